@@ -57,6 +57,7 @@ TESTED_BY = {
     "kernels/association": ("kernels", "association"),
     "kernels/lens.py": ("kernels", "geometry"),
     "kernels": ("kernels", "filters"),
+    "sequences": ("sequences", "bad_input/test_table.py"),
     "boxes.py": ("geometry",),
     "camera.py": ("geometry",),
     "assignment.py": ("geometry", "association"),
@@ -67,7 +68,7 @@ NOT_DRAWN = (
     "kernels/compilation.py",  # does nothing where kernels are not compiled
     "kernels/checked_cache.py",
 )
-NOT_RUN = ("test_compilation.py", "test_checked_cache.py", "test_robustness.py", "test_shape.py")
+NOT_RUN = ("test_compilation.py", "test_checked_cache.py", "test_robustness.py")
 """Tests of compiled kernels alone, and of many or large pictures, which take long interpreted."""
 
 SORTS = ("bound", "sign", "off by one", "factor", "swapped", "and/or", "negated")

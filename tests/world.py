@@ -77,16 +77,39 @@ def look_at(
     focal: float = 620.0,
     image_size: tuple[int, int] = (1280, 800),
     distortion: ndarray = PINHOLE,
+    aspect: float = 1.0,
+    shift: tuple[float, float] = (0.0, 0.0),
 ) -> Camera:
-    """A camera at ``position``, metres, that looks at ``target``; ``focal`` is in pixels."""
+    """A camera at ``position``, metres, that looks at ``target``.
+
+    Args:
+        name: Of the camera.
+        position: World metres.
+        target: World metres.
+        focal: Pixels across; down it is ``aspect`` times as much.
+        image_size: Width and height, pixels.
+        distortion: Of the lens.
+        aspect: Width of a pixel in its heights.
+        shift: Pixels from the middle of the picture to the optical axis.
+    """
     ahead = np.subtract(target, position)
     ahead = ahead / np.linalg.norm(ahead)
     right = np.cross(ahead, [0.0, 0.0, 1.0])
     right /= np.linalg.norm(right)
     rotation = np.stack([right, np.cross(ahead, right), ahead])
     width, height = image_size
-    intrinsics = np.array([[focal, 0, (width - 1) / 2], [0, focal, (height - 1) / 2], [0, 0, 1]])
+    x, y = (width - 1) / 2 + shift[0], (height - 1) / 2 + shift[1]
+    intrinsics = np.array([[focal, 0, x], [0, aspect * focal, y], [0, 0, 1]])
     return Camera(name, image_size, intrinsics, rotation, -rotation @ position, distortion)
+
+
+def surveillance(
+    name: str, position: Many[float], target: Many[float] = (0.0, 0.0, 1.0), **changes: Any
+) -> Camera:
+    """A cheap camera: a bent lens, uneven pixels, an optical axis beside the picture's middle."""
+    numbers: dict[str, Any] = {"focal": 390.0, "image_size": (360, 288), "distortion": BARREL,
+                               "aspect": 1.08, "shift": (-1.3, 2.5)}  # fmt: skip
+    return look_at(name, position, target, **(numbers | changes))
 
 
 def ring(
@@ -117,6 +140,15 @@ def volume(
     """A square room around the origin, its floor at z = 0; entrances are points in metres."""
     doors = tuple(Entrance(np.array(place), np.array(sigma)) for place in entrances)
     return Room(np.array([-half, -half, 0.0]), np.array([half, half, height]), doors)
+
+
+SMALL_CAMERAS = (
+    surveillance("left", (-3.4, -3.2, 2.6)),
+    surveillance("right", (3.3, -3.1, 2.4)),
+    surveillance("back", (0.4, 4.4, 2.7)),
+)
+SMALL_ROOM = volume(1.5, 2.0, [(-1.2, 0.0, 1.0), (1.2, 0.0, 1.0)], (0.25, 0.25, 0.15))
+"""What they see; people come in on both sides."""
 
 
 # ── people

@@ -8,52 +8,17 @@ from pathlib import Path
 import numpy as np
 from numpy import ndarray
 
+from tests.world import HEAD as HALF_EXTENTS
+from tests.world import SMALL_CAMERAS as CAMERAS
+from tests.world import SMALL_ROOM as ROOM
+from tests.world import surveillance as look_at
 from tracker.camera import Camera
 from tracker.filters.gaussian_mixture import GaussianMixture
-from tracker.sequences.sequence import Detections, Entrance, GroundTruth, Room, Sequence, View
+from tracker.sequences.sequence import Detections, GroundTruth, Room, Sequence, View
 from tracker.single_view.protocol import ViewResult
 
-HALF_EXTENTS = np.array([0.09, 0.09, 0.12])
-"""A head: so small that the middle of its box is the picture of its middle."""
-
-BARREL = np.array([-0.29, 0.01, 0.004, -0.004, 0.0])
-"""The lens of a cheap surveillance camera: corners are drawn a good tenth too near."""
-
-ENTRANCES = (
-    Entrance(np.array([-1.2, 0.0, 1.0]), np.array([0.25, 0.25, 0.15])),
-    Entrance(np.array([1.2, 0.0, 1.0]), np.array([0.25, 0.25, 0.15])),
-)
-
-ROOM = Room(np.array([-1.5, -1.5, 0.0]), np.array([1.5, 1.5, 2.0]), ENTRANCES)
-
-
-def look_at(
-    name: str,
-    position: Many[float],
-    target: Many[float] = (0.0, 0.0, 1.0),
-    *,
-    focal: float = 390.0,
-    image_size: tuple[int, int] = (360, 288),
-    distortion: ndarray = BARREL,
-) -> Camera:
-    """A camera at ``position`` that looks at ``target``, its picture upright."""
-    ahead = np.subtract(target, position)
-    ahead = ahead / np.linalg.norm(ahead)
-    right = np.cross(ahead, [0.0, 0.0, 1.0])
-    right /= np.linalg.norm(right)
-    rotation = np.stack([right, np.cross(ahead, right), ahead])
-    width, height = image_size
-    intrinsics = np.array(
-        [[focal, 0, width / 2 - 1.8], [0, 1.08 * focal, height / 2 + 2], [0, 0, 1]]
-    )
-    return Camera(name, image_size, intrinsics, rotation, -rotation @ position, distortion)
-
-
-CAMERAS = (
-    look_at("left", (-3.4, -3.2, 2.6)),
-    look_at("right", (3.3, -3.1, 2.4)),
-    look_at("back", (0.4, 4.4, 2.7)),
-)
+__all__ = ["CAMERAS", "HALF_EXTENTS", "ROOM", "crossing", "look_at", "observe", "people",
+           "sequence", "views_at", "walk"]  # fmt: skip
 
 
 def walk(start: Many[float], end: Many[float], steps: int, *, sway: float = 0.0) -> ndarray:

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy import ndarray
 
-from tests.engine.rooms import SKIN, clip, empty_room, person_mask, photograph, with_person
+from tests.pictures.furnished import SKIN, clip, empty_room, person_mask, photograph, with_person
 from tracker.kernels.pictures.foreground import above
 from tracker.parameters import ForegroundParams
 from tracker.pictures.foreground import AdaptiveForeground, first_background
@@ -70,14 +70,6 @@ def test_the_background_follows_a_slow_change_of_light(parameters: ForegroundPar
     assert found.mask[:, :50].mean() < 0.002
 
 
-def test_with_its_background_left_as_it_was_the_room_becomes_foreground() -> None:
-    still = PUBLISHED.model_copy(update={"update_rate": 0.0})
-    gains = np.linspace(1.0, 0.81, 160)
-    pictures = [photograph(empty_room(), gain, seed=k) for k, gain in enumerate(gains)]
-    assert max(mask.mean() for mask in run(prepared(still), pictures)[1]) > 0.05
-    assert max(mask.mean() for mask in run(prepared(PUBLISHED), pictures)[1]) < 0.05
-
-
 def test_a_sudden_change_of_light_is_met_by_the_exposure_alone() -> None:
     pictures = [photograph(with_person(empty_room(), 70), gain, seed=5) for gain in (1.0, 0.75)]
     away = ~cv2.dilate(person_mask(70).astype(np.uint8), np.ones((5, 5))).astype(bool)
@@ -107,13 +99,6 @@ def test_a_black_or_white_frame_has_no_foreground_and_teaches_nothing(
     np.testing.assert_array_equal(state.background, model.start().background)
     _, found = model.step(state, photograph(with_person(empty_room(), 70), seed=9))
     assert found.mask[person_mask(70)].mean() > 0.7
-
-
-@both
-def test_a_frozen_camera_has_no_foreground(parameters: ForegroundParams) -> None:
-    picture = clip(np.ones(1))[0]
-    _, masks = run(over([picture] * 5, parameters), [picture] * 5)
-    assert not np.any(masks)
 
 
 @both

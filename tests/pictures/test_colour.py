@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy import ndarray
+from numpy.testing import assert_allclose
 
 from tracker.pictures import colour
 from tracker.pictures.colour import BINS, ColourModel, ColourSpaceName, KernelName
@@ -186,3 +187,30 @@ def test_what_is_grey_or_dark_has_no_hue_in_hsi(level: int, green: int, red: int
     mean = np.mean((pixel >> 3) * 8.0 + 3.5)
     if level > 90 or level < 25:
         assert colour.bin_map(pixel, "hsi")[0, 0] == 256 + int(mean // 32)
+
+
+def test_hsi_bins_are_the_formula_of_five_bits_a_channel() -> None:
+    rng = np.random.default_rng(9)
+    picture = rng.integers(0, 256, (60, 60, 3), dtype=np.uint8)
+    picture[:20] = picture[:20, :, :1] + rng.integers(0, 30, (20, 60, 3))  # little colour
+    blue, green, red = np.moveaxis((picture >> 3) * 8.0 + 3.5, 2, 0)
+    # the same angle as that of the cosine, by its sine as well
+    hue = np.arctan2(np.sqrt(3.0) * (green - blue), 2.0 * red - green - blue) % (2.0 * np.pi)
+    intensity = (red + green + blue) / 3.0
+    saturation = 1.0 - np.minimum(np.minimum(red, green), blue) / intensity
+    cut = [np.minimum(hue / (2.0 * np.pi) * 16.0, 15), np.minimum(saturation * 4.0, 3),
+           np.minimum(intensity / 64.0, 3)]  # fmt: skip
+    coloured = (np.floor(cut) * np.array([16, 4, 1])[:, None, None]).sum(axis=0)
+    has_hue = (saturation * 255.0 >= 40) & (intensity >= 40)
+    expected = np.where(has_hue, coloured, 256 + intensity // 32)
+    assert 0.1 < has_hue.mean() < 0.9
+    # at a bin's edge rounding decides
+    assert (colour.bin_map(picture, "hsi") == expected).mean() > 0.995
+
+
+def test_the_likelihood_is_the_normal_density() -> None:
+    found = colour.likelihood(np.array([0.0, 0.2, 0.4]), 0.2)
+    assert_allclose(found, np.exp([0.0, -0.5, -2.0]) / (0.2 * np.sqrt(2.0 * np.pi)))
+    assert colour.distance(np.array([0.5, 0.5]), np.array([1.0, 0.0])) == pytest.approx(
+        np.sqrt(1.0 - np.sqrt(0.5))
+    )

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 from numpy import ndarray
 
-from tests.engine.rooms import SKIN, clip, empty_room, person_mask, photograph, with_person
+from tests.pictures.furnished import SKIN, clip, empty_room, person_mask, photograph, with_person
 from tracker.kernels.pictures import images
 from tracker.parameters import ForegroundParams
 from tracker.pictures import foreground
@@ -66,19 +66,6 @@ def test_a_tone_curve_ignores_a_person_over_a_third_of_the_picture() -> None:
     target[:32] = (30, 60, 170)
     mapped = cv2.LUT(source, tone_curve(source, target))
     assert np.median(np.abs(mapped.astype(int) - source)) <= 5.0
-
-
-@pytest.mark.parametrize("level", [0, 255])
-def test_a_black_or_white_frame_has_no_foreground(level: int) -> None:
-    model = learnt(np.ones(9))
-    assert model.foreground(np.full((96, 128, 3), level, dtype=np.uint8), PLAIN).mean() < 0.01
-
-
-def test_a_frozen_camera_has_no_foreground() -> None:
-    picture = clip(np.ones(1))[0]
-    model = BackgroundModel.learn([picture] * 5)
-    assert model is not None
-    assert not model.foreground(picture, PLAIN).any()
 
 
 def test_no_pictures_give_no_model() -> None:

@@ -2,85 +2,99 @@
 
 from __future__ import annotations
 
-import cv2
 import numpy as np
 import pytest
 from numpy import ndarray
+from numpy.testing import assert_array_equal
 
-from tests.engine.rooms import SKIN, clip, empty_room, photograph
 from tracker.parameters import ForegroundParams
-from tracker.pictures.foreground import BackgroundModel, MovingForeground
-
-SECONDS = 0.04
+from tracker.pictures.foreground import BackgroundModel, MovingForeground, spread_steps
 
 
-def exercising(steps: int) -> list[ndarray]:
-    """Somebody stays in one place all the time and bends from side to side."""
-    pictures = []
-    for step in range(steps):
-        room = empty_room()
-        lean = round(14 * np.sin(step / 4.0))
-        cv2.line(room, (64, 90), (64 + lean, 50), SKIN, 15)
-        pictures.append(photograph(room, seed=step))
-    return pictures
+def plain(level: int = 100) -> ndarray:
+    return np.full((60, 80, 3), level, dtype=np.uint8)
 
 
-def where(step: int) -> ndarray:
-    blank = np.zeros(empty_room().shape)
-    cv2.line(blank, (64, 90), (64 + round(14 * np.sin(step / 4.0)), 50), SKIN, 15)
-    return blank.any(axis=2)
+def model(restlessness: float) -> BackgroundModel:
+    return BackgroundModel(plain(), np.zeros((60, 80), dtype=np.uint8), restlessness)
 
 
-def learnt(pictures: list[ndarray]) -> BackgroundModel:
-    model = BackgroundModel.learn(pictures)
-    assert model is not None
-    return model
+def test_doubt_rises_smoothly_with_the_restlessness() -> None:
+    p = ForegroundParams(restless_from=0.2, restless_to=0.6)
+    found = [model(r).doubt(p) for r in (0.0, 0.2, 0.3, 0.4, 0.5, 0.6, 1.0)]
+    np.testing.assert_allclose(found, [0.0, 0.0, 0.15625, 0.5, 0.84375, 1.0, 1.0])
 
 
-def test_who_passes_by_leaves_no_doubt_and_who_stays_does() -> None:
-    parameters = ForegroundParams()
-    passing = learnt(clip(np.ones(25)))
-    assert passing.doubt(parameters) == 0.0
-    staying = learnt(exercising(32))
-    assert staying.doubt(parameters) > 0.5
+def test_restless_are_pixels_that_are_away_in_more_than_three_of_ten_pictures() -> None:
+    # of patches of 40 pixels that show something else in so many of ten pictures
+    pictures = [plain() for _ in range(10)]
+    for row, count in enumerate((1, 2, 3, 4)):
+        for k in range(count):
+            pictures[(2 * k + row) % 10][10 * row : 10 * row + 4, 20:30] = 170
+    learnt = BackgroundModel.learn(pictures)
+    assert learnt is not None
+    assert learnt.restlessness == pytest.approx(1 / 3)
+    # a single pixel of thousands says nothing
+    few = [plain() for _ in range(10)]
+    for k in range(5):
+        few[2 * k][30, 40] = 170
+    learnt = BackgroundModel.learn(few)
+    assert learnt is not None
+    assert learnt.restlessness == 0.0
 
 
-def test_an_empty_room_leaves_no_doubt() -> None:
-    model = learnt([photograph(empty_room(), seed=k) for k in range(20)])
-    assert model.restlessness == 0.0
+@pytest.mark.parametrize(
+    ("memory", "restlessness", "time", "lasting"),
+    [(0.4, 1.0, 0.1, 4), (0.4, 0.5, 0.1, 2), (0.5, 1.0, 0.1, 5), (4.0, 1.0, 0.01, 254)],
+)
+def test_a_change_counts_for_the_length_of_the_memory(
+    memory: float, restlessness: float, time: float, lasting: int
+) -> None:
+    p = ForegroundParams(motion_memory=memory, restless_from=0.0, restless_to=1.0, threshold=128.0)
+    moving = MovingForeground(model(restlessness), p, time)
+    assert moving.memory == lasting
+    if lasting > 10:
+        return
+    state, seen = moving.start(), []
+    for step in range(9):
+        picture = plain()
+        picture[20:40, 30:50] = 100 if step < 2 else 190
+        state, found = moving.step(state, picture)
+        assert set(np.unique(found.mask)) <= {0, 1}
+        seen.append(bool(found.mask[25:35, 35:45].all()))
+        assert not found.mask[:, :20].any()
+        assert_array_equal(found.thresholds, 128.0)
+    # from the step of the change on
+    assert seen == [2 <= step < 2 + lasting for step in range(9)]
 
 
-@pytest.mark.parametrize("memory", [0.4, 0.8])
-def test_what_moved_lately_is_foreground(memory: float) -> None:
-    pictures = exercising(32)
-    background = learnt(pictures)
-    parameters = ForegroundParams(motion_memory=memory)
-    model = MovingForeground(background, parameters, SECONDS)
-    state = model.start()
-    inside, plain, outside = [], [], []
-    for step, picture in enumerate(pictures):
-        state, found = model.step(state, picture)
-        alone = background.foreground(picture, parameters)
-        assert (found.mask >= alone).all()
-        if step > 20:
-            upper = where(step)
-            upper[70:] = False  # the legs hardly move
-            inside.append(found.mask[upper].mean())
-            plain.append(alone[upper].mean())
-            outside.append(found.mask[:, :30].mean())
-    assert np.mean(inside) > 0.75
-    assert np.mean(inside) > np.mean(plain) + 0.2
-    assert np.max(outside) < 0.02
-
-
-def test_a_light_that_is_switched_is_nobody() -> None:
-    room = empty_room()
-    background = learnt(exercising(32))
-    model = MovingForeground(background, ForegroundParams(), SECONDS)
-    state = model.start()
+def test_pictures_are_compared_over_a_tenth_of_a_second() -> None:
+    p = ForegroundParams(restless_from=0.0, restless_to=0.5, threshold=128.0, motion_memory=0.05)
+    moving = MovingForeground(model(1.0), p, 0.05)
+    state, seen = moving.start(), []
     for step in range(6):
-        state, _ = model.step(state, photograph(room, seed=step))
-    for step in range(6):
-        state, _ = model.step(state, photograph(room, gain=1.6, seed=50 + step))
-    assert state.since is not None
-    assert (state.since[:, :30] <= 5).mean() < 0.02
+        picture = plain()
+        picture[20:40, 30:50] = 100 if step < 2 else 190
+        state, found = moving.step(state, picture)
+        seen.append(bool(found.mask[25:35, 35:45].all()))
+    assert len(state.before) == 2
+    assert seen == [False, False, True, True, False, False]  # against two pictures ago
+
+
+def test_a_change_of_more_than_half_of_the_picture_is_none() -> None:
+    p = ForegroundParams(restless_from=0.0, restless_to=0.5, threshold=128.0, motion_memory=0.3)
+    for rows, moved in ((27, True), (33, False)):
+        moving = MovingForeground(model(1.0), p, 0.1)
+        state, _ = moving.step(moving.start(), plain())
+        picture = plain()
+        picture[:rows] = 190
+        _, found = moving.step(state, picture)
+        assert found.mask.any() == moved
+
+
+def test_a_background_is_learnt_from_steps_all_over_the_clip() -> None:
+    assert spread_steps(range(5)) == [0, 1, 2, 3, 4]
+    assert spread_steps(range(3, 4)) == [3]
+    many = spread_steps(range(10, 1000))
+    assert (len(many), many[0], many[-1]) == (32, 10, 999)
+    assert set(np.diff(many)) <= {31, 32}

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.synthetic import camera_toml, head_toml, number_in, write_lines, write_sequence
-from tracker.sequences.clock import Clock, Timing
+from tests.synthetic import number_in, write_lines, write_sequence
+from tracker.sequences.clock import Timing
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.reader import read_sequence, read_summary
 from tracker.sequences.sequence import SequenceError
@@ -39,16 +39,6 @@ def test_a_step_shows_the_nearest_frame_and_a_frame_belongs_to_one_step(
         assert (shown[begun] >= 0).all()
 
 
-def test_without_a_clock_frames_are_steps() -> None:
-    assert Timing(7).clock(25.0, 100) is None
-
-
-def test_frames_outside_and_gaps_belong_to_no_step() -> None:
-    clock = Clock.of_times(np.array([-1.0, 0.0, 0.11, np.nan, 0.5]), 10.0, 4)
-    assert clock.frame_of_step.tolist() == [1, 2, -1, -1]
-    assert clock.steps_of(np.array([-1, 0, 1, 2, 3, 4, 9])).tolist() == [-1, -1, 0, 1, -1, -1, -1]
-
-
 def edited(folder: Path, old: str, new: str) -> Path:
     """The folder with some text of its file replaced."""
     text = (folder / "sequence.toml").read_text(encoding="utf-8")
@@ -75,15 +65,6 @@ def test_a_late_camera_shows_and_detects_what_it_took_then(tmp_path: Path) -> No
     assert any("from step 17 on it has no picture" in said for said in sequence.warnings)
 
 
-def test_a_slow_camera_has_no_frame_at_most_steps(tmp_path: Path) -> None:
-    folder = write_sequence(tmp_path / "room", frames=20, detections=True, container=None)
-    edited(folder, 'detections = "cam2.csv"', 'detections = "cam2.csv"\nfps = 5')
-    view = read_sequence(folder).views[1]
-    assert view.detections is not None
-    assert np.unique(view.detections.frames).tolist() == [0, 5, 10, 15]
-    assert [view.was_looked_at(step) for step in range(7)] == [1, 0, 0, 0, 0, 1, 0]
-
-
 def test_time_stamps_in_the_layout_of_caliscope(tmp_path: Path) -> None:
     folder = write_sequence(tmp_path / "room", frames=10, container="images", templates=False)
     rows = [f"{k},1,{k},{100.0 + k / 25:.4f}" for k in range(10)]
@@ -100,30 +81,6 @@ def test_time_stamps_in_the_layout_of_caliscope(tmp_path: Path) -> None:
         read_sequence(folder)
 
 
-def test_rows_without_a_box_say_that_nobody_was_seen(tmp_path: Path) -> None:
-    folder = write_sequence(tmp_path / "room", frames=8, container=None, detections=True)
-    rows = ["0,20,30,24,48,0.9", "3,,,,,", "5,25,30,24,48,0.9"]
-    write_lines(folder / "cam1.csv", "frame,left,top,width,height,score", rows)
-    assert read_sequence(folder).views[0].looked_at is None
-    edited(folder, 'detections = "cam1.csv"', 'detections = "cam1.csv"\ndetected_steps = "listed"')
-    view = read_sequence(folder).views[0]
-    assert view.detections is not None
-    assert view.detections.frames.tolist() == [0, 5]
-    assert [step for step in range(8) if view.was_looked_at(step)] == [0, 3, 5]
-
-
-def test_boxes_counted_from_one_are_told_and_put_right(tmp_path: Path) -> None:
-    folder = write_sequence(tmp_path / "room", frames=8, container=None, detections=True)
-    rows = [f"{k},20,30,24,48,0.9" for k in range(1, 9)]
-    write_lines(folder / "cam1.csv", "frame,left,top,width,height,score", rows)
-    with pytest.raises(SequenceError, match="counted from 1; write detections_first_frame = 1"):
-        read_sequence(folder)
-    edited(folder, 'detections = "cam1.csv"', 'detections = "cam1.csv"\ndetections_first_frame = 1')
-    own = read_sequence(folder).views[0].detections
-    assert own is not None
-    assert own.frames.tolist() == list(range(8))
-
-
 def test_what_the_videos_know_need_not_be_stated(tmp_path: Path) -> None:
     folder = write_sequence(tmp_path / "room", frames=30, first_frame=4)
     full = read_sequence(folder)
@@ -135,22 +92,6 @@ def test_what_the_videos_know_need_not_be_stated(tmp_path: Path) -> None:
     assert any(said.startswith("fps is not stated: 25") for said in sequence.warnings)
     summary = read_summary(folder)
     assert (summary.fps, summary.frames) == (None, None)
-
-
-def test_everything_that_is_missing_is_told_at_once(tmp_path: Path) -> None:
-    folder = tmp_path / "room"
-    folder.mkdir()
-    text = head_toml(8) + camera_toml("cam1") + camera_toml("cam2")
-    for line in ('name = "numbers"\n', "fps = 25.0\n", "frames = 8\n"):
-        text = text.replace(line, "")
-    text = "\n".join(line for line in text.split("\n") if not line.startswith("t = "))
-    (folder / "sequence.toml").write_text(text, encoding="utf-8")
-    with pytest.raises(SequenceError) as caught:
-        read_sequence(folder)
-    assert str(caught.value) == (
-        "room/sequence.toml: these are missing and cannot be found out: name; fps (steps a "
-        'second); frames (the number of steps); t of camera "cam1"; t of camera "cam2"'
-    )
 
 
 def test_room_and_target_are_found_where_views_overlap(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 import pytest
 
-from tests.engine.rooms import empty_room, person_mask, photograph, with_person
+from tests.pictures.furnished import empty_room, person_mask, photograph, with_person
 from tests.synthetic import camera_toml, head_toml, write_sequence
 from tracker.library import bundle
 from tracker.parameters import ForegroundParams, RunParameters
@@ -119,9 +119,6 @@ def test_the_picture_is_reduced_as_the_others_are(tmp_path: Path) -> None:
         ('background = "none.png"', 'there is no file "none.png" in the sequence folder'),
         ('background = "sequence.toml"', '"sequence.toml" cannot be read as a picture ('),
         ('background = "small.png"', "background 4×4 does not match calibration 128×96"),
-        ("background = [0, 12]", "whole numbers from 0 to 11, found 0 and 12"),
-        ("background = [3, 1]", "whole numbers from 0 to 11, found 3 and 1"),
-        ("background = [1.5, 3]", "whole numbers from 0 to 11, found 1.5 and 3"),
         ("background = [3]", "expected 2 numbers"),
         (
             "background = 3",

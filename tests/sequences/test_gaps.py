@@ -8,7 +8,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from app.command import main as cli
@@ -173,17 +172,3 @@ def test_which_names_are_a_row(names: list[str], row: list[str] | None) -> None:
     found, there = whole_row([Path(name) for name in names])
     assert [path.as_posix() for path in found] == (row or names)
     assert [path.as_posix() for path, has in zip(found, there, strict=True) if has] == names
-
-
-def test_the_steps_that_are_expected_follow_the_clock() -> None:
-    from tests.engine.synthetic import CAMERAS
-    from tracker.sequences.clock import Timing
-    from tracker.sequences.sequence import View
-
-    there = np.array([True, True, False, True])
-    plain = View(CAMERAS[0], Path("v.avi"), first_frame=1, there=there)
-    assert plain.asked_for(5).all()
-    assert plain.expected(5).tolist() == [True, False, True, False, False]
-    half = View(CAMERAS[0], Path("v.avi"), clock=Timing(fps=5.0).clock(10.0, 6), there=there)
-    assert half.asked_for(6).tolist() == [True, False, True, False, True, False]
-    assert half.expected(6).tolist() == [True, False, True, False, False, False]

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from tests.synthetic import camera_toml, head_toml, write_lines, write_sequence, write_video
+from tests.synthetic import camera_toml, head_toml, write_sequence, write_video
 from tracker.sequences.reader import read_sequence, read_summary
 from tracker.sequences.sequence import SequenceError
 
@@ -91,58 +89,6 @@ def test_summary_needs_no_videos(folder: Path) -> None:
     assert (summary.name, summary.frames, summary.cameras) == ("numbers", 8, 2)
 
 
-def test_calibration_by_projection_is_the_same_camera(folder: Path) -> None:
-    camera = read_sequence(folder).cameras[0]
-    pose = np.column_stack([camera.rotation, camera.translation])
-    text = (folder / "sequence.toml").read_text(encoding="utf-8")
-    projection = f"projection = {(-2.5 * camera.intrinsics @ pose).tolist()}"  # any scale, any sign
-    text = re.sub(r"K = .*\nR = .*\nt = .*", projection, text, count=1)
-    (folder / "sequence.toml").write_text(text, encoding="utf-8")
-    split = read_sequence(folder).cameras[0]
-    points = np.array([[0.3, -0.4, 0.9], [-1.0, 1.0, 0.1]])
-    np.testing.assert_allclose(split.project(points)[0], camera.project(points)[0], atol=1e-9)
-    np.testing.assert_allclose(split.rotation, camera.rotation, atol=1e-12)
-
-
-@pytest.mark.parametrize(
-    "coefficients", [[], [-0.3, 0.1, 0.001, 0.002], [-0.3, 0.1, 0.0, 0.0, 0.2]]
-)
-def test_distortion_is_filled_up_with_zeros(folder: Path, coefficients: list[float]) -> None:
-    edit(folder, "K = ", f"distortion = {coefficients}\nK = ")
-    expected = coefficients + [0.0] * (5 - len(coefficients))
-    assert read_sequence(folder).cameras[0].distortion.tolist() == expected
-
-
-def test_rows_are_sorted_and_scores_may_be_missing(folder: Path) -> None:
-    write_lines(
-        folder / "cam1.csv", "width,frame,left,top,height,note", ["9,5,1,2,8,7", "", "7,0,3,4,6,7"]
-    )
-    write_lines(folder / "ground_truth.csv", "frame,id,x,y,z", ["3,2,0,0,1", "3,1,1,0,1"])
-    sequence = read_sequence(folder)
-    detections, truth = sequence.views[0].detections, sequence.ground_truth
-    assert detections is not None
-    assert truth is not None
-    assert detections.frames.tolist() == [0, 5]
-    assert detections.boxes.tolist() == [[3.0, 4.0, 7.0, 6.0], [1.0, 2.0, 9.0, 8.0]]
-    assert detections.scores.tolist() == [1.0, 1.0]
-    assert truth.ids.tolist() == [1, 2]
-    assert truth.valid.all()
-    assert detections.boxes[detections.at(5)].tolist() == [[1.0, 2.0, 9.0, 8.0]]
-    assert len(detections.boxes[detections.at(4)]) == 0
-
-
-@pytest.mark.parametrize("line_end", ["\n", "\r\n"])
-def test_a_table_may_have_no_rows_or_windows_lines(folder: Path, line_end: str) -> None:
-    header = "\ufeffframe,left,top,width,height,score"
-    (folder / "cam1.csv").write_bytes(line_end.join([header, ""]).encode())
-    (folder / "cam2.csv").write_bytes(line_end.join([header, '"1", 2,3,4,5,0.5', ""]).encode())
-    views = read_sequence(folder).views
-    assert views[0].detections is not None
-    assert views[0].detections.boxes.shape == (0, 4)
-    assert views[1].detections is not None
-    assert views[1].detections.boxes.tolist() == [[2.0, 3.0, 4.0, 5.0]]
-
-
 def test_the_digest_follows_every_file(folder: Path) -> None:
     digests = [read_sequence(folder).digest]
     for name in ("cam1.mp4", "cam2.csv", "ground_truth.csv"):
@@ -221,16 +167,6 @@ def test_a_short_video_opens_with_a_warning(folder: Path) -> None:
         "steps 6 to 7 have no picture",
         'camera "cam2": the video has too few: expected 8 frames from frame 1 on, found 7; '
         "step 7 has no picture",
-    )
-
-
-def test_images_without_leading_zeros_are_warned_of(tmp_path: Path) -> None:
-    folder = write_sequence(tmp_path / "room", frames=12, cameras=1, container="images")
-    for number in range(12):
-        (folder / "cam1" / f"{number:05d}.jpg").rename(folder / "cam1" / f"{number}.jpg")
-    assert read_sequence(folder).warnings == (
-        'camera "cam1": images are taken in the order of their names, so "10.jpg" comes before '
-        '"2.jpg"; write the numbers with leading zeros',
     )
 
 

@@ -12,6 +12,7 @@ from numpy.testing import assert_allclose
 
 from tests import world
 from tests.single_view.conftest import COLOURS
+from tests.single_view.test_scenes import stays
 from tracker.boxes import Boxes
 from tracker.parameters import ForegroundParams
 from tracker.pictures.foreground import learn
@@ -61,8 +62,11 @@ def carried_by(sequence: Sequence) -> dict[str, Template]:
     return {template.name: template for template in carried.templates[len(sequence.templates) :]}
 
 
-def test_a_template_is_carried_to_where_the_other_camera_has_the_person(two: Sequence) -> None:
+def test_a_template_is_carried_to_where_the_other_camera_has_the_person(
+    two: Sequence, request: pytest.FixtureRequest
+) -> None:
     carried = carried_by(two)
+    stays("carried", [carried[name].box.tolist() for name in ("walks", "sits")], request)
     assert set(carried) == {"walks", "sits"}
     exact = world.upright(CAMERAS[1], PATHS[TAUGHT], world.HEAD)
     for name, box in zip(("walks", "sits"), exact, strict=True):

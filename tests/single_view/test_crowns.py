@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from numpy import ndarray
 
-from tests.engine.synthetic import CAMERAS, ROOM
+from tests.world import SMALL_CAMERAS as CAMERAS
+from tests.world import SMALL_ROOM as ROOM
 from tracker.parameters import JpdaParams
 from tracker.sequences.sequence import Room
 from tracker.single_view.box_sizes import upright_boxes
@@ -86,19 +87,3 @@ def test_an_empty_mask_and_a_full_one_show_nobody(sizes: TargetSizes, filled: bo
     found = crowns(mask, sizes, 40, NUMBERS)
     assert found.boxes.shape == (0, 4)
     assert found.pieces.shape == (0, 4)
-
-
-def test_single_pixels_raise_nothing(sizes: TargetSizes) -> None:
-    mask = np.zeros(CAMERA.image_size[::-1], dtype=np.uint8)
-    mask[::9, ::7] = 1
-    assert np.isfinite(crowns(mask, sizes, 1, NUMBERS).boxes).all()
-    assert len(crowns(mask, sizes, 40, NUMBERS).boxes) == 0
-
-
-def test_a_camera_that_sees_nothing_of_the_room_finds_nobody() -> None:
-    away = Room(np.array([50.0, 50.0, 0.0]), np.array([51.0, 51.0, 2.0]))
-    mask, _ = standing((0.0, 0.0))
-    assert (
-        len(crowns(mask, TargetSizes(CAMERA, away, HALF, NUMBERS.height_sigmas), 40, NUMBERS).boxes)
-        == 0
-    )

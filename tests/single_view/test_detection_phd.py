@@ -8,7 +8,7 @@ from numpy import ndarray
 from numpy.testing import assert_allclose, assert_array_equal
 
 from tests import world
-from tests.single_view.detected import ANYWHERE, CAMERA, detected, normal, run
+from tests.single_view.detected import ANYWHERE, CAMERA, detected, normal
 from tracker import single_view
 from tracker.filters.gaussian_mixture import GaussianMixture, gate_distance
 from tracker.parameters import RunParameters, with_values
@@ -120,22 +120,6 @@ def test_estimates_go_on_where_asked_as_sure_as_the_filter() -> None:
     for box, sigma in zip(result.boxes, result.sigmas, strict=True):
         row = np.flatnonzero((after.mixture.means == box).all(axis=1))[0]
         assert_allclose(sigma**2, np.diagonal(after.mixture.covariances[row]))
-
-
-def test_two_people_keep_a_label_each_among_misses_and_clutter() -> None:
-    rng = np.random.default_rng(2)
-    walks = [world.walk([(-1.0, -1.0), (0.5, 1.0)], [0, 6], FPS), world.stand([1.0, -1.2], 60)]
-    paths = world.together(*walks)
-    seen = world.boxes((CAMERA,), paths, 1.0, rng, misses=0.1, clutter=0.5)[0]
-    steps = [seen.boxes[seen.frames == step] for step in range(60)]
-    labels: list[set[int]] = [set(), set()]
-    for step, result in enumerate(run("detection_phd", detected(steps, fps=FPS))):
-        for person, box in enumerate(world.upright(CAMERA, paths[step])):
-            apart = np.abs(result.estimates[:, :2] - box[:2]).max(axis=1)
-            if step > 5 and len(apart) and apart.min() < 8.0:
-                labels[person].add(int(result.estimate_labels[apart.argmin()]))
-    assert [len(names) for names in labels] == [1, 1]
-    assert labels[0] != labels[1]
 
 
 def test_without_detections_the_methods_say_what_to_do() -> None:

@@ -81,31 +81,6 @@ def test_the_best_hypothesis_is_the_best_of_all(modes: int, columns: int, seed: 
     assert sum(logs[m, c] for m, c in enumerate(found)) == pytest.approx(max(totals))
 
 
-def test_those_who_look_alike_are_told_apart_by_where_they_are() -> None:
-    expected = targets([LEFT, RIGHT], [0, 0])
-    modes = np.array([[87.0, 60.0, 10.0, 14.0], [52.0, 62.0, 10.0, 14.0]])
-    distances = np.full((2, 1), LIKELY)
-    found = best_hypothesis(matrix(modes, distances, expected, np.zeros(0, dtype=int)))
-    np.testing.assert_array_equal(found, [1, 0])
-
-
-def test_those_in_one_place_are_told_apart_by_their_colours() -> None:
-    expected = targets([LEFT, LEFT], [0, 1])
-    modes = np.array([LEFT, LEFT])
-    distances = np.array([[0.45, LIKELY], [LIKELY, 0.45]])
-    found = best_hypothesis(matrix(modes, distances, expected, np.zeros(0, dtype=int)))
-    np.testing.assert_array_equal(found, [1, 0])
-
-
-def test_what_looks_like_nobody_is_background_but_a_target_may_look_worse_for_a_while() -> None:
-    expected, vacant = targets([LEFT], [0]), np.array([1])
-    modes = np.array([LEFT, RIGHT, RIGHT])
-    for distance, columns in ((0.3, [0, 1, 2]), (0.6, [0, 2, 2]), (UNLIKELY, [2, 2, 2])):
-        distances = np.array([[distance, 1.0], [1.0, distance], [1.0, 1.0]])
-        found = best_hypothesis(matrix(modes, distances, expected, vacant))
-        np.testing.assert_array_equal(found, columns)
-
-
 def test_the_probability_of_somebody() -> None:
     logs = np.log(np.array([[0.2, 0.3, 0.5], [1e-300, 1e-300, 1.0]]))
     np.testing.assert_allclose(somebody(logs), [0.5, 0.0], atol=1e-12)
@@ -190,32 +165,6 @@ def test_somebody_comes_goes_and_returns() -> None:
     assert len(story.tracks.departed.labels) == 0
 
 
-def test_nobody_is_remembered_for_ever() -> None:
-    story = Story(memory=4, confirmation=1, patience=0)
-    assert story.step((50.0, 0)) == [event("new", 1)]
-    assert story.step() == [event("vanished", 1)]
-    for _ in range(5):
-        story.step()
-    assert story.step((50.0, 0)) == [event("new", 2)]
-
-
-def test_of_two_alike_who_vanished_the_last_returns_first() -> None:
-    story = Story(confirmation=1, patience=0)
-    assert story.step((50.0, 0), (120.0, 0)) == [event("new", 1), event("new", 2)]
-    assert story.step((120.0, 0)) == [event("vanished", 1)]
-    assert story.step() == [event("vanished", 2)]
-    assert story.step((50.0, 0)) == [event("returned", 2)]
-    assert story.step((50.0, 0), (120.0, 0)) == [event("returned", 1)]
-
-
-def test_what_is_seen_once_is_forgotten_without_an_event() -> None:
-    story = Story(confirmation=3)
-    assert story.step((50.0, 0)) == []
-    assert [story.step(), story.step()] == [[], []]
-    assert len(story.tracks.targets) == 0
-    assert story.tracks.next_label == 1
-
-
 def test_a_label_is_given_once() -> None:
     rng = np.random.default_rng(3)
     story, given = Story(patience=1), []
@@ -228,14 +177,3 @@ def test_a_label_is_given_once() -> None:
         assert np.all(np.bincount(story.tracks.targets.persons, minlength=2) <= 2)
     assert len(given) > 5
     assert given == list(range(1, len(given) + 1))
-
-
-def test_a_target_that_walks_is_expected_further_on() -> None:
-    story = Story()
-    for x in range(50, 90, 2):
-        story.step((float(x), 0))
-    walker = story.tracks.targets
-    assert walker.velocities[0, 0] == pytest.approx(2.0, abs=0.1)
-    ahead = walker.moved(0.5)
-    assert ahead.boxes[0, 0] - walker.boxes[0, 0] == pytest.approx(1.0, abs=0.05)
-    np.testing.assert_array_equal(walker.moved(0.0).boxes, walker.boxes)

@@ -34,48 +34,6 @@ def walking(steps: int, x: float = 30.0, speed: float = 1.5) -> list[tuple[float
     return [(x + speed * k, 60.0) for k in range(steps)]
 
 
-def test_one_person_is_followed_under_one_label() -> None:
-    path = walking(40)
-    results = track([[place] for place in path])
-    assert told(results, "new") == [(0, (1,))]
-    for result, place in zip(results[5:], path[5:], strict=True):
-        assert result.labels.tolist() == [1]
-        np.testing.assert_allclose(result.estimates[0], (*place, *HALF), atol=1.5)
-        assert (result.sigmas > 0.0).all()
-        (x, y, xx, _, yy), *_ = result.gates
-        assert (x - place[0]) ** 2 / xx + (y - place[1]) ** 2 / yy < 1.0
-    assert all(result.gates.shape == (1, 5) for result in results[1:])
-
-
-def test_a_newcomer_counts_after_some_steps_in_a_row() -> None:
-    blink: list = [[], [(80, 60)], [], [(80, 60)], *[[(80.0, 60.0)] for _ in range(6)]]
-    results = track((blink), confirmation_steps=4)
-    assert told(results, "new") == [(6, (1,))]
-    assert [len(result.estimates) for result in results] == [0] * 6 + [1] * 4
-    assert results[4].information["newcomers"] == 1.0
-
-
-def test_who_is_not_measured_for_three_steps_has_vanished() -> None:
-    path: list = [[place] for place in walking(12)]
-    results = track(path + [[]] * 6)
-    assert told(results, "vanished") == [(14, (1,))]
-    assert [len(result.estimates) for result in results[11:]] == [1, 1, 1, 0, 0, 0, 0]
-    # coasting: shown where it was going, but not handed on
-    assert [len(result.boxes) for result in results[11:]] == [1, 0, 0, 0, 0, 0, 0]
-    assert results[13].estimates[0, 0] > results[11].estimates[0, 0] + 2.0
-
-
-@pytest.mark.parametrize(("away", "same"), [(5, True), (7, True), (12, False)])
-def test_who_comes_back_within_five_steps_is_the_same(away: int, same: bool) -> None:
-    path = walking(30 + away, speed=0.6)
-    steps: list = [[place] for place in path]
-    steps[15 : 15 + away] = [[]] * away
-    results = track(steps)
-    assert told(results, "vanished")[0] == (17, (1,))
-    assert (told(results, "returned") == [(15 + away, (1,))]) == same
-    assert results[-1].labels.tolist() == ([1] if same else [2])
-
-
 def meeting(steps: int = 60, merged: range = range(24, 36)) -> list:
     """Two pass each other; where they overlap a detector sees one box around both."""
     boxes: list = []
@@ -137,21 +95,6 @@ def test_without_the_five_cases_there_is_neither_occlusion_nor_return() -> None:
     assert kinds == {"new", "vanished"}
 
 
-@pytest.mark.parametrize("association", ["exact", "murty", "simplified_murty"])
-@pytest.mark.parametrize("clutter", ["poisson", "diffuse"])
-def test_every_way_of_associating_keeps_two_apart(association: str, clutter: str) -> None:
-    rng = np.random.default_rng(3)
-    steps: list = [
-        [(40.0 + k + rng.normal(), 50.0), (44.0 + k, 72.0 + rng.normal()), (150 * rng.random(), 20)]
-        for k in range(40)
-    ]
-    changes = {"association": association, "clutter": clutter}
-    result = track(steps, **changes)[-1]
-    places = dict(zip(result.estimate_labels.tolist(), result.estimates, strict=True))
-    np.testing.assert_allclose(places[1][:2], [79.0, 50.0], atol=3.0)
-    np.testing.assert_allclose(places[2][:2], [83.0, 72.0], atol=3.0)
-
-
 def test_measurements_can_go_on_instead_of_estimates() -> None:
     steps: list = [[place, (140.0, 20.0 + 7.0 * (k % 9))] for k, place in enumerate(walking(30))]
     changes = {"output": "measurements", "confirmation_steps": 3}
@@ -159,27 +102,6 @@ def test_measurements_can_go_on_instead_of_estimates() -> None:
     kept = result.boxes[result.labels == 1]
     np.testing.assert_allclose(kept, [(*walking(30)[-1], *HALF)])
     assert len(result.measurements) == 2
-
-
-def test_boxes_of_one_pixel_and_of_none_raise_nothing() -> None:
-    steps: list = [
-        [(40.0 + k, 60.0, 0.5, 0.5), (80.0, 60.0, 0.01, 0.01), (0.0, 0.0, 0.5, 0.5)]
-        for k in range(30)
-    ]
-    for changes in ({}, {"five_cases": False}, {"occlusion": "measurement"}):
-        results = track(steps, **changes)
-        for result in results:
-            assert np.isfinite(result.estimates).all()
-            assert np.isfinite(result.gates).all()
-            assert np.isfinite(result.sigmas).all()
-
-
-def test_twenty_in_one_place_raise_nothing() -> None:
-    rng = np.random.default_rng(0)
-    steps: list = [[tuple(place) for place in rng.normal(80.0, 3.0, (20, 2))] for _ in range(3)]
-    for association in ("exact", "murty", "simplified_murty"):
-        results = track(steps, association=association)
-        assert all(np.isfinite(result.estimates).all() for result in results)
 
 
 def test_only_what_the_source_reads_counts() -> None:

@@ -9,29 +9,14 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from tests.engine.painted import GREEN, RED, painted_sequence
-from tests.engine.standing import line
+from tests.single_view.test_scenes import truth
+from tracker.parameters import ColourPhdParams
+from tracker.pictures import colour
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
-from tracker.single_view.box_sizes import upright_boxes
 from tracker.single_view.colour import templates
-from tracker.single_view.colour.likeness import Likeness
-
-STEPS = 40
-
-
-@pytest.fixture(scope="module")
-def painted(tmp_path_factory: pytest.TempPathFactory) -> Sequence:
-    """A red and a green head that pass before one camera."""
-    folder = tmp_path_factory.mktemp("painted")
-    return painted_sequence(folder, paths(), [RED, GREEN])
-
-
-def paths() -> list[np.ndarray]:
-    """A metre apart, half a metre along."""
-    first = line([(-0.6, 0.0), (-0.3, 0.4)], [0, 1], STEPS)[:STEPS]
-    second = line([(0.6, 0.4), (0.4, 0.0)], [0, 1], STEPS)[:STEPS]
-    return [first, second]
+from tracker.single_view.colour.likeness import Likeness, looks_of
+from tracker.single_view.colour.templates import read_templates
 
 
 def likeness_of(sequence: Sequence) -> Likeness | None:
@@ -39,57 +24,64 @@ def likeness_of(sequence: Sequence) -> Likeness | None:
         return Likeness.of(sequence, reader)
 
 
-def test_each_head_looks_like_itself_and_the_wall_like_nobody(painted: Sequence) -> None:
-    step = 8
-    heads, _ = upright_boxes(
-        painted.cameras[0], np.array([path[step] for path in paths()]), painted.target_half_extents
-    )
-    width, height = painted.cameras[0].image_size
-    corner = np.array([[0.0, 0.0, 5.0, 5.0]])
-    beyond = np.array([[-90.0, 20.0, 5.0, 5.0], [width + 60.0, height + 60.0, 9.0, 9.0]])
-    with FrameReader(painted) as reader:
-        likeness = Likeness.of(painted, reader)
-        picture = reader.picture(0, step)
+def test_whom_a_box_looks_like_follows_from_its_distances_to_everybody(
+    heads: Sequence, reader: FrameReader
+) -> None:
+    picture, likeness = reader.picture(0, 3), Likeness.of(heads, reader)
     assert likeness is not None
     assert picture is not None
-    told = likeness.of_boxes(picture, np.concatenate([heads, corner, beyond]))
-    assert_allclose(told.sum(axis=1), 1.0)
-    assert told[0, 0] > 0.95
-    assert told[1, 1] > 0.95
-    assert told[2].max() < 0.9, "a grey wall has no person's colours"
-    assert_allclose(told[3:], 0.5)
-    assert_allclose(likeness.of_boxes(picture, heads[1:]), told[1:2], err_msg="whatever else asks")
-    assert likeness.of_boxes(picture, heads[:0]).shape == (0, 2)
+    height, width = picture.shape[:2]
+    own = truth(heads, 3)
+    corners = np.array([[0.0, 0.0, 5.0, 5.0], [width - 1.0, height - 1.0, 3.0, 9.0]])
+    beyond = np.array([[-90.0, 20.0, 5.0, 5.0], [width + 60.0, height + 60.0, 9.0, 9.0],
+                       [20.0, -90.0, 5.0, 5.0]])  # fmt: skip
+    every = np.concatenate([own, corners, beyond])
+    told = likeness.of_boxes(picture, every)
+    p = ColourPhdParams()
+    model = read_templates(heads, p.colour_space, p.histogram_kernel, reader)
+    bins = colour.bin_map(picture, p.colour_space)
+    powers = np.exp(-0.5 * (model.distances(bins, every) / p.likelihood_sigma) ** 2)
+    assert_allclose(told, powers / powers.sum(axis=1, keepdims=True))
+    assert_allclose(told[4:], 0.5)
+    assert told[0, 0] > 0.9
+    assert told[1, 1] > 0.9
+    assert_allclose(likeness.of_boxes(picture, every[1:2]), told[1:2])  # whatever else asks
+    assert likeness.of_boxes(picture, every[:0]).shape == (0, 2)
+    looks = looks_of(picture, every)
+    roots = np.sqrt(colour.histograms(bins, every, p.colour_space, p.histogram_kernel))
+    assert_allclose(looks, roots, atol=1e-3)
+    assert_allclose(np.linalg.norm(looks[:4].astype(float), axis=1), 1.0, atol=1e-2)
+    assert not looks[4:].any()
 
 
-def test_there_is_nobody_to_tell_apart(painted: Sequence) -> None:
-    alone = replace(painted, templates=painted.templates[:1])
+def test_there_is_nobody_to_tell_apart(heads: Sequence) -> None:
+    alone = replace(heads, templates=heads.templates[:1])
     assert likeness_of(alone) is None
-    assert likeness_of(replace(painted, templates=())) is None
+    assert likeness_of(replace(heads, templates=())) is None
 
 
 def test_a_template_that_cannot_be_read_is_told_and_hinders_nobody(
-    painted: Sequence, caplog: pytest.LogCaptureFixture
+    heads: Sequence, caplog: pytest.LogCaptureFixture
 ) -> None:
-    away = replace(painted.templates[1], box=np.array([9000.0, 9000.0, 5.0, 5.0]))
-    broken = replace(painted, templates=(painted.templates[0], away))
+    away = replace(heads.templates[1], box=np.array([9000.0, 9000.0, 5.0, 5.0]))
+    broken = replace(heads, templates=(heads.templates[0], away))
     with caplog.at_level(logging.WARNING):
         assert likeness_of(broken) is None
-    assert 'template "person2"' in caplog.text
+    assert 'template "green"' in caplog.text
 
 
 def test_the_templates_of_a_run_are_read_once(
-    painted: Sequence, monkeypatch: pytest.MonkeyPatch
+    heads: Sequence, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     read = []
     histograms = templates.colour.histograms
     monkeypatch.setattr(
         templates.colour, "histograms", lambda *a: read.append(len(a[1])) or histograms(*a)
     )
-    with FrameReader(painted) as reader:
-        first = templates.read_templates(painted, "hue_saturation", "epanechnikov", reader)
-        assert Likeness.of(painted, reader) is not None
-        assert read == [1] * len(painted.templates)
-        fewer = replace(painted, templates=painted.templates[:1])
+    with FrameReader(heads) as reader:
+        first = templates.read_templates(heads, "hue_saturation", "epanechnikov", reader)
+        assert Likeness.of(heads, reader) is not None
+        assert read == [1] * len(heads.templates)
+        fewer = replace(heads, templates=heads.templates[:1])
         other = templates.read_templates(fewer, "hue_saturation", "epanechnikov", reader)
         assert len(other.roots) < len(first.roots)

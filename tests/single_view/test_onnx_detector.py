@@ -13,15 +13,17 @@ import pytest
 from numpy import ndarray
 from onnx import TensorProto
 
-from tests.engine.painted import RED, painted_sequence, true_boxes
-from tests.engine.synthetic import look_at
+from tests import world
 from tests.single_view.networks import answering, pooling, sized
+from tests.single_view.test_scenes import truth
+from tests.world import surveillance as look_at
 from tracker import pipeline
 from tracker.boxes import Boxes
 from tracker.camera import Camera
 from tracker.parameters import RunParameters, with_values
 from tracker.runs.run import stage_keys
 from tracker.sequences.library import with_detector
+from tracker.sequences.reader import read_sequence
 from tracker.sequences.sequence import Sequence, SequenceError
 from tracker.single_view.onnx.file import ports_of
 from tracker.single_view.onnx.layouts import proposals
@@ -296,13 +298,17 @@ def test_inputs_and_outputs_are_read_from_the_file(tmp_path: Path) -> None:
 # ── as a method ──────────────────────────────────────────────────────────────
 
 STEPS = 6
+RED = (60.0, 70.0, 200.0)
 
 
 def red_head(folder: Path, camera: Camera, model: Path) -> Sequence:
     """Somebody in red who walks; and the network that finds red."""
-    path = np.linspace([-0.5, 0.0, 1.2], [0.5, 0.0, 1.2], STEPS)
-    folder.mkdir()
-    return with_detector(painted_sequence(folder, [path], [(RED[1], RED[1])], camera=camera), model)
+    paths = world.together(np.linspace([-0.5, 0.0, 1.2], [0.5, 0.0, 1.2], STEPS))
+    whole = world.sequence(
+        (camera,), paths, fps=25.0, room=world.SMALL_ROOM, half_extents=world.HEAD
+    )
+    picture = world.painted((camera,), paths, [(RED, RED)], half_extents=world.HEAD)
+    return with_detector(read_sequence(world.folder(folder, whole, picture)), model)
 
 
 def parameters(**more: float) -> RunParameters:
@@ -315,9 +321,9 @@ def test_what_it_finds_is_tracked_in_full_pixels(tmp_path: Path) -> None:
     sequence = red_head(tmp_path / "level", look_at("level", (0.0, -4.0, 1.2)), model)
     run = pipeline.compute(sequence, parameters(score_threshold=0.25, room_tolerance=100.0))
     for step, (view,) in enumerate(run.views):
-        (truth,) = true_boxes(sequence, step)
-        distances = np.linalg.norm(view.measurements[:, :2] - truth[:2], axis=1)
-        assert distances.min() < 0.6 * truth[3]
+        (box,) = truth(sequence, step)
+        distances = np.linalg.norm(view.measurements[:, :2] - box[:2], axis=1)
+        assert distances.min() < 0.6 * box[3]
 
 
 def test_a_rolled_camera_is_looked_at_upright(tmp_path: Path) -> None:

@@ -21,6 +21,8 @@ from tracker.parameters import PRESETS, RunParameters, with_values
 from tracker.pictures.foreground import unpack
 from tracker.sequences.pictures.frames import FrameReader, Picture
 from tracker.sequences.sequence import Sequence
+from tracker.single_view.colour import peaks
+from tracker.single_view.colour.trust import shapes_of_templates
 from tracker.single_view.protocol import ViewResult
 
 KEPT = Path(__file__).with_name("scenes.json")
@@ -101,20 +103,46 @@ def numbers(result: ViewResult) -> list[float]:
     return [float(f"{number:.9g}") for number in np.concatenate(parts)]
 
 
+def stays(name: str, found: list[list[float]], request: pytest.FixtureRequest) -> None:
+    """Compare rows of numbers with those of the file, or accept them."""
+    kept = json.loads(KEPT.read_text(encoding="utf-8")) if KEPT.is_file() else {}
+    if request.config.getoption("--update-golden"):
+        found = [[float(f"{number:.9g}") for number in row] for row in found]
+        lines = [f" {json.dumps(one)}: {json.dumps(rows)}" for one, rows in
+                 (kept | {name: found}).items()]  # fmt: skip
+        KEPT.write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="utf-8")
+        return
+    for number, (row, expected) in enumerate(zip(found, kept[name], strict=True)):
+        assert_allclose(row, expected, rtol=1e-6, atol=1e-7, err_msg=f"row {number}")
+
+
 @every_variant
 def test_what_a_method_finds_stays_what_it_was(
     variant: str, heads: Sequence, reader: FrameReader, request: pytest.FixtureRequest
 ) -> None:
     _, results = run(method_of(variant, heads, reader), film(reader))
-    found = [numbers(result) for result in (results[1], results[3], results[6])]
-    kept = json.loads(KEPT.read_text(encoding="utf-8")) if KEPT.is_file() else {}
-    if request.config.getoption("--update-golden"):
-        lines = [f" {json.dumps(name)}: {json.dumps(row)}" for name, row in
-                 (kept | {variant: found}).items()]  # fmt: skip
-        KEPT.write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="utf-8")
-        return
-    for step, (row, expected) in enumerate(zip(found, kept[variant], strict=True)):
-        assert_allclose(row, expected, rtol=1e-6, atol=1e-7, err_msg=f"the {step}th of the steps")
+    stays(variant, [numbers(results[step]) for step in (1, 3, 6)], request)
+
+
+def test_people_by_shape_that_lie_where_the_templates_are_go_on_with_their_odds(
+    heads: Sequence,
+    reader: FrameReader,
+    monkeypatch: pytest.MonkeyPatch,
+    request: pytest.FixtureRequest,
+) -> None:
+    monkeypatch.setattr(peaks, "FITTING", 0.0)  # heads alone are of no shape that would fit
+    method = method_of(
+        "colours and shapes",
+        heads,
+        reader,
+        **{"colour_phd.shapes": "fitting", "colour_phd.shape_odds": -3.0},
+    )
+    _, results = run(method, film(reader))
+    found = [numbers(results[step]) for step in (1, 3, 6)]
+    assert all(len(results[step].log_ratios) for step in (1, 3, 6))
+    by_shape = shapes_of_templates(heads, reader)
+    found.append([*(by_shape.trust[name] for name in sorted(by_shape.trust)), by_shape.fit])
+    stays("colours and fitting shapes", found, request)
 
 
 def truth(heads: Sequence, step: int) -> ndarray:

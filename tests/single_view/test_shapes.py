@@ -6,10 +6,14 @@ from dataclasses import replace
 
 import cv2
 import numpy as np
+import pytest
+from numpy import ndarray
 from numpy.testing import assert_allclose, assert_array_equal
 
 from tests import world
-from tracker.pictures.foreground import BackgroundModel
+from tracker.kernels.pictures.channels import ORIENTATIONS, gradients
+from tracker.pictures.foreground import BackgroundModel, tone_curve
+from tracker.pictures.foreground.exposure import square_roots
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import upright_boxes
@@ -133,30 +137,56 @@ def test_a_box_is_supported_by_the_best_window_at_its_place() -> None:
     assert found.support(none).shape == (0,)
 
 
-def test_another_exposure_neither_moves_nor_differs_and_a_person_does_both() -> None:
+def planes_of(sums: ndarray) -> ndarray:
+    """Strength of edges, and what follows it, of integral images."""
+    return np.diff(np.diff(sums[..., ORIENTATIONS:].astype(int), axis=0), axis=1)
+
+
+def moved_in_numpy(old: ndarray, new: ndarray) -> ndarray:
+    """The change beyond the median's, less twice the median of what is left."""
+    shift = [int(np.median(new[::4, ::4, c].astype(int) - old[::4, ::4, c])) for c in range(3)]
+    apart = np.abs(new.astype(int) - np.clip(old.astype(int) + shift, 0, 255)).max(axis=2)
+    return np.maximum(apart - 2 * int(np.median(apart[::2, ::2])), 0)
+
+
+def test_channels_are_edges_what_is_no_background_and_what_moved() -> None:
     rng = np.random.default_rng(1)
-    empty = cv2.GaussianBlur(rng.integers(40, 160, (80, 100, 3)).astype(np.uint8), (0, 0), 3.0)
-    background = BackgroundModel.learn([empty] * 3)
-    assert background is not None
-    channels = Channels(background, 1.0, 40.0, 0.1)
-    state, _ = channels.step(channels.initial(), empty)
-    brighter = cv2.convertScaleAbs(empty, alpha=1.25)
-    state, sums = channels.step(state, brighter)
-    difference, motion, activity, spread = (sums[-1, -1, 7:] / empty[..., 0].size).tolist()
-    assert difference < 16.0
-    assert motion < 16.0
-    person = brighter.copy()
-    person[20:60, 40:60] = 250
-    _, sums = channels.step(state, person)
+    empty = cv2.GaussianBlur(rng.integers(0, 256, (48, 64, 3)).astype(np.uint8), (0, 0), 2.0)
+    spread = rng.integers(0, 80, (48, 64)).astype(np.uint8)
+    channels = Channels(BackgroundModel(empty, spread), 1.0, 12.0, 0.06)
+    assert channels.factors == (1.0, 1.0)
+    state, smooth, activity = channels.initial(), [], np.zeros((48, 64))
+    fading = np.exp(-0.06 / 2.0)
+    for step in range(4):
+        picture = np.clip(empty * (1.0 + 0.1 * step), 0, 255).astype(np.uint8)
+        picture[10:40, 5 + 8 * step : 20 + 8 * step] = (30, 90, 200)
+        state, sums = channels.step(state, picture)
+        roots = square_roots(picture)
+        smooth.append(cv2.GaussianBlur(roots, (0, 0), 1.0))
+        motion = moved_in_numpy(smooth[max(0, step - 2)], smooth[-1])  # 0.12 s ago
+        activity = fading * activity + (1.0 - fading) * motion
+        shown = cv2.LUT(empty, square_roots(tone_curve(empty, picture)))
+        difference = np.abs(roots.astype(int) - shown).max(axis=2)
+        magnitudes = gradients(roots).magnitudes
+        edges = 64.0 * magnitudes / (cv2.blur(magnitudes, (9, 9)) + 4.0)  # 2 · 0.35 · 12 + 1
+        expected = [np.minimum(edges, 255), 4 * np.minimum(difference, 63),
+                    8 * np.minimum(motion, 31), np.minimum(32.0 * activity, 255),
+                    4 * np.minimum(spread.astype(int), 63)]  # fmt: skip
+        found = np.moveaxis(planes_of(sums), 2, 0)
+        for one, plane in zip(found, expected, strict=True):
+            assert_allclose(one, np.floor(plane), atol=1.0)
+            assert (one == np.floor(plane)).mean() > 0.99
+    assert len(state.before) == 2
 
-    def mean(plane: int) -> float:
-        part = sums[55, 55] - sums[25, 55] - sums[55, 45] + sums[25, 45]
-        return float(part[plane] / 300.0)
 
-    assert mean(7) > difference + 60.0
-    assert mean(8) > motion + 60.0
-    assert mean(9) > activity
-    assert spread == 0.0
+@pytest.mark.parametrize(("factor", "size"), [(0.5, (32, 24)), (0.01, (1, 1)), (0.26, (17, 12))])
+def test_channels_of_a_reduced_picture_are_as_small(factor: float, size: tuple[int, int]) -> None:
+    empty = np.full((48, 64, 3), 90, dtype=np.uint8)
+    channels = Channels(BackgroundModel(empty, empty[..., 0]), factor, 12.0, 1.0)
+    assert channels.factors == (size[0] / 64, size[1] / 48)
+    state, sums = channels.step(channels.initial(), empty)
+    assert sums.shape[:2] == (size[1] + 1, size[0] + 1)
+    assert len(state.before) == 1
 
 
 def test_colours_speak_for_a_shape_by_a_peak_and_against_it_by_its_own_box() -> None:

@@ -9,7 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy import ndarray
 
-from tests.engine.synthetic import CAMERAS, HALF_EXTENTS, ROOM
+from tests.world import HEAD as HALF_EXTENTS
+from tests.world import SMALL_CAMERAS as CAMERAS
+from tests.world import SMALL_ROOM as ROOM
 from tracker.parameters import AssociationMatrixParams
 from tracker.pictures.blobs import blobs
 from tracker.single_view.association_matrix.joining import join

@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 from tests.golden.pieces import cut
-from tests.single_view.shaken import SIZE, shaken
+from tests.single_view.shaken import scene, shaken, taken
 from tracker import pipeline
-from tracker.parameters import ForegroundParams, RunParameters, with_values
-from tracker.pictures.foreground import BackgroundModel
+from tracker.parameters import RunParameters, with_values
 from tracker.runs.gates import notices
 from tracker.sequences.library import open_sequence
 from tracker.sequences.pictures.frames import FrameReader, Picture
@@ -21,35 +20,28 @@ from tracker.single_view.working.shaking import check_shake
 from tracker.single_view.working.steadying import Steadying, agreed
 
 
-@pytest.mark.full
-@pytest.mark.parametrize("sigma", [0.5, 2.0])
-def test_a_shake_is_measured_and_undone(sigma: float) -> None:
-    pictures = shaken(np.random.default_rng(3), sigma)
+def test_a_shake_is_the_deviation_of_what_moved_and_is_undone() -> None:
+    rng = np.random.default_rng(3)
+    room = scene(rng)
+    moved = np.array([
+        [2.5, 0, 0], [-2.5, 0, 0], [0, 2.5, 0.002], [0, -2.5, -0.002], [1.5, 1.5, 0],
+        [-1.5, -1.5, 0], [1, -1.5, 0.001], [-1, 1.5, -0.001], [0, 0, 0],
+    ])  # fmt: skip
+    pictures = [taken(room, one, rng) for one in moved]
     found = Steadying.learn(pictures, None, 0.2)
     assert found is not None
-    assert found.shake == pytest.approx(sigma, rel=0.35)
-    held = [found.still(picture) for picture in pictures]
-    # what is left of the shake, measured in the same way on the pictures that are held still
-    left = Steadying.learn(held, None, 0.0)
+    square = np.median((moved[:, :2] ** 2).sum(axis=1))
+    assert found.shake == pytest.approx(np.sqrt(square / np.log(4.0)), rel=0.25)
+    # what is left of it, measured in the same way on the pictures that are held still
+    left = Steadying.learn([found.still(picture) for picture in pictures], None, 0.0)
     assert left is not None
-    assert left.shake < 0.15 * sigma
-
-
-@pytest.mark.full
-def test_a_shake_undone_leaves_people_as_foreground_and_no_edges() -> None:
-    pictures = shaken(np.random.default_rng(3), 2.0)
-    found = Steadying.learn(pictures, None, 0.2)
-    assert found is not None
-    shares = []
-    for some in (pictures, [found.still(picture) for picture in pictures]):
-        background = BackgroundModel.learn(some)
-        assert background is not None
-        masks = [background.foreground(one, ForegroundParams()) for one in some]
-        shares.append(float(np.mean([mask.mean() for mask in masks])))
-    person = 50 * 130 / (SIZE[0] * SIZE[1])
-    shaking, held = shares
-    assert held == pytest.approx(person, rel=0.2)
-    assert abs(held - person) < 0.7 * abs(shaking - person)
+    assert left.shake < 0.15 * found.shake
+    # a picture of three times the size shakes by three times as many pixels
+    larger = [cv2.resize(one, None, fx=3.0, fy=3.0) for one in pictures]
+    wider = Steadying.learn(larger, None, 0.2)
+    assert wider is not None
+    assert wider.reduction == pytest.approx(320.0 / 720.0)
+    assert wider.shake == pytest.approx(3.0 * found.shake, rel=0.2)
 
 
 def test_people_light_and_noise_are_no_shake() -> None:

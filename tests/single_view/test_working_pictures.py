@@ -13,10 +13,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy import ndarray
 
-from tests.engine.standing import CAMERAS, HALF_EXTENTS, ROOM
-from tests.engine.synthetic import CAMERAS as SMALL
-from tests.engine.synthetic import HALF_EXTENTS as HEAD
-from tests.engine.synthetic import ROOM as SMALL_ROOM
+from tests import world
+from tests.world import PERSON as HALF_EXTENTS
+from tests.world import SMALL_CAMERAS, SMALL_ROOM
 from tracker.camera import Camera
 from tracker.parameters import RunParameters, with_values
 from tracker.parameters.groups.pictures import PictureParams
@@ -29,6 +28,12 @@ from tracker.single_view.protocol import ViewResult
 from tracker.single_view.working.sequence import Working
 from tracker.single_view.working.view import WorkingView, working_view
 
+CAMERAS = tuple(
+    world.surveillance(f"cam{k}", (4.6 * x, 4.6 * y, 2.6), (0.0, 0.0, 0.8), focal=620.0,
+                       image_size=(1280, 800))
+    for k, (x, y) in enumerate(((1.0, 0.1), (0.1, 1.0), (-1.0, -0.1)), 1)
+)  # fmt: skip
+ROOM = world.volume(2.2, 2.2, [(-1.9, -1.9, 0.85)])
 LENS = np.array([-0.05, 0.01, 0.002, -0.001, 0.0])
 
 
@@ -51,7 +56,9 @@ def places(count: int = 40) -> ndarray:
 
 
 def test_a_small_level_camera_is_left_alone() -> None:
-    assert all(working_view(c, SMALL_ROOM, HEAD, PictureParams()) is None for c in SMALL)
+    assert all(
+        working_view(c, SMALL_ROOM, world.HEAD, PictureParams()) is None for c in SMALL_CAMERAS
+    )
 
 
 @given(
@@ -154,6 +161,68 @@ def test_ellipses_come_back_turned() -> None:
     apart = view.points_back(border[None])[0] - back[:2]
     full = np.array([[back[2], back[3]], [back[3], back[4]]])
     assert apart @ np.linalg.solve(full, apart) == pytest.approx(1.0)
+
+
+@given(angle=st.floats(-math.pi, math.pi))
+def test_deviations_come_back_turned(angle: float) -> None:
+    view = seen(rolled(CAMERAS[0], angle), lines=400)
+    sigmas = np.array([[2.0, 3.0, 4.0, 9.0]])
+    back = view.sigmas_back(sigmas)[0]
+    matrix = view.gates_back(np.array([[50.0, 60.0, 4.0, 0.0, 9.0]]))[0]
+    # of independent errors along both axes, in the picture's own
+    np.testing.assert_allclose(back[:2] ** 2, matrix[[2, 4]], rtol=1e-9)
+    reach = view.boxes_back(np.array([[50.0, 60.0, 4.0, 9.0]]))[0, 2:]
+    np.testing.assert_allclose(back[2:], reach)
+    cos, sin = abs(math.cos(view.roll)), abs(math.sin(view.roll))
+    expected = [max(4.0 * cos, 9.0 * sin), max(9.0 * cos, 4.0 * sin)] / view.factors
+    np.testing.assert_allclose(reach, expected)
+    assert view.scale == pytest.approx(math.sqrt(view.factors[0] * view.factors[1]))
+    assert view.key[:2] == view.camera.image_size
+
+
+def test_a_picture_is_left_alone_from_a_twentieth_less_on() -> None:
+    numbers = {"target_height": 2000, "least_height": 8}
+    for lines, alone in ((800, True), (761, True), (760, False), (759, False)):
+        view = working_view(CAMERAS[0], ROOM, HALF_EXTENTS, PictureParams(lines=lines, **numbers))
+        assert (view is None) == alone
+    view = working_view(
+        rolled(CAMERAS[0], 0.6), ROOM, HALF_EXTENTS, PictureParams(lines=761, **numbers)
+    )
+    assert view is not None  # turned, and as large as it was
+    assert view.factors[0] == 1.0
+
+
+def test_targets_are_made_so_high_and_pictures_at_most_half_as_large_for_it() -> None:
+    boxes, there = upright_boxes(CAMERAS[0], places(3000), HALF_EXTENTS)
+    high = 2.0 * float(np.median(boxes[there, 3]))
+
+    def scale(**numbers: float) -> float:
+        return seen(CAMERAS[0], lines=400, **numbers).scale
+
+    assert scale(target_height=2000, least_height=8) == pytest.approx(0.5)
+    wanted = round(0.4 * high)
+    assert scale(target_height=wanted, least_height=8) == pytest.approx(0.4, rel=0.06)
+    assert scale(target_height=16, least_height=8) == pytest.approx(0.25, rel=0.01)
+    wanted = round(0.7 * high)
+    assert scale(target_height=16, least_height=wanted) == pytest.approx(0.7, rel=0.06)
+
+
+def test_what_is_seen_from_above_or_skewed_is_not_turned() -> None:
+    def turned(camera: Camera, **numbers: float) -> bool:
+        view = working_view(camera, ROOM, HALF_EXTENTS, PictureParams(**numbers))
+        return view is not None and view.turn is not None
+
+    for slope, expected in ((0.19, False), (0.21, True)):  # of the sine of its tilt
+        tilt = math.asin(slope)
+        above = world.look_at("a", (0.0, -math.tan(tilt) * 4.0, 4.0), (0.0, 0.0, 0.0))
+        assert turned(rolled(above, 1.0)) == expected
+    skewed = CAMERAS[0].intrinsics.copy()
+    skewed[0, 1] = 2e-6 * skewed[0, 0]
+    assert turned(rolled(CAMERAS[0], 1.0))
+    assert not turned(rolled(CAMERAS[0], 1.0, intrinsics=skewed))
+    assert not turned(rolled(CAMERAS[0], 0.1), level_from=0.11)
+    assert turned(rolled(CAMERAS[0], 0.12), level_from=0.11)
+    assert turned(rolled(CAMERAS[0], -0.12), level_from=0.11)
 
 
 def recording(folder: Path, camera: Camera) -> Sequence:
