@@ -108,7 +108,7 @@ class Camera:
             folds = np.flatnonzero(np.diff(drawn) <= 0.0)
             return float(radii[folds[0]]) if len(folds) else np.inf
         # a coefficient that bends nothing would be divided by
-        k1, k2, _, _, k3 = np.where(np.abs(self.distortion) < 1e-30, 0.0, self.distortion)
+        k1, k2, _, _, k3 = np.where(np.abs(self._lens) < 1e-30, 0.0, self._lens)
         roots = np.roots([7.0 * k3, 5.0 * k2, 3.0 * k1, 1.0])  # in r²
         real = roots[(np.abs(roots.imag) < 1e-9) & (roots.real > 0.0)].real
         return float(np.sqrt(real.min())) if len(real) else np.inf

@@ -275,6 +275,14 @@ def test_a_lens_that_never_folds_holds_everywhere() -> None:
     assert twice.largest_radius == pytest.approx(np.sqrt(0.4))
 
 
+def test_a_lens_of_eight_numbers_of_which_five_are_used_folds_as_that_of_five() -> None:
+    five = np.array([-0.3, 0.02, 0.001, -0.001, 0.0])
+    camera = replace(PINHOLE, distortion=five)
+    padded = replace(PINHOLE, distortion=np.r_[five, np.zeros(3)])
+    assert np.isfinite(camera.largest_radius)
+    assert padded.largest_radius == camera.largest_radius
+
+
 def test_only_a_plain_lens_without_numbers_is_a_pinhole() -> None:
     assert PINHOLE.is_pinhole
     assert not CAMERAS[0].is_pinhole
