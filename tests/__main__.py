@@ -214,7 +214,7 @@ def main() -> int:
     os.environ["OPENBLAS_NUM_THREADS"] = "1"
     page, code = page_checks(), code_checks()
     # at once for all processes that the tests start
-    kernels = Check("kernels", ((PYTHON, "-m", "tracker.warm_up"),))
+    kernels = Check("kernels", ((PYTHON, "-m", "tracker.runs.warm_up"),))
     benchmarks = Check("benchmarks", ((PYTHON, "-m", "tests.benchmarks", "--short"),))
     mutants = Check("mutants", ((PYTHON, "-m", "tests.mutate"),))
     always = ("--seed", "20261122")  # the same cases; --fuzz draws others each time

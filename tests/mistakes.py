@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 from numpy import ndarray
 
-from tracker.camera import Camera
-from tracker.checks.reading import FLIP, upright
+from tracker.geometry.camera import Camera
+from tracker.io.checks.reading import FLIP, upright
 from tracker.sequences.sequence import Detections, Sequence
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy import ndarray
 
-from tracker.camera import Camera
+from tracker.geometry.camera import Camera
 from tracker.sequences.sequence import Detections, GroundTruth, Room, Sequence, View
 
 

@@ -17,11 +17,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.engine import synthetic
-from tracker import __version__, export
+from tracker import __version__
+from tracker.export import tracks_csv
+from tracker.fusion.trajectories import Trajectories
 from tracker.parameters import METHODS, PARAMETERS, RunParameters, value, with_values
 from tracker.sequences.csv_columns import guarded, unguarded
 from tracker.sequences.sequence import Sequence
-from tracker.trajectories import Trajectories
 
 SEQUENCE = synthetic.sequence([], 40)
 CAMERA = SEQUENCE.cameras[0].name
@@ -57,7 +58,7 @@ TRACKS = tracks_of(
 
 def text_of(tracks: Trajectories, sequence: Sequence = SEQUENCE, done: int | None = None) -> str:
     stream = io.StringIO(newline="")
-    export.write_tracks_csv(stream, sequence, tracks, PARAMETERS_OF_RUN, 5, done=done)
+    tracks_csv.write_tracks_csv(stream, sequence, tracks, PARAMETERS_OF_RUN, 5, done=done)
     return stream.getvalue()
 
 
@@ -114,8 +115,8 @@ def test_a_name_over_two_lines_stays_in_its_comment() -> None:
 
 def test_what_is_read_is_what_was_written(tmp_path: Path) -> None:
     path = tmp_path / "tracks.csv"
-    export.save_tracks_csv(path, SEQUENCE, TRACKS, PARAMETERS_OF_RUN, 5)
-    read = export.read_tracks_csv(path)
+    tracks_csv.save_tracks_csv(path, SEQUENCE, TRACKS, PARAMETERS_OF_RUN, 5)
+    read = tracks_csv.read_tracks_csv(path)
     assert len(read) == 4
     np.testing.assert_array_equal(read.frames, TRACKS.frames)
     np.testing.assert_array_equal(read.ids, TRACKS.ids)
@@ -131,8 +132,8 @@ def test_what_is_read_is_what_was_written(tmp_path: Path) -> None:
 
 def test_the_settings_make_the_same_parameters_again(tmp_path: Path) -> None:
     path = tmp_path / "tracks.csv"
-    export.save_tracks_csv(path, SEQUENCE, TRACKS, PARAMETERS_OF_RUN, 5)
-    settings = dict(export.read_tracks_csv(path).settings)
+    tracks_csv.save_tracks_csv(path, SEQUENCE, TRACKS, PARAMETERS_OF_RUN, 5)
+    settings = dict(tracks_csv.read_tracks_csv(path).settings)
     assert settings.pop("sequence") == SEQUENCE.name
     assert settings.pop("seed") == "5"
     assert with_values(RunParameters(), settings) == PARAMETERS_OF_RUN
@@ -155,7 +156,7 @@ def test_reading_and_writing_again_changes_nothing(
     once = text_of(tracks)
     path = tmp_path_factory.getbasetemp() / "tracks.csv"
     path.write_text(once, encoding="utf-8")
-    read = export.read_tracks_csv(path)
+    read = tracks_csv.read_tracks_csv(path)
     again = dataclasses.replace(
         tracks, positions=read.positions, existences=read.existences, sigmas=read.sigmas
     )
@@ -165,8 +166,8 @@ def test_reading_and_writing_again_changes_nothing(
 
 def test_no_tracks_make_a_file_with_a_header(tmp_path: Path) -> None:
     path = tmp_path / "none.csv"
-    export.save_tracks_csv(path, SEQUENCE, tracks_of([]), RunParameters(), 0)
-    read = export.read_tracks_csv(path)
+    tracks_csv.save_tracks_csv(path, SEQUENCE, tracks_of([]), RunParameters(), 0)
+    read = tracks_csv.read_tracks_csv(path)
     assert len(read) == 0
     assert read.positions.shape == (0, 3)
     assert set(read.boxes) == {camera.name for camera in SEQUENCE.cameras}
@@ -183,9 +184,9 @@ def test_an_interrupted_save_leaves_what_was_there(
         stream.write("half a ")
         raise error
 
-    monkeypatch.setattr(export, "write_tracks_csv", interrupted)
+    monkeypatch.setattr(tracks_csv, "write_tracks_csv", interrupted)
     with pytest.raises((KeyboardInterrupt, MemoryError, OSError)):
-        export.save_tracks_csv(path, SEQUENCE, TRACKS, RunParameters(), 0)
+        tracks_csv.save_tracks_csv(path, SEQUENCE, TRACKS, RunParameters(), 0)
     assert path.read_text(encoding="utf-8") == "before"
     assert list(tmp_path.iterdir()) == [path]
 
@@ -193,9 +194,9 @@ def test_an_interrupted_save_leaves_what_was_there(
 def test_where_it_cannot_be_written_is_said(tmp_path: Path) -> None:
     nowhere = tmp_path / "nowhere" / "tracks.csv"
     with pytest.raises(OSError, match=r"tracks\.csv: there is no folder .*nowhere to write it to"):
-        export.save_tracks_csv(nowhere, SEQUENCE, TRACKS, RunParameters(), 0)
+        tracks_csv.save_tracks_csv(nowhere, SEQUENCE, TRACKS, RunParameters(), 0)
     with pytest.raises(OSError, match="expected a file to write, found a folder; add a name"):
-        export.save_tracks_csv(tmp_path, SEQUENCE, TRACKS, RunParameters(), 0)
+        tracks_csv.save_tracks_csv(tmp_path, SEQUENCE, TRACKS, RunParameters(), 0)
 
 
 def test_a_link_is_followed_and_a_new_file_is_readable_by_all(tmp_path: Path) -> None:
@@ -204,9 +205,9 @@ def test_a_link_is_followed_and_a_new_file_is_readable_by_all(tmp_path: Path) ->
         link.symlink_to(target)
     except OSError:
         pytest.skip("symbolic links cannot be made here")
-    export.save_tracks_csv(link, SEQUENCE, TRACKS, RunParameters(), 0)
+    tracks_csv.save_tracks_csv(link, SEQUENCE, TRACKS, RunParameters(), 0)
     assert link.is_symlink()
-    assert len(export.read_tracks_csv(target)) == 4
+    assert len(tracks_csv.read_tracks_csv(target)) == 4
     (tmp_path / "plain").touch()
     assert target.stat().st_mode == (tmp_path / "plain").stat().st_mode
 
@@ -218,7 +219,7 @@ def test_a_pipe_is_written_to(tmp_path: Path) -> None:
     received: list[str] = []
     thread = threading.Thread(target=lambda: received.append(pipe.read_text(encoding="utf-8")))
     thread.start()
-    export.save_tracks_csv(pipe, SEQUENCE, TRACKS, PARAMETERS_OF_RUN, 5)
+    tracks_csv.save_tracks_csv(pipe, SEQUENCE, TRACKS, PARAMETERS_OF_RUN, 5)
     thread.join()
     assert received == [text_of(TRACKS)]
 
@@ -235,13 +236,13 @@ def test_a_name_is_no_formula_and_comes_back(tmp_path: Path, name: str) -> None:
     sequence = replace(SEQUENCE, name=f"{name}, {name}", views=views)
     path = tmp_path / "tracks.csv"
     remark = f'40 pictures of camera "{name}" are missing'
-    export.save_tracks_csv(path, sequence, TRACKS, PARAMETERS_OF_RUN, 5, remarks=(remark,))
+    tracks_csv.save_tracks_csv(path, sequence, TRACKS, PARAMETERS_OF_RUN, 5, remarks=(remark,))
     for line in path.read_text(encoding="utf-8").splitlines():
         for cells in (csv.reader([line]), csv.reader([line], delimiter=";")):
             for cell in next(cells):
                 risky = re.match(r"\s*[=+\-@]", cell)
                 assert not risky or re.fullmatch(r"-?[\d.]+(,.*)?", cell), line
-    found = export.read_tracks_csv(path)
+    found = tracks_csv.read_tracks_csv(path)
     assert found.settings["sequence"] == sequence.name
     assert list(found.boxes) == [one.camera.name for one in views]
     assert found.remarks == (remark,)
@@ -255,7 +256,7 @@ def test_what_is_guarded_is_what_it_was(text: str) -> None:
 def test_who_was_named_has_the_name_in_every_row(tmp_path: Path) -> None:
     path = tmp_path / "tracks.csv"
     with path.open("w", encoding="utf-8", newline="") as stream:
-        export.write_tracks_csv(
+        tracks_csv.write_tracks_csv(
             stream, SEQUENCE, TRACKS, PARAMETERS_OF_RUN, 5, names={2: "Anna, the =first"}
         )
     lines = [one for one in path.read_text("utf-8").splitlines() if not one.startswith("#")]
@@ -263,5 +264,5 @@ def test_who_was_named_has_the_name_in_every_row(tmp_path: Path) -> None:
     assert [unguarded(row["name"]) for row in rows] == [
         "", "Anna, the =first", "Anna, the =first", "",
     ]  # fmt: skip
-    assert len(export.read_tracks_csv(path)) == len(TRACKS)
-    assert export.NAME not in table_of(text_of(TRACKS))[0]
+    assert len(tracks_csv.read_tracks_csv(path)) == len(TRACKS)
+    assert tracks_csv.NAME not in table_of(text_of(TRACKS))[0]

@@ -30,8 +30,9 @@ import numpy as np
 import tomlkit
 from numpy import ndarray
 
-from tracker.camera import Camera
 from tracker.filters.gaussian_mixture import GaussianMixture
+from tracker.fusion.trajectories import Trajectories
+from tracker.geometry.camera import Camera
 from tracker.sequences.sequence import (
     Detections,
     Entrance,
@@ -42,7 +43,6 @@ from tracker.sequences.sequence import (
     View,
 )
 from tracker.single_view.protocol import ViewResult
-from tracker.trajectories import Trajectories
 
 PERSON = np.array([0.3, 0.3, 0.85])
 """Half width, depth and height of somebody upright, metres."""

@@ -33,7 +33,7 @@ from app.command.flags import (
     parse,
 )
 from app.command.terminal import FAILURE, CommandError, check_data, check_keep, say
-from tracker.folders import library_file
+from tracker.files.folders import library_file
 from tracker.parameters import ParameterError
 
 if TYPE_CHECKING:

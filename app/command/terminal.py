@@ -10,8 +10,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from tracker.files.text import visible
 from tracker.parameters import ParameterError
-from tracker.visible import visible
 
 FAILURE = 1
 """The status of a command that could not do what was asked, or found what must not be."""

@@ -10,8 +10,8 @@ from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
 from tracker.filters.gaussian_mixture import gate_distance
+from tracker.fusion.trajectories import Trajectories
 from tracker.sequences.sequence import Room
-from tracker.trajectories import Trajectories
 
 DEFAULT_MASS = 0.9
 """Probability that an ellipsoid holds of its Gaussian."""

@@ -26,10 +26,10 @@ from app.scene.worker import LatestWorker
 from app.state import opening_step
 from app.state.snapshot import Change, Snapshot, View
 from app.state.workbench import Workbench
-from tracker.pipeline import Run
+from tracker.fusion.trajectories import Trajectories
+from tracker.runs.pipeline import Run
 from tracker.runs.run import given_names
 from tracker.sequences.sequence import Room
-from tracker.trajectories import Trajectories
 
 Rgb = UInt8[np.ndarray, "H W 3"]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 
 from app.state.snapshot import Snapshot
-from tracker.doubts import Doubt, Queue, queue
+from tracker.review.queue import Doubt, Queue, queue
 
 _NOTHING = Queue((), 0, "there is no run yet")
 

@@ -11,8 +11,8 @@ from numpy import ndarray
 
 from tracker.evaluation import EvaluationSettings
 from tracker.evaluation.measures.matching import assign
+from tracker.fusion.trajectories import Trajectories
 from tracker.sequences.sequence import GroundTruth
-from tracker.trajectories import Trajectories
 
 GATE = float(EvaluationSettings().gate)
 """Metres: farther apart, nobody is taken for anybody."""

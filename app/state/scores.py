@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from tracker.evaluation import Evaluation
+from tracker.fusion.trajectories import Trajectories
 from tracker.parameters import RunParameters
-from tracker.pipeline import Run
+from tracker.runs.pipeline import Run
 from tracker.sequences.sequence import Sequence
-from tracker.trajectories import Trajectories
 
 Reference = Literal["pinned", "previous"]
 """What the shown run is set against: the pinned one, else the finished one before it."""

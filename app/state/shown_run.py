@@ -14,7 +14,7 @@ from app.state.snapshot import (
 from app.state.store import Store
 from tracker.corrections import Correction
 from tracker.parameters import RunParameters
-from tracker.pipeline import Progress, Run
+from tracker.runs.pipeline import Progress, Run
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 

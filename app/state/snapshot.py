@@ -13,13 +13,13 @@ from app.colours import Theme
 from app.state.scores import Scores
 from tracker import parameters as table
 from tracker.corrections import Correction
-from tracker.offers import Offer
+from tracker.fusion.trajectories import Trajectories
 from tracker.parameters import MethodKey, RunParameters
-from tracker.pipeline import Run
+from tracker.review.template_suggestions import Offer
 from tracker.runs.fitting import unfit_methods
+from tracker.runs.pipeline import Run
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
-from tracker.trajectories import Trajectories
 
 Change = Literal[
     "sequence", "opening", "parameters", "playhead", "selection", "layers", "view", "theme",

@@ -29,9 +29,9 @@ from app.state.snapshot import (
 )
 from tracker import parameters as table
 from tracker.corrections import Correction
-from tracker.offers import Offer
 from tracker.parameters import ParameterError, RunParameters
-from tracker.pipeline import Run
+from tracker.review.template_suggestions import Offer
+from tracker.runs.pipeline import Run
 from tracker.sequences.sequence import Sequence
 
 

@@ -27,7 +27,7 @@ from app.web.opening import begun, told_in_the_answer
 from app.web.pictures.jpegs import Pictures
 from app.web.views import results, steps
 from app.web.views.timeline import Timelines
-from tracker import export
+from tracker.export import tracks_csv
 from tracker.runs import gaps
 from tracker.runs.run import given_names, resting_of
 from tracker.sequences import library
@@ -275,7 +275,7 @@ def export_tracks(bench: Bench) -> Response:
     name = file_name(sequence.name, "tracks.csv")
     stream = io.StringIO(newline="")
     told = gaps.sentences(run)
-    export.write_tracks_csv(
+    tracks_csv.write_tracks_csv(
         stream,
         sequence,
         tracks,

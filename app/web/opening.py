@@ -8,7 +8,7 @@ from concurrent.futures import Future
 from contextlib import contextmanager
 
 from app.errors import ApiError, sentence
-from tracker.pipeline import Cancelled
+from tracker.runs.pipeline import Cancelled
 
 OPENING_SECONDS = 1.0
 """How long a request to open waits, so that what fails at once is told in the answer."""

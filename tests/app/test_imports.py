@@ -11,7 +11,7 @@ LATER = {
     "plotly": "the report",
     "scipy.stats": "half a second for one quantile",
     "scipy.special": "a tenth of a second for a gate and a normal quantile",
-    "tracker.formats.registry": "the readers of all formats: an import's",
+    "tracker.io.read.registry": "the readers of all formats: an import's",
     "viser": "the 3D view, which starts beside the page",
     "PIL": "viser's",
     "trimesh": "viser's",
@@ -36,5 +36,5 @@ def test_the_web_imports_what_the_first_page_needs() -> None:
         check=True,
     )
     imported = set(told.stdout.split())
-    assert "tracker.pipeline" in imported
+    assert "tracker.runs.pipeline" in imported
     assert not imported & set(LATER)

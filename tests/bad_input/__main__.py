@@ -23,7 +23,7 @@ from collections import Counter
 from pathlib import Path
 from random import Random
 
-from tracker.folders import cache_folder
+from tracker.files.folders import cache_folder
 
 HANG_SECONDS = 30.0
 """A worker that says nothing for so long is ended; its kernels may be compiled before."""

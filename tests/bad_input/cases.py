@@ -15,9 +15,10 @@ from app.command.terminal import CommandError
 from tests.app.folders import write_crossing
 from tests.bad_input.drawing import Damage, damage
 from tests.synthetic import write_sequence
-from tracker import export, parameters, pipeline
-from tracker.checks import check
-from tracker.runs import gaps
+from tracker import parameters
+from tracker.export import tracks_csv
+from tracker.io.checks import check
+from tracker.runs import gaps, pipeline
 from tracker.sequences import library
 from tracker.sequences.reader import FILE, read_sequence
 from tracker.sequences.sequence import Sequence, SequenceError
@@ -101,7 +102,7 @@ def _run(sequence: Sequence) -> None:
     run = pipeline.compute(sequence, wanted, steps=min(sequence.frames, STEPS))
     gaps.sentences(run)
     stream = io.StringIO(newline="")
-    export.write_tracks_csv(stream, sequence, run.tracks, wanted, 0, done=run.done)
+    tracks_csv.write_tracks_csv(stream, sequence, run.tracks, wanted, 0, done=run.done)
     rows = csv.reader(line for line in stream.getvalue().splitlines() if line[:1] != "#")
     for row in rows:
         for cell in row:

@@ -18,18 +18,18 @@ from app.state.kept.presets import OwnPresets
 from app.state.snapshot import Event, Notice
 from app.state.workbench import Workbench
 from tests.corrections.test_log import LOG
-from tests.formats.recorded import detections, settled_of, toml
+from tests.io.read.recorded import detections, settled_of, toml
 from tests.library.runs import filled, tracks
 from tests.library.runs import run as kept_run
 from tests.single_view.networks import answering
 from tests.studies.small import recording
 from tests.synthetic import write_sequence
 from tests.test_export import PARAMETERS_OF_RUN, SEQUENCE, TRACKS
-from tracker import export
 from tracker.corrections import CorrectionError
 from tracker.corrections.log import read_log
-from tracker.formats.pieces import FormatError
-from tracker.importing.gathering import gather
+from tracker.export import tracks_csv
+from tracker.io.importing.gathering import gather
+from tracker.io.read.pieces import FormatError
 from tracker.library.bundle import unpack_bundle, write_bundle
 from tracker.library.errors import LibraryError
 from tracker.library.keeping import recording_of
@@ -80,7 +80,7 @@ def boxes_alone(folder: Path) -> None:
 
 def track_file(folder: Path) -> None:
     folder.mkdir(parents=True)
-    export.save_tracks_csv(folder / "tracks.csv", SEQUENCE, TRACKS, PARAMETERS_OF_RUN, 5)
+    tracks_csv.save_tracks_csv(folder / "tracks.csv", SEQUENCE, TRACKS, PARAMETERS_OF_RUN, 5)
 
 
 def study(folder: Path) -> None:
@@ -233,7 +233,7 @@ KINDS = {
             "tracks",
             "tracks.csv",
             track_file,
-            export.read_tracks_csv,
+            tracks_csv.read_tracks_csv,
             ("evaluate", "CROSSING", "FILE"),
             may_be_a_pipe=True,
         ),

@@ -23,13 +23,13 @@ from tests.rooms.writing import whole_folder
 from tests.studies.small import definition
 from tests.synthetic import write_sequence
 from tests.test_export import PARAMETERS_OF_RUN, SEQUENCE, TRACKS
-from tracker import export
 from tracker.corrections.kinds import make
 from tracker.corrections.log import read_log, write_log
+from tracker.export import tracks_csv
+from tracker.files.atomic import filling, write_whole
 from tracker.kernels.checked_cache import CheckedFiles
 from tracker.library import repair
 from tracker.library.store import Library
-from tracker.placing import filling, write_whole
 from tracker.runs.stage_files import StageFiles
 from tracker.sequences.reader import read_sequence
 from tracker.sequences.sequence import Sequence
@@ -156,14 +156,14 @@ def _without_gap(numbers: set[int]) -> int:
 
 
 def export_tracks(folder: Path, number: int) -> None:
-    export.save_tracks_csv(folder / "tracks.csv", SEQUENCE, TRACKS, PARAMETERS_OF_RUN, number)
+    tracks_csv.save_tracks_csv(folder / "tracks.csv", SEQUENCE, TRACKS, PARAMETERS_OF_RUN, number)
 
 
 def exported(folder: Path) -> int:
     path = folder / "tracks.csv"
     if not path.exists():
         return 0
-    found = export.read_tracks_csv(path)
+    found = tracks_csv.read_tracks_csv(path)
     assert len(found) == len(TRACKS)
     return int(found.settings["seed"])
 

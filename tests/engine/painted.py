@@ -11,7 +11,7 @@ import numpy as np
 from numpy import ndarray
 
 from tests.engine.synthetic import CAMERAS, HALF_EXTENTS, ROOM
-from tracker.camera import Camera
+from tracker.geometry.camera import Camera
 from tracker.sequences.sequence import GroundTruth, Sequence, Template, View
 from tracker.single_view.box_sizes import upright_boxes
 

@@ -10,17 +10,17 @@ import numpy as np
 from numpy import ndarray
 
 from tests.engine.synthetic import look_at
-from tracker import trajectories
-from tracker.camera import Camera
+from tracker.fusion import trajectories
 from tracker.fusion.multi_bernoulli import MultiBernoulli
 from tracker.fusion.protocol import FusionResult
 from tracker.fusion.sequential_phd import SequentialPhd
 from tracker.fusion.target_model import TargetModel
+from tracker.fusion.trajectories import Trajectories
+from tracker.geometry.camera import Camera
 from tracker.parameters import DetectionBoxParams, FusionParams, RunParameters
 from tracker.sequences.sequence import Entrance, GroundTruth, Room, Sequence, View
 from tracker.single_view.detector_boxes import trust
 from tracker.single_view.protocol import ViewResult
-from tracker.trajectories import Trajectories
 
 HALF_EXTENTS = np.array([0.3, 0.3, 0.85])
 METHODS = (MultiBernoulli, SequentialPhd)

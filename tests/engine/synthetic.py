@@ -12,8 +12,8 @@ from tests.world import HEAD as HALF_EXTENTS
 from tests.world import SMALL_CAMERAS as CAMERAS
 from tests.world import SMALL_ROOM as ROOM
 from tests.world import surveillance as look_at
-from tracker.camera import Camera
 from tracker.filters.gaussian_mixture import GaussianMixture
+from tracker.geometry.camera import Camera
 from tracker.sequences.sequence import Detections, GroundTruth, Room, Sequence, View
 from tracker.single_view.protocol import ViewResult
 

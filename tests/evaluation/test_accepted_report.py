@@ -19,16 +19,9 @@ from tracker.evaluation import EvaluationSettings
 from tracker.evaluation.report.page import report_html
 from tracker.evaluation.report.tables import parameter_table
 from tracker.evaluation.summary import evaluate_sequence
-from tracker.parameters import (
-    METHODS,
-    PARAMETERS,
-    RunParameters,
-    stage_values,
-    value,
-    with_values,
-)
+from tracker.fusion.trajectories import Trajectories
+from tracker.parameters import METHODS, PARAMETERS, RunParameters, stage_values, value, with_values
 from tracker.sequences.sequence import Room, Sequence, View
-from tracker.trajectories import Trajectories
 
 ACCEPTED = Path(__file__).with_name("accepted_report.html")
 

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from tests.evaluation.scenes import HALF_EXTENTS, comparison, tracks_of, truth_of
-from tracker.camera import Camera
 from tracker.evaluation import EvaluationSettings, evaluate
 from tracker.evaluation.measures.clear import clear
 from tracker.evaluation.measures.gospa import gospa_parts
@@ -18,6 +17,7 @@ from tracker.evaluation.measures.matching import assign, match, to_rows
 from tracker.evaluation.measures.ospa import ospa_parts
 from tracker.evaluation.pixels import pixels
 from tracker.evaluation.positions import positions
+from tracker.geometry.camera import Camera
 
 ONE = truth_of([(0, 1, 0, 0, 0)])
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from tests.evaluation.scenes import by_hand, comparison, tracks_of, truth_of
-from tracker.camera import Camera
 from tracker.evaluation.measures.clear import clear
 from tracker.evaluation.measures.gospa import gospa
 from tracker.evaluation.measures.hota import hota
@@ -15,6 +14,7 @@ from tracker.evaluation.measures.matching import Measure
 from tracker.evaluation.measures.ospa import ospa, ospa2, ospa2_whole
 from tracker.evaluation.pixels import pixels
 from tracker.evaluation.positions import cardinality_error, positions
+from tracker.geometry.camera import Camera
 
 
 def test_clear():

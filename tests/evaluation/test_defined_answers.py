@@ -7,16 +7,11 @@ import json
 import numpy as np
 import pytest
 
-from tests.evaluation.scenes import (
-    HALF_EXTENTS,
-    Columns,
-    tracks_of,
-    truth_of,
-)
-from tracker.camera import Camera
+from tests.evaluation.scenes import HALF_EXTENTS, Columns, tracks_of, truth_of
 from tracker.evaluation import EvaluationSettings, evaluate
 from tracker.evaluation.measures.matching import to_rows
-from tracker.trajectories import Trajectories
+from tracker.fusion.trajectories import Trajectories
+from tracker.geometry.camera import Camera
 
 CAMERA = Camera(
     "front",

@@ -7,12 +7,7 @@ import json
 import pytest
 from pydantic import ValidationError
 
-from tests.evaluation.scenes import (
-    HALF_EXTENTS,
-    by_hand,
-    perturbed,
-    walks,
-)
+from tests.evaluation.scenes import HALF_EXTENTS, by_hand, perturbed, walks
 from tracker.evaluation import DEFINITIONS, EvaluationSettings, compare, evaluate
 from tracker.evaluation.difference import verdict
 from tracker.evaluation.figures import SOURCES, number

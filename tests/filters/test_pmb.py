@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy import ndarray
 from numpy.testing import assert_allclose
 
-from tests.association.test_association import exact
+from tests.filters.association.test_association import exact
 from tracker.filters import pmb
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.kernels.kalman import Expected

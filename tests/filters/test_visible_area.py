@@ -10,8 +10,8 @@ from numpy import ndarray
 from scipy.spatial import ConvexHull
 
 from tests.world import look_at, volume
-from tracker.camera import Camera
 from tracker.filters.models import visible_area
+from tracker.geometry.camera import Camera
 
 ROOM = volume(2.0, 2.5)
 

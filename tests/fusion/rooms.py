@@ -8,13 +8,13 @@ import numpy as np
 from numpy import ndarray
 
 from tests import world
-from tracker.camera import Camera
 from tracker.fusion.measurement_births import BirthModel, Evidence, MeasurementBirths
 from tracker.fusion.model import all_boxes
 from tracker.fusion.multi_bernoulli import MultiBernoulli
 from tracker.fusion.protocol import FusionResult
 from tracker.fusion.sequential_phd import SequentialPhd
 from tracker.fusion.target_model import MeasurementKind, TargetModel
+from tracker.geometry.camera import Camera
 from tracker.kernels.gating import Measurements
 from tracker.parameters import FusionParams, RunParameters
 from tracker.sequences.sequence import Room, Sequence

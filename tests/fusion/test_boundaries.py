@@ -21,7 +21,6 @@ from tests.fusion.rooms import (
     exact,
     of_boxes,
 )
-from tracker.camera import stacked
 from tracker.corrections.kinds import make
 from tracker.filters.gaussian_mixture import GaussianMixture, gate_distance
 from tracker.fusion import sight
@@ -36,11 +35,12 @@ from tracker.fusion.sequential_phd import SequentialPhd, SequentialPhdState
 from tracker.fusion.sight import Glimpse
 from tracker.fusion.target_model import TargetModel
 from tracker.fusion.told import obey, told_by_step
+from tracker.fusion.trajectories import Bounds, by_boxes, extract
+from tracker.geometry.camera import stacked
 from tracker.kernels import births as kernels
 from tracker.kernels.births import Refinement
 from tracker.parameters import FusionParams, RunParameters
 from tracker.single_view.protocol import ViewResult
-from tracker.trajectories import Bounds, by_boxes, extract
 
 PLACE = np.array([0.4, -0.3, 0.85])
 ABOVE = 1e-9

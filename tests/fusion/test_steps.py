@@ -26,8 +26,8 @@ from tests.fusion.rooms import (
     of_boxes,
     reordered,
 )
-from tracker import trajectories
 from tracker.filters.gaussian_mixture import GaussianMixture
+from tracker.fusion import trajectories
 from tracker.fusion.labels.memory import Memory
 from tracker.fusion.labels.reidentification import Identities
 from tracker.fusion.model import FusionModel

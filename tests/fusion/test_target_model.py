@@ -11,8 +11,8 @@ from numpy.testing import assert_allclose
 
 from tests.fusion.rooms import CAMERAS, HALF_EXTENTS
 from tests.world import BARREL, look_at
-from tracker.camera import Camera
 from tracker.fusion.target_model import SIZES, MeasurementKind, TargetModel, UpdateKind
+from tracker.geometry.camera import Camera
 from tracker.kernels import kalman
 from tracker.kernels.gating import Measurements
 from tracker.single_view.protocol import ViewResult

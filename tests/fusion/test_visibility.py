@@ -12,10 +12,10 @@ from scipy.stats import norm
 
 from tests.fusion.rooms import CAMERAS, HALF_EXTENTS
 from tests.world import look_at
-from tracker.camera import Camera
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion.target_model import ExpectedBoxes, TargetModel
 from tracker.fusion.visibility import Visibility, inside_probability, visibility
+from tracker.geometry.camera import Camera
 
 MODEL = TargetModel(HALF_EXTENTS, "box")
 FRONT = look_at("front", (0.0, -5.0, 1.2), (0.0, 0.0, 0.9), focal=600.0, image_size=(800, 600))

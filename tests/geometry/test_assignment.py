@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tracker.assignment import linear_sum_assignment, names_by_majority, pairs_within
+from tracker.geometry.assignment import linear_sum_assignment, names_by_majority, pairs_within
 
 
 @given(st.integers(0, 10_000), st.integers(1, 4), st.integers(1, 4), st.booleans())

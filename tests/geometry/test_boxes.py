@@ -7,7 +7,7 @@ import pytest
 from numpy import ndarray
 from numpy.testing import assert_allclose, assert_array_equal
 
-from tracker.boxes import Boxes, box_overlaps, paired_overlaps
+from tracker.geometry.boxes import Boxes, box_overlaps, paired_overlaps
 
 CENTRED = np.array([[10.0, 20.0, 3.0, 5.0], [0.5, -1.0, 0.5, 0.25]])
 CORNERS = np.array([[7.0, 15.0, 13.0, 25.0], [0.0, -1.25, 1.0, -0.75]])

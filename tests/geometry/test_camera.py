@@ -17,7 +17,7 @@ from tests.world import HEAD, PERSON
 from tests.world import SMALL_CAMERAS as CAMERAS
 from tests.world import SMALL_ROOM as ROOM
 from tests.world import surveillance as look_at
-from tracker.camera import NEAREST_DEPTH, Camera, stacked
+from tracker.geometry.camera import NEAREST_DEPTH, Camera, stacked
 from tracker.kernels import lens
 
 PINHOLE = look_at("pinhole", (-3.0, -3.0, 2.5), distortion=np.zeros(5))

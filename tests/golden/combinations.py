@@ -6,9 +6,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from tracker import pipeline
 from tracker.parameters import METHODS, PARAMETERS, PRESETS, RunParameters, with_values
-from tracker.pipeline import Run
+from tracker.runs import pipeline
+from tracker.runs.pipeline import Run
 from tracker.sequences.sequence import Sequence
 
 _BOXES = ("none", "detection_phd")

@@ -17,7 +17,7 @@ from tests.golden.combinations import alternatives, combinations, runs
 from tests.golden.pieces import PIECES
 from tests.rooms import ROOMS, render
 from tracker.evaluation import evaluate_sequence
-from tracker.pipeline import Run
+from tracker.runs.pipeline import Run
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 

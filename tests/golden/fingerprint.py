@@ -12,7 +12,7 @@ from numpy import ndarray
 
 from tests.golden.combinations import Combination
 from tracker.evaluation import evaluate_sequence
-from tracker.pipeline import Run
+from tracker.runs.pipeline import Run
 
 COLUMNS: dict[str, tuple[str, ...]] = {
     "single_view": (

@@ -16,7 +16,7 @@ from tests.golden.exact import digest, of_run
 from tests.golden.fingerprint import Fingerprint, fingerprints
 from tests.golden.pieces import cut
 from tracker.parameters import METHODS, PARAMETERS
-from tracker.pipeline import Run
+from tracker.runs.pipeline import Run
 
 STEPS = 12
 

@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.stats import norm
 
 from tests.world import BARREL, PERSON, ring, upright
-from tracker.camera import Camera
+from tracker.geometry.camera import Camera
 from tracker.kernels import boxes as kernels
 
 HALF_HEIGHT, HALF_WIDTH = PERSON[2], PERSON[0]

@@ -11,10 +11,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.kernels.test_bernoulli_kernels import people
 from tests.world import PERSON, gaussians, ring
-from tracker.camera import stacked
 from tracker.filters import gaussian_mixture
 from tracker.filters.gaussian_mixture import GaussianMixture, concatenate
 from tracker.fusion.target_model import TargetModel
+from tracker.geometry.camera import stacked
 from tracker.kernels import linear_algebra
 from tracker.kernels.gating import Measurements
 from tracker.kernels.labelled import camera_update, step

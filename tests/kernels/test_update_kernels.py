@@ -12,9 +12,9 @@ from numpy import ndarray
 from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.world import PERSON, boxes, ring, views
-from tracker import association
-from tracker.camera import stacked
+from tracker.filters import association
 from tracker.fusion.target_model import MeasurementKind, TargetModel
+from tracker.geometry.camera import stacked
 from tracker.kernels import births as birth_kernels
 from tracker.kernels.gating import Measurements
 from tracker.kernels.labelled import marginals as marginal_kernels

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
+from tracker.fusion.trajectories import Trajectories
 from tracker.library.columns import KeptTracks
 from tracker.library.records import NewRecording, NewRun
 from tracker.library.store import Library
 from tracker.parameters import RunParameters
-from tracker.trajectories import Trajectories
 
 RECORDING = NewRecording("room44-3p", "room44-3p", "rendered", "d", 2, 500, 25.0, True, False, 3)
 

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.library.runs import KEPT, tracks
+from tracker.fusion.trajectories import Trajectories
 from tracker.library.columns import KeptTracks, pack, unpack
-from tracker.trajectories import Trajectories
 
 EXACT = ("frames", "ids", "positions", "seen", "components", "labels")
 

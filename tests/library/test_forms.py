@@ -19,12 +19,11 @@ import trimesh
 
 from app.command.arguments.library import FormatName
 from tests.library.written import STEPS, written
-from tracker import export
 from tracker.evaluation import EvaluationSettings, evaluate
-from tracker.writing import json_file
-from tracker.writing.palette import rgb
-from tracker.writing.registry import FORMATS, format_of, save
-from tracker.writing.written import Options, Stopped
+from tracker.export import json_file, tracks_csv
+from tracker.export.palette import rgb
+from tracker.export.registry import FORMATS, format_of, save
+from tracker.export.written import Options, Stopped
 
 WRITTEN = written()
 TRACKS = WRITTEN.tracks
@@ -54,7 +53,7 @@ def test_the_form_follows_from_the_suffix_or_is_named() -> None:
 
 
 def test_csv(tmp_path: Path) -> None:
-    back = export.read_tracks_csv(saved(tmp_path, "csv"))
+    back = tracks_csv.read_tracks_csv(saved(tmp_path, "csv"))
     np.testing.assert_allclose(back.positions, TRACKS.positions, atol=5.1e-5)
     assert back.settings["seed"] == "5"
 

@@ -13,13 +13,13 @@ import pytest
 
 from tests.library.written import written
 from tests.synthetic import number_in, write_sequence
+from tracker.export.palette import rgb
+from tracker.export.registry import FORMATS, save
+from tracker.export.video.drawing import Mosaic
+from tracker.export.written import Options, Stopped, Written
+from tracker.fusion.trajectories import Trajectories
 from tracker.parameters import RunParameters
 from tracker.sequences.reader import read_sequence
-from tracker.trajectories import Trajectories
-from tracker.writing.palette import rgb
-from tracker.writing.registry import FORMATS, save
-from tracker.writing.video.drawing import Mosaic
-from tracker.writing.written import Options, Stopped, Written
 
 MP4 = FORMATS["mp4"]
 

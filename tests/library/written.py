@@ -7,10 +7,10 @@ import dataclasses
 import numpy as np
 
 from tests.engine import synthetic
+from tracker.export.written import Written
+from tracker.fusion.trajectories import Trajectories
 from tracker.parameters import RunParameters, with_values
 from tracker.sequences.sequence import GroundTruth, Sequence
-from tracker.trajectories import Trajectories
-from tracker.writing.written import Written
 
 STEPS = 60
 

@@ -31,7 +31,7 @@ def made_pages() -> dict[Path, Callable[[], str]]:
     """Every file that is made, whole or in part, and how."""
     from tests.manual import command_line, rooms, tuning
     from tests.manual.records import results
-    from tracker.writing import json_file
+    from tracker.export import json_file
 
     return {
         PAGES / "command-line.md": command_line.page,

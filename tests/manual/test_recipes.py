@@ -13,8 +13,8 @@ from pydantic import Field
 from app.web.server import ROUTERS
 from tests.manual.places import PAGES, ROOT
 from tests.manual.records import sweeps
-from tracker.formats.protocol import Format
-from tracker.formats.registry import FORMATS
+from tracker.io.read.protocol import Format
+from tracker.io.read.registry import FORMATS
 from tracker.parameters import PARAMETERS, methods
 from tracker.parameters.definition import Params, ui
 from tracker.parameters.registry import BUILT_IN, ENTRY_POINTS

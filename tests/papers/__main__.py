@@ -15,13 +15,7 @@ import tyro
 from tyro.conf import FlagCreatePairsOff, Positional, UseAppendAction, arg
 
 from app.command.terminal import Bar, CommandError, check_data, print_table
-from tests.papers.laboratory.experiment import (
-    Context,
-    Experiment,
-    RandomRooms,
-    Result,
-    Unavailable,
-)
+from tests.papers.laboratory.experiment import Context, Experiment, RandomRooms, Result, Unavailable
 from tests.papers.laboratory.writing import write
 from tests.papers.registry import EXPERIMENTS
 from tracker.parameters import ParameterError

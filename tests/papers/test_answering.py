@@ -6,10 +6,10 @@ import numpy as np
 
 from tests.papers.laboratory.answering import Truthful
 from tracker.corrections import Place
-from tracker.doubts import Alternative, Doubt
-from tracker.doubts.doubt import unsaid
+from tracker.fusion.trajectories import Trajectories
+from tracker.review.queue import Alternative, Doubt
+from tracker.review.queue.doubt import unsaid
 from tracker.sequences.sequence import GroundTruth
-from tracker.trajectories import Trajectories
 
 
 def tracks(rows: list[tuple[int, int, float]]) -> Trajectories:

@@ -17,13 +17,7 @@ from tests.papers.clips.association import (
     true_mask,
 )
 from tests.papers.clips.clip import Actor, Clip, constant_size, wall
-from tests.papers.clips.light import (
-    ADAPTIVE,
-    ROBUST,
-    FixedForeground,
-    Light,
-    models,
-)
+from tests.papers.clips.light import ADAPTIVE, ROBUST, FixedForeground, Light, models
 from tracker.parameters import ForegroundParams
 from tracker.single_view.protocol import ViewResult
 

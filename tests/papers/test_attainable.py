@@ -8,7 +8,7 @@ import pytest
 from tests.engine.synthetic import sequence as boxes_of
 from tests.papers.laboratory.attainable import Attainable, attainable
 from tracker.evaluation import EvaluationSettings
-from tracker.trajectories import Trajectories
+from tracker.fusion.trajectories import Trajectories
 
 STEPS = 40
 PATHS = {1: 0.0, 2: 5.0, 3: 10.0}

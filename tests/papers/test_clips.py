@@ -10,15 +10,7 @@ import pytest
 from numpy import ndarray
 from numpy.testing import assert_allclose, assert_array_equal
 
-from tests.papers.clips.clip import (
-    Actor,
-    Clip,
-    constant_size,
-    plane_camera,
-    through,
-    wall,
-    write,
-)
+from tests.papers.clips.clip import Actor, Clip, constant_size, plane_camera, through, wall, write
 from tracker.sequences.pictures.frames import FrameReader
 
 STEPS, SIZE = 12, (96, 72)

@@ -24,14 +24,8 @@ from tests.rooms.rooms import (
 )
 from tests.rooms.scene import Scene
 from tests.rooms.studio import Studio, in_order, studio_of
-from tests.rooms.writing import (
-    Description,
-    Marked,
-    RenderCancelled,
-    describe,
-    whole_folder,
-)
-from tracker.camera import Camera
+from tests.rooms.writing import Description, Marked, RenderCancelled, describe, whole_folder
+from tracker.geometry.camera import Camera
 
 VISIBILITY_FILE = "visibility.csv"
 _QUALITY = 82

@@ -10,7 +10,7 @@ from numpy import ndarray
 
 from tests.rooms.cast.casts import CROSSING, MEETING, THREE, Person
 from tests.rooms.walls.interior import Decor
-from tracker.camera import Camera
+from tracker.geometry.camera import Camera
 
 VOLUME_MINIMUM = np.array([-1.5, -1.5, 0.0])
 VOLUME_MAXIMUM = np.array([1.5, 1.5, 2.0])

@@ -27,12 +27,7 @@ from tests.rooms.cast.gait import (
 from tests.rooms.cast.paths import Path, walk
 from tests.rooms.cast.people import Body, build
 from tests.rooms.lighting import Placed, Skeleton, Surface, place_bodies
-from tests.rooms.rooms import (
-    TARGET_HALF_EXTENTS,
-    VOLUME_MAXIMUM,
-    VOLUME_MINIMUM,
-    RoomSpec,
-)
+from tests.rooms.rooms import TARGET_HALF_EXTENTS, VOLUME_MAXIMUM, VOLUME_MINIMUM, RoomSpec
 from tests.rooms.walls.background import AMBIENT
 from tests.rooms.walls.interior import FAR, RIGHT
 

@@ -15,24 +15,12 @@ from numpy import ndarray
 from scipy.ndimage import gaussian_filter
 
 from tests.rooms.lighting import floor_shadows
-from tests.rooms.raster import (
-    Backdrop,
-    Figures,
-    Mesh,
-    Sensor,
-    draw,
-)
+from tests.rooms.raster import Backdrop, Figures, Mesh, Sensor, draw
 from tests.rooms.rooms import CAMERAS, TARGET_HALF_EXTENTS, RoomSpec
 from tests.rooms.scene import Scene, script, shadow_balls
-from tests.rooms.walls.background import (
-    FINE,
-    Background,
-    Tracer,
-    lamp_table,
-    render_background,
-)
+from tests.rooms.walls.background import FINE, Background, Tracer, lamp_table, render_background
 from tests.rooms.walls.interior import LEFT, NEAR, Interior, furnish
-from tracker.camera import Camera
+from tracker.geometry.camera import Camera
 
 Result = TypeVar("Result")
 

@@ -9,12 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
-from tests.rooms import (
-    ROOMS,
-    RenderCancelled,
-    read_visibility,
-    render,
-)
+from tests.rooms import ROOMS, RenderCancelled, read_visibility, render
 from tests.rooms.avi import AviWriter, compress
 from tests.rooms.cast.paths import FASTEST, FRAMES_PER_SECOND, walk
 from tests.rooms.lighting import floor_shadows

@@ -23,7 +23,7 @@ from tests.rooms.random_rooms.rig import drawn_by, mount
 from tests.rooms.random_rooms.sensors import record
 from tests.rooms.random_rooms.shell import build_shell
 from tests.rooms.walls.background import Background
-from tracker.camera import Camera
+from tracker.geometry.camera import Camera
 from tracker.sequences.reader import read_sequence
 
 SEED = 71

@@ -13,8 +13,8 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from tracker.camera import Camera
-from tracker.placing import beside, sweep, sync_file, sync_folder
+from tracker.files.atomic import beside, sweep, sync_file, sync_folder
+from tracker.geometry.camera import Camera
 
 SUMS = "SHA256SUMS"
 """The SHA-256 of every file of a rendered folder, in the form of ``sha256sum``."""

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from tests.runs import work
-from tracker.pipeline import Cancelled
+from tracker.runs.pipeline import Cancelled
 from tracker.runs.processes import available_cores, map_in_processes
 
 pytestmark = pytest.mark.full

@@ -11,14 +11,14 @@ import cv2
 import numpy as np
 import pytest
 
-from tests.pictures.furnished import empty_room, person_mask, photograph, with_person
+from tests.single_view.pictures.furnished import empty_room, person_mask, photograph, with_person
 from tests.synthetic import camera_toml, head_toml, write_sequence
 from tracker.library import bundle
 from tracker.parameters import ForegroundParams, RunParameters
-from tracker.pictures.foreground import BackgroundModel, learn, learn_background
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.reader import read_sequence
 from tracker.sequences.sequence import Sequence, SequenceError
+from tracker.single_view.pictures.foreground import BackgroundModel, learn, learn_background
 from tracker.single_view.working.sequence import Working
 
 _Made = TypeVar("_Made")

@@ -12,9 +12,10 @@ import pytest
 
 from app.command import main as cli
 from tests.synthetic import CODECS, number_in, write_sequence, write_video
-from tracker import export, parameters, pipeline
-from tracker.pipeline import Run
-from tracker.runs import gaps
+from tracker import parameters
+from tracker.export import tracks_csv
+from tracker.runs import gaps, pipeline
+from tracker.runs.pipeline import Run
 from tracker.runs.stage_cache import StageCache
 from tracker.runs.stage_files import StageFiles
 from tracker.sequences.pictures.frames import FrameReader
@@ -112,7 +113,7 @@ def test_a_short_video_is_told_on_opening_and_counted(
     told = '20 of 30 pictures of camera "cam2" are missing'
     assert told in capsys.readouterr().err.strip().splitlines()[-1]
     assert f"# incomplete: {told}\n" in output.read_text(encoding="utf-8")
-    assert export.read_tracks_csv(output).remarks == (told,)
+    assert tracks_csv.read_tracks_csv(output).remarks == (told,)
     assert cli.main([*words, "--strict"]) == 1
     assert output.is_file()
 

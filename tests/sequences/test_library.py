@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from tests.synthetic import write_sequence
-from tracker.folders import cache_folder
+from tracker.files.folders import cache_folder
 from tracker.sequences import library
 from tracker.sequences.built_in import (
     BUILT_IN,

@@ -11,11 +11,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from tracker.files.text import shown
 from tracker.sequences import csv_columns
 from tracker.sequences.calibration import POSE, check_sight, read_camera
 from tracker.sequences.clock import Clock, read_timing
 from tracker.sequences.csv_columns import Columns, guarded, read_columns, unguarded
-from tracker.sequences.fields import Fields, did_you_mean, is_number, listed, shown
+from tracker.sequences.fields import Fields, did_you_mean, is_number, listed
 from tracker.sequences.sequence import Room, SequenceError, View
 from tracker.sequences.tables import BoxTable, truth_of
 from tracker.sequences.writing.taught_fields import read_room, read_templates

@@ -15,8 +15,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.synthetic import write_sequence
-from tracker import pipeline
 from tracker.parameters import with_values
+from tracker.runs import pipeline
 from tracker.sequences.reader import FILE, read_sequence
 from tracker.sequences.sequence import Sequence, SequenceError
 from tracker.sequences.writing import saving

@@ -8,10 +8,10 @@ import numpy as np
 from numpy import ndarray
 
 from tracker.parameters import AssociationMatrixParams
-from tracker.pictures.blobs import Blobs, blobs
 from tracker.single_view.association_matrix.following import object_histograms
 from tracker.single_view.association_matrix.handing_over import advance
 from tracker.single_view.association_matrix.moving_objects import Situation
+from tracker.single_view.pictures.blobs import Blobs, blobs
 from tracker.single_view.protocol import ViewEvent
 
 SIZE = (80, 200)

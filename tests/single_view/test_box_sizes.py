@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from tests import world
 from tests.single_view.detected import CAMERA, detected, run
 from tracker import single_view
-from tracker.boxes import Boxes
+from tracker.geometry.boxes import Boxes
 from tracker.parameters import DetectionBoxParams, RunParameters, with_values
 from tracker.sequences.sequence import Room
 from tracker.single_view import box_sizes

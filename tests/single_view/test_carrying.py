@@ -13,14 +13,14 @@ from numpy.testing import assert_allclose
 from tests import world
 from tests.single_view.conftest import COLOURS
 from tests.single_view.test_scenes import stays
-from tracker.boxes import Boxes
+from tracker.geometry.boxes import Boxes
 from tracker.parameters import ForegroundParams
-from tracker.pictures.foreground import learn
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.reader import read_sequence
 from tracker.sequences.sequence import Sequence, Template
 from tracker.single_view.colour.carrying import with_carried
 from tracker.single_view.colour.trust import template_trust
+from tracker.single_view.pictures.foreground import learn
 
 STEPS, TAUGHT = 6, 3
 PATHS = world.together(

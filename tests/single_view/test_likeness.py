@@ -11,12 +11,12 @@ from numpy.testing import assert_allclose
 
 from tests.single_view.test_scenes import truth
 from tracker.parameters import ColourPhdParams
-from tracker.pictures import colour
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.colour import templates
 from tracker.single_view.colour.likeness import Likeness, looks_of
 from tracker.single_view.colour.templates import read_templates
+from tracker.single_view.pictures import colour
 
 
 def likeness_of(sequence: Sequence) -> Likeness | None:

@@ -17,10 +17,10 @@ from tests import world
 from tests.single_view.networks import answering, pooling, sized
 from tests.single_view.test_scenes import truth
 from tests.world import surveillance as look_at
-from tracker import pipeline
-from tracker.boxes import Boxes
-from tracker.camera import Camera
+from tracker.geometry.boxes import Boxes
+from tracker.geometry.camera import Camera
 from tracker.parameters import RunParameters, with_values
+from tracker.runs import pipeline
 from tracker.runs.run import stage_keys
 from tracker.sequences.library import with_detector
 from tracker.sequences.reader import read_sequence

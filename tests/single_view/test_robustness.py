@@ -20,11 +20,12 @@ from tests.single_view.test_scenes import (
     numbers,
     run,
 )
-from tracker import pipeline, single_view
+from tracker import single_view
 from tracker.parameters import RunParameters, with_values
-from tracker.pictures.foreground import unpack
+from tracker.runs import pipeline
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence, View
+from tracker.single_view.pictures.foreground import unpack
 
 
 @every_variant

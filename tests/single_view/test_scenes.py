@@ -18,11 +18,11 @@ from numpy.testing import assert_allclose
 from tests import world
 from tracker import single_view
 from tracker.parameters import PRESETS, RunParameters, with_values
-from tracker.pictures.foreground import unpack
 from tracker.sequences.pictures.frames import FrameReader, Picture
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.colour import peaks
 from tracker.single_view.colour.trust import shapes_of_templates
+from tracker.single_view.pictures.foreground import unpack
 from tracker.single_view.protocol import ViewResult
 
 KEPT = Path(__file__).with_name("scenes.json")

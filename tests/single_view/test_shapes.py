@@ -12,13 +12,13 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from tests import world
 from tracker.kernels.pictures.channels import ORIENTATIONS, gradients
-from tracker.pictures.foreground import BackgroundModel, tone_curve
-from tracker.pictures.foreground.exposure import square_roots
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import upright_boxes
 from tracker.single_view.colour.evidence import colour_ratios
 from tracker.single_view.colour.trust import taught_well
+from tracker.single_view.pictures.foreground import BackgroundModel, tone_curve
+from tracker.single_view.pictures.foreground.exposure import square_roots
 from tracker.single_view.shape.channels import Channels
 from tracker.single_view.shape.finder import ShapeFinder, Shapes, strongest
 from tracker.single_view.shape.windows import ABOVE, BELOW, CROWNS, WIDTH, Windows

@@ -13,10 +13,10 @@ from tests.world import HEAD as HALF_EXTENTS
 from tests.world import SMALL_CAMERAS as CAMERAS
 from tests.world import SMALL_ROOM as ROOM
 from tracker.parameters import AssociationMatrixParams
-from tracker.pictures.blobs import blobs
 from tracker.single_view.association_matrix.joining import join
 from tracker.single_view.association_matrix.silhouettes import Fits, Silhouettes
 from tracker.single_view.box_sizes import upright_boxes
+from tracker.single_view.pictures.blobs import blobs
 
 CAMERA = CAMERAS[0]
 NUMBERS = AssociationMatrixParams(acceptance=-2.0, further_acceptance=-1.4, spare_acceptance=-0.7)

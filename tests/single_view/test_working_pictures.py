@@ -16,14 +16,14 @@ from numpy import ndarray
 from tests import world
 from tests.world import PERSON as HALF_EXTENTS
 from tests.world import SMALL_CAMERAS, SMALL_ROOM
-from tracker.camera import Camera
+from tracker.geometry.camera import Camera
 from tracker.parameters import RunParameters, with_values
 from tracker.parameters.groups.pictures import PictureParams
-from tracker.pictures.foreground import pack, unpack
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence, Template, View
 from tracker.single_view.box_sizes import upright_boxes
 from tracker.single_view.dropped import Dropped
+from tracker.single_view.pictures.foreground import pack, unpack
 from tracker.single_view.protocol import ViewResult
 from tracker.single_view.working.sequence import Working
 from tracker.single_view.working.view import WorkingView, working_view

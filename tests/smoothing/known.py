@@ -9,8 +9,8 @@ import numpy as np
 from numpy import ndarray
 
 from tests import world
-from tracker.camera import Camera
 from tracker.fusion.protocol import Associations, FusionResult
+from tracker.geometry.camera import Camera
 from tracker.parameters import RunParameters, with_values
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult

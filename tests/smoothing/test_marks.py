@@ -12,8 +12,8 @@ from numpy.testing import assert_allclose
 from tests.smoothing.known import CAMERAS, PLAIN, Known
 from tests.smoothing.test_positions_laws import one_walker
 from tests.world import PERSON as HALF_EXTENTS
-from tracker.boxes import Boxes
-from tracker.camera import Camera
+from tracker.geometry.boxes import Boxes
+from tracker.geometry.camera import Camera
 from tracker.parameters import with_values
 from tracker.sequences.sequence import Sequence, Template
 from tracker.smoothing import create

@@ -11,12 +11,12 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from tests import world
 from tests.smoothing.known import known
-from tracker import trajectories
+from tracker.fusion import trajectories
 from tracker.fusion.protocol import Associations, FusionResult
+from tracker.fusion.trajectories import Bounds
 from tracker.smoothing.reading import read_links, read_paths
 from tracker.smoothing.result import Smoothed
 from tracker.smoothing.tracks import names_of, tracks_of
-from tracker.trajectories import Bounds
 
 ROOM = world.volume()
 

@@ -9,10 +9,10 @@ import pytest
 
 from tests.app.folders import write_crossing
 from tests.studies.small import Serial
-from tracker import pipeline
 from tracker.corrections.kinds import make
 from tracker.corrections.log import place_of, read_log, write_log
 from tracker.library.store import open_library
+from tracker.runs import pipeline
 from tracker.sequences.library import open_sequence
 from tracker.studies.batches import BatchRun, places_of, run_batch
 from tracker.studies.work.working import tracks_hash

@@ -12,16 +12,16 @@ import pytest
 
 from tests.studies.processes import cluster, finish, kill, outcomes, start, wait, workers_of
 from tests.studies.small import definition, recording
-from tracker import pipeline
+from tracker.export.registry import format_of, save
+from tracker.export.written import Options, Written
 from tracker.parameters import with_values
+from tracker.runs import pipeline
 from tracker.sequences.library import open_sequence
 from tracker.studies.kept.store import Store, create
 from tracker.studies.opened import open_recordings
 from tracker.studies.told.commands import changes_of, track_commands
 from tracker.studies.work import recordings, working
 from tracker.studies.work.working import tracks_hash
-from tracker.writing.registry import format_of, save
-from tracker.writing.written import Options, Written
 
 pytestmark = [
     pytest.mark.full,

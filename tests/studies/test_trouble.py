@@ -15,7 +15,7 @@ from app.command.arguments.studies import Where
 from app.command.commands.studies import crew_of
 from app.command.terminal import CommandError
 from tests.studies.small import Serial, definition, made_up, run
-from tracker.placing import write_whole
+from tracker.files.atomic import write_whole
 from tracker.studies.errors import StudyError
 from tracker.studies.kept import writer
 from tracker.studies.kept.records import Status

@@ -14,10 +14,10 @@ from tests.rooms.random_rooms.figures import HALF_EXTENTS
 from tracker import parameters as table
 from tracker.kernels.pictures.channels import cell_means
 from tracker.parameters import RunParameters
-from tracker.pictures.foreground import learn_background
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.reader import read_sequence
 from tracker.sequences.sequence import Sequence
+from tracker.single_view.pictures.foreground import learn_background
 from tracker.single_view.shape.channels import Channels
 from tracker.single_view.shape.finder import PIXELS_PER_METRE
 from tracker.single_view.shape.trees import Trees

@@ -19,10 +19,10 @@ from pydantic import ValidationError
 
 from tracker.corrections.contradictions import refuse_contradiction
 from tracker.corrections.kinds import KINDS, Correction, CorrectionError, sentence_of
-from tracker.folders import settings_folder
-from tracker.placing import replacing
+from tracker.files.atomic import replacing
+from tracker.files.folders import settings_folder
+from tracker.files.text import not_utf_8
 from tracker.sequences.built_in import EARLIER, earlier_key, key_of, opens_by_name
-from tracker.visible import not_utf_8
 
 FILE = "corrections.toml"
 FORMAT = 1

@@ -8,8 +8,8 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from tracker.camera import Camera
 from tracker.corrections.kinds import CorrectionError
+from tracker.geometry.camera import Camera
 
 _FLAT = 0.02
 """Sine of the angle to the floor below which a ray says nothing of how far away somebody is."""

@@ -12,9 +12,9 @@ import numpy as np
 from jaxtyping import Int
 from numpy import ndarray
 
-from tracker.assignment import names_by_majority
 from tracker.corrections.kinds import Correction, Place
 from tracker.corrections.seeking import Whereabouts, mostly_inside
+from tracker.geometry.assignment import names_by_majority
 
 
 class _Segments:

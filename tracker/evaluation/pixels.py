@@ -15,9 +15,9 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from tracker.boxes import box_overlaps
-from tracker.camera import Camera
 from tracker.evaluation.measures.matching import Comparison, Rows, assign
+from tracker.geometry.boxes import box_overlaps
+from tracker.geometry.camera import Camera
 
 
 @dataclass(frozen=True, slots=True, eq=False)

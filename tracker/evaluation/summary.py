@@ -8,7 +8,6 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from tracker.camera import Camera
 from tracker.evaluation.figures import DEFINITIONS, Figure
 from tracker.evaluation.measures.clear import clear
 from tracker.evaluation.measures.gospa import gospa
@@ -21,6 +20,7 @@ from tracker.evaluation.positions import cardinality_error, positions
 from tracker.evaluation.result import Evaluation, Pairs, Series
 from tracker.evaluation.settings import EvaluationSettings
 from tracker.evaluation.tables import person_rows, track_rows
+from tracker.geometry.camera import Camera
 from tracker.sequences.sequence import GroundTruth, Sequence
 
 

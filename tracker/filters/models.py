@@ -14,9 +14,9 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from tracker.camera import Camera
 from tracker.filters import gaussian_mixture
 from tracker.filters.gaussian_mixture import GaussianMixture
+from tracker.geometry.camera import Camera
 from tracker.parameters import FusionParams
 from tracker.sequences.sequence import Room
 

@@ -13,8 +13,8 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from tracker import association
-from tracker.association import Marginals
+from tracker.filters import association
+from tracker.filters.association import Marginals
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.kernels.gating import Measurements
 from tracker.kernels.kalman import Expected

@@ -8,8 +8,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
-from tracker.camera import Camera, stacked
 from tracker.fusion.target_model import TargetModel
+from tracker.geometry.camera import Camera, stacked
 from tracker.kernels import births
 from tracker.kernels.births import Refinement
 from tracker.kernels.gating import Measurements

@@ -15,7 +15,6 @@ import numpy as np
 from jaxtyping import Int
 from numpy import ndarray
 
-from tracker.camera import stacked
 from tracker.filters import gaussian_mixture, models
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion import sight
@@ -28,6 +27,7 @@ from tracker.fusion.protocol import FusionResult
 from tracker.fusion.record import WORTH_TELLING, Record, summed
 from tracker.fusion.sight import Recent
 from tracker.fusion.told import Told, obey
+from tracker.geometry.camera import stacked
 from tracker.kernels.gating import Measurements
 from tracker.kernels.labelled import step as step_kernels
 from tracker.kernels.labelled.camera_update import Tracks

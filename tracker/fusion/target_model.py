@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray
 
-from tracker.camera import Camera
+from tracker.geometry.camera import Camera
 from tracker.kernels import measurement
 from tracker.kernels.gating import Measurements
 from tracker.kernels.kalman import Expected

@@ -8,9 +8,9 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
-from tracker.camera import Camera
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion.target_model import ExpectedBoxes
+from tracker.geometry.camera import Camera
 from tracker.kernels import boxes as box_kernels
 from tracker.kernels.boxes import Occlusion
 

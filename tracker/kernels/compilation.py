@@ -35,7 +35,7 @@ import numpy as np
 from numba.core import event
 from numba.core.compiler_lock import global_compiler_lock
 
-from tracker.folders import cache_folder
+from tracker.files.folders import cache_folder
 from tracker.kernels import checked_cache
 
 _F = TypeVar("_F", bound=Callable[..., Any])

@@ -19,13 +19,14 @@ from typing import Any
 
 import numpy as np
 
-from tracker import __version__, export
+from tracker import __version__
+from tracker.export import tracks_csv
+from tracker.files.atomic import replacing, zip_folder
 from tracker.library import columns
 from tracker.library.errors import LibraryError
 from tracker.library.keeping import remarks_of, rescored
 from tracker.library.records import KeptRun, Result
 from tracker.library.store import parameters_of
-from tracker.placing import replacing, zip_folder
 from tracker.sequences.clock import FIELDS as CLOCK
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
@@ -95,7 +96,7 @@ def _fill(folder: Path, result: Result, sequence: Sequence, videos: bool) -> Non
     (folder / TRACKS).write_bytes(columns.pack(result.kept))
     tracks = result.kept.tracks
     with (folder / "tracks.csv").open("w", encoding="utf-8", newline="") as stream:
-        export.write_tracks_csv(
+        tracks_csv.write_tracks_csv(
             stream, sequence, tracks, result.parameters, run.seed, remarks=remarks_of(result)
         )
     if evaluation is not None:

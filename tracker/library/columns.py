@@ -16,7 +16,7 @@ import numpy as np
 from jaxtyping import Float, Shaped
 from numpy import ndarray
 
-from tracker.trajectories import Trajectories
+from tracker.fusion.trajectories import Trajectories
 
 _MAGIC = b"MVT1"
 _HEAD = struct.Struct("<4sIH")

@@ -14,14 +14,7 @@ from typing import Any
 from tracker.library import KEEP, columns
 from tracker.library.errors import LibraryError, NoSuchRun, told
 from tracker.library.file import WAIT_SECONDS, LibraryFile
-from tracker.library.records import (
-    HEADLINES,
-    KeptRun,
-    NewRecording,
-    NewRun,
-    Recording,
-    Result,
-)
+from tracker.library.records import HEADLINES, KeptRun, NewRecording, NewRun, Recording, Result
 from tracker.parameters import RunParameters, with_values
 
 UNDO_SECONDS = 24 * 3600.0

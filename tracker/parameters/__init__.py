@@ -27,23 +27,11 @@ from tracker.parameters.groups.smoothing import SmoothingParams
 from tracker.parameters.methods import Method, MethodKey, Reads, Uses
 
 if TYPE_CHECKING:
-    from tracker.parameters.changing import (
-        ParameterError,
-        changed,
-        value,
-        with_values,
-    )
+    from tracker.parameters.changing import ParameterError, changed, value, with_values
     from tracker.parameters.reading import shown_keys, stage_values
     from tracker.parameters.registry import FOLLOWS, PluginWarning
     from tracker.parameters.run import RunParameters
-    from tracker.parameters.table import (
-        GROUPS,
-        METHODS,
-        PARAMETERS,
-        PRESETS,
-        Parameter,
-        method_of,
-    )
+    from tracker.parameters.table import GROUPS, METHODS, PARAMETERS, PRESETS, Parameter, method_of
 
 __all__ = [
     "FOLLOWS",

@@ -8,9 +8,9 @@ from collections.abc import Mapping
 from operator import attrgetter
 from typing import Any
 
+from tracker.files.text import visible
 from tracker.parameters.run import RunParameters
 from tracker.parameters.table import METHODS, PARAMETERS, Parameter
-from tracker.visible import visible
 
 _READ = {key: attrgetter(key) for key in (*METHODS, *PARAMETERS)}
 """How the value of each key is read: a slider asks for all of them many times."""

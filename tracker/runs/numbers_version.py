@@ -18,13 +18,13 @@ from tracker.parameters.registry import ORIGINS
 
 _ROOT = Path(__file__).resolve().parents[1]
 
-_NO_PART = ("evaluation", "export.py", "library", "writing",
-            "doubts", "corrections/log.py", "corrections/merging.py", "studies")  # fmt: skip
+_NO_PART = ("corrections/log.py", "corrections/merging.py", "evaluation", "export", "library",
+            "review", "studies")  # fmt: skip
 """What looks at results or makes recordings; a change of it changes no run."""
 
 _LATER: dict[Stage, tuple[str, ...]] = {
-    "single_view": ("corrections", "fusion", "smoothing", "kernels/smoothing", "trajectories.py"),
-    "fusion": ("smoothing", "kernels/smoothing", "trajectories.py"),
+    "single_view": ("corrections", "fusion", "smoothing", "kernels/smoothing"),
+    "fusion": ("smoothing", "kernels/smoothing", "fusion/trajectories.py"),
     "smoothing": (),
     "tracks": (),
 }

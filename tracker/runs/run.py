@@ -12,13 +12,13 @@ from tracker.corrections.kinds import IN_THE_FUSION, OF_PEOPLE, Correction, Kind
 from tracker.corrections.outcomes import Outcome, names_by_track
 from tracker.corrections.resting import resting
 from tracker.fusion.protocol import FusionResult
+from tracker.fusion.trajectories import Trajectories
 from tracker.parameters import RunParameters, Stage, stage_values
 from tracker.parameters.reading import CHOSEN_BY
 from tracker.runs.numbers_version import method_version, numbers_version
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult
 from tracker.smoothing import Smoothed
-from tracker.trajectories import Trajectories
 
 
 class Cancelled(Exception):

@@ -15,13 +15,13 @@ from typing import Any
 
 from numpy import ndarray
 
-from tracker.folders import cache_folder
+from tracker.files.folders import cache_folder
 from tracker.fusion.protocol import FusionResult
+from tracker.fusion.trajectories import Trajectories
 from tracker.parameters import Stage
 from tracker.runs.stage_files import StageFiles
 from tracker.single_view.protocol import ViewResult
 from tracker.smoothing import Smoothed
-from tracker.trajectories import Trajectories
 
 MEMORY_BYTES = 512 << 20
 """Memory for the columns of all runs and sequences together."""

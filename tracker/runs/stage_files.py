@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 from numpy.lib.npyio import NpzFile
 
-from tracker.placing import sync_folder
+from tracker.files.atomic import sync_folder
 from tracker.runs.columns import pack, unpack
 from tracker.single_view.protocol import ViewResult
 

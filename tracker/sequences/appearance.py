@@ -8,7 +8,8 @@ import numpy as np
 from jaxtyping import Float16
 from numpy import ndarray
 
-from tracker.sequences.fields import Fields, shown
+from tracker.files.text import shown
+from tracker.sequences.fields import Fields
 from tracker.sequences.sequence import SequenceError
 
 LONGEST = 4096

@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 from pathlib import Path
 
-from tracker.folders import cache_folder
+from tracker.files.folders import cache_folder
 
 ROOMS = Path(__file__).resolve().parent / "rooms"
 BUILT_IN = ("room24-2p", "room35-2p", "room44-3p")

@@ -8,8 +8,9 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from tracker.camera import Camera
-from tracker.sequences.fields import LARGEST, Fields, listed, shown
+from tracker.files.text import shown
+from tracker.geometry.camera import Camera
+from tracker.sequences.fields import LARGEST, Fields, listed
 from tracker.sequences.sequence import Room, SequenceError
 
 POSE = ("K", "distortion", "lens", "R", "t")

@@ -13,9 +13,9 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
-from tracker.sequences.fields import LARGEST, did_you_mean, listed, shown
+from tracker.files.text import not_utf_8, shown
+from tracker.sequences.fields import LARGEST, did_you_mean, listed
 from tracker.sequences.sequence import SequenceError
-from tracker.visible import not_utf_8
 
 _FORMULA = re.compile(r"(^|[,;\t]\s*)(?='*[=+\-@\t\r])")
 _GUARDED = re.compile(r"(^|[,;\t]\s*)'(?='*[=+\-@\t\r])")

@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
+from tracker.files.text import shown
 from tracker.sequences.sequence import SequenceError
 
 LARGEST = 1e6
@@ -50,17 +51,6 @@ def listed(words: Iterable[str]) -> str:
     return " and ".join(
         [", ".join(all_words[:-1]), *all_words[-1:]] if all_words[1:] else all_words
     )
-
-
-def shown(value: Any) -> str:
-    """A value as a message shows it: short, in TOML's notation."""
-    try:
-        text = "true" if value is True else "false" if value is False else repr(value)
-    except ValueError:  # Python writes no whole number of thousands of digits
-        return "a number with thousands of digits"
-    if isinstance(value, str):
-        text = f'"{value}"'
-    return text if len(text) <= 60 else f"{text[:57]}…"
 
 
 class Fields:

@@ -8,8 +8,8 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from tracker.agreement.observed import upright_rays
-from tracker.agreement.suggestion import agreement, suggest
+from tracker.geometry.consistency.observed import upright_rays
+from tracker.geometry.consistency.suggestion import agreement, suggest
 from tracker.sequences.fields import Fields, listed
 from tracker.sequences.sequence import Room, SequenceError, View
 from tracker.sequences.views import Source, Time

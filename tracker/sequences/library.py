@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
-from tracker.placing import size_of
+from tracker.files.atomic import size_of
 from tracker.sequences.built_in import BUILT_IN, ROOMS, cached_rooms
 from tracker.sequences.fields import did_you_mean, listed
 from tracker.sequences.reader import FILE, given_folder, read_sequence, read_summary

@@ -10,8 +10,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Float16, Int
 from numpy import ndarray
 
-from tracker.camera import Camera
-from tracker.visible import visible
+from tracker.files.text import visible
+from tracker.geometry.camera import Camera
 
 if TYPE_CHECKING:
     from tracker.sequences.clock import Clock

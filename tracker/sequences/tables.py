@@ -10,10 +10,11 @@ import numpy as np
 from jaxtyping import Bool, Float, Float16, Int
 from numpy import ndarray
 
+from tracker.files.text import shown
 from tracker.sequences.appearance import read_appearance
 from tracker.sequences.clock import Clock
 from tracker.sequences.csv_columns import Columns, read_columns
-from tracker.sequences.fields import SMALLEST, Fields, shown
+from tracker.sequences.fields import SMALLEST, Fields
 from tracker.sequences.pictures.media import locate
 from tracker.sequences.sequence import Detections, GroundTruth, SequenceError
 

@@ -10,9 +10,10 @@ import numpy as np
 from jaxtyping import Bool
 from numpy import ndarray
 
+from tracker.files.text import shown
 from tracker.sequences.calibration import POSE, read_camera
 from tracker.sequences.clock import FIELDS, Timing, read_timing
-from tracker.sequences.fields import Fields, shown
+from tracker.sequences.fields import Fields
 from tracker.sequences.pictures.containers import MOST_PIXELS
 from tracker.sequences.pictures.media import (
     Pictures,

@@ -9,9 +9,9 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
-from tracker.camera import Camera
 from tracker.filters import models
 from tracker.filters.gaussian_mixture import GaussianMixture
+from tracker.geometry.camera import Camera
 from tracker.sequences.sequence import Room, Sequence
 
 CELLS = 24

@@ -19,12 +19,12 @@ from tracker.filters import gaussian_mixture, models, phd
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.kernels.kalman import Expected
 from tracker.parameters import ColourPhdParams
-from tracker.pictures.foreground import pack
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import entrance_boxes
 from tracker.single_view.colour.peaks import PeakFinder, Peaks
 from tracker.single_view.dropped import Dropped
+from tracker.single_view.pictures.foreground import pack
 from tracker.single_view.protocol import ViewResult
 
 if TYPE_CHECKING:

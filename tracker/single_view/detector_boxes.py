@@ -8,8 +8,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Float16, Int
 from numpy import ndarray
 
-from tracker.boxes import Boxes
-from tracker.camera import Camera
+from tracker.geometry.boxes import Boxes
+from tracker.geometry.camera import Camera
 from tracker.parameters import DetectionBoxParams
 from tracker.sequences.sequence import Room, Sequence
 

@@ -72,8 +72,8 @@ class ViewResult:
     xx, xy, yy of the matrix C with (z − c)ᵀ C⁻¹ (z − c) = 1 on the border, pixels squared."""
     foreground: UInt8[ndarray, " bytes"] | None = None
     """What of the picture the method took for foreground, as
-    ``tracker.pictures.foreground.pack`` makes it; None where it asked for none or there was
-    no picture."""
+    ``tracker.single_view.pictures.foreground.pack`` makes it; None where it asked for none or there
+    was no picture."""
     likenesses: Float[ndarray, "N P"] = field(default_factory=lambda: np.zeros((0, 0)))
     """Probability that the colours of each box are those of each of P people with templates,
     if they are one's; (0, 0) where there was no picture, or fewer than two have templates. A

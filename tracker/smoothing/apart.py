@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
-from tracker.boxes import Boxes, paired_overlaps
+from tracker.geometry.boxes import Boxes, paired_overlaps
 from tracker.smoothing.paths import Paths
 from tracker.smoothing.smoother import Shared, Smoother
 

@@ -14,8 +14,8 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
-from tracker.boxes import Boxes
-from tracker.camera import Camera
+from tracker.geometry.boxes import Boxes
+from tracker.geometry.camera import Camera
 from tracker.sequences.sequence import Sequence
 from tracker.smoothing.calibration import ODD
 from tracker.smoothing.paths import Paths

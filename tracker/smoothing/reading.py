@@ -9,9 +9,9 @@ from jaxtyping import Bool
 from numpy import ndarray
 
 from tracker.fusion.protocol import FusionResult
+from tracker.fusion.trajectories import Trajectories
 from tracker.smoothing.paths import Links, Paths
 from tracker.smoothing.recording import CameraBoxes
-from tracker.trajectories import Trajectories
 
 _WIDE = 1.0
 """Square metres and (m/s)²: how little is known of a state within a gap, at first."""

@@ -11,8 +11,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
-from tracker import trajectories
 from tracker.corrections import Correction
+from tracker.fusion import trajectories
 from tracker.fusion.model import CONFIRMED
 from tracker.fusion.protocol import FusionResult
 from tracker.parameters import RunParameters, SmoothingParams

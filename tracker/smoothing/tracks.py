@@ -9,8 +9,8 @@ from jaxtyping import Int
 from numpy import ndarray
 
 from tracker.fusion.protocol import FusionResult
+from tracker.fusion.trajectories import Bounds, Trajectories
 from tracker.smoothing.result import Smoothed
-from tracker.trajectories import Bounds, Trajectories
 
 
 def tracks_of(
@@ -29,7 +29,7 @@ def tracks_of(
         fused: Stage 2 of each step, for the component that stands for each person.
         ids: Label → id as the filter reported them; labels that it never reported get the
             next numbers.
-        extraction_threshold: As ``bounds``, of :func:`tracker.trajectories.extract`.
+        extraction_threshold: As ``bounds``, of :func:`tracker.fusion.trajectories.extract`.
         near: Metres within which a component of the filter's posterior is the person's.
     """
     chosen = smoothed.existences > extraction_threshold

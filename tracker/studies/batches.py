@@ -11,13 +11,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from tracker import pipeline
 from tracker.corrections import Correction
 from tracker.corrections.log import place_of, read_log
 from tracker.library.keeping import recording_of
 from tracker.library.records import KeptRun
 from tracker.library.store import Library
 from tracker.parameters import changed, with_values
+from tracker.runs import pipeline
 from tracker.sequences.library import open_sequence
 from tracker.sequences.reader import FILE
 from tracker.sequences.sequence import Sequence as Recording

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tracker.visible import visible
+from tracker.files.text import visible
 
 
 class StudyError(ValueError):

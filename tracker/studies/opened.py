@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from tracker import pipeline
 from tracker.parameters import METHODS, RunParameters, changed, value, with_values
+from tracker.runs import pipeline
 from tracker.runs.fitting import unfit_methods
 from tracker.sequences.library import open_sequence
 from tracker.sequences.sequence import Sequence, SequenceError

@@ -12,7 +12,7 @@ from app.command.commands.studies import INTERRUPTED, crew_of, to_be_stopped
 from app.command.flags import set_values
 from app.command.terminal import FAILURE, Bar, print_table, say
 from tracker import parameters as table
-from tracker.folders import library_file
+from tracker.files.folders import library_file
 from tracker.library.store import open_library
 from tracker.parameters import PRESETS, ParameterError
 from tracker.studies.batches import BatchRun, places_of, run_batch

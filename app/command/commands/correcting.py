@@ -21,12 +21,12 @@ from tracker.corrections import Correction, CorrectionError
 from tracker.corrections.log import FILE, place_of, read_log, remark_on, write_log
 from tracker.corrections.merging import difference, merge
 from tracker.corrections.truth import checked_ranges, write_truth
-from tracker.placing import replacing
+from tracker.files.atomic import replacing
 from tracker.sequences import library
 from tracker.sequences.sequence import Sequence
 
 if TYPE_CHECKING:
-    from tracker.pipeline import Run
+    from tracker.runs.pipeline import Run
 
 DIFFERENT = 1
 
@@ -128,7 +128,7 @@ def _row(one: Correction) -> tuple[str, ...]:
 def _tracked(name: str, file: Path | None) -> Run:
     """A sequence tracked with its corrections."""
     from app.state.workers.compiling import Compiling
-    from tracker import pipeline
+    from tracker.runs import pipeline
     from tracker.runs.stage_cache import StageCache
 
     sequence = library.open_sequence(name)

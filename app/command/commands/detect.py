@@ -25,9 +25,9 @@ def detect(command: Detect) -> None:
     """
     from app.state.workers.compiling import Compiling
     from tracker import parameters as table
-    from tracker import pipeline
-    from tracker.boxes import Boxes
-    from tracker.placing import file_names, replacing
+    from tracker.files.atomic import file_names, replacing
+    from tracker.geometry.boxes import Boxes
+    from tracker.runs import pipeline
     from tracker.runs.stage_cache import StageCache
     from tracker.sequences import library
 

@@ -12,17 +12,18 @@ from pydantic import ValidationError
 from app.command.flags import Evaluate
 from app.command.terminal import Bar, CommandError, print_json, print_table, say
 from app.state.workers.compiling import Compiling
-from tracker import __version__, export
+from tracker import __version__
 from tracker.evaluation import Evaluation, EvaluationSettings, evaluate_sequence
 from tracker.evaluation.figures import number
-from tracker.export import TrackFile
+from tracker.export import tracks_csv
+from tracker.export.tracks_csv import TrackFile
 from tracker.parameters import ParameterError
 from tracker.sequences import library
 from tracker.sequences.sequence import Sequence
 from tracker.sequences.tables import truth_of
 
 if TYPE_CHECKING:
-    from tracker.without_truth import Estimate
+    from tracker.review.self_consistency import Estimate
 
 
 def evaluate(command: Evaluate) -> None:
@@ -51,7 +52,7 @@ def evaluate(command: Evaluate) -> None:
     if command.truth is not None:
         truth = truth_of(command.truth, str(command.truth), sequence.frames)
         sequence = replace(sequence, ground_truth=truth)
-    tracks = export.read_tracks_csv(command.tracks)
+    tracks = tracks_csv.read_tracks_csv(command.tracks)
     check_fit(sequence, tracks, str(command.tracks))
     for sentence in (*sequence.warnings, *tracks.remarks):
         say(sentence)
@@ -93,12 +94,11 @@ def estimate_without_truth(command: Evaluate) -> None:
         flags = ", ".join(f"--{name.replace('_', '-')}" for name in given)
         raise CommandError(f"{flags}: expected a track file as well; name it after the sequence")
 
-    from tracker import pipeline
-    from tracker.runs import gaps
+    from tracker.review.self_consistency import estimate
+    from tracker.review.self_consistency.estimate import WARNING
+    from tracker.runs import gaps, pipeline
     from tracker.runs.processes import available_cores
     from tracker.runs.stage_cache import StageCache
-    from tracker.without_truth import estimate
-    from tracker.without_truth.estimate import WARNING
 
     sequence = library.open_sequence(command.sequence)
     for sentence in sequence.warnings:

@@ -11,7 +11,7 @@ from app.command.terminal import FAILURE, CommandError, print_table, say
 from tracker.parameters import ParameterError
 
 if TYPE_CHECKING:
-    from tracker.importing.gathering import Taken
+    from tracker.io.importing.gathering import Taken
 
 MOST_UNKNOWN = 30
 """Files that nobody knows, named one by one."""
@@ -43,9 +43,9 @@ def _import(command: Import) -> int:
     if not command.sources:
         raise ParameterError("SOURCE", "expected files or a folder to import, got none")
     options = _options(command)
-    from tracker.importing.arriving import gather_whole
-    from tracker.importing.settling import settle
-    from tracker.importing.writing import FILE, write
+    from tracker.io.importing.arriving import gather_whole
+    from tracker.io.importing.settling import settle
+    from tracker.io.importing.writing import FILE, write
     from tracker.sequences import library
 
     if command.output is not None and (command.output / FILE).exists():
@@ -109,7 +109,7 @@ def _not_inside(files: Any, sources: Sequence[Path]) -> list[Path]:
 
 
 def _options(command: Import) -> Any:
-    from tracker.importing.options import ImportOptions
+    from tracker.io.importing.options import ImportOptions
 
     unit: Any = command.unit
     if unit is not None and unit not in ("m", "cm", "mm"):
@@ -162,8 +162,8 @@ def _check(command: Check) -> int:
 
 def _print_checks(sequence: Any, reading: Any = None) -> int:
     """Every check in a row; status 1 where one of them warns."""
-    from tracker.checks import check
-    from tracker.importing.remedies import for_import
+    from tracker.io.checks import check
+    from tracker.io.importing.remedies import for_import
     from tracker.single_view.working.shaking import check_shake
 
     checks = [*check(sequence), *check_shake(sequence)]
@@ -176,8 +176,8 @@ def _print_checks(sequence: Any, reading: Any = None) -> int:
 
 
 def _formats() -> None:
-    from tracker.formats.export import WRITTEN
-    from tracker.formats.registry import all_formats
+    from tracker.export.calibration import WRITTEN
+    from tracker.io.read.registry import all_formats
 
     rows = [
         (one.KIND, one.NAME, "a file a frame, too" if one.SERIES else "") for one in all_formats()
@@ -186,7 +186,7 @@ def _formats() -> None:
 
 
 def _export(command: ExportCalibration) -> None:
-    from tracker.formats.export import save_calibration
+    from tracker.export.calibration import save_calibration
     from tracker.sequences import library
 
     if command.output.exists():

@@ -26,11 +26,11 @@ from app.command.arguments.library import (
 from app.command.terminal import Bar, CommandError, print_json, print_table, say
 from tracker.evaluation.figures import BY_KEY, number
 from tracker.evaluation.settings import EvaluationSettings
-from tracker.folders import library_file
+from tracker.files.folders import library_file
+from tracker.files.text import visible
 from tracker.library import KEEP, repair
 from tracker.library.records import HEADLINES, PROVISIONAL, KeptRun, Result
 from tracker.library.store import Library, open_library
-from tracker.visible import visible
 
 DAMAGED = 1
 
@@ -211,10 +211,10 @@ def _show(library: Library, command: ShowRun) -> None:
 
 
 def _export(library: Library, command: ExportRun) -> None:
+    from tracker.export.registry import format_of, save
+    from tracker.export.written import Options, Written
     from tracker.library.keeping import remarks_of
     from tracker.sequences import library as sequences
-    from tracker.writing.registry import format_of, save
-    from tracker.writing.written import Options, Written
 
     form = format_of(command.output, command.format)
     result = library.result(library.find(command.run).id)

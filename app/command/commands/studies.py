@@ -75,7 +75,7 @@ def study(command: Study) -> int:
 
 
 def _new(command: NewStudy) -> None:
-    from tracker.placing import replacing
+    from tracker.files.atomic import replacing
     from tracker.studies.defined.example import example
 
     file = command.file
@@ -328,7 +328,7 @@ def save_preset(name: str, values: dict[str, Any]) -> None:
         ParameterError: If the name does not do.
     """
     from app.state.kept.presets import keep_preset
-    from tracker.folders import settings_folder
+    from tracker.files.folders import settings_folder
 
     keep_preset(settings_folder() / "presets.json", name, values)
     say(f"kept as the preset {name!r}, which the page lists")

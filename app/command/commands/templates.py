@@ -14,18 +14,13 @@ from app.command.arguments.templates import (
     Templates,
 )
 from app.command.terminal import Bar, CommandError, check_seed, print_json, print_table, say
-from tracker import offers
+from tracker.review import template_suggestions
 from tracker.sequences import library
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.reader import FILE
 from tracker.sequences.sequence import Sequence, Template
 from tracker.sequences.writing import saving
-from tracker.sequences.writing.teaching import (
-    Values,
-    taught_values,
-    template_values,
-    with_taught,
-)
+from tracker.sequences.writing.teaching import Values, taught_values, template_values, with_taught
 
 
 def templates(command: Templates) -> None:
@@ -90,11 +85,11 @@ def _offer(action: OfferTemplates) -> None:
         say(f"{len(new)} of {len(found)} added to {sequence.folder / FILE}")
 
 
-def _found(sequence: Sequence, action: OfferTemplates) -> tuple[offers.Offer, ...]:
+def _found(sequence: Sequence, action: OfferTemplates) -> tuple[template_suggestions.Offer, ...]:
     """What a run offers, its pictures written where they are wanted."""
     from app.command.commands.correcting import of_run
     from app.state.workers.compiling import Compiling
-    from tracker import pipeline
+    from tracker.runs import pipeline
     from tracker.runs.stage_cache import StageCache
 
     with Bar("tracking", "step") as tracking, closing(Compiling(say)) as compiling:
@@ -108,14 +103,17 @@ def _found(sequence: Sequence, action: OfferTemplates) -> tuple[offers.Offer, ..
             on_progress=lambda _, progress: tracking.at(progress.done, progress.total),
         )
     with FrameReader(sequence) as reader:
-        found = offers.offered(run, reader)
+        found = template_suggestions.offered(run, reader)
         if action.pictures is not None:
             _write_pictures(action.pictures, sequence, found, reader)
     return found
 
 
 def _write_pictures(
-    folder: Path, sequence: Sequence, found: tuple[offers.Offer, ...], reader: FrameReader
+    folder: Path,
+    sequence: Sequence,
+    found: tuple[template_suggestions.Offer, ...],
+    reader: FrameReader,
 ) -> None:
     import cv2
 
@@ -134,7 +132,7 @@ def _write_pictures(
     say(f"{len(found)} pictures written to {folder}")
 
 
-def _values(one: offers.Offer) -> dict[str, Any]:
+def _values(one: template_suggestions.Offer) -> dict[str, Any]:
     return {
         **template_values(one.template),
         "track": one.track,

@@ -10,10 +10,10 @@ from app.command.flags import Track
 from app.command.interruption import between_steps
 from app.command.terminal import FAILURE, Bar, CommandError, check_keep, check_seed, say
 from tracker import parameters as table
-from tracker.folders import library_file
+from tracker.files.folders import library_file
 
 if TYPE_CHECKING:
-    from tracker.pipeline import Run
+    from tracker.runs.pipeline import Run
 
 
 def track(command: Track) -> int:
@@ -22,8 +22,8 @@ def track(command: Track) -> int:
     check_seed(command.seed)
     check_keep(command.keep)
     output = command.output
-    from tracker.writing.registry import format_of, save
-    from tracker.writing.written import Options, Written
+    from tracker.export.registry import format_of, save
+    from tracker.export.written import Options, Written
 
     form = format_of(output, command.format)
     if output.is_dir() and not form.folder:
@@ -33,9 +33,8 @@ def track(command: Track) -> int:
 
     from app.command.commands.correcting import of_run
     from app.state.workers.compiling import Compiling
-    from tracker import pipeline
-    from tracker.checks import check
-    from tracker.runs import gaps
+    from tracker.io.checks import check
+    from tracker.runs import gaps, pipeline
     from tracker.runs.gates import notices
     from tracker.runs.outcome import why_no_tracks
     from tracker.runs.run import given_names, resting_of

@@ -13,10 +13,10 @@ from app.command.flags import set_values
 from app.command.terminal import print_table, say
 from tracker import parameters as table
 from tracker.parameters import ParameterError
+from tracker.review.self_consistency.estimate import WARNING
 from tracker.studies.errors import StudyError
 from tracker.studies.kept.store import create, studies_folder
 from tracker.studies.tuning import tuning
-from tracker.without_truth.estimate import WARNING
 
 
 def tune(command: Tune) -> int:

@@ -17,7 +17,7 @@ from jaxtyping import Float, Int, UInt8
 from numpy import ndarray
 
 from app import colours
-from tracker.camera import Camera
+from tracker.geometry.camera import Camera
 
 HALO = (0, 0, 0)
 

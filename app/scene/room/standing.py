@@ -15,7 +15,7 @@ from app.scene import geometry
 from app.scene.framing import Pose
 from app.scene.nodes import Lines, Meshes, Tag, Tags
 from app.scene.room.pictures import StraightView
-from tracker.camera import Camera
+from tracker.geometry.camera import Camera
 from tracker.sequences.sequence import Room
 
 GRID_MARGIN = 1.0

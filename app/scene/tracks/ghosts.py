@@ -8,8 +8,8 @@ import viser
 from app.colours import Palette
 from app.scene import geometry
 from app.scene.nodes import Lines, Tag, Tags
+from tracker.fusion.trajectories import Trajectories
 from tracker.sequences.sequence import Sequence
-from tracker.trajectories import Trajectories
 
 WIDE = 7.0
 """Pixels of the way that they would have gone: broader than a trail, which lies in it."""

@@ -15,9 +15,9 @@ from app.scene.geometry import FUTURE_SECONDS
 from app.scene.nodes import Lines, Meshes, Tag, Tags, Targets
 from app.state.snapshot import Trail
 from tracker.filters.gaussian_mixture import GaussianMixture
-from tracker.pipeline import Run
+from tracker.fusion.trajectories import Trajectories
+from tracker.runs.pipeline import Run
 from tracker.sequences.sequence import Room, Sequence
-from tracker.trajectories import Trajectories
 
 TAGS = 16
 """Made at once; a step with more people adds some for good."""

@@ -12,8 +12,8 @@ from app.scene import geometry
 from app.scene.nodes import Lines
 from app.state.pairs import GATE, pairs_at
 from app.state.snapshot import Trail
+from tracker.fusion.trajectories import Trajectories
 from tracker.sequences.sequence import Sequence
-from tracker.trajectories import Trajectories
 
 DASH = 0.18
 """Of the largest half extent of a person: dashed is what this run did not see here."""

@@ -13,7 +13,7 @@ from pathlib import Path
 from app.errors import sentence
 from app.state.importing.draft import Draft, folder_name
 from app.state.importing.uploads import Announced, UploadError
-from tracker.folders import settings_folder
+from tracker.files.folders import settings_folder
 from tracker.sequences.reader import FILE, given_folder
 
 MOST_DRAFTS = 4

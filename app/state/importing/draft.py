@@ -18,16 +18,16 @@ import numpy as np
 from app.errors import sentence
 from app.state.importing.uploads import Upload
 from app.state.importing.wish import Wish, looks_alike, options_of
-from tracker.formats.pieces import FormatError, ImagesPiece, VideoPiece
-from tracker.pipeline import Cancelled
+from tracker.io.read.pieces import FormatError, ImagesPiece, VideoPiece
+from tracker.runs.pipeline import Cancelled
 from tracker.sequences.pictures.video import VideoDecoder, VideoError, index_video, read_image
 from tracker.sequences.reader import FILE
 
 if TYPE_CHECKING:
     from app.state.importing.looking import Looked
-    from tracker.importing.arriving import Footprint
-    from tracker.importing.gathering import Taken
-    from tracker.importing.settling import Settled, SettledView
+    from tracker.io.importing.arriving import Footprint
+    from tracker.io.importing.gathering import Taken
+    from tracker.io.importing.settling import Settled, SettledView
 
 logger = logging.getLogger("app")
 
@@ -180,8 +180,8 @@ class Draft:
 
         # the readers of all formats: a server starts without them
         from app.state.importing.looking import look_into
-        from tracker.importing.arriving import gather_whole
-        from tracker.importing.settling import settle
+        from tracker.io.importing.arriving import gather_whole
+        from tracker.io.importing.settling import settle
 
         def sleep(seconds: float) -> None:
             if stop.wait(seconds):
@@ -257,7 +257,7 @@ class Draft:
         Raises:
             FormatError: If files came or were written to since; they are looked at again.
         """
-        from tracker.importing.arriving import changed_since
+        from tracker.io.importing.arriving import changed_since
 
         changed = changed_since([self.source], self._read)
         if changed:
@@ -271,9 +271,9 @@ class Draft:
     def _write(
         self, taken: tuple[Taken, ...], wish: Wish, place: Path, then: Callable[[Path], object]
     ) -> None:
-        from tracker.importing.bringing import copy_links, links_in
-        from tracker.importing.settling import settle
-        from tracker.importing.writing import write
+        from tracker.io.importing.bringing import copy_links, links_in
+        from tracker.io.importing.settling import settle
+        from tracker.io.importing.writing import write
 
         try:
             # what was wished last may not have been looked into yet

@@ -9,20 +9,20 @@ import numpy as np
 
 from app.state.importing.plan import Plan, draw_plan
 from app.state.teaching.entrances import entrances_of
-from tracker.agreement.consensus import Consensus
-from tracker.agreement.entrances import Door
-from tracker.checks import Check
-from tracker.checks.boxes import check_boxes, listen
-from tracker.checks.cameras import check_lenses, check_places
-from tracker.checks.readings import EVERY_ORDER
-from tracker.checks.synchronisation import CameraOffset, synchronise
-from tracker.checks.timing import check_counting, check_time
-from tracker.importing.preview import as_sequence
-from tracker.importing.remedies import for_import
-from tracker.importing.settling import Settled
+from tracker.geometry.consistency.consensus import Consensus
+from tracker.geometry.consistency.entrances import Door
+from tracker.io.checks import Check
+from tracker.io.checks.boxes import check_boxes, listen
+from tracker.io.checks.cameras import check_lenses, check_places
+from tracker.io.checks.readings import EVERY_ORDER
+from tracker.io.checks.synchronisation import CameraOffset, synchronise
+from tracker.io.checks.timing import check_counting, check_time
+from tracker.io.importing.preview import as_sequence
+from tracker.io.importing.remedies import for_import
+from tracker.io.importing.settling import Settled
 from tracker.parameters import METHODS
-from tracker.pipeline import Cancelled, compute
 from tracker.runs.fitting import default_parameters, unfit_methods
+from tracker.runs.pipeline import Cancelled, compute
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.working.shaking import check_shake

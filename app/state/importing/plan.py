@@ -8,9 +8,9 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
-from tracker.agreement.consensus import Consensus
-from tracker.camera import Camera
-from tracker.importing.settling import Settled
+from tracker.geometry.camera import Camera
+from tracker.geometry.consistency.consensus import Consensus
+from tracker.io.importing.settling import Settled
 
 CELLS = 72
 """Of the longer side."""

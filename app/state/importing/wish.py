@@ -8,8 +8,9 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from tracker.checks import Check
-from tracker.formats.pieces import (
+from tracker.io.checks import Check
+from tracker.io.importing.options import Corner, ImportOptions
+from tracker.io.read.pieces import (
     METRES,
     Axes,
     DetectionPiece,
@@ -22,10 +23,9 @@ from tracker.formats.pieces import (
     Up,
     VideoPiece,
 )
-from tracker.importing.options import Corner, ImportOptions
 
 if TYPE_CHECKING:
-    from tracker.importing.gathering import Taken
+    from tracker.io.importing.gathering import Taken
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,8 +14,8 @@ import stat
 from pathlib import Path
 from typing import Any, TypeVar
 
-from tracker.checked import value_of
-from tracker.placing import write_whole
+from tracker.files.atomic import write_whole
+from tracker.files.validated import value_of
 
 logger = logging.getLogger("app")
 

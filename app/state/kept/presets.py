@@ -16,8 +16,8 @@ from app.state.kept.json_files import read_as, set_aside, write_json
 from app.state.snapshot import Presets
 from app.state.workbench import Workbench
 from tracker import parameters as table
+from tracker.files.atomic import locked
 from tracker.parameters import ParameterError
-from tracker.placing import locked
 
 YOURS = "GET /api/state lists your presets."
 

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from app.state.workbench import Workbench
-from tracker.placing import write_whole
+from tracker.files.atomic import write_whole
 from tracker.studies.defined.definition import Definition
 from tracker.studies.errors import StudyError
 from tracker.studies.kept.reading import read_as

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tracker.agreement.entrances import Door, not_yet_there, suggest_entrances
+from tracker.geometry.consistency.entrances import Door, not_yet_there, suggest_entrances
 from tracker.runs.run import Run
 
 

@@ -20,8 +20,8 @@ from app.errors import sentence
 from app.state.kept.drafts import Drafts
 from app.state.snapshot import Change
 from app.state.workbench import Workbench
-from tracker import pipeline
 from tracker.parameters import RunParameters
+from tracker.runs import pipeline
 from tracker.sequences.built_in import EARLIER
 from tracker.sequences.reader import FILE
 from tracker.sequences.sequence import Sequence, SequenceError

@@ -11,8 +11,8 @@ from app.state.teaching.entrances import entrances_of
 from app.state.teaching.taught import Taught
 from app.state.teaching.values import METRE_DIGITS, at, rounded, take, within
 from app.state.workbench import Workbench
-from tracker import offers
-from tracker.folders import home
+from tracker.files.folders import home
+from tracker.review import template_suggestions
 from tracker.sequences.reader import FILE, given_folder
 from tracker.sequences.sequence import Sequence, SequenceError
 from tracker.sequences.writing import saving
@@ -99,7 +99,7 @@ class Teaching(Taught):
             raise SequenceError("the run goes on; ask for templates when it has ended")
         if not run.sequence.has_pictures:
             raise SequenceError("no camera has pictures, so there are no colours to learn")
-        found = offers.offered(run, reader)
+        found = template_suggestions.offered(run, reader)
         if not found:
             raise SequenceError(
                 "the tracks offer no further template: nobody is seen whole, apart from others and "
@@ -123,12 +123,12 @@ class Teaching(Taught):
         new = [template_values(one.template) for one in taken]
         self.edit(lambda values: values["template"].extend(new))
 
-    def offered(self) -> list[offers.Offer]:
+    def offered(self) -> list[template_suggestions.Offer]:
         """The templates that are offered and not taken yet."""
         now = self._workbench.snapshot()
         if now.sequence is None or now.offers is None:
             return []
-        return offers.untaken(now.offers, now.sequence)
+        return template_suggestions.untaken(now.offers, now.sequence)
 
     def forget_offers(self) -> None:
         """List none any more."""

@@ -7,8 +7,8 @@ import subprocess
 import threading
 from collections.abc import Callable
 
-from tracker import warm_up
 from tracker.kernels import compilation
+from tracker.runs import warm_up
 
 logger = logging.getLogger("app")
 

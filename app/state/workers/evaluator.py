@@ -14,7 +14,7 @@ from app.state.snapshot import Change, Snapshot
 from app.state.workbench import Workbench
 from app.state.workers.threads import CLOSING_SECONDS, be_nice
 from tracker.evaluation import Evaluation, EvaluationSettings, evaluate_sequence
-from tracker.trajectories import Trajectories
+from tracker.fusion.trajectories import Trajectories
 
 logger = logging.getLogger("app")
 

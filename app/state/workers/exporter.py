@@ -14,8 +14,8 @@ from typing import Literal
 
 from app.errors import sentence
 from app.state.workers.threads import CLOSING_SECONDS, be_nice
-from tracker.writing.registry import Format, save
-from tracker.writing.written import Options, Stopped, Written
+from tracker.export.registry import Format, save
+from tracker.export.written import Options, Stopped, Written
 
 logger = logging.getLogger("app")
 

@@ -11,9 +11,9 @@ from app.errors import sentence
 from app.state.snapshot import Change
 from app.state.workbench import Workbench
 from app.state.workers.threads import CLOSING_SECONDS, be_nice
-from tracker.pipeline import Cancelled, Run
+from tracker.review.self_consistency import Estimate, estimate
+from tracker.runs.pipeline import Cancelled, Run
 from tracker.runs.processes import available_cores
-from tracker.without_truth import Estimate, estimate
 
 logger = logging.getLogger("app")
 

@@ -24,18 +24,17 @@ from app.state.workers.compiling import WORDS, Compiling
 from app.state.workers.opening import Opener
 from app.state.workers.threads import CLOSING_SECONDS, be_nice
 from app.state.workers.watchdog import Watchdog
-from tracker import pipeline
+from tracker.fusion.trajectories import Trajectories, corrected
 from tracker.library.keeping import run_from
 from tracker.library.records import Result
 from tracker.parameters import RunParameters, changed, with_values
-from tracker.pipeline import Cancelled, Progress, Run
-from tracker.runs import gaps
+from tracker.runs import gaps, pipeline
 from tracker.runs.gates import notices
 from tracker.runs.outcome import why_no_tracks
+from tracker.runs.pipeline import Cancelled, Progress, Run
 from tracker.runs.stage_cache import StageCache
 from tracker.sequences.pictures.frames import CACHE_BYTES, FrameReader
 from tracker.sequences.sequence import Sequence
-from tracker.trajectories import Trajectories, corrected
 
 logger = logging.getLogger("app")
 

@@ -14,10 +14,10 @@ from app.state.kept.crashes import Crashes
 from app.state.snapshot import Opening
 from app.state.workbench import Workbench
 from app.state.workers.threads import be_nice
-from tracker import pipeline
 from tracker.corrections.log import open_log
 from tracker.parameters import RunParameters, changed, with_values
-from tracker.pipeline import Cancelled
+from tracker.runs import pipeline
+from tracker.runs.pipeline import Cancelled
 from tracker.sequences import library
 from tracker.sequences.pictures.frames import FrameReader
 

@@ -19,10 +19,10 @@ from app.state.snapshot import Change, Snapshot
 from app.state.workbench import Workbench
 from app.state.workers.threads import CLOSING_SECONDS, be_nice
 from tracker import parameters as table
-from tracker import pipeline
 from tracker.evaluation import EvaluationSettings, evaluate_sequence
 from tracker.parameters import Parameter, RunParameters
-from tracker.pipeline import Cancelled, Run
+from tracker.runs import pipeline
+from tracker.runs.pipeline import Cancelled, Run
 
 logger = logging.getLogger("app")
 

@@ -27,8 +27,8 @@ from app.web.corrections.wishes import corrections_of
 from app.web.dependencies import ERRORS, Bench, Work, file_name, nothing_open
 from tracker.corrections import CorrectionError
 from tracker.corrections.truth import write_truth
-from tracker.doubts import Doubt
-from tracker.doubts.doubt import said
+from tracker.review.queue import Doubt
+from tracker.review.queue.doubt import said
 
 NOTHING_CHANGED = "Nothing was changed."
 SETTLES_SECONDS = 10.0

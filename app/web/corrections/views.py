@@ -24,10 +24,10 @@ from app.state.correcting import Correcting
 from app.state.snapshot import Ghosts, Snapshot
 from tracker.corrections.outcomes import Outcome, names_by_track
 from tracker.corrections.truth import checked_ranges
-from tracker.doubts import Doubt, Queue
-from tracker.doubts.doubt import Lanes
-from tracker.pipeline import Run
-from tracker.trajectories import Trajectories, corrected
+from tracker.fusion.trajectories import Trajectories, corrected
+from tracker.review.queue import Doubt, Queue
+from tracker.review.queue.doubt import Lanes
+from tracker.runs.pipeline import Run
 
 GHOST_SECONDS = 5.0
 """Before and after a doubtful place."""

@@ -10,7 +10,7 @@ from app.errors import ApiError
 from app.models import Model
 from app.state.workers.identity_check import Checked, IdentityCheck
 from app.web.dependencies import ERRORS, Bench, nothing_open
-from tracker.without_truth.estimate import WARNING
+from tracker.review.self_consistency.estimate import WARNING
 
 router = APIRouter(prefix="/api/identity", responses=ERRORS)
 

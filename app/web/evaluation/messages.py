@@ -14,9 +14,9 @@ from app.state.scores import Reference, Scored
 from app.web.evaluation import models
 from app.web.views.timeline import Window
 from tracker import parameters as table
-from tracker import pipeline
 from tracker.evaluation import Evaluation, compare
 from tracker.evaluation.figures import SOURCES
+from tracker.runs import pipeline
 
 DECIMALS = 4
 """Decimals of the series, metres."""

@@ -8,8 +8,8 @@ from pydantic import Field
 
 from app.models.base import GivenPath, Model, Vector
 from app.state.importing.draft import Phase
-from tracker.checks import Status
-from tracker.formats.pieces import Axes, Direction, Layout, Unit, Up
+from tracker.io.checks import Status
+from tracker.io.read.pieces import Axes, Direction, Layout, Unit, Up
 from tracker.parameters import MethodKey
 
 

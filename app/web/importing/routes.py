@@ -29,7 +29,7 @@ from app.web.importing.models import (
 )
 from app.web.importing.sheet.start import start_sheet
 from app.web.importing.views import info_of, wish_of
-from tracker.formats.pieces import FormatError
+from tracker.io.read.pieces import FormatError
 from tracker.parameters import ParameterError, RunParameters, with_values
 from tracker.sequences import library
 

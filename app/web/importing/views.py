@@ -24,15 +24,15 @@ from app.web.importing.models import (
     ImportWish,
 )
 from app.web.importing.sheet.draft import draft_sheet
-from tracker.checks import Check
-from tracker.checks.synchronisation import CameraOffset
-from tracker.formats.pieces import CalibrationPiece, DetectionPiece
-from tracker.importing.finding.angles import open_turns, told_product, told_turns
+from tracker.io.checks import Check
+from tracker.io.checks.synchronisation import CameraOffset
+from tracker.io.importing.finding.angles import open_turns, told_product, told_turns
+from tracker.io.read.pieces import CalibrationPiece, DetectionPiece
 
 if TYPE_CHECKING:
     from app.state.importing.looking import Looked
-    from tracker.agreement.entrances import Door
-    from tracker.importing.settling import Settled, SettledView
+    from tracker.geometry.consistency.entrances import Door
+    from tracker.io.importing.settling import Settled, SettledView
 
 MOST_OFFSETS = 241
 """Values of a curve of agreement."""

@@ -16,14 +16,14 @@ from app.state.workers.exporter import Exporter
 from app.web.dependencies import ERRORS, Bench, not_finished
 from app.web.library.routes import Kept, no_library
 from app.web.views.link import address_of
+from tracker.export.registry import FORMATS
+from tracker.export.written import Options, Written
 from tracker.library.errors import LibraryError
 from tracker.library.keeping import remarks_of
 from tracker.runs import gaps
 from tracker.runs.fitting import default_parameters
 from tracker.runs.run import given_names, resting_of
 from tracker.sequences import library as sequences
-from tracker.writing.registry import FORMATS
-from tracker.writing.written import Options, Written
 
 router = APIRouter(prefix="/api/exports", responses=ERRORS)
 

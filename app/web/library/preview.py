@@ -7,8 +7,8 @@ import numpy as np
 from app.models import TrackLife
 from app.web.library.models import Course
 from app.web.views.timeline import Window, lives_of
+from tracker.fusion.trajectories import Trajectories
 from tracker.library.keeping import stride
-from tracker.trajectories import Trajectories
 
 BUCKETS = 600
 """Values a curve and a lane: as wide as it is drawn."""

@@ -14,12 +14,12 @@ from app.errors import sentence
 from app.state.snapshot import Snapshot
 from app.web.pictures import address
 from tracker.parameters import ColourPhdParams
-from tracker.pictures.colour import ColourModel
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import BoxSizes
 from tracker.single_view.colour.likelihood_map import likelihood_map
 from tracker.single_view.colour.templates import read_templates
+from tracker.single_view.pictures.colour import ColourModel
 
 LOW, HIGH = (200, 84, 26), (150, 255, 190)
 """Blue, green, red of a small and of the largest likelihood: hues that neither skin, wood nor the

@@ -9,8 +9,8 @@ from numpy import ndarray
 
 from app.state.snapshot import Snapshot
 from app.web.pictures.address import checked, missing, picture_of
-from tracker.boxes import Boxes
-from tracker.pictures import colour
+from tracker.geometry.boxes import Boxes
+from tracker.single_view.pictures import colour
 
 CROP_HEIGHT = 88
 """Pixels: twice what the page shows, for fine screens."""

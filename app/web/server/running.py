@@ -41,9 +41,9 @@ from app.web.server.room import Room, start_room
 from app.web.server.settings import Settings
 from app.web.stream import Stream
 from app.web.views.timeline import Timelines
-from tracker.folders import settings_folder
+from tracker.files.folders import settings_folder
 from tracker.library.records import Result
-from tracker.pipeline import Cancelled
+from tracker.runs.pipeline import Cancelled
 from tracker.runs.stage_cache import StageCache
 from tracker.studies.kept.store import studies_folder
 

@@ -9,7 +9,7 @@ from app.state.snapshot import Snapshot
 from app.state.studies.desk import StudyDesk
 from app.web.studies import models
 from tracker import parameters as table
-from tracker.folders import cache_folder
+from tracker.files.folders import cache_folder
 from tracker.parameters import METHODS, PARAMETERS
 from tracker.studies.defined.definition import Varied
 from tracker.studies.defined.objectives import Objective

@@ -24,8 +24,8 @@ from app.web.tables.markup import (
 )
 from app.web.views.decisions import words_of
 from app.web.views.timeline import Timelines
-from tracker.without_truth import Estimate
-from tracker.without_truth.estimate import WARNING
+from tracker.review.self_consistency import Estimate
+from tracker.review.self_consistency.estimate import WARNING
 
 MOST_EVENTS = 500
 """Rows of the table of events; more are counted."""

@@ -14,7 +14,7 @@ from app import models
 from app.state.scores import Scored
 from app.web.evaluation.messages import axis_end
 from app.web.views.timeline import Window
-from tracker.pipeline import Run
+from tracker.runs.pipeline import Run
 
 SPEED_SECONDS = 0.4
 """A speed is taken over so long: from one step to the next it would be noise."""

@@ -12,7 +12,7 @@ from numpy import ndarray
 from app import models
 from app.models.floor import Line
 from app.scene.geometry import grid_cell
-from tracker.camera import Camera
+from tracker.geometry.camera import Camera
 from tracker.sequences.sequence import Room, Sequence
 
 PIECES = 25

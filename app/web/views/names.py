@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tracker.pipeline import Run
+from tracker.runs.pipeline import Run
 from tracker.sequences.sequence import Sequence
 
 SURE = 0.6

@@ -9,10 +9,10 @@ from jaxtyping import Int
 from numpy import ndarray
 
 from app import models
-from tracker.boxes import Boxes, box_overlaps
 from tracker.filters.gaussian_mixture import gate_distance
 from tracker.fusion.target_model import TargetModel
-from tracker.pipeline import Run
+from tracker.geometry.boxes import Boxes, box_overlaps
+from tracker.runs.pipeline import Run
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult
 

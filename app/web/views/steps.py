@@ -10,10 +10,10 @@ from app.scene.geometry import FUTURE_SECONDS
 from app.state.pairs import pairs_at
 from app.web.pictures.likelihood import key_of
 from app.web.views.owners import tell_owners
-from tracker.boxes import Boxes
 from tracker.fusion.protocol import FusionResult
+from tracker.geometry.boxes import Boxes
 from tracker.parameters import ColourPhdParams
-from tracker.pipeline import Run
+from tracker.runs.pipeline import Run
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.dropped import GATES
 from tracker.single_view.protocol import ViewResult

@@ -20,10 +20,10 @@ from app.state.pairs import alike
 from app.state.scores import Scored
 from app.web.views.decisions import Named, decided
 from app.web.views.names import Names
-from tracker.pipeline import Run
+from tracker.fusion.trajectories import Trajectories
+from tracker.runs.pipeline import Run
 from tracker.runs.run import given_names
 from tracker.sequences.sequence import Sequence
-from tracker.trajectories import Trajectories
 
 BUCKETS = 4096
 """Values a curve at most, where nobody asks for fewer: more than a wide screen has pixels."""

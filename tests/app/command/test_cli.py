@@ -16,10 +16,12 @@ from app.command.commands import listing
 from app.command.flags import Track, parse
 from tests.app.conftest import Runs
 from tests.app.folders import write_crossing
-from tracker import export, parameters, pipeline
+from tracker import parameters
+from tracker.export import tracks_csv
 from tracker.kernels import compilation
 from tracker.parameters import PARAMETERS, ParameterError
-from tracker.pipeline import Run
+from tracker.runs import pipeline
+from tracker.runs.pipeline import Run
 from tracker.sequences.reader import read_sequence
 
 P_D = "fusion.detection_probability"
@@ -29,7 +31,7 @@ def engine_csv(crossing: Path, path: Path, changes: dict[str, Any], seed: int = 
     sequence = read_sequence(crossing)
     wanted = parameters.with_values(pipeline.default_parameters(sequence), changes)
     computed = pipeline.compute(sequence, wanted, seed=seed)
-    export.save_tracks_csv(path, sequence, computed.tracks, wanted, seed)
+    tracks_csv.save_tracks_csv(path, sequence, computed.tracks, wanted, seed)
     return path.read_text(encoding="utf-8")
 
 
@@ -43,7 +45,7 @@ def test_track_writes_the_engines_tracks(run: Runs, crossing: Path, tmp_path: Pa
     assert "steps/s" in summary
     assert summary.endswith(f"written to {out}")
     assert out.read_text(encoding="utf-8") == engine_csv(crossing, tmp_path / "own.csv", {}, 3)
-    assert len(export.read_tracks_csv(out).frames) > 100
+    assert len(tracks_csv.read_tracks_csv(out).frames) > 100
 
 
 @pytest.mark.full
@@ -240,7 +242,7 @@ def test_a_failure_leaves_an_older_file_as_it_was(
     def interrupt(*_: Any, **__: Any) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(export, "write_tracks_csv", interrupt)
+    monkeypatch.setattr(tracks_csv, "write_tracks_csv", interrupt)
     status, _, stderr = run("track", crossing, "-o", out)
     assert status == 130
     assert stderr.strip().splitlines()[-1] == "multiview-phd: interrupted; nothing was written"

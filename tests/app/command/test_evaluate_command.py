@@ -10,8 +10,9 @@ import pytest
 from app.command.flags import Evaluate, parse
 from tests.app.conftest import Runs
 from tests.app.folders import FRAMES, write_crossing
-from tracker import export, pipeline
 from tracker.evaluation import EvaluationSettings, evaluate_sequence
+from tracker.export import tracks_csv
+from tracker.runs import pipeline
 from tracker.sequences.reader import read_sequence
 
 
@@ -22,7 +23,7 @@ def tracks(crossing: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     sequence = read_sequence(crossing)
     parameters = pipeline.default_parameters(sequence)
     run = pipeline.compute(sequence, parameters)
-    export.save_tracks_csv(path, sequence, run.tracks, parameters, 0)
+    tracks_csv.save_tracks_csv(path, sequence, run.tracks, parameters, 0)
     return path
 
 
@@ -34,7 +35,7 @@ def test_the_table_says_what_was_measured_with_what(
     assert status == 0, stderr
     settings = EvaluationSettings(gate=0.75, cutoff=2.0, order=2.0, window=5)
     sequence = read_sequence(crossing)
-    expected = evaluate_sequence(sequence, export.read_tracks_csv(tracks), settings)
+    expected = evaluate_sequence(sequence, tracks_csv.read_tracks_csv(tracks), settings)
     lines = stdout.splitlines()
     for figure, line in zip(expected.figures, lines[1:], strict=False):
         name = figure.definition.name
@@ -54,7 +55,7 @@ def test_json(run: Runs, crossing: Path, tracks: Path) -> None:
     found = json.loads(stdout)
     sequence = read_sequence(crossing)
     settings = EvaluationSettings(distance="ground")
-    expected = evaluate_sequence(sequence, export.read_tracks_csv(tracks), settings).to_json()
+    expected = evaluate_sequence(sequence, tracks_csv.read_tracks_csv(tracks), settings).to_json()
     assert found["sequence"] == "crossing"
     assert {key: found[key] for key in expected} == json.loads(json.dumps(expected))
 
@@ -77,8 +78,8 @@ def test_a_partial_file_is_scored_as_far_as_it_goes(
     parameters = pipeline.default_parameters(sequence)
     computed = pipeline.compute(sequence, parameters, steps=50)
     path = tmp_path / "part.csv"
-    export.save_tracks_csv(path, sequence, computed.tracks, parameters, 0, done=50)
-    assert export.read_tracks_csv(path).done == 50
+    tracks_csv.save_tracks_csv(path, sequence, computed.tracks, parameters, 0, done=50)
+    assert tracks_csv.read_tracks_csv(path).done == 50
     status, stdout, stderr = run("evaluate", crossing, path, "--json")
     assert status == 0
     assert json.loads(stdout)["steps"] == 50

@@ -29,7 +29,7 @@ from app.web.server import Settings, build_routes, create_app
 from app.web.server.running import say_failure
 from tests.app.conftest import wait_until
 from tests.app.folders import write_crossing
-from tracker.pipeline import Cancelled
+from tracker.runs.pipeline import Cancelled
 
 T = TypeVar("T")
 VISER = Subprotocol(f"viser-v{viser.__version__}")

@@ -18,7 +18,7 @@ from tests.app.folders import write_crossing
 from tests.library.runs import RECORDING, run
 from tests.studies.small import Serial, definition, made_up
 from tests.studies.small import run as run_study
-from tracker import folders
+from tracker.files import folders
 from tracker.kernels.compilation import kernel_folder
 from tracker.library.store import Library
 from tracker.studies.kept.store import create

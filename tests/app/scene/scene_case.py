@@ -8,12 +8,12 @@ import numpy as np
 from numpy import ndarray
 
 from app.state.workbench import Workbench
-from tracker import trajectories
-from tracker.camera import Camera
 from tracker.filters.gaussian_mixture import GaussianMixture
+from tracker.fusion import trajectories
 from tracker.fusion.protocol import FusionResult
+from tracker.geometry.camera import Camera
 from tracker.parameters import RunParameters
-from tracker.pipeline import Progress, Run, stage_keys
+from tracker.runs.pipeline import Progress, Run, stage_keys
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Entrance, GroundTruth, Room, Sequence, View
 

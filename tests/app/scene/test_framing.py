@@ -19,7 +19,7 @@ from app.state import opening_step
 from app.state.workbench import Workbench
 from app.web.access.viewer import start_viser
 from tests.app.scene import scene_case
-from tracker.pipeline import Progress, Run
+from tracker.runs.pipeline import Progress, Run
 from tracker.sequences.sequence import Entrance
 
 SECONDS = 20.0

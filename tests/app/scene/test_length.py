@@ -11,7 +11,7 @@ import viser
 from app.scene.scene import Scene
 from app.web.access.viewer import start_viser
 from tests.app.scene import scene_case
-from tracker.pipeline import Run
+from tracker.runs.pipeline import Run
 from tracker.sequences.sequence import Sequence
 
 SECONDS = 60.0

@@ -21,7 +21,7 @@ from app.scene.worker import LatestWorker
 from app.state.snapshot import Ghosts
 from app.web.access.viewer import start_viser
 from tests.app.scene import scene_case
-from tracker.pipeline import Progress
+from tracker.runs.pipeline import Progress
 
 SECONDS = 20.0
 

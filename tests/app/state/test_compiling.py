@@ -14,8 +14,8 @@ from app.state.workbench import Workbench
 from app.state.workers.compiling import WORDS, Compiling
 from app.state.workers.jobs import Jobs
 from tests.app.conftest import wait_until
-from tracker import warm_up
 from tracker.kernels import compilation
+from tracker.runs import warm_up
 
 
 @pytest.fixture

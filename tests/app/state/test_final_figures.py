@@ -16,9 +16,9 @@ from app.state.workers.evaluator import Evaluator
 from app.state.workers.keeper import Keeper
 from tests.app.conftest import wait_until
 from tests.app.folders import FRAMES
-from tracker import pipeline
 from tracker.evaluation import evaluate_sequence
-from tracker.pipeline import Progress, Run
+from tracker.runs import pipeline
+from tracker.runs.pipeline import Progress, Run
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.reader import read_sequence
 

@@ -9,7 +9,7 @@ import pytest
 from app.state.kept import history
 from app.state.kept.history import History
 from app.state.workbench import Workbench
-from tracker import pipeline
+from tracker.runs import pipeline
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.reader import read_sequence
 

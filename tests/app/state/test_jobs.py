@@ -18,8 +18,8 @@ from app.state.workers.jobs import Jobs
 from tests.app.conftest import wait_until
 from tests.app.folders import write_crossing
 from tests.synthetic import write_sequence
-from tracker import pipeline
-from tracker.pipeline import Cancelled, Run
+from tracker.runs import pipeline
+from tracker.runs.pipeline import Cancelled, Run
 from tracker.sequences.reader import read_sequence
 from tracker.sequences.sequence import Sequence, SequenceError
 

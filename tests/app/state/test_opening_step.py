@@ -10,7 +10,7 @@ from app.state import opening_step
 from app.state.workbench import Workbench
 from tests.app.scene import scene_case
 from tests.app.state.test_workbench import progress
-from tracker.pipeline import Run
+from tracker.runs.pipeline import Run
 
 
 def test_with_most_people_shortly_before_a_switch() -> None:

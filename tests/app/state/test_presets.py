@@ -11,7 +11,7 @@ from app.state.kept.presets import LONGEST_NAME, OwnPresets
 from app.state.snapshot import Event, Notice
 from app.state.workbench import Workbench
 from tests.app.conftest import run_is, wait_until
-from tracker.folders import settings_folder
+from tracker.files.folders import settings_folder
 from tracker.parameters import ParameterError, value
 
 P_D = "fusion.detection_probability"

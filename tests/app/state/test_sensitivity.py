@@ -14,9 +14,9 @@ from app.state.workbench import Workbench
 from app.state.workers import sensitivity as module
 from app.state.workers.sensitivity import Curve, Sensitivity, values_to_try
 from tracker import parameters as table
-from tracker import pipeline
 from tracker.evaluation import evaluate_sequence
 from tracker.parameters import PARAMETERS, ParameterError
+from tracker.runs import pipeline
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.reader import read_sequence
 

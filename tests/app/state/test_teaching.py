@@ -23,7 +23,7 @@ from app.web.views import results
 from tests.app.conftest import ADDRESS, connect, run_is, wait_until
 from tests.browser.walkers import write_walkers
 from tests.single_view.networks import answering, pooling
-from tracker import pipeline
+from tracker.runs import pipeline
 from tracker.sequences.library import open_sequence
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.reader import FILE, read_sequence

@@ -10,9 +10,9 @@ import pytest
 from app.state.snapshot import LAYERS, Change, Command, Event, Notice, clamp
 from app.state.workbench import Workbench
 from app.state.workers.jobs import silence
-from tracker import pipeline
 from tracker.parameters import PARAMETERS, PRESETS, ParameterError, value
-from tracker.pipeline import Progress, Run
+from tracker.runs import pipeline
+from tracker.runs.pipeline import Progress, Run
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.reader import read_sequence
 

@@ -20,7 +20,9 @@ from app.web.server import ROUTERS, Settings, create_app
 from tests.app.conftest import ADDRESS, run_is, wait_until
 from tests.app.folders import FRAMES
 from tests.synthetic import number_in
-from tracker import export, parameters, pipeline
+from tracker import parameters
+from tracker.export import tracks_csv
+from tracker.runs import pipeline
 from tracker.sequences.reader import read_sequence
 
 P_D = "fusion.detection_probability"
@@ -201,7 +203,7 @@ def test_the_csv_is_the_engines(client: TestClient, crossing: Path, tmp_path: Pa
     run = pipeline.compute(sequence, wanted)
     assert answer.headers["x-run-key"] == run.key
     path = tmp_path / "tracks.csv"
-    export.save_tracks_csv(path, sequence, run.tracks, wanted, 0)
+    tracks_csv.save_tracks_csv(path, sequence, run.tracks, wanted, 0)
     assert answer.text == path.read_text(encoding="utf-8")
     rows = [line for line in io.StringIO(answer.text) if not line.startswith("#")]
     assert len(list(csv.DictReader(rows))) == len(run.tracks) > 0

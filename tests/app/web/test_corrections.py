@@ -17,8 +17,8 @@ from app.state.doubting import Doubting
 from app.web.server import Settings, create_app
 from tests.app.conftest import ADDRESS, Runs, connect, run_is, wait_until
 from tracker.corrections.log import read_log
-from tracker.doubts import Alternative, Doubt, Queue
-from tracker.doubts.doubt import Lanes, unsaid
+from tracker.review.queue import Alternative, Doubt, Queue
+from tracker.review.queue.doubt import Lanes, unsaid
 from tracker.sequences.reader import read_sequence
 
 PLACE = "/api/corrections"
@@ -229,8 +229,8 @@ def test_the_queue_is_answered_previewed_and_skipped(
 ) -> None:
     assert desk.get(f"{PLACE}/queue").json()["doubts"] == [], "all is clear here"
     # so that what is hardly doubtful is told, too: who passes metres apart
-    monkeypatch.setattr("tracker.doubts.ranking.LEAST", 0.0)
-    monkeypatch.setattr("tracker.doubts.meetings._CLOSE", 8.0)
+    monkeypatch.setattr("tracker.review.queue.ranking.LEAST", 0.0)
+    monkeypatch.setattr("tracker.review.queue.meetings._CLOSE", 8.0)
     desk.patch("/api/parameters", json={"changes": {"fusion.survival_probability": 0.97}})
     settled(desk)
     queue = desk.get(f"{PLACE}/queue").json()
@@ -310,8 +310,8 @@ def test_what_is_answered_of_the_run_before_counts_in_the_one_that_came_meanwhil
 def test_what_is_checked_leaves_the_queue_though_the_run_stays_the_same(
     desk: TestClient, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("tracker.doubts.ranking.LEAST", 0.0)
-    monkeypatch.setattr("tracker.doubts.meetings._CLOSE", 8.0)
+    monkeypatch.setattr("tracker.review.queue.ranking.LEAST", 0.0)
+    monkeypatch.setattr("tracker.review.queue.meetings._CLOSE", 8.0)
     desk.patch("/api/parameters", json={"changes": {"fusion.survival_probability": 0.97}})
     settled(desk)
     first, last = 0, desk.app.state.workbench.snapshot().sequence.frames - 1  # type: ignore[attr-defined]

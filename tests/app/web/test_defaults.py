@@ -11,10 +11,11 @@ from starlette.testclient import TestClient
 from app.web.tables import teaching_tables
 from tests.app.conftest import Runs
 from tests.app.web.test_api import assert_error
-from tracker import export, pipeline
 from tracker.evaluation import evaluate_sequence
 from tracker.evaluation.report.page import report_html
+from tracker.export import tracks_csv
 from tracker.parameters import FOLLOWS, METHODS, PARAMETERS, RunParameters, value, with_values
+from tracker.runs import pipeline
 from tracker.sequences.reader import read_sequence
 
 DEFINED = RunParameters()
@@ -42,7 +43,7 @@ def test_one_default_in_definition_list_help_page_report_and_plain_run(
 
     out = tmp_path / "tracks.csv"
     assert run("track", crossing, "-o", out)[0] == 0
-    tracks = export.read_tracks_csv(out)
+    tracks = tracks_csv.read_tracks_csv(out)
     told = {key: tracks.settings[key] for key in (*METHODS, *PARAMETERS)}
     assert with_values(DEFINED, told) == followed
 

@@ -14,7 +14,7 @@ from app.web.server import Settings, create_app
 from app.web.views.floor import NEAR, OFF, floor_of
 from tests.app.conftest import ADDRESS
 from tests.app.scene import scene_case
-from tracker.camera import Camera
+from tracker.geometry.camera import Camera
 from tracker.sequences.reader import read_sequence
 from tracker.sequences.sequence import View
 

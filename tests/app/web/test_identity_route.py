@@ -13,10 +13,10 @@ from starlette.testclient import TestClient
 from app.state.workbench import Workbench
 from app.state.workers import identity_check
 from tests.app.conftest import wait_until
-from tracker import pipeline
-from tracker.pipeline import Run
+from tracker.review.self_consistency import Estimate
+from tracker.runs import pipeline
+from tracker.runs.pipeline import Run
 from tracker.sequences.library import open_sequence
-from tracker.without_truth import Estimate
 
 
 @pytest.mark.full

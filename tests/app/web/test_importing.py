@@ -18,13 +18,13 @@ from app.web.importing.models import ImportInfo
 from app.web.importing.sheet.draft import draft_sheet
 from app.web.server import Settings, create_app
 from tests.app.conftest import ADDRESS, run_is, wait_until
-from tests.formats.recorded import PLACES, detections, settled_of, toml, videos
-from tests.importing.test_angles import lay_out
+from tests.io.importing.test_angles import lay_out
+from tests.io.read.recorded import PLACES, detections, settled_of, toml, videos
 from tests.single_view.shaken import SIZE as SHAKEN_SIZE
 from tests.single_view.shaken import shaken
-from tracker.importing import bringing
-from tracker.importing.writing import write
-from tracker.pipeline import Cancelled
+from tracker.io.importing import bringing
+from tracker.io.importing.writing import write
+from tracker.runs.pipeline import Cancelled
 from tracker.sequences.reader import read_sequence
 
 PIECE = 4096

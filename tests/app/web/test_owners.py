@@ -10,9 +10,9 @@ import pytest
 
 from app.web.views.steps import step_of
 from app.web.views.timeline import deviation
-from tracker import pipeline
 from tracker.filters.gaussian_mixture import gate_distance
 from tracker.fusion.target_model import SIZES
+from tracker.runs import pipeline
 from tracker.sequences.reader import read_sequence
 
 

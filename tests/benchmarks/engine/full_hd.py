@@ -17,7 +17,7 @@ import av
 
 from tests.benchmarks.measure import Measurement
 from tests.rooms.random_rooms import choose, render_chosen
-from tracker import pipeline
+from tracker.runs import pipeline
 from tracker.runs.run import Progress, Run
 from tracker.runs.single_views import _CameraWorker
 from tracker.sequences.pictures.frames import FrameReader

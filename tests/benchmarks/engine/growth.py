@@ -13,10 +13,10 @@ import numpy as np
 from tests.benchmarks.measure import Measurement, seconds
 from tests.engine import synthetic
 from tests.filters.mixtures import random_mixture
-from tracker import pipeline
-from tracker.camera import Camera
 from tracker.filters import gaussian_mixture
+from tracker.geometry.camera import Camera
 from tracker.parameters import RunParameters, with_values
+from tracker.runs import pipeline
 
 PEOPLE = RunParameters(single_view="none", fusion_method="multi_bernoulli")
 

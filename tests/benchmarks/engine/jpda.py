@@ -8,10 +8,10 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from tests.association.stone_soup_jpda import Cluster, associators, cluster
-from tests.association.test_association import problem
 from tests.benchmarks.measure import Measurement, ratio, seconds
-from tracker.association import exact_marginals, marginals, simplified_murty
+from tests.filters.association.stone_soup_jpda import Cluster, associators, cluster
+from tests.filters.association.test_association import problem
+from tracker.filters.association import exact_marginals, marginals, simplified_murty
 
 TARGETS = (3, 4, 5, 6, 8, 10, 12, 15)
 ENUMERATED = 4

@@ -8,10 +8,10 @@ import numpy as np
 
 from tests.benchmarks.measure import Measurement, ratio, seconds
 from tests.filters.mixtures import random_mixture, reference_merge, reference_update
-from tests.pictures.test_particles import reference_climb
+from tests.single_view.pictures.test_particles import reference_climb
 from tracker.filters import gaussian_mixture, phd
 from tracker.kernels.kalman import Expected
-from tracker.pictures import colour, particles
+from tracker.single_view.pictures import colour, particles
 
 
 def run(short: bool) -> Iterator[Measurement]:

@@ -9,9 +9,10 @@ from statistics import median
 
 from tests.benchmarks.measure import Measurement
 from tests.engine import synthetic
-from tracker import fusion, pipeline, smoothing
+from tracker import fusion, smoothing
 from tracker.fusion import FusionMethod, FusionResult
 from tracker.parameters import PRESETS, RunParameters, with_values
+from tracker.runs import pipeline
 from tracker.sequences.reader import read_sequence
 from tracker.single_view.protocol import ViewResult
 

@@ -20,7 +20,7 @@ from tests.benchmarks.engine.pipeline import DATA
 from tests.benchmarks.measure import Measurement
 from tests.browser.serving import Server
 from tests.synthetic import write_sequence
-from tracker import pipeline
+from tracker.runs import pipeline
 from tracker.runs.run import Run
 
 P_D = "colour_phd.detection_probability"

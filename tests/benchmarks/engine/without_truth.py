@@ -1,8 +1,8 @@
 """How well J stands for IDF1: ``python3 -m tests.benchmarks.engine.without_truth``.
 
 Every recording of boxes and some random rooms are tracked with random settings; of each the
-estimate J and the true IDF1 are kept in ``tracker/without_truth/calibration.json``, from which
-the program takes the interval that it tells. A run that was stopped goes on where it was.
+estimate J and the true IDF1 are kept in ``tracker/review/self_consistency/calibration.json``, from
+which the program takes the interval that it tells. A run that was stopped goes on where it was.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from scipy.stats import spearmanr
 
 from tests.conftest import DATA
 from tests.random_rooms import random_room
-from tracker import pipeline
 from tracker.evaluation import evaluate_sequence
 from tracker.parameters import RunParameters, with_values
+from tracker.review.self_consistency import estimate
+from tracker.review.self_consistency.calibration import FILE
+from tracker.runs import pipeline
 from tracker.sequences.reader import read_sequence
 from tracker.sequences.sequence import Sequence
-from tracker.without_truth import estimate
-from tracker.without_truth.calibration import FILE
 
 RECORDINGS = ("cmc1", "cmc2", "av163-seq45-3p-1111-points", "wildtrack-points-300")
 ROOMS = {

@@ -10,7 +10,7 @@ from playwright.sync_api import Page, expect
 from tests.browser.looking import as_at_first, by_palette, readout, until
 from tests.browser.serving import Server
 from tests.browser.walkers import FRAMES
-from tracker.export import read_tracks_csv
+from tracker.export.tracks_csv import read_tracks_csv
 
 MOST_TABS = 90
 """Presses of Tab that reach everything of the page."""

@@ -28,9 +28,9 @@ from tests.browser.looking import (
 )
 from tests.browser.serving import Server
 from tests.browser.walkers import FRAMES
-from tracker import pipeline
-from tracker.export import read_tracks_csv
+from tracker.export.tracks_csv import read_tracks_csv
 from tracker.parameters import PARAMETERS, with_values
+from tracker.runs import pipeline
 from tracker.sequences.library import open_sequence
 
 BUILT_IN = "room44-3p"

@@ -13,7 +13,7 @@ from tests.browser.access.test_accessibility import found
 from tests.browser.conftest import opened
 from tests.browser.serving import Server
 from tests.browser.walkers import write_walkers
-from tests.formats.recorded import detections, toml, videos
+from tests.io.read.recorded import detections, toml, videos
 
 LONG = 300_000
 """Milliseconds for all that is looked into: how fast that is, a benchmark tells."""

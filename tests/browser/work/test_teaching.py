@@ -16,8 +16,8 @@ from app.scene import framing
 from app.scene.scene import _margin_around
 from tests.browser.conftest import Server
 from tests.browser.looking import as_at_first, ask, by_palette, readout, until, viser
-from tracker import pipeline
-from tracker.export import read_tracks_csv
+from tracker.export.tracks_csv import read_tracks_csv
+from tracker.runs import pipeline
 from tracker.sequences.reader import FILE, read_sequence
 from tracker.sequences.writing.teaching import taught_values, with_taught
 

@@ -7,9 +7,9 @@ from playwright.sync_api import Page, expect
 from app.web.tables.markup import number
 from tests.browser.looking import as_at_first, ask
 from tests.browser.serving import Server
-from tracker import pipeline
 from tracker.evaluation import compare, evaluate_sequence
 from tracker.parameters import PARAMETERS, with_values
+from tracker.runs import pipeline
 from tracker.sequences.library import open_sequence
 
 P_D = "fusion.detection_probability"

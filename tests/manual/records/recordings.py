@@ -1,4 +1,4 @@
-"""What `check` and `import` find in recordings, from the record of `python -m tests.checks`."""
+"""What `check` and `import` find in recordings, from the record of `python -m tests.io.checks`."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ INTRODUCTION = """## Other people's recordings
 
 How often the usual mistakes are named, and how well late cameras are found, on recordings in which
 each was made on purpose; and how long it takes from the files of others to tracks, by two commands
-and without a flag. Made anew by `python3 -m tests.checks --record`.
+and without a flag. Made anew by `python3 -m tests.io.checks --record`.
 """
 
 MISTAKES = """Mistakes: translations in millimetres, camera-to-world poses, OpenGL's axes, y up,

@@ -10,11 +10,11 @@ from typing import Any
 
 from tests.golden.pieces import PIECES, cut
 from tests.manual.places import RECORDS
-from tracker import pipeline
 from tracker.evaluation import evaluate_sequence
 from tracker.parameters import PARAMETERS, Parameter, RunParameters, with_values
 from tracker.parameters.registry import REGISTERED
-from tracker.pipeline import Run
+from tracker.runs import pipeline
+from tracker.runs.pipeline import Run
 from tracker.sequences.library import open_sequence
 from tracker.sequences.reader import read_sequence
 from tracker.sequences.sequence import Sequence

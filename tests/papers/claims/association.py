@@ -18,11 +18,11 @@ from tests.papers.clips.light import Light, light_rows, segment
 from tests.papers.laboratory.experiment import Context, Experiment, Finding, Result
 from tracker import parameters as table
 from tracker import single_view
-from tracker.boxes import Boxes
 from tracker.evaluation.figures import number
 from tracker.evaluation.measures.matching import assign
+from tracker.geometry.boxes import Boxes
 from tracker.parameters import PRESETS, RunParameters, with_values
-from tracker.pipeline import Cancelled
+from tracker.runs.pipeline import Cancelled
 from tracker.runs.processes import WorkerControl
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.single_view.protocol import ViewResult

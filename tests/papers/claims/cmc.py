@@ -6,19 +6,14 @@ import time
 from typing import TYPE_CHECKING, Any
 
 from tests.papers.laboratory import runs
-from tests.papers.laboratory.experiment import (
-    Context,
-    Experiment,
-    Finding,
-    Result,
-    Unavailable,
-)
-from tracker import fusion, pipeline
+from tests.papers.laboratory.experiment import Context, Experiment, Finding, Result, Unavailable
+from tracker import fusion
 from tracker import parameters as table
 from tracker.evaluation import EvaluationSettings, evaluate_sequence
 from tracker.evaluation.figures import number
 from tracker.parameters import PRESETS, RunParameters, with_values
-from tracker.pipeline import Cancelled, Run
+from tracker.runs import pipeline
+from tracker.runs.pipeline import Cancelled, Run
 from tracker.sequences.sequence import Sequence
 
 if TYPE_CHECKING:

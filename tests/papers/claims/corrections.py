@@ -8,18 +8,12 @@ from typing import TYPE_CHECKING, Any
 from tests.papers.laboratory import runs
 from tests.papers.laboratory.answering import Answered, session
 from tests.papers.laboratory.attainable import attainable
-from tests.papers.laboratory.experiment import (
-    Context,
-    Experiment,
-    Finding,
-    Result,
-    Unavailable,
-)
-from tracker import pipeline
+from tests.papers.laboratory.experiment import Context, Experiment, Finding, Result, Unavailable
 from tracker.evaluation import EvaluationSettings
 from tracker.evaluation.figures import number
 from tracker.parameters import changed, with_values
-from tracker.pipeline import Cancelled
+from tracker.runs import pipeline
+from tracker.runs.pipeline import Cancelled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

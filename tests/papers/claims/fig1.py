@@ -11,7 +11,7 @@ from tests.papers.laboratory.experiment import Context, Experiment, Finding, Res
 from tracker.evaluation import Evaluation, evaluate_sequence
 from tracker.evaluation.figures import number
 from tracker.evaluation.tables import TrackRow
-from tracker.pipeline import Run
+from tracker.runs.pipeline import Run
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

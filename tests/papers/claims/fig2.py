@@ -11,10 +11,10 @@ from tests.papers.claims.fig1 import QUICK_STEPS, ROOM
 from tests.papers.laboratory import runs
 from tests.papers.laboratory.experiment import Context, Experiment, Finding, Result
 from tests.rooms import read_visibility
-from tracker.boxes import box_overlaps
 from tracker.evaluation.figures import number
 from tracker.evaluation.measures.matching import assign
-from tracker.pipeline import Run
+from tracker.geometry.boxes import box_overlaps
+from tracker.runs.pipeline import Run
 from tracker.sequences.pictures.frames import FrameReader
 
 if TYPE_CHECKING:

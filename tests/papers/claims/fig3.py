@@ -17,14 +17,14 @@ from tests.papers.laboratory.experiment import Context, Experiment, Finding, Res
 from tests.papers.laboratory.noise import NoisyReader
 from tests.rooms import read_visibility
 from tracker import parameters as table
-from tracker import pipeline
 from tracker.evaluation import EvaluationSettings, evaluate
 from tracker.evaluation.figures import number
+from tracker.fusion.trajectories import Trajectories
 from tracker.parameters import RunParameters
+from tracker.runs import pipeline
 from tracker.runs.processes import WorkerControl
 from tracker.sequences.reader import read_sequence
 from tracker.sequences.sequence import Sequence
-from tracker.trajectories import Trajectories
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

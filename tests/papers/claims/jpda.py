@@ -19,21 +19,15 @@ from numpy import ndarray
 from tests.papers.claims import cameras
 from tests.papers.clips import clip as clips
 from tests.papers.laboratory import runs
-from tests.papers.laboratory.experiment import (
-    Context,
-    Experiment,
-    Finding,
-    Result,
-    Unavailable,
-)
+from tests.papers.laboratory.experiment import Context, Experiment, Finding, Result, Unavailable
 from tracker import parameters as table
 from tracker import single_view
-from tracker.assignment import linear_sum_assignment
-from tracker.boxes import Boxes
 from tracker.evaluation.figures import number
 from tracker.evaluation.measures.matching import assign
+from tracker.geometry.assignment import linear_sum_assignment
+from tracker.geometry.boxes import Boxes
 from tracker.parameters import PRESETS, RunParameters, with_values
-from tracker.pipeline import Cancelled
+from tracker.runs.pipeline import Cancelled
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import upright_boxes

@@ -9,18 +9,12 @@ import numpy as np
 
 from tests.papers.claims import cameras, fig1
 from tests.papers.laboratory import runs, sequences
-from tests.papers.laboratory.experiment import (
-    Context,
-    Experiment,
-    Finding,
-    Result,
-    Unavailable,
-)
+from tests.papers.laboratory.experiment import Context, Experiment, Finding, Result, Unavailable
 from tracker import parameters as table
-from tracker import pipeline
 from tracker.evaluation import EvaluationSettings, evaluate_sequence
 from tracker.evaluation.figures import number
 from tracker.parameters import METHODS, RunParameters, method_of
+from tracker.runs import pipeline
 from tracker.sequences.sequence import Sequence
 
 if TYPE_CHECKING:

@@ -16,19 +16,13 @@ from tests.papers.claims import cameras
 from tests.papers.clips import clip as clips
 from tests.papers.clips.ppf import CLIPS
 from tests.papers.laboratory import runs
-from tests.papers.laboratory.experiment import (
-    Context,
-    Experiment,
-    Finding,
-    Result,
-    Unavailable,
-)
+from tests.papers.laboratory.experiment import Context, Experiment, Finding, Result, Unavailable
 from tracker import parameters as table
 from tracker import single_view
 from tracker.evaluation.figures import number
 from tracker.evaluation.measures.matching import assign
 from tracker.parameters import PRESETS, RunParameters, with_values
-from tracker.pipeline import Cancelled
+from tracker.runs.pipeline import Cancelled
 from tracker.runs.processes import WorkerControl
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence

@@ -23,8 +23,8 @@ from jaxtyping import Float, UInt8
 from numpy import ndarray
 from scipy.interpolate import PchipInterpolator
 
-from tracker.boxes import Boxes
-from tracker.camera import Camera
+from tracker.geometry.boxes import Boxes
+from tracker.geometry.camera import Camera
 from tracker.sequences.sequence import GroundTruth, Room, Sequence, Template, View
 
 METRES_PER_PIXEL = 0.01

@@ -13,9 +13,9 @@ from tests.papers.clips.association import FULL_LIGHT, coming_and_going, light, 
 from tests.papers.laboratory.experiment import Context, Finding
 from tracker.evaluation.figures import number
 from tracker.parameters import ForegroundParams
-from tracker.pictures.foreground import AdaptiveForeground, first_background
-from tracker.pipeline import Cancelled
+from tracker.runs.pipeline import Cancelled
 from tracker.runs.processes import WorkerControl
+from tracker.single_view.pictures.foreground import AdaptiveForeground, first_background
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

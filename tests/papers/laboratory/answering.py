@@ -8,18 +8,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from tests.papers.laboratory.attainable import people_of
-from tracker import pipeline
 from tracker.corrections import Correction, Place
 from tracker.corrections.kinds import leeway
-from tracker.doubts import Doubt, queue
-from tracker.doubts.doubt import Lanes, said
 from tracker.evaluation import EvaluationSettings, evaluate_sequence
+from tracker.fusion.trajectories import Trajectories
 from tracker.parameters import RunParameters
-from tracker.pipeline import Run
+from tracker.review.queue import Doubt, queue
+from tracker.review.queue.doubt import Lanes, said
+from tracker.review.self_consistency.others import Given, Look, looked
+from tracker.runs import pipeline
+from tracker.runs.pipeline import Run
 from tracker.runs.stage_cache import StageCache
 from tracker.sequences.sequence import GroundTruth, Sequence
-from tracker.trajectories import Trajectories
-from tracker.without_truth.others import Given, Look, looked
 
 
 class Truthful:

@@ -10,10 +10,10 @@ from jaxtyping import Float, Int
 from numpy import ndarray
 from scipy.optimize import linear_sum_assignment
 
-from tracker.assignment import pairs_within
 from tracker.evaluation import EvaluationSettings, evaluate_sequence
+from tracker.fusion.trajectories import Trajectories
+from tracker.geometry.assignment import pairs_within
 from tracker.sequences.sequence import GroundTruth, Sequence
-from tracker.trajectories import Trajectories
 
 
 @dataclass(frozen=True, slots=True)

@@ -57,7 +57,8 @@ class Context:
     """At most this many at once."""
     told: Told = lambda words, done, total: None
     cancelled: Callable[[], bool] = lambda: False
-    """Asked now and then; an experiment that hears yes raises ``tracker.pipeline.Cancelled``."""
+    """Asked now and then; an experiment that hears yes raises
+    ``tracker.runs.pipeline.Cancelled``."""
     shared: dict[str, Any] = field(default_factory=dict, compare=False)
     """Runs that several experiments use."""
 
@@ -87,7 +88,7 @@ class Context:
             steps: Sum of the steps by which all items advance.
 
         Raises:
-            tracker.pipeline.Cancelled: If the context is cancelled.
+            tracker.runs.pipeline.Cancelled: If the context is cancelled.
         """
         return map_in_processes(
             work,

@@ -9,15 +9,15 @@ from dataclasses import dataclass, replace
 
 from tests import rooms
 from tests.papers.laboratory.experiment import Context, Unavailable
-from tracker import pipeline
+from tracker.fusion.trajectories import Trajectories
 from tracker.parameters import RunParameters
-from tracker.pipeline import Cancelled, Progress, Run
+from tracker.runs import pipeline
+from tracker.runs.pipeline import Cancelled, Progress, Run
 from tracker.runs.processes import WorkerControl
 from tracker.sequences.built_in import cached_rooms
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.reader import read_sequence
 from tracker.sequences.sequence import Sequence, SequenceError
-from tracker.trajectories import Trajectories
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -7,13 +7,7 @@ from typing import TYPE_CHECKING, Any
 from tests.papers.claims import cameras, fig1
 from tests.papers.claims.fig1 import ROOM
 from tests.papers.laboratory import runs
-from tests.papers.laboratory.experiment import (
-    Context,
-    Experiment,
-    Finding,
-    Result,
-    Unavailable,
-)
+from tests.papers.laboratory.experiment import Context, Experiment, Finding, Result, Unavailable
 from tracker.evaluation import evaluate_sequence
 from tracker.evaluation.figures import number
 from tracker.sequences.library import open_sequence

@@ -8,7 +8,7 @@ from typing import Any
 
 from tests.papers.laboratory.experiment import Experiment, Result
 from tracker import __version__
-from tracker.placing import replacing
+from tracker.files.atomic import replacing
 
 
 def document(

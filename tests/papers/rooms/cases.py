@@ -17,9 +17,9 @@ from tests.papers.rooms.kept import keep_row
 from tests.rooms import RenderCancelled, choose, render_random
 from tests.rooms.random_rooms import VERSION
 from tracker import parameters as table
-from tracker import pipeline
 from tracker.evaluation import evaluate_sequence
 from tracker.parameters import METHODS, RunParameters, Stage, method_of
+from tracker.runs import pipeline
 from tracker.runs.numbers_version import method_version, numbers_version
 from tracker.runs.processes import WorkerControl
 from tracker.sequences.reader import read_sequence

@@ -8,13 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tests.papers.laboratory.experiment import (
-    Context,
-    Experiment,
-    Finding,
-    Result,
-    Unavailable,
-)
+from tests.papers.laboratory.experiment import Context, Experiment, Finding, Result, Unavailable
 from tests.papers.rooms.cases import Case, Item, cases, key_of, measure, steps_of
 from tests.papers.rooms.causes import causes_of, worst_of
 from tests.papers.rooms.kept import read_rows

@@ -13,8 +13,8 @@ from numpy import ndarray
 
 from tests.rooms.random_rooms.choices import Choices
 from tests.rooms.writing import Marked
-from tracker.boxes import box_overlaps
-from tracker.camera import Camera
+from tracker.geometry.boxes import box_overlaps
+from tracker.geometry.camera import Camera
 
 FILE = "boxes.csv"
 _FOUND = 0.3

@@ -10,17 +10,7 @@ from jaxtyping import Bool, Float
 from numpy import ndarray
 from scipy.ndimage import gaussian_filter1d
 
-from tests.rooms.cast.gait import (
-    CHEST,
-    HEAD,
-    JOINTS,
-    PELVIS,
-    STATURE,
-    Poses,
-    Sitting,
-    lay,
-    pose,
-)
+from tests.rooms.cast.gait import CHEST, HEAD, JOINTS, PELVIS, STATURE, Poses, Sitting, lay, pose
 from tests.rooms.cast.paths import Facing, Path, walk
 from tests.rooms.cast.people import Body, build
 from tests.rooms.random_rooms.behaviour import Script

@@ -37,13 +37,8 @@ from tests.rooms.random_rooms.wardrobe import dress
 from tests.rooms.scene import Scene
 from tests.rooms.studio import CELL, Drawn, Stage, Studio, in_order, muted_room
 from tests.rooms.walls.background import Background, Tracer, render_background
-from tests.rooms.writing import (
-    Description,
-    RenderCancelled,
-    describe,
-    whole_folder,
-)
-from tracker.camera import Camera
+from tests.rooms.writing import Description, RenderCancelled, describe, whole_folder
+from tracker.geometry.camera import Camera
 
 VERSION = 2
 """Grows when the same seed would give another room."""

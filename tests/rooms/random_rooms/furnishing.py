@@ -8,18 +8,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from tests.rooms.random_rooms.choices import Choices, generator
-from tests.rooms.random_rooms.shell import (
-    SIDES,
-    Bed,
-    Furnished,
-    Seat,
-    Side,
-    length,
-    near_camera,
-)
+from tests.rooms.random_rooms.shell import SIDES, Bed, Furnished, Seat, Side, length, near_camera
 from tests.rooms.rays import BALL, CYLINDER
 from tests.rooms.walls.interior import DOOR_WIDTH, Finish, plant
-from tracker.camera import Camera
+from tracker.geometry.camera import Camera
 
 _HEADINGS: dict[Side, float] = {
     "east": math.pi, "north": -math.pi / 2.0, "west": 0.0, "south": math.pi / 2.0

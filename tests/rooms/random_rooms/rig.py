@@ -10,7 +10,7 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from tests.rooms.random_rooms.choices import Choices, generator
-from tracker.camera import Camera
+from tracker.geometry.camera import Camera
 
 _HEIGHTS = {"low": (1.1, 1.7), "middle": (1.8, 2.3), "high": (2.25, 3.1)}
 _VIEWS = {"pinhole": (58.0, 84.0), "mild": (60.0, 88.0), "barrel": (74.0, 96.0),

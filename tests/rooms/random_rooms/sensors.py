@@ -13,7 +13,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from tests.rooms.random_rooms.choices import Choices, generator
 from tests.rooms.walls.background import Background
-from tracker.camera import Camera
+from tracker.geometry.camera import Camera
 
 _MIDDLE_GREY = 0.105
 """Mean light of the empty room that a camera exposes for."""

@@ -12,15 +12,8 @@ from jaxtyping import Bool, Float
 from numpy import ndarray
 
 from tests.rooms.random_rooms.choices import Choices, generator
-from tests.rooms.walls.interior import (
-    DOOR_HEIGHT,
-    DOOR_WIDTH,
-    WALL,
-    Finish,
-    Interior,
-    Lamp,
-)
-from tracker.camera import Camera
+from tests.rooms.walls.interior import DOOR_HEIGHT, DOOR_WIDTH, WALL, Finish, Interior, Lamp
+from tracker.geometry.camera import Camera
 
 Side = Literal["east", "north", "west", "south"]
 SIDES: tuple[Side, ...] = ("east", "north", "west", "south")

@@ -13,7 +13,7 @@ from tests.rooms.rays import BOX, Hits, cast
 from tests.rooms.walls.interior import Interior, Lamp, Solid
 from tests.rooms.walls.paint import paint
 from tests.rooms.walls.textures import linear
-from tracker.camera import Camera
+from tracker.geometry.camera import Camera
 
 FINE = 2
 """The empty room is traced, and people are drawn, this many times finer than the picture."""

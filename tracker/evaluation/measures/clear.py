@@ -14,8 +14,8 @@ import numpy as np
 from jaxtyping import Bool, Int
 from numpy import ndarray
 
-from tracker.assignment import linear_sum_assignment
 from tracker.evaluation.measures.matching import Comparison, Matches, gather
+from tracker.geometry.assignment import linear_sum_assignment
 
 CONTINUATION = 1000.0
 """What keeping last step's pair is worth beside the score of a pair, which is at most 1."""

@@ -12,8 +12,8 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
-from tracker.assignment import linear_sum_assignment
 from tracker.evaluation.measures.matching import Comparison
+from tracker.geometry.assignment import linear_sum_assignment
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -12,8 +12,8 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from tracker.assignment import linear_sum_assignment
 from tracker.evaluation.measures.matching import Comparison
+from tracker.geometry.assignment import linear_sum_assignment
 
 ALPHAS = np.arange(1, 20) * 0.05
 """The strictnesses: similarity from which a pair counts, 0.05 … 0.95."""

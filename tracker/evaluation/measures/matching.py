@@ -37,8 +37,8 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
-from tracker.assignment import linear_sum_assignment
 from tracker.evaluation.settings import Distance
+from tracker.geometry.assignment import linear_sum_assignment
 from tracker.sequences.sequence import GroundTruth
 
 

@@ -21,8 +21,8 @@ from tracker.evaluation.report.tables import (
     track_table,
 )
 from tracker.evaluation.result import Evaluation
+from tracker.files.atomic import replacing
 from tracker.parameters import RunParameters
-from tracker.placing import replacing
 from tracker.sequences.sequence import Sequence
 
 _HERE = Path(__file__).parent

@@ -8,10 +8,10 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
-from tracker.assignment import linear_sum_assignment
 from tracker.filters import gaussian_mixture
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion.model import CONFIRMED, FusionModel
+from tracker.geometry.assignment import linear_sum_assignment
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -9,10 +9,10 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
-from tracker.assignment import linear_sum_assignment
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion.model import CONFIRMED
 from tracker.fusion.protocol import Associations
+from tracker.geometry.assignment import linear_sum_assignment
 from tracker.parameters import FusionParams
 from tracker.single_view.protocol import ViewResult
 

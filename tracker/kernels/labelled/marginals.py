@@ -8,10 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy import ndarray
 
-from tracker.kernels.association.belief_propagation import (
-    Settling,
-    belief_propagation,
-)
+from tracker.kernels.association.belief_propagation import Settling, belief_propagation
 from tracker.kernels.compilation import kernel
 from tracker.kernels.gating import Measurements
 from tracker.kernels.kalman import Expected, all_pairs

@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Bool
 from numpy import ndarray
 
-from tracker.folders import files_matching
+from tracker.files.folders import files_matching
 from tracker.sequences.fields import LONGEST_NAME, Fields, did_you_mean, listed
 from tracker.sequences.pictures.numbering import whole_row
 from tracker.sequences.pictures.video import VideoError, index_video, not_a_picture, read_image

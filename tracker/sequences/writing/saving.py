@@ -14,8 +14,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from tracker.folders import cache_folder
-from tracker.placing import beside, replacing, sweep, sync_file, sync_folder
+from tracker.files.atomic import beside, replacing, sweep, sync_file, sync_folder
+from tracker.files.folders import cache_folder
 from tracker.sequences.built_in import built_in_name
 from tracker.sequences.reader import FILE, check_own_file, given_folder, read_sequence
 from tracker.sequences.sequence import Sequence, SequenceError

@@ -9,7 +9,8 @@ from __future__ import annotations
 from jaxtyping import Float
 from numpy import ndarray
 
-from tracker.sequences.fields import Fields, did_you_mean, listed, shown
+from tracker.files.text import shown
+from tracker.sequences.fields import Fields, did_you_mean, listed
 from tracker.sequences.sequence import Entrance, Room, Template, View
 
 LEAST_TEMPLATE = 2.0

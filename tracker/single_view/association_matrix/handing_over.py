@@ -13,12 +13,12 @@ import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray
 
-from tracker.assignment import linear_sum_assignment
+from tracker.geometry.assignment import linear_sum_assignment
 from tracker.parameters import AssociationMatrixParams
-from tracker.pictures.blobs import Blobs
 from tracker.single_view.association_matrix import decision_matrices
 from tracker.single_view.association_matrix.following import coefficients
 from tracker.single_view.association_matrix.moving_objects import MovingObject, Situation, Track
+from tracker.single_view.pictures.blobs import Blobs
 from tracker.single_view.protocol import ViewEvent
 
 

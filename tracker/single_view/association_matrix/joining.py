@@ -7,8 +7,8 @@ from jaxtyping import Float
 from numpy import ndarray
 from scipy.sparse.csgraph import connected_components
 
-from tracker.boxes import Boxes
-from tracker.pictures.blobs import Blobs
+from tracker.geometry.boxes import Boxes
+from tracker.single_view.pictures.blobs import Blobs
 
 
 def join(pieces: Blobs, gaps: Float[ndarray, " N"]) -> Blobs:

@@ -14,10 +14,6 @@ from jaxtyping import Float, Int, UInt8, UInt16
 from numpy import ndarray
 
 from tracker.parameters import AssociationMatrixParams
-from tracker.pictures import colour
-from tracker.pictures.blobs import Blobs, blobs
-from tracker.pictures.colour import BINS
-from tracker.pictures.foreground import ForegroundModel, learn, pack
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.association_matrix.following import follow, object_histograms
@@ -25,6 +21,10 @@ from tracker.single_view.association_matrix.handing_over import advance
 from tracker.single_view.association_matrix.joining import join
 from tracker.single_view.association_matrix.moving_objects import MovingObject, Situation
 from tracker.single_view.association_matrix.silhouettes import Fits, Silhouettes
+from tracker.single_view.pictures import colour
+from tracker.single_view.pictures.blobs import Blobs, blobs
+from tracker.single_view.pictures.colour import BINS
+from tracker.single_view.pictures.foreground import ForegroundModel, learn, pack
 from tracker.single_view.protocol import ViewEvent, ViewResult
 
 if TYPE_CHECKING:

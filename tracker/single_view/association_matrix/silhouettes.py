@@ -14,14 +14,14 @@ import numpy as np
 from jaxtyping import Float, Int, UInt8
 from numpy import ndarray
 
-from tracker.camera import Camera
+from tracker.geometry.camera import Camera
 from tracker.kernels.pictures import silhouettes
 from tracker.kernels.pictures.silhouettes import Acceptance, SizeTable
 from tracker.parameters import AssociationMatrixParams
-from tracker.pictures.blobs import Blobs
-from tracker.pictures.foreground import integral, shape_scores
 from tracker.sequences.sequence import Room
 from tracker.single_view.box_sizes import BoxSizes
+from tracker.single_view.pictures.blobs import Blobs
+from tracker.single_view.pictures.foreground import integral, shape_scores
 
 SIZES = 6
 """Sizes of targets that are tried at each place; the best are averaged, so few are enough."""

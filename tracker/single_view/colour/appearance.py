@@ -13,15 +13,15 @@ from jaxtyping import Float, Int, UInt8, UInt16
 from numpy import ndarray
 
 from tracker.parameters import ForegroundParams
-from tracker.pictures import colour
-from tracker.pictures.colour import ColourSpaceName, KernelName
-from tracker.pictures.foreground import ForegroundModel, integral, learn, shape_scores
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import BoxSizes, geometry
 from tracker.single_view.colour.carrying import with_carried
 from tracker.single_view.colour.templates import read_templates
 from tracker.single_view.colour.trust import template_trust
+from tracker.single_view.pictures import colour
+from tracker.single_view.pictures.colour import ColourSpaceName, KernelName
+from tracker.single_view.pictures.foreground import ForegroundModel, integral, learn, shape_scores
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -130,8 +130,8 @@ class Appearance:
     ) -> tuple[Float[ndarray, " N"], Float[ndarray, " N"]]:
         """What the foreground says of each box: log factors of the likelihood, and shares inside.
 
-        As :func:`tracker.pictures.foreground.shape_scores`; without a foreground model the factors
-        are 0 and the shares 1.
+        As :func:`tracker.single_view.pictures.foreground.shape_scores`; without a foreground model
+        the factors are 0 and the shares 1.
 
         Args:
             scene: The picture.

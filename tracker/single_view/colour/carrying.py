@@ -13,14 +13,14 @@ import numpy as np
 from jaxtyping import Float, UInt16
 from numpy import ndarray
 
-from tracker.boxes import Boxes
-from tracker.camera import Camera
-from tracker.pictures import colour
-from tracker.pictures.colour import ColourSpaceName, KernelName
+from tracker.geometry.boxes import Boxes
+from tracker.geometry.camera import Camera
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence, Template
 from tracker.single_view.box_sizes import geometry, upright_boxes
 from tracker.single_view.colour.templates import template_picture
+from tracker.single_view.pictures import colour
+from tracker.single_view.pictures.colour import ColourSpaceName, KernelName
 
 DEPTHS = 400
 """Places along a template's ray, a hundredth of the distance apart."""

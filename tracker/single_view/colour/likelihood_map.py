@@ -10,9 +10,9 @@ import numpy as np
 from jaxtyping import Float, UInt8
 from numpy import ndarray
 
-from tracker.pictures import colour
-from tracker.pictures.colour import ColourModel
 from tracker.single_view.box_sizes import BoxSizes
+from tracker.single_view.pictures import colour
+from tracker.single_view.pictures.colour import ColourModel
 
 COLUMNS = 72
 """Places across a picture: as fine as the eye follows in a pane."""

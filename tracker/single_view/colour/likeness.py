@@ -12,13 +12,13 @@ import numpy as np
 from jaxtyping import Float, Float16, Int, UInt8, UInt16
 from numpy import ndarray
 
-from tracker.boxes import Boxes
+from tracker.geometry.boxes import Boxes
 from tracker.parameters import ColourPhdParams
-from tracker.pictures import colour
-from tracker.pictures.colour import ColourModel, ColourSpaceName
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.colour.templates import read_templates
+from tracker.single_view.pictures import colour
+from tracker.single_view.pictures.colour import ColourModel, ColourSpaceName
 
 logger = logging.getLogger(__name__)
 

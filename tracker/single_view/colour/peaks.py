@@ -17,18 +17,14 @@ from scipy.special import expit
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.parameters import ColourPeakParams, ForegroundParams
 from tracker.parameters.groups.shapes import ShapesParams
-from tracker.pictures import mean_shift
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import BoxSizes
 from tracker.single_view.colour.appearance import Appearance, Scene
 from tracker.single_view.colour.evidence import colour_ratios
-from tracker.single_view.colour.trust import (
-    shapes_of_templates,
-    taught_well,
-    template_trust,
-)
+from tracker.single_view.colour.trust import shapes_of_templates, taught_well, template_trust
 from tracker.single_view.dropped import Dropped
+from tracker.single_view.pictures import mean_shift
 from tracker.single_view.protocol import TRUST
 from tracker.single_view.shape.evidence import log_ratios, shape_sigmas
 from tracker.single_view.shape.finder import SAME_PERSON, ShapeFinder, Shapes

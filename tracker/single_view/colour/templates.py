@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from tracker.boxes import Boxes
-from tracker.pictures import colour
-from tracker.pictures.colour import ColourModel, ColourSpaceName, KernelName
+from tracker.geometry.boxes import Boxes
 from tracker.sequences.pictures.frames import Picture, Pictures
 from tracker.sequences.sequence import Sequence, SequenceError
+from tracker.single_view.pictures import colour
+from tracker.single_view.pictures.colour import ColourModel, ColourSpaceName, KernelName
 
 
 def read_templates(

@@ -17,13 +17,13 @@ from jaxtyping import Float
 from numpy import ndarray
 from scipy.special import expit
 
-from tracker.boxes import Boxes, box_overlaps
+from tracker.geometry.boxes import Boxes, box_overlaps
 from tracker.parameters import ForegroundParams
-from tracker.pictures.foreground import box_shares, integral, learn
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence, Template
 from tracker.single_view.box_sizes import geometry
 from tracker.single_view.colour.templates import template_picture
+from tracker.single_view.pictures.foreground import box_shares, integral, learn
 from tracker.single_view.shape.finder import ShapeFinder
 
 PICTURES_BEFORE = 8

@@ -7,8 +7,8 @@ from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 from scipy.special import gammaln
 
-from tracker import association
-from tracker.association import MOST_ITEMS, Marginals
+from tracker.filters import association
+from tracker.filters.association import MOST_ITEMS, Marginals
 from tracker.parameters import JpdaParams
 from tracker.single_view.jpda.targets import Innovations
 

@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
-from tracker.assignment import linear_sum_assignment
+from tracker.geometry.assignment import linear_sum_assignment
 
 UNREACHED = 1e6
 """Cost of a pair in place of −ln β where β is 0: more than all other costs together."""

@@ -21,13 +21,13 @@ from jaxtyping import Float, Int, UInt8
 from numpy import ndarray
 from scipy.ndimage import minimum_filter1d
 
-from tracker.camera import Camera
+from tracker.geometry.camera import Camera
 from tracker.parameters import JpdaParams
-from tracker.pictures.blobs import Blobs, blobs
-from tracker.pictures.foreground import integral, shape_shares
 from tracker.sequences.sequence import Room
 from tracker.single_view.box_sizes import BELOW_FLOOR, BoxSizes
 from tracker.single_view.dropped import Dropped
+from tracker.single_view.pictures.blobs import Blobs, blobs
+from tracker.single_view.pictures.foreground import integral, shape_shares
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -12,28 +12,23 @@ import numpy as np
 from jaxtyping import Float, UInt8
 from numpy import ndarray
 
-from tracker.boxes import Boxes
 from tracker.filters.gaussian_mixture import GaussianMixture
-from tracker.parameters import (
-    ColourPhdParams,
-    DetectionBoxParams,
-    ForegroundParams,
-    JpdaParams,
-)
-from tracker.pictures.blobs import blobs
-from tracker.pictures.foreground import (
-    ForegroundModel,
-    MovingForeground,
-    box_shares,
-    integral,
-    learn,
-)
+from tracker.geometry.boxes import Boxes
+from tracker.parameters import ColourPhdParams, DetectionBoxParams, ForegroundParams, JpdaParams
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.colour.peaks import PeakFinder
 from tracker.single_view.detector_boxes import DetectorBoxes, trust
 from tracker.single_view.dropped import Dropped
 from tracker.single_view.jpda.crowns import TargetSizes, crowns
+from tracker.single_view.pictures.blobs import blobs
+from tracker.single_view.pictures.foreground import (
+    ForegroundModel,
+    MovingForeground,
+    box_shares,
+    integral,
+    learn,
+)
 from tracker.single_view.protocol import DOUBT
 
 if TYPE_CHECKING:

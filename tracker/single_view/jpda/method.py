@@ -13,10 +13,9 @@ import numpy as np
 from jaxtyping import UInt8
 from numpy import ndarray
 
-from tracker.association import validation_matrix
+from tracker.filters.association import validation_matrix
 from tracker.filters.gaussian_mixture import gate_distance
 from tracker.parameters import JpdaParams
-from tracker.pictures.foreground import pack
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.jpda.association import associate
@@ -25,6 +24,7 @@ from tracker.single_view.jpda.measurements import Measured, Source, source_of
 from tracker.single_view.jpda.moves import Moved, move
 from tracker.single_view.jpda.targets import Targets, innovations
 from tracker.single_view.jpda.track_management import Managed, manage
+from tracker.single_view.pictures.foreground import pack
 from tracker.single_view.protocol import ViewEvent, ViewResult
 
 if TYPE_CHECKING:

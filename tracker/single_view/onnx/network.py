@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Float, UInt8
 from numpy import ndarray
 
-from tracker.placing import size_of
+from tracker.files.atomic import size_of
 from tracker.single_view.onnx.file import INT64, UINT8, Port, ports_of
 from tracker.single_view.onnx.layouts import FOUND_OUT, proposals
 

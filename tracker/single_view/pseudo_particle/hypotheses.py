@@ -10,7 +10,7 @@ from jaxtyping import Float, Int
 from numpy import ndarray
 from scipy.special import logsumexp
 
-from tracker.assignment import linear_sum_assignment
+from tracker.geometry.assignment import linear_sum_assignment
 from tracker.single_view.pseudo_particle.track_management import Targets
 
 

@@ -14,11 +14,11 @@ from numpy import ndarray
 from scipy.special import expit
 
 from tracker.parameters import PseudoParticleParams
-from tracker.pictures import particles as particle_set
-from tracker.pictures.foreground import pack
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.colour.appearance import Scene
+from tracker.single_view.pictures import particles as particle_set
+from tracker.single_view.pictures.foreground import pack
 from tracker.single_view.protocol import ViewEvent, ViewResult
 from tracker.single_view.pseudo_particle import hypotheses
 from tracker.single_view.pseudo_particle.particles import ColourParticles

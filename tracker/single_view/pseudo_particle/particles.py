@@ -9,10 +9,10 @@ from jaxtyping import Float, Int, UInt8
 from numpy import ndarray
 
 from tracker.parameters import ForegroundParams, PseudoParticleParams
-from tracker.pictures import particles as particle_set
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.colour.appearance import Appearance, Scene
+from tracker.single_view.pictures import particles as particle_set
 
 
 class ColourParticles:

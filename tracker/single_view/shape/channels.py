@@ -13,8 +13,8 @@ from jaxtyping import Float32, Int32, UInt8
 from numpy import ndarray
 
 from tracker.kernels.pictures.channels import channel_sums, gradients
-from tracker.pictures.foreground import BackgroundModel, tone_curve
-from tracker.pictures.foreground.exposure import square_roots
+from tracker.single_view.pictures.foreground import BackgroundModel, tone_curve
+from tracker.single_view.pictures.foreground.exposure import square_roots
 
 LAG = 0.12
 """Seconds between two pictures that are compared: a moving hand leaves its place."""

@@ -8,10 +8,10 @@ import numpy as np
 from jaxtyping import Float, Int, UInt8
 from numpy import ndarray
 
-from tracker.pictures.foreground import learn_background
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import geometry
+from tracker.single_view.pictures.foreground import learn_background
 from tracker.single_view.shape.channels import Channels, ChannelState
 from tracker.single_view.shape.trees import Trees
 from tracker.single_view.shape.windows import Windows

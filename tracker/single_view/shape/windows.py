@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from tracker.camera import Camera
+from tracker.geometry.camera import Camera
 from tracker.sequences.sequence import Room
 from tracker.single_view.box_sizes import upright_boxes
 

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from tracker.boxes import Boxes
-from tracker.pictures.foreground import pack, unpack
+from tracker.geometry.boxes import Boxes
 from tracker.sequences.pictures.frames import Picture, Pictures
 from tracker.sequences.sequence import Sequence
+from tracker.single_view.pictures.foreground import pack, unpack
 from tracker.single_view.protocol import ViewResult
 from tracker.single_view.working.steadying import SteadyReader
 from tracker.single_view.working.view import WorkingView, working_view

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from tracker.checks.check import Check, absent, good, warning
 from tracker.parameters import RunParameters, with_values
+from tracker.sequences.finding import Check, absent, good, warning
 from tracker.sequences.pictures.frames import FrameReader, Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.working.sequence import Working

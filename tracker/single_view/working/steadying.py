@@ -20,10 +20,10 @@ import numpy as np
 from jaxtyping import Float, Float32, UInt8
 from numpy import ndarray
 
-from tracker.pictures.foreground import spread_steps
-from tracker.pictures.foreground.exposure import median
 from tracker.sequences.pictures.frames import Picture, Pictures
 from tracker.sequences.sequence import Sequence
+from tracker.single_view.pictures.foreground import spread_steps
+from tracker.single_view.pictures.foreground.exposure import median
 from tracker.single_view.working.view import WorkingView
 
 _Made = TypeVar("_Made")

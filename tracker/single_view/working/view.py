@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float, UInt8
 from numpy import ndarray
 
-from tracker.camera import Camera
+from tracker.geometry.camera import Camera
 from tracker.parameters.groups.pictures import PictureParams
 from tracker.sequences.sequence import Room
 from tracker.single_view.box_sizes import BoxSizes

@@ -14,11 +14,11 @@ import numpy as np
 from jaxtyping import Bool, Int
 from numpy import ndarray
 
-from tracker.assignment import names_by_majority
 from tracker.corrections import Correction
 from tracker.corrections.kinds import OF_PEOPLE, digest
 from tracker.corrections.kinds import leeway as corrections_leeway
 from tracker.corrections.outcomes import outcomes
+from tracker.geometry.assignment import names_by_majority
 from tracker.parameters import SmoothingParams
 from tracker.smoothing.identity import cutting, joining, odds, pieces
 from tracker.smoothing.identity import decisions as decided

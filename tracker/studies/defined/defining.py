@@ -10,12 +10,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, get_args
 
+from tracker.files.text import not_utf_8, shown
 from tracker.parameters import METHODS, PARAMETERS, PRESETS, RunParameters, value, with_values
-from tracker.sequences.fields import did_you_mean, shown
+from tracker.sequences.fields import did_you_mean
 from tracker.studies.defined.definition import GRID_STEPS, MOST_TRIALS, Definition, Search, Varied
 from tracker.studies.defined.objectives import OBJECTIVES
 from tracker.studies.errors import StudyError
-from tracker.visible import not_utf_8
 
 _NAME = re.compile(r"[^\W_][\w .+-]{0,59}")
 _TOP = frozenset(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TypeVar
 
-from tracker.checked import Spoilt, value_of
+from tracker.files.validated import Spoilt, value_of
 from tracker.studies.errors import StudyError
 
 T = TypeVar("T")

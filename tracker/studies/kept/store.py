@@ -14,8 +14,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from tracker.folders import data_folder
-from tracker.placing import filling
+from tracker.files.atomic import filling
+from tracker.files.folders import data_folder
 from tracker.studies.defined.defining import read_definition
 from tracker.studies.defined.definition import Definition
 from tracker.studies.errors import StudyError

@@ -11,7 +11,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from tracker.placing import replacing
+from tracker.files.atomic import replacing
 from tracker.studies.errors import StudyError
 from tracker.studies.kept.reading import read_as
 from tracker.studies.kept.records import Status, ToldOutcome, Trial

@@ -7,8 +7,8 @@ import shlex
 from pathlib import Path
 from typing import Any
 
-from tracker import pipeline
 from tracker.parameters import changed, with_values
+from tracker.runs import pipeline
 from tracker.sequences.library import open_sequence
 from tracker.studies.defined.definition import Definition
 from tracker.studies.kept.records import JobRow, Trial

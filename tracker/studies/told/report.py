@@ -11,7 +11,7 @@ from typing import Any
 
 from tracker import __version__
 from tracker.evaluation.report.tables import escaped
-from tracker.placing import replacing
+from tracker.files.atomic import replacing
 from tracker.sequences.sequence import SequenceError
 from tracker.studies.kept.records import Trial
 from tracker.studies.kept.store import Store

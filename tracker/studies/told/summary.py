@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from tracker.sequences.fields import shown
+from tracker.files.text import shown
+from tracker.review.self_consistency.estimate import WARNING
 from tracker.studies.defined.definition import Definition
 from tracker.studies.defined.objectives import BESIDE, IDENTITY, OBJECTIVES, WITH_TRUTH, Objective
 from tracker.studies.errors import StudyError
@@ -14,7 +15,6 @@ from tracker.studies.judging import best_of, front_of, usable
 from tracker.studies.kept.records import Status, Trial
 from tracker.studies.kept.store import Store
 from tracker.studies.kept.writer import RESULTS
-from tracker.without_truth.estimate import WARNING
 
 BETTER_SIGMAS = 2.0
 """A difference within so many standard deviations over the seeds is said to be no sure one."""

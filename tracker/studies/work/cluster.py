@@ -20,13 +20,13 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from tracker.files.text import visible
 from tracker.kernels import compilation
 from tracker.runs.processes import available_cores
 from tracker.studies.errors import StudyError
 from tracker.studies.work import recordings, working
 from tracker.studies.work.jobs import Job, Outcome
 from tracker.studies.work.local import how_many
-from tracker.visible import visible
 
 ADDRESS = "DASK_SCHEDULER_ADDRESS"
 """Environment variable: the cluster's scheduler, where none is named."""
@@ -93,7 +93,7 @@ def compile_first(tell: Told) -> None:
     """Have this machine's kernels compiled before its workers start."""
     if not compilation.is_compiled():
         tell(working.COMPILING)
-        line = [sys.executable, "-m", "tracker.warm_up"]
+        line = [sys.executable, "-m", "tracker.runs.warm_up"]
         subprocess.run(line, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, check=False)
 
 

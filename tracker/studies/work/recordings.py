@@ -10,8 +10,8 @@ import zipfile
 from pathlib import Path
 from typing import Any
 
-from tracker.folders import cache_folder, files_matching
-from tracker.placing import filling, write_whole
+from tracker.files.atomic import filling, write_whole
+from tracker.files.folders import cache_folder, files_matching
 from tracker.sequences.library import open_sequence
 from tracker.sequences.reader import FILE
 from tracker.sequences.sequence import Sequence, SequenceError

@@ -22,13 +22,14 @@ from typing import Any
 
 import cv2
 
-from tracker import pipeline
 from tracker.evaluation import evaluate_sequence
-from tracker.folders import cache_folder
+from tracker.files.folders import cache_folder
 from tracker.kernels import compilation
 from tracker.library.keeping import recording_of, run_of, thumbnail_of
 from tracker.parameters import with_values
-from tracker.pipeline import Run
+from tracker.review.self_consistency import estimate
+from tracker.runs import pipeline
+from tracker.runs.pipeline import Run
 from tracker.runs.stage_cache import StageCache
 from tracker.runs.stage_files import StageFiles
 from tracker.sequences.pictures.frames import FrameReader
@@ -36,7 +37,6 @@ from tracker.sequences.sequence import Sequence, SequenceError
 from tracker.studies.defined.objectives import OBJECTIVES
 from tracker.studies.work import recordings
 from tracker.studies.work.jobs import Job, Outcome, code_version
-from tracker.without_truth import estimate
 
 CACHE_BYTES = 128 << 20
 """Memory of a worker for columns of runs, above all of stage 1, which every trial uses that changes
@@ -113,7 +113,7 @@ def _compile() -> None:
         lock.isolation_level = None
         lock.execute("BEGIN EXCLUSIVE")  # the system frees it with the process
         if not compilation.is_compiled():
-            line = [sys.executable, "-m", "tracker.warm_up"]
+            line = [sys.executable, "-m", "tracker.runs.warm_up"]
             subprocess.run(line, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, check=False)
 
 

@@ -13,10 +13,10 @@ from starlette.testclient import TestClient
 
 from app.web.server import Settings, create_app
 from tests.app.conftest import ADDRESS, run_is, wait_until
-from tracker import pipeline
-from tracker.pictures.foreground import unpack
-from tracker.pipeline import Run
+from tracker.runs import pipeline
+from tracker.runs.pipeline import Run
 from tracker.sequences.reader import read_sequence
+from tracker.single_view.pictures.foreground import unpack
 
 
 @pytest.fixture(scope="module")

@@ -7,11 +7,11 @@ from dataclasses import replace
 from app.web.views.decisions import decided, words_of
 from app.web.views.timeline import Timelines, Window
 from tests.engine.synthetic import crossing, sequence
-from tracker import pipeline
-from tracker.doubts import queue
-from tracker.doubts.doubt import Lanes
-from tracker.doubts.moves import pieces_of
 from tracker.parameters import RunParameters
+from tracker.review.queue import queue
+from tracker.review.queue.doubt import Lanes
+from tracker.review.queue.moves import pieces_of
+from tracker.runs import pipeline
 from tracker.smoothing import Decision, names_of
 
 STEPS = 40

@@ -24,10 +24,10 @@ from app.web.evaluation.messages import axis_end, comparison_of
 from app.web.server import Settings, create_app
 from tests.app.conftest import ADDRESS, connect, is_evaluated, run_is, wait_until
 from tests.app.folders import FRAMES
-from tracker import pipeline
 from tracker.evaluation import DEFINITIONS, compare, evaluate_sequence
 from tracker.parameters import with_values
-from tracker.pipeline import Progress, Run
+from tracker.runs import pipeline
+from tracker.runs.pipeline import Progress, Run
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.reader import read_sequence
 from tracker.sequences.sequence import Sequence

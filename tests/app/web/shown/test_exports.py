@@ -16,8 +16,8 @@ from app.state.workers.exporter import Exporter
 from app.web.server import Settings, create_app
 from tests.app.conftest import ADDRESS, run_is, wait_until
 from tests.library.written import written
-from tracker.writing.registry import FORMATS
-from tracker.writing.written import Options, Written
+from tracker.export.registry import FORMATS
+from tracker.export.written import Options, Written
 
 
 def fetched(client: TestClient, **wish: object) -> bytes:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from app.web.views.steps import step_of
-from tracker import pipeline
+from tracker.runs import pipeline
 from tracker.sequences.reader import read_sequence
 from tracker.single_view.protocol import ViewEvent
 

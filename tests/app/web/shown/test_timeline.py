@@ -15,10 +15,10 @@ from app.state.scores import Scored
 from app.web.views.timeline import MOST_TRACKS, Timelines, Window, counts, numbers
 from tests.app.folders import FRAMES
 from tests.engine.synthetic import crossing, sequence
-from tracker import pipeline
+from tracker.fusion.trajectories import Trajectories
 from tracker.parameters import RunParameters
-from tracker.pipeline import Run
-from tracker.trajectories import Trajectories
+from tracker.runs import pipeline
+from tracker.runs.pipeline import Run
 
 
 def run_of(frames: int, rows: list[tuple[int, int, bool]]) -> Run:

@@ -1,1 +1,0 @@
-"""Whole runs, what is kept of them, their parameters."""

@@ -1,0 +1,1 @@
+"""Formats, import and check."""

@@ -1,0 +1,221 @@
+"""The boxes of random rooms tell how their calibration is meant."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.mistakes import MISTAKES
+from tests.random_rooms import random_room
+from tracker.geometry.consistency.suggestion import agreement, suggest
+from tracker.io.checks import check
+from tracker.io.checks.boxes import listen, raw_cameras
+from tracker.io.checks.reading import FLIP, Reading, pose, read_boxes, to_camera, upright
+from tracker.io.checks.readings import Seen, find_meaning
+from tracker.io.checks.sizes import likely_unit
+from tracker.io.checks.timing import check_counting
+from tracker.io.read.pieces import METRES, RawCamera
+from tracker.sequences.sequence import Sequence
+
+ROOMS = range(6)
+
+
+def seen(sequence: Sequence) -> list[Seen | None]:
+    """The boxes of all cameras."""
+    return [
+        None if v.detections is None else Seen(v.detections.frames, v.detections.boxes)
+        for v in sequence.views
+    ]
+
+
+def warnings(sequence: Sequence) -> list[str]:
+    """The remedies that are named."""
+    found = [each for each in check(sequence) if each.status == "warning"]
+    return [str(remedy) for each in found for remedy in each.remedies]
+
+
+@pytest.mark.parametrize("seed", ROOMS)
+def test_nothing_is_odd_in_a_good_room(seed: int) -> None:
+    found = check(random_room(seed))
+    assert [str(each) for each in found if each.status == "warning"] == []
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("name", MISTAKES)
+def test_each_usual_mistake_is_named_with_its_remedy(name: str) -> None:
+    make, remedy = MISTAKES[name]
+    named = [warnings(make(random_room(seed, steps=150))) == [remedy] for seed in ROOMS]
+    assert sum(named) >= len(ROOMS) - 1
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("height", [0.25, 1.25, 1.7])
+@pytest.mark.parametrize("seed", [0, 1])
+def test_heads_and_people_who_sit_raise_no_alarm(seed: int, height: float) -> None:
+    found = check(random_room(seed, height=height, people=4))
+    assert [str(each) for each in found if each.status == "warning"] == []
+
+
+@pytest.mark.full
+def test_a_crowd_raises_no_alarm_and_is_read_rightly() -> None:
+    crowd = random_room(3, people=20, cameras=4, steps=100)
+    assert warnings(crowd) == []
+    assert warnings(MISTAKES["camera to world"][0](crowd)) == ["--pose camera-to-world"]
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("seed", ROOMS)
+def test_all_at_once_is_found_out(seed: int) -> None:
+    """Inverted OpenGL poses in centimetres of a world with y up, and corners of boxes."""
+    sequence = random_room(seed, steps=150)
+    turned = [
+        (FLIP @ raw.rotation @ upright("y"), 100.0 * FLIP @ raw.translation)
+        for raw in raw_cameras(sequence)
+    ]
+    cameras = [
+        replace(raw, rotation=rotation.T, translation=-rotation.T @ translation)
+        for raw, (rotation, translation) in zip(raw_cameras(sequence), turned, strict=True)
+    ]
+    corners = [
+        Seen(own.frames, np.concatenate([own.four[:, :2], own.four[:, :2] + own.four[:, 2:]], 1))
+        for own in seen(sequence)
+        if own is not None
+    ]
+    found = find_meaning(cameras, corners)
+    assert found is not None
+    expected = Reading("camera-to-world", "opengl", "xyxy", False, "cm", "y")
+    assert found.reading == expected
+    assert found.height == pytest.approx(1.7, rel=0.12)
+    again = to_camera(cameras[0], found.reading, sequence.cameras[0].image_size)
+    np.testing.assert_allclose(again.centre, sequence.cameras[0].centre, atol=1e-9)
+    np.testing.assert_allclose(again.rotation, sequence.cameras[0].rotation, atol=1e-9)
+
+
+def test_boxes_of_nobody_prove_nothing() -> None:
+    rng = np.random.default_rng(5)
+    sequence = random_room(2, cameras=3)
+    noise = [
+        Seen(np.repeat(np.arange(200), 3), rng.uniform(10, 300, (600, 4))) for _ in sequence.views
+    ]
+    found = find_meaning(raw_cameras(sequence), noise)
+    assert found is not None
+    assert not found.certain
+
+
+def test_too_few_boxes_are_no_reason_for_an_alarm() -> None:
+    found = check(random_room(1, steps=4, people=1))
+    assert [each for each in found if each.status == "warning"] == []
+
+
+def test_a_convention_that_a_file_states_is_not_questioned() -> None:
+    sequence = random_room(0, steps=150)
+    stated = [
+        replace(raw, convention=replace(raw.convention, direction="camera-to-world", unit="mm"))
+        for raw in raw_cameras(sequence)
+    ]
+    found = find_meaning(stated, seen(sequence))
+    assert found is not None
+    assert found.reading.direction == "camera-to-world"
+    assert found.reading.unit == "mm"
+
+
+def test_one_camera_alone_tells_nothing() -> None:
+    sequence = random_room(0, cameras=2)
+    assert find_meaning(raw_cameras(sequence), [seen(sequence)[0], None]) is None
+    alone = replace(sequence, views=sequence.views[:1])
+    assert listen(alone) is None
+    assert {each.status for each in check(alone)} <= {"good", "absent"}
+
+
+@pytest.mark.parametrize("up", ["x", "y", "z", "-x", "-y", "-z"])
+def test_up_becomes_z(up: str) -> None:
+    axis = np.zeros(3)
+    axis["xyz".index(up[-1])] = -1.0 if up.startswith("-") else 1.0
+    turn = upright(up)  # type: ignore[arg-type]
+    np.testing.assert_allclose(turn @ axis, [0.0, 0.0, 1.0], atol=1e-12)
+    assert np.linalg.det(turn) == pytest.approx(1.0)
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("height", [0.25, 0.9, 1.2, 1.7])
+@pytest.mark.parametrize("unit", METRES)
+def test_the_unit_follows_from_how_tall_and_far_people_are(unit: str, height: float) -> None:
+    agreed = listen(random_room(0, steps=60))
+    assert agreed is not None
+    one = METRES[unit]  # type: ignore[index]
+    scaled = replace(agreed.given.consensus, rise=np.array([0.0, 0.0, height / one]))
+    assert likely_unit(5.0 / one, scaled) == unit
+
+
+@pytest.mark.parametrize("layout", ["ltwh", "xyxy", "cxcywh"])
+def test_layouts_of_a_box(layout: str) -> None:
+    box = np.array([[10.0, 20.0, 30.0, 60.0]])
+    as_written = {
+        "ltwh": box,
+        "xyxy": np.array([[10.0, 20.0, 40.0, 80.0]]),
+        "cxcywh": np.array([[25.0, 50.0, 30.0, 60.0]]),
+    }[layout]
+    np.testing.assert_allclose(read_boxes(as_written, layout), box)  # type: ignore[arg-type]
+
+
+def test_a_camera_without_a_pose_is_told() -> None:
+    with pytest.raises(ValueError, match="has no pose"):
+        pose(RawCamera("cam1"), Reading())
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("seed", ROOMS)
+def test_room_and_people_are_suggested(seed: int) -> None:
+    from tracker.geometry.consistency.observed import rays_of
+
+    sequence = random_room(seed, people=5)
+    rays = [
+        rays_of(v.detections.frames, v.detections.boxes, v.camera)
+        for v in sequence.views
+        if v.detections is not None
+    ]
+    found = suggest(sequence.cameras, agreement(sequence.cameras, rays))
+    assert found is not None
+    truth = sequence.ground_truth
+    assert truth is not None
+    assert abs(found.floor) < 0.12
+    assert 2.0 * found.half_extents[2] == pytest.approx(1.7, rel=0.1)
+    low, high = np.quantile(truth.positions, [0.03, 0.97], axis=0)
+    assert (found.minimum <= low + 0.6).all()
+    assert (found.maximum >= high - 0.6).all()
+    assert (found.maximum[:2] - found.minimum[:2] <= high[:2] - low[:2] + 3.0).all()
+
+
+def test_without_boxes_the_room_is_where_views_overlap() -> None:
+    sequence = random_room(4, cameras=3)
+    found = suggest(sequence.cameras, None)
+    assert found is not None
+    middle = (sequence.room.minimum + sequence.room.maximum)[:2] / 2.0
+    assert (found.minimum[:2] < middle).all()
+    assert (found.maximum[:2] > middle).all()
+    assert found.people == 0
+
+
+def test_with_an_exchange_everything_else_is_tried_again_and_once() -> None:
+    """What boxes are taken for may have looked best for want of the exchange."""
+    sequence = MISTAKES["exchanged"][0](random_room(0, steps=100))
+    meaning = find_meaning(raw_cameras(sequence), seen(sequence))
+    assert meaning is not None
+    tried = [one.reading for one in meaning.tried]
+    assert len(set(tried)) == len(tried)
+    layouts = {one.layout for one in tried if one.order == meaning.reading.order}
+    assert layouts == {"ltwh", "cxcywh"}  # corners would lie before the boxes' beginnings
+
+
+def test_boxes_a_step_before_the_truth_are_counted_from_0() -> None:
+    sequence = random_room(2, steps=200)
+    early = [
+        replace(view, detections=replace(own, frames=np.maximum(own.frames - 1, 0)))
+        for view in sequence.views
+        if (own := view.detections) is not None
+    ]
+    found = check_counting(replace(sequence, views=tuple(early)))
+    assert [str(remedy) for remedy in found.remedies] == ["--first-index 0"]
+    assert check_counting(sequence).status == "good"

@@ -1,0 +1,149 @@
+"""Offsets of cameras are found from boxes and from pictures, and only where there are any."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from tests.random_rooms import looking_camera, random_room, random_walkers
+from tracker.geometry.camera import Camera
+from tracker.io.checks import check
+from tracker.io.checks.synchronisation import CameraOffset, synchronise
+from tracker.sequences.sequence import Room, Sequence, View
+
+STEPS = [-25.0, -7.0, -0.5, 0.0, 0.5, 3.0, 12.0, 40.0]
+
+
+def against_the_first(found: tuple[CameraOffset, ...]) -> list[float]:
+    """The offsets of all cameras less that of the first: which one is right nobody can know."""
+    return [offset.steps - found[0].steps for offset in found]
+
+
+@pytest.mark.parametrize("late", STEPS)
+@pytest.mark.parametrize("seed", range(3))
+def test_a_late_camera_is_found_from_boxes(seed: int, late: float) -> None:
+    sequence = random_room(seed, fps=12.0, steps=300, people=3, late=(0.0, late / 12.0))
+    found = synchronise(sequence)
+    expected = [late if camera == 1 else 0.0 for camera in range(len(found))]
+    assert against_the_first(found) == pytest.approx(expected, abs=1.0)
+
+
+@pytest.mark.full
+def test_several_late_cameras_of_a_crowd_are_found_together() -> None:
+    late = (0.0, 1.3, 0.0, -0.7, 0.0)
+    sequence = random_room(11, cameras=5, fps=10.0, steps=300, people=12, late=late)
+    found = synchronise(sequence)
+    assert [offset.seconds for offset in found] == pytest.approx(late, abs=0.08)
+    assert [offset.sure for offset in found] == [False, True, False, True, False]
+
+
+@pytest.mark.full
+def test_a_late_camera_is_told_with_its_remedy_and_nothing_is_applied() -> None:
+    sequence = random_room(5, cameras=4, fps=25.0, steps=400, people=3, late=(0, 0, 12 / 25))
+    told = [each for each in check(sequence) if each.status == "warning"]
+    (late,) = told
+    assert late.sentence.startswith("cam3 is 1")
+    assert "frames late" in late.sentence
+    (remedy,) = late.remedies
+    assert remedy.flag == "camera.time_offset"
+    assert float(remedy.value) == pytest.approx(-12 / 25, abs=0.04)
+    assert sequence.views[2].clock is None
+
+
+def test_the_curve_has_its_peak_at_the_offset() -> None:
+    sequence = random_room(5, cameras=3, fps=12.0, steps=300, people=3, late=(0.0, 1.0))
+    curve = synchronise(sequence)[1].curve
+    assert curve.offsets[0] == -120
+    assert curve.offsets[-1] == 120
+    assert curve.offsets[int(np.nanargmax(curve.agreement))] == pytest.approx(12.0, abs=1.0)
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("seed", range(4))
+def test_boxes_of_other_people_give_no_sure_offset(seed: int) -> None:
+    sequence, other = random_room(seed, cameras=3), random_room(seed + 50, cameras=3)
+    stranger = replace(sequence.views[1], detections=other.views[1].detections)
+    views = (sequence.views[0], stranger, *sequence.views[2:])
+    assert not any(offset.sure for offset in synchronise(replace(sequence, views=views)))
+
+
+def test_people_who_stand_still_give_no_sure_offset() -> None:
+    sequence = random_room(7, cameras=3, people=3, steps=200)
+    still = []
+    for view in sequence.views:
+        own = view.detections
+        assert own is not None
+        first = own.at(0)
+        count = first.stop - first.start
+        noise = np.random.default_rng(0).normal(0.0, 1.0, (200, count, 4))
+        boxes = (own.boxes[first] + noise).reshape(-1, 4)
+        frames = np.repeat(np.arange(200), count)
+        still.append(
+            replace(
+                view,
+                detections=replace(own, frames=frames, boxes=boxes, scores=np.ones(len(frames))),
+            )
+        )
+    found = synchronise(replace(sequence, views=tuple(still)))
+    assert not any(offset.sure for offset in found)
+
+
+def test_nothing_to_compare_gives_nothing() -> None:
+    sequence = random_room(0, cameras=2)
+    bare = [replace(view, detections=None) for view in sequence.views]
+    assert synchronise(replace(sequence, views=tuple(bare))) == ()
+
+
+def drawn(folder: Path, camera: Camera, rng: np.random.Generator, late: float) -> tuple[Path, ...]:
+    """Pictures of people as bright columns before a noisy wall, shown ``late`` seconds too late."""
+    width, height = camera.image_size
+    wall = cv2.resize(rng.integers(60, 160, (12, 16), dtype=np.uint8), (width, height))
+    room = Room(np.zeros(3), np.array([5.0, 5.0, 2.2]))
+    walkers = random_walkers(np.random.default_rng(3), room, 2, 30.0)
+    folder.mkdir()
+    for step in range(240):
+        picture = wall + rng.normal(0.0, 3.0, wall.shape)
+        boxes, visible = camera.project_boxes(
+            walkers.at(step / 12.0 - late), np.array([0.25, 0.25, 0.85])
+        )
+        for number in np.flatnonzero(visible):
+            left, top, right, bottom = np.round(
+                [*boxes[number, :2], *(boxes[number, :2] + boxes[number, 2:])]
+            ).astype(int)
+            picture[max(top, 0) : max(bottom, 0), max(left, 0) : max(right, 0)] = 30 + 190 * number
+        colour = cv2.cvtColor(np.clip(picture, 0, 255).astype(np.uint8), cv2.COLOR_GRAY2BGR)
+        cv2.imwrite(str(folder / f"{step:04d}.png"), colour)
+    return tuple(sorted(folder.iterdir()))
+
+
+@pytest.mark.parametrize(
+    "late",
+    [0.5, *(pytest.param(late, marks=pytest.mark.full) for late in (-25.0, 0.0, 17.0))],
+)
+def test_a_late_camera_is_found_from_the_motion_in_pictures(tmp_path: Path, late: float) -> None:
+    rng = np.random.default_rng(8)
+    middle = np.array([2.5, 2.5, 0.9])
+    views = []
+    for number, place in enumerate([(-1.0, -1.5, 2.5), (6.5, -0.5, 2.2), (2.0, 7.0, 2.7)]):
+        camera = looking_camera(f"cam{number + 1}", np.array(place), middle, 170.0, (240, 180))
+        delay = late / 12.0 if number == 1 else 0.0
+        views.append(View(camera, images=drawn(tmp_path / camera.name, camera, rng, delay)))
+    sequence = Sequence(
+        name="columns",
+        folder=tmp_path,
+        fps=12.0,
+        frames=240,
+        room=Room(np.zeros(3), np.array([5.0, 5.0, 2.2])),
+        target_half_extents=np.array([0.25, 0.25, 0.85]),
+        views=tuple(views),
+    )
+    found = synchronise(sequence)
+    assert against_the_first(found) == pytest.approx([0.0, late, 0.0], abs=1.0)
+    if abs(late) < 1.0:
+        assert not found[1].sure
+    if late == 17.0:
+        assert found[1].sure

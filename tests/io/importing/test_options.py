@@ -1,0 +1,217 @@
+"""What whoever imports knows better than the files, and time stamps of cameras."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import pytest
+
+from app.command.main import main
+from tests.io.read.recorded import PLACES, detections, settled_of, toml, videos
+from tests.io.read.rig import SIZE, boxes, cameras
+from tracker.io.checks import check
+from tracker.io.importing.gathering import gather
+from tracker.io.importing.options import ImportOptions
+from tracker.io.importing.preview import as_sequence
+from tracker.io.importing.remedies import for_import
+from tracker.io.importing.writing import write
+from tracker.io.read.pieces import FormatError, Unit
+from tracker.sequences.reader import read_sequence
+
+
+def test_boxes_as_parts_of_the_picture_are_read_where_it_is_told(tmp_path: Path) -> None:
+    toml(tmp_path)
+    for camera in cameras():
+        frames, found = boxes(camera, PLACES)
+        parts = (found + np.array([0.5, 0.5, 0.0, 0.0])) / np.array([*SIZE, *SIZE])
+        rows = [f"{f},{','.join(map(str, b))}" for f, b in zip(frames, parts.tolist(), strict=True)]
+        (tmp_path / f"{camera.name}.csv").write_text(
+            "\n".join(["frame,left,top,width,height", *rows])
+        )
+    options = ImportOptions(boxes="ltwh", normalised=True)
+    view = settled_of(tmp_path, options).views[0]
+    assert view.detections is not None
+    np.testing.assert_allclose(view.detections.boxes, boxes(cameras()[0], PLACES)[1], atol=1e-6)
+
+
+def test_parts_of_the_picture_may_reach_beyond_it(tmp_path: Path) -> None:
+    toml(tmp_path)
+    for camera in cameras():
+        frames, found = boxes(camera, PLACES)
+        found[::50, 3] += 2.0 * SIZE[1]  # drawn on below the picture
+        corners = np.hstack([found[:, :2], found[:, :2] + found[:, 2:]])
+        parts = (corners + 0.5) / np.array([*SIZE, *SIZE])
+        rows = [f"{f},{','.join(map(str, b))}" for f, b in zip(frames, parts.tolist(), strict=True)]
+        (tmp_path / f"{camera.name}.csv").write_text("\n".join(["frame,x1,y1,x2,y2", *rows]))
+    for view in settled_of(tmp_path).views:
+        assert view.detections is not None
+        assert np.median(view.detections.boxes[:, 3]) > 50.0
+
+
+@pytest.mark.full
+def test_exchanged_calibrations_are_named_and_mended_by_a_flag(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    files, out = tmp_path / "files", tmp_path / "out"
+    files.mkdir()
+    toml(files)
+    detections(files)
+    text = (files / "calibration.toml").read_text()
+    names = {"cam1": "cam3", "cam2": "cam1", "cam3": "cam2", "cam4": "cam4"}
+    for old, new in names.items():
+        text = text.replace(f"[{old}]", f"[x{new}]").replace(f'"{old}"', f'"x{new}"')
+    (files / "calibration.toml").write_text(text.replace("xcam", "cam"))
+    assert main(["import", str(files), "-o", str(out)]) == 0
+    said = capsys.readouterr().out
+    assert "with the calibrations exchanged" in said
+    flags = said[said.index("--swap") :].split("\n")[0].split()
+    assert flags[::2] == ["--swap", "--swap"]
+    mended = tmp_path / "mended"
+    assert main(["import", str(files), "-o", str(mended), *flags]) == 0
+    assert "exchanged" not in capsys.readouterr().out
+    by_name = {camera.name: camera for camera in read_sequence(mended).cameras}
+    for camera in cameras():
+        np.testing.assert_allclose(by_name[camera.name].centre, camera.centre, atol=1e-6)
+
+
+def test_swap_names_cameras_that_are_there(tmp_path: Path) -> None:
+    toml(tmp_path)
+    detections(tmp_path)
+    with pytest.raises(FormatError, match="--swap door: expected a camera of the calibration"):
+        settled_of(tmp_path, ImportOptions(swap=(("door", "cam1"),)))
+
+
+@pytest.mark.full
+def test_time_stamps_say_when_frames_were_taken(tmp_path: Path) -> None:
+    """One camera begins half a second late and leaves out every third frame."""
+    files, out = tmp_path / "files", tmp_path / "out"
+    files.mkdir()
+    toml(files)
+    videos(files)
+    rows = ["sync_index,port,frame_index,frame_time"]
+    times = {port: 100.0 + np.arange(60) / 20.0 for port in (1, 2, 3, 4)}
+    times[2] = 100.5 + np.delete(np.arange(90), slice(2, None, 3)) / 20.0
+    rows += [f"{n},{port},{n},{t}" for port in times for n, t in enumerate(times[port])]
+    (files / "frame_time_history.csv").write_text("\n".join(rows))
+    settled = settled_of(files)
+    assert settled.fps == pytest.approx(20.0, rel=1e-3)
+    write(settled, out, "stamped")
+    sequence = read_sequence(out)
+    shown = [[view.frame_at(step) for step in range(8, 20)] for view in sequence.views]
+    assert shown[0] == list(range(8, 20))
+    assert shown[1] == [-1, -1, 0, 1, -1, 2, 3, -1, 4, 5, -1, 6]
+
+
+def test_time_stamps_must_be_seconds(tmp_path: Path) -> None:
+    toml(tmp_path)
+    videos(tmp_path, frames=2)
+    (tmp_path / "timestamps.csv").write_text("cam_id,frame_time\n1,0.0\n1,noon\n")
+    taken = {one.label: one for one in gather([tmp_path])}
+    assert "line 3, frame_time: expected seconds, found 'noon'" in (
+        taken["timestamps.csv"].complaint
+    )
+
+
+def test_what_is_known_better_is_taken(tmp_path: Path) -> None:
+    toml(tmp_path)
+    detections(tmp_path)
+    options = ImportOptions(
+        left_out=frozenset({"cam4"}),
+        names={"cam1": "door"},
+        offsets={"cam2": -0.4},
+        fps=20.0,
+        room=((-4.0, -4.0, 0.0), (4.0, 4.0, 2.5)),
+        half_extents=(0.25, 0.25, 0.9),
+    )
+    settled = settled_of(tmp_path, options)
+    assert settled.suggested.maximum[0] != 4.0
+    write(settled, tmp_path / "out", "told")
+    sequence = read_sequence(tmp_path / "out")
+    assert [camera.name for camera in sequence.cameras] == ["door", "cam2", "cam3"]
+    assert sequence.views[1].frame_at(0) == 8
+    assert sequence.room.maximum.tolist() == [4.0, 4.0, 2.5]
+    assert sequence.target_half_extents.tolist() == [0.25, 0.25, 0.9]
+    frames = sequence.views[1].detections
+    assert frames is not None
+    assert frames.frames.max() == 51
+
+
+@pytest.mark.full
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (ImportOptions(names={"cam1": "cam2"}), 'found "cam2" twice'),
+        (ImportOptions(names={"cam1": " "}), "a name of its own"),
+        (ImportOptions(room=((0.0, 0.0, 0.0), (1.0, -1.0, 2.0))), "expected y to end above 0 m"),
+        (ImportOptions(left_out=frozenset({"cam1", "cam2", "cam3", "cam4"})), "left out"),
+    ],
+)
+def test_what_cannot_be_taken_is_told(tmp_path: Path, options: ImportOptions, words: str) -> None:
+    toml(tmp_path)
+    detections(tmp_path)
+    with pytest.raises(FormatError, match=words):
+        settled_of(tmp_path, options)
+
+
+@pytest.mark.full
+@pytest.mark.parametrize(
+    ("options", "flags"),
+    [
+        (ImportOptions(pose="camera-to-world", axes="opencv"), "--pose world-to-camera"),
+        (ImportOptions(axes="opengl", pose="world-to-camera"), "--axes opencv"),
+        (ImportOptions(up="-y"), "--up z"),
+        (ImportOptions(up="x"), "--up z"),
+    ],
+)
+def test_what_was_told_wrongly_is_mended_by_the_right_flag(
+    tmp_path: Path, options: ImportOptions, flags: str
+) -> None:
+    toml(tmp_path)
+    detections(tmp_path)
+    settled = settled_of(tmp_path, options)
+    checks = [for_import(one, settled.reading) for one in check(as_sequence(settled, "told"))]
+    told = [str(remedy) for one in checks for remedy in one.remedies]
+    assert flags in told
+
+
+@pytest.mark.full
+@pytest.mark.parametrize(
+    ("counted", "stated", "words"),
+    [
+        (0, 1, "are of frame 0, so frames are counted from 0, not from 1: --first-index 0"),
+        (1, 0, "the one after the last of 60, so frames are counted from 1: --first-index 1"),
+        (5, 0, "outside the 60 of the pictures; --first-index says where counting begins"),
+    ],
+)
+def test_where_counting_begins_was_told_wrongly(
+    tmp_path: Path, counted: Literal[0, 1], stated: Literal[0, 1], words: str
+) -> None:
+    toml(tmp_path)
+    videos(tmp_path)
+    detections(tmp_path, first=counted)
+    settled = settled_of(tmp_path, ImportOptions(first_index=stated))
+    assert sum(words in sentence for sentence in settled.told) == 4
+
+
+@pytest.mark.full
+@pytest.mark.parametrize(("scale", "unit", "right"), [(1.0, "mm", "m"), (100.0, "mm", "cm")])
+def test_people_smaller_than_a_head_are_told_with_the_unit_that_makes_them_people(
+    tmp_path: Path, scale: float, unit: Unit, right: str
+) -> None:
+    toml(tmp_path, scale=scale)
+    detections(tmp_path)
+    settled = settled_of(tmp_path, ImportOptions(unit=unit))
+    checks = [for_import(one, settled.reading) for one in check(as_sequence(settled, "told"))]
+    told = [str(remedy) for one in checks for remedy in one.remedies]
+    assert f"--unit {right}" in told
+
+
+@pytest.mark.full
+def test_people_smaller_than_a_hand_are_told(tmp_path: Path) -> None:
+    toml(tmp_path)
+    detections(tmp_path)
+    settled = settled_of(tmp_path, ImportOptions(unit="mm"))
+    told = [str(one) for one in check(as_sequence(settled, "told")) if one.status == "warning"]
+    assert any("nobody is as small" in words for words in told)

@@ -1,0 +1,1 @@
+"""The queue, self-consistency and template suggestions."""

@@ -1,0 +1,133 @@
+"""Where doubts come from: people who meet, boxes that nobody takes, ends inside the room."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.engine.synthetic import HALF_EXTENTS, sequence, walk
+from tests.runs.test_corrected_runs import run_of
+from tracker.corrections import Place
+from tracker.fusion.trajectories import Trajectories
+from tracker.review.queue import queue
+from tracker.review.queue.doubt import Alternative, Doubt, Lanes, said, unsaid
+from tracker.review.queue.meetings import draws, meetings
+from tracker.review.queue.ranking import once_each, settled
+from tracker.review.queue.unclaimed import unclaimed
+from tracker.runs.run import Run
+
+
+def without(run: Run, track: int, first: int = 0, last: int = 10**6) -> Run:
+    """The run as if a track had not been found at some steps."""
+    tracks = run.tracks
+    gone = (tracks.ids == track) & (tracks.frames >= first) & (tracks.frames <= last)
+    other = replace(run)
+    other.tracks, other.done, other.views = tracks.take(~gone), run.done, run.views
+    other.fused, other.smoothed = run.fused, None
+    return other
+
+
+def two() -> Run:
+    one = walk((-1.2, 0.5, 1.0), (1.2, 0.6, 1.0), 80)
+    other = walk((1.2, -0.7, 1.0), (-1.2, -0.6, 1.0), 80)
+    return run_of(sequence([(0, one), (0, other)], 80))
+
+
+def near() -> Run:
+    """Two who pass each other as near as they can without touching."""
+    one = walk((-1.2, 0.14, 1.0), (1.1, 0.14, 1.0), 60)
+    other = walk((1.2, -0.14, 1.0), (-1.1, -0.14, 1.0), 60)
+    return run_of(sequence([(0, one), (0, other)], 60))
+
+
+def exchanged(tracks: Trajectories, step: int) -> Trajectories:
+    """Two tracks, exchanged from a step on."""
+    ids, names, late = tracks.ids.copy(), np.unique(tracks.ids), tracks.frames >= step
+    ids[late] = np.where(ids[late] == names[0], names[1], names[0])
+    changed = replace(tracks, ids=ids)
+    return changed.take(np.lexsort((ids, tracks.frames)))
+
+
+def test_who_goes_straight_on_is_himself_and_who_turns_back_was_exchanged() -> None:
+    run = near()
+    straight = [one.odds for one in meetings(run, Lanes(run.tracks)) if len(one.earlier) == 2]
+    assert straight
+    run.tracks = exchanged(run.tracks, 30)
+    turned = [one.odds for one in meetings(run, Lanes(run.tracks)) if len(one.earlier) == 2]
+    assert min(turned) > max(straight) + 2.0
+
+
+def test_boxes_are_drawn_between_people_no_more_than_they_are() -> None:
+    run = near()
+    shares = draws(run)
+    assert all(0.0 < share <= 1.0 for share in shares.values())
+    assert all(one < other for one, other, _ in shares)
+
+
+def test_who_is_missing_is_asked_for_with_where_he_is() -> None:
+    run = two()
+    assert unclaimed(run) == []
+    assert not [one for one in queue(run).doubts if one.kind == "missing"]
+    gone = int(run.tracks.ids[0])
+    own = run.tracks.ids == gone
+    path = dict(zip(run.tracks.frames[own].tolist(), run.tracks.positions[own], strict=True))
+    found = unclaimed(without(run, gone))
+    assert len(found) == 1
+    away = [
+        np.hypot(*(place.point - path[place.step])[:2])
+        for place in found[0].places
+        if place.step in path
+    ]
+    assert len(away) > 70
+    assert max(away) < HALF_EXTENTS[0]
+    told = [one for one in queue(without(run, gone)).doubts if one.kind == "missing"]
+    assert len(told) == 1
+    assert told[0].tracks == ()
+    now, other = told[0].alternatives
+    assert [one.kind for one in now.corrections] == ["nobody"]
+    assert {one.kind for one in other.corrections} == {"here"}
+    assert other.probability == told[0].probability > 0.5
+
+
+@pytest.mark.parametrize(("first", "last", "kind"), [(0, 39, "begins"), (40, 99, "ends")])
+def test_a_track_that_begins_or_ends_inside_is_asked_for(first: int, last: int, kind: str) -> None:
+    run = two()
+    track = int(run.tracks.ids[0])
+    cut = without(run, track, first, last)
+    cut.views = [
+        tuple(replace(view, boxes=view.boxes[:0]) for view in step)
+        if first <= number <= last
+        else step
+        for number, step in enumerate(run.views)
+    ]
+    told = [one for one in queue(cut).doubts if one.kind == kind]
+    assert [one.tracks for one in told] == [(track,)]
+    now, other = told[0].alternatives
+    assert now.corrections[0].kind == {"begins": "came", "ends": "left"}[kind]
+    assert other.corrections[0].kind == "here"
+    assert settled(told[0], said(now.corrections), 25)
+    assert not [one for one in queue(two()).doubts if one.kind in ("begins", "ends")]
+
+
+def test_a_place_is_told_once_and_only_where_something_is_at_stake() -> None:
+    place = Place(30, 0.0, 0.0, 1.0)
+
+    def doubt(tracks: tuple[int, ...], first: int, stake: int, x: float) -> Doubt:
+        other = replace_place(place, x)
+        return Doubt(
+            "exchange", "", "", first, first + 4, tracks, (place, other), 0.5, stake,
+            (Alternative("as it is", 0.5, ()), Alternative("other", 0.5, unsaid("name", [other],
+                                                                               name="A"))),
+        )  # fmt: skip
+
+    first, mirrored = doubt((1, 2), 30, 80, 0.1), doubt((2, 1), 40, 60, 0.2)
+    later, others = doubt((2, 1), 120, 50, 0.3), doubt((1, 3), 31, 40, 0.4)
+    little = doubt((4,), 31, 1, 0.5)
+    told = list(once_each([first, mirrored, later, others, little], 25))
+    assert told == [first, later, others]
+
+
+def replace_place(place: Place, x: float) -> Place:
+    return place._replace(x=x)

@@ -1,0 +1,143 @@
+"""The estimate of identity without truth: of runs that agree, and of those that do not."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.stats import spearmanr
+
+from tests.engine.synthetic import crossing, sequence
+from tests.random_rooms import random_room
+from tracker.fusion.trajectories import Trajectories
+from tracker.parameters import RunParameters
+from tracker.review.self_consistency import estimate
+from tracker.review.self_consistency.agreement import agreement, compared, differences, doubts
+from tracker.review.self_consistency.calibration import FILE, interval
+from tracker.review.self_consistency.others import mirrored
+from tracker.review.self_consistency.overlap import overlap
+from tracker.runs import pipeline
+from tracker.runs.pipeline import Cancelled
+from tracker.single_view.protocol import ViewResult
+
+BOXES = RunParameters(single_view="none")
+HALF = np.array([0.3, 0.3, 0.85])
+STEPS = 60
+
+
+def tracks(ids: list[list[int]]) -> Trajectories:
+    """People who stand 2 m apart; of each the id at every step, 0 where he is not found."""
+    rows = [
+        (step, name, 2.0 * place)
+        for step in range(len(ids[0]))
+        for place, names in enumerate(ids)
+        if (name := names[step])
+    ]
+    count = len(rows)
+    frames, names, places = (np.array(column) for column in zip(*rows, strict=True))
+    return Trajectories(
+        frames=frames,
+        ids=names,
+        positions=np.stack([places, np.zeros(count), np.ones(count)], axis=1),
+        existences=np.ones(count),
+        sigmas=np.ones((count, 3)),
+        seen=np.ones((count, 1), dtype=bool),
+        components=np.full(count, -1),
+        labels=names,
+    )
+
+
+def test_two_people_who_never_meet_are_sure() -> None:
+    run = pipeline.compute(sequence(crossing(STEPS), STEPS, clutter_rate=0.2), BOXES)
+    told: list[tuple[int, int]] = []
+    found = estimate(run, on_progress=lambda done, total: told.append((done, total)))
+    assert found.score > 0.97
+    assert len(found.without) == len(found.overlaps) == len(run.sequence.views)
+    assert found.score == pytest.approx(found.backwards * np.mean(found.without))
+    assert all(one is not None and one > 0.5 for one in found.overlaps)
+    assert found.interval[0] <= found.interval[1] <= 1.0
+    assert told[-1] == (4 * STEPS, 4 * STEPS)
+    assert [done for done, _ in told] == sorted(done for done, _ in told)
+
+
+def test_it_ends_when_it_is_told_to() -> None:
+    run = pipeline.compute(sequence(crossing(STEPS), STEPS), BOXES)
+    with pytest.raises(Cancelled):
+        estimate(run, cancelled=lambda: True)
+
+
+def test_one_camera_alone_is_held_against_the_way_back() -> None:
+    room = random_room(3, cameras=1, people=2, steps=60)
+    found = estimate(pipeline.compute(room, BOXES))
+    assert (found.without, found.overlaps) == ((), ())
+    assert found.score == found.backwards
+
+
+def test_seen_backwards_twice_is_the_same() -> None:
+    run = pipeline.compute(random_room(5, cameras=3, people=3, steps=80), BOXES)
+    twice = mirrored(mirrored(run.tracks, 80), 80)
+    for name in Trajectories.__slots__:
+        assert_allclose(getattr(twice, name), getattr(run.tracks, name))
+
+
+def test_who_is_exchanged_is_told_with_step_and_ids() -> None:
+    here = tracks([[1] * 40, [2] * 40])
+    there = tracks([[7] * 25 + [8] * 15, [8] * 25 + [7] * 15])
+    comparison = compared(here, there, 40, HALF)
+    assert agreement(comparison) == pytest.approx(25 / 40)
+    found = doubts([("backwards", differences(comparison, 0.1))], 0.1)
+    assert {(one.step, one.ids) for one in found} == {(25, (1, 2)), (25, (2, 1))}
+    assert found[0].why == f"{found[0].ids[0]} is taken for {found[0].ids[1]} backwards"
+
+
+def test_who_is_missed_is_told_after_who_is_another() -> None:
+    here = tracks([[1] * 40, [2] * 40, [3] * 40])
+    there = tracks([[7] * 20 + [8] * 20, [8] * 20 + [7] * 20, [9] * 10 + [0] * 30])
+    comparison = compared(here, there, 40, HALF)
+    found = doubts([("a", differences(comparison, 0.1))], 0.1)
+    assert [one.ids[0] for one in found] == [1, 2, 3]
+    assert found[-1].why == "3 is not there a"
+    # what two runs see otherwise comes first, whatever it is
+    other = tracks([[1] * 40, [2] * 40, [3] * 10 + [0] * 30])
+    second = differences(compared(here, other, 40, HALF), 0.1)
+    both = doubts([("a", differences(comparison, 0.1)), ("b", second)], 0.1)
+    assert (both[0].ids, both[0].looks) == ((3,), ("a", "b"))
+
+
+def test_a_moment_is_no_difference() -> None:
+    here = tracks([[1] * 40])
+    there = tracks([[5] * 20 + [0] * 2 + [5] * 18])
+    assert differences(compared(here, there, 40, HALF), 0.1) == []
+
+
+def test_nobody_anywhere_is_agreement() -> None:
+    nobody = Trajectories.empty(1)
+    assert agreement(compared(nobody, nobody, 10, HALF)) == 1.0
+
+
+def test_boxes_elsewhere_are_a_veto() -> None:
+    run = pipeline.compute(random_room(5, cameras=3, people=3, steps=40), BOXES)
+    camera, half = run.sequence.cameras[0], run.sequence.target_half_extents
+    own = overlap(run.tracks, camera, half, [step[0] for step in run.views])
+    other = overlap(run.tracks, camera, half, [step[0] for step in run.views[::-1]])
+    assert own is not None
+    assert other is not None
+    assert own > other + 0.2
+    assert overlap(Trajectories.empty(3), camera, half, []) is None
+    # where it had no frame it contradicts nobody
+    assert overlap(run.tracks, camera, half, [ViewResult.of_no_frame()] * 40) is None
+
+
+def test_the_record_is_what_the_interval_is_made_of() -> None:
+    kept = json.loads(FILE.read_text(encoding="utf-8"))
+    assert len(kept) >= 3
+    for name, pairs in kept.items():
+        both = np.array(pairs)
+        assert len(both) >= 20, name
+        assert ((both >= 0.0) & (both <= 1.0)).all(), name
+    every = np.concatenate([np.array(pairs) for pairs in kept.values()])
+    assert spearmanr(every[:, 0], every[:, 1]).statistic > 0.7
+    inside = [low <= truth <= high for (j, truth) in every for low, high in [interval(j)]]
+    assert np.mean(inside) > 0.8

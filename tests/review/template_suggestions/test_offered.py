@@ -1,0 +1,252 @@
+"""What a run's tracks offer: whole people, apart, whom two cameras agree about, and by whom."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+from numpy import ndarray
+
+from tests.engine.painted import GREEN, RED, Colour, corner_box, paint, wall
+from tests.engine.synthetic import CAMERAS, HALF_EXTENTS, ROOM, walk
+from tracker.fusion.trajectories import Trajectories
+from tracker.geometry.boxes import box_overlaps
+from tracker.parameters import RunParameters
+from tracker.review.template_suggestions import Offer, offered, untaken
+from tracker.review.template_suggestions.candidates import drawn_boxes
+from tracker.runs.run import Run
+from tracker.sequences.pictures.frames import FrameReader
+from tracker.sequences.sequence import Sequence, Template, View
+from tracker.single_view.box_sizes import upright_boxes
+
+STEPS = 60
+
+PINK: tuple[Colour, Colour] = ((190.0, 60.0, 200.0), (230.0, 120.0, 250.0))
+
+LOOKS = {"anna": RED, "bert": GREEN}
+
+PATHS = {
+    "anna": walk((-0.9, 0.6, 1.2), (0.5, 0.7, 1.2), STEPS),
+    "bert": walk((0.9, -0.6, 1.2), (-0.5, -0.7, 1.2), STEPS),
+}
+"""Two who pass each other and are apart in every camera at the beginning and at the end."""
+
+
+@pytest.fixture(scope="module")
+def room(tmp_path_factory: pytest.TempPathFactory) -> Sequence:
+    """Pictures of both by three cameras, without templates."""
+    folder = tmp_path_factory.mktemp("room")
+    views = []
+    for camera in CAMERAS:
+        files = []
+        for step in range(STEPS):
+            boxes = boxes_at(camera.name, step)
+            files.append(folder / f"{camera.name}-{step:04d}.png")
+            picture = paint(wall(camera), boxes, list(LOOKS.values()), step)
+            cv2.imwrite(str(files[-1]), picture)
+        views.append(View(camera, images=tuple(files)))
+    return Sequence(
+        name="two", folder=folder, fps=25.0, frames=STEPS, room=ROOM,
+        target_half_extents=HALF_EXTENTS, views=tuple(views), templates=(), ground_truth=None,
+        digest="two",
+    )  # fmt: skip
+
+
+def boxes_at(camera: str, step: int) -> ndarray:
+    """Where Anna and Bert are in a camera's picture."""
+    (own,) = (one for one in CAMERAS if one.name == camera)
+    positions = np.array([path[step] for path in PATHS.values()])
+    return upright_boxes(own, positions, HALF_EXTENTS)[0]
+
+
+def template_of(name: str, camera: str, step: int) -> Template:
+    """As somebody draws it."""
+    box = boxes_at(camera, step)[list(PATHS).index(name)]
+    return Template(name, camera, step, corner_box(box))
+
+
+def tracked(
+    sequence: Sequence,
+    *,
+    seen: Callable[[int, int], Many] = lambda person, step: (True, True, True),
+    existence: float = 1.0,
+    sigma: float = 0.02,
+) -> Run:
+    """A run that found everybody where they are, as track 1 and track 2.
+
+    Args:
+        sequence: The room.
+        seen: Which cameras' boxes are a person's (0 or 1) at a step.
+        existence: Of all of them.
+        sigma: Standard deviation of each coordinate, metres.
+    """
+    run = Run(sequence, RunParameters(), 0, {})
+    run.done = STEPS
+    frames, ids = np.repeat(np.arange(STEPS), 2), np.tile([1, 2], STEPS)
+    run.tracks = Trajectories(
+        frames,
+        ids,
+        np.stack(list(PATHS.values()), axis=1).reshape(-1, 3),
+        np.full(2 * STEPS, existence),
+        np.full((2 * STEPS, 3), sigma),
+        np.array([seen(k % 2, k // 2) for k in range(2 * STEPS)], dtype=bool),
+        np.full(2 * STEPS, -1),
+        ids,
+    )
+    return run
+
+
+Many = tuple[bool, bool, bool]
+
+
+@pytest.fixture
+def offers_of() -> Iterator[Callable[[Run], list[Offer]]]:
+    """What a run offers, its pictures read and closed again."""
+    readers: list[FrameReader] = []
+
+    def found(run: Run) -> list[Offer]:
+        readers.append(FrameReader(run.sequence))
+        return list(offered(run, readers[-1]))
+
+    yield found
+    for reader in readers:
+        reader.close()
+
+
+Found = Callable[[Run], list[Offer]]
+
+
+def test_who_has_a_template_in_one_camera_is_offered_one_in_the_others(
+    room: Sequence, offers_of: Found
+) -> None:
+    templates = (template_of("anna", "left", 5), template_of("bert", "left", 5))
+    found = offers_of(tracked(replace(room, templates=templates)))
+    places = {(one.template.name, one.template.camera) for one in found}
+    assert places == {(name, camera) for name in LOOKS for camera in ("right", "back")}
+    for one in found:
+        person = list(PATHS).index(one.template.name)
+        true = corner_box(boxes_at(one.template.camera, one.template.frame)[person])
+        assert box_overlaps(one.template.box[None], true[None])[0, 0] > 0.9
+        assert one.track == person + 1
+        assert one.cameras == ("left", "right", "back")
+        assert one.difference is not None
+        assert "the first of this camera" in one.reason
+        # nobody else is in the box
+        other = corner_box(boxes_at(one.template.camera, one.template.frame)[1 - person])
+        assert box_overlaps(one.template.box[None], other[None])[0, 0] < 0.05
+
+
+def test_a_camera_that_shows_a_person_as_its_template_does_is_offered_nothing(
+    room: Sequence, offers_of: Found
+) -> None:
+    templates = tuple(template_of(name, camera.name, 5) for name in LOOKS for camera in CAMERAS)
+    assert offers_of(tracked(replace(room, templates=templates))) == []
+
+
+def test_who_has_none_is_offered_as_somebody_new(room: Sequence, offers_of: Found) -> None:
+    alone = offers_of(tracked(replace(room, templates=(template_of("anna", "left", 5),))))
+    new = [one for one in alone if one.track == 2]
+    assert {one.template.name for one in new} == {"person1"}
+    assert {one.template.camera for one in new} == {"left", "right", "back"}
+    assert all(one.difference is None and "nobody's template yet" in one.reason for one in new)
+    assert {one.template.name for one in alone if one.track == 1} == {"anna"}
+    nobody = offers_of(tracked(room))
+    assert {(one.track, one.template.name) for one in nobody} == {(1, "person1"), (2, "person2")}
+
+
+def test_where_a_track_is_somebody_it_is_his_template_and_not_his_looks_that_count(
+    room: Sequence, offers_of: Found
+) -> None:
+    """A template that shows the person in another light is still the person's."""
+    box = template_of("bert", "left", 5)
+    wrong = replace_look(room, "left", 5)
+    found = offers_of(tracked(replace(wrong, templates=(box,))))
+    assert {one.template.name for one in found if one.track == 2} == {"bert"}
+
+
+def replace_look(room: Sequence, camera: str, step: int) -> Sequence:
+    """The room with a picture in which Bert is pink."""
+    index = [one.name for one in CAMERAS].index(camera)
+    view = room.views[index]
+    picture = paint(wall(view.camera), boxes_at(camera, step), [RED, PINK], step)
+    file = view.images[step].with_name(f"other-{camera}-{step}.png")
+    cv2.imwrite(str(file), picture)
+    images = (*view.images[:step], file, *view.images[step + 1 :])
+    views = list(room.views)
+    views[index] = replace(view, images=images)
+    return replace(room, views=tuple(views))
+
+
+@pytest.mark.parametrize(
+    ("seen", "existence", "sigma"),
+    [
+        (lambda person, step: (True, False, False), 1.0, 0.02),
+        (lambda person, step: (True, True, True), 0.5, 0.02),
+        (lambda person, step: (True, True, True), 1.0, 0.5),
+    ],
+    ids=["one camera", "may not be there", "may be elsewhere"],
+)
+def test_of_whom_cameras_are_not_sure_nothing_is_offered(
+    room: Sequence, offers_of: Found, seen: Callable[[int, int], Many], existence: float,
+    sigma: float,
+) -> None:  # fmt: skip
+    run = tracked(room, seen=seen, existence=existence, sigma=sigma)
+    assert offers_of(run) == []
+
+
+def test_what_two_cameras_say_of_a_third_is_told_as_their_word(
+    room: Sequence, offers_of: Found
+) -> None:
+    templates = tuple(template_of(name, "left", 5) for name in LOOKS)
+    run = tracked(replace(room, templates=templates), seen=lambda person, step: (True, True, False))
+    (back,) = (one for one in offers_of(run) if (one.track, one.template.camera) == (1, "back"))
+    assert not back.own
+    assert "2 cameras agree, this one finds nobody" in back.reason
+
+
+def test_a_box_that_others_cover_is_not_offered(room: Sequence, offers_of: Found) -> None:
+    run = tracked(room)
+    together = run.tracks.positions.copy()
+    together[1::2] = together[::2] + np.array([0.05, 0.0, 0.0])
+    run.tracks = replace(run.tracks, positions=together)
+    assert offers_of(run) == []
+
+
+def test_who_is_there_for_less_than_a_second_is_not_offered(
+    room: Sequence, offers_of: Found
+) -> None:
+    run = tracked(room)
+    early = run.tracks.frames < 20
+    run.tracks = run.tracks.take((run.tracks.ids == 1) | early)
+    assert {one.track for one in offers_of(run)} == {1}
+
+
+def test_nobody_and_a_recording_of_boxes_offer_nothing(room: Sequence, offers_of: Found) -> None:
+    run = tracked(room)
+    run.tracks = Trajectories.empty(3)
+    assert offers_of(run) == []
+    blind = replace(room, views=tuple(replace(view, images=()) for view in room.views))
+    assert offers_of(tracked(blind)) == []
+
+
+def test_what_was_taken_is_offered_no_more(room: Sequence, offers_of: Found) -> None:
+    found = offers_of(tracked(room))
+    taken = replace(room, templates=(found[0].template,))
+    assert untaken(found, taken) == found[1:]
+    assert untaken(found, room) == found  # and taken back it is offered again
+
+
+def test_a_box_of_a_rolled_camera_bounds_whom_it_shows() -> None:
+    """Turned by a quarter, what is high in the room is wide in the picture."""
+    camera = CAMERAS[0]
+    turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    rolled = replace(camera, rotation=turn @ camera.rotation, translation=turn @ camera.translation)
+    half = np.array([0.2, 0.2, 0.8])
+    place = np.array([[0.1, 0.0, 1.0]])
+    (upright,) = drawn_boxes(camera, place, half)
+    (lying,) = drawn_boxes(rolled, place, half)
+    assert upright[3] / upright[2] > 2.0
+    assert lying[2] / lying[3] > 2.0

@@ -1,0 +1,86 @@
+"""A run tells what its cameras looked at, where it fell, and what was not believed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.engine.painted import GREEN, RED, painted_sequence
+from tests.engine.synthetic import walk
+from tracker.parameters import RunParameters, with_values
+from tracker.runs import pipeline
+from tracker.runs.gates import count_gates, notices
+from tracker.runs.run import Run
+from tracker.sequences.sequence import Sequence
+from tracker.single_view.box_sizes import upright_boxes
+from tracker.single_view.dropped import DROPPED, GATES
+
+STEPS = 10
+
+
+def film(folder: Path, *, stays: bool) -> Sequence:
+    seat = np.tile([0.35, -0.3, 1.0], (STEPS, 1))
+    path = seat if stays else walk((-0.8, 0.0, 1.0), (0.6, 0.3, 1.05), STEPS)
+    return painted_sequence(folder, [path], [RED if stays else GREEN])
+
+
+def run_of(sequence: Sequence, **changes: object) -> Run:
+    keys = {name.replace("__", "."): value for name, value in changes.items()}
+    return pipeline.compute(sequence, with_values(RunParameters(), keys))
+
+
+def test_candidates_are_passed_on_or_fall_at_a_gate(tmp_path: Path) -> None:
+    (told,) = count_gates(run_of(film(tmp_path, stays=False)))
+    assert told.pictures == STEPS
+    assert told.passed > 0.8
+    assert told.candidates == pytest.approx(told.passed + sum(told.dropped.values()))
+    assert f"{told.passed:.1f} passed on" in str(told)
+
+
+def test_a_gate_that_lets_nobody_through_is_named(tmp_path: Path) -> None:
+    run = run_of(film(tmp_path, stays=False), colour_phd__acceptance_distance=0.05)
+    (told,) = count_gates(run)
+    assert told.passed == 0.0
+    assert told.dropped["colour"] >= 0.9 * told.candidates
+    assert any('camera "left"' in one and "for colour" in one for one in notices(run))
+
+
+def test_what_fell_is_told_with_its_place_and_gate(tmp_path: Path) -> None:
+    run = run_of(film(tmp_path, stays=False), colour_phd__acceptance_distance=0.05)
+    camera = run.sequence.cameras[0]
+    for (view,) in run.views:
+        dropped = view.dropped
+        assert len(dropped.boxes) == len(dropped.gates) == view.information["candidates"]
+        told = {name: count for name, count in view.information.items() if name.startswith(DROPPED)}
+        named = [DROPPED + GATES[gate] for gate in dropped.gates.tolist()]
+        assert told == {name: named.count(name) for name in named}
+    # who is refused by the strict gate is the person himself
+    last = np.array([[0.6, 0.3, 1.05]])
+    (box,), _ = upright_boxes(camera, last, run.sequence.target_half_extents)
+    apart = np.abs(run.views[9][0].dropped.boxes[:, :2] - box[:2])
+    assert (apart < box[2:]).all(axis=1).any()
+
+
+def test_a_background_made_by_who_stays_is_told(tmp_path: Path) -> None:
+    run = run_of(film(tmp_path, stays=True))
+    assert count_gates(run)[0].trust == 0.0
+    assert any('background of "left"' in one and "templates" in one for one in notices(run))
+
+
+def test_a_background_that_somebody_gave_was_not_learnt(tmp_path: Path) -> None:
+    """Who names steps as empty at which people are is told so."""
+    sequence = film(tmp_path, stays=True)
+    views = tuple(replace(view, background=range(STEPS)) for view in sequence.views)
+    (told,) = notices(run_of(replace(sequence, views=views, digest="given")))
+    assert told.startswith('the background given for "left" shows what the templates show')
+    assert "learnt" not in told
+
+
+def test_of_the_foreground_alone_tops_are_counted(tmp_path: Path) -> None:
+    run = run_of(film(tmp_path, stays=False), single_view="jpda", jpda__least_inside=1.0)
+    (told,) = count_gates(run)
+    assert told.candidates > 0.5
+    assert told.dropped["foreground"] > 0.5

@@ -1,0 +1,25 @@
+"""The track file, as the program itself reads it back."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from tracker.export import tracks_csv
+from tracker.export.written import Options, Written
+
+
+def write(path: Path, written: Written, options: Options) -> None:
+    """Write the file."""
+    with path.open("w", encoding="utf-8", newline="") as stream:
+        tracks_csv.write_tracks_csv(
+            stream,
+            written.sequence,
+            written.tracks,
+            written.parameters,
+            written.seed,
+            done=written.done,
+            remarks=written.remarks,
+            resting=written.resting,
+            names=written.names,
+        )
+    options.at(written.steps, written.steps)

@@ -1,0 +1,141 @@
+"""MOTChallenge text in TrackEval's folders: each camera's pixels, and the ground plane.
+
+A row is ``frame, id, left, top, width, height, confidence, x, y, z``; frames and ids are from 1.
+Of a camera the box is the reprojected one in pixels, of which 1 is the first, as the challenge
+counts [MOT16, sec. 4.2]; on the ground plane it is the target's outline on the floor in metres.
+x, y, z are metres in both. A person of uncertain place (``valid = 0``) is written as a
+distractor: who matches one counts on neither side.
+
+[MOT16] Milan, Leal-Taixé, Reid, Roth, Schindler, "MOT16: a benchmark for multi-object
+tracking", arXiv 1603.00831, 2016. Folders: TrackEval, docs/MOTChallenge-Official/Readme.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float, Int
+from numpy import ndarray
+
+from tracker.export.written import Options, Written
+from tracker.files.atomic import file_names
+
+BENCHMARK, SPLIT, TRACKER = "multiview", "train", "multiview-phd"
+GROUND = "ground-plane"
+PERSON, DISTRACTOR = 1, 8
+"""Classes of the challenge."""
+
+_FROM_1 = np.array([1.0, 1.0, 0.0, 0.0])
+_CLOSE = 10
+"""Decimals of metres: figures agree to what a double holds of a room."""
+
+
+def write(folder: Path, written: Written, options: Options) -> None:
+    """Fill a folder: ``gt`` (where there is a truth) and ``trackers``, for TrackEval."""
+    sequence, tracks = written.sequence, written.tracks
+    name = "".join(c if c.isalnum() or c in "-_" else "-" for c in sequence.name)
+    half = sequence.target_half_extents
+    truth = sequence.ground_truth
+    names = file_names([GROUND, *(camera.name for camera in sequence.cameras)])
+    parts = [(part, k - 1) for k, part in enumerate(names)]
+    for done, (part, index) in enumerate(parts):
+        options.at(done, len(parts))
+        one = f"{name}-{part}"
+        if index < 0:
+            boxes, visible = _outlines(tracks.positions, half), np.ones(len(tracks), dtype=bool)
+        else:
+            boxes, visible = written.boxes[index]
+            boxes = boxes + _FROM_1
+        rows = _rows(
+            tracks.frames, tracks.ids, boxes, np.minimum(tracks.existences, 1.0), tracks.positions
+        )
+        results = folder / "trackers" / "mot_challenge" / f"{BENCHMARK}-{SPLIT}" / TRACKER / "data"
+        _save(results / f"{one}.txt", _chosen(rows, visible))
+        if truth is None:
+            continue
+        home = folder / "gt" / "mot_challenge" / f"{BENCHMARK}-{SPLIT}" / one
+        if index < 0:
+            boxes, visible = _outlines(truth.positions, half), np.ones(len(truth.ids), dtype=bool)
+        else:
+            camera = sequence.cameras[index]
+            boxes, visible = camera.project_boxes(truth.positions, half)
+            boxes = boxes + _FROM_1
+        visible = visible & (truth.frames < written.steps)
+        kinds = np.where(truth.valid, PERSON, DISTRACTOR)
+        numbers = np.unique(truth.ids, return_inverse=True)[1] + 1
+        _save(
+            home / "gt" / "gt.txt",
+            _chosen(
+                _truth_rows(truth.frames, numbers, boxes, truth.valid.astype(int), kinds), visible
+            ),
+        )
+        width, height = (100, 100) if index < 0 else sequence.cameras[index].image_size
+        _save(
+            home / "seqinfo.ini",
+            [
+                f"[Sequence]\nname={one}\nimDir=img1\nframeRate={sequence.fps:g}\n"
+                f"seqLength={written.steps}\nimWidth={width}\nimHeight={height}\nimExt=.jpg\n"
+            ],
+        )
+    if truth is not None:
+        maps = folder / "gt" / "mot_challenge" / "seqmaps" / f"{BENCHMARK}-{SPLIT}.txt"
+        _save(maps, ["name\n", *(f"{name}-{part}\n" for part, _ in parts)])
+    options.at(len(parts), len(parts))
+
+
+def _outlines(
+    positions: Float[ndarray, "N 3"], half: Float[ndarray, " 3"]
+) -> Float[ndarray, "N 4"]:
+    low = positions[:, :2] - half[:2]
+    return np.concatenate([low, np.broadcast_to(2.0 * half[:2], low.shape)], axis=1)
+
+
+def _rows(
+    frames: Int[ndarray, " N"],
+    ids: Int[ndarray, " N"],
+    boxes: Float[ndarray, "N 4"],
+    confidences: Float[ndarray, " N"],
+    positions: Float[ndarray, "N 3"],
+) -> list[str]:
+    return [
+        f"{frame + 1},{number},{_numbers(box)},{confidence:.6f},{_numbers(place)}\n"
+        for frame, number, box, confidence, place in zip(
+            frames.tolist(),
+            ids.tolist(),
+            boxes.tolist(),
+            confidences.tolist(),
+            positions.tolist(),
+            strict=True,
+        )
+    ]
+
+
+def _truth_rows(
+    frames: Int[ndarray, " G"],
+    ids: Int[ndarray, " G"],
+    boxes: Float[ndarray, "G 4"],
+    counted: Int[ndarray, " G"],
+    kinds: Int[ndarray, " G"],
+) -> list[str]:
+    """``frame, id, left, top, width, height, whether it counts, class, visibility``."""
+    columns = (frames.tolist(), ids.tolist(), boxes.tolist(), counted.tolist(), kinds.tolist())
+    return [
+        f"{frame + 1},{number},{_numbers(box)},{counts},{kind},1\n"
+        for frame, number, box, counts, kind in zip(*columns, strict=True)
+    ]
+
+
+def _numbers(values: list[float]) -> str:
+    return ",".join(f"{value:.{_CLOSE}f}" for value in values)
+
+
+def _chosen(rows: list[str], mask: ndarray) -> Iterable[str]:
+    return (rows[k] for k in np.flatnonzero(mask).tolist())
+
+
+def _save(path: Path, lines: Iterable[str]) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("w", encoding="utf-8", newline="\n") as file:
+        file.writelines(lines)

@@ -1,0 +1,60 @@
+"""One Parquet table, one row a target a step: the track file's columns, in full precision."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from tracker import __version__
+from tracker.export.tracks_csv import BOX
+from tracker.export.written import Options, Written
+
+_ROWS = 1 << 17
+"""Of a group, which is in memory at once."""
+
+
+def write(path: Path, written: Written, options: Options) -> None:
+    """Write the file."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    sequence, tracks = written.sequence, written.tracks
+    settings = {key: str(value) for key, value in written.settings.items()}
+    facts = {"sequence": sequence.name, "fps": sequence.fps, "seed": written.seed}
+    metadata = {
+        "multiview-phd": json.dumps({"version": __version__, **facts, "parameters": settings})
+    }
+    columns: dict[str, np.ndarray] = {
+        "frame": tracks.frames,
+        "time": tracks.frames * sequence.step_time,
+        "id": tracks.ids,
+        **{axis: tracks.positions[:, k] for k, axis in enumerate("xyz")},
+        "existence": tracks.existences,
+        **{f"sigma_{axis}": tracks.sigmas[:, k] for k, axis in enumerate("xyz")},
+    }
+    if written.names:
+        called = [written.names.get(track, "") for track in tracks.ids.tolist()]
+        columns["name"] = np.array(called, dtype=object)
+    if written.resting:
+        columns["correction"] = np.array(written.resting, dtype=object)
+    for index, camera in enumerate(sequence.cameras):
+        boxes, visible = written.boxes[index]
+        columns[f"{camera.name}_seen"] = tracks.seen[:, index]
+        for k, side in enumerate(BOX):
+            columns[f"{camera.name}_{side}"] = np.where(visible, boxes[:, k], np.nan)
+    kinds = {  # of no rows a text would be nothing at all
+        name: pa.string() if values.dtype == object else pa.array(values[:0]).type
+        for name, values in columns.items()
+    }
+    shape = pa.schema(list(kinds.items()), metadata=metadata)
+    with pq.ParquetWriter(path, shape, compression="zstd") as file:
+        for first in range(0, len(tracks), _ROWS):
+            options.at(first, len(tracks))
+            part = {
+                name: pa.array(values[first : first + _ROWS], from_pandas=True)
+                for name, values in columns.items()
+            }
+            file.write_table(pa.table(part, schema=shape))
+    options.at(len(tracks), len(tracks))

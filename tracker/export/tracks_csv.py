@@ -1,0 +1,262 @@
+"""The track file: one row a target a step, with the boxes it makes in every picture.
+
+The comment lines at the top say what made it: version, sequence, seed, methods and the
+value of every parameter, in words that ``multiview-phd track --set`` takes back.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import itertools
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Sequence as Many
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, TextIO
+
+import numpy as np
+from jaxtyping import Float, Int
+from numpy import ndarray
+
+from tracker import __version__
+from tracker.files.atomic import replacing
+from tracker.fusion.trajectories import Trajectories
+from tracker.parameters import METHODS, PARAMETERS, RunParameters, value
+from tracker.sequences.csv_columns import guarded, read_columns, unguarded
+from tracker.sequences.sequence import Sequence, SequenceError
+
+PROGRAM = "multiview-phd"
+BOX = ("left", "top", "width", "height")
+COLUMNS = ("frame", "time", "id", "x", "y", "z", "existence", "sigma_x", "sigma_y", "sigma_z")
+
+CORRECTION = "correction"
+"""The column of a corrected run: the id of the correction that a row rests on, empty for none."""
+
+NAME = "name"
+"""The column of a run in which somebody was named: the name of a row's track, empty for none."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TrackFile:
+    """What a track file says. N rows, sorted by step and then id."""
+
+    frames: Int[ndarray, " N"]
+    times: Float[ndarray, " N"]
+    """Seconds."""
+    ids: Int[ndarray, " N"]
+    positions: Float[ndarray, "N 3"]
+    """World metres."""
+    existences: Float[ndarray, " N"]
+    sigmas: Float[ndarray, "N 3"]
+    """Standard deviation of the position along x, y and z, metres."""
+    boxes: Mapping[str, Float[ndarray, "N 4"]]
+    """For each camera left, top, width, height in pixels; NaN where its picture has no box."""
+    settings: Mapping[str, str]
+    """The comment lines ``# key = value``: sequence, seed, methods and parameters."""
+    done: int | None = None
+    """The number of steps computed, where the file says that it is not all of them."""
+    remarks: tuple[str, ...] = ()
+    """What the file says is missing of it."""
+
+    def __len__(self) -> int:
+        return len(self.frames)
+
+
+def write_tracks_csv(
+    stream: TextIO,
+    sequence: Sequence,
+    tracks: Trajectories,
+    parameters: RunParameters,
+    seed: int,
+    *,
+    done: int | None = None,
+    remarks: Iterable[str] = (),
+    resting: Many[str] = (),
+    names: Mapping[int, str] = MappingProxyType({}),
+) -> None:
+    """Write the track file.
+
+    Positions have 4 decimals (a tenth of a millimetre), boxes 2, times 6.
+
+    Args:
+        stream: Text, opened with ``newline=""``; lines end with a single line feed.
+        sequence: What was tracked.
+        tracks: Its targets, by step and then id.
+        parameters: With which they were found.
+        seed: Of the run.
+        done: The number of steps computed; fewer than the sequence has are said at the top.
+        remarks: What else is said there of the result, for instance that pictures were missing.
+        resting: Of a run with corrections the id of the one that each row rests on; it becomes
+            the column :data:`CORRECTION`.
+        names: What people were called by hand, by track; they become the column :data:`NAME`.
+    """
+    for line in _comments(sequence, parameters, seed, done, remarks):
+        stream.write(f"# {line}\n")
+    cameras = sequence.cameras
+    boxes = [f"{camera.name}_{side}" for camera in cameras for side in BOX]
+    head = [
+        *COLUMNS,
+        *([NAME] if names else []),
+        *([CORRECTION] if resting else []),
+        *map(guarded, boxes),
+    ]
+    csv.writer(stream, lineterminator="\n").writerow(head)
+    called = {track: _cell(name) for track, name in names.items()}
+    columns = [
+        [f"{frame}" for frame in tracks.frames],
+        [f"{frame * sequence.step_time:.6f}" for frame in tracks.frames],
+        [f"{number}" for number in tracks.ids],
+        *_fixed(tracks.positions, 4),
+        *_fixed(tracks.existences[:, None], 4),
+        *_fixed(tracks.sigmas, 4),
+        *([[called.get(track, "") for track in tracks.ids.tolist()]] if names else []),
+        *([list(resting)] if resting else []),
+    ]
+    for camera in cameras:
+        pixels, visible = camera.project_boxes(tracks.positions, sequence.target_half_extents)
+        columns += _fixed(np.where(visible[:, None], pixels, np.nan), 2)
+    stream.writelines(",".join(row) + "\n" for row in zip(*columns, strict=True))
+
+
+def _cell(text: str) -> str:
+    """Text that somebody wrote as a cell of its own, and no formula."""
+    cell = io.StringIO()
+    csv.writer(cell, lineterminator="").writerow([guarded(" ".join(text.split()))])
+    return cell.getvalue()
+
+
+def _fixed(values: Float[ndarray, "N C"], decimals: int) -> Iterator[list[str]]:
+    """Columns of text with a fixed number of decimals; NaN is empty, and zero has no sign."""
+    rounded = np.round(values, decimals) + 0.0  # turns −0.0 into 0.0
+    for column in rounded.T:
+        yield [f"{number:.{decimals}f}" if number == number else "" for number in column.tolist()]
+
+
+def _comments(
+    sequence: Sequence,
+    parameters: RunParameters,
+    seed: int,
+    done: int | None,
+    remarks: Iterable[str],
+) -> Iterator[str]:
+    yield f"{PROGRAM} {__version__}"
+    yield from (f"incomplete: {guarded(' '.join(remark.split()))}" for remark in remarks)
+    if done is not None and done < sequence.frames:
+        yield f"partial: the first {done} of {sequence.frames} steps"
+    yield f"sequence = {guarded(' '.join(sequence.name.split()))}"
+    yield f"seed = {seed}"
+    for key in (*METHODS, *PARAMETERS):
+        yield f"{key} = {_as_text(value(parameters, key))}"
+
+
+def _as_text(setting: Any) -> str:
+    return str(setting).lower() if isinstance(setting, bool) else str(setting)
+
+
+def save_tracks_csv(
+    path: Path | str,
+    sequence: Sequence,
+    tracks: Trajectories,
+    parameters: RunParameters,
+    seed: int,
+    *,
+    done: int | None = None,
+    remarks: Iterable[str] = (),
+) -> None:
+    """Write the track file to disk: wholly or not at all, whatever interrupts it.
+
+    Args:
+        path: Replaced if it is there. A pipe or device is written to directly.
+        sequence, tracks, parameters, seed, done, remarks: As for :func:`write_tracks_csv`.
+
+    Raises:
+        OSError: With a sentence, if the file cannot be written.
+    """
+    path = Path(path)
+    if not path.is_dir() and path.exists() and not path.is_file():
+        with path.open("w", encoding="utf-8", newline="") as stream:
+            write_tracks_csv(stream, sequence, tracks, parameters, seed, done=done, remarks=remarks)
+        return
+    with replacing(path) as temporary, temporary.open("x", encoding="utf-8", newline="") as stream:
+        write_tracks_csv(stream, sequence, tracks, parameters, seed, done=done, remarks=remarks)
+
+
+def read_tracks_csv(path: Path | str) -> TrackFile:
+    """Read a track file.
+
+    Raises:
+        SequenceError: In one sentence: file, line and column, expected, found.
+    """
+    path = Path(path)
+    header = _header(path)
+    cameras = [name.removesuffix("_left") for name in header if name.endswith("_left")]
+    sides = tuple(f"{camera}_{side}" for camera in cameras for side in BOX)
+    columns = read_columns(
+        path,
+        path.name,
+        needed=(*COLUMNS, *(s for s in sides if s not in header)),
+        blank=sides,
+        called=unguarded,
+    )
+    frames = columns.whole("frame", 0, None, "the step")
+    ids = columns.whole("id", 0, None, "the track")
+    order = columns.one_row_each(frames, ids, "track")
+    return TrackFile(
+        frames=frames[order],
+        times=columns.values["time"][order],
+        ids=ids[order],
+        positions=columns.stacked("x", "y", "z")[order],
+        existences=columns.values["existence"][order],
+        sigmas=columns.stacked("sigma_x", "sigma_y", "sigma_z")[order],
+        boxes={
+            camera: columns.stacked(*(f"{camera}_{side}" for side in BOX))[order]
+            for camera in cameras
+        },
+        settings=_settings(path),
+        done=_done(path),
+        remarks=_remarks(path),
+    )
+
+
+def _header(path: Path) -> list[str]:
+    for line in _beginning(path):
+        if line.strip() and not line.startswith("#"):
+            return [unguarded(cell.strip()) for cell in next(csv.reader([line]))]
+    return []
+
+
+def _settings(path: Path) -> dict[str, str]:
+    settings = {}
+    for line in _beginning(path):
+        if not line.startswith("#"):
+            break
+        key, equals, setting = line[1:].partition("=")
+        if equals:
+            settings[key.strip()] = unguarded(setting.strip())
+    return settings
+
+
+def _done(path: Path) -> int | None:
+    for line in _beginning(path):
+        if not line.startswith("#"):
+            break
+        if partial := re.match(r"# partial: the first (\d+) of ", line):
+            return int(partial[1])
+    return None
+
+
+def _remarks(path: Path) -> tuple[str, ...]:
+    head = itertools.takewhile(lambda line: line.startswith("#"), _beginning(path))
+    found = (re.match(r"# incomplete: (.*)", line) for line in head)
+    return tuple(unguarded(one[1].strip()) for one in found if one)
+
+
+def _beginning(path: Path) -> Iterator[str]:
+    try:
+        with path.open(encoding="utf-8-sig", errors="replace") as stream:
+            yield from stream
+    except OSError as error:
+        raise SequenceError(f"{path}: cannot be read ({error.strerror})") from None

@@ -1,0 +1,218 @@
+"""One step as a picture: cameras in a mosaic, the room from above, lanes underneath."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence as Many
+
+import cv2
+import numpy as np
+from jaxtyping import Float, UInt8
+from numpy import ndarray
+
+from tracker.export.palette import rgb
+from tracker.export.written import Written
+
+Bgr = tuple[int, int, int]
+
+GROUND: Bgr = (24, 24, 24)
+PANE: Bgr = (32, 32, 32)
+LINE: Bgr = (90, 90, 90)
+WORDS: Bgr = (200, 200, 200)
+BLACK: Bgr = (0, 0, 0)
+
+WIDEST = 1920
+"""Pixels of the whole picture."""
+
+LARGEST_CELL = 640
+"""Pixels of a camera's width."""
+
+TRAIL_SECONDS = 3.0
+LANE = 12
+"""Pixels a track's lane."""
+
+MOST_LANES = 24
+"""Of the longest tracks; more would hide the cameras."""
+
+_MARGIN = 6
+_FONT = cv2.FONT_HERSHEY_SIMPLEX
+
+
+def colour(number: int) -> Bgr:
+    """Of a track."""
+    red, green, blue = rgb(number)
+    return blue, green, red
+
+
+class Mosaic:
+    """Draws the steps of a run."""
+
+    def __init__(self, written: Written) -> None:
+        """Lay out cameras and room, and draw what stays: room and lanes."""
+        self._written = written
+        sequence, tracks = written.sequence, written.tracks
+        cells = len(sequence.views) + 1
+        self._columns = math.ceil(math.sqrt(cells)) if cells > 3 else cells
+        rows = -(-cells // self._columns)
+        largest = max((c.image_size for c in sequence.cameras), default=(360, 288))
+        width = min(LARGEST_CELL, largest[0], WIDEST // self._columns)
+        self._cell = (_even(width), _even(width * largest[1] / largest[0]))
+        self._lanes = _lanes_of(written)
+        lanes = LANE * len(self._lanes) + 2 * _MARGIN
+        self.size = (self._cell[0] * self._columns, _even(self._cell[1] * rows + lanes))
+        self._trail = round(TRAIL_SECONDS * sequence.fps)
+        feet = tracks.positions - [0.0, 0.0, sequence.target_half_extents[2]]
+        self._feet = []
+        for camera in sequence.cameras:
+            pixels, in_front = camera.project(feet)
+            self._feet.append(np.where(in_front[:, None], pixels, np.nan))
+        self._rows_of = {n: np.flatnonzero(tracks.ids == n) for n in written.ids}
+        self._still = self._draw_still()
+
+    def draw(self, step: int, pictures: Many[ndarray | None]) -> UInt8[ndarray, "h w 3"]:
+        """One step.
+
+        Args:
+            step: 0-based.
+            pictures: One a camera, BGR; None where there is none.
+        """
+        canvas = self._still.copy()
+        for index, picture in enumerate(pictures):
+            self._draw_camera(self._at(canvas, index), index, step, picture)
+        self._draw_room(self._at(canvas, len(pictures)), step)
+        width, height = self.size
+        x = round((step + 0.5) / self._written.sequence.frames * width)
+        top = height - LANE * len(self._lanes) - 2 * _MARGIN
+        cv2.line(canvas, (x, top), (x, height - 1), WORDS, 1)
+        seconds = step * self._written.sequence.step_time
+        _write(canvas, f"step {step}  {seconds:.2f} s", (width - 170, self._cell[1] - 8))
+        return canvas
+
+    def _at(self, canvas: ndarray, index: int) -> ndarray:
+        """The part of the canvas that a cell takes."""
+        width, height = self._cell
+        row, column = divmod(index, self._columns)
+        cell: ndarray = canvas[
+            row * height : (row + 1) * height, column * width : (column + 1) * width
+        ]
+        return cell
+
+    def _draw_camera(self, cell: ndarray, index: int, step: int, picture: ndarray | None) -> None:
+        camera = self._written.sequence.cameras[index]
+        height, width = cell.shape[:2]
+        scale = min(width / camera.image_size[0], height / camera.image_size[1])
+        size = (round(camera.image_size[0] * scale), round(camera.image_size[1] * scale))
+        if picture is None:
+            _write(cell, "no picture", (8, height - 10))
+        else:
+            small = picture
+            if picture.shape[1::-1] != size:
+                small = cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
+            cell[: size[1], : size[0]] = small
+        tracks = self._written.tracks
+        pixels, visible = self._written.boxes[index]
+        rows = tracks.at(step)
+        for row in range(rows.start, rows.stop):
+            number = int(tracks.ids[row])
+            self._draw_trail(cell, self._feet[index] * scale, number, step)
+            if not visible[row]:
+                continue
+            left, top, wide, high = (pixels[row] * scale).round().astype(int).tolist()
+            seen = bool(tracks.seen[row, index])
+            corner = (left + wide, top + high)
+            cv2.rectangle(cell, (left, top), corner, BLACK, 3 if seen else 2)
+            cv2.rectangle(cell, (left, top), corner, colour(number), 2 if seen else 1)
+            _tag(cell, number, (left, top))
+        _write(cell, camera.name, (6, 14))
+
+    def _draw_trail(
+        self, cell: ndarray, points: Float[ndarray, "N 2"], number: int, step: int
+    ) -> None:
+        rows = self._rows_of[number]
+        frames = self._written.tracks.frames[rows]
+        first, last = np.searchsorted(frames, [step - self._trail, step + 1])
+        way = points[rows[first:last]]
+        way = way[np.isfinite(way).all(axis=1)]
+        if len(way) > 1:
+            line = np.clip(way, -1e4, 1e4).round().astype(np.int32)[:, None]
+            cv2.polylines(cell, [line], False, colour(number), 1, cv2.LINE_AA)
+
+    def _draw_room(self, cell: ndarray, step: int) -> None:
+        tracks = self._written.tracks
+        rows = tracks.at(step)
+        points = self._above(tracks.positions[:, :2])
+        for row in range(rows.start, rows.stop):
+            number = int(tracks.ids[row])
+            self._draw_trail(cell, points, number, step)
+            place = tuple(points[row].round().astype(int).tolist())
+            cv2.circle(cell, place, 5, colour(number), -1, cv2.LINE_AA)
+            _write(cell, str(number), (place[0] + 7, place[1] + 4))
+
+    def _above(self, points: Float[ndarray, "N 2"]) -> Float[ndarray, "N 2"]:
+        """World metres to pixels of the room's cell, y up."""
+        room = self._written.sequence.room
+        cameras = np.array([c.centre[:2] for c in self._written.sequence.cameras]).reshape(-1, 2)
+        size = room.maximum[:2] - room.minimum[:2]
+        low = np.minimum(room.minimum[:2] - 0.1 * size, np.min(cameras, axis=0, initial=np.inf))
+        high = np.maximum(room.maximum[:2] + 0.1 * size, np.max(cameras, axis=0, initial=-np.inf))
+        low = np.maximum(low, room.minimum[:2] - size)  # a camera far away leaves the room visible
+        high = np.minimum(high, room.maximum[:2] + size)
+        width, height = self._cell
+        scale = min((width - 24) / (high[0] - low[0]), (height - 24) / (high[1] - low[1]))
+        middle = (low + high) / 2.0
+        pixels: ndarray = (points - middle) * [scale, -scale] + [width / 2.0, height / 2.0]
+        return pixels
+
+    def _draw_still(self) -> UInt8[ndarray, "h w 3"]:
+        width, height = self.size
+        canvas = np.full((height, width, 3), GROUND, dtype=np.uint8)
+        sequence = self._written.sequence
+        cell = self._at(canvas, len(sequence.views))
+        cell[:] = PANE
+        ends = self._above(np.array([sequence.room.minimum[:2], sequence.room.maximum[:2]]))
+        (left, low), (right, high) = ends.round().astype(int).tolist()
+        cv2.rectangle(cell, (left, high), (right, low), LINE, 1)
+        for camera in sequence.cameras:
+            place = self._above(camera.centre[None, :2])[0].round().astype(int).tolist()
+            cv2.drawMarker(cell, tuple(place), WORDS, cv2.MARKER_TRIANGLE_UP, 8)
+        _write(cell, "from above", (6, 14))
+        top = height - LANE * len(self._lanes) - _MARGIN
+        for index, (number, spans) in enumerate(self._lanes):
+            y = top + LANE * index + LANE // 2
+            for first, last in spans:
+                begin, end = (round(s / sequence.frames * width) for s in (first, last + 1))
+                cv2.rectangle(
+                    canvas, (begin, y - 3), (max(begin, end - 1), y + 2), colour(number), -1
+                )
+        return canvas
+
+
+def _lanes_of(written: Written) -> list[tuple[int, list[tuple[int, int]]]]:
+    """The longest tracks by id, each with the first and last steps of its parts."""
+    tracks = written.tracks
+    longest = sorted(written.ids, key=lambda n: -int((tracks.ids == n).sum()))[:MOST_LANES]
+    lanes = []
+    for number in sorted(longest):
+        frames = tracks.frames[tracks.ids == number]
+        parts = np.split(frames, np.flatnonzero(np.diff(frames) > 1) + 1)
+        lanes.append((number, [(int(part[0]), int(part[-1])) for part in parts]))
+    return lanes
+
+
+def _tag(cell: ndarray, number: int, place: tuple[int, int]) -> None:
+    text = str(number)
+    width = 8 + 8 * len(text)
+    left, top = place[0], max(0, place[1] - 15)
+    cv2.rectangle(cell, (left, top), (left + width, top + 14), colour(number), -1)
+    cv2.putText(cell, text, (left + 4, top + 11), _FONT, 0.42, BLACK, 1, cv2.LINE_AA)
+
+
+def _write(cell: ndarray, text: str, place: tuple[int, int]) -> None:
+    plain = text.encode("ascii", "replace").decode()  # the font has no other letters
+    cv2.putText(cell, plain, place, _FONT, 0.4, BLACK, 3, cv2.LINE_AA)
+    cv2.putText(cell, plain, place, _FONT, 0.4, WORDS, 1, cv2.LINE_AA)
+
+
+def _even(value: float) -> int:
+    """H.264 halves its colours."""
+    return max(2, round(value / 2.0) * 2)

@@ -1,0 +1,1 @@
+"""How files are written, where they lie, and how what was written is validated."""

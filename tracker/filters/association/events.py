@@ -1,0 +1,189 @@
+"""Joint events one by one: the K best, K that share no pair, and what they say together.
+
+[WW10] Wang, Wan, patent CN101783020A, 2010.
+[FBS83] Fortmann, Bar-Shalom, Scheffe, "Sonar tracking of multiple targets using joint
+probabilistic data association", IEEE Journal of Oceanic Engineering 8(3), 1983.
+[M68] K. G. Murty, "An algorithm for ranking all the assignments in order of increasing
+cost", Operations Research 16(3), 1968.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from numpy import ndarray
+
+from tracker.filters.association.belief_propagation import Marginals
+from tracker.kernels.association.disjoint import disjoint_matchings
+from tracker.kernels.association.matchings import best_matchings
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JointEvents:
+    """K joint events of n targets and M measurements."""
+
+    sources: Int[ndarray, "K M"]
+    """The target of each measurement, -1 for nobody."""
+    targets: int
+    """n."""
+
+    @property
+    def size(self) -> int:
+        """K."""
+        return len(self.sources)
+
+    @property
+    def measurement_indicators(self) -> Bool[ndarray, "K M"]:
+        """τ_j: whether measurement j is of a target."""
+        return np.asarray(self.sources >= 0)
+
+    @property
+    def target_indicators(self) -> Bool[ndarray, "K n"]:
+        """δ_t: whether target t has a measurement."""
+        present = np.zeros((self.size, self.targets + 1), dtype=bool)
+        present[np.arange(self.size)[:, None], self.sources] = True  # nobody is the last column
+        return np.asarray(present[:, : self.targets])
+
+    @property
+    def false_counts(self) -> Int[ndarray, " K"]:
+        """Φ: how many measurements are of nobody."""
+        return np.asarray((self.sources < 0).sum(axis=1))
+
+
+def simplified_murty(
+    missed: Float[ndarray, " n"],
+    detected: Float[ndarray, "n M"],
+    unexplained: Float[ndarray, " M"],
+    count: int | None = None,
+) -> JointEvents:
+    """Up to K joint events, each the best that shares no pair with those before ([WW10]_).
+
+    Targets and measurements are the two sides of a weighted graph, the smaller side padded
+    with dummies; a pair weighs
+
+        ln(1 + w_ij / (w_i0 ρ_j))
+
+    the logarithm of how much likelier it is than none, where it is much likelier, and
+    always above 0. The heaviest matching, by the Hungarian method, is one event: who is
+    matched to a dummy is missed, or is clutter. Its pairs are taken out of the graph,
+    and the next is sought in what is left. Exact Murty would split the rest into n parts
+    and search each.
+
+    A heaviest matching leaves no two free ends of a pair, so a pair that is still there
+    after r of them has lost a neighbour to each, of which there are n + M − 2: K = n + M
+    events are enough for every pair, and for the event without any. Since no pair comes
+    twice, what is likely in many joint events is in one only: the marginals are rougher
+    the more targets compete.
+
+    Args:
+        missed: w_i0 > 0.
+        detected: w_ij; 0 outside the gate.
+        unexplained: ρ_j > 0.
+        count: K, at least 1; n + M if None.
+
+    Returns:
+        Different events, in the order in which they are found; at least one.
+    """
+    targets, measurements = detected.shape
+    size = max(targets, measurements)
+    weights = np.zeros((size, size))
+    weights[:targets, :measurements] = np.log1p(detected / missed[:, None] / unexplained)
+    most = max(1, targets + measurements) if count is None else count
+    columns = disjoint_matchings(weights, most)
+    columns[columns < 0] = measurements
+    return JointEvents(_sources(columns, targets, measurements), targets)
+
+
+def murty(
+    missed: Float[ndarray, " n"],
+    detected: Float[ndarray, "n M"],
+    unexplained: Float[ndarray, " M"],
+    count: int,
+) -> JointEvents:
+    """The K joint events of the greatest weight Π w_i0 Π w_ij Π ρ_j, greatest first.
+
+    By Murty's partition [M68] of a square assignment problem in which target i may also take
+    a dummy of its own for w_i0, and measurement j one for ρ_j.
+
+    Args:
+        missed: w_i0 > 0.
+        detected: w_ij; 0 outside the gate.
+        unexplained: ρ_j > 0.
+        count: K; fewer where there are fewer events.
+    """
+    targets, measurements = detected.shape
+    size = targets + measurements
+    if size == 0:
+        return JointEvents(np.zeros((1, 0), dtype=np.int64), 0)
+    cost = np.full((size, size), np.inf)  # rows: targets, dummies; columns: measurements, dummies
+    with np.errstate(divide="ignore"):
+        cost[:targets, :measurements] = -np.log(detected)
+        np.fill_diagonal(cost[:targets, measurements:], -np.log(missed))
+        np.fill_diagonal(cost[targets:, :measurements], -np.log(unexplained))
+    cost[targets:, measurements:] = 0.0
+    columns = best_matchings(cost, targets, count)
+    return JointEvents(_sources(columns, targets, measurements), targets)
+
+
+def log_weights(
+    events: JointEvents,
+    missed: Float[ndarray, " n"],
+    detected: Float[ndarray, "n M"],
+    unexplained: Float[ndarray, " M"],
+    *,
+    false_counts: Float[ndarray, " M1"] | None = None,
+) -> Float[ndarray, " K"]:
+    """ln w(θ) of each event.
+
+    With w_i0 = 1 − P_D, w_ij = P_D Λ_ij, ρ_j = 1/V and g(Φ) = Φ! this is the numerator of
+    Bayes' rule for a number of false measurements of which nothing is known ([FBS83]_,
+    as in [WW10]_):
+
+        P(θ | Z) ∝ Φ! / V^Φ · Π_j Λ_j^τ_j · Π_t P_D^δ_t (1 − P_D)^(1 − δ_t)
+
+    Args:
+        events: K events.
+        missed: w_i0.
+        detected: w_ij.
+        unexplained: ρ_j.
+        false_counts: g(0) … g(M); 1 if none, as of a Poisson number of false measurements.
+    """
+    indices = np.arange(events.sources.shape[1])
+    with np.errstate(divide="ignore"):
+        # the last row is of the measurements of nobody: source -1
+        pairs = np.log(np.vstack([detected, unexplained]))
+        total = pairs[events.sources, indices].sum(axis=1)
+        total += np.where(events.target_indicators, 0.0, np.log(missed)).sum(axis=1)
+        if false_counts is not None:
+            total += np.log(np.asarray(false_counts, dtype=float))[events.false_counts]
+    return np.asarray(total)
+
+
+def marginals_of(events: JointEvents, log_weight: Float[ndarray, " K"]) -> Marginals:
+    """Marginals of a few events: β_jt = Σ_θ P(θ) [t ← j], as if there were no others.
+
+    Args:
+        events: At least one, of a finite weight.
+        log_weight: ln w(θ), up to a constant.
+    """
+    probabilities = np.exp(log_weight - log_weight.max())
+    probabilities /= probabilities.sum()
+    measurements = events.sources.shape[1]
+    rows = np.zeros((events.targets + 1, measurements))
+    columns = np.broadcast_to(np.arange(measurements), events.sources.shape)
+    np.add.at(rows, (events.sources, columns), probabilities[:, None])  # nobody is the last row
+    return Marginals(
+        detected=rows[:-1],
+        missed=probabilities @ ~events.target_indicators,
+        unexplained=rows[-1],
+    )
+
+
+def _sources(columns: Int[ndarray, "K N"], targets: int, measurements: int) -> Int[ndarray, "K M"]:
+    """The target of each measurement, from the column of each row."""
+    sources = np.full((len(columns), measurements + 1), -1, dtype=np.int64)
+    taken = np.minimum(columns[:, :targets], measurements)
+    sources[np.arange(len(columns))[:, None], taken] = np.arange(targets)
+    return np.ascontiguousarray(sources[:, :measurements])

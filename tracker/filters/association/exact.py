@@ -1,0 +1,77 @@
+"""Exact marginal association probabilities, by dynamic programming over subsets.
+
+The sum over all joint events of n targets and M measurements has more terms than can
+be written down, but after any number of measurements only the *set* of targets that
+are taken matters, not who took whom: M · 2ⁿ sums do (or n · 2ᴹ, whichever is less).
+The same observation carries efficient hypothesis management: S. Maskell, M. Briers,
+R. Wright, "Fast mutual exclusion", Signal and Data Processing of Small Targets, SPIE
+5428, 2004.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
+
+from tracker.filters.association.belief_propagation import Marginals
+from tracker.kernels.association.subsets import subset_marginals
+
+MOST_ITEMS = 18
+"""The smaller of the numbers of targets and measurements: beyond, memory grows too large."""
+
+
+def exact_marginals(
+    missed: Float[ndarray, " n"],
+    detected: Float[ndarray, "n M"],
+    unexplained: Float[ndarray, " M"],
+    *,
+    false_counts: Float[ndarray, " M1"] | None = None,
+) -> Marginals:
+    """Marginals of the one-to-one association over all joint events, to rounding.
+
+    Args:
+        missed: w_i0.
+        detected: w_ij; 0 outside the gate.
+        unexplained: ρ_j.
+        false_counts: g(0) … g(M), by the number of measurements of nobody; 1 if none.
+
+    Returns:
+        Rows and columns that sum to 1.
+
+    Raises:
+        ValueError: If both numbers are above :data:`MOST_ITEMS`, or no joint event has a
+            positive weight.
+    """
+    targets, count = detected.shape
+    if min(targets, count) > MOST_ITEMS:
+        raise ValueError(
+            f"exact marginals of {targets} targets and {count} measurements: one of the numbers "
+            f"must be at most {MOST_ITEMS}; split them into clusters, or use belief propagation"
+        )
+    factors = np.ones(count + 1) if false_counts is None else np.asarray(false_counts, float)
+    # by the number of targets that have a measurement: what is not theirs is nobody's
+    factors = factors[::-1][: min(targets, count) + 1]
+    factors = np.ascontiguousarray(factors / factors.max())
+    weights = np.array(detected, dtype=float)
+    missed, unexplained = np.array(missed, dtype=float), np.array(unexplained, dtype=float)
+    # each measurement and each target has one factor in every event: scaled to at most 1,
+    # measurements first, since theirs are densities of any unit
+    columns = np.maximum(unexplained, weights.max(axis=0, initial=0.0))
+    columns[columns == 0.0] = 1.0
+    weights /= columns
+    unexplained /= columns
+    rows = np.maximum(missed, weights.max(axis=1, initial=0.0))
+    rows[rows == 0.0] = 1.0
+    weights /= rows[:, None]
+    missed /= rows
+    if targets <= count:
+        # measurement by measurement, each of which takes a target or none
+        sums = subset_marginals(unexplained, np.ascontiguousarray(weights.T), missed, factors)
+        detected, none, left = sums.chosen.T, sums.left, sums.none
+    else:
+        sums = subset_marginals(missed, weights, unexplained, factors)
+        detected, none, left = sums.chosen, sums.none, sums.left
+    if not sums.total > 0.0:
+        raise ValueError("no joint event has a positive weight; give every target a w_i0 above 0")
+    return Marginals(detected / sums.total, none / sums.total, left / sums.total)

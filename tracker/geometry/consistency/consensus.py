@@ -1,0 +1,216 @@
+"""Do pairs of boxes triangulate to people: heads above feet, all of about one height, one way up.
+
+Two cameras see head and foot of a person as four rays. Rays of the same person meet, in front
+of both lenses; rays of different people, or through cameras that stand elsewhere than is said,
+meet by chance only. And all people stand the same way up and are of about one height, so the
+vectors from foot to head (here *rises*) agree with each other, in whatever axes and unit the
+world has. Points are triangulated by the midpoint method: the middle of the shortest segment
+between two rays (Hartley, Sturm, "Triangulation", Computer Vision and Image Understanding
+68(2), 1997, §5.3).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from collections.abc import Sequence as Many
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from numpy import ndarray
+
+from tracker.geometry.consistency.observed import PairsOfBoxes, Pose, Rays, in_world
+
+LARGEST_GAP = 0.15
+"""Largest distance between two rays that meet, as a share of the person's height there."""
+
+SPREAD = 0.25
+"""Largest distance of a rise from the common one, as a share of the latter's length."""
+
+_LEAST_SINE = 0.05  # of the angle between two rays that are to meet: flatter ones tell no depth
+_LARGEST_RATIO = 2.5  # between the heights that two cameras see; one may look down steeply
+_HYPOTHESES = 200
+_MOST_VOTES = 2000
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Meetings:
+    """N pairs of boxes whose rays meet, in the axes and the unit of the calibration's world."""
+
+    pairs: Int[ndarray, " N"]
+    """Index into the pairs of boxes."""
+    feet: Float[ndarray, "N 3"]
+    """Triangulated feet."""
+    rises: Float[ndarray, "N 3"]
+    """Vectors from foot to head."""
+    gaps: Float[ndarray, " N"]
+    """Distance between the two rays, the larger of head's and foot's, as a share of the height."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Consensus:
+    """What the pairs of boxes agree on, in the world's own axes and unit."""
+
+    rise: Float[ndarray, " 3"]
+    """The common vector from foot to head; zero where nobody is found."""
+    share: float
+    """:attr:`agreeing` / :attr:`possible`, 0 … 1."""
+    shares: Mapping[tuple[int, int], float]
+    """The same of every pair of cameras that have boxes at the same steps."""
+    agreeing: int
+    """Pairs of boxes that meet and have the common rise, each box in one pair at most."""
+    possible: int
+    """The largest number of such pairs that there could be."""
+    steps: Int[ndarray, " N"]
+    """Of the agreeing pairs, as the following."""
+    feet: Float[ndarray, "N 3"]
+    rises: Float[ndarray, "N 3"]
+    gaps: Float[ndarray, " N"]
+    """As of :class:`Meetings`."""
+    fits: Float[ndarray, " N"]
+    """Weight of each: 1 for a perfect fit, 0 for one that only just agrees."""
+    cameras: Int[ndarray, "N 2"]
+    """Indices of the two cameras."""
+
+    @property
+    def height(self) -> float:
+        """Of the usual person, in the world's unit."""
+        return float(np.linalg.norm(self.rise))
+
+
+def meet(pairs: PairsOfBoxes, first: Rays, second: Rays, one: Pose, other: Pose) -> Meetings:
+    """Those pairs of boxes whose heads and feet triangulate in front of both cameras."""
+    whole = np.flatnonzero(first.whole[pairs.first] & second.whole[pairs.second])
+    rows, columns = pairs.first[whole], pairs.second[whole]
+    base = other.centre - one.centre
+    heads_one, heads_other = in_world(one, first.heads), in_world(other, second.heads)
+    feet_one, feet_other = in_world(one, first.feet), in_world(other, second.feet)
+    heads, near_h, far_h, gap_h, good_h = _between(base, heads_one[rows], heads_other[columns])
+    feet, near_f, far_f, gap_f, good_f = _between(base, feet_one[rows], feet_other[columns])
+    seen_one = (near_h + near_f) / 2.0 * first.extents[rows]
+    seen_other = (far_h + far_f) / 2.0 * second.extents[columns]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        size = np.minimum(seen_one, seen_other)
+        gaps = np.maximum(gap_h, gap_f) / size
+        ratio = np.maximum(seen_one, seen_other) / size
+        good = good_h & good_f & (gaps < LARGEST_GAP) & (ratio < _LARGEST_RATIO)
+    kept = np.flatnonzero(good)
+    return Meetings(whole[kept], one.centre + feet[kept], heads[kept] - feet[kept], gaps[kept])
+
+
+def _between(
+    base: Float[ndarray, " 3"], one: Float[ndarray, "N 3"], other: Float[ndarray, "N 3"]
+) -> tuple[ndarray, ndarray, ndarray, ndarray, ndarray]:
+    """Midpoints between rays from 0 and from ``base``, distances along both, gaps, and if ahead."""
+    together = np.einsum("ni,ni->n", one, other)
+    sine_squared = np.maximum(1.0 - together**2, 1e-12)
+    on_one, on_other = one @ base, other @ base
+    along_one = (on_one - together * on_other) / sine_squared
+    along_other = (together * on_one - on_other) / sine_squared
+    at_one = along_one[:, None] * one
+    at_other = base + along_other[:, None] * other
+    gaps = np.linalg.norm(at_one - at_other, axis=1)
+    ahead = (along_one > 0.0) & (along_other > 0.0) & (sine_squared > _LEAST_SINE**2)
+    return (at_one + at_other) / 2.0, along_one, along_other, gaps, ahead
+
+
+def consensus(
+    rays: Many[Rays],
+    poses: Many[Pose],
+    pairs: Mapping[tuple[int, int], PairsOfBoxes],
+    rng: np.random.Generator | None = None,
+) -> Consensus:
+    """What the boxes of all cameras agree on, with the cameras standing like this.
+
+    Args:
+        rays: Of each camera.
+        poses: Of each camera.
+        pairs: Of pairs of cameras, as :func:`tracker.geometry.consistency.observed.pair_up` makes
+            them.
+        rng: Chooses among many; the same every time where none is given.
+    """
+    rng = np.random.default_rng(0) if rng is None else rng
+    found = {
+        (a, b): meet(own, rays[a], rays[b], poses[a], poses[b]) for (a, b), own in pairs.items()
+    }
+    rises = np.concatenate([np.zeros((0, 3)), *(met.rises for met in found.values())])
+    rise = _usual(rises, rng)
+    shares: dict[tuple[int, int], float] = {}
+    agreeing = 0
+    feet, all_rises, gaps, fits = (
+        [np.zeros((0, 3))],
+        [np.zeros((0, 3))],
+        [np.zeros(0)],
+        [np.zeros(0)],
+    )
+    cameras: list[tuple[int, int]] = []
+    steps = [np.zeros(0, dtype=np.int64)]
+    for key, met in found.items():
+        own = pairs[key]
+        near = np.flatnonzero(_agree(met.rises, rise))
+        kept = near[_one_to_one(own.first[met.pairs[near]], own.second[met.pairs[near]],
+                                met.gaps[near])]  # fmt: skip
+        agreeing += len(kept)
+        shares[key] = len(kept) / own.most if own.most else 0.0
+        steps.append(rays[key[0]].frames[own.first[met.pairs[kept]]])
+        feet.append(met.feet[kept])
+        all_rises.append(met.rises[kept])
+        gaps.append(met.gaps[kept])
+        away = ((met.rises[kept] - rise) ** 2).sum(axis=1) / (SPREAD**2 * float(rise @ rise) or 1.0)
+        fits.append((1.0 - (met.gaps[kept] / LARGEST_GAP) ** 2) * (1.0 - away))
+        cameras += [key] * len(kept)
+    possible = sum(own.most for own in pairs.values())
+    return Consensus(
+        rise,
+        agreeing / possible if possible else 0.0,
+        shares,
+        agreeing,
+        possible,
+        np.concatenate(steps),
+        np.concatenate(feet),
+        np.concatenate(all_rises),
+        np.concatenate(gaps),
+        np.concatenate(fits),
+        np.array(cameras, dtype=np.int64).reshape(-1, 2),
+    )
+
+
+def _agree(rises: Float[ndarray, "N 3"], rise: Float[ndarray, " 3"]) -> Bool[ndarray, " N"]:
+    height = float(np.linalg.norm(rise))
+    return np.asarray(np.linalg.norm(rises - rise, axis=1) < SPREAD * height)
+
+
+def _usual(rises: Float[ndarray, "N 3"], rng: np.random.Generator) -> Float[ndarray, " 3"]:
+    """The rise that most others are near to, then the median of those: a consensus (RANSAC)."""
+    if not len(rises):
+        return np.zeros(3)
+    votes = rises
+    if len(votes) > _MOST_VOTES:
+        votes = votes[rng.choice(len(votes), _MOST_VOTES, replace=False)]
+    tried = votes
+    if len(tried) > _HYPOTHESES:
+        tried = tried[rng.choice(len(tried), _HYPOTHESES, replace=False)]
+    # |v − u|² < s² |u|²  ⇔  2 v·u − |v|² − (1 − s²) |u|² > 0
+    ones = np.ones((len(tried), 1))
+    own = np.hstack([2.0 * tried, -ones, (SPREAD**2 - 1.0) * (tried**2).sum(axis=1)[:, None]])
+    all_ = np.hstack([votes, (votes**2).sum(axis=1)[:, None], np.ones((len(votes), 1))])
+    near = own @ all_.T > 0.0
+    best = tried[int(np.argmax(near.sum(axis=1)))]
+    for _ in range(3):
+        around = rises[_agree(rises, best)]
+        if not len(around):
+            break
+        best = np.median(around, axis=0)
+    return np.asarray(best)
+
+
+def _one_to_one(
+    first: Int[ndarray, " N"], second: Int[ndarray, " N"], gaps: Float[ndarray, " N"]
+) -> Int[ndarray, " K"]:
+    """The pairs that are the best of both their boxes."""
+    order = np.argsort(gaps, kind="stable")
+    best_of_first = np.zeros(len(gaps), dtype=bool)
+    best_of_second = np.zeros(len(gaps), dtype=bool)
+    best_of_first[order[np.unique(first[order], return_index=True)[1]]] = True
+    best_of_second[order[np.unique(second[order], return_index=True)[1]]] = True
+    return np.flatnonzero(best_of_first & best_of_second)

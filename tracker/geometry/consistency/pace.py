@@ -1,0 +1,107 @@
+"""How far people go from step to step, which tells how many steps a second there are."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence as Many
+
+import numpy as np
+from jaxtyping import Float, Int
+from numpy import ndarray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import KDTree
+
+from tracker.geometry.camera import Camera
+from tracker.geometry.consistency.observed import Rays
+from tracker.geometry.consistency.suggestion import agreement
+
+WALKING = 1.2
+"""Metres a second at which people walk indoors and among others: a little below the 1.34 m/s of
+free walking (Weidmann, "Transporttechnik der Fussgänger", ETH Zürich, 1993, §3.1)."""
+
+SHARE = 0.8
+"""Quantile of the ways: most people in a room stand, talk or sit at any moment."""
+
+CLEAR = 0.3
+"""Metres: a way that is longer is none that a wrong measurement feigns."""
+
+LAGS = (1, 2, 4, 8, 16, 32)
+"""Steps between two looks."""
+
+_FARTHEST = 1.5  # metres from one look to the next: beyond it somebody else is taken for them
+_SAME = 0.4  # metres: pairs of boxes that meet so near to each other show one person
+_LEAST_WAYS = 30
+_APART = 1e4  # metres between the points of one step and those of the next, in one tree
+_BLOCK = 2 * LAGS[-1]  # steps in a row
+_MOST_BOXES = 12_000  # of all cameras
+
+
+def pace(cameras: Many[Camera], rays: Many[Rays]) -> float | None:
+    """Metres a step that those who walk go, from places where the boxes of two cameras meet.
+
+    Args:
+        cameras: In metres, z up.
+        rays: Of each camera's boxes, in its own axes.
+
+    Returns:
+        None where nobody goes far enough to tell it from measurements that waver.
+    """
+    within = [own.take(np.flatnonzero(np.isin(own.frames, _looked_at(rays)))) for own in rays]
+    agreed = agreement(cameras, within, most_pairs=10**9)
+    steps, places = _people(agreed.steps, agreed.feet[:, :2])
+    for lag in LAGS:
+        ways = _ways(steps, places, lag)
+        if len(ways) >= _LEAST_WAYS:
+            way = float(np.quantile(ways, SHARE))
+            if way > CLEAR:
+                return way / lag
+    return None
+
+
+def _looked_at(rays: Many[Rays]) -> Int[ndarray, " K"]:
+    """Blocks of steps in a row, spread over the recording, with so many boxes in all."""
+    frames = np.concatenate([np.zeros(0, dtype=np.int64), *(own.frames for own in rays)])
+    if not len(frames):
+        return frames
+    blocks, counts = np.unique(frames // _BLOCK, return_counts=True)
+    wanted = max(1, int(len(blocks) * min(1.0, _MOST_BOXES / counts.sum())))
+    kept = blocks[np.unique(np.linspace(0, len(blocks) - 1, wanted).astype(int))]
+    return np.asarray((kept[:, None] * _BLOCK + np.arange(_BLOCK)).ravel())
+
+
+def _people(
+    steps: Int[ndarray, " N"], places: Float[ndarray, "N 2"]
+) -> tuple[Int[ndarray, " M"], Float[ndarray, "M 2"]]:
+    """One place for all meetings that lie together at one step."""
+    near = KDTree(_in_one_tree(steps, places)).query_pairs(_SAME, output_type="ndarray")
+    graph = coo_array((np.ones(len(near)), (near[:, 0], near[:, 1])), shape=(len(steps),) * 2)
+    count, of = connected_components(graph, directed=False)
+    size = np.bincount(of, minlength=count)
+    means = [np.bincount(of, weights=axis, minlength=count) / size for axis in places.T]
+    first = np.zeros(count, dtype=np.int64)
+    first[of] = steps
+    return first, np.stack(means, axis=1)
+
+
+def _ways(
+    steps: Int[ndarray, " M"], places: Float[ndarray, "M 2"], lag: int
+) -> Float[ndarray, " W"]:
+    """How far people are from where they are some steps later: each other's nearest."""
+    if not len(steps):
+        return np.zeros(0)
+    now, later = _in_one_tree(steps, places), _in_one_tree(steps - lag, places)
+    far, there = _nearest(later, now)
+    _, back = _nearest(now, later)
+    found = np.flatnonzero(np.isfinite(far))
+    found = found[back[there[found]] == found]
+    return np.asarray(far[found])
+
+
+def _nearest(tree: Float[ndarray, "M 3"], points: Float[ndarray, "K 3"]) -> tuple[ndarray, ndarray]:
+    """How far the nearest of a tree is from each point, infinite beyond reach, and its row."""
+    far, row = KDTree(tree).query(points, distance_upper_bound=_FARTHEST)
+    return np.asarray(far), np.asarray(row)
+
+
+def _in_one_tree(steps: Int[ndarray, " N"], places: Float[ndarray, "N 2"]) -> ndarray:
+    return np.column_stack([places, steps * _APART])

@@ -1,0 +1,133 @@
+"""How well two cameras' boxes agree when one of them is shifted in time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence as Many
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+from numpy import ndarray
+
+from tracker.geometry.camera import Camera
+from tracker.geometry.consistency.observed import Rays
+from tracker.kernels import sliding
+
+SIGMA = 0.06
+"""σ of :func:`tracker.kernels.sliding.slide`: noise of a box's ends, as a share of its height."""
+
+DEPTH_SIGMA = 0.15
+"""σ_λ: standard deviation of the logarithm of the distance that one box's size tells."""
+
+_LINKED = 0.5  # heights that a box may move in a step, and by which share its height may change
+_STEP = 0.05  # of the logarithm of the distance, for the derivative
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Course:
+    """The boxes of one camera over F steps. D boxes, sorted by step."""
+
+    camera: Camera
+    rays: Rays
+    ends: Float[ndarray, "D 4"]
+    """x and y of head and foot, pixels; NaN where the box is cut off."""
+    starts: Int[ndarray, " F1"]
+    """Where each step's boxes begin, and the end."""
+    following: Int[ndarray, " D"]
+    """The box of the same person a step later, -1 for none."""
+
+
+def course(camera: Camera, rays: Rays, boxes: Float[ndarray, "D 4"], frames: int) -> Course:
+    """The boxes of a camera, linked from step to step.
+
+    Args:
+        camera: In metres, z up.
+        rays: Of its boxes, sorted by step.
+        boxes: left, top, width, height, pixels, in the same order.
+        frames: F, how many steps the camera has.
+    """
+    middle = boxes[:, 0] + boxes[:, 2] / 2.0
+    ends = np.stack([middle, boxes[:, 1], middle, boxes[:, 1] + boxes[:, 3]], axis=1)
+    ends[~rays.whole] = np.nan
+    starts = np.searchsorted(rays.frames, np.arange(frames + 1))
+    return Course(camera, rays, ends, starts, _following(ends, starts))
+
+
+def _following(ends: Float[ndarray, "D 4"], starts: Int[ndarray, " F1"]) -> Int[ndarray, " D"]:
+    """The box of the next step that is nearest, where each is the nearest to the other."""
+    following = np.full(len(ends), -1, dtype=np.int64)
+    for first, last, end in zip(starts[:-2], starts[1:-1], starts[2:], strict=True):
+        if first == last or last == end:
+            continue
+        own, other = ends[first:last], ends[last:end]
+        heights = np.minimum((own[:, 3] - own[:, 1])[:, None], (other[:, 3] - other[:, 1])[None])
+        away = np.abs(own[:, None, :] - other[None, :, :]).max(axis=2) / heights
+        away = np.where(np.isnan(away), np.inf, away)
+        nearest, back = np.argmin(away, axis=1), np.argmin(away, axis=0)
+        rows = np.arange(last - first)
+        good = (back[nearest] == rows) & (away[rows, nearest] < _LINKED)
+        following[first + rows[good]] = last + nearest[good]
+    return following
+
+
+def slid(
+    one: Course,
+    other: Course,
+    offsets: Float[ndarray, " O"],
+    height: float,
+    most_steps: int = 150,
+) -> tuple[Float[ndarray, "O S"], Float[ndarray, "O S"]]:
+    """How well the boxes of two cameras agree, for offsets in time between them.
+
+    The size of a box in camera ``one`` gives the person's distance, and so where the other camera
+    should have a box: across the epipolar line within the noise, along it within the error of that
+    distance. The equation stands in :mod:`tracker.kernels.sliding`.
+
+    Args:
+        one: Whose boxes say where people are.
+        other: What is seen by ``one`` at step k is sought here at step k + offset.
+        offsets: Steps; fractions are interpolated.
+        height: Of people, metres.
+        most_steps: So many of the steps where ``one`` has boxes are taken, evenly.
+
+    Returns:
+        Of each offset and sampled step: the sum of the fits, 0 … 1 each, and their number.
+    """
+    counts = np.diff(one.starts)
+    steps = np.flatnonzero(counts)
+    if len(steps) > most_steps:
+        steps = steps[np.linspace(0, len(steps) - 1, most_steps).astype(int)]
+    rows = np.concatenate(
+        [np.zeros(0, dtype=np.int64), *(np.arange(*one.starts[k : k + 2]) for k in steps)]
+    )
+    starts = np.concatenate([[0], np.cumsum(counts[steps])])
+    expected, tangents = _seen_by(other.camera, one, rows, height)
+    fits: tuple[ndarray, ndarray] = sliding.slide(
+        expected, tangents, starts, steps, other.ends, other.following, other.starts,
+        np.asarray(offsets, dtype=float), SIGMA, DEPTH_SIGMA,
+    )  # fmt: skip
+    return fits
+
+
+def _seen_by(
+    camera: Camera, one: Course, rows: Int[ndarray, " N"], height: float
+) -> tuple[Float[ndarray, "N 4"], Float[ndarray, "N 4"]]:
+    """Where another camera should see the heads and feet, and how that moves with depth."""
+    heads = one.rays.heads[rows] @ one.camera.rotation
+    feet = one.rays.feet[rows] @ one.camera.rotation
+    # s u − t v = (0, 0, h) in the least squares, for unit vectors u, v
+    together = (heads * feet).sum(axis=1)
+    determinant = np.maximum(1.0 - together**2, 1e-9)
+    s = height * (heads[:, 2] - together * feet[:, 2]) / determinant
+    t = height * (together * heads[:, 2] - feet[:, 2]) / determinant
+    ends: list[Many[ndarray]] = []
+    for factor in (np.exp(-_STEP), 1.0, np.exp(_STEP)):
+        places = [one.camera.centre + factor * far[:, None] * way
+                  for far, way in ((s, heads), (t, feet))]  # fmt: skip
+        ends.append([camera.project(place)[0] for place in places])
+    nearer, middle, farther = (np.concatenate(both, axis=1) for both in ends)
+    tangents = (farther - nearer) / (2.0 * _STEP)
+    inside = one.rays.whole[rows] & (s > 0.0) & (t > 0.0) & np.isfinite(tangents).all(axis=1)
+    inside &= camera.contains(middle[:, :2]) & camera.contains(middle[:, 2:])
+    expected = np.where(inside[:, None], middle, np.nan)
+    return np.ascontiguousarray(expected), np.ascontiguousarray(tangents)

@@ -1,0 +1,1 @@
+"""How a foreign recording becomes a sequence: formats, conventions, import, check."""

@@ -1,0 +1,358 @@
+"""Do the boxes of several cameras meet in 3D, as given and as each usual mistake would have it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Bool
+from numpy import ndarray
+
+from tracker.geometry.consistency.consensus import Consensus
+from tracker.geometry.consistency.observed import pose_of
+from tracker.geometry.consistency.suggestion import LEAST_AGREEING, Suggestion, stands, suggest
+from tracker.io.checks.level import confirmed, upwards
+from tracker.io.checks.reading import Reading, exchanged, exchanges
+from tracker.io.checks.readings import (
+    CLEARLY,
+    LEAST_SHARE,
+    Judge,
+    Judged,
+    Meaning,
+    Open,
+    Seen,
+    clearly_better,
+    find_meaning,
+)
+from tracker.io.checks.sizes import likely_unit
+from tracker.io.read.pieces import METRES, RawCamera
+from tracker.sequences.finding import Check, Remedy, absent, good, percent, warning
+from tracker.sequences.sequence import Sequence, View
+
+AS_GIVEN = Reading()
+"""How a sequence's file is read."""
+
+SCORE_THRESHOLD = 0.3
+"""Boxes below it are left out."""
+
+_SMALLER, _TALLER = 0.6, 1.6  # than the target: how tall boxes may be
+_SMALLEST = 0.08  # metres: not even a head
+_TALLEST_TARGET = 4.0  # metres: who states more has not written metres
+_LEAST_INSIDE = 0.25  # of the people: with fewer in the room it is another place
+_FLOOR_OFF = 0.5  # metres
+_TILT = np.radians(20.0)
+_OWN_SHARE = 0.2  # of the people whom others see: with boxes of fewer a camera is out of place
+_SAME_PLACE = 0.5  # heights of a person in the picture
+_LEAST_EXPECTED = 50
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BoxesTell:
+    """What the boxes of a sequence say of it."""
+
+    given: Judged
+    """With the calibration and the boxes as the file has them."""
+    meaning: Meaning
+    """The best reading."""
+    mistaken: bool
+    """Whether another reading is clearly better than that of the file."""
+    suggestion: Suggestion | None
+    """Room and size, where the file is read rightly."""
+
+
+def raw_cameras(sequence: Sequence) -> tuple[RawCamera, ...]:
+    """The calibrations of a sequence as if nobody knew how they are meant."""
+    return tuple(
+        RawCamera(
+            camera.name,
+            camera.image_size,
+            camera.intrinsics,
+            camera.distortion,
+            "fisheye" if camera.fisheye else "pinhole",
+            rotation=camera.rotation,
+            translation=camera.translation,
+        )
+        for camera in sequence.cameras
+    )
+
+
+def listen(sequence: Sequence, *, exchanges: bool = True) -> BoxesTell | None:
+    """Judge all usual readings of a sequence; None where fewer than two cameras have boxes.
+
+    Args:
+        sequence: Whose cameras and boxes.
+        exchanges: Whether to look for calibrations that are exchanged.
+    """
+    seen: list[Seen | None] = []
+    for view in sequence.views:
+        own = view.detections
+        if own is None:
+            seen.append(None)
+            continue
+        kept = own.scores >= SCORE_THRESHOLD
+        seen.append(Seen(own.frames[kept], own.boxes[kept]))
+    cameras = raw_cameras(sequence)
+    judge = Judge(cameras, seen)
+    if not judge.possible:
+        return None
+    given = judge.righted(judge(AS_GIVEN), AS_GIVEN.up)
+    meaning = find_meaning(cameras, seen, tried=Open(orders=exchanges))
+    assert meaning is not None
+    best = meaning.best
+    otherwise = replace(best.reading, unit="m", up="z") != AS_GIVEN
+    enough = best.consensus.agreeing >= LEAST_AGREEING and best.consensus.share >= LEAST_SHARE
+    alone = all(best.score > CLEARLY * other.score for other in meaning.tried[1:])
+    mistaken = enough and alone and otherwise and clearly_better(best, given)
+    chosen = judge.righted(best, AS_GIVEN.up) if mistaken else given
+    known = 2.0 * float(sequence.target_half_extents[2])
+    unit = likely_unit(judge.away(chosen), chosen.consensus)
+    if _fits(chosen.consensus.height, known) and known < _TALLEST_TARGET:
+        unit = "m"  # as tall as the file says
+    up = upwards(chosen.consensus.rise)
+    reading = replace(chosen.reading, unit=unit, up=up)
+    meaning = Meaning(replace(chosen, reading=reading), meaning.tried)
+    agreed = chosen.consensus.agreeing >= LEAST_AGREEING
+    right = reading == AS_GIVEN and agreed
+    suggestion = suggest(sequence.cameras, given.consensus) if right else None
+    return BoxesTell(given, meaning, agreed and reading != AS_GIVEN, suggestion)
+
+
+def _fits(height: float, known: float) -> bool:
+    return _SMALLER * known < height < _TALLER * known
+
+
+def check_boxes(sequence: Sequence, told: BoxesTell | None) -> Iterator[Check]:
+    """Do boxes meet, as the file is read, and are people of a plausible size where they should be.
+
+    Args:
+        sequence: Whose boxes.
+        told: As :func:`listen` has it.
+    """
+    name = "boxes meet in 3D"
+    if told is None:
+        few = sum(view.detections is not None for view in sequence.views)
+        why = "no camera has boxes" if not few else "fewer than two cameras have boxes at a step"
+        yield absent(
+            name,
+            f"{why}, so only lenses, places of the cameras and motion are checked: neither poses, "
+            "unit and axes against people, nor their size",
+        )
+        return
+    if told.mistaken:
+        yield _mistake(sequence, told)
+        return
+    agreed = told.given.consensus
+    if agreed.agreeing < LEAST_AGREEING or agreed.share < LEAST_SHARE:
+        yield _nothing_meets(told)
+        return
+    gap = float(np.median(agreed.gaps)) * agreed.height
+    pixels = _pixels(sequence, gap / agreed.height)
+    yield good(
+        name,
+        f"{percent(agreed.share)} of the boxes meet one of another camera, "
+        f"{gap:.2f} m or {pixels:.0f} px apart (median)",
+        share=agreed.share,
+        metres=gap,
+        pixels=pixels,
+    )
+    yield _tilt(sequence, told)
+    yield from _stray_cameras(sequence, told)
+    yield _size(sequence, told)
+    yield _inside(sequence, told)
+
+
+def _mistake(sequence: Sequence, told: BoxesTell) -> Check:
+    """The one reading that lets boxes meet, and how far that of the file is off."""
+    reading, agreed = told.meaning.reading, told.meaning.best.consensus
+    names = [camera.name for camera in sequence.cameras]
+    words: list[str] = []
+    remedies: list[Remedy] = []
+    if reading.direction != "world-to-camera":
+        words.append("the poses inverted")
+        remedies.append(Remedy("--pose", reading.direction))
+    if reading.axes != "opencv":
+        words.append("OpenGL's camera axes (y up, z back)")
+        remedies.append(Remedy("--axes", reading.axes))
+    if reading.layout != "ltwh":
+        what = {"xyxy": "left, top, right, bottom", "cxcywh": "centre and size"}[reading.layout]
+        words.append(f"boxes read as {what}")
+        remedies.append(Remedy("--boxes", reading.layout))
+    if reading.normalised:
+        words.append("boxes read as parts of the picture's size")
+        remedies.append(Remedy("--boxes", f"{reading.layout}-normalised"))
+    if reading.order is not None:
+        pairs = exchanged(reading.order, names)
+        words.append(f"the calibrations exchanged ({pairs})")
+        remedies += [Remedy("--swap", f"{a}={b}") for a, b in exchanges(reading.order, names)]
+    shared = told.given.consensus.share
+    if words:
+        sentence = (
+            f"with {' and '.join(words)} {percent(agreed.share)} of the boxes of several cameras "
+            f"meet, as given {percent(shared)}"
+        )
+    else:
+        sentence = f"{percent(agreed.share)} of the boxes of several cameras meet"
+    if reading.unit != "m":
+        words_unit = {"cm": "centimetres", "mm": "millimetres"}[reading.unit]
+        tall = agreed.height
+        sentence += (
+            f"{', and' if words else ', but'} people are {tall:.0f} units tall: translations are "
+            f"in {words_unit}, which makes people {tall * METRES[reading.unit]:.2f} m"
+        )
+        remedies.append(Remedy("--unit", reading.unit))
+    if reading.up != "z":
+        sentence += f"; people stand along {reading.up} of the world, which should be z"
+        remedies.append(Remedy("--up", reading.up))
+    return warning(
+        "calibration and boxes are read rightly",
+        sentence,
+        *remedies,
+        share=agreed.share,
+        as_given=shared,
+        height=agreed.height * METRES[reading.unit],
+    )
+
+
+def _nothing_meets(told: BoxesTell) -> Check:
+    agreed = told.given.consensus
+    best = told.meaning.tried[0].consensus
+    if agreed.possible < 3 * LEAST_AGREEING or best.agreeing >= LEAST_AGREEING:
+        return absent(
+            "boxes meet in 3D", "too few boxes meet to tell how calibration and boxes are meant"
+        )
+    return warning(
+        "boxes meet in 3D",
+        f"only {percent(agreed.share)} of the boxes of several cameras meet, and no usual way to "
+        "read poses, units, axes and boxes lets more meet: check that calibration, boxes and "
+        "cameras belong together, and that the cameras are synchronised",
+        share=agreed.share,
+    )
+
+
+def _pixels(sequence: Sequence, share: float) -> float:
+    """A share of a box's height in pixels of the usual box."""
+    heights = [v.detections.boxes[:, 3] for v in sequence.views if v.detections is not None]
+    return share * float(np.median(np.concatenate(heights)))
+
+
+def _tilt(sequence: Sequence, told: BoxesTell) -> Check:
+    """Boxes alone do not tell: they lean in cameras that are rolled."""
+    agreed = told.given.consensus
+    poses = [pose_of(camera) for camera in sequence.cameras]
+    up = confirmed(agreed, told.given.pictured, poses, told.given.turns)
+    tilt = 0.0 if up is None else float(np.arccos(np.clip(up[2], -1.0, 1.0)))
+    degrees = float(np.degrees(tilt))
+    if tilt > _TILT:
+        return warning(
+            "people stand upright",
+            f"people stand {degrees:.0f}° from the z axis: the world's floor is not level",
+            degrees=degrees,
+        )
+    return good("people stand upright", "people stand along the z axis", degrees=degrees)
+
+
+def _size(sequence: Sequence, told: BoxesTell) -> Check:
+    height = told.given.consensus.height
+    known = 2.0 * float(sequence.target_half_extents[2])
+    if height < _SMALLEST:
+        return warning(
+            "size of people",
+            f"boxes are {height:.2g} m tall in the room, nobody is as small: translations are in "
+            "a larger unit than they were taken for",
+            height=height,
+        )
+    if _fits(height, known):
+        return good(
+            "size of people",
+            f"boxes are {height:.2f} m tall in the room, [target] says {known:.2f} m",
+            height=height,
+        )
+    own = suggest(sequence.cameras, told.given.consensus)
+    remedy = (
+        ()
+        if own is None
+        else (Remedy("target.half_extents", str([round(float(v), 2) for v in own.half_extents])),)
+    )
+    return warning(
+        "size of people",
+        f"boxes are {height:.2f} m tall in the room, [target] says {known:.2f} m",
+        *remedy,
+        height=height,
+    )
+
+
+def _inside(sequence: Sequence, told: BoxesTell) -> Check:
+    agreed, room = told.given.consensus, sequence.room
+    middles = agreed.feet + agreed.rises / 2.0
+    inside = float(room.contains(middles, 0.5).mean())
+    own = told.suggestion
+    if inside < _LEAST_INSIDE and own is not None:
+        low, high = (
+            str([round(float(value), 1) for value in corner])
+            for corner in (own.minimum, own.maximum)
+        )
+        return warning(
+            "people are in the room",
+            f"only {percent(inside)} of the people whom the boxes show are in [room]",
+            Remedy("room.min", low),
+            Remedy("room.max", high),
+            inside=inside,
+        )
+    if own is not None and sequence.target_half_extents[2] > 0.7 and stands(agreed.height):
+        off = own.floor - float(room.minimum[2])
+        if abs(off) > _FLOOR_OFF:
+            return warning(
+                "people are in the room",
+                f"people stand at z = {own.floor:.2f} m, the floor of [room] is at "
+                f"{float(room.minimum[2]):.2f} m",
+                floor=own.floor,
+            )
+    return good(
+        "people are in the room",
+        f"{percent(inside)} of the people whom the boxes show are in [room]",
+        inside=inside,
+    )
+
+
+def _stray_cameras(sequence: Sequence, told: BoxesTell) -> Iterator[Check]:
+    """A camera that has no box where others see somebody: its own pose or clock is off."""
+    if len(sequence.views) < 3:
+        return
+    shares: dict[str, float] = {}
+    for index, view in enumerate(sequence.views):
+        hits = _found_where_expected(view, index, told.given.consensus)
+        if len(hits) >= _LEAST_EXPECTED:
+            shares[view.camera.name] = float(hits.mean())
+    for name, share in shares.items():
+        if share < _OWN_SHARE:
+            yield warning(
+                "every camera agrees with another",
+                f"{name} has a box at {percent(share)} of the places where others' boxes meet and "
+                "it sees: its calibration, its file of boxes or its clock is another one's",
+                share=share,
+            )
+    if shares and min(shares.values()) >= _OWN_SHARE:
+        yield good("every camera agrees with another", "each one's boxes meet others'")
+
+
+def _found_where_expected(view: View, index: int, agreed: Consensus) -> Bool[ndarray, " E"]:
+    """Whether a camera has a box where boxes of two others meet, at steps at which it has any."""
+    own = view.detections
+    if own is None:
+        return np.zeros(0, dtype=bool)
+    rows = np.flatnonzero((agreed.cameras != index).all(axis=1))
+    low, low_seen = view.camera.project(agreed.feet[rows])
+    high, high_seen = view.camera.project(agreed.feet[rows] + agreed.rises[rows])
+    first, last = np.searchsorted(own.frames, [agreed.steps[rows], agreed.steps[rows] + 1])
+    there = low_seen & high_seen & (last > first)
+    there &= view.camera.contains(low) & view.camera.contains(high)
+    low, high, first, last = low[there], high[there], first[there], last[there]
+    middles = own.boxes[:, :2] + own.boxes[:, 2:] / 2.0
+    counts = last - first
+    of = np.repeat(np.arange(len(counts)), counts)
+    boxes = np.arange(counts.sum()) + np.repeat(first - np.cumsum(counts) + counts, counts)
+    away = np.linalg.norm(middles[boxes] - (low + high)[of] / 2.0, axis=1)
+    found = np.zeros(len(counts), dtype=bool)
+    found[of[away < _SAME_PLACE * np.linalg.norm(high - low, axis=1)[of]]] = True
+    return found

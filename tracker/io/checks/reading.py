@@ -1,0 +1,192 @@
+"""A way to read somebody's calibration and boxes, and the cameras and boxes that follow from it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence as Many
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
+
+from tracker.geometry.camera import Camera
+from tracker.geometry.consistency.observed import Pose
+from tracker.io.read.pieces import IN_DEGREES, METRES, Axes, Direction, Layout, RawCamera, Unit, Up
+
+FLIP = np.diag([1.0, -1.0, -1.0])
+"""Between OpenCV's camera axes (y down, z ahead) and OpenGL's (y up, z back), either way."""
+
+UPS: tuple[Up, ...] = ("x", "y", "z", "-x", "-y", "-z")
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """One way to read a calibration and its boxes."""
+
+    direction: Direction = "world-to-camera"
+    axes: Axes = "opencv"
+    layout: Layout = "ltwh"
+    normalised: bool = False
+    """Whether boxes are parts of the picture's size."""
+    unit: Unit = "m"
+    up: Up = "z"
+    lean: tuple[float, float] = (0.0, 0.0)
+    """x and y of the unit vector along which people stand once ``up`` is z: the world of a rig
+    whose first camera is the origin leans as that camera does."""
+    turns: str = ""
+    """Of cameras whose rotations are given by angles: how these are composed."""
+    order: tuple[int, ...] | None = None
+    """Of each camera's boxes and pictures: whose calibration is theirs. None: their own."""
+
+
+def pose(camera: RawCamera, reading: Reading) -> Pose:
+    """Where a camera stands in its file's own world axes and unit.
+
+    Raises:
+        ValueError: If the file gives no pose.
+    """
+    if camera.projection is not None:
+        split = _split(camera)
+        return Pose(split.rotation, split.centre)
+    if camera.rotation is None or camera.translation is None:
+        raise ValueError(f'camera "{camera.name}" has no pose: expected R and t, or a projection')
+    rotation = np.asarray(camera.turns.get(reading.turns, camera.rotation), dtype=float)
+    translation = np.asarray(camera.translation, dtype=float).reshape(3)
+    if reading.direction == "camera-to-world":
+        rotation, centre = rotation.T, translation
+    else:
+        centre = -rotation.T @ translation
+    if reading.axes == "opengl":
+        rotation = FLIP @ rotation
+    return Pose(rotation, centre)
+
+
+def turns_of(cameras: Many[RawCamera]) -> tuple[str, ...]:
+    """How the angles of cameras may be composed, the likeliest first; ``""`` where there are none.
+
+    Angles that are radians in one camera are not degrees in another.
+    """
+    told = [camera.turns for camera in cameras if camera.turns]
+    if not told:
+        return ("",)
+    common = [name for name in told[0] if all(name in own for own in told)]
+    radians = [name for name in common if name and not name.endswith(IN_DEGREES)]
+    return tuple(n for n in common if not radians or n in radians or not n)
+
+
+def upright(up: Up) -> Float[ndarray, "3 3"]:
+    """The rotation that turns a world so that this axis points along z; the others stay near."""
+    axis = np.zeros(3)
+    axis["xyz".index(up[-1])] = -1.0 if up.startswith("-") else 1.0
+    turns = {
+        "z": np.eye(3),
+        "-z": np.diag([1.0, -1.0, -1.0]),
+        "y": np.array([[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]]),
+        "-y": np.array([[1.0, 0, 0], [0, 0, 1.0], [0, -1.0, 0]]),
+        "x": np.array([[0.0, 0, -1.0], [0, 1.0, 0], [1.0, 0, 0]]),
+        "-x": np.array([[0.0, 0, 1.0], [0, 1.0, 0], [-1.0, 0, 0]]),
+    }
+    return np.asarray(turns[up])
+
+
+def levelled(reading: Reading) -> Float[ndarray, "3 3"]:
+    """The rotation from the file's world to one in which people stand along z."""
+    x, y = reading.lean
+    if x == y == 0.0:
+        return upright(reading.up)
+    z = float(np.sqrt(1.0 - x * x - y * y))
+    # the smallest rotation that takes (x, y, z) to the z axis (Rodrigues)
+    across = np.array([[0.0, 0.0, -x], [0.0, 0.0, -y], [x, y, 0.0]])
+    turn = np.eye(3) + across + across @ across / (1.0 + z)
+    return np.asarray(turn @ upright(reading.up))
+
+
+def to_camera(camera: RawCamera, reading: Reading, image_size: tuple[int, int]) -> Camera:
+    """The camera in metres, z up, world to camera, OpenCV axes.
+
+    Raises:
+        ValueError: If lens or pose are missing.
+    """
+    lens = lens_of(camera, image_size)
+    stands = pose(camera, reading)
+    to_world = levelled(reading)
+    rotation = stands.rotation @ to_world.T
+    centre = METRES[reading.unit] * to_world @ stands.centre
+    return replace(lens, name=camera.name, rotation=rotation, translation=-rotation @ centre)
+
+
+def lens_of(camera: RawCamera, image_size: tuple[int, int]) -> Camera:
+    """A camera with the file's lens that stands at the origin and looks along z.
+
+    Raises:
+        ValueError: If the file gives no K.
+    """
+    if camera.projection is not None:
+        intrinsics, distortion = _split(camera).intrinsics, np.zeros(5)
+    elif camera.intrinsics is None:
+        raise ValueError(f'camera "{camera.name}" has no lens: expected K, or a projection')
+    else:
+        intrinsics = np.asarray(camera.intrinsics, dtype=float)
+        distortion = np.zeros(0) if camera.distortion is None else np.asarray(camera.distortion)
+        if camera.lens != "fisheye":
+            distortion = np.concatenate([distortion, np.zeros(max(0, 5 - len(distortion)))])
+    fisheye = camera.lens == "fisheye"
+    return Camera(camera.name, image_size, intrinsics, np.eye(3), np.zeros(3), distortion, fisheye)
+
+
+def _split(camera: RawCamera) -> Camera:
+    assert camera.projection is not None
+    return Camera.from_projection(camera.name, (1, 1), np.asarray(camera.projection, dtype=float))
+
+
+def read_boxes(
+    four: Float[ndarray, "D 4"], layout: Layout, scale: tuple[int, int] | None = None
+) -> Float[ndarray, "D 4"]:
+    """Boxes as left, top, width, height in pixels.
+
+    Args:
+        four: The numbers as the file has them.
+        layout: What they mean.
+        scale: Width and height of the picture where they are parts of it.
+    """
+    boxes = np.array(four, dtype=float)
+    if layout == "xyxy":
+        boxes[:, 2:] -= boxes[:, :2]
+    elif layout == "cxcywh":
+        boxes[:, :2] -= boxes[:, 2:] / 2.0
+    if scale is not None:
+        boxes *= np.array([*scale, *scale], dtype=float)
+        boxes[:, :2] -= 0.5  # a part of the picture's size begins at the pixel's corner
+    return boxes
+
+
+def likely_size(camera: RawCamera) -> tuple[int, int]:
+    """The picture's size where only the lens is known: the principal point is near its middle."""
+    if camera.image_size is not None:
+        return camera.image_size
+    middle = lens_of(camera, (1, 1)).intrinsics[:2, 2]
+    width, height = (max(2, round(2.0 * float(value) + 1.0)) for value in middle)
+    return width, height
+
+
+def exchanged(order: Many[int], names: Many[str]) -> str:
+    """Which cameras' calibrations are exchanged, in words."""
+    told: list[str] = []
+    for first, second in enumerate(order):
+        if order[second] == first and first < second:
+            told.append(f"{names[first]} and {names[second]}")
+        elif order[second] != first:
+            told.append(f"{names[first]} has that of {names[second]}")
+    return ", ".join(told)
+
+
+def exchanges(order: Many[int], names: Many[str]) -> list[tuple[str, str]]:
+    """The same as exchanges of two, one after the other."""
+    told: list[tuple[str, str]] = []
+    now = list(range(len(order)))
+    for place, wanted in enumerate(order):
+        other = now.index(wanted)
+        if other != place:
+            now[place], now[other] = now[other], now[place]
+            told.append((names[place], names[other]))
+    return told

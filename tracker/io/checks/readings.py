@@ -1,0 +1,405 @@
+"""The boxes tell how a calibration is meant: of all usual readings the one that lets them meet.
+
+Which way a pose leads, which axes a camera has, how the four numbers of a box are meant and
+whose calibration is whose change where rays meet: only the right reading lets many boxes of
+camera pairs triangulate to people. The axes and the unit of the world change nothing of that:
+these follow from the way that people stand up and from how tall they are.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterable, Mapping
+from collections.abc import Sequence as Many
+from dataclasses import dataclass, replace
+from typing import get_args
+
+import numpy as np
+from jaxtyping import Float, Int
+from numpy import ndarray
+
+from tracker.geometry.consistency.consensus import Consensus, consensus
+from tracker.geometry.consistency.observed import PairsOfBoxes, Pose, Rays, pair_up, rays_of, uncut
+from tracker.io.checks.level import upwards
+from tracker.io.checks.reading import (
+    Reading,
+    lens_of,
+    likely_size,
+    pose,
+    read_boxes,
+    turns_of,
+    upright,
+)
+from tracker.io.checks.sizes import likely_unit
+from tracker.io.checks.standing import reversed_, standing, turns_tried, upside_down
+from tracker.io.read.pieces import METRES, Axes, Direction, Layout, RawCamera, Unit, Up
+
+MOST_PAIRS = 6000
+"""Pairs of boxes of two cameras that are looked at, and"""
+
+MOST_IN_ALL = 60_000
+"""of all cameras."""
+
+_PLAIN = 0.5
+"""Share of boxes that meet with heads at their tops with which nobody asks for another side: how
+broad people are agrees between cameras too, but of fewer."""
+
+_LEAST_BREADTH = -0.2
+"""Logarithm: who lies across the picture is not so much taller there than broad."""
+
+_REFINED = 8
+"""Of so many readings, the best, heads and feet are found exactly."""
+
+LEAST_AGREEING = 20
+"""Fewer pairs that agree prove nothing."""
+
+LEAST_SHARE = 0.05
+"""A smaller share of agreeing pairs proves nothing."""
+
+CLEARLY = 1.3
+"""A reading is better than another where its score is so many times the other's, and"""
+
+SIGMAS = 4.0
+"""so many standard deviations of a count above it."""
+
+EVERY_ORDER = 4
+"""Up to so many cameras every exchange is tried, above that one pair at a time."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Seen:
+    """The boxes of one camera, as its file gives them. D boxes."""
+
+    frames: Int[ndarray, " D"]
+    four: Float[ndarray, "D 4"]
+    """The four numbers of each, as they stand there."""
+
+
+@dataclass(frozen=True, slots=True)
+class Open:
+    """What is to be found out: the values that are tried of each part of a reading."""
+
+    directions: tuple[Direction, ...] = get_args(Direction)
+    axes: tuple[Axes, ...] = get_args(Axes)
+    layouts: tuple[Layout, ...] = get_args(Layout)
+    normalised: tuple[bool, ...] = (False, True)
+    orders: bool = True
+    """Whether calibrations may be exchanged."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Judged:
+    """A reading, and how well the boxes meet with it."""
+
+    reading: Reading
+    consensus: Consensus
+    score: float
+    """Agreeing pairs, each counting the less the worse it fits."""
+    pictured: Float[ndarray, " 3"]
+    """The common vector from foot to head with both at sides of the boxes: it leans in rolled
+    cameras, and in worlds that lean."""
+    turns: tuple[int, ...]
+    """Where heads are in boxes, as :func:`tracker.geometry.consistency.standing.sides` counts."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Meaning:
+    """How calibration and boxes are meant, as far as the boxes tell."""
+
+    best: Judged
+    tried: tuple[Judged, ...]
+    """All that were tried, the best first."""
+
+    @property
+    def reading(self) -> Reading:
+        """The best one."""
+        return self.best.reading
+
+    @property
+    def certain(self) -> bool:
+        """Whether enough boxes meet, and clearly fewer with any other reading."""
+        agreed = self.best.consensus
+        return (
+            agreed.agreeing >= LEAST_AGREEING
+            and agreed.share >= LEAST_SHARE
+            and all(clearly_better(self.best, other) for other in self.tried[1:])
+        )
+
+    @property
+    def height(self) -> float:
+        """Of the usual person's box, metres."""
+        return METRES[self.reading.unit] * self.best.consensus.height
+
+
+def clearly_better(one: Judged, other: Judged) -> bool:
+    """Whether a reading fits so much better than another that chance is no explanation.
+
+    Of a sum of the weights of things that are there by chance, independent of each other, the
+    variance is the sum of their squares.
+    """
+    squares = sum(float(np.square(each.consensus.fits).sum()) for each in (one, other))
+    spread = math.sqrt(max(squares, 1.0))
+    return one.score > CLEARLY * other.score and one.score - other.score > SIGMAS * spread
+
+
+def find_meaning(
+    cameras: Many[RawCamera],
+    seen: Many[Seen | None],
+    *,
+    tried: Open | None = None,
+    unit: Unit | None = None,
+    up: Up | None = None,
+    height: float | None = None,
+) -> Meaning | None:
+    """Find out how a calibration and its boxes are meant.
+
+    What a camera's :class:`~tracker.io.read.pieces.Convention` states is not questioned.
+
+    Args:
+        cameras: As their files give them; each needs a lens and a pose.
+        seen: The boxes of each, None for a camera without any.
+        tried: What is to be found out; everything where it is None.
+        unit: Of the poses, where it is known.
+        up: The world's axis that points up, where it is known.
+        height: Of what is tracked, metres, where it is known.
+
+    Returns:
+        None where fewer than two cameras have boxes at the same steps.
+
+    Raises:
+        ValueError: If a camera has no lens or no pose.
+    """
+    judge = Judge(cameras, seen)
+    if not judge.possible:
+        return None
+    open_ = _restricted(tried or Open(), cameras, seen)
+    parts = (open_.directions, open_.axes, open_.layouts, open_.normalised, turns_of(cameras))
+    judged = [
+        judge.turned(Reading(direction, axes, layout, normalised, turns=turns))
+        for direction, axes, layout, normalised, turns in itertools.product(*parts)
+    ]
+    judged.sort(key=lambda one: -one.score)
+    if open_.orders:
+        judged = _with_orders(judge, judged)
+    judged[:_REFINED] = [judge.refined(one) for one in judged[:_REFINED]]
+    judged.sort(key=lambda one: -one.score)
+    conventions = [camera.convention for camera in cameras]
+    unit = unit or next((c.unit for c in conventions if c.unit is not None), None)
+    up = up or next((c.up for c in conventions if c.up is not None), None)
+    best = judge.righted(judged[0], up, unit, height)
+    reading = replace(best.reading, up=up or upwards(best.consensus.rise))
+    reading = replace(reading, unit=unit or likely_unit(judge.away(best), best.consensus, height))
+    return Meaning(replace(best, reading=reading), (*judged,))
+
+
+class Judge:
+    """Judges readings of one set of cameras and boxes."""
+
+    def __init__(
+        self,
+        cameras: Many[RawCamera],
+        seen: Many[Seen | None],
+        most_pairs: int = MOST_PAIRS,
+    ) -> None:
+        """Prepare.
+
+        Args:
+            cameras: As their files give them.
+            seen: The boxes of each, None for a camera without any.
+            most_pairs: Of boxes of two cameras.
+        """
+        self.cameras = tuple(cameras)
+        self._seen = tuple(seen)
+        self.sizes = [likely_size(camera) for camera in cameras]
+        self._rays: dict[tuple[int, int, Layout, bool, int | tuple[float, ...]], Rays] = {}
+        empty = Rays(np.zeros(0, int), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, bool))
+        times = [
+            empty
+            if own is None
+            else Rays(np.sort(own.frames), empty.heads, empty.feet, empty.whole)
+            for own in seen
+        ]
+        count = len(times) * (len(times) - 1) // 2
+        most = max(MOST_IN_ALL // max(count, 1), MOST_PAIRS // 4)
+        most = min(most, most_pairs)
+        self.pairs: Mapping[tuple[int, int], PairsOfBoxes] = {
+            (a, b): found
+            for a, b in itertools.combinations(range(len(times)), 2)
+            if (found := pair_up(times[a], times[b], most)).most
+        }
+        self._empty = empty
+
+    @property
+    def possible(self) -> int:
+        """How many pairs of boxes could be of one person."""
+        return sum(own.most for own in self.pairs.values())
+
+    def __call__(self, reading: Reading) -> Judged:
+        """How well the boxes meet, as exactly as can be told."""
+        return self.refined(self.turned(reading))
+
+    def turned(self, reading: Reading) -> Judged:
+        """How well they meet with heads at that side of the boxes where most of them do."""
+        poses = self.poses(reading)
+        best: Judged | None = None
+        for turns in turns_tried(poses):
+            aside = [self._breadth(n, reading) for n, turn in enumerate(turns) if turn % 2]
+            if aside and np.mean(aside) < _LEAST_BREADTH:
+                continue
+            rays = [
+                self._of(camera, own, reading, turn)
+                for (camera, own), turn in zip(enumerate(self._order(reading)), turns, strict=True)
+            ]
+            agreed = consensus(rays, poses, self.pairs)
+            score = float(agreed.fits.sum())
+            judged = Judged(reading, agreed, score, agreed.rise, turns)
+            if best is None or score > best.score:
+                best = judged
+            if not any(best.turns) and best.consensus.share > _PLAIN:
+                break
+        assert best is not None
+        return best
+
+    def _breadth(self, camera: int, reading: Reading) -> float:
+        """The logarithm of how many times as broad as tall the usual box of a camera is."""
+        own = self._seen[camera]
+        if own is None or not len(own.four):
+            return 0.0
+        size = self.sizes[self._order(reading)[camera]]
+        boxes = read_boxes(own.four, reading.layout, size if reading.normalised else None)
+        sides = boxes[uncut(boxes, size), 2:]
+        return float(np.median(np.log(sides[:, 0] / sides[:, 1]))) if len(sides) else 0.0
+
+    def refined(self, judged: Judged) -> Judged:
+        """With heads and feet where people who stand upright have them in the boxes."""
+        up = standing(judged.consensus)
+        if up is None:
+            return judged
+        poses = self.poses(judged.reading)
+        rays = [
+            self._of(camera, own, judged.reading, pose.rotation @ up)
+            for (camera, own), pose in zip(
+                enumerate(self._order(judged.reading)), poses, strict=True
+            )
+        ]
+        agreed = consensus(rays, poses, self.pairs)
+        score = float(agreed.fits.sum())
+        return replace(judged, consensus=agreed, score=score) if score > judged.score else judged
+
+    def righted(
+        self, judged: Judged, up: Up | None, unit: Unit | None = None, height: float | None = None
+    ) -> Judged:
+        """With heads above feet, where the cameras hang upside down.
+
+        Args:
+            judged: What boxes agree on.
+            up: The axis that the file claims to point up.
+            unit: Of the poses, where it is known.
+            height: Of what is tracked, metres, where it is known.
+        """
+        agreed = judged.consensus
+        metres = METRES[unit or likely_unit(self.away(judged), agreed, height)]
+        claimed = None if up is None else upright(up).T @ np.array([0.0, 0.0, 1.0])
+        if not upside_down(agreed, self.poses(judged.reading), metres, claimed):
+            return judged
+        turns = tuple((turn + 2) % 4 for turn in judged.turns)
+        return replace(judged, consensus=reversed_(agreed), pictured=-judged.pictured, turns=turns)
+
+    def poses(self, reading: Reading) -> list[Pose]:
+        """Where the cameras stand."""
+        return [pose(self.cameras[own], reading) for own in self._order(reading)]
+
+    def _order(self, reading: Reading) -> tuple[int, ...]:
+        return reading.order or tuple(range(len(self.cameras)))
+
+    def _of(
+        self, camera: int, calibration: int, reading: Reading, heads: int | Float[ndarray, " 3"]
+    ) -> Rays:
+        """The rays of a camera's boxes through the lens of a calibration.
+
+        Heads are at a side of the boxes, or where they are of people who stand this way.
+        """
+        own = self._seen[camera]
+        if own is None:
+            return self._empty
+        told = heads if isinstance(heads, int) else tuple(np.round(heads, 9).tolist())
+        key = (camera, calibration, reading.layout, reading.normalised, told)
+        if key not in self._rays:
+            size = self.sizes[calibration]
+            raw = self.cameras[calibration]
+            boxes = read_boxes(own.four, reading.layout, size if reading.normalised else None)
+            turn, up = (heads, None) if isinstance(heads, int) else (0, heads)
+            self._rays[key] = rays_of(
+                own.frames, boxes, lens_of(raw, size), raw.image_size is not None, up, turn
+            )
+        return self._rays[key]
+
+    def away(self, judged: Judged) -> float:
+        """The usual distance from a camera to people, in the world's unit."""
+        agreed = judged.consensus
+        if not len(agreed.feet):
+            return math.nan
+        centres = np.array([own.centre for own in self.poses(judged.reading)])
+        ways = agreed.feet[:, None, :] - centres[agreed.cameras]
+        return float(np.median(np.linalg.norm(ways, axis=2)))
+
+
+def _with_orders(judge: Judge, judged: list[Judged]) -> list[Judged]:
+    """With calibrations exchanged, where that fits better than what fits best without."""
+    count = len(judge.cameras)
+    found = {one.reading: one for one in judged}
+
+    def turned(reading: Reading) -> Judged:
+        if reading not in found:
+            found[reading] = judge.turned(reading)
+        return found[reading]
+
+    # an exchange and a wrong pose together: the poses' readings are all near nothing then
+    for start in judged[:1] if judged[0].consensus.share >= LEAST_SHARE else judged[:_REFINED]:
+        best = start
+        for _ in range(1 if count <= EVERY_ORDER else count):
+            own = [turned(replace(best.reading, order=order)) for order in _orders(best, count)]
+            better = max(own, key=lambda one: one.score, default=best)
+            if better.score <= best.score:
+                break
+            best = better
+        if best is not start:
+            # what fitted best without the exchange may have done so for want of it
+            for other in judged[:_REFINED]:
+                turned(replace(other.reading, order=best.reading.order))
+    return sorted(found.values(), key=lambda one: -one.score)
+
+
+def _orders(best: Judged, count: int) -> Iterable[tuple[int, ...]]:
+    own = best.reading.order or tuple(range(count))
+    if count <= EVERY_ORDER:
+        yield from (order for order in itertools.permutations(range(count)) if order != own)
+        return
+    for a, b in itertools.combinations(range(count), 2):
+        changed = list(own)
+        changed[a], changed[b] = changed[b], changed[a]
+        yield tuple(changed)
+
+
+def _restricted(tried: Open, cameras: Many[RawCamera], seen: Many[Seen | None]) -> Open:
+    """Without what the files state, and what their numbers exclude."""
+    conventions = [camera.convention for camera in cameras]
+    directions = {c.direction for c in conventions if c.direction is not None}
+    axes = {c.axes for c in conventions if c.axes is not None}
+    if len(directions) == 1:
+        tried = replace(tried, directions=tuple(directions))
+    if len(axes) == 1:
+        tried = replace(tried, axes=tuple(axes))
+    if all(camera.projection is not None for camera in cameras):
+        tried = replace(tried, directions=("world-to-camera",), axes=("opencv",))
+    four = np.concatenate([np.zeros((0, 4)), *(own.four for own in seen if own is not None)])
+    if len(tried.normalised) > 1 and len(four):
+        # parts of a picture are at most 1, and a box a little beyond the edge a little more
+        tried = replace(tried, normalised=(bool(np.quantile(np.abs(four), 0.99) <= 1.5),))
+    if "xyxy" in tried.layouts and len(tried.layouts) > 1 and len(four):
+        corners = (four[:, 2:] > four[:, :2]).all(axis=1).mean()
+        if corners < 0.99:  # a right edge left of the left one
+            layouts = tuple(layout for layout in tried.layouts if layout != "xyxy")
+            tried = replace(tried, layouts=layouts)
+    return tried

@@ -1,0 +1,47 @@
+"""How tall and how far from cameras people usually are, by which an unknown unit is found."""
+
+from __future__ import annotations
+
+import math
+from typing import get_args
+
+from tracker.geometry.consistency.consensus import Consensus
+from tracker.io.read.pieces import METRES, Unit
+
+
+def likely_unit(away: float, agreed: Consensus, height: float | None = None) -> Unit:
+    """The unit in which the usual person is as tall, and as far from the cameras, as people are.
+
+    Args:
+        away: The usual distance from a camera to people, in the world's unit.
+        agreed: On how tall they are, in the world's unit.
+        height: Of what is tracked, metres, where it is known.
+    """
+    if agreed.height <= 0.0:
+        return "m"
+
+    def fit(unit: Unit) -> float:
+        own = METRES[unit]
+        return likelihood_of_size(agreed.height * own, away * own, height)
+
+    units: tuple[Unit, ...] = get_args(Unit)
+    return max(units, key=fit)
+
+
+_USUAL_HEIGHTS = ((1.70, 0.15, 0.0), (1.2, 0.25, -1.5), (0.7, 0.2, -1.5), (0.25, 0.25, -0.5))
+"""People standing, seated, head and torso, heads: metres, spread of the logarithm, log weight."""
+
+USUAL_HEIGHTS = tuple(height for height, _, _ in _USUAL_HEIGHTS)
+"""Metres: of boxes of people who stand, of seated ones, of heads with shoulders, of heads."""
+
+_USUAL_DISTANCE = (6.0, 0.9)  # metres from a camera, spread of the logarithm
+
+
+def likelihood_of_size(height: float, away: float, known: float | None = None) -> float:
+    """The logarithm of how usual people are of that height, that far from a camera, metres."""
+    kinds = _USUAL_HEIGHTS if known is None else ((known, 0.3, 0.0),)
+    tall = max(w - 0.5 * (math.log(height / h) / s) ** 2 for h, s, w in kinds)
+    if not away > 0.0:
+        return tall
+    middle, spread = _USUAL_DISTANCE
+    return tall - 0.5 * (math.log(away / middle) / spread) ** 2

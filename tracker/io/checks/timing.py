@@ -1,0 +1,156 @@
+"""Do the cameras show the same moments, and do boxes and steps count from the same number."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from tracker.io.checks.synchronisation import CameraOffset, synchronise
+from tracker.sequences.finding import Check, Remedy, absent, good, warning
+from tracker.sequences.pictures.frames import FrameReader
+from tracker.sequences.sequence import Sequence
+
+_SHIFTS = (-3, -2, -1, 0, 1, 2, 3)
+_NEAR = 0.4  # heights of a box
+_LEAST_NEAR = 100
+
+
+def check_time(
+    sequence: Sequence,
+    reader: FrameReader | None = None,
+    found: tuple[CameraOffset, ...] | None = None,
+) -> Iterator[Check]:
+    """Is any camera late; from the boxes, or from the motion in the pictures where there are none.
+
+    Args:
+        sequence: Read rightly: with a wrong calibration nothing can be said.
+        reader: Of the pictures.
+        found: What :func:`synchronise` found, where it is known.
+    """
+    name = "cameras show the same moments"
+    if len(sequence.views) < 2:
+        yield absent(name, "it needs two cameras")
+        return
+    found = synchronise(sequence, reader=reader) if found is None else found
+    if not found:
+        yield absent(name, "neither boxes nor pictures of two cameras can be compared")
+        return
+    late = [offset for offset in found if offset.sure]
+    for offset in late:
+        yield warning(
+            name,
+            offset.sentence,
+            Remedy("camera.time_offset", f"{-offset.seconds:.3f}", offset.camera),
+            steps=offset.steps,
+            seconds=offset.seconds,
+            sharpness=offset.sharpness,
+        )
+    if not late:
+        yield good(name, _agreeing(found))
+
+
+def _agreeing(found: tuple[CameraOffset, ...]) -> str:
+    steps = max(abs(offset.steps) for offset in found)
+    if min(offset.sharpness for offset in found) < 3.0:
+        return "no camera is seen to be late; too little moves to be sure of all of them"
+    return f"to within {max(steps, 0.1):.1f} frames"
+
+
+def check_counting(sequence: Sequence, *, places: bool = True) -> Check:
+    """Do frames of boxes count from 0, as steps do.
+
+    Args:
+        sequence: With boxes.
+        places: Whether the calibration is read rightly, so that the truth can be compared.
+    """
+    name = "boxes count from step 0"
+    every = [v.detections.frames for v in sequence.views if v.detections is not None]
+    every = [frames for frames in every if len(frames)]
+    if not every:
+        return absent(name, "there are no boxes")
+    first = min(int(frames.min()) for frames in every)
+    begin_together = sum(int(frames.min()) == 1 for frames in every)
+    if first == 1 and begin_together == len(every) and len(every) > 1:
+        return warning(
+            name,
+            "no camera has a box at step 0 and every camera has one at step 1: frames of the boxes "
+            "seem to be counted from 1",
+            Remedy("--first-index", "1"),
+        )
+    behind = steps_behind_truth(sequence) if places else ()
+    late = float(np.median(behind)) if behind else 0.0
+    # one camera may be late for other reasons: counting is the same in all
+    for side, when, right in ((1.0, "before", "1"), (-1.0, "later", "0")):
+        apart = [side * steps for steps in behind]
+        if len(behind) > 1 and min(apart) > 0.4 and abs(late - side) < 0.4:
+            return warning(
+                name,
+                f"boxes show people as they are {abs(late):.1f} steps {when}, by the ground truth: "
+                f"their frames seem to be counted from {right}",
+                Remedy("--first-index", right),
+                steps=late,
+            )
+    return good(name, "the first is at step 0" if first == 0 else "nothing says otherwise")
+
+
+def steps_behind_truth(sequence: Sequence) -> tuple[float, ...]:
+    """How many steps the boxes of each camera are later than the ground truth.
+
+    The least of the mean distance, in heights of a box and truncated, between the middle of a
+    person in the picture some steps before and the nearest box; between whole steps by a parabola.
+
+    Returns:
+        One for each camera of which enough boxes are near the truth; none without truth.
+    """
+    truth = sequence.ground_truth
+    if truth is None:
+        return ()
+    row_of = {
+        (frame, who): row
+        for row, (frame, who) in enumerate(
+            zip(truth.frames.tolist(), truth.ids.tolist(), strict=True)
+        )
+    }
+    rows = [
+        [row_of.get((frame - shift, who), -1) for shift in _SHIFTS]
+        for frame, who in zip(truth.frames.tolist(), truth.ids.tolist(), strict=True)
+    ]
+    before = np.array(rows, dtype=np.int64).reshape(-1, len(_SHIFTS))
+    here = np.flatnonzero((before >= 0).all(axis=1))
+    found: list[float] = []
+    for view in sequence.views:
+        own = view.detections
+        if own is None or not len(here):
+            continue
+        first, last = np.searchsorted(own.frames, [truth.frames[here], truth.frames[here] + 1])
+        some = here[last > first]
+        first, counts = first[last > first], (last - first)[last > first]
+        if not len(some):
+            continue
+        starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
+        boxes = own.boxes[np.repeat(first - starts, counts) + np.arange(counts.sum())]
+        middles = boxes[:, :2] + boxes[:, 2:] / 2.0
+        places, _ = view.camera.project(truth.positions)
+        away = np.stack(
+            [
+                np.minimum.reduceat(
+                    np.linalg.norm(
+                        middles - np.repeat(places[before[some, column]], counts, axis=0), axis=1
+                    )
+                    / boxes[:, 3],
+                    starts,
+                )
+                for column in range(len(_SHIFTS))
+            ]
+        )
+        near = np.isfinite(away).all(axis=0) & (away.min(axis=0) < _NEAR)
+        total = np.minimum(away[:, near], _NEAR).sum(axis=1)
+        best = int(np.argmin(total))
+        if near.sum() < _LEAST_NEAR or best in (0, len(_SHIFTS) - 1):
+            continue
+        below, least, above = (float(value) for value in total[best - 1 : best + 2])
+        bend = below - 2.0 * least + above
+        if bend > 0.0:
+            found.append(_SHIFTS[best] + 0.5 * (below - above) / bend)
+    return tuple(found)

@@ -1,0 +1,168 @@
+"""The cameras of all calibration files: lenses and poses put together, one set chosen."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from tracker.io.importing.finding.names import match, short_names
+from tracker.io.importing.gathering import Taken
+from tracker.io.read.pieces import CalibrationPiece, FormatError, RawCamera
+
+MOST_CAMERAS = 1000
+"""Of one file; Panoptic Studio has 521."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CameraSet:
+    """Cameras that belong together: of one file, or of one folder with a file a camera."""
+
+    label: str
+    format: str
+    cameras: tuple[RawCamera, ...]
+
+    @property
+    def posed(self) -> bool:
+        """Whether every camera has a pose."""
+        return all(c.projection is not None or c.rotation is not None for c in self.cameras)
+
+    @property
+    def lensed(self) -> bool:
+        """Whether every camera has a lens."""
+        return all(c.projection is not None or c.intrinsics is not None for c in self.cameras)
+
+
+def camera_sets(taken: Sequence[Taken]) -> tuple[list[CameraSet], list[str]]:
+    """Complete sets of cameras, and what is told of the others.
+
+    Returns:
+        Sets whose cameras all have a lens and a pose, the one with the most cameras first; and
+        a sentence for each file whose lenses or poses found no counterpart.
+
+    Raises:
+        FormatError: If two cameras of one set have the same name, or a file has too many.
+    """
+    sets = _sets(taken)
+    complete = [one for one in sets if one.posed and one.lensed]
+    lenses = [one for one in sets if one.lensed and not one.posed]
+    poses = [one for one in sets if one.posed and not one.lensed]
+    told: list[str] = []
+    used: set[str] = set()
+    for pose in poses:
+        joined = [found for lens in lenses if (found := _join(pose, lens)) is not None]
+        if not joined:
+            told.append(f"{pose.label}: has poses, but no file has the lenses of these cameras")
+            continue
+        # of several, the one that comes last by its name
+        complete.append(joined[-1])
+        used |= {lens.label for lens in lenses if lens.label in joined[-1].label}
+        told += [
+            f"{one.label}: are other lenses of the same cameras; name only one of both to use it"
+            for one in joined[:-1]
+        ]
+    told += [
+        f"{lens.label}: has lenses, but no file has the poses of these cameras"
+        for lens in lenses
+        if lens.label not in used and not poses
+    ]
+    told += [_mixed(one) for one in sets if not one.posed and not one.lensed]
+    for one in complete:
+        names = [camera.name for camera in one.cameras]
+        twice = next((name for name in names if names.count(name) > 1), None)
+        if twice is not None:
+            raise FormatError(f'{one.label}: two cameras have the name "{twice}"; rename one')
+    return sorted(complete, key=lambda one: -len(one.cameras)), told
+
+
+def _mixed(one: CameraSet) -> str:
+    """Why a set of which some cameras have but a lens, and others but a pose, is of no use."""
+    posed = Counter(
+        c.name for c in one.cameras if c.rotation is not None or c.projection is not None
+    )
+    name, count = posed.most_common(1)[0] if posed else ("", 0)
+    if count > 1:
+        return (
+            f'{one.label}: has {count} poses of "{name}", expected one of each camera; '
+            "leave those of other recordings out"
+        )
+    lacking = [c.name for c in one.cameras if c.intrinsics is None and c.projection is None]
+    return f"{one.label}: some cameras have no lens, others no pose ({', '.join(lacking[:3])} …)"
+
+
+def _sets(taken: Sequence[Taken]) -> list[CameraSet]:
+    """Files with several cameras each, and the files of a folder with one camera each."""
+    sets: list[CameraSet] = []
+    single: dict[tuple[str, str, bool], list[tuple[str, RawCamera]]] = {}
+    beside = _in_a_folder_each(taken)
+    for one in taken:
+        for piece in one.pieces:
+            if not isinstance(piece, CalibrationPiece) or not piece.cameras:
+                continue
+            if len(piece.cameras) > MOST_CAMERAS:
+                raise FormatError(
+                    f"{one.label}: has {len(piece.cameras):,} cameras, expected at most "
+                    f"{MOST_CAMERAS}; leave out those of other recordings"
+                )
+            if len(piece.cameras) > 1:
+                sets.append(CameraSet(one.label, piece.format, piece.cameras))
+                continue
+            camera = piece.cameras[0]
+            has_pose = camera.rotation is not None or camera.projection is not None
+            key = (_place(piece.source, beside), piece.format, has_pose)
+            single.setdefault(key, []).append((one.label, camera))
+    for (_, format_, _), rows in single.items():
+        labels = [label.rsplit(".", 1)[0] for label, _ in rows]
+        given = [camera.name for _, camera in rows]
+        own = len(set(given)) == len(given) and all(given)
+        names = given if own else short_names(labels)
+        cameras = tuple(
+            replace(camera, name=name) for name, (_, camera) in zip(names, rows, strict=True)
+        )
+        label = rows[0][0] if len(rows) == 1 else f"{rows[0][0]} … ({len(rows)})"
+        sets.append(CameraSet(label, format_, cameras))
+    return sets
+
+
+def _in_a_folder_each(taken: Sequence[Taken]) -> set[tuple[Path, str]]:
+    """Names of files that lie in several folders beside each other: a camera a folder."""
+    sources = [
+        piece.source
+        for one in taken
+        for piece in one.pieces
+        if isinstance(piece, CalibrationPiece) and len(piece.cameras) == 1
+    ]
+    kinds = Counter((source.parent, _without_numbers(source.name)) for source in sources)
+    folders = Counter((folder.parent, name) for (folder, name), n in kinds.items() if n == 1)
+    return {kind for kind, count in folders.items() if count > 1}
+
+
+def _place(source: Path, beside: set[tuple[Path, str]]) -> str:
+    """Where the other cameras' files of the same kind are."""
+    kind = (source.parent.parent, _without_numbers(source.name))
+    return f"{kind[0]}/*/{kind[1]}" if kind in beside else str(source.parent)
+
+
+def _without_numbers(name: str) -> str:
+    return re.sub(r"\d+", "#", name)
+
+
+def _join(pose: CameraSet, lens: CameraSet) -> CameraSet | None:
+    """Each pose with its lens, where every pose finds one."""
+    names = [camera.name for camera in lens.cameras]
+    found = match(names, [camera.name for camera in pose.cameras])
+    if found is None or len(found[0]) < len(pose.cameras):
+        return None
+    cameras = tuple(
+        replace(
+            camera,
+            image_size=lens.cameras[found[0][n]].image_size,
+            intrinsics=lens.cameras[found[0][n]].intrinsics,
+            distortion=lens.cameras[found[0][n]].distortion,
+            lens=lens.cameras[found[0][n]].lens,
+        )
+        for n, camera in enumerate(pose.cameras)
+    )
+    return CameraSet(f"{pose.label} with {lens.label}", pose.format, cameras)

@@ -1,0 +1,201 @@
+"""The steps of a recording, and which of them each camera's frames belong to."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Int
+from numpy import ndarray
+
+from tracker.io.importing.finding.matching import MatchedCamera
+from tracker.io.importing.options import ImportOptions
+from tracker.io.read.pieces import DetectionPiece, FormatError, TruthPiece, VideoPiece
+from tracker.sequences.clock import Clock, Timing
+
+USUAL_RATE = 25.0
+"""Steps a second where no file says."""
+
+SAME_RATE = 0.002
+"""By how much rates may differ that are the same: 29.97 and 30 are not within ten minutes."""
+
+MOST_FRAMES = 10_000_000
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CameraTime:
+    """The clock of one camera."""
+
+    timing: Timing
+    clock: Clock | None
+    """None where frame k is that of step k."""
+
+    def steps_of(self, frames: Int[ndarray, " N"]) -> Int[ndarray, " N"]:
+        """The step of each frame of the file, -1 where it belongs to none."""
+        return frames if self.clock is None else self.clock.steps_of(frames)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Times:
+    """The steps, and the clock of every camera."""
+
+    fps: float
+    stated: bool
+    """Whether a file or a flag says the rate."""
+    frames: int
+    """The number of steps."""
+    cameras: tuple[CameraTime, ...]
+
+
+def settle_times(
+    cameras: Sequence[MatchedCamera],
+    truths: Sequence[tuple[str, TruthPiece]],
+    options: ImportOptions,
+    found: list[tuple[str, str]],
+) -> Times:
+    """Steps and rate: those of the pictures, else those of the boxes.
+
+    Args:
+        cameras: With what belongs to each.
+        truths: Whose files may state a rate.
+        options: What is known better.
+        found: What was found out is added.
+
+    Raises:
+        FormatError: If there is no step, or there are more than a recording has.
+    """
+    stated = _rate(cameras, truths, options, found)
+    fps = USUAL_RATE if stated is None else stated
+    timings = [_timing(camera, fps, options) for camera in cameras]
+    stamped = [timing.stamps[0] for timing in timings if timing.stamps]
+    beginning = min(stamped, default=0.0)
+    counts = [
+        int(np.floor(timing.seconds(frames, fps, beginning) * fps + 1e-6))
+        for camera, timing in zip(cameras, timings, strict=True)
+        if (frames := _pictures(camera)) is not None
+    ]
+    if counts:
+        frames = min(counts)
+        if max(counts) > frames:
+            found.append(
+                ("frames", f"{frames}, those of the shortest of {min(counts)} … {max(counts)}")
+            )
+    else:
+        lasts = [
+            max(int(c.detections.frames.max(initial=-1)), c.detections.last_frame or 0)
+            - first_index(c.detections, options, None)
+            for c in cameras
+            if c.detections is not None
+        ]
+        frames = max(lasts, default=-1) + 1
+        found.append(("frames", f"{frames}, up to the last that the boxes name"))
+    if not 0 < frames <= MOST_FRAMES:
+        raise FormatError(
+            f"expected 1 to {MOST_FRAMES:,} steps in videos, pictures or boxes, found {frames}"
+        )
+    own = tuple(
+        CameraTime(timing, timing.clock(fps, frames, beginning if timing.stamps else 0.0))
+        for timing in timings
+    )
+    return Times(fps, stated is not None, frames, own)
+
+
+def _pictures(camera: MatchedCamera) -> int | None:
+    """How many frames a camera has pictures of."""
+    if camera.video is not None:
+        return camera.video.frames
+    return None if camera.images is None else len(camera.images.files)
+
+
+def _timing(camera: MatchedCamera, fps: float, options: ImportOptions) -> Timing:
+    offset = options.offsets.get(camera.raw.name, 0.0)
+    if camera.times is not None:
+        return Timing(time_offset=offset, stamps=tuple(camera.times.times.tolist()))
+    return Timing(fps=_own_rate(camera.video, fps), time_offset=offset)
+
+
+def _own_rate(video: VideoPiece | None, fps: float) -> float | None:
+    """The rate of a camera's video where it is another than that of the steps."""
+    if video is None or video.fps <= 0.0 or abs(video.fps / fps - 1.0) <= SAME_RATE:
+        return None
+    return video.fps
+
+
+def _rate(
+    cameras: Sequence[MatchedCamera],
+    truths: Sequence[tuple[str, TruthPiece]],
+    options: ImportOptions,
+    found: list[tuple[str, str]],
+) -> float | None:
+    """Steps a second: as time stamps say, else the videos' usual rate, else that of boxes
+    and truth."""
+    if options.fps is not None:
+        return options.fps
+    stamps = [c.times.times for c in cameras if c.times is not None and len(c.times.times) > 1]
+    if stamps:
+        rates = [float((len(own) - 1) / (own[-1] - own[0])) for own in stamps if own[-1] > own[0]]
+        fps = round(float(np.max(rates)), 3) if rates else USUAL_RATE
+        found.append(("fps", f"{fps:g}, by the time stamps of {len(stamps)} cameras; --fps"))
+        return fps
+    rates = [c.video.fps for c in cameras if c.video is not None and c.video.fps > 0.0]
+    if not rates:
+        pieces = [c.detections for c in cameras if c.detections is not None]
+        rates = [own.fps for own in pieces if own.fps is not None]
+        rates += [truth.fps for _, truth in truths if truth.fps is not None]
+    if not rates:
+        return None
+    fps = sorted(rates)[len(rates) // 2]
+    for camera in cameras:
+        own = _own_rate(camera.video, fps)
+        if own is not None:
+            found.append((f"{camera.raw.name} fps", f"{own:.6g}, the steps have {fps:.6g}"))
+    return fps
+
+
+def first_index(piece: DetectionPiece, options: ImportOptions, frames: int | None) -> int:
+    """The number of the first frame in a file of boxes."""
+    if options.first_index is not None:
+        return options.first_index
+    # a frame that is called 0 says more than what is usual in a format
+    if len(piece.frames) == 0 or piece.frames.min() == 0:
+        return 0
+    if piece.first_index is not None:
+        return piece.first_index
+    last = max(int(piece.frames.max()), piece.last_frame or 0)
+    return 1 if piece.frames.min() == 1 and (frames is None or last >= frames) else 0
+
+
+def told_beyond(piece: DetectionPiece, first: int, frames: int) -> str:
+    """A sentence about boxes of frames that are not there; empty where all are.
+
+    Args:
+        piece: The boxes.
+        first: The number of the first frame, as it is taken.
+        frames: How many there are.
+    """
+    steps = piece.frames - first
+    before, behind = int((steps < 0).sum()), int((steps >= frames).sum())
+    if not before and not behind:
+        return ""
+    if before and not behind and int(steps.min()) == -1:
+        return (
+            f"{piece.source.name}: {before} of {len(steps)} boxes are of frame {first - 1}, so "
+            f"frames are counted from {first - 1}, not from {first}: --first-index {first - 1}"
+        )
+    if behind and not before and first == 0 and int(steps.max()) == frames:
+        return (
+            f"{piece.source.name}: {behind} of {len(steps)} boxes are of frame {frames}, the one "
+            f"after the last of {frames}, so frames are counted from 1: --first-index 1"
+        )
+    return (
+        f"{piece.source.name}: {before + behind} of {len(steps)} boxes are of frames outside the "
+        f"{frames} of the pictures; --first-index says where counting begins"
+    )
+
+
+def frames_of(camera: MatchedCamera, time: CameraTime, steps: int) -> int:
+    """How many frames the file of a camera has that may have boxes."""
+    if time.clock is None:
+        return steps
+    return _pictures(camera) or len(time.clock.step_of_frame)

@@ -1,0 +1,152 @@
+"""Truth brought into the world of the cameras, people numbered across files."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
+
+from tracker.geometry.camera import Camera
+from tracker.io.checks.reading import Reading, levelled, upright
+from tracker.io.read.pieces import METRES, TruthPiece, Unit
+from tracker.sequences.sequence import Detections, GroundTruth
+
+_SAMPLED = 300
+"""Places that are held against the boxes."""
+
+_CLEARLY = 0.05
+"""By how much more of the places must lie in boxes for another reading than the plain one."""
+
+
+def settle_truth(
+    pieces: Sequence[TruthPiece],
+    cameras: Sequence[Camera],
+    detections: Sequence[Detections | None],
+    reading: Reading,
+    frames: int,
+    middle: float,
+    first_index: int | None,
+    found: list[tuple[str, str]],
+) -> GroundTruth | None:
+    """All truth in metres, in the cameras' world.
+
+    A file may have another axis up than the calibration, and be turned about it by a quarter:
+    that is taken in which most places lie in boxes.
+
+    Args:
+        pieces: As their files have them; several of one person each become several people.
+        cameras: In metres, z up.
+        detections: Of each camera.
+        reading: Of the calibration.
+        frames: Steps of the recording; what is beyond is left out.
+        middle: z of the middle of a person, metres, for places on the floor.
+        first_index: Number of the first frame, where it is known better.
+        found: What was found out is added.
+
+    Returns:
+        None where there is no truth.
+    """
+    pieces = [piece for piece in pieces if len(piece.frames)]
+    if not pieces:
+        return None
+    steps, ids, places, valid = [], [], [], []
+    beyond = 0
+    for piece in pieces:
+        first = piece.first_index if first_index is None else first_index
+        own = piece.frames - (first if first is not None else int(piece.frames.min() > 0))
+        given = piece.positions.copy()
+        given[~np.isfinite(given[:, 2]), 2] = 0.0
+        on_floor = ~np.isfinite(piece.positions[:, 2])
+        ways = list(_ways(piece, reading))
+        scores = []
+        for factor, turn in ways:
+            moved = _moved(given, on_floor, factor, turn, middle)
+            scores.append(_inside(own, moved, cameras, detections))
+        best = int(np.argmax(scores))
+        if scores[best] < scores[0] + _CLEARLY:
+            best = 0
+        if best:
+            found.append(
+                ("truth", f"{piece.source.name}: turned so that {100 * scores[best]:.0f} % of its "
+                 f"places lie in boxes ({100 * scores[0]:.0f} % as it is)")
+            )  # fmt: skip
+        factor, turn = ways[best]
+        keep = (own >= 0) & (own < frames)
+        beyond += int((~keep).sum())
+        steps.append(own[keep])
+        ids.append(piece.ids[keep])
+        places.append(_moved(given, on_floor, factor, turn, middle)[keep])
+        valid.append(
+            np.ones(int(keep.sum()), dtype=bool) if piece.valid is None else piece.valid[keep]
+        )
+    if _overlap(steps, ids):  # a file a person, each with its own numbers
+        ids = [np.full(len(own), number) for number, own in enumerate(ids, 1)]
+    all_steps, all_ids = np.concatenate(steps), np.concatenate(ids)
+    if beyond:
+        found.append(("truth", f"{beyond} rows are of steps that the recording does not have"))
+    all_ids = all_ids - min(0, int(all_ids.min(initial=0)))
+    order = np.lexsort([all_ids, all_steps])
+    pairs = np.column_stack([all_steps, all_ids])[order]
+    order = order[np.concatenate([[True], (np.diff(pairs, axis=0) != 0).any(axis=1)])]
+    return GroundTruth(
+        all_steps[order],
+        all_ids[order],
+        np.concatenate(places)[order],
+        np.concatenate(valid)[order],
+    )
+
+
+def _ways(piece: TruthPiece, reading: Reading) -> Iterator[tuple[float, Float[ndarray, "3 3"]]]:
+    """Metres in a unit and rotation into the cameras' world, the plain reading first."""
+    same = piece.up in (None, reading.up)
+    own = levelled(reading) if same else upright(piece.up or reading.up)
+    units: tuple[Unit, ...] = (
+        (piece.unit,) if piece.unit else (reading.unit, *(u for u in METRES if u != reading.unit))
+    )
+    for unit in units:
+        for turn in range(4 if not same or piece.unit is None else 1):
+            angle = turn * np.pi / 2.0
+            c, s = round(np.cos(angle)), round(np.sin(angle))
+            yaw = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+            yield METRES[unit], yaw @ own
+
+
+def _moved(
+    given: Float[ndarray, "G 3"],
+    on_floor: ndarray,
+    factor: float,
+    turn: Float[ndarray, "3 3"],
+    middle: float,
+) -> Float[ndarray, "G 3"]:
+    moved = factor * given @ turn.T
+    moved[on_floor, 2] = middle
+    return np.asarray(moved)
+
+
+def _inside(
+    steps: ndarray,
+    places: Float[ndarray, "G 3"],
+    cameras: Sequence[Camera],
+    detections: Sequence[Detections | None],
+) -> float:
+    """Of the places that a camera with boxes sees, how many lie in a box."""
+    rows = np.unique(np.linspace(0, len(steps) - 1, min(_SAMPLED, len(steps))).astype(int))
+    seen = inside = 0
+    for camera, own in zip(cameras, detections, strict=True):
+        if own is None:
+            continue
+        pixels, _ = camera.project(places[rows])
+        visible = camera.contains(pixels)
+        for row in np.flatnonzero(visible):
+            boxes = own.boxes[own.at(int(steps[rows[row]]))]
+            low, high = boxes[:, :2], boxes[:, :2] + boxes[:, 2:]
+            seen += 1
+            inside += bool(((pixels[row] >= low) & (pixels[row] <= high)).all(axis=1).any())
+    return inside / seen if seen >= min(10, len(rows)) else 0.0
+
+
+def _overlap(steps: Sequence[ndarray], ids: Sequence[ndarray]) -> bool:
+    pairs = np.column_stack([np.concatenate(steps), np.concatenate(ids)])
+    return len(np.unique(pairs, axis=0)) < len(pairs)

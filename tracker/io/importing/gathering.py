@@ -1,0 +1,254 @@
+"""Every file of what was named, and what each was taken for."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from tracker.io.read.calibration.possible import check_cameras
+from tracker.io.read.pieces import CalibrationPiece, FormatError, Piece
+from tracker.io.read.protocol import Certainty, Format
+from tracker.io.read.registry import recognise, unforeseen
+from tracker.io.read.source import SourceFile
+
+MOST_FILES = 200_000
+MOST_DEPTH = 8
+"""Folders within each other."""
+
+_MOST_REFUSED = 200
+"""So many files alike, none of which anybody knows, speak for the rest."""
+
+_LOOKED_AT = 50
+"""Members of a series among which the one is sought that stands for all."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Taken:
+    """A file, or a series of numbered files, and what it was taken for."""
+
+    label: str
+    """Path from the folder that was named; of a series that of the first, with the count."""
+    format: str
+    """What it was recognised as; empty where it is not used."""
+    certainty: Certainty
+    pieces: tuple[Piece, ...] = ()
+    complaint: str = ""
+    """Why it is not used, where it was recognised or begins as something known."""
+    files: tuple[Path, ...] = ()
+
+
+def gather(sources: Sequence[Path]) -> list[Taken]:
+    """Recognise and read everything in some files and folders.
+
+    Args:
+        sources: Files, or folders that are searched with all in them.
+
+    Returns:
+        In the order of their paths. What cannot be read has its complaint and no pieces.
+
+    Raises:
+        FormatError: If a source is not there, or there are too many files.
+    """
+    taken: list[Taken] = []
+    for source in sources:
+        if not source.exists():
+            raise FormatError(f"{source}: there is no such file or folder")
+        root = source if source.is_dir() else source.parent
+        files, strays = _walk(source, root)
+        taken += strays
+        crowds: dict[tuple[Path, str], _Crowd] = {}
+        for series in _series(files):
+            kind = (series[0].parent, series[0].suffix)
+            crowd = crowds.setdefault(kind, _Crowd())
+            if crowd.passes_over(series):
+                continue
+            found = list(_read(series, root))
+            crowd.add(series, known=any(one.format for one in found))
+            taken += found
+        taken += [crowd.told(kind, root) for kind, crowd in crowds.items() if crowd.passed]
+    return taken
+
+
+class _Crowd:
+    """Files of one folder with one ending: once hundreds are nobody's, more of them are not opened.
+
+    A file that is smaller or larger than all of those is something else, and is looked at.
+    """
+
+    def __init__(self) -> None:
+        self.passed = 0
+        """Files that were not opened."""
+        self._refused = 0
+        self._known = False
+        self._smallest, self._largest = 0, 0
+
+    def passes_over(self, series: tuple[Path, ...]) -> bool:
+        """Whether a series need not be looked at."""
+        if self._known or self._refused < _MOST_REFUSED:
+            return False
+        sizes = [_size(path) for path in series[:_LOOKED_AT]]
+        if min(sizes) < self._smallest or max(sizes) > self._largest:
+            return False
+        self.passed += len(series)
+        return True
+
+    def add(self, series: tuple[Path, ...], *, known: bool) -> None:
+        """Remember a series that was looked at."""
+        if known:
+            self._known |= self._refused < _MOST_REFUSED
+            return
+        sizes = [_size(path) for path in series[:_LOOKED_AT]]
+        self._smallest = min([*sizes, self._smallest]) if self._refused else min(sizes)
+        self._largest = max([*sizes, self._largest])
+        # of a long series that nobody knows one was opened
+        self._refused += len(series) if len(series) < _LOOKED_AT else 1
+
+    def told(self, kind: tuple[Path, str], root: Path) -> Taken:
+        """What is said of those that were not opened."""
+        folder, suffix = kind
+        where = SourceFile(folder / f"…{suffix}", root).where
+        complaint = (
+            f"{where}: {self._refused:,} of these files are of no format that is read, so "
+            f"{self.passed:,} more of like size were not opened; name those that are wanted"
+        )
+        return Taken(f"{where} ({self.passed:,})", "", Certainty.NO, complaint=complaint)
+
+
+def _walk(source: Path, root: Path) -> tuple[list[Path], list[Taken]]:
+    """Ordinary files, and what leads out of the folder."""
+    if source.is_file():
+        return [source], []
+    home = root.resolve()
+    files: list[Path] = []
+    strays: list[Taken] = []
+    for folder, folders, names in os.walk(source):
+        here = Path(folder)
+        depth = len(here.relative_to(source).parts)
+        folders[:] = (
+            sorted(f for f in folders if not f.startswith(".")) if depth < MOST_DEPTH else []
+        )
+        for name in sorted([*names, *(f for f in folders if (here / f).is_symlink())]):
+            path = here / name
+            if name.startswith("."):
+                continue
+            if path.is_symlink() and not _stays(path, home):
+                strays.append(_stray(path, root, "a symbolic link leads out of the folder"))
+            elif path.is_file():
+                files.append(path)
+            elif not path.is_dir():
+                strays.append(_stray(path, root, "expected an ordinary file"))
+        if len(files) > MOST_FILES:
+            raise FormatError(
+                f"{source}: has more than {MOST_FILES:,} files; name the folder of one recording"
+            )
+    return files, strays
+
+
+def _stays(path: Path, home: Path) -> bool:
+    try:
+        return path.resolve(strict=True).is_relative_to(home)
+    except (OSError, RuntimeError):  # a circle, or nothing there
+        return False
+
+
+def _stray(path: Path, root: Path, why: str) -> Taken:
+    where = SourceFile(path, root).where
+    return Taken(where, "", Certainty.NO, complaint=f"{where}: {why}")
+
+
+def _series(files: Sequence[Path]) -> Iterator[tuple[Path, ...]]:
+    """Files of a folder whose names differ in one number, the one that differs most."""
+    groups: dict[tuple[object, ...], list[tuple[tuple[str, ...], Path]]] = {}
+    for path in files:
+        words = re.split(r"(\d+)", path.name)
+        key = (path.parent, *words[::2])
+        groups.setdefault(key, []).append((tuple(words[1::2]), path))
+    for members in groups.values():
+        numbers = [numbers for numbers, _ in members]
+        kinds = [len(set(column)) for column in zip(*numbers, strict=True)]
+        if not kinds:
+            yield from ((path,) for _, path in members)
+            continue
+        # of numbers that differ as much, the last
+        at = max(range(len(kinds)), key=lambda place: (kinds[place], place))
+        by_rest: dict[tuple[str, ...], list[tuple[int, Path]]] = {}
+        for own, path in members:
+            by_rest.setdefault((*own[:at], *own[at + 1 :]), []).append((int(own[at]), path))
+        for row in by_rest.values():
+            yield tuple(path for _, path in sorted(row))
+
+
+def _read(series: tuple[Path, ...], root: Path) -> Iterator[Taken]:
+    largest = max(series[:_LOOKED_AT], key=_size)
+    file = SourceFile(largest, root, series)
+    found, certainty, complaint = _recognise(file)
+    if found is not None and found.SERIES and len(series) > 1:
+        yield from _series_pieces(found, certainty, file, root)
+        return
+    for path in series if found is not None or len(series) < _LOOKED_AT else ():
+        own = SourceFile(path, root)
+        if len(series) > 1:  # else it is the one that was just looked at
+            found, certainty, complaint = _recognise(own)
+        if found is not None:
+            yield _pieces(found, certainty, own, own.where)
+        else:
+            yield Taken(own.where, "", Certainty.NO, complaint=complaint, files=(path,))
+    if found is None and len(series) >= _LOOKED_AT:
+        label = f"{SourceFile(series[0], root).where} … ({len(series)})"
+        yield Taken(label, "", Certainty.NO, complaint=complaint, files=series)
+
+
+def _size(path: Path) -> int:
+    try:
+        return path.stat().st_size
+    except OSError:
+        return 0
+
+
+def _recognise(file: SourceFile) -> tuple[Format | None, Certainty, str]:
+    try:
+        with np.errstate(all="ignore"):
+            found, certainty, complaint = recognise(file)
+        return found, certainty, "" if complaint is None else str(complaint)
+    except (FormatError, OSError) as error:
+        return None, Certainty.NO, str(error)
+
+
+def _series_pieces(
+    found: Format, certainty: Certainty, file: SourceFile, root: Path
+) -> Iterator[Taken]:
+    """A series; without those of its files that cannot be read by themselves, each told."""
+    series = file.series
+    label = f"{SourceFile(series[0], root).where} … ({len(series)})"
+    taken = _pieces(found, certainty, file, label)
+    if not taken.complaint:
+        yield taken
+        return
+    alone = [SourceFile(path, root) for path in series]
+    each = [_pieces(found, certainty, one, one.where) for one in alone]
+    spoilt = [one for one in each if one.complaint]
+    whole = tuple(path for path, one in zip(series, each, strict=True) if not one.complaint)
+    if not whole or not 0 < len(spoilt) <= _LOOKED_AT:
+        yield taken
+        return
+    yield from spoilt
+    label = f"{SourceFile(whole[0], root).where} … ({len(whole)})"
+    yield _pieces(found, certainty, SourceFile(whole[0], root, whole), label)
+
+
+def _pieces(found: Format, certainty: Certainty, file: SourceFile, label: str) -> Taken:
+    try:
+        with np.errstate(all="ignore"):  # what overflows is infinite, and refused by its reader
+            pieces = tuple(found.read(file))
+            for piece in pieces:
+                if isinstance(piece, CalibrationPiece):
+                    check_cameras(file, piece)
+    except Exception as error:  # or a field of a kind that the reader does not foresee
+        told = error if isinstance(error, FormatError) else unforeseen(file, found, error)
+        return Taken(label, found.NAME, certainty, complaint=str(told), files=file.series)
+    return Taken(label, found.NAME, certainty, pieces, files=file.series)

@@ -1,0 +1,402 @@
+"""From matched files to what a sequence needs: conventions, sizes, rate, room and target."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
+
+from tracker.geometry.camera import Camera
+from tracker.geometry.consistency.suggestion import STANDING, Suggestion, agreement, suggest
+from tracker.io.checks.level import lean_of
+from tracker.io.checks.reading import Reading, pose, read_boxes, to_camera
+from tracker.io.checks.readings import Open, Seen, find_meaning
+from tracker.io.importing.arriving import short_videos
+from tracker.io.importing.finding.angles import check_turns, chosen_turns, told_turns
+from tracker.io.importing.finding.calibrations import camera_sets
+from tracker.io.importing.finding.geometry import check_places, read_poses
+from tracker.io.importing.finding.matching import MatchedCamera, match_all, nothing_of
+from tracker.io.importing.finding.people import rate_of, rays_of_all
+from tracker.io.importing.finding.pictures import picture_sizes, scaled
+from tracker.io.importing.finding.scale import AS_STANDING, PERSON, paced, resized
+from tracker.io.importing.finding.times import (
+    CameraTime,
+    Times,
+    first_index,
+    frames_of,
+    settle_times,
+    told_beyond,
+)
+from tracker.io.importing.finding.truths import settle_truth
+from tracker.io.importing.gathering import Taken
+from tracker.io.importing.options import ImportOptions
+from tracker.io.read.pieces import FormatError, Layout, RawCamera
+from tracker.sequences.sequence import Detections, Entrance, GroundTruth
+
+ROOM_MARGIN = 1.0
+"""Metres on each side: a room that is too large costs little, who is outside is lost."""
+
+FARTHEST = 1e6
+"""Pixels from a picture's corner: a box that lies farther is no one's."""
+
+_WITHOUT_UNIT = ("COLMAP", "nerfstudio", "Metashape", "OpenMVG", "MVSNet", "Middlebury")
+"""Formats whose unit is arbitrary."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SettledView:
+    """One camera, ready to be written."""
+
+    camera: Camera
+    matched: MatchedCamera
+    detections: Detections | None
+    """By frames of the camera's own file."""
+    time: CameraTime
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Settled:
+    """A recording, ready to be written, and what was found out on the way."""
+
+    views: tuple[SettledView, ...]
+    fps: float
+    frames: int
+    room: Suggestion
+    """As it is written."""
+    suggested: Suggestion
+    """As it was found out."""
+    entrances: tuple[Entrance, ...]
+    """Of the room; none unless they are wished."""
+    truth: GroundTruth | None
+    calibration: str
+    """What its file was recognised as."""
+    reading: Reading
+    found: tuple[tuple[str, str], ...]
+    """What was not in the files or had to be chosen, and why it is so."""
+    told: tuple[str, ...]
+    """Sentences about what is not used or odd."""
+
+
+def settle(taken: Sequence[Taken], options: ImportOptions | None = None) -> Settled:
+    """Find out everything that a sequence needs.
+
+    Raises:
+        FormatError: If there is no calibration, or files contradict each other; the sentence
+            says which and what to do.
+    """
+    options = options or ImportOptions()
+    sets, told = camera_sets(taken)
+    matched = match_all(taken, sets, options, told)
+    told += matched.told + short_videos(taken)
+    found: list[tuple[str, str]] = []
+    cameras = matched.cameras
+    for way in sorted({how for camera in cameras for how in camera.how.values()} - {"name"}):
+        found.append(("matching", f"pictures and boxes go to the cameras by {way}"))
+    sizes = picture_sizes(cameras, found)
+    raws = [
+        _told(scaled(camera.raw, size), options)
+        for camera, size in zip(cameras, sizes, strict=True)
+    ]
+    if not any(c.video or c.images or c.detections is not None for c in cameras):
+        raise nothing_of(cameras, taken, told)
+    times = settle_times(cameras, matched.truths, options, found)
+    boxes = _boxes(cameras, sizes, times, options, found, told)
+    arbitrary = matched.format.startswith(_WITHOUT_UNIT)
+    reading, raws, boxes, factor = _read(raws, boxes, times, arbitrary, options, found)
+    settled = [to_camera(raw, reading, size) for raw, size in zip(raws, sizes, strict=True)]
+    check_places(settled, matched.format)
+    detections = [_detections(own) for own in boxes]
+    at_steps = _at_steps(detections, times)
+    if factor is not None and options.half_extents is not None:
+        height = 2.0 * options.half_extents[2]
+        found.append(("unit", f"scaled by {factor:.4g}, so that people are {height:g} m; --unit"))
+    elif factor is not None:
+        more, why = paced(settled, at_steps, times.fps) if times.stated else (1.0, AS_STANDING)
+        settled = resized(settled, more)
+        found.append(("unit", f"scaled by {more * factor:.4g}, {why}: --unit"))
+    if not times.stated:
+        fps, why = rate_of(settled, at_steps)
+        found.append(("fps", f"{fps:g}, {why}, since no file says it; --fps"))
+        times = settle_times(cameras, matched.truths, replace(options, fps=fps), [])
+        at_steps = _at_steps(detections, times)
+    suggested = _room(settled, at_steps, found)
+    room = _as_told(suggested, options)
+    truth = settle_truth(
+        [piece for _, piece in matched.truths],
+        settled,
+        at_steps,
+        reading,
+        times.frames,
+        float(room.half_extents[2]) + room.floor,
+        options.first_index,
+        found,
+    )
+    views = tuple(
+        SettledView(camera, own, boxes_, time)
+        for camera, own, boxes_, time in zip(
+            _renamed(settled, options), cameras, detections, times.cameras, strict=True
+        )
+    )
+    return Settled(
+        views,
+        times.fps,
+        times.frames,
+        room,
+        suggested,
+        _entrances(options),
+        truth,
+        matched.format,
+        reading,
+        tuple(found),
+        tuple(told),
+    )
+
+
+def _at_steps(detections: Sequence[Detections | None], times: Times) -> list[Detections | None]:
+    return [
+        None if own is None else at_steps_of(own, time)
+        for own, time in zip(detections, times.cameras, strict=True)
+    ]
+
+
+def at_steps_of(own: Detections, time: CameraTime) -> Detections:
+    """Boxes by step in place of the file's frames, without those of frames that no step shows."""
+    if time.clock is None:
+        return own
+    steps = time.steps_of(own.frames)
+    rows = np.flatnonzero(steps >= 0)
+    rows = rows[np.argsort(steps[rows], kind="stable")]
+    return Detections(steps[rows], own.boxes[rows], own.scores[rows])
+
+
+def _renamed(cameras: Sequence[Camera], options: ImportOptions) -> list[Camera]:
+    """Cameras under the names that are wished."""
+    renamed = [replace(c, name=options.names.get(c.name, c.name).strip()) for c in cameras]
+    names = [camera.name for camera in renamed]
+    for name in names:
+        if not name or names.count(name) > 1:
+            raise FormatError(
+                f'expected a name of its own for each camera, found "{name}"'
+                f"{' twice' if name else ''}; choose another"
+            )
+    return renamed
+
+
+def _as_told(room: Suggestion, options: ImportOptions) -> Suggestion:
+    """The room and the size of people as they are stated."""
+    if options.half_extents is not None:
+        room = replace(room, half_extents=np.array(options.half_extents))
+    if options.room is None:
+        return room
+    minimum, maximum = (np.array(corner) for corner in options.room)
+    for axis, low, high in zip("xyz", minimum, maximum, strict=True):
+        if not low < high:
+            raise FormatError(
+                f"room: expected {axis} to end above {low:g} m, where it begins, found {high:g} m"
+            )
+    return replace(room, minimum=minimum, maximum=maximum)
+
+
+def _entrances(options: ImportOptions) -> tuple[Entrance, ...]:
+    """Those that are wished."""
+    for position, sigma in options.entrances:
+        if not (np.isfinite(position).all() and np.isfinite(sigma).all() and min(sigma) > 0.0):
+            raise FormatError(
+                "entrances: expected x, y, z and three positive standard deviations in metres, "
+                f"found {position} and {sigma}"
+            )
+    return tuple(Entrance(np.array(place), np.array(sigma)) for place, sigma in options.entrances)
+
+
+def _told(raw: RawCamera, options: ImportOptions) -> RawCamera:
+    """With what the flags say in place of what the format says."""
+    convention = replace(
+        raw.convention,
+        direction=options.pose or raw.convention.direction,
+        axes=options.axes or raw.convention.axes,
+        up=options.up or raw.convention.up,
+    )
+    if options.turns is not None and raw.turns:
+        raw = replace(raw, turns=chosen_turns(raw, options.turns))
+    if isinstance(options.unit, float):
+        return _resized(replace(raw, convention=replace(convention, unit="m")), options.unit)
+    unit = options.unit or convention.unit
+    return replace(raw, convention=replace(convention, unit=unit))
+
+
+def _resized(raw: RawCamera, factor: float) -> RawCamera:
+    """With another unit."""
+    if raw.projection is not None:
+        return replace(raw, projection=raw.projection @ np.diag([1.0, 1.0, 1.0, factor]))
+    assert raw.translation is not None
+    return replace(raw, translation=raw.translation * factor)
+
+
+_Boxes = tuple[Detections, Layout | None]
+
+
+def _boxes(
+    cameras: Sequence[MatchedCamera],
+    sizes: Sequence[tuple[int, int]],
+    times: Times,
+    options: ImportOptions,
+    found: list[tuple[str, str]],
+    told: list[str],
+) -> list[_Boxes | None]:
+    """Boxes in pixels, those of a known layout as left, top, width, height."""
+    pieces = [camera.detections for camera in cameras]
+    firsts = {first_index(p, options, times.frames) for p in pieces if p is not None}
+    # all cameras were written by the same program: one that begins at 0 speaks for all
+    first = min(firsts, default=0)
+    if first and any(p is not None and p.first_index is None for p in pieces):
+        found.append(("first index", "1, since no frame is called 0; --first-index"))
+    result: list[_Boxes | None] = []
+    for camera, size, time in zip(cameras, sizes, times.cameras, strict=True):
+        piece = camera.detections
+        if piece is None:
+            result.append(None)
+            continue
+        layout = options.boxes or piece.layout
+        normalised = piece.normalised if options.normalised is None else options.normalised
+        scale = size if normalised else None
+        four = read_boxes(piece.boxes, layout or "ltwh", scale)
+        steps = piece.frames - first
+        within = frames_of(camera, time, times.frames)
+        there = (steps >= 0) & (steps < within)
+        sane = (np.abs(four) < FARTHEST).all(axis=1)
+        if not sane.all():
+            told.append(
+                f"{piece.source.name}: {int((~sane).sum())} of {len(sane)} boxes lie farther than "
+                f"{FARTHEST:,.0f} pixels away; they are left out"
+            )
+        if beyond := told_beyond(piece, first, within):
+            told.append(beyond)
+        scores = np.clip(piece.scores, 0.0, 1.0)
+        there &= sane
+        own = Detections(steps[there], four[there], scores[there])
+        result.append((own, layout))
+    return result
+
+
+def _read(
+    raws: list[RawCamera],
+    boxes: list[_Boxes | None],
+    times: Times,
+    arbitrary: bool,
+    options: ImportOptions,
+    found: list[tuple[str, str]],
+) -> tuple[Reading, list[RawCamera], list[_Boxes | None], float | None]:
+    """How poses and boxes are meant: by flags, formats, the boxes and the poses, in this order.
+
+    Returns:
+        The reading; cameras and boxes as they are by it; and by how much the cameras' unit was
+        made larger so that people are as tall as they are said to be, or as people who stand.
+    """
+    seen = [
+        None if own is None else _seen(own[0], time)
+        for own, time in zip(boxes, times.cameras, strict=True)
+    ]
+    unknown = any(own is not None and own[1] is None for own in boxes)
+    layouts: tuple[Layout, ...] = ("ltwh", "xyxy", "cxcywh") if unknown else ("ltwh",)
+    convention = raws[0].convention
+    meaning = find_meaning(
+        raws,
+        seen,
+        tried=Open(layouts=layouts, normalised=(False,), orders=False),
+        unit=convention.unit,
+        up=convention.up,
+    )
+    enough = meaning is not None and meaning.best.consensus.agreeing >= 20
+    if meaning is None or not enough:
+        check_turns(raws)
+        reading = read_poses(raws, boxes=any(own is not None for own in boxes))
+        why = "from where the cameras look; the boxes do not tell"
+    else:
+        reading = meaning.reading
+        if convention.up is None:
+            poses = [pose(raw, reading) for raw in raws]
+            best = meaning.best
+            lean = lean_of(best.consensus, best.pictured, poses, best.turns, reading.up)
+            reading = replace(reading, lean=lean)
+        share = 100.0 * meaning.best.consensus.share
+        why = f"since {share:.0f} % of the boxes meet so"
+        if unknown:
+            found.append(("boxes", f"{reading.layout}, {why}; --boxes"))
+    if any(raw.turns for raw in raws):
+        found.append(("angles", f"{told_turns(reading.turns)}, {why}; --euler"))
+    if reading.lean != (0.0, 0.0):
+        degrees = np.degrees(np.arcsin(np.hypot(*reading.lean)))
+        found.append(("level", f"the world is turned by {degrees:.0f}° so that people stand"))
+    for name, known, flag in (
+        ("direction", convention.direction, "pose"),
+        ("axes", convention.axes, "axes"),
+        ("up", convention.up, "up"),
+        ("unit", convention.unit, "unit"),
+    ):
+        if known is None and not (name == "unit" and enough and arbitrary):
+            how = "by the height of people" if name == "unit" and enough else why
+            found.append((name, f"{getattr(reading, name)}, {how}; --{flag}"))
+    factor: float | None = None
+    changed: list[_Boxes | None] = []
+    for own in boxes:
+        if own is not None and own[1] is None:
+            four = read_boxes(own[0].boxes, reading.layout)
+            own = (replace(own[0], boxes=four), reading.layout)
+        changed.append(own)
+    if meaning is not None and enough and arbitrary and convention.unit is None:
+        stated = options.half_extents
+        factor = (PERSON if stated is None else 2.0 * stated[2]) / meaning.height
+        raws = [_resized(raw, factor) for raw in raws]
+    return replace(reading, layout="ltwh", order=None), raws, changed, factor
+
+
+def _seen(own: Detections, time: CameraTime) -> Seen:
+    steps = time.steps_of(own.frames)
+    return Seen(steps[steps >= 0], own.boxes[steps >= 0])
+
+
+def _detections(own: _Boxes | None) -> Detections | None:
+    """Sorted by step, without boxes that have no size."""
+    if own is None:
+        return None
+    boxes = own[0]
+    order = np.argsort(boxes.frames, kind="stable")
+    order = order[(boxes.boxes[order, 2:] > 0.0).all(axis=1)]
+    return Detections(boxes.frames[order], boxes.boxes[order], boxes.scores[order])
+
+
+def _room(
+    cameras: Sequence[Camera],
+    detections: Sequence[Detections | None],
+    found: list[tuple[str, str]],
+) -> Suggestion:
+    """Where people are, and how large they are: from the boxes, else from the views."""
+    agreed = None
+    if any(own is not None for own in detections):
+        agreed = agreement(cameras, rays_of_all(cameras, detections))
+    room = suggest(cameras, agreed)
+    if room is None:
+        centres = np.array([camera.centre for camera in cameras])
+        low, high = centres.min(axis=0) - 3.0, centres.max(axis=0) + 3.0
+        room = Suggestion(
+            np.array([low[0], low[1], 0.0]), np.array([high[0], high[1], 2.0]), STANDING, 0.0, 0
+        )
+        found.append(("room", "around the cameras: neither boxes nor views meet; correct it"))
+        return room
+    margin = np.array([ROOM_MARGIN, ROOM_MARGIN, 0.0])
+    room = replace(room, minimum=room.minimum - margin, maximum=room.maximum + margin)
+    how = f"from {room.people} pairs of boxes that meet" if room.people else "where views overlap"
+    sides = " × ".join(f"{side:.1f}" for side in _sides(room))
+    found.append(("room", f"{sides} m, {how}"))
+    size = " × ".join(f"{2.0 * side:.2f}" for side in room.half_extents)
+    found.append(
+        ("target", f"{size} m, {'from the boxes' if room.people else 'a standing person'}")
+    )
+    return room
+
+
+def _sides(room: Suggestion) -> Float[ndarray, " 3"]:
+    return np.asarray(room.maximum - room.minimum)

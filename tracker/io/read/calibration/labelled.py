@@ -1,0 +1,75 @@
+"""Text in which a name stands before its numbers: ``K``, ``R``, ``T`` and their kin.
+
+As scripts print matrices (``K1 = [[…], […]]``), and as the files of some data sets are: a name on
+a line of its own, or before the numbers, which may go on over several lines. A name that comes
+again begins the next camera.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from typing import Any
+
+from tracker.io.read.calibration.camera_fields import cameras, has_cameras
+from tracker.io.read.calibration.camera_words import split
+from tracker.io.read.pieces import CalibrationPiece, Convention, Piece
+from tracker.io.read.protocol import Certainty, Kind
+from tracker.io.read.source import SourceFile
+
+NAME = "text with K, R, T by name"
+KIND: Kind = "calibration"
+SERIES = False
+
+MOST_BYTES = 2**20
+
+_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_TOKEN = re.compile(rf"(?P<name>[A-Za-z_][\w.]*)|(?P<number>{_NUMBER})")
+_COMMENT = re.compile(r"(?m)(#|//|%).*$")
+_WRAPPING = ("array", "matrix", "np", "np.array", "numpy.array", "dtype", "float32", "float64")
+"""Words that stand around numbers and name nothing."""
+
+
+def recognise(file: SourceFile) -> Certainty:
+    """A short text of names and numbers in which a camera's parts are called so."""
+    head = file.head_text
+    if not head or file.size > MOST_BYTES or head.lstrip()[:1] in ("{", "<") or "%YAML" in head:
+        return Certainty.NO
+    if not any(_means_a_camera(line) for line in head.splitlines()[:200]):
+        return Certainty.NO
+    return Certainty.POSSIBLE if has_cameras(_values(file.text(MOST_BYTES))) else Certainty.NO
+
+
+def read(file: SourceFile) -> Iterator[Piece]:
+    """One piece with every camera of the file; nothing is known of the convention."""
+    values = _values(file.text(MOST_BYTES))
+    yield CalibrationPiece(file.path, NAME, tuple(cameras(file, values, Convention())))
+
+
+def _means_a_camera(line: str) -> bool:
+    word = re.match(r"\s*([A-Za-z_][\w.]*)", line)
+    meaning = None if word is None else split(word[1])
+    return meaning is not None and meaning[0] not in ("name", "size", "width", "height")
+
+
+def _values(text: str) -> Any:
+    """A table of the names, or one a camera where they come again."""
+    tables: list[dict[str, Any]] = [{}]
+    numbers: list[float] | None = None
+    for token in _TOKEN.finditer(_COMMENT.sub("", text)):
+        name = token["name"]
+        if name is None:
+            if numbers is not None:
+                numbers.append(float(token["number"]))
+            continue
+        if name in _WRAPPING:
+            continue
+        if name in tables[-1]:
+            tables.append({})
+        numbers = tables[-1][name] = []
+    found = [
+        {name: own[0] if len(own) == 1 else own for name, own in table.items() if own}
+        for table in tables
+    ]
+    # what stands before the names that come again is of none of the cameras
+    return found[0] if len(found) == 1 else {str(n): table for n, table in enumerate(found)}

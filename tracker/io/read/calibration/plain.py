@@ -1,0 +1,87 @@
+"""JSON, YAML or ``.npz`` of one's own script: K, R and t by their usual names.
+
+Arrays of an ``.npz`` may have the cameras as their first axis: K (C, 3, 3), t (C, 3).
+"""
+
+from __future__ import annotations
+
+import io
+import zipfile
+import zlib
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy import ndarray
+
+from tracker.io.read.calibration.camera_fields import cameras, has_cameras
+from tracker.io.read.pieces import CalibrationPiece, Convention, FormatError, Piece
+from tracker.io.read.protocol import Certainty, Kind
+from tracker.io.read.source import SourceFile
+
+NAME = "JSON, YAML or .npz with K, R, t"
+KIND: Kind = "calibration"
+SERIES = False
+
+MOST_BYTES = 16 * 2**20
+"""Of an archive of arrays, packed and unpacked: a few bytes may stand for gigabytes."""
+
+_ZIP = b"PK\x03\x04"
+
+
+def recognise(file: SourceFile) -> Certainty:
+    """JSON, YAML or arrays that hold a table with a camera's fields."""
+    if file.head.startswith(_ZIP):
+        return Certainty.POSSIBLE if has_cameras(_arrays(file)) else Certainty.NO
+    head = file.head_text.lstrip()
+    try:
+        if head[:1] in ("{", "[") or (":" in head and "\n" in head and "<" not in head[:1]):
+            return Certainty.POSSIBLE if has_cameras(_values(file)) else Certainty.NO
+    except FormatError:  # some other text
+        if head[:1] in ("{", "["):
+            raise
+    return Certainty.NO
+
+
+def read(file: SourceFile) -> Iterator[Piece]:
+    """One piece with every camera of the file; nothing is known of the convention."""
+    yield CalibrationPiece(file.path, NAME, tuple(cameras(file, _values(file), Convention())))
+
+
+def _values(file: SourceFile) -> Any:
+    if file.head.startswith(_ZIP):
+        return _arrays(file)
+    return file.json if file.head_text.lstrip()[:1] in ("{", "[") else file.yaml
+
+
+def _arrays(file: SourceFile) -> dict[str, Any]:
+    """The arrays of an archive by their names, or a table of them a camera."""
+    try:
+        with zipfile.ZipFile(io.BytesIO(file.bytes(MOST_BYTES))) as archive:
+            members = [one for one in archive.infolist() if one.filename.endswith(".npy")]
+            if sum(one.file_size for one in members) > MOST_BYTES:
+                raise file.error(
+                    f"unpacks to more than {MOST_BYTES / 2**20:.0f} MB, expected a calibration"
+                )
+            arrays: dict[str, ndarray] = {
+                one.filename.removesuffix(".npy"): np.load(
+                    io.BytesIO(archive.read(one)), allow_pickle=False
+                )
+                for one in members
+            }
+    except (zipfile.BadZipFile, ValueError, EOFError, NotImplementedError, zlib.error) as error:
+        if isinstance(error, FormatError):
+            raise
+        return {}  # some other archive
+    lenses = [own for own in arrays.values() if own.ndim == 3 and own.shape[1:] == (3, 3)]
+    if not lenses:
+        return {name: own.tolist() for name, own in arrays.items()}
+    count = len(lenses[0])
+    return {
+        str(camera): {
+            name: own[camera].tolist()
+            for name, own in arrays.items()
+            if own.ndim > 1 and len(own) == count
+        }
+        for camera in range(count)
+    }

@@ -1,0 +1,126 @@
+"""3×4 projection matrices, poses [R | t] or lenses K, as text or ``.npy``.
+
+Text: twelve numbers a camera, in three lines or in one, with or without a name before them
+(KITTI's ``P0: …``). A left part that is a rotation makes it a pose without a lens; nine numbers
+that are a K make a lens without a pose.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Iterator
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
+
+from tracker.io.read.pieces import CalibrationPiece, Convention, Piece, RawCamera
+from tracker.io.read.protocol import Certainty, Kind
+from tracker.io.read.source import SourceFile
+from tracker.io.read.values import intrinsics, is_rotation
+
+NAME = "matrices P, [R | t] or K"
+KIND: Kind = "calibration"
+SERIES = False
+
+MOST_CAMERAS = 1000
+
+_NPY = b"\x93NUMPY"
+_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_ROW = re.compile(
+    rf"\s*(?:([A-Za-z_]\w*)\s*[:=,\s]\s*)?[\[(\s]*({_NUMBER}(?:[\s,;]+{_NUMBER})*)[\])\s,;]*"
+)
+
+
+def recognise(file: SourceFile) -> Certainty:
+    """A NumPy array of 3×4, 4×4 or K matrices, or a text of nothing but rows of them."""
+    if file.head.startswith(_NPY):
+        return Certainty.LIKELY if _shape(file) else Certainty.NO
+    if file.size > 2**20 or not file.is_text:
+        return Certainty.NO
+    return Certainty.LIKELY if _blocks(file.head_text) else Certainty.NO
+
+
+def read(file: SourceFile) -> Iterator[Piece]:
+    """One piece with every camera."""
+    if file.head.startswith(_NPY):
+        array = np.load(io.BytesIO(file.bytes(2**20)), allow_pickle=False).astype(float)
+        array = array.reshape(-1, *array.shape[-2:])[:, :3]
+        found = [("" if len(array) == 1 else str(n), matrix) for n, matrix in enumerate(array)]
+    else:
+        found = _blocks(file.text(2**20)) or []
+    yield CalibrationPiece(file.path, NAME, tuple(_camera(file, *item) for item in found))
+
+
+def _camera(file: SourceFile, name: str, matrix: Float[ndarray, "3 n"]) -> RawCamera:
+    if not np.isfinite(matrix).all():
+        raise file.error("expected finite numbers", f"camera {name}")
+    if matrix.shape == (3, 3) and is_rotation(matrix):
+        raise file.error(
+            "is a rotation alone, expected [R | t] or a lens; save K, R and t of a camera "
+            "together as .npz"
+        )
+    if matrix.shape == (3, 3):
+        return RawCamera(name, intrinsics=intrinsics(file, f"camera {name}".strip(), matrix))
+    if is_rotation(matrix[:, :3]):
+        return RawCamera(name, rotation=matrix[:, :3], translation=matrix[:, 3])
+    convention = Convention(direction="world-to-camera", axes="opencv")
+    return RawCamera(name, projection=matrix, convention=convention)
+
+
+def _is_lens(matrix: Float[ndarray, "3 3"]) -> bool:
+    """Whether it is upper triangular with focal lengths of some pixels, as no rotation is."""
+    return (
+        bool(np.abs(matrix[[1, 2, 2], [0, 0, 1]]).max() < 1e-9)
+        and matrix[2, 2] == 1.0
+        and bool((np.diag(matrix)[:2] > 10.0).all())
+    )
+
+
+def _shape(file: SourceFile) -> tuple[int, ...] | None:
+    """The shape of an array of matrices, from its header alone."""
+    stream = io.BytesIO(file.head)
+    try:
+        version = np.lib.format.read_magic(stream)
+        reader = (
+            np.lib.format.read_array_header_1_0
+            if version == (1, 0)
+            else np.lib.format.read_array_header_2_0
+        )
+        shape, _, kind = reader(stream)
+    except ValueError:
+        return None
+    fits = len(shape) in (2, 3) and shape[-2:] in ((3, 3), (3, 4), (4, 4)) and kind.kind in "fiu"
+    return shape if fits and (len(shape) == 2 or shape[0] <= MOST_CAMERAS) else None
+
+
+def _blocks(text: str) -> list[tuple[str, Float[ndarray, "3 n"]]] | None:
+    """Name and matrix of every camera; None where the text has anything else."""
+    rows: list[tuple[str, list[float]]] = []
+    for line in text.splitlines():
+        if not line.strip() or line.lstrip().startswith(("#", "%", "//")):
+            continue
+        match = _ROW.fullmatch(line)
+        if match is None or len(rows) > 4 * MOST_CAMERAS:
+            return None
+        values = [float(word) for word in re.split(r"[\s,;]+", match[2])]
+        rows.append((match[1] or "", values))
+    lengths = {len(values) for _, values in rows}
+    if lengths == {12}:
+        names = [name or (str(n) if len(rows) > 1 else "") for n, (name, _) in enumerate(rows)]
+        return [(n, np.reshape(v, (3, 4))) for n, (_, v) in zip(names, rows, strict=True)]
+    if lengths == {3} and len(rows) == 3:
+        lens = np.array([values for _, values in rows])
+        return [("", lens)] if _is_lens(lens) else None
+    if lengths != {4}:
+        return None
+    table = np.array([values for _, values in rows])
+    if len(table) % 4 == 0 and (np.abs(table[3::4] - [0.0, 0.0, 0.0, 1.0]) < 1e-12).all():
+        table = np.delete(table, np.s_[3::4], axis=0)
+    if len(table) % 3 or len(table) == 0:
+        return None
+    count = len(table) // 3
+    return [
+        ("" if count == 1 else str(n), block) for n, block in enumerate(table.reshape(-1, 3, 4))
+    ]

@@ -1,0 +1,389 @@
+"""What the columns of a table mean, by their names: frame, box, score, person, place.
+
+Shared by CSV and JSON of detectors, of annotation programs and of one's own scripts. The
+four numbers of a box are told apart by the names (``x2`` is no width); where there is but a
+list of four, the layout stays open.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from numpy import ndarray
+
+from tracker.io.read.picture_names import camera_of, number_in
+from tracker.io.read.pieces import DetectionPiece, Layout, Piece, TruthPiece, Unit
+from tracker.io.read.source import SourceFile
+from tracker.io.read.values import shown
+
+WORDS: dict[str, tuple[str, ...]] = {
+    "frame": ("frame", "frameid", "frameindex", "framenumber", "frameno", "frameidx", "framenr",
+              "imageid", "imgid", "step", "image", "imagename", "filename", "file", "framename",
+              "imageindex", "imagepath", "imgpath", "filepath", "path", "imgname", "imagefile"),
+    "time": ("time", "timestamp", "seconds", "sec", "times", "t", "timesec", "timems",
+             "timestampms", "timecode"),
+    "camera": ("camera", "cam", "cameraid", "camid", "view", "cameraname", "viewid", "viewnum"),
+    "left": ("left", "xmin", "x1", "bbleft", "bboxleft", "xtl", "l", "bboxx1", "boxx1", "minx",
+             "bboxxmin", "x0"),
+    "top": ("top", "ymin", "y1", "bbtop", "bboxtop", "ytl", "bboxy1", "boxy1", "miny",
+            "bboxymin", "y0"),
+    "right": ("right", "xmax", "x2", "bbright", "xbr", "r", "bboxx2", "boxx2", "maxx", "bboxxmax"),
+    "bottom": ("bottom", "ymax", "y2", "bbbottom", "ybr", "b", "bboxy2", "boxy2", "maxy",
+               "bboxymax"),
+    "width": ("width", "w", "bbwidth", "bboxwidth", "boxwidth", "bboxw", "bw"),
+    "height": ("height", "h", "bbheight", "bboxheight", "boxheight", "bboxh", "bh"),
+    "cx": ("cx", "xcenter", "xcentre", "xc", "centerx", "centrex"),
+    "cy": ("cy", "ycenter", "ycentre", "yc", "centery", "centrey"),
+    "box": ("bbox", "box", "xyxy", "xywh", "tlwh", "ltwh", "boundingbox"),
+    "score": ("score", "confidence", "conf", "prob", "probability", "detectionscore",
+              "bboxscore"),
+    "class": ("class", "classname", "label", "name", "category", "classid", "categoryid",
+              "prediction"),
+    "id": ("id", "trackid", "trackerid", "personid", "objectid", "identity", "targetid", "person",
+           "pid"),
+    "x": ("x", "xm", "worldx", "xworld", "px", "posx", "positionx", "xmm", "xcm"),
+    "y": ("y", "ym", "worldy", "yworld", "py", "posy", "positiony", "ymm", "ycm"),
+    "z": ("z", "zm", "worldz", "zworld", "pz", "posz", "positionz", "zmm", "zcm"),
+    "valid": ("valid",),
+}  # fmt: skip
+"""Names, without case, blanks and underscores, of each meaning; the first that is there counts."""
+
+_MEANING = {word: meaning for meaning, words in WORDS.items() for word in words}
+
+PEOPLE = ("person", "pedestrian", "people", "human", "1", "0")
+"""Classes that are people: by name, or the first of COCO (1) and of YOLO (0)."""
+
+_OURS = "existence"
+"""A column of the track files that this program writes, which are no one's truth."""
+
+_LONGEST = 1e6
+"""Seconds: larger numbers are not times since a recording began."""
+
+_LONGEST_BOX = 8
+"""Numbers of a box that is a list: the four, a score, a class, a track, and one to spare."""
+
+Column = Sequence[Any]
+
+
+def plain(name: str) -> str:
+    """A column's name without case, blanks, brackets and underscores."""
+    return re.sub(r"[^a-z0-9]", "", name.lower())
+
+
+def meanings(names: Sequence[str]) -> dict[str, str]:
+    """The column of each meaning: the one whose name stands first in :data:`WORDS`."""
+    found: dict[str, str] = {}
+    by_word = {plain(name): name for name in reversed(names)}
+    for meaning, words in WORDS.items():
+        for word in words:
+            if word in by_word:
+                found[meaning] = by_word[word]
+                break
+    return found
+
+
+def layout_of(found: Mapping[str, str]) -> tuple[Layout | None, tuple[str, ...]] | None:
+    """The layout of the box, and the meanings of its columns; None where there is no box.
+
+    Under x and y some programs write the left and upper edges, others the middle (Roboflow,
+    Ultralytics' ``xywh``): their layout stays open.
+    """
+    forms: tuple[tuple[Layout | None, tuple[str, ...]], ...] = (
+        ("ltwh", ("left", "top", "width", "height")),
+        ("xyxy", ("left", "top", "right", "bottom")),
+        ("cxcywh", ("cx", "cy", "width", "height")),
+        (None, ("x", "y", "width", "height")),
+    )
+    for layout, parts in forms:
+        if all(part in found for part in parts):
+            return layout, parts
+    return None
+
+
+def is_table(names: Sequence[str]) -> bool:
+    """Whether the columns are those of boxes or of places of people."""
+    if _OURS in names:
+        return False
+    found = meanings(names)
+    when = "frame" in found or "time" in found
+    return layout_of(found) is not None or (when and all(p in found for p in ("id", "x", "y")))
+
+
+def read_table(
+    file: SourceFile,
+    name: str,
+    columns: Mapping[str, Column],
+    frame: int | None = None,
+    boxes_layout: Layout | None = None,
+) -> Iterator[Piece]:
+    """The boxes, a piece a camera, or the truth that a table holds.
+
+    Args:
+        file: For the messages.
+        name: The format, as it is shown.
+        columns: Cells by column, as text or numbers.
+        frame: The frame of all rows, where the file's name or place says it.
+        boxes_layout: How a box that is one list of four numbers is meant.
+
+    Raises:
+        FormatError: If there is no frame, or a cell is no number.
+    """
+    found = meanings(list(columns))
+    rows = len(next(iter(columns.values()), ()))
+    fps = None
+    if frame is None and "frame" not in found and "time" in found:
+        column = found["time"]
+        cells = [_seconds(cell) for cell in columns[column]]
+        frames, fps = _frames_of_times(file, column, _numbers(file, column, cells))
+    elif frame is None and "frame" not in found:
+        raise file.error(
+            'expected a column "frame" (or a number in the name of a file a frame), found the '
+            f"columns {shown(', '.join(columns))}"
+        )
+    elif frame is not None:
+        frames = np.full(rows, frame, dtype=np.int64)
+    else:
+        frames = _frames(file, found["frame"], columns[found["frame"]])
+    form = layout_of(found)
+    if form is None and "box" in found:
+        values, more = _fours(file, found["box"], columns[found["box"]], frames)
+        new = {meaning: cells for meaning, cells in more.items() if meaning not in found}
+        columns, found = {**columns, **new}, {**{meaning: meaning for meaning in new}, **found}
+        yield from _detections(file, name, columns, found, frames, values, boxes_layout, fps)
+    elif form is not None:
+        layout, parts = form
+        values = np.column_stack([_numbers(file, found[p], columns[found[p]]) for p in parts])
+        yield from _detections(file, name, columns, found, frames, values, layout, fps)
+    else:
+        yield _truth(file, name, columns, found, frames, fps)
+
+
+def to_unit(scores: Float[ndarray, " D"]) -> Float[ndarray, " D"]:
+    """Scores as parts of 1: logits through the logistic function, percents divided."""
+    if len(scores) == 0 or (scores.min() >= 0.0 and scores.max() <= 1.0):
+        return scores
+    if (scores == -1.0).all():  # "none"
+        return np.ones(len(scores))
+    if scores.min() >= 0.0:
+        return scores / max(float(scores.max()), 100.0 if scores.max() <= 100.0 else 0.0)
+    return np.asarray(1.0 / (1.0 + np.exp(-np.clip(scores, -50.0, 50.0))))
+
+
+def is_normalised(boxes: Float[ndarray, "D 4"]) -> bool:
+    """Whether the numbers are parts of the picture: no box of pixels is that small.
+
+    A few may be larger: some detectors draw people on beyond the picture.
+    """
+    return len(boxes) > 0 and bool(np.quantile(np.abs(boxes), 0.9) <= 1.5)
+
+
+def _detections(
+    file: SourceFile,
+    name: str,
+    columns: Mapping[str, Column],
+    found: Mapping[str, str],
+    frames: Int[ndarray, " D"],
+    boxes: Float[ndarray, "D 4"],
+    layout: Layout | None,
+    fps: float | None,
+) -> Iterator[Piece]:
+    scores = np.ones(len(frames))
+    if "score" in found:
+        scores = _numbers(file, found["score"], columns[found["score"]], blank=1.0)
+    keep = np.isfinite(boxes).all(axis=1) & np.isfinite(scores)
+    if "score" in found:
+        scores = to_unit(np.where(np.isfinite(scores), scores, 0.0))
+    if "class" in found:
+        keep &= people([str(cell) for cell in columns[found["class"]]])
+    cameras = np.array(_cameras(columns, found, len(frames)))
+    for camera in dict.fromkeys(cameras[keep].tolist()) or [""]:
+        rows = keep & (cameras == camera) if len(cameras) else keep
+        yield DetectionPiece(
+            source=file.path,
+            format=name,
+            camera=str(camera),
+            frames=frames[rows],
+            boxes=boxes[rows],
+            scores=scores[rows],
+            layout=layout,
+            normalised=is_normalised(boxes[rows]),
+            first_index=None if fps is None else 0,
+            last_frame=int(frames.max()) if len(frames) else None,
+            fps=fps,
+        )
+
+
+def _cameras(columns: Mapping[str, Column], found: Mapping[str, str], rows: int) -> list[str]:
+    """Of each row: by its column, or by what the names of its pictures have before the frame."""
+    if "camera" in found:
+        return [str(cell) for cell in columns[found["camera"]]]
+    pictures = columns[found["frame"]] if "frame" in found else ()
+    if pictures and isinstance(pictures[0], str) and number_in(pictures[0]) is not None:
+        named = [camera_of(str(cell)) for cell in pictures]
+        if len(set(named)) > 1:
+            return named
+    return [""] * rows
+
+
+def people(classes: Sequence[str]) -> Bool[ndarray, " D"]:
+    """Which rows are people: by a class's name; numbers count where no name is known.
+
+    A single class other than those is taken for people whatever it is called.
+    """
+    words = [re.sub(r"\.0$", "", word.strip().lower()) for word in classes]
+    for group in (PEOPLE[:4], ("0",), ("1",)):
+        is_one = np.array([word in group for word in words], dtype=bool)
+        if is_one.any():
+            return is_one
+    return np.full(len(words), len(set(words)) <= 1)
+
+
+def _truth(
+    file: SourceFile,
+    name: str,
+    columns: Mapping[str, Column],
+    found: Mapping[str, str],
+    frames: Int[ndarray, " G"],
+    fps: float | None,
+) -> TruthPiece:
+    axes = [axis for axis in "xyz" if axis in found]
+    places = np.full((len(frames), 3), np.nan)
+    for axis in axes:
+        places[:, "xyz".index(axis)] = _numbers(file, found[axis], columns[found[axis]])
+    ids = _whole_or_names(columns[found["id"]])
+    valid = None
+    if "valid" in found:
+        valid = _numbers(file, found["valid"], columns[found["valid"]]) > 0.5
+    unit: Unit | None = None
+    ending = plain(found["x"])[-2:]
+    if ending in ("mm", "cm"):
+        unit = "mm" if ending == "mm" else "cm"
+    good = np.isfinite(places[:, :2]).all(axis=1)
+    return TruthPiece(
+        source=file.path,
+        format=f"{name}: places",
+        frames=frames[good],
+        ids=ids[good],
+        positions=places[good],
+        unit=unit,
+        valid=None if valid is None else valid[good],
+        fps=fps,
+        first_index=None if fps is None else 0,
+    )
+
+
+def _frames(file: SourceFile, name: str, cells: Column) -> Int[ndarray, " D"]:
+    try:
+        values = np.asarray(cells, dtype=float)
+    except (ValueError, TypeError):
+        numbers = [number_in(str(cell)) for cell in cells]
+        if None in numbers:
+            cell = cells[numbers.index(None)]
+            raise file.error(f"expected a frame's number, found {shown(cell)}", name) from None
+        return np.array(numbers, dtype=np.int64)
+    whole = np.isfinite(values) & (values == np.round(values)) & (np.abs(values) < 2**53)
+    if not whole.all():
+        row = int(np.argmin(whole))
+        raise file.error(
+            f"row {row + 1}: expected the whole number of a frame, found {shown(cells[row])}", name
+        )
+    return values.astype(np.int64)
+
+
+def _frames_of_times(
+    file: SourceFile, name: str, times: Float[ndarray, " D"]
+) -> tuple[Int[ndarray, " D"], float]:
+    """Frames that are as far apart as the times, counted from time 0, and how many a second.
+
+    Times are seconds, or milliseconds where the column is called so. The rate that fits all of
+    them is taken: times are rounded, and where nobody was seen there are none.
+    """
+    unit = 1e-3 if plain(name).endswith("ms") else 1.0
+    seconds = times * unit
+    if not np.isfinite(seconds).all():
+        raise file.error("expected a time in every row", name)
+    own = np.unique(seconds)
+    if len(own) < 2 or own[0] < 0.0 or own[-1] > _LONGEST:
+        raise file.error(
+            f"expected two or more times from 0 to {_LONGEST:g} s since the beginning, found "
+            f'{own[0]:g} … {own[-1]:g} s; have a column "frame" instead'
+            if len(own)
+            else "expected times, found none",
+            name,
+        )
+    apart = np.diff(own)
+    steps = np.round(apart / np.median(apart))
+    fps = float(round(steps.sum() / apart[steps > 0].sum(), 3))
+    return np.round(seconds * fps).astype(np.int64), fps
+
+
+def _seconds(cell: Any) -> Any:
+    """A time of day (``00:01:02.5``) as seconds; anything else as it is."""
+    parts = re.fullmatch(r"(?:(\d+):)?(\d+):(\d+(?:[.,]\d*)?)", str(cell).strip())
+    if parts is None:
+        return cell
+    hours, minutes, seconds = parts.groups(default="0")
+    return 3600.0 * float(hours) + 60.0 * float(minutes) + float(seconds.replace(",", "."))
+
+
+def _numbers(
+    file: SourceFile, name: str, cells: Column, blank: float = np.nan
+) -> Float[ndarray, " D"]:
+    try:
+        return np.asarray([blank if c is None or c == "" else c for c in cells], dtype=float)
+    except (ValueError, TypeError):
+        for row, cell in enumerate(cells):
+            try:
+                float(cell if cell not in (None, "") else blank)
+            except (ValueError, TypeError):
+                raise file.error(
+                    f"row {row + 1}: expected a number, found {shown(cell)}", name
+                ) from None
+        raise
+
+
+def _fours(
+    file: SourceFile, name: str, cells: Column, frames: Int[ndarray, " D"]
+) -> tuple[Float[ndarray, "D 4"], dict[str, Column]]:
+    """Boxes that are lists of four numbers; and the score and class that may follow these.
+
+    A whole number that two rows of a frame share is no person's, so it is a class; of what
+    follows, the first column that is not whole is the score.
+    """
+    lengths = {len(cell) if isinstance(cell, list | tuple) else 0 for cell in cells}
+    lists: Column = cells
+    if lengths == {1}:  # [[left, top, …]], as mmpose writes them
+        lists = [cell[0] for cell in cells]
+    try:
+        values = np.asarray(list(lists), dtype=float)
+    except (ValueError, TypeError):
+        raise file.error("expected lists of four numbers", name) from None
+    if not len(values):
+        return np.zeros((0, 4)), {}
+    if values.ndim != 2 or not 4 <= values.shape[1] <= _LONGEST_BOX:
+        raise file.error("expected lists of four numbers, or with score and class", name)
+    more: dict[str, Column] = {}
+    for column in values[:, 4:].T:
+        parts = bool(((column >= 0.0) & (column <= 1.0)).all())
+        if "score" not in more and parts and (values.shape[1] == 5 or (column % 1.0).any()):
+            more["score"] = column
+        elif "score" in more and not (column % 1.0).any():
+            if len(np.unique(np.stack([frames, column]), axis=1).T) < len(column):
+                more.setdefault("class", column)
+    return values[:, :4], more
+
+
+def _whole_or_names(cells: Column) -> Int[ndarray, " G"]:
+    """Persons as whole numbers: as they are, or counted in the order of their first row."""
+    try:
+        values = np.asarray(cells, dtype=float)
+        if (values == np.round(values)).all() and (np.abs(values) < 2**53).all():
+            return values.astype(np.int64)
+    except (ValueError, TypeError):
+        pass
+    order = {name: place for place, name in enumerate(dict.fromkeys(map(str, cells)), 1)}
+    return np.array([order[str(cell)] for cell in cells], dtype=np.int64)

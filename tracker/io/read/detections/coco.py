@@ -1,0 +1,106 @@
+"""COCO: results (a list of image_id, bbox, score) or a data set with images and annotations.
+
+Boxes are left, top, width, height. AlphaPose writes the same with key points and ``box``.
+
+Source: Lin et al., "Microsoft COCO", ECCV 2014; cocodataset.org, "Data format", "Results
+format"; AlphaPose, "Output format".
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from tracker.io.read.columns import people, to_unit
+from tracker.io.read.detections.poses.body import read_people
+from tracker.io.read.picture_names import camera_of, number_in
+from tracker.io.read.pieces import DetectionPiece, Piece
+from tracker.io.read.protocol import Certainty, Kind
+from tracker.io.read.source import SourceFile
+from tracker.io.read.values import is_list_of_tables, numbers, shown
+
+NAME = "COCO results or annotations JSON"
+KIND: Kind = "detections"
+SERIES = False
+
+
+def recognise(file: SourceFile) -> Certainty:
+    """A list of records with image_id, or a table with images and annotations."""
+    head = file.head_text.lstrip()
+    if head[:1] == "[" and '"image_id"' in head and ('"bbox"' in head or '"keypoints"' in head):
+        return Certainty.SURE
+    if head[:1] != "{" or not re.search(r'"(images|annotations)"\s*:', head):
+        return Certainty.NO
+    values = file.json
+    return Certainty.SURE if {"images", "annotations"} <= values.keys() else Certainty.NO
+
+
+def read(file: SourceFile) -> Iterator[Piece]:
+    """A piece a folder of the images' names, which is a camera; one where there are no names."""
+    values = file.json
+    images: dict[Any, Any] = {}
+    classes: dict[Any, str] = {}
+    if isinstance(values, dict):
+        for part in ("images", "annotations"):
+            if not is_list_of_tables(values[part]):
+                raise file.error(f"expected a list of tables, found {shown(values[part])}", part)
+        images = {image.get("id"): image for image in values["images"]}
+        categories = values.get("categories", [])
+        classes = {c.get("id"): str(c.get("name")) for c in categories if isinstance(c, dict)}
+        records = values["annotations"]
+    else:
+        records = values
+    if not is_list_of_tables(records):
+        raise file.error(f"expected a list of tables, found {shown(records)}")
+    by_camera: dict[str, list[Any]] = {}
+    for record in records:
+        image = images.get(record.get("image_id"), {})
+        name = str(image.get("file_name", record.get("image_id")))
+        by_camera.setdefault(camera_of(name), []).append((name, image, record))
+    for camera, rows in (by_camera or {"": []}).items():
+        yield _piece(file, camera, rows, classes)
+
+
+def _piece(
+    file: SourceFile, camera: str, rows: list[Any], classes: dict[Any, str]
+) -> DetectionPiece:
+    frames = np.zeros(len(rows), dtype=np.int64)
+    boxes = np.full((len(rows), 4), np.nan)
+    scores = np.ones(len(rows))
+    for place, (name, _, record) in enumerate(rows):
+        frame = number_in(name)
+        if frame is None:
+            raise file.error(f"expected a name with the frame's number, found {shown(name)}")
+        frames[place] = frame
+        box = record.get("bbox", record.get("box"))
+        if box is not None:
+            found = numbers(file, f"record {place} bbox", box)
+            if len(found) != 4:
+                raise file.error(f"expected 4 numbers, found {len(found)}", f"record {place} bbox")
+            boxes[place] = found
+        scores[place] = numbers(file, f"record {place} score", [record.get("score", 1.0)])[0]
+    kinds = [str(classes.get(r.get("category_id"), r.get("category_id", 1))) for *_, r in rows]
+    keypoints = read_people(file, [record.get("keypoints") for *_, record in rows])
+    if keypoints is not None:
+        boxes = np.where(np.isfinite(keypoints.boxes), keypoints.boxes, boxes)
+    keep = people(kinds) & np.isfinite(boxes).all(axis=1) if rows else np.zeros(0, dtype=bool)
+    # AlphaPose's score is a sum over box and joints, and above 1
+    scores = to_unit(np.minimum(scores, 1.0) if keypoints is not None else scores)
+    image = rows[0][1] if rows else {}
+    size: tuple[Any, Any] = (image.get("width"), image.get("height"))
+    known = all(isinstance(side, int) and 0 < side < 65536 for side in size)
+    return DetectionPiece(
+        source=file.path,
+        format="AlphaPose JSON" if keypoints is not None else NAME,
+        camera=camera,
+        frames=frames[keep],
+        boxes=boxes[keep],
+        scores=scores[keep],
+        layout="ltwh",
+        keypoints=None if keypoints is None else keypoints.joints[keep],
+        last_frame=int(frames.max()) if len(frames) else None,
+        image_size=(int(size[0]), int(size[1])) if known else None,
+    )

@@ -1,0 +1,218 @@
+"""CSV with a header, or JSON of records: supervision's sinks, Ultralytics, one's own.
+
+Columns in any order; see :mod:`tracker.io.read.columns`. A file a frame (Ultralytics'
+``to_json`` and ``to_csv``) has its frame in its name.
+
+Sources: supervision, "Save detections" (CSVSink, JSONSink: x_min, y_min, x_max, y_max);
+Ultralytics, ``Results.summary`` (name, class, confidence, box with x1, y1, x2, y2).
+"""
+
+from __future__ import annotations
+
+import ast
+import csv
+import io
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from tracker.io.read.columns import Column, is_table, layout_of, meanings, read_table
+from tracker.io.read.picture_names import is_camera_number, number_in
+from tracker.io.read.pieces import FormatError, Piece
+from tracker.io.read.protocol import Certainty, Kind
+from tracker.io.read.source import SourceFile
+from tracker.io.read.values import is_list_of_tables
+
+NAME = "table of boxes or places (CSV, JSON)"
+KIND: Kind = "detections"
+SERIES = True
+
+
+_FIVE = ["frame", "1", "2", "3", "4"]
+"""The header that five columns are given which have none: the four numbers of a box, meant
+somehow."""
+
+
+_DECIMAL_COMMA = re.compile(r"\A(\s*-?\d+),(\d+\s*)\Z")
+
+
+def recognise(file: SourceFile) -> Certainty:
+    """A header, or records, with the names of a box or of a person's place."""
+    start = file.head_text.lstrip()[:1]
+    if start in ("[", "{"):
+        if not any(word in file.head_text for word in ("box", "x_min", "xmin", "x1", "left")):
+            return Certainty.NO
+        records = _records(file)
+        names = list(flat(records[0][1])) if records else []
+        has_box = "box" in meanings(names) or layout_of(meanings(names)) is not None
+        return Certainty.LIKELY if has_box or is_table(names) else Certainty.NO
+    lines = _data_lines(file.head_text)
+    names = _cells(lines[0], _delimiter(lines[0])) if lines else []
+    if names == _FIVE:
+        return Certainty.POSSIBLE
+    return Certainty.LIKELY if len(names) > 3 and is_table(_flat_names(names)) else Certainty.NO
+
+
+def read(file: SourceFile) -> Iterator[Piece]:
+    """One piece a camera; of a series of files a frame, all together."""
+    parts = [_columns(file.member(path)) for path in file.series]
+    alone = [bool({"frame", "time"} & meanings(list(columns)).keys()) for columns, _ in parts]
+    # cam1.csv, cam2.csv … without frames are no frames either
+    of_cameras = all(is_camera_number(path.stem) for path in file.series)
+    if len(parts) == 1 or any(alone) or of_cameras:
+        for path, (columns, frames) in zip(file.series, parts, strict=True):
+            member = file.member(path)
+            if columns:
+                name = _name(columns)
+                yield from read_table(member, name, {**columns, **_own_frames(columns, frames)})
+        return
+    names = list(dict.fromkeys(name for columns, _ in parts for name in columns))
+    together: dict[str, list[Any]] = {name: [] for name in names}
+    together["frame"] = []
+    for path, (columns, _) in zip(file.series, parts, strict=True):
+        rows = len(next(iter(columns.values()), ()))
+        for name in names:
+            together[name] += list(columns.get(name, [""] * rows))
+        together["frame"] += [number_in(path.name)] * rows
+    if together["frame"]:
+        yield from read_table(file, _name(together), together)
+
+
+def _own_frames(columns: Mapping[str, Column], frames: list[int] | None) -> dict[str, Column]:
+    has_one = "frame" in meanings(list(columns))
+    return {} if has_one or frames is None else {"frame": frames}
+
+
+def _name(columns: Mapping[str, Column]) -> str:
+    names = set(columns)
+    if {"x_min", "y_min", "x_max", "y_max", "tracker_id"} <= names:
+        return "supervision sink"
+    if {"name", "class", "confidence"} <= names:
+        return "Ultralytics results"
+    return "table"
+
+
+def _columns(file: SourceFile) -> tuple[dict[str, Column], list[int] | None]:
+    """Cells by column; and of a list of lists the frame of each row."""
+    if file.head_text.lstrip()[:1] in ("[", "{"):
+        records = [(frame, flat(record)) for frame, record in _records(file)]
+        names = list(dict.fromkeys(name for _, record in records for name in record))
+        columns: dict[str, Column] = {
+            name: [record.get(name, "") for _, record in records] for name in names
+        }
+        frames = [frame for frame, _ in records]
+        return columns, None if None in frames else [f for f in frames if f is not None]
+    lines = _data_lines(file.text())
+    if not lines:
+        return {}, None
+    delimiter = _delimiter(lines[0])
+    try:
+        rows = list(csv.reader(io.StringIO("\n".join(lines)), delimiter=delimiter))
+    except csv.Error as error:
+        raise file.error(f"is not a CSV table ({error})") from None
+    names = [name.strip() for name in rows[0]]
+    for line, row in enumerate(rows[1:], 2):
+        if len(row) != len(names):
+            raise file.error(
+                f"row {line}: expected {len(names)} columns as in the header, found {len(row)}"
+            )
+    if delimiter != ",":
+        rows = [[_DECIMAL_COMMA.sub(r"\1.\2", cell) for cell in row] for row in rows]
+    cells = list(zip(*rows[1:], strict=True)) or [()] * len(names)
+    if names == _FIVE:
+        return {"frame": cells[0], "box": list(zip(*cells[1:], strict=True))}, None
+    return _with_boxes(dict(zip(names, cells, strict=True))), None
+
+
+def _with_boxes(columns: dict[str, Column]) -> dict[str, Column]:
+    """A column of boxes in Python's notation, as a data frame prints them, as columns."""
+    box = meanings(list(columns)).get("box")
+    if box is None or layout_of(meanings(list(columns))) is not None:
+        return columns
+    try:
+        cells = [ast.literal_eval(cell[:1000]) for cell in columns[box]]
+    except (ValueError, SyntaxError, MemoryError, RecursionError):
+        return columns
+    if cells and all(isinstance(cell, dict) for cell in cells):
+        parts: dict[str, Column] = {part: [c.get(part, "") for c in cells] for part in cells[0]}
+        return {**columns, **parts}
+    return {**columns, box: cells}
+
+
+def _records(file: SourceFile) -> list[tuple[int | None, dict[str, Any]]]:
+    """Records with their frame, where they are in a list a frame."""
+    values = file.json if file.json_lines is None else _of_lines(file.json_lines)
+    if isinstance(values, dict):  # one list under some name
+        lists = [value for value in values.values() if is_list_of_tables(value) and value]
+        values = lists[0] if len(lists) == 1 else []
+    if not isinstance(values, list):
+        return []
+    if values and all(isinstance(item, list) for item in values):
+        return [
+            (frame, record)
+            for frame, records in enumerate(values)
+            for record in records
+            if isinstance(record, dict)
+        ]
+    return [(None, record) for record in values if isinstance(record, dict)]
+
+
+def _of_lines(values: list[Any]) -> list[dict[str, Any]]:
+    """The records of lines; those of a list among a line's fields each with its other fields."""
+    records: list[dict[str, Any]] = []
+    for line in values:
+        if not isinstance(line, dict):
+            continue
+        several = [key for key, value in line.items() if is_list_of_tables(value)]
+        if len(several) == 1:
+            shared = {key: value for key, value in line.items() if key != several[0]}
+            records += [{**shared, **own} for own in line[several[0]]]
+        else:
+            records.append(line)
+    return records
+
+
+def flat(record: Mapping[str, Any]) -> dict[str, Any]:
+    """A record with the fields of its box as its own."""
+    flat = {key: value for key, value in record.items() if not isinstance(value, dict)}
+    for key in ("box", "bbox", "bounding_box"):
+        if isinstance(record.get(key), dict):
+            flat.update(record[key])
+    return flat
+
+
+def _flat_names(names: list[str]) -> list[str]:
+    return [*names, "x1", "y1", "x2", "y2"] if "box" in names or "bbox" in names else names
+
+
+def _data_lines(text: str) -> list[str]:
+    """The header and the rows; a header may be a comment, and blanks may stand for commas."""
+    lines = [line for line in text.splitlines() if line.strip()]
+    first = next((n for n, line in enumerate(lines) if not line.startswith("#")), len(lines))
+    header = lines[first - 1].lstrip("#") if first else ""
+    if first < len(lines) and not re.search("[A-Za-z]", lines[first]) and header:
+        lines[first - 1], first = header, first - 1
+    lines = lines[first:]
+    if lines and not any(sign in lines[0] for sign in ",;\t"):
+        lines = [",".join(line.split()) for line in lines]
+    return [_delimiter(lines[0]).join(_FIVE), *lines] if lines and _is_five(lines[0]) else lines
+
+
+def _is_five(line: str) -> bool:
+    """Whether a line is the whole number of a frame and four numbers of pixels."""
+    try:
+        frame, *four = [float(cell) for cell in re.split("[,;\t]", line)]
+    except ValueError:
+        return False
+    return len(four) == 4 and frame == round(frame) and max(four) > 1.5
+
+
+def _delimiter(line: str) -> str:
+    return max(",;\t", key=line.count)
+
+
+def _cells(line: str, delimiter: str) -> list[str]:
+    try:
+        return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter), [])]
+    except (csv.Error, FormatError):
+        return []

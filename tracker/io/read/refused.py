@@ -1,0 +1,126 @@
+"""What people have and cannot be read: each is refused by its name, with what to do instead."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from typing import NamedTuple
+
+from tracker.io.read.pieces import FormatError
+from tracker.io.read.source import SourceFile
+
+
+class _Refused(NamedTuple):
+    what: str
+    is_it: Callable[[SourceFile], bool]
+    instead: str
+
+
+def _starts(*signatures: bytes) -> Callable[[SourceFile], bool]:
+    return lambda file: file.head.startswith(signatures)
+
+
+def _holds(pattern: str) -> Callable[[SourceFile], bool]:
+    return lambda file: re.search(pattern, file.head_text[:4096]) is not None
+
+
+def _is_pickle(file: SourceFile) -> bool:
+    """Protocols 2 to 5 begin with their number."""
+    return re.match(rb"\x80[\x02-\x05]", file.head) is not None
+
+
+def _is_array_of_objects(file: SourceFile) -> bool:
+    return file.head.startswith(b"\x93NUMPY") and b"'|O'" in file.head[:256]
+
+
+def _is_motive(file: SourceFile) -> bool:
+    return "<Calibration" in file.head[:4096].decode("utf-16", errors="ignore")
+
+
+def _is_dlt(file: SourceFile) -> bool:
+    """Eleven rows of a number a camera."""
+    rows = file.head_text.split()
+    widths = {row.count(",") for row in rows}
+    return len(rows) == 11 and len(widths) == 1 and re.search("[A-Za-df-z]", "".join(rows)) is None
+
+
+_ITSELF = "reading it would run what is in it; save K, R and t as JSON or .npz, and boxes as CSV"
+
+_KNOWN: tuple[_Refused, ...] = (
+    _Refused("a Python pickle (as of DeepLabCut's 3D projects)", _is_pickle, _ITSELF),
+    _Refused("a NumPy array of Python objects (a pickle)", _is_array_of_objects, _ITSELF),
+    _Refused(
+        "a NumPy array of another shape than cameras have",
+        _starts(b"\x93NUMPY"),
+        "save boxes as CSV with a header, and K, R and t of a camera together as .npz",
+    ),
+    _Refused(
+        "HDF5 (as of DeepLabCut, SLEAP or MATLAB 7.3)",
+        _starts(b"\x89HDF\r\n\x1a\n"),
+        "save the boxes or key points as CSV, a calibration as JSON with K, R and t",
+    ),
+    _Refused(
+        "a table of joints of DeepLabCut (or Anipose's 2D points)",
+        _holds(r"\Ascorer,"),
+        "save a box a row instead: frame, left, top, width, height of each animal's joints",
+    ),
+    _Refused(
+        "a table of instances of SLEAP",
+        _holds(r"\Atrack,frame_idx,instance\.score"),
+        "save a box a row instead: frame, left, top, width, height of each instance's joints",
+    ),
+    _Refused(
+        "a table of DLT coefficients (as of easyWand and Argus)",
+        _is_dlt,
+        "save K, R and t of each camera as JSON, or a 3×4 projection matrix a camera as text",
+    ),
+    _Refused(
+        "Bundler's model",
+        _holds(r"\A# Bundle file"),
+        "it has no sizes of pictures; export the same model for COLMAP (text) or Metashape (XML)",
+    ),
+    _Refused(
+        "Vicon's calibration (XCP)",
+        _holds(r"<Cameras[\s>](.|\n)*DEVICEID="),
+        "its lens is another than OpenCV's; save K, R and t of the video cameras as JSON, or "
+        "calibrate them in Pose2Sim or Caliscope",
+    ),
+    _Refused(
+        "Motive's calibration",
+        _is_motive,
+        "export the cameras with Motive's API, and save K, R and t as JSON",
+    ),
+    _Refused(
+        "Motive's take (CSV)",
+        _holds(r"\AFormat Version,"),
+        "export it as TRC to have it as truth",
+    ),
+    _Refused("C3D", _starts(*(bytes([n, 0x50]) for n in range(2, 12))), "export it as TRC"),
+    _Refused("a skeleton in BVH", _holds(r"\AHIERARCHY\s"), "export the joints as TRC"),
+    _Refused("FBX", _starts(b"Kaydara FBX"), "export the joints as TRC"),
+    _Refused(
+        "a ROS bag",
+        _starts(b"#ROSBAG", b"\x89MCAP"),
+        "extract pictures or video, and camera_info as YAML",
+    ),
+)
+
+
+_ARCHIVE = _Refused(
+    "an archive (ZIP, gzip, 7z, RAR or Excel's .xlsx; or a spoilt .npz)",
+    _starts(b"PK\x03\x04", b"PK\x05\x06", b"\x1f\x8b", b"7z\xbc\xaf\x27\x1c", b"Rar!\x1a"),
+    "unpack it and name the folder; save a table as CSV",
+)
+
+
+def refusal(file: SourceFile, complaint: FormatError | None = None) -> FormatError | None:
+    """What a file is that no format reads, and what to do; None where it is not known.
+
+    Args:
+        file: Which no format reads.
+        complaint: What one of them said of it, who knows more than that it is an archive.
+    """
+    for one in (*_KNOWN, _ARCHIVE) if complaint is None else _KNOWN:
+        if one.is_it(file):
+            return file.error(f"is {one.what}, which is not read; {one.instead}")
+    return complaint

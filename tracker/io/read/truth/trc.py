@@ -1,0 +1,86 @@
+"""TRC: the markers or joints of one person in 3D, as OpenSim and Pose2Sim write them; y up.
+
+The person's place is the mid of the hips where joints are named so, else the mid of all.
+
+Source: OpenSim, "Marker (.trc) files".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
+
+from tracker.io.read.pieces import Piece, TruthPiece, Unit
+from tracker.io.read.protocol import Certainty, Kind
+from tracker.io.read.source import SourceFile
+
+NAME = "TRC markers or joints"
+KIND: Kind = "truth"
+SERIES = False
+
+HIPS = {"rhip", "lhip", "hip", "midhip", "pelvis", "rasis", "lasis", "rpsis", "lpsis"}
+
+_MOST_FRAMES = 1e9
+"""Of one file: a year at 30 a second."""
+
+_UNITS: dict[str, Unit] = {"m": "m", "cm": "cm", "mm": "mm"}
+
+
+def recognise(file: SourceFile) -> Certainty:
+    """The word PathFileType, with which every TRC begins."""
+    return Certainty.SURE if file.head_text.startswith("PathFileType") else Certainty.NO
+
+
+def read(file: SourceFile) -> Iterator[Piece]:
+    """One piece with the place of the one person; 1 is its id."""
+    lines = file.lines()
+    if len(lines) < 5:
+        raise file.error("expected five lines of a header, found fewer; it is cut short")
+    facts = dict(zip(lines[1].split("\t"), lines[2].split("\t"), strict=False))
+    names = lines[3].rstrip().split("\t")[2::3]
+    rows = [line.split("\t") for line in lines[5:] if line.strip()]
+    width = 2 + 3 * len(names)
+    table = np.full((len(rows), width), np.nan)
+    for place, row in enumerate(rows):
+        if len(row) < 2 or len(row) > width + 1:
+            raise file.error(
+                f"row {place + 1}: expected {width} columns by the header, found {len(row)}"
+            )
+        try:
+            values = [float(cell) if cell.strip() else np.nan for cell in row[:width]]
+        except ValueError:
+            raise file.error(f"row {place + 1}: expected numbers") from None
+        table[place, : len(values)] = values
+    joints = table[:, 2:].reshape(len(rows), len(names), 3)
+    place_of = _middle(joints, [name.strip().lower() for name in names])
+    # of a number that is no frame's nothing is known
+    good = np.isfinite(place_of).all(axis=1) & (np.abs(table[:, 0]) < _MOST_FRAMES)
+    try:
+        rate = float(facts.get("DataRate", "nan"))
+    except ValueError:
+        rate = float("nan")
+    frames = table[good, 0].astype(np.int64)
+    yield TruthPiece(
+        source=file.path,
+        format=NAME,
+        frames=frames,
+        ids=np.ones(len(frames), dtype=np.int64),
+        positions=place_of[good],
+        unit=_UNITS.get(facts.get("Units", "").strip().lower()),
+        up="y",
+        fps=rate if np.isfinite(rate) and rate > 0.0 else None,
+        first_index=1 if len(frames) == 0 or frames.min() > 0 else 0,
+    )
+
+
+def _middle(joints: Float[ndarray, "F J 3"], names: list[str]) -> Float[ndarray, "F 3"]:
+    """The mean of the hips, else of all joints that are there."""
+    hips = [n for n, name in enumerate(names) if name.replace("_", "") in HIPS]
+    chosen = joints[:, hips] if hips else joints
+    there = np.isfinite(chosen).all(axis=2)
+    count = there.sum(axis=1)[:, None]
+    total = np.where(there[:, :, None], chosen, 0.0).sum(axis=1)
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan)

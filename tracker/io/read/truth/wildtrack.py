@@ -1,0 +1,98 @@
+"""WILDTRACK's ``annotations_positions``: JSON a frame, places on a grid and boxes of each view.
+
+The place of ``positionID`` i is x = −3 m + 0.025 m · (i mod 480), y = −9 m + 0.025 m · ⌊i/480⌋
+on the floor, centimetres in its calibration; boxes are corners, −1 where a view does not see.
+
+Source: Chavdarova et al., "WILDTRACK", CVPR 2018, and its notes on the annotations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from tracker.io.read.picture_names import number_in
+from tracker.io.read.pieces import DetectionPiece, Piece, TruthPiece
+from tracker.io.read.protocol import Certainty, Kind
+from tracker.io.read.source import SourceFile
+from tracker.io.read.values import is_list_of_tables, need, vector
+
+NAME = "WILDTRACK annotations"
+KIND: Kind = "truth"
+SERIES = True
+
+GRID_COLUMNS = 480
+CELL = 0.025
+"""Metres."""
+ORIGIN = (-3.0, -9.0)
+"""Metres: the place of position 0."""
+
+VIDEO_RATE = 10.0
+"""The numbers of the files count frames at this rate: 0, 5, 10 … are two a second."""
+
+
+def recognise(file: SourceFile) -> Certainty:
+    """JSON records with personID, positionID and views."""
+    head = file.head_text
+    is_it = all(f'"{word}"' in head for word in ("personID", "positionID", "views"))
+    return Certainty.SURE if is_it else Certainty.NO
+
+
+def read(file: SourceFile) -> Iterator[Piece]:
+    """The truth, and the boxes of each view."""
+    rows: list[tuple[int, int, int]] = []
+    boxes: dict[int, list[tuple[int, list[float]]]] = {}
+    numbers = [number_in(path.name) for path in file.series]
+    known = [n for n in numbers if n is not None]
+    stride = int(np.gcd.reduce(np.diff(known))) if len(known) > 1 else 1
+    stride = stride or 1
+    for place, path in enumerate(file.series):
+        member = file.member(path)
+        number = numbers[place]
+        frame = place if number is None else (number - known[0]) // stride
+        if not is_list_of_tables(member.json):
+            raise member.error("expected a list of people")
+        for person in member.json:
+            need(member, person, ("personID", "positionID", "views"))
+            who, cell = vector(
+                member, "personID and positionID", [person["personID"], person["positionID"]], 2, ""
+            )
+            rows.append((frame, int(who), int(cell)))
+            for view in person["views"]:
+                need(member, view, ("viewNum", "xmin", "ymin", "xmax", "ymax"), "views")
+                found = vector(
+                    member,
+                    "views",
+                    [view[side] for side in ("viewNum", "xmin", "ymin", "xmax", "ymax")],
+                    5,
+                    "a box",
+                )
+                seen = boxes.setdefault(int(found[0]), [])
+                if found[1] != -1 or found[3] != -1:
+                    seen.append((frame, found[1:].tolist()))
+    table = np.array(rows, dtype=np.int64).reshape(-1, 3)
+    floor = np.column_stack([table[:, 2] % GRID_COLUMNS, table[:, 2] // GRID_COLUMNS]) * CELL
+    yield TruthPiece(
+        source=file.path,
+        format=NAME,
+        frames=table[:, 0],
+        ids=table[:, 1],
+        positions=np.column_stack([floor + ORIGIN, np.full(len(table), np.nan)]),
+        unit="m",
+        up="z",
+        fps=VIDEO_RATE / stride,
+        first_index=0,
+    )
+    for view in sorted(boxes):
+        yield DetectionPiece(
+            source=file.path,
+            format=NAME,
+            camera=str(view),
+            frames=np.array([frame for frame, _ in boxes[view]], dtype=np.int64),
+            boxes=np.array([box for _, box in boxes[view]], dtype=float).reshape(-1, 4),
+            scores=np.ones(len(boxes[view])),
+            layout="xyxy",
+            first_index=0,
+            last_frame=len(file.series) - 1,
+        )

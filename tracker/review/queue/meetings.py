@@ -1,0 +1,180 @@
+"""Two people so near, or so alike to the cameras, that they may have been exchanged."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from jaxtyping import Float, Int
+from numpy import ndarray
+
+from tracker.review.queue.doubt import Lanes
+from tracker.review.queue.linking import Move, Piece
+from tracker.runs.run import Run
+
+_CLOSE = 2.0
+"""Target widths within which two people are close."""
+
+_EXCHANGED = 0.12
+"""Probability, before anything is looked at, that two who touch are exchanged."""
+
+_ALONE = 1.5
+"""Log odds by which it is rarer that of two who meet one goes on as the other and he as nobody."""
+
+_TURN = 0.6
+"""Metres a second: standard deviation of how somebody's velocity changes while he meets another."""
+
+_STRIDE = 0.5
+"""Seconds before and after over which a velocity is taken."""
+
+_MOST = 3.0
+"""Log odds that velocities add at most: their model is a rough one."""
+
+_EVEN = 0.3
+"""Share of two people's boxes that is drawn between them, from which on they are in doubt though
+they are not close."""
+
+
+def meetings(run: Run, lanes: Lanes) -> Iterator[Move]:
+    """Exchanges, and their halves, once for each time that two people meet.
+
+    The odds are those of a table by the distance, times how much likelier the exchange makes the
+    velocities before and after: with u and v those of the one relative to the other before and
+    after, and each one's change of velocity of N(0, σ² I),
+
+        log odds = −u · v / σ²
+
+    so who goes straight on stays himself, and two who seem to have turned back were exchanged.
+    """
+    step_time = run.sequence.step_time
+    width = 2.0 * float(run.sequence.target_half_extents[:2].mean())
+    drawn = draws(run)
+    pause = max(round(1.0 / step_time), 2)
+    for (one, other), met in _near(run, _CLOSE * width, drawn).items():
+        steps = np.array([step for step, _ in met])
+        for part in np.split(np.arange(len(met)), np.flatnonzero(np.diff(steps) > pause) + 1):
+            nearest, apart = min((met[k] for k in part.tolist()), key=lambda at: at[1])
+            first, last = int(steps[part[0]]) - 1, int(steps[part[-1]]) + 1
+            mine, theirs = (
+                Piece(track, lanes.place(track, last, after=True), lanes.place(track, first))
+                for track in (one, other)
+            )
+            draw = max(drawn.get((one, other, int(steps[k])), 0.0) for k in part.tolist())
+            wrong = max(_EXCHANGED * float(np.exp(-apart / width)), 0.1 * (draw > _EVEN))
+            odds = float(np.log(wrong) - np.log1p(-wrong))
+            odds += _straight_on(lanes, one, other, nearest, step_time)
+            why = f"{apart:.2f} m apart at step {nearest}"
+            if draw > _EVEN:
+                why += f", and {100 * draw:.0f} % of their boxes fit either"
+            for i, j in ((mine, theirs), (theirs, mine)):
+                yield Move((i, j), (i, j), "crossing", odds, why)
+                yield Move((i,), (i, j), "crossing", odds - _ALONE, why)
+
+
+def _near(
+    run: Run, reach: float, drawn: dict[tuple[int, int, int], float]
+) -> dict[tuple[int, int], list[tuple[int, float]]]:
+    """The steps at which two are near, or their boxes drawn between them, and how far apart."""
+    tracks = run.tracks
+    found: dict[tuple[int, int], list[tuple[int, float]]] = {}
+    for step in np.unique(tracks.frames).tolist():
+        own = tracks.at(step)
+        ids, ground = tracks.ids[own].tolist(), tracks.positions[own, :2]
+        apart = np.hypot(*(ground[:, None] - ground[None]).transpose(2, 0, 1))
+        for a, b in np.argwhere(np.triu(apart < 2.0 * reach, 1)).tolist():
+            pair = (ids[a], ids[b])
+            if apart[a, b] < reach or drawn.get((*pair, step), 0.0) > _EVEN:
+                found.setdefault(pair, []).append((step, float(apart[a, b])))
+    return found
+
+
+def _straight_on(lanes: Lanes, one: int, other: int, step: int, step_time: float) -> float:
+    """Log odds of an exchange at a step by the velocities around it; 0 where they are not known."""
+    stride = max(round(_STRIDE / step_time), 1)
+    relative: Float[ndarray, "3 2"] = np.zeros((3, 2))
+    for k, at in enumerate((step - stride, step, step + stride)):
+        places = [lanes.place(track, at) for track in (one, other)]
+        if any(place.step != at for place in places):
+            return 0.0
+        relative[k] = np.subtract(places[0][1:3], places[1][1:3])
+    before, after = np.diff(relative, axis=0) / (stride * step_time)
+    return float(np.clip(-(before @ after) / _TURN**2, -_MOST, _MOST))
+
+
+def draws(run: Run) -> dict[tuple[int, int, int], float]:
+    """How far the cameras' boxes could be either of two people's.
+
+    It is Σ_c Σ_z min(p_c(z | i), p_c(z | j)) over the cameras c that have boxes of theirs, divided
+    by their number, by the association probabilities p of the fusion.
+
+    Returns:
+        By the ids of the two, the smaller first, and the step; who shares nothing is not there.
+    """
+    steps, labels, cameras, boxes, shares = _associated(run)
+    if not len(steps):
+        return {}
+    who = _tracks_of(run, steps, labels)
+    known = who >= 0
+    steps, cameras, boxes, shares, who = (
+        column[known] for column in (steps, cameras, boxes, shares, who)
+    )
+    order = np.lexsort((who, boxes, cameras, steps))
+    steps, cameras, boxes, shares, who = (
+        column[order] for column in (steps, cameras, boxes, shares, who)
+    )
+    looks: dict[tuple[int, int], set[int]] = {}
+    for step, track, camera in zip(steps.tolist(), who.tolist(), cameras.tolist(), strict=True):
+        looks.setdefault((step, track), set()).add(camera)
+    total: dict[tuple[int, int, int], float] = {}
+    for lag in range(1, len(steps)):
+        same = np.flatnonzero(
+            (steps[lag:] == steps[:-lag])
+            & (cameras[lag:] == cameras[:-lag])
+            & (boxes[lag:] == boxes[:-lag])
+        )
+        if not len(same):
+            break
+        for k in same.tolist():
+            a, b, step = int(who[k]), int(who[k + lag]), int(steps[k])
+            if a != b:
+                share = float(min(shares[k], shares[k + lag]))
+                total[a, b, step] = total.get((a, b, step), 0.0) + share
+    return {
+        (a, b, step): share / len(looks[step, a] | looks[step, b])
+        for (a, b, step), share in total.items()
+    }
+
+
+def _associated(run: Run) -> tuple[ndarray, ndarray, ndarray, ndarray, ndarray]:
+    """Step, label, camera, box and probability of every association."""
+    each = [
+        (step, result) for step, result in enumerate(run.fused) if len(result.associations.boxes)
+    ]
+    if not each:
+        nothing = np.zeros(0, dtype=np.int64)
+        return nothing, nothing, nothing, nothing, np.zeros(0)
+    told = [result.associations for _, result in each]
+    return (
+        np.repeat([step for step, _ in each], [len(one.boxes) for one in told]),
+        np.concatenate([result.posterior.labels[result.associations.components]
+                        for _, result in each]),
+        np.concatenate([one.cameras for one in told]),
+        np.concatenate([one.boxes for one in told]),
+        np.concatenate([one.probabilities for one in told]),
+    )  # fmt: skip
+
+
+def _tracks_of(run: Run, steps: Int[ndarray, " A"], labels: Int[ndarray, " A"]) -> ndarray:
+    """The id of the track with a label at a step, -1 for none."""
+    tracks = run.tracks
+    own = np.flatnonzero(tracks.labels >= 0)
+    if not len(own):
+        return np.full(len(steps), -1, dtype=np.int64)
+    most = int(max(tracks.labels.max(), labels.max())) + 1
+    keys = tracks.frames[own] * most + tracks.labels[own]
+    order = np.argsort(keys, kind="stable")
+    wanted = steps * most + labels
+    at = np.minimum(np.searchsorted(keys, wanted, sorter=order), len(own) - 1)
+    found = own[order[at]]
+    hit = (keys[order[at]] == wanted) & (labels >= 0)
+    return np.where(hit, tracks.ids[found], -1)

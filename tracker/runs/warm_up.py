@@ -1,0 +1,232 @@
+"""Every kernel compiled before it is needed, by a few steps of every method.
+
+numba compiles a function when it is first called, for the arguments it is called with.
+So a tiny made-up recording is tracked with each method and in each way that calls other
+kernels; what the first real run calls is then there.
+
+``python -m tracker.runs.warm_up`` does it in two processes, one a half of the methods, which
+leave the interpreter of the workbench alone. Each tells how far it is: a line ``done
+total`` whenever a kernel has been compiled; the first half tells ``ready`` when the method
+that a sequence with templates starts with has what cannot run as plain Python.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterable
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from tracker.geometry.camera import Camera
+from tracker.kernels import compilation
+from tracker.parameters import METHODS, PRESETS, MethodKey, RunParameters, with_values
+from tracker.parameters.registry import FOLLOWING, ORIGINS, REGISTERED
+from tracker.runs import pipeline
+from tracker.sequences.sequence import Detections, Entrance, Room, Sequence, Template, View
+
+STEPS = 36
+EMPTY = 12
+"""Steps before anybody is there, of which the background is learnt."""
+
+SIZE = (160, 120)
+"""Pixels of a picture."""
+
+_HALF_EXTENTS = np.array([0.3, 0.3, 0.84])
+_WAYS = (((-1.2, 0.2, 0.84), (1.2, 0.2, 0.84)), ((1.2, -0.3, 0.84), (-1.2, -0.3, 0.84)))
+"""Where each of two people comes from and goes to, metres: they pass each other."""
+
+_COLOURS = ((40, 40, 220), (220, 60, 40))
+"""Of the two people, blue green red."""
+
+HALVES = ("first", "second")
+"""The work of two processes: stage 1 with the intensity filter; and the labelled fusion's step,
+which takes longest to compile, with what comes after it."""
+
+_OTHER_WAYS = (
+    {"fusion.update": "unscented"},
+    {"fusion.measurement": "centre", "fusion.motion": "random_walk"},
+    {"fusion.measurement": "box_and_width", "fusion.extraction": "boxes"},
+    {"single_view": "colour_phd", "foreground.model": "adaptive"},
+)
+"""Values that call kernels which neither the defaults nor a preset call."""
+
+
+def compile_kernels(
+    half: str,
+    told: Callable[[int, int], None] = lambda done, total: None,
+    ready: Callable[[], None] = lambda: None,
+) -> None:
+    """Compile what has not been compiled on this machine.
+
+    Args:
+        half: One of :data:`HALVES`.
+        told: Called with the number of kernels that are ready and of all, whenever one has
+            been compiled.
+        ready: Called by the first half when the method that a sequence with templates starts
+            with has the kernels that cannot run as plain Python.
+    """
+    for methods in REGISTERED.values():
+        for method in methods.values():
+            if method.name not in ORIGINS:
+                method.load()  # its kernels are counted from the beginning
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        compilation.followed(lambda: told(*compilation.counts())),
+    ):
+        recording = _recording(Path(folder))
+        if half == HALVES[0]:
+            for single_view in FOLLOWING:
+                with compilation.only_of_pixels():
+                    pipeline.compute(recording, RunParameters(single_view=single_view))
+                if single_view == FOLLOWING[0]:
+                    ready()
+        for parameters in _ways(half):
+            pipeline.compute(recording, parameters)
+
+
+def _ways(half: str) -> Iterable[RunParameters]:
+    """Ways of tracking that between them call every kernel, the usual ones first."""
+    of_views = (
+        with_values(
+            RunParameters(),
+            {
+                **preset,
+                "single_view": single_view,
+                "fusion_method": "sequential_phd",
+                "smoothing_method": "none",
+            },
+        )
+        for preset in PRESETS.values()
+        for single_view in _own("single_view")
+    )
+    of_fusions = (
+        with_values(
+            RunParameters(), {"single_view": "none", **values, "fusion_method": fusion_method}
+        )
+        for values in (*PRESETS.values(), *_OTHER_WAYS)
+        for fusion_method in _own("fusion_method")
+    )
+    of_smoothings = (
+        RunParameters(single_view=single_view, smoothing_method=smoothing_method)
+        for single_view in FOLLOWING
+        for smoothing_method in _own("smoothing_method")
+    )
+    # neither compiles what the other does just then: that would be done twice
+    if half == HALVES[0]:
+        return of_views
+    boxes = RunParameters(single_view="none")
+    return chain([boxes], of_smoothings, of_fusions)
+
+
+def _own(key: MethodKey) -> list[str]:
+    """The methods of this project: another package compiles its kernels when they are called, and
+    a detection network has none."""
+    return [
+        name
+        for name in METHODS[key]
+        if name not in ORIGINS and not REGISTERED[key][name].used(RunParameters()).detector
+    ]
+
+
+def _recording(folder: Path) -> Sequence:
+    """Two cameras, two people who cross a room, as pictures and as boxes."""
+    rng = np.random.default_rng(0)
+    share = np.linspace(0.0, 1.0, STEPS - EMPTY)[:, None]
+    paths = [np.array(one) * (1.0 - share) + np.array(other) * share for one, other in _WAYS]
+    cameras = (_camera("left", -3.2), _camera("right", 3.2))
+    views = []
+    for camera in cameras:
+        rows, boxes, images = [], [], []
+        wall = rng.integers(90, 130, (SIZE[1], SIZE[0], 3), dtype=np.uint8)
+        for step in range(STEPS):
+            picture = wall.copy()
+            people = np.array([path[step - EMPTY] for path in paths if step >= EMPTY])
+            found, visible = camera.project_boxes(people.reshape(-1, 3), _HALF_EXTENTS)
+            for box, colour in zip(found[visible], _COLOURS, strict=False):
+                left, top, width, height = box.round().astype(int).tolist()
+                cv2.rectangle(picture, (left, top), (left + width, top + height), colour, -1)
+                rows.append(step)
+                boxes.append(box)
+            images.append(folder / f"{camera.name}{step}.png")
+            cv2.imwrite(str(images[-1]), picture)
+        detections = Detections(
+            np.array(rows, dtype=np.int64), np.array(boxes).reshape(-1, 4), np.ones(len(rows))
+        )
+        views.append(View(camera, images=tuple(images), detections=detections))
+    first = views[0].detections
+    assert first is not None
+    return Sequence(
+        name="warm-up",
+        folder=folder,
+        fps=25.0,
+        frames=STEPS,
+        room=Room(
+            np.array([-1.5, -1.5, 0.0]),
+            np.array([1.5, 1.5, 2.0]),
+            (Entrance(np.array([1.0, -0.3, 0.84]), np.full(3, 0.3)),),
+        ),
+        target_half_extents=_HALF_EXTENTS,
+        views=tuple(views),
+        templates=tuple(
+            Template(f"person{number}", "left", EMPTY, box)
+            for number, box in enumerate(first.boxes[first.at(EMPTY)])
+        ),
+    )
+
+
+def _camera(name: str, place: float) -> Camera:
+    """A camera at one side of the room that looks at its middle."""
+    position = np.array([place, -3.4, 1.6])
+    ahead = np.array([0.0, 0.0, 0.9]) - position
+    ahead /= np.linalg.norm(ahead)
+    right = np.cross(ahead, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    rotation = np.stack([right, np.cross(ahead, right), ahead])
+    intrinsics = np.array([[150.0, 0, SIZE[0] / 2], [0, 150.0, SIZE[1] / 2], [0, 0, 1]])
+    distortion = np.array([-0.2, 0.01, 0.001, -0.001, 0.0])
+    return Camera(name, SIZE, intrinsics, rotation, -rotation @ position, distortion)
+
+
+def start(half: str, **how: Any) -> subprocess.Popen[str]:
+    """The process that compiles one half; what it tells comes through its standard output."""
+    line = [sys.executable, "-m", "tracker.runs.warm_up", half]
+    return subprocess.Popen(line, stdin=subprocess.DEVNULL, text=True, **how)
+
+
+def main() -> int:
+    """Compile one half and tell of it, or both and wait; whoever works goes first."""
+    if len(sys.argv) < 2:
+        statuses = [process.wait() for process in [start(half) for half in HALVES]]
+        if not any(statuses):
+            compilation.mark_compiled()
+        return max(statuses)
+    half = sys.argv[1]
+    _give_way(5 if half == HALVES[0] else 19)
+
+    def say(words: str) -> None:
+        sys.stdout.write(f"{words}\n")
+        sys.stdout.flush()
+
+    def ready() -> None:
+        say("ready")
+        _give_way(10)
+
+    compile_kernels(half, lambda done, total: say(f"{done} {total}"), ready)
+    return 0
+
+
+def _give_way(steps: int) -> None:
+    """Whoever renders or tracks goes first; what a run waits for goes before the rest."""
+    if sys.platform != "win32":
+        os.nice(steps)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,205 @@
+"""Foreground by thresholds that each picture sets itself, over a background that follows the light.
+
+[CMQ07] Chang, Ma, Qiao, "Human oriented multi-target tracking algorithm in video
+sequence", Control and Decision 22(4), 2007.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from jaxtyping import Float, Int, UInt8, UInt16
+from numpy import ndarray
+
+from tracker.kernels.pictures.foreground import above, clear_shadows, two_classes, update_background
+from tracker.parameters.groups.foreground import ForegroundParams
+from tracker.single_view.pictures.foreground.exposure import BackgroundModel, median, tone_curve
+from tracker.single_view.pictures.foreground.segmentation import Segmentation
+
+ITERATIONS = 20
+"""Of the c-means at most; the thresholds usually come to rest well before."""
+
+CLOSING = np.ones((3, 3), dtype=np.uint8)
+"""Gaps that are closed, as published."""
+
+AROUND_FOREGROUND = np.ones((5, 5), dtype=np.uint8)
+"""What is this near to the foreground does not change the background."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AdaptiveState:
+    """The background of one camera, and how long each pixel has shown it."""
+
+    background: UInt16[ndarray, "h w 3"]
+    """256 times the grey level, BGR: slow changes are below one level a picture."""
+    still: UInt8[ndarray, "h w"]
+    """For how many pictures each pixel has been away from the foreground, 255 at most."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Iterations:
+    """What the c-means went through, and where it stopped."""
+
+    thresholds: Float[ndarray, "K 3"]
+    """Of each iteration, grey levels in B, G, R."""
+    counts: Int[ndarray, " K"]
+    """n(k): foreground pixels of each."""
+    chosen: int
+    """k*."""
+
+
+def choose_iteration(counts: Int[ndarray, " K"]) -> int:
+    """k* = argmin (n(k) - n(k - 1)) over the k with n(k) > n(k - 1), [CMQ07].
+
+    Where the foreground grows least it has reached its border: before, parts of people
+    are missing, after, noise comes in. Where it never grows, the iteration's end.
+    """
+    growth = np.diff(counts)
+    growing = np.flatnonzero(growth > 0)
+    return int(growing[growth[growing].argmin()]) + 1 if len(growing) else len(counts) - 1
+
+
+def cluster(difference: UInt8[ndarray, "h w 3"], parameters: ForegroundParams) -> Iterations:
+    """The modified c-means of [CMQ07] on the difference of a picture and its background.
+
+    The distances to the classes' centres m_b and m_f are taken in units of the classes'
+    deviations, whose ratio r is given: |d - m_b| / r against |d - m_f|. Differences
+    beyond the foreground's centre are foreground, and below the background's background.
+
+    Args:
+        difference: |I - M|.
+        parameters: Start centres, ratio r, least threshold, least number of pixels.
+    """
+    found = two_classes(
+        difference,
+        parameters.background_centre,
+        parameters.foreground_centre,
+        parameters.deviation_ratio,
+        parameters.least_threshold,
+        parameters.minimum_area,
+        ITERATIONS,
+    )
+    return Iterations(found.thresholds, found.counts, choose_iteration(found.counts))
+
+
+def first_background(
+    pictures: list[UInt8[ndarray, "h w 3"]],
+    *,
+    follow_exposure: bool,
+    check: Callable[[], None] = lambda: None,
+) -> UInt8[ndarray, "h w 3"] | None:
+    """The median of pictures spread over the clip; None where there is none.
+
+    Args:
+        pictures: BGR, of one size.
+        follow_exposure: Whether they are brought to one exposure first.
+        check: Called every so often; what it raises ends the work.
+    """
+    if not follow_exposure:
+        return median(pictures, check) if pictures else None
+    learnt = BackgroundModel.learn(pictures, check)
+    return None if learnt is None else learnt.picture
+
+
+class AdaptiveForeground:
+    """The segmentation of [CMQ07] in one camera.
+
+    The difference D = |I - M| of each channel falls into two classes by a c-means
+    iteration (:func:`cluster`); a pixel is background only where all three channels
+    are. Small pieces are dropped and gaps closed (3×3). The background follows,
+    M ← M + α (I - M), where a pixel lies away from the foreground (5×5), differs by
+    less than Th and has been background for w pictures.
+
+    Beyond the paper, and switched off by the preset ``published``: the background is
+    brought to each picture's exposure first, and a shadow's difference is no difference.
+    """
+
+    def __init__(self, first: UInt8[ndarray, "h w 3"], parameters: ForegroundParams) -> None:
+        """Take the background to begin with.
+
+        Args:
+            first: From :func:`first_background`, or any other picture of the empty scene, BGR.
+            parameters: The numbers.
+        """
+        self._first = first
+        self._parameters = parameters
+
+    def start(self) -> AdaptiveState:
+        """The median, which counts as seen for long enough."""
+        still = np.full(self._first.shape[:2], 255, dtype=np.uint8)
+        return AdaptiveState(self._first.astype(np.uint16) * 256, still)
+
+    def thresholds(self, difference: UInt8[ndarray, "h w 3"]) -> Float[ndarray, " 3"]:
+        """What a pixel must differ by in each channel, grey levels: those of iteration k*."""
+        found = cluster(difference, self._parameters)
+        chosen: ndarray = found.thresholds[found.chosen]
+        return chosen
+
+    def step(
+        self, state: AdaptiveState, picture: UInt8[ndarray, "h w 3"]
+    ) -> tuple[AdaptiveState, Segmentation]:
+        """Segment one picture and let the background follow it.
+
+        A blank picture, or one of which most differs from the background, has no foreground
+        and leaves the background as it is.
+
+        Args:
+            state: After the picture before.
+            picture: BGR, of the background's size.
+        """
+        p = self._parameters
+        shown = cv2.convertScaleAbs(state.background, alpha=1.0 / 256.0)
+        if p.follow_exposure:
+            shown = cv2.LUT(shown, tone_curve(shown, picture))
+        difference = cv2.absdiff(picture, shown)
+        if p.drop_shadows:
+            clear_shadows(
+                difference, picture, shown, p.darkest_shadow, p.shadow_tint, p.least_threshold
+            )
+        thresholds = self.thresholds(difference)
+        different = above(difference, thresholds)
+        share = cv2.countNonZero(different) / different.size
+        if share > p.blinding_share or cv2.meanStdDev(picture)[1].max() < p.blank_deviation:
+            return state, Segmentation(np.zeros_like(different), thresholds)
+        mask = clean(different, p.minimum_area)
+        after = update_background(
+            state.background,
+            state.still,
+            picture,
+            shown,
+            cv2.dilate(mask, AROUND_FOREGROUND),
+            p.update_limit,
+            p.update_frames,
+            p.update_rate,
+        )
+        return AdaptiveState(after.levels, after.still), Segmentation(mask, thresholds)
+
+
+def clean(mask: UInt8[ndarray, "h w"], minimum_area: int) -> UInt8[ndarray, "h w"]:
+    """Drop connected components of fewer pixels, then close gaps (morphological closing, 3×3).
+
+    Args:
+        mask: Foreground is what is not 0.
+        minimum_area: Pixels.
+
+    Returns:
+        1 on the foreground, 0 elsewhere.
+    """
+    left, top, width, height = cv2.boundingRect(mask)
+    cleaned = np.zeros_like(mask)
+    if width == 0:
+        return cleaned
+    # most of a picture is empty; the closing needs a pixel more on every side
+    rows, columns = (
+        slice(max(0, top - 1), top + height + 1),
+        slice(max(0, left - 1), left + width + 1),
+    )
+    part = mask[rows, columns]
+    _, labels, statistics, _ = cv2.connectedComponentsWithStats(part, connectivity=8)
+    kept = (statistics[:, cv2.CC_STAT_AREA] >= minimum_area).astype(np.uint8)
+    kept[0] = 0
+    cleaned[rows, columns] = cv2.morphologyEx(kept[labels], cv2.MORPH_CLOSE, CLOSING)
+    return cleaned

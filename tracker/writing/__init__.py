@@ -1,1 +1,0 @@
-"""Tracks in the forms of other programs."""
