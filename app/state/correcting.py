@@ -15,7 +15,7 @@ from app.state.kept.json_files import read_json, write_json
 from app.state.snapshot import Change
 from app.state.workbench import Workbench
 from tracker.corrections import Correction, CorrectionError
-from tracker.corrections.contradictions import refuse_contradiction, said_again
+from tracker.corrections.contradictions import find_repeated, refuse_contradiction
 from tracker.corrections.log import Log, open_log, own_place, remark_on, write_log, writing_place
 from tracker.sequences.built_in import key_of
 from tracker.sequences.sequence import Sequence as Recording
@@ -121,7 +121,7 @@ class Correcting:
             before = self._workbench.snapshot().corrections
             after = list(before)
             for one in new:
-                old, again = said_again(after, one)
+                old, again = find_repeated(after, one)
                 if old is not None:
                     after.remove(old)
                 refuse_contradiction(after, again)

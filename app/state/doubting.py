@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 
 from app.state.snapshot import Snapshot
-from tracker.review.queue import Doubt, Queue, queue
+from tracker.review.queue import Queue, ReviewItem, queue
 
 _NOTHING = Queue((), 0, "there is no run yet")
 
@@ -20,7 +20,7 @@ class Doubting:
         self._lock = threading.Lock()
         self._made: tuple[tuple[str, int, bool, tuple[str, ...]], Queue] | None = None
         self._of = ""
-        self._told: dict[str, Doubt] = {}
+        self._told: dict[str, ReviewItem] = {}
 
     def of(self, snapshot: Snapshot) -> Queue:
         """The doubtful places of what is shown, as far as it is computed."""
@@ -47,11 +47,11 @@ class Doubting:
         for old in list(self._told)[:-_MOST]:
             del self._told[old]
 
-    def find(self, snapshot: Snapshot, identity: str) -> Doubt | None:
+    def find(self, snapshot: Snapshot, identity: str) -> ReviewItem | None:
         """One of them; None where it is not there any more."""
         return next((one for one in self.of(snapshot).doubts if one.id == identity), None)
 
-    def told(self, snapshot: Snapshot, identity: str) -> Doubt | None:
+    def told(self, snapshot: Snapshot, identity: str) -> ReviewItem | None:
         """One of them, or of a run before: what somebody says of steps and places who still has
         it on the page is as true of the run that came meanwhile."""
         found = self.find(snapshot, identity)

@@ -16,7 +16,7 @@ from numpy import ndarray
 
 from tests import world
 from tracker.corrections import Correction, CorrectionError, Place
-from tracker.corrections.contradictions import along, refuse_contradiction, said_again
+from tracker.corrections.contradictions import along, find_repeated, refuse_contradiction
 from tracker.corrections.kinds import content_of, digest, leeway, make
 from tracker.corrections.merging import difference, merge
 from tracker.corrections.outcomes import Outcome, names_by_track, outcomes
@@ -217,7 +217,7 @@ def test_whoever_is_moved_again_is_found_where_he_was_put(
         make(kind="here", places=[at(3), at(3, x)], accuracy=accuracy) for x in (7.0, 8.0)
     )
     new = make(kind="here", places=[at(step, 2.0), at(step, apart)])
-    old, meant = said_again([first, last], new)
+    old, meant = find_repeated([first, last], new)
     assert old == (last if again else None)
     assert meant.places[1:] == (last.places[1:] if again else new.places[1:])
 

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tracker.corrections import Correction, CorrectionError
-from tracker.corrections.contradictions import refuse_contradiction, said_again
+from tracker.corrections.contradictions import find_repeated, refuse_contradiction
 from tracker.corrections.kinds import KINDS, digest, make
 from tracker.corrections.log import (
     FILE,
@@ -197,17 +197,17 @@ def test_whoever_is_moved_again_is_where_it_was_said_last() -> None:
     found, first, second = (30, 1.0, 2.0, 0.9), (30, 2.5, 2.0, 0.9), (30, 2.5, 3.5, 0.9)
     one = make(kind="here", places=[first, found])
     again = make(kind="here", places=[second, (30, 2.6, 2.0, 0.9)])
-    old, new = said_again([one], again)
+    old, new = find_repeated([one], again)
     assert old is one
     assert new.places == again.places[:1] + one.places[1:]
     begun = make(kind="here", places=[first])  # nobody was there before
-    assert said_again([begun], again)[1].places == again.places[:1]
+    assert find_repeated([begun], again)[1].places == again.places[:1]
     for other in (
         make(kind="here", places=[second, found]),  # where another was
         make(kind="here", places=[(31, *second[1:]), (31, *first[1:])]),
         make(kind="here", places=[second]),
     ):
-        assert said_again([one], other) == (None, other)
+        assert find_repeated([one], other) == (None, other)
 
 
 def test_two_logs_as_one() -> None:

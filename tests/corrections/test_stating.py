@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from tracker.corrections.kinds import make
 from tracker.corrections.outcomes import outcomes
 from tracker.corrections.stating import doubted
-from tracker.smoothing.stated import Stated
+from tracker.smoothing.place_constraints import Stated
 
 SIGMAS = st.floats(0.01, 2.0)
 WAYS = st.lists(st.floats(-3.0, 3.0), min_size=3, max_size=3).map(np.array)

@@ -23,18 +23,18 @@ from tests.fusion.rooms import (
 )
 from tracker.corrections.kinds import make
 from tracker.filters.gaussian_mixture import GaussianMixture, gate_distance
-from tracker.fusion import sight
+from tracker.fusion import missing_frames
 from tracker.fusion.labels.memory import Memory, recall
 from tracker.fusion.labels.reidentification import Identities
 from tracker.fusion.measurement_births import Newborns
+from tracker.fusion.missing_frames import Glimpse
 from tracker.fusion.model import FusionModel, all_boxes
 from tracker.fusion.multi_bernoulli import MultiBernoulli, MultiBernoulliState
+from tracker.fusion.place_constraints import constraints_by_step, obey
 from tracker.fusion.protocol import FusionResult
 from tracker.fusion.record import Ledger, Record, summed
 from tracker.fusion.sequential_phd import SequentialPhd, SequentialPhdState
-from tracker.fusion.sight import Glimpse
 from tracker.fusion.target_model import TargetModel
-from tracker.fusion.told import obey, told_by_step
 from tracker.fusion.trajectories import Bounds, by_boxes, extract
 from tracker.geometry.camera import stacked
 from tracker.kernels import births as kernels
@@ -258,10 +258,10 @@ def glimpse(views: tuple[ViewResult, ...], unexplained: float = 1.0) -> Glimpse:
 def test_what_was_left_unexplained_is_remembered_for_a_fifth_of_a_second(
     step_time: float, count: int
 ) -> None:
-    recent: sight.Recent = ()
+    recent: missing_frames.Recent = ()
     steps = [glimpse(some(exact([PLACE]), k % 4)) for k in range(7)]
     for one in steps:
-        recent = sight.remember(recent, one, step_time)
+        recent = missing_frames.remember(recent, one, step_time)
     assert list(recent) == steps[::-1][:count]
 
 
@@ -273,7 +273,7 @@ def test_the_last_frame_of_a_blind_camera_counts_the_less_the_older_it_is(age: i
     now = glimpse((NO_FRAME, own[1], NO_FRAME, own[3]))
     between = glimpse((NO_FRAME, own[1], NO_FRAME, own[3]))
     recent = (before,) if age == 1 else (between, before)
-    found = sight.with_recent(now, recent, 0.1, 0.85)
+    found = missing_frames.with_recent(now, recent, 0.1, 0.85)
     assert found.starts.tolist() == [0, 1, 3, 4, 6]
     assert found.seeing is not None
     assert found.seeing.tolist() == [False, True, False, True]
@@ -283,36 +283,36 @@ def test_the_last_frame_of_a_blind_camera_counts_the_less_the_older_it_is(age: i
     extra = found.measurements.noises[0] - before.evidence.measurements.noises[1]
     assert_allclose(extra, walked**2 * np.eye(3), rtol=1e-9)
     assert_allclose(found.measurements.noises[1:3], now.evidence.measurements.noises[:2])
-    alone = sight.with_recent(now, (), 0.1, 0.85)
+    alone = missing_frames.with_recent(now, (), 0.1, 0.85)
     assert alone.starts.tolist() == [0, 0, 2, 2, 4]
 
 
 def test_only_a_newcomer_with_a_box_of_this_step_begins_and_old_boxes_are_no_sources() -> None:
     blind = np.array([True, False, True, False])
     sources = np.array([[0, 0, 1], [-1, 2, 0], [3, 0, 1], [-1, -1, 4]])
-    found = sight.of_this_step(
+    found = missing_frames.of_this_step(
         Newborns(np.eye(3), np.tile(np.eye(3), (3, 1, 1)), np.ones(3), sources), blind
     )
     assert found.sources.T.tolist() == [[-1, 2, -1, -1], [-1, 0, -1, 4]]
     assert_allclose(found.positions, np.eye(3)[1:])
     views = (NO_FRAME, NO_BOXES, NO_FRAME, NO_BOXES)
-    cameras = sight.seeing(views)
+    cameras = missing_frames.seeing(views)
     assert cameras is not None
     assert cameras.tolist() == [1, 3]
-    assert sight.seeing((NO_BOXES,)) is None
+    assert missing_frames.seeing((NO_BOXES,)) is None
     part = Record(
         np.array([[0.1], [0.2]]),
         np.array([[4], [5]]),
         np.array([[0.3], [0.4]]),
         np.array([[6], [7]]),
     )
-    whole = sight.spread(part, cameras, 4)
+    whole = missing_frames.spread(part, cameras, 4)
     assert whole.detection_probabilities.T.tolist() == [[0.0, 0.1, 0.0, 0.2]]
     assert whole.sources.T.tolist() == [[-1, 4, -1, 5]]
     assert whole.source_weights.T.tolist() == [[0.0, 0.3, 0.0, 0.4]]
     assert whole.hidden_by.T.tolist() == [[-1, 6, -1, 7]]
     seen = all_boxes((NO_FRAME, of_boxes(np.ones((2, 4))), NO_FRAME, of_boxes(np.ones((3, 4)))))
-    assert sight.boxes_of(seen, cameras).starts.tolist() == [0, 2, 5]
+    assert missing_frames.boxes_of(seen, cameras).starts.tolist() == [0, 2, 5]
 
 
 # ── what is recorded
@@ -347,7 +347,9 @@ def test_pairs_are_recorded_from_one_per_cent_on_and_summed_by_label() -> None:
     [(0.5, 9, True), (0.5, 10, False), (0.5 + 1e-6, 10, True), (0.0, 12, False)],
 )
 def test_nobody_is_born_where_nobody_is(apart: float, label: int, born: bool) -> None:
-    told = told_by_step([make(kind="nobody", places=[[3, 0.0, 0.0, 1.0], [5, 0.0, 0.0, 1.0]])])
+    told = constraints_by_step(
+        [make(kind="nobody", places=[[3, 0.0, 0.0, 1.0], [5, 0.0, 0.0, 1.0]])]
+    )
     assert sorted(told) == [3, 4, 5]
     mixture = people((label, 0.9, apart))
     found, record, free = obey(
@@ -363,7 +365,9 @@ def test_a_stated_place_updates_whom_it_means_or_begins_somebody() -> None:
     mixture = people((3, 0.6, 0.0), (4, 0.9, 1.5))
 
     def said(x: float, *more: list[float]) -> tuple[GaussianMixture, int]:
-        told = told_by_step([make(kind="here", places=[[2, x, 0.0, 0.85], *more], accuracy=0.2)])
+        told = constraints_by_step(
+            [make(kind="here", places=[[2, x, 0.0, 0.85], *more], accuracy=0.2)]
+        )
         found, record, free = obey(
             mixture, Record.blank(4, 2), told[2], MODEL, first_new_label=9, next_label=9
         )
@@ -397,7 +401,7 @@ def test_a_stated_place_updates_whom_it_means_or_begins_somebody() -> None:
 
 def test_the_heavier_of_two_is_meant_where_both_are_as_near() -> None:
     mixture = people((3, 0.3, -0.1), (4, 0.8, 0.1))
-    told = told_by_step([make(kind="here", places=[[0, 0.0, 0.0, 0.85]], accuracy=0.1)])[0]
+    told = constraints_by_step([make(kind="here", places=[[0, 0.0, 0.0, 0.85]], accuracy=0.1)])[0]
     found, _, _ = obey(mixture, Record.blank(1, 2), told, MODEL, first_new_label=9, next_label=9)
     assert found.weights.tolist() == [0.3, pytest.approx(0.999)]
     nobody, record, free = obey(

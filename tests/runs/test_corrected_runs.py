@@ -16,7 +16,7 @@ from tracker.corrections.kinds import make
 from tracker.corrections.log import dump, parse
 from tracker.fusion.multi_bernoulli import MultiBernoulli
 from tracker.parameters import RunParameters, with_values
-from tracker.review.queue.doubt import Lanes
+from tracker.review.queue.item import Lanes
 from tracker.runs import pipeline
 from tracker.runs.pipeline import Run
 from tracker.runs.stage_cache import StageCache

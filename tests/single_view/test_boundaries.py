@@ -24,7 +24,7 @@ from tracker.single_view.pseudo_particle import hypotheses, track_management
 from tracker.single_view.pseudo_particle.track_management import Departed, Tracks
 from tracker.single_view.shape.finder import strongest
 from tracker.single_view.shape.windows import Windows
-from tracker.single_view.working.steadying import LARGEST, LEAST_CORNERS, agreed
+from tracker.single_view.working.stabilisation import LARGEST, LEAST_CORNERS, agreed
 
 JPDA = JpdaParams(vanish_steps=3, return_steps=5, confirmation_steps=5)
 

@@ -14,7 +14,7 @@ from tracker.parameters import ColourPhdParams
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.colour import templates
-from tracker.single_view.colour.likeness import Likeness, looks_of
+from tracker.single_view.colour.likeness import Likeness, appearance_of
 from tracker.single_view.colour.templates import read_templates
 from tracker.single_view.pictures import colour
 
@@ -47,7 +47,7 @@ def test_whom_a_box_looks_like_follows_from_its_distances_to_everybody(
     assert told[1, 1] > 0.9
     assert_allclose(likeness.of_boxes(picture, every[1:2]), told[1:2])  # whatever else asks
     assert likeness.of_boxes(picture, every[:0]).shape == (0, 2)
-    looks = looks_of(picture, every)
+    looks = appearance_of(picture, every)
     roots = np.sqrt(colour.histograms(bins, every, p.colour_space, p.histogram_kernel))
     assert_allclose(looks, roots, atol=1e-3)
     assert_allclose(np.linalg.norm(looks[:4].astype(float), axis=1), 1.0, atol=1e-2)

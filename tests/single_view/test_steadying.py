@@ -17,7 +17,7 @@ from tracker.sequences.library import open_sequence
 from tracker.sequences.pictures.frames import FrameReader, Picture
 from tracker.single_view.working.sequence import Working
 from tracker.single_view.working.shaking import check_shake
-from tracker.single_view.working.steadying import Steadying, agreed
+from tracker.single_view.working.stabilisation import Steadying, agreed
 
 
 def test_a_shake_is_the_deviation_of_what_moved_and_is_undone() -> None:

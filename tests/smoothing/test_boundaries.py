@@ -14,6 +14,7 @@ from tracker.filters.models import Motion
 from tracker.kernels.gating import Measurements
 from tracker.parameters import FusionParams
 from tracker.smoothing.identity.appearance import Appearance
+from tracker.smoothing.identity.constraints import Said, Ties, possible
 from tracker.smoothing.identity.ends import Ends
 from tracker.smoothing.identity.pieces import (
     Pairs,
@@ -22,7 +23,6 @@ from tracker.smoothing.identity.pieces import (
     near_pairs,
     same_label,
 )
-from tracker.smoothing.identity.ties import Said, Ties, possible
 from tracker.smoothing.lifetimes import independence
 from tracker.smoothing.paths import Links, Paths
 from tracker.smoothing.recording import CameraBoxes

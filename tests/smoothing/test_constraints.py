@@ -11,7 +11,7 @@ from numpy import ndarray
 from tests.smoothing.test_boundaries import fitted, standing
 from tracker.corrections import Correction
 from tracker.corrections.kinds import make
-from tracker.smoothing.identity.ties import Said, Seeker, Ties, possible
+from tracker.smoothing.identity.constraints import Said, Seeker, Ties, possible
 from tracker.smoothing.paths import Paths
 
 PATHS = standing((1, 0, 9, 0.0), (2, 0, 9, 5.0), (3, 14, 19, 0.0))

@@ -12,8 +12,8 @@ from numpy.testing import assert_array_equal
 from tests import world
 from tests.smoothing.known import Known, known
 from tracker.parameters import SmoothingParams
+from tracker.smoothing.identity.constraints import Seeker
 from tracker.smoothing.identity.cutting import Cuts, Tracked, cut, cuts
-from tracker.smoothing.identity.ties import Seeker
 
 STEPS = 30
 P = SmoothingParams(change=20.0, gap=0.5)

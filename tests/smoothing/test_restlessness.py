@@ -13,7 +13,7 @@ from tracker.filters.models import Motion
 from tracker.kernels.smoothing import passes
 from tracker.smoothing.identity.ends import Ends
 from tracker.smoothing.paths import Paths
-from tracker.smoothing.restlessness import restlessness
+from tracker.smoothing.process_noise import restlessness
 from tracker.smoothing.smoother import Fitted
 
 SIGMA = 0.03

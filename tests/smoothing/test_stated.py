@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.smoothing.test_boundaries import standing
 from tracker.corrections.kinds import make
-from tracker.smoothing.stated import ASIDE, Stated
+from tracker.smoothing.place_constraints import ASIDE, Stated
 
 SPREAD = np.diag([0.01, 0.02, 0.03, 0.1, 0.1, 0.1])
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from tracker.smoothing.identity.constraints import Ties
 from tracker.smoothing.identity.joining import chains, join
 from tracker.smoothing.identity.pieces import Pairs
 from tracker.smoothing.identity.staying import Staying
-from tracker.smoothing.identity.ties import Ties
 from tracker.smoothing.paths import Paths
 
 PIECES = 6

@@ -9,8 +9,8 @@ import pytest
 from numpy import ndarray
 
 from tests.smoothing.test_joining import worth_of
+from tracker.smoothing.identity.constraints import Said, Ties, possible
 from tracker.smoothing.identity.joining import chains, join
-from tracker.smoothing.identity.ties import Said, Ties, possible
 
 
 def obeys(following: tuple[int, ...], used: tuple[bool, ...], ties: Ties) -> bool:

@@ -19,7 +19,7 @@ from tracker.runs import pipeline
 from tracker.sequences.library import open_sequence
 from tracker.studies.kept.store import Store, create
 from tracker.studies.opened import open_recordings
-from tracker.studies.told.commands import changes_of, track_commands
+from tracker.studies.reporting.commands import changes_of, track_commands
 from tracker.studies.work import recordings, working
 from tracker.studies.work.working import tracks_hash
 

@@ -19,9 +19,9 @@ from tracker.studies.kept.records import Trial
 from tracker.studies.kept.store import JOURNAL, Store, create
 from tracker.studies.kept.writer import RESULTS
 from tracker.studies.opened import open_recordings
+from tracker.studies.reporting.report import report_html
+from tracker.studies.reporting.summary import summary_of
 from tracker.studies.sampling import Sampler
-from tracker.studies.told.report import report_html
-from tracker.studies.told.summary import summary_of
 from tracker.studies.work import working
 from tracker.studies.work.jobs import Job, Outcome
 

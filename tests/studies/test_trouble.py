@@ -21,7 +21,7 @@ from tracker.studies.kept import writer
 from tracker.studies.kept.records import Status
 from tracker.studies.kept.store import JOURNAL, Store, create, find
 from tracker.studies.kept.writer import RESULTS, STATUS, Writer
-from tracker.studies.told.summary import summary_of
+from tracker.studies.reporting.summary import summary_of
 from tracker.studies.work.jobs import Job, Outcome
 from tracker.studies.work.recordings import packed
 

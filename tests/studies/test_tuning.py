@@ -12,7 +12,7 @@ from tests.studies.small import Serial, definition, recording, run
 from tracker.parameters import PARAMETERS, table
 from tracker.studies.errors import StudyError
 from tracker.studies.kept.store import Store, create
-from tracker.studies.told.report import report_html
+from tracker.studies.reporting.report import report_html
 from tracker.studies.tuning import tuning
 from tracker.studies.work.jobs import Job, Outcome
 

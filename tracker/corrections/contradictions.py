@@ -58,7 +58,9 @@ def refuse_two_names(first: Many[Correction], second: Many[Correction]) -> None:
             )
 
 
-def said_again(before: Many[Correction], new: Correction) -> tuple[Correction | None, Correction]:
+def find_repeated(
+    before: Many[Correction], new: Correction
+) -> tuple[Correction | None, Correction]:
     """Whoever is moved again at a step is where it was said last.
 
     Returns:

@@ -1,10 +1,5 @@
 """Tracks, cameras and films as files: the track file and the forms of other programs."""
 
-from tracker.export.tracks_csv import (
-    TrackFile,
-    read_tracks_csv,
-    save_tracks_csv,
-    write_tracks_csv,
-)
+from tracker.export.tracks_csv import TrackFile, read_tracks_csv, save_tracks_csv, write_tracks_csv
 
 __all__ = ["TrackFile", "read_tracks_csv", "save_tracks_csv", "write_tracks_csv"]

@@ -19,7 +19,7 @@ from tracker.kernels.intensity import merging
 from tracker.kernels.intensity import mixture as mixture_kernels
 from tracker.kernels.linear_algebra import Gaussians
 
-_NOBODY = np.zeros(0, dtype=np.int64)
+_NO_OWNERS = np.zeros(0, dtype=np.int64)
 """Stands for the owners where no component has one."""
 
 
@@ -201,7 +201,7 @@ def merge(
         mixture.means,
         mixture.covariances,
         order,
-        _NOBODY if owners is None else owners,
+        _NO_OWNERS if owners is None else owners,
         threshold,
     )
     leaders = groups.leaders
@@ -241,7 +241,7 @@ def reduce(
         mixture.weights,
         mixture.means,
         mixture.covariances,
-        _NOBODY if owners is None else owners,
+        _NO_OWNERS if owners is None else owners,
         pruning_threshold,
         merging_threshold,
         max_components,

@@ -10,9 +10,9 @@ from numpy import ndarray
 
 from tracker.filters import association, gaussian_mixture, models
 from tracker.filters.gaussian_mixture import GaussianMixture
-from tracker.fusion import sight, visibility
+from tracker.fusion import missing_frames, visibility
 from tracker.fusion.measurement_births import BirthModel, Evidence, MeasurementBirths, Newborns
-from tracker.fusion.sight import Glimpse, Recent
+from tracker.fusion.missing_frames import Glimpse, Recent
 from tracker.fusion.target_model import ExpectedBoxes, TargetModel
 from tracker.fusion.visibility import Visibility
 from tracker.kernels import linear_algebra
@@ -161,14 +161,14 @@ class FusionModel:
         """
         blind = np.array([view.blind for view in views])
         now = Glimpse(evidence, boxes, blind)
-        later = sight.remember(recent, now, self.step_time)
+        later = missing_frames.remember(recent, now, self.step_time)
         if not blind.any():
             return self.newborns(evidence), later
-        joined = sight.with_recent(now, recent, self.step_time, self.target.half_height)
+        joined = missing_frames.with_recent(now, recent, self.step_time, self.target.half_height)
         proposed = self._newborns.propose(joined)
         if proposed is None:
             return None, later
-        found = sight.of_this_step(proposed, blind)
+        found = missing_frames.of_this_step(proposed, blind)
         return (self._at_rest(found) if len(found.existences) else None), later
 
     def _at_rest(self, found: Newborns) -> tuple[GaussianMixture, Newborns]:

@@ -17,16 +17,16 @@ from numpy import ndarray
 
 from tracker.filters import gaussian_mixture, models
 from tracker.filters.gaussian_mixture import GaussianMixture
-from tracker.fusion import sight
+from tracker.fusion import missing_frames
 from tracker.fusion.labels import memory, reidentification
 from tracker.fusion.labels.memory import Memory
 from tracker.fusion.labels.reidentification import Identities
 from tracker.fusion.measurement_births import Evidence, Newborns
+from tracker.fusion.missing_frames import Recent
 from tracker.fusion.model import CONFIRMED, FusionModel, all_boxes
+from tracker.fusion.place_constraints import Told, obey
 from tracker.fusion.protocol import FusionResult
 from tracker.fusion.record import WORTH_TELLING, Record, summed
-from tracker.fusion.sight import Recent
-from tracker.fusion.told import Told, obey
 from tracker.geometry.camera import stacked
 from tracker.kernels.gating import Measurements
 from tracker.kernels.labelled import step as step_kernels
@@ -120,13 +120,13 @@ class MultiBernoulli:
         if p.recognition:
             alike = reidentification.resemblance(state.identities, before.labels, views)
             seen = seen._replace(resemblance=alike)
-        cameras = sight.seeing(views)
+        cameras = missing_frames.seeing(views)
         step_model, calibrations = self._with_frame(cameras)
         found = step_kernels.predict_and_update(
             Tracks(before.weights, before.means, before.covariances, before.labels),
             state.next_label,
             state.undetected.gaussians,
-            seen if cameras is None else sight.boxes_of(seen, cameras),
+            seen if cameras is None else missing_frames.boxes_of(seen, cameras),
             step_model,
             self._target,
             calibrations,
@@ -137,7 +137,7 @@ class MultiBernoulli:
         record = Record(found.detection_probabilities, found.sources, found.shares, found.hidden_by)
         pair_cameras = found.pair_cameras
         if cameras is not None:
-            record = sight.spread(record, cameras, len(views))
+            record = missing_frames.spread(record, cameras, len(views))
             pair_cameras = cameras[pair_cameras]
         if p.birth != "entrances":
             evidence = Evidence(

@@ -14,7 +14,7 @@ from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.single_view.protocol import ViewResult
 
 if TYPE_CHECKING:
-    from tracker.fusion.told import Told
+    from tracker.fusion.place_constraints import Told
 
 
 @dataclass(frozen=True, slots=True, eq=False)

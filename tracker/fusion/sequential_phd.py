@@ -16,15 +16,15 @@ from numpy import ndarray
 
 from tracker.filters import gaussian_mixture, models, phd
 from tracker.filters.gaussian_mixture import GaussianMixture
-from tracker.fusion import sight
+from tracker.fusion import missing_frames
 from tracker.fusion.labels import memory, one_person
 from tracker.fusion.labels.memory import Memory
 from tracker.fusion.measurement_births import Evidence
+from tracker.fusion.missing_frames import Recent
 from tracker.fusion.model import CONFIRMED, FusionModel, all_boxes
+from tracker.fusion.place_constraints import Told, obey
 from tracker.fusion.protocol import FusionResult
 from tracker.fusion.record import Ledger, Record
-from tracker.fusion.sight import Recent
-from tracker.fusion.told import Told, obey
 from tracker.kernels import linear_algebra
 from tracker.kernels.gating import Measurements
 from tracker.kernels.intensity import mixture as mixture_kernels
@@ -204,7 +204,7 @@ class SequentialPhd:
         work.record = work.record.extended(born.size)
         work.record.sources[:, first:] = newborns.sources
         work.record.source_weights[:, first:] = newborns.sources >= 0
-        cameras = sight.seeing(views)
+        cameras = missing_frames.seeing(views)
         seeing = slice(None) if cameras is None else cameras
         work.record.detection_probabilities[seeing, first:] = self._parameters.detection_probability
         return later

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from tracker.runs.run import Run
 from tracker.single_view.dropped import CANDIDATES, DROPPED
-from tracker.single_view.protocol import DOUBT, SHAKE, TRUST, ViewResult
+from tracker.single_view.protocol import SHAKE, TRUST, UNCERTAINTY, ViewResult
 
 _HALF = 0.5
 """A foreground that is trusted less than this is not what finds people."""
@@ -68,7 +68,7 @@ def count_gates(run: Run) -> list[Gates]:
                 dropped={name.removeprefix(DROPPED): _mean(told, name) for name in names},
                 passed=sum(len(result.boxes) for result in told) / len(told),
                 trust=_mean(told, TRUST, 1.0),
-                doubt=_mean(told, DOUBT),
+                doubt=_mean(told, UNCERTAINTY),
             )
         )
     return gates

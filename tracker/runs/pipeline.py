@@ -12,7 +12,7 @@ from tracker.corrections import Correction
 from tracker.corrections.kinds import leeway
 from tracker.corrections.outcomes import outcomes
 from tracker.fusion import trajectories as tracks_stage
-from tracker.fusion.told import told_by_step
+from tracker.fusion.place_constraints import constraints_by_step
 from tracker.fusion.trajectories import Bounds, Trajectories, corrected
 from tracker.parameters import RunParameters, Stage
 from tracker.runs.fitting import default_parameters
@@ -187,7 +187,7 @@ def _fuse(
     """Compute what is missing of the first ``total`` steps."""
     telling.now()
     method = fusion.create(run.sequence, run.parameters)
-    told = told_by_step(run.corrections) if _takes(method.step, "told") else {}
+    told = constraints_by_step(run.corrections) if _takes(method.step, "told") else {}
     state = run.fusion_state if run.fused else method.start()
     with ExitStack() as stack:
         if len(run.views) < total:

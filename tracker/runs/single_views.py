@@ -13,7 +13,7 @@ import numpy as np
 from tracker import single_view
 from tracker.runs.run import Cancelled, Run
 from tracker.sequences.pictures.frames import Picture, Pictures
-from tracker.single_view.colour.likeness import Likeness, looks_of
+from tracker.single_view.colour.likeness import Likeness, appearance_of
 from tracker.single_view.protocol import SHAKE, SingleViewMethod, ViewResult
 from tracker.single_view.working.sequence import Working
 
@@ -142,7 +142,7 @@ class _CameraWorker:
                 likenesses = self._likeness.of_boxes(picture, result.boxes)
                 result = replace(result, likenesses=likenesses)
             if picture is not None:
-                result = replace(result, looks=looks_of(picture, result.boxes))
+                result = replace(result, looks=appearance_of(picture, result.boxes))
             if self._shake > 0.0:
                 result = replace(result, information={**result.information, SHAKE: self._shake})
             done.append((self._working.back(self._camera, result), self._state))

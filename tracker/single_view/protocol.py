@@ -15,7 +15,7 @@ from numpy import ndarray
 
 from tracker.single_view.dropped import Dropped
 
-TRUST, DOUBT = "trust in the foreground", "doubt in the background"
+TRUST, UNCERTAINTY = "trust in the foreground", "doubt in the background"
 """Names in a result's information: how far the foreground was believed about people with
 templates, and how little the background, 0 … 1."""
 

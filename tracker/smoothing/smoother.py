@@ -35,9 +35,9 @@ from tracker.smoothing.calibration import (
 )
 from tracker.smoothing.marks import Marks, shifts
 from tracker.smoothing.paths import Links, Paths
+from tracker.smoothing.place_constraints import Stated
+from tracker.smoothing.process_noise import restlessness
 from tracker.smoothing.recording import CameraBoxes
-from tracker.smoothing.restlessness import restlessness
-from tracker.smoothing.stated import Stated
 
 _T = TypeVar("_T")
 

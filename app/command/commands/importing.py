@@ -11,7 +11,7 @@ from app.command.terminal import FAILURE, CommandError, print_table, say
 from tracker.parameters import ParameterError
 
 if TYPE_CHECKING:
-    from tracker.io.importing.gathering import Taken
+    from tracker.io.importing.gathering import ParsedFiles
 
 MOST_UNKNOWN = 30
 """Files that nobody knows, named one by one."""
@@ -80,7 +80,7 @@ def _import(command: Import) -> int:
     return 0
 
 
-def _rows(taken: Sequence[Taken]) -> Iterator[tuple[str, str, str]]:
+def _rows(taken: Sequence[ParsedFiles]) -> Iterator[tuple[str, str, str]]:
     """What each file was taken for; of those that nobody knows the first are named."""
     unknown = 0
     for one in taken:

@@ -237,7 +237,7 @@ def _show(command: ShowStudy, folder: Path) -> None:
         return
     trial = store.trial(number)
     if command.command:
-        from tracker.studies.told.commands import track_commands
+        from tracker.studies.reporting.commands import track_commands
 
         sys.stdout.writelines(f"{one}\n" for one in track_commands(store.definition(), trial))
     elif command.json:
@@ -260,7 +260,7 @@ def _named(what: tuple[str, ...], folder: Path) -> tuple[Store, int | None]:
 
 
 def _show_trials(store: Store) -> None:
-    from tracker.studies.told.summary import summary_of
+    from tracker.studies.reporting.summary import summary_of
 
     summary = summary_of(store)
     keys = [key for key, _ in summary.importance[:6]] or [
@@ -298,7 +298,7 @@ def _show_trial(store: Store, trial: Trial) -> None:
 
 
 def _best(store: Store, command: BestOfStudy) -> None:
-    from tracker.studies.told.summary import summary_of
+    from tracker.studies.reporting.summary import summary_of
 
     summary = summary_of(store)
     best = summary.best
@@ -335,7 +335,7 @@ def save_preset(name: str, values: dict[str, Any]) -> None:
 
 
 def _export(store: Store, command: ExportStudy) -> None:
-    from tracker.studies.told.report import write_csv, write_json, write_report
+    from tracker.studies.reporting.report import write_csv, write_json, write_report
 
     writers = {".csv": write_csv, ".json": write_json, ".html": write_report}
     output = command.output
@@ -346,7 +346,7 @@ def _export(store: Store, command: ExportStudy) -> None:
 
 
 def _everything(store: Store) -> dict[str, Any]:
-    from tracker.studies.told.report import everything
+    from tracker.studies.reporting.report import everything
 
     return everything(store)
 

@@ -26,8 +26,8 @@ from tracker.sequences.reader import FILE
 if TYPE_CHECKING:
     from app.state.importing.looking import Looked
     from tracker.io.importing.arriving import Footprint
-    from tracker.io.importing.gathering import Taken
-    from tracker.io.importing.settling import Settled, SettledView
+    from tracker.io.importing.gathering import ParsedFiles
+    from tracker.io.importing.settling import ImportPlan, PlannedView
 
 logger = logging.getLogger("app")
 
@@ -49,8 +49,8 @@ class Known:
     wish: Wish
     version: int = 0
     """Grows with every change."""
-    taken: tuple[Taken, ...] = ()
-    settled: Settled | None = None
+    taken: tuple[ParsedFiles, ...] = ()
+    settled: ImportPlan | None = None
     """As it was wished last and could be; also while another wish is being looked into."""
     looked: Looked | None = None
     busy: bool = False
@@ -269,7 +269,11 @@ class Draft:
             )
 
     def _write(
-        self, taken: tuple[Taken, ...], wish: Wish, place: Path, then: Callable[[Path], object]
+        self,
+        taken: tuple[ParsedFiles, ...],
+        wish: Wish,
+        place: Path,
+        then: Callable[[Path], object],
     ) -> None:
         from tracker.io.importing.bringing import copy_links, links_in
         from tracker.io.importing.settling import settle
@@ -324,7 +328,7 @@ def folder_name(name: str) -> str:
     return re.sub(r"[^\w\- .]+", "-", name).strip(" .-")[:80] or "recording"
 
 
-def _middle(view: SettledView) -> bytes | None:
+def _middle(view: PlannedView) -> bytes | None:
     pictures: VideoPiece | ImagesPiece | None = view.matched.video or view.matched.images
     picture = None
     if isinstance(pictures, VideoPiece):

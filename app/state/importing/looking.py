@@ -19,7 +19,7 @@ from tracker.io.checks.synchronisation import CameraOffset, synchronise
 from tracker.io.checks.timing import check_counting, check_time
 from tracker.io.importing.preview import as_sequence
 from tracker.io.importing.remedies import for_import
-from tracker.io.importing.settling import Settled
+from tracker.io.importing.settling import ImportPlan
 from tracker.parameters import METHODS
 from tracker.runs.fitting import default_parameters, unfit_methods
 from tracker.runs.pipeline import Cancelled, compute
@@ -68,7 +68,7 @@ class Looked:
     """What is being looked into; empty when all is done."""
 
 
-def look_into(settled: Settled, name: str, cancelled: Callable[[], bool]) -> Iterator[Looked]:
+def look_into(settled: ImportPlan, name: str, cancelled: Callable[[], bool]) -> Iterator[Looked]:
     """Everything that can be said before an import, the quick things first.
 
     Args:
@@ -136,7 +136,7 @@ def _doors(sequence: Sequence, cancelled: Callable[[], bool]) -> list[Door]:
     return entrances_of(compute(sequence, values, steps=MOST_TRACKED, cancelled=cancelled))
 
 
-def _for_import(checks: Iterable[Check], settled: Settled) -> tuple[Check, ...]:
+def _for_import(checks: Iterable[Check], settled: ImportPlan) -> tuple[Check, ...]:
     return tuple(for_import(one, settled.reading) for one in checks)
 
 

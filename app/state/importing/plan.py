@@ -10,7 +10,7 @@ from numpy import ndarray
 
 from tracker.geometry.camera import Camera
 from tracker.geometry.consistency.consensus import Consensus
-from tracker.io.importing.settling import Settled
+from tracker.io.importing.settling import ImportPlan
 
 CELLS = 72
 """Of the longer side."""
@@ -38,7 +38,7 @@ class Plan:
     """Where boxes of two cameras show feet."""
 
 
-def draw_plan(settled: Settled, agreed: Consensus | None) -> Plan:
+def draw_plan(settled: ImportPlan, agreed: Consensus | None) -> Plan:
     """The plan of a settled recording.
 
     Args:

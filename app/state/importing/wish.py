@@ -25,7 +25,7 @@ from tracker.io.read.pieces import (
 )
 
 if TYPE_CHECKING:
-    from tracker.io.importing.gathering import Taken
+    from tracker.io.importing.gathering import ParsedFiles
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +68,7 @@ def looks_alike(one: Wish, other: Wish) -> bool:
     return replace(one, **later) == replace(other, **later)  # type: ignore[arg-type]
 
 
-def options_of(wish: Wish, taken: Sequence[Taken]) -> ImportOptions:
+def options_of(wish: Wish, taken: Sequence[ParsedFiles]) -> ImportOptions:
     """The same as the import takes it.
 
     Raises:
@@ -96,7 +96,7 @@ def options_of(wish: Wish, taken: Sequence[Taken]) -> ImportOptions:
     )
 
 
-def _files(wish: Wish, taken: Sequence[Taken]) -> tuple[tuple[str, Path], ...]:
+def _files(wish: Wish, taken: Sequence[ParsedFiles]) -> tuple[tuple[str, Path], ...]:
     known = places(taken)
     for _, label in wish.files:
         if label not in known:
@@ -104,7 +104,7 @@ def _files(wish: Wish, taken: Sequence[Taken]) -> tuple[tuple[str, Path], ...]:
     return tuple((camera, known[label]) for camera, label in wish.files)
 
 
-def places(taken: Sequence[Taken]) -> dict[str, Path]:
+def places(taken: Sequence[ParsedFiles]) -> dict[str, Path]:
     """Videos, folders of pictures and files of boxes that a camera may be given, by label."""
     found: dict[str, Path] = {}
     for one in taken:

@@ -25,7 +25,7 @@ from tracker.studies.errors import StudyError
 from tracker.studies.kept.reading import read_as
 from tracker.studies.kept.records import Trial
 from tracker.studies.kept.store import FILE, Store, create, find, stores
-from tracker.studies.told.summary import Summary, summary_of
+from tracker.studies.reporting.summary import Summary, summary_of
 from tracker.studies.work.local import how_many
 
 logger = logging.getLogger("app")

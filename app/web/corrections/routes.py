@@ -27,8 +27,8 @@ from app.web.corrections.wishes import corrections_of
 from app.web.dependencies import ERRORS, Bench, Work, file_name, nothing_open
 from tracker.corrections import CorrectionError
 from tracker.corrections.truth import write_truth
-from tracker.review.queue import Doubt
-from tracker.review.queue.doubt import said
+from tracker.review.queue import ReviewItem
+from tracker.review.queue.item import confirmed
 
 NOTHING_CHANGED = "Nothing was changed."
 SETTLES_SECONDS = 10.0
@@ -146,7 +146,7 @@ def answer(wish: AnswerRequest, bench: Bench, correct: Correct, doubts: Doubts) 
         correct.skipped.add(found.id)
         return views.corrections_of(snapshot, correct)
     with _complaining():
-        correct.add(said(chosen.corrections, found.title if wish.alternative else ""))
+        correct.add(confirmed(chosen.corrections, found.title if wish.alternative else ""))
     return views.corrections_of(bench.snapshot(), correct)
 
 
@@ -185,11 +185,11 @@ def remove(correction: str, bench: Bench, correct: Correct) -> Corrections:
     return views.corrections_of(bench.snapshot(), correct)
 
 
-def _found(doubts: Doubting, snapshot: Snapshot, identity: str) -> Doubt:
+def _found(doubts: Doubting, snapshot: Snapshot, identity: str) -> ReviewItem:
     return _there(doubts.find(snapshot, identity), identity)
 
 
-def _there(found: Doubt | None, identity: str) -> Doubt:
+def _there(found: ReviewItem | None, identity: str) -> ReviewItem:
     if found is None:
         raise ApiError(
             404, "no_doubt", f"There is no doubtful place {identity} any more.",
@@ -198,7 +198,7 @@ def _there(found: Doubt | None, identity: str) -> Doubt:
     return found
 
 
-def _alternative(doubt: Doubt, number: int) -> int:
+def _alternative(doubt: ReviewItem, number: int) -> int:
     if not 0 <= number < len(doubt.alternatives):
         raise ApiError(
             404, "no_alternative", f"Expected an alternative below {len(doubt.alternatives)}, "

@@ -25,8 +25,8 @@ from app.state.snapshot import Ghosts, Snapshot
 from tracker.corrections.outcomes import Outcome, names_by_track
 from tracker.corrections.truth import checked_ranges
 from tracker.fusion.trajectories import Trajectories, corrected
-from tracker.review.queue import Doubt, Queue
-from tracker.review.queue.doubt import Lanes
+from tracker.review.queue import Queue, ReviewItem
+from tracker.review.queue.item import Lanes
 from tracker.runs.pipeline import Run
 
 GHOST_SECONDS = 5.0
@@ -94,7 +94,7 @@ def queue_of(snapshot: Snapshot, found: Queue, skipped: AbstractSet[str]) -> Dou
     )
 
 
-def _doubt(one: Doubt, run: Run | None) -> DoubtInfo:
+def _doubt(one: ReviewItem, run: Run | None) -> DoubtInfo:
     return DoubtInfo(
         id=one.id, kind=one.kind, title=one.title, why=one.why, first=one.first, last=one.last,
         tracks=list(one.tracks), places=[(p.step, p.x, p.y, p.z) for p in one.places],
@@ -107,7 +107,7 @@ def _doubt(one: Doubt, run: Run | None) -> DoubtInfo:
     )  # fmt: skip
 
 
-def _sights(one: Doubt, run: Run) -> list[Sight]:
+def _sights(one: ReviewItem, run: Run) -> list[Sight]:
     points = np.array([place.point for place in one.places])
     found = []
     for number, camera in enumerate(run.sequence.cameras):
@@ -120,7 +120,7 @@ def _sights(one: Doubt, run: Run) -> list[Sight]:
     return found
 
 
-def preview_of(snapshot: Snapshot, doubt: Doubt, alternative: int) -> AlternativePreview:
+def preview_of(snapshot: Snapshot, doubt: ReviewItem, alternative: int) -> AlternativePreview:
     """The tracks as they would be if an alternative were true: at once, by their rows alone."""
     assert snapshot.run is not None
     run = snapshot.run.still()
@@ -133,7 +133,7 @@ def preview_of(snapshot: Snapshot, doubt: Doubt, alternative: int) -> Alternativ
     return AlternativePreview(tracks=ghosts, spans=spans)
 
 
-def ghosts_of(snapshot: Snapshot, doubt: Doubt, alternative: int) -> Ghosts:
+def ghosts_of(snapshot: Snapshot, doubt: ReviewItem, alternative: int) -> Ghosts:
     """The same for the 3D view."""
     assert snapshot.run is not None
     run = snapshot.run.still()
@@ -144,19 +144,19 @@ def ghosts_of(snapshot: Snapshot, doubt: Doubt, alternative: int) -> Ghosts:
     return Ghosts(run.key, after.take(near & np.isin(after.ids, sorted(touched))))
 
 
-def _after(run: Run, doubt: Doubt, alternative: int) -> Trajectories:
+def _after(run: Run, doubt: ReviewItem, alternative: int) -> Trajectories:
     if not alternative:
         return run.tracks
     said = doubt.alternatives[alternative].corrections
     return corrected(run.tracks, said, run.sequence.step_time)
 
 
-def _around(run: Run, doubt: Doubt) -> tuple[int, int]:
+def _around(run: Run, doubt: ReviewItem) -> tuple[int, int]:
     margin = round(GHOST_SECONDS / run.sequence.step_time)
     return max(doubt.first - margin, 0), min(doubt.last + margin, run.sequence.frames - 1)
 
 
-def _touched(doubt: Doubt, spans: list[ChangedSpan]) -> set[int]:
+def _touched(doubt: ReviewItem, spans: list[ChangedSpan]) -> set[int]:
     return {*doubt.tracks, *(one.id for one in spans if one.id)}
 
 

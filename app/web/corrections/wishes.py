@@ -7,7 +7,7 @@ from app.state.snapshot import Snapshot
 from tracker.corrections import Correction, CorrectionError, Place
 from tracker.corrections.kinds import KINDS, make
 from tracker.corrections.pointing import foot_on_floor, ground_under, stands, triangulated
-from tracker.review.queue.doubt import WITHIN, Lanes
+from tracker.review.queue.item import WITHIN, Lanes
 from tracker.sequences.sequence import Sequence
 
 

@@ -26,13 +26,13 @@ from app.web.importing.models import (
 from app.web.importing.sheet.draft import draft_sheet
 from tracker.io.checks import Check
 from tracker.io.checks.synchronisation import CameraOffset
-from tracker.io.importing.finding.angles import open_turns, told_product, told_turns
+from tracker.io.importing.finding.angles import open_turns, product_in_words, turns_in_words
 from tracker.io.read.pieces import CalibrationPiece, DetectionPiece
 
 if TYPE_CHECKING:
     from app.state.importing.looking import Looked
     from tracker.geometry.consistency.entrances import Door
-    from tracker.io.importing.settling import Settled, SettledView
+    from tracker.io.importing.settling import ImportPlan, PlannedView
 
 MOST_OFFSETS = 241
 """Values of a curve of agreement."""
@@ -101,7 +101,7 @@ def _info(draft: Draft) -> ImportInfo:
     )
 
 
-def _recording(settled: Settled | None) -> dict[str, Any]:
+def _recording(settled: ImportPlan | None) -> dict[str, Any]:
     if settled is None:
         return {
             "fps": 0.0, "frames": 0, "unit": "", "up": "", "pose": "", "axes": "", "turns": "",
@@ -128,9 +128,9 @@ def _recording(settled: Settled | None) -> dict[str, Any]:
     }
 
 
-def _turns(settled: Settled) -> str:
+def _turns(settled: ImportPlan) -> str:
     by_angles = any(view.matched.raw.turns for view in settled.views)
-    return told_turns(settled.reading.turns) if by_angles else ""
+    return turns_in_words(settled.reading.turns) if by_angles else ""
 
 
 def _open_turns(known: Known) -> list[tuple[str, str]]:
@@ -138,7 +138,7 @@ def _open_turns(known: Known) -> list[tuple[str, str]]:
     names = open_turns(
         [raw for piece in pieces if isinstance(piece, CalibrationPiece) for raw in piece.cameras]
     )
-    return [(name, told_product(name)) for name in names]
+    return [(name, product_in_words(name)) for name in names]
 
 
 def _vector(values: np.ndarray) -> tuple[float, float, float]:
@@ -160,7 +160,7 @@ def _files(known: Known) -> list[ImportedFile]:
     ]
 
 
-def _camera(view: SettledView, known: Known) -> ImportedCamera:
+def _camera(view: PlannedView, known: Known) -> ImportedCamera:
     matched, camera = view.matched, view.camera
     settled, looked = known.settled, known.looked
     assert settled is not None

@@ -18,7 +18,7 @@ from tracker import parameters as table
 from tracker.sequences.sequence import SequenceError
 from tracker.studies.errors import StudyError
 from tracker.studies.kept.store import Store
-from tracker.studies.told.commands import track_commands
+from tracker.studies.reporting.commands import track_commands
 
 router = APIRouter(prefix="/api/studies", responses=ERRORS)
 
@@ -145,7 +145,7 @@ def _proposed(store: Store, bench: Bench) -> dict[str, object]:
 )
 def export(store: Named, file: Literal["report.html", "trials.csv", "study.json"]) -> Response:
     """A study as a report, a table, or everything."""
-    from tracker.studies.told import report  # and with it the library of plots
+    from tracker.studies.reporting import report  # and with it the library of plots
 
     write = {
         "report.html": report.write_report,

@@ -17,7 +17,7 @@ from tracker import parameters as table
 from tracker.runs.processes import available_cores
 from tracker.studies.defined.defining import definition_of
 from tracker.studies.defined.definition import Definition
-from tracker.studies.defined.objectives import OBJECTIVES, WITH_TRUTH, WITHOUT_TRUTH, chosen
+from tracker.studies.defined.objectives import OBJECTIVES, SELF_CONSISTENCY, WITH_TRUTH, chosen
 from tracker.studies.errors import StudyError
 from tracker.studies.kept.store import Store
 from tracker.studies.tuning import tuning
@@ -75,7 +75,7 @@ def draft(
         recordings=[views.place_of(snapshot)],
         has_truth=has_truth,
         parameters=views.ranges_of(snapshot, wanted),
-        objectives=list(WITH_TRUTH if has_truth else WITHOUT_TRUTH),
+        objectives=list(WITH_TRUTH if has_truth else SELF_CONSISTENCY),
         choices=[
             views.objective_of(one) for one in OBJECTIVES.values() if has_truth or one.of != "truth"
         ],
@@ -168,7 +168,7 @@ def _seconds(snapshot: Snapshot, definition: Definition, runs: int) -> float | N
     if not speed or sequence is None or state.done < min(FEWEST_STEPS, sequence.frames):
         return None
     truth = sequence.ground_truth is not None
-    looks = "identity" in (definition.objectives or (WITH_TRUTH if truth else WITHOUT_TRUTH))
+    looks = "identity" in (definition.objectives or (WITH_TRUTH if truth else SELF_CONSISTENCY))
     times = 2 + len(sequence.views) if looks else 1
     return runs * times * sequence.frames / speed
 

@@ -17,8 +17,8 @@ from app.state.doubting import Doubting
 from app.web.server import Settings, create_app
 from tests.app.conftest import ADDRESS, Runs, connect, run_is, wait_until
 from tracker.corrections.log import read_log
-from tracker.review.queue import Alternative, Doubt, Queue
-from tracker.review.queue.doubt import Lanes, unsaid
+from tracker.review.queue import Alternative, Queue, ReviewItem
+from tracker.review.queue.item import Lanes, proposed
 from tracker.sequences.reader import read_sequence
 
 PLACE = "/api/corrections"
@@ -261,8 +261,8 @@ def test_how_it_would_be_is_shown_until_it_is_no_more(
     lanes = Lanes(desk.app.state.workbench.snapshot().run.tracks)  # type: ignore[attr-defined]
     track = tracks(desk)[0]["id"]
     places = (lanes.place(track, 59), lanes.place(track, 60, after=True))
-    two = Alternative("two people", 0.5, unsaid("different", places))
-    made = Doubt(
+    two = Alternative("two people", 0.5, proposed("different", places))
+    made = ReviewItem(
         "cut", "two people?", "told", 59, 60, (track,), places, 0.5, 60,
         (Alternative("as it is", 0.5, ()), two),
     )  # fmt: skip
@@ -286,9 +286,9 @@ def test_what_is_answered_of_the_run_before_counts_in_the_one_that_came_meanwhil
     lanes = Lanes(desk.app.state.workbench.snapshot().run.tracks)  # type: ignore[attr-defined]
     track = tracks(desk)[0]["id"]
     places = (lanes.place(track, 59), lanes.place(track, 60, after=True))
-    now = Alternative("as it is", 0.5, unsaid("same", places))
-    two = Alternative("two people", 0.5, unsaid("different", places))
-    made = Doubt(
+    now = Alternative("as it is", 0.5, proposed("same", places))
+    two = Alternative("two people", 0.5, proposed("different", places))
+    made = ReviewItem(
         "cut", "two people?", "told", 59, 60, (track,), places, 0.5, 60, (now, two)
     )  # fmt: skip
     queues = iter([Queue((made,), 0, "a test")])
@@ -410,10 +410,10 @@ def test_who_may_be_missing_is_shown_where_each_camera_would_have_him(
     run = desk.app.state.workbench.snapshot().run  # type: ignore[attr-defined]
     place = Lanes(run.tracks).place(tracks(desk)[0]["id"], 60)
     other = place._replace(step=70)
-    here = (*unsaid("here", (place,)), *unsaid("here", (other,)))
-    made = Doubt(
+    here = (*proposed("here", (place,)), *proposed("here", (other,)))
+    made = ReviewItem(
         "missing", "Somebody is missing?", "told", 60, 70, (), (place, other), 0.7, 11,
-        (Alternative("nobody", 0.3, unsaid("nobody", (place, other))),
+        (Alternative("nobody", 0.3, proposed("nobody", (place, other))),
          Alternative("somebody", 0.7, here)),
     )  # fmt: skip
     monkeypatch.setattr(Doubting, "of", lambda self, snapshot: Queue((made,), 0, "a test"))

@@ -15,13 +15,13 @@ from tests.io.read.recorded import PLACES, detections, settled_of, toml, videos
 from tests.io.read.rig import FLIP, HALF_EXTENTS, SIZE, boxes, cameras
 from tracker.io.importing.finding.names import match, short_names
 from tracker.io.importing.options import ImportOptions
-from tracker.io.importing.settling import Settled
+from tracker.io.importing.settling import ImportPlan
 from tracker.io.importing.writing import write
 from tracker.io.read.pieces import FormatError
 from tracker.sequences.reader import read_sequence
 
 
-def _assert_cameras(settled: Settled, tolerance: float = 1e-6) -> None:
+def _assert_cameras(settled: ImportPlan, tolerance: float = 1e-6) -> None:
     for view, camera in zip(settled.views, cameras(), strict=True):
         np.testing.assert_allclose(view.camera.centre, camera.centre, atol=tolerance)
         np.testing.assert_allclose(view.camera.rotation, camera.rotation, atol=tolerance)

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from tests.io.read.rig import SIZE, boxes, cameras, walks
 from tracker.io.importing.gathering import gather
 from tracker.io.importing.options import ImportOptions
-from tracker.io.importing.settling import Settled, settle
+from tracker.io.importing.settling import ImportPlan, settle
 
 PLACES = walks()
 
@@ -54,5 +54,5 @@ def videos(folder: Path, size: tuple[int, int] = SIZE, frames: int = 60) -> None
         writer.release()
 
 
-def settled_of(folder: Path, options: ImportOptions | None = None) -> Settled:
+def settled_of(folder: Path, options: ImportOptions | None = None) -> ImportPlan:
     return settle(gather([folder]), options)

@@ -13,8 +13,8 @@ from tracker.corrections.kinds import leeway
 from tracker.evaluation import EvaluationSettings, evaluate_sequence
 from tracker.fusion.trajectories import Trajectories
 from tracker.parameters import RunParameters
-from tracker.review.queue import Doubt, queue
-from tracker.review.queue.doubt import Lanes, said
+from tracker.review.queue import ReviewItem, queue
+from tracker.review.queue.item import Lanes, confirmed
 from tracker.review.self_consistency.others import Given, Look, looked
 from tracker.runs import pipeline
 from tracker.runs.pipeline import Run
@@ -93,12 +93,12 @@ class Truthful:
         apart = [who[a] != who[b] for a, b in one.apart]
         return all(same) and all(apart)
 
-    def wrong(self, doubt: Doubt) -> bool:
+    def wrong(self, doubt: ReviewItem) -> bool:
         """Whether the run is wrong there."""
         now = doubt.alternatives[0].corrections
         return not (now and all(self.holds(one) for one in now))
 
-    def answer(self, doubt: Doubt) -> tuple[Correction, ...]:
+    def answer(self, doubt: ReviewItem) -> tuple[Correction, ...]:
         """What is true of a doubtful place, of what is offered the one that says most; nothing
         where that cannot be said."""
         true = [
@@ -109,7 +109,7 @@ class Truthful:
         if not true:
             return ()
         as_it_is = doubt.alternatives[0].corrections
-        return said(
+        return confirmed(
             as_it_is
             if as_it_is in true
             else max(true, key=lambda told: sum(len(one.pairs) for one in told))
@@ -123,7 +123,7 @@ class Answered:
     answers: int
     idf1: float
     run: Run
-    doubt: Doubt | None = None
+    doubt: ReviewItem | None = None
     """What was asked last."""
     wrong: bool = False
     """Whether the run was wrong there."""

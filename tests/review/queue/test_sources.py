@@ -12,7 +12,7 @@ from tests.runs.test_corrected_runs import run_of
 from tracker.corrections import Place
 from tracker.fusion.trajectories import Trajectories
 from tracker.review.queue import queue
-from tracker.review.queue.doubt import Alternative, Doubt, Lanes, said, unsaid
+from tracker.review.queue.item import Alternative, Lanes, ReviewItem, confirmed, proposed
 from tracker.review.queue.meetings import draws, meetings
 from tracker.review.queue.ranking import once_each, settled
 from tracker.review.queue.unclaimed import unclaimed
@@ -107,18 +107,18 @@ def test_a_track_that_begins_or_ends_inside_is_asked_for(first: int, last: int, 
     now, other = told[0].alternatives
     assert now.corrections[0].kind == {"begins": "came", "ends": "left"}[kind]
     assert other.corrections[0].kind == "here"
-    assert settled(told[0], said(now.corrections), 25)
+    assert settled(told[0], confirmed(now.corrections), 25)
     assert not [one for one in queue(two()).doubts if one.kind in ("begins", "ends")]
 
 
 def test_a_place_is_told_once_and_only_where_something_is_at_stake() -> None:
     place = Place(30, 0.0, 0.0, 1.0)
 
-    def doubt(tracks: tuple[int, ...], first: int, stake: int, x: float) -> Doubt:
+    def doubt(tracks: tuple[int, ...], first: int, stake: int, x: float) -> ReviewItem:
         other = replace_place(place, x)
-        return Doubt(
+        return ReviewItem(
             "exchange", "", "", first, first + 4, tracks, (place, other), 0.5, stake,
-            (Alternative("as it is", 0.5, ()), Alternative("other", 0.5, unsaid("name", [other],
+            (Alternative("as it is", 0.5, ()), Alternative("other", 0.5, proposed("name", [other],
                                                                                name="A"))),
         )  # fmt: skip
 

@@ -184,6 +184,6 @@ def marginals_of(events: JointEvents, log_weight: Float[ndarray, " K"]) -> Margi
 def _sources(columns: Int[ndarray, "K N"], targets: int, measurements: int) -> Int[ndarray, "K M"]:
     """The target of each measurement, from the column of each row."""
     sources = np.full((len(columns), measurements + 1), -1, dtype=np.int64)
-    taken = np.minimum(columns[:, :targets], measurements)
-    sources[np.arange(len(columns))[:, None], taken] = np.arange(targets)
+    assigned = np.minimum(columns[:, :targets], measurements)
+    sources[np.arange(len(columns))[:, None], assigned] = np.arange(targets)
     return np.ascontiguousarray(sources[:, :measurements])

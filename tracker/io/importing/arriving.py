@@ -14,7 +14,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
-from tracker.io.importing.gathering import MOST_DEPTH, MOST_FILES, Taken, gather
+from tracker.io.importing.gathering import MOST_DEPTH, MOST_FILES, ParsedFiles, gather
 from tracker.io.read.pieces import FormatError
 
 FRESH_SECONDS = 2.0
@@ -94,7 +94,7 @@ def gather_whole(
     sources: Sequence[Path],
     told: Callable[[str], object],
     sleep: Callable[[float], object] = time.sleep,
-) -> tuple[list[Taken], Footprint]:
+) -> tuple[list[ParsedFiles], Footprint]:
     """Recognise and read everything as :func:`gather` does, once nothing grows any more.
 
     Args:
@@ -127,7 +127,7 @@ def changed_since(sources: Sequence[Path], before: Footprint) -> list[Path]:
     return sorted(p for p in before.keys() | after.keys() if before.get(p) != after.get(p))
 
 
-def short_videos(taken: Sequence[Taken]) -> list[str]:
+def short_videos(taken: Sequence[ParsedFiles]) -> list[str]:
     """Sentences about videos that end before they say they do, and grow no more."""
     sentences = []
     for path in dict.fromkeys(path for one in taken if one.pieces for path in one.files):

@@ -28,7 +28,7 @@ _LOOKED_AT = 50
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Taken:
+class ParsedFiles:
     """A file, or a series of numbered files, and what it was taken for."""
 
     label: str
@@ -42,7 +42,7 @@ class Taken:
     files: tuple[Path, ...] = ()
 
 
-def gather(sources: Sequence[Path]) -> list[Taken]:
+def gather(sources: Sequence[Path]) -> list[ParsedFiles]:
     """Recognise and read everything in some files and folders.
 
     Args:
@@ -54,7 +54,7 @@ def gather(sources: Sequence[Path]) -> list[Taken]:
     Raises:
         FormatError: If a source is not there, or there are too many files.
     """
-    taken: list[Taken] = []
+    taken: list[ParsedFiles] = []
     for source in sources:
         if not source.exists():
             raise FormatError(f"{source}: there is no such file or folder")
@@ -108,7 +108,7 @@ class _Crowd:
         # of a long series that nobody knows one was opened
         self._refused += len(series) if len(series) < _LOOKED_AT else 1
 
-    def told(self, kind: tuple[Path, str], root: Path) -> Taken:
+    def told(self, kind: tuple[Path, str], root: Path) -> ParsedFiles:
         """What is said of those that were not opened."""
         folder, suffix = kind
         where = SourceFile(folder / f"…{suffix}", root).where
@@ -116,16 +116,16 @@ class _Crowd:
             f"{where}: {self._refused:,} of these files are of no format that is read, so "
             f"{self.passed:,} more of like size were not opened; name those that are wanted"
         )
-        return Taken(f"{where} ({self.passed:,})", "", Certainty.NO, complaint=complaint)
+        return ParsedFiles(f"{where} ({self.passed:,})", "", Certainty.NO, complaint=complaint)
 
 
-def _walk(source: Path, root: Path) -> tuple[list[Path], list[Taken]]:
+def _walk(source: Path, root: Path) -> tuple[list[Path], list[ParsedFiles]]:
     """Ordinary files, and what leads out of the folder."""
     if source.is_file():
         return [source], []
     home = root.resolve()
     files: list[Path] = []
-    strays: list[Taken] = []
+    strays: list[ParsedFiles] = []
     for folder, folders, names in os.walk(source):
         here = Path(folder)
         depth = len(here.relative_to(source).parts)
@@ -156,9 +156,9 @@ def _stays(path: Path, home: Path) -> bool:
         return False
 
 
-def _stray(path: Path, root: Path, why: str) -> Taken:
+def _stray(path: Path, root: Path, why: str) -> ParsedFiles:
     where = SourceFile(path, root).where
-    return Taken(where, "", Certainty.NO, complaint=f"{where}: {why}")
+    return ParsedFiles(where, "", Certainty.NO, complaint=f"{where}: {why}")
 
 
 def _series(files: Sequence[Path]) -> Iterator[tuple[Path, ...]]:
@@ -183,7 +183,7 @@ def _series(files: Sequence[Path]) -> Iterator[tuple[Path, ...]]:
             yield tuple(path for _, path in sorted(row))
 
 
-def _read(series: tuple[Path, ...], root: Path) -> Iterator[Taken]:
+def _read(series: tuple[Path, ...], root: Path) -> Iterator[ParsedFiles]:
     largest = max(series[:_LOOKED_AT], key=_size)
     file = SourceFile(largest, root, series)
     found, certainty, complaint = _recognise(file)
@@ -197,10 +197,10 @@ def _read(series: tuple[Path, ...], root: Path) -> Iterator[Taken]:
         if found is not None:
             yield _pieces(found, certainty, own, own.where)
         else:
-            yield Taken(own.where, "", Certainty.NO, complaint=complaint, files=(path,))
+            yield ParsedFiles(own.where, "", Certainty.NO, complaint=complaint, files=(path,))
     if found is None and len(series) >= _LOOKED_AT:
         label = f"{SourceFile(series[0], root).where} … ({len(series)})"
-        yield Taken(label, "", Certainty.NO, complaint=complaint, files=series)
+        yield ParsedFiles(label, "", Certainty.NO, complaint=complaint, files=series)
 
 
 def _size(path: Path) -> int:
@@ -221,7 +221,7 @@ def _recognise(file: SourceFile) -> tuple[Format | None, Certainty, str]:
 
 def _series_pieces(
     found: Format, certainty: Certainty, file: SourceFile, root: Path
-) -> Iterator[Taken]:
+) -> Iterator[ParsedFiles]:
     """A series; without those of its files that cannot be read by themselves, each told."""
     series = file.series
     label = f"{SourceFile(series[0], root).where} … ({len(series)})"
@@ -241,7 +241,7 @@ def _series_pieces(
     yield _pieces(found, certainty, SourceFile(whole[0], root, whole), label)
 
 
-def _pieces(found: Format, certainty: Certainty, file: SourceFile, label: str) -> Taken:
+def _pieces(found: Format, certainty: Certainty, file: SourceFile, label: str) -> ParsedFiles:
     try:
         with np.errstate(all="ignore"):  # what overflows is infinite, and refused by its reader
             pieces = tuple(found.read(file))
@@ -250,5 +250,5 @@ def _pieces(found: Format, certainty: Certainty, file: SourceFile, label: str) -
                     check_cameras(file, piece)
     except Exception as error:  # or a field of a kind that the reader does not foresee
         told = error if isinstance(error, FormatError) else unforeseen(file, found, error)
-        return Taken(label, found.NAME, certainty, complaint=str(told), files=file.series)
-    return Taken(label, found.NAME, certainty, pieces, files=file.series)
+        return ParsedFiles(label, found.NAME, certainty, complaint=str(told), files=file.series)
+    return ParsedFiles(label, found.NAME, certainty, pieces, files=file.series)

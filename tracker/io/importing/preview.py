@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
-from tracker.io.importing.settling import Settled, at_steps_of
+from tracker.io.importing.settling import ImportPlan, at_steps_of
 from tracker.sequences.sequence import Room, Sequence, View
 
 
-def as_sequence(settled: Settled, name: str) -> Sequence:
+def as_sequence(settled: ImportPlan, name: str) -> Sequence:
     """What the written folder will be read as; its folder is none.
 
     Args:

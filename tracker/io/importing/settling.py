@@ -15,7 +15,7 @@ from tracker.io.checks.level import lean_of
 from tracker.io.checks.reading import Reading, pose, read_boxes, to_camera
 from tracker.io.checks.readings import Open, Seen, find_meaning
 from tracker.io.importing.arriving import short_videos
-from tracker.io.importing.finding.angles import check_turns, chosen_turns, told_turns
+from tracker.io.importing.finding.angles import check_turns, chosen_turns, turns_in_words
 from tracker.io.importing.finding.calibrations import camera_sets
 from tracker.io.importing.finding.geometry import check_places, read_poses
 from tracker.io.importing.finding.matching import MatchedCamera, match_all, nothing_of
@@ -31,7 +31,7 @@ from tracker.io.importing.finding.times import (
     told_beyond,
 )
 from tracker.io.importing.finding.truths import settle_truth
-from tracker.io.importing.gathering import Taken
+from tracker.io.importing.gathering import ParsedFiles
 from tracker.io.importing.options import ImportOptions
 from tracker.io.read.pieces import FormatError, Layout, RawCamera
 from tracker.sequences.sequence import Detections, Entrance, GroundTruth
@@ -47,7 +47,7 @@ _WITHOUT_UNIT = ("COLMAP", "nerfstudio", "Metashape", "OpenMVG", "MVSNet", "Midd
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SettledView:
+class PlannedView:
     """One camera, ready to be written."""
 
     camera: Camera
@@ -58,10 +58,10 @@ class SettledView:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Settled:
+class ImportPlan:
     """A recording, ready to be written, and what was found out on the way."""
 
-    views: tuple[SettledView, ...]
+    views: tuple[PlannedView, ...]
     fps: float
     frames: int
     room: Suggestion
@@ -80,7 +80,7 @@ class Settled:
     """Sentences about what is not used or odd."""
 
 
-def settle(taken: Sequence[Taken], options: ImportOptions | None = None) -> Settled:
+def settle(taken: Sequence[ParsedFiles], options: ImportOptions | None = None) -> ImportPlan:
     """Find out everything that a sequence needs.
 
     Raises:
@@ -135,12 +135,12 @@ def settle(taken: Sequence[Taken], options: ImportOptions | None = None) -> Sett
         found,
     )
     views = tuple(
-        SettledView(camera, own, boxes_, time)
+        PlannedView(camera, own, boxes_, time)
         for camera, own, boxes_, time in zip(
             _renamed(settled, options), cameras, detections, times.cameras, strict=True
         )
     )
-    return Settled(
+    return ImportPlan(
         views,
         times.fps,
         times.frames,
@@ -326,7 +326,7 @@ def _read(
         if unknown:
             found.append(("boxes", f"{reading.layout}, {why}; --boxes"))
     if any(raw.turns for raw in raws):
-        found.append(("angles", f"{told_turns(reading.turns)}, {why}; --euler"))
+        found.append(("angles", f"{turns_in_words(reading.turns)}, {why}; --euler"))
     if reading.lean != (0.0, 0.0):
         degrees = np.degrees(np.arcsin(np.hypot(*reading.lean)))
         found.append(("level", f"the world is turned by {degrees:.0f}° so that people stand"))

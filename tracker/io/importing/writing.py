@@ -12,7 +12,7 @@ from numpy import ndarray
 
 from tracker.files.atomic import replacing, write_whole
 from tracker.io.importing.bringing import Told, bring, bring_images
-from tracker.io.importing.settling import Settled, SettledView
+from tracker.io.importing.settling import ImportPlan, PlannedView
 from tracker.io.read.pieces import FormatError
 from tracker.sequences.sequence import Detections, GroundTruth
 
@@ -20,7 +20,7 @@ FILE = "sequence.toml"
 
 
 def write(
-    settled: Settled,
+    settled: ImportPlan,
     folder: Path,
     name: str,
     *,
@@ -78,7 +78,7 @@ def write(
     return told
 
 
-def _entrances(settled: Settled) -> list[str]:
+def _entrances(settled: ImportPlan) -> list[str]:
     """The lines of the room's entrances."""
     if not settled.entrances:
         return []
@@ -90,7 +90,7 @@ def _entrances(settled: Settled) -> list[str]:
 
 
 def _camera(
-    view: SettledView, name: str, folder: Path, copy: bool, copied: Told, told: list[str]
+    view: PlannedView, name: str, folder: Path, copy: bool, copied: Told, told: list[str]
 ) -> str:
     camera = view.camera
     lines = ["[[camera]]", f"name = {_text(_plain_name(camera.name))}"]

@@ -3,7 +3,7 @@
 One file a source of doubt; :func:`tracker.review.queue.ranking.queue` has them all in one order.
 """
 
-from tracker.review.queue.doubt import Alternative, Doubt
+from tracker.review.queue.item import Alternative, ReviewItem
 from tracker.review.queue.ranking import Queue, queue
 
-__all__ = ["Alternative", "Doubt", "Queue", "queue"]
+__all__ = ["Alternative", "Queue", "ReviewItem", "queue"]

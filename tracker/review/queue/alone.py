@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from tracker.corrections.kinds import KINDS
-from tracker.review.queue.doubt import WITHIN, Alternative, Doubt, Lanes, unsaid
+from tracker.review.queue.item import WITHIN, Alternative, Lanes, ReviewItem, proposed
 from tracker.review.queue.linking import Move, Piece
 from tracker.runs.run import Run
 
@@ -25,7 +25,7 @@ _FASTEST = 3.0
 """Metres a second that nobody in a room exceeds for long."""
 
 
-def of_tracks(run: Run, lanes: Lanes) -> Iterator[Doubt]:
+def of_tracks(run: Run, lanes: Lanes) -> Iterator[ReviewItem]:
     """Who may be nobody."""
     for track in lanes.ids.tolist():
         yield from _nobody(run, lanes, track)
@@ -38,7 +38,7 @@ def moves(run: Run, lanes: Lanes) -> Iterator[Move]:
         yield from _fast(run, lanes, track)
 
 
-def _nobody(run: Run, lanes: Lanes, track: int) -> Iterator[Doubt]:
+def _nobody(run: Run, lanes: Lanes, track: int) -> Iterator[ReviewItem]:
     """A short life, or one of few sights."""
     rows, tracks = lanes.rows[track], run.tracks
     life = len(rows) * run.sequence.step_time
@@ -57,12 +57,12 @@ def _nobody(run: Run, lanes: Lanes, track: int) -> Iterator[Doubt]:
     how = f"{life:.1f} s long, seen at {100 * seen:.0f} % of its steps"
     if one_alone:
         how += " by one camera alone"
-    yield Doubt(
+    yield ReviewItem(
         "short", f"{track} is nobody?", how, first, last, (track,), (places[0], places[-1]),
         wrong, len(rows),
         (
-            Alternative("as it is", 1.0 - wrong, unsaid("same", (places[0], places[-1]))),
-            Alternative("nobody", wrong, unsaid("nobody", places)),
+            Alternative("as it is", 1.0 - wrong, proposed("same", (places[0], places[-1]))),
+            Alternative("nobody", wrong, proposed("nobody", places)),
         ),
     )  # fmt: skip
 

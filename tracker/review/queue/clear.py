@@ -8,7 +8,7 @@ from numpy import ndarray
 
 from tracker.corrections import Place
 from tracker.corrections.kinds import REACH
-from tracker.review.queue.doubt import Lanes
+from tracker.review.queue.item import Lanes
 from tracker.review.queue.linking import Move, Piece
 
 _WIDTHS = 4.0

@@ -10,7 +10,7 @@ from numpy import ndarray
 
 from tracker.corrections import Correction, Place
 from tracker.corrections.kinds import leeway
-from tracker.review.queue.doubt import Alternative, Doubt, Lanes, unsaid
+from tracker.review.queue.item import Alternative, Lanes, ReviewItem, proposed
 from tracker.review.queue.moves import ends_there
 from tracker.review.queue.unclaimed import Unclaimed, unclaimed
 from tracker.runs.run import Run
@@ -36,7 +36,7 @@ _NEAR, _WHILE = 1.0, 1.0
 """Metres and seconds between a track and boxes that nobody takes, which may be its person's."""
 
 
-def of_edges(run: Run, lanes: Lanes, asked: Collection[Place]) -> Iterator[Doubt]:
+def of_edges(run: Run, lanes: Lanes, asked: Collection[Place]) -> Iterator[ReviewItem]:
     """Everybody who may be missing; then tracks that begin or end in the middle of the room.
 
     With q the probability that nobody comes, or leaves, at a place before anything is looked at,
@@ -77,7 +77,7 @@ def _shown(place: Place, free: list[Unclaimed], run: Run, *, before: bool) -> bo
     return False
 
 
-def _missing(run: Run, lanes: Lanes, one: Unclaimed) -> Doubt:
+def _missing(run: Run, lanes: Lanes, one: Unclaimed) -> ReviewItem:
     """Somebody whom boxes show."""
     seconds = len(one.places) * run.sequence.step_time
     wrong = float(0.8 * one.share * -np.expm1(-seconds * (len(one.cameras) - 1)))
@@ -89,20 +89,20 @@ def _missing(run: Run, lanes: Lanes, one: Unclaimed) -> Doubt:
     names = [run.sequence.cameras[number].name for number in one.cameras]
     told = f"{', '.join(names[:-1])} and {names[-1]}"
     here: tuple[Correction, ...] = tuple(
-        said for place in along for said in unsaid("here", (place,), accuracy=_ACCURACY)
+        said for place in along for said in proposed("here", (place,), accuracy=_ACCURACY)
     )
-    return Doubt(
+    return ReviewItem(
         "missing", "Somebody is missing?",
         f"boxes of {told} meet for {seconds:.1f} s where nobody is tracked",
         first.step, last.step, (), tuple(along), wrong, last.step - first.step + 1,
         (
-            Alternative("nobody", 1.0 - wrong, unsaid("nobody", along)),
+            Alternative("nobody", 1.0 - wrong, proposed("nobody", along)),
             Alternative("somebody", wrong, here),
         ),
     )  # fmt: skip
 
 
-def _edge(run: Run, lanes: Lanes, track: int, *, before: bool) -> Iterator[Doubt]:
+def _edge(run: Run, lanes: Lanes, track: int, *, before: bool) -> Iterator[ReviewItem]:
     """A track that begins or ends where nobody should."""
     sequence = run.sequence
     rows = lanes.rows[track]
@@ -124,10 +124,10 @@ def _edge(run: Run, lanes: Lanes, track: int, *, before: bool) -> Iterator[Doubt
     metres = _way_out(run, point)
     stake = round(metres / _WALK / sequence.step_time)
     other = Place(place.step + (-stride if before else stride), *beyond.tolist())
-    here = unsaid("here", (other,), accuracy=_ACCURACY)
-    now = unsaid("came" if before else "left", (place,))
+    here = proposed("here", (other,), accuracy=_ACCURACY)
+    now = proposed("came" if before else "left", (place,))
     word, was = ("begins", "there before") if before else ("ends", "there after")
-    yield Doubt(
+    yield ReviewItem(
         "begins" if before else "ends", f"{track} {word} here?",
         f"{track} {word} {metres:.1f} m from where people {'come' if before else 'leave'}, "
         f"in sight of {'a camera' if cameras == 1 else f'{cameras} cameras'}",

@@ -6,7 +6,7 @@ from collections.abc import Sequence as Many
 from dataclasses import dataclass
 
 from tracker.corrections import Place
-from tracker.review.queue.doubt import Alternative, DoubtKind, unsaid
+from tracker.review.queue.item import Alternative, ItemKind, proposed
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +38,7 @@ class Move:
     """i, then i' where there is one."""
     later: tuple[Piece, ...]
     """What they go on as now: j, then j'; for a join those that begin anew."""
-    kind: DoubtKind
+    kind: ItemKind
     """exchange: both cross over; cut: i → j no more; join: i → j where both were free."""
     odds: float
     """log of how much likelier than what the run has."""
@@ -66,22 +66,23 @@ class Move:
         if len(self.earlier) == 1 and len(self.later) == 1:
             i, j = self.earlier[0], self.later[0]
             if self.joins:
-                return Alternative(_joined(i, j), 0.0, unsaid("same", (i.end, j.begin)))
-            return Alternative("two people", 0.0, unsaid("different", (i.end, j.begin)))
+                return Alternative(_joined(i, j), 0.0, proposed("same", (i.end, j.begin)))
+            return Alternative("two people", 0.0, proposed("different", (i.end, j.begin)))
         if len(self.earlier) == 2 and len(self.later) == 2:
             (i, other), (j, after) = self.earlier, self.later
-            told = unsaid("exchanged", (i.end, other.end, after.begin, j.begin))
+            told = proposed("exchanged", (i.end, other.end, after.begin, j.begin))
             if not told:
                 told = (
-                    *unsaid("same", (i.end, after.begin)), *unsaid("same", (other.end, j.begin)),
-                )  # fmt: skip
+                    *proposed("same", (i.end, after.begin)),
+                    *proposed("same", (other.end, j.begin)),
+                )
             words = f"exchanged with {other.track if other.track != i.track else after.track}"
             return Alternative(words, 0.0, told)
         if len(self.earlier) == 2:  # j goes on from i', and i ends
             (_, other), (j,) = self.earlier, self.later
-            return Alternative(_joined(other, j), 0.0, unsaid("same", (other.end, j.begin)))
+            return Alternative(_joined(other, j), 0.0, proposed("same", (other.end, j.begin)))
         (i,), (_, after) = self.earlier, self.later
-        return Alternative(_joined(i, after), 0.0, unsaid("same", (i.end, after.begin)))
+        return Alternative(_joined(i, after), 0.0, proposed("same", (i.end, after.begin)))
 
     @property
     def halves(self) -> tuple[Alternative, ...]:
@@ -90,7 +91,7 @@ class Move:
             return ()
         (i, other), (j, after) = self.earlier, self.later
         return tuple(
-            Alternative(_joined(a, b), 0.0, unsaid("same", (a.end, b.begin)))
+            Alternative(_joined(a, b), 0.0, proposed("same", (a.end, b.begin)))
             for a, b in ((i, after), (other, j))
         )
 

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
-from tracker.review.queue.doubt import Lanes
+from tracker.review.queue.item import Lanes
 from tracker.review.queue.linking import Move, Piece
 from tracker.runs.run import Run
 

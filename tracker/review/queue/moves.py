@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from tracker.corrections import Place
-from tracker.review.queue.doubt import Lanes
+from tracker.review.queue.item import Lanes
 from tracker.review.queue.linking import Move, Piece
 from tracker.runs.run import Run
 from tracker.smoothing import names_of

@@ -13,7 +13,7 @@ from numpy import ndarray
 from tracker.corrections import Place
 from tracker.fusion.trajectories import Trajectories
 from tracker.geometry.assignment import pairs_within
-from tracker.review.queue.doubt import Lanes
+from tracker.review.queue.item import Lanes
 from tracker.review.queue.linking import Move, Piece
 
 _REACH = 0.7

@@ -13,8 +13,8 @@ from tracker.corrections.kinds import Kind, leeway
 from tracker.fusion.trajectories import Trajectories
 from tracker.review.queue import alone, moves
 from tracker.review.queue.clear import Clear
-from tracker.review.queue.doubt import Alternative, Doubt, Lanes, unsaid
 from tracker.review.queue.edges import of_edges
+from tracker.review.queue.item import Alternative, Lanes, ReviewItem, proposed
 from tracker.review.queue.linking import Move
 from tracker.review.queue.meetings import meetings
 from tracker.review.queue.opinion import Opinion
@@ -48,7 +48,7 @@ _ROUNDED = 1e-3
 class Queue:
     """What to look at."""
 
-    doubts: tuple[Doubt, ...]
+    doubts: tuple[ReviewItem, ...]
     """The most at stake first."""
     answered: int
     """Doubtful places that corrections settle already."""
@@ -79,7 +79,7 @@ def queue(
     ordered = sorted(found, key=lambda one: (-one.weight, one.first, one.id))
     steps = leeway(run.sequence.step_time)
     parted, somebody = _parted_by(run), _somebody(run)
-    told: list[Doubt] = []
+    told: list[ReviewItem] = []
     answered = 0
     for one in once_each(ordered, round(_SAME_MOMENT / run.sequence.step_time)):
         known = one.kind == "join" and parted(*one.tracks[:2])
@@ -117,7 +117,7 @@ def _obeyed(run: Run) -> list[tuple[Kind | None, tuple[int, ...]]]:
     return [(kinds.get(one.id), one.tracks) for one in run.outcomes if one.met]
 
 
-def once_each(ordered: Iterable[Doubt], pause: int) -> Iterable[Doubt]:
+def once_each(ordered: Iterable[ReviewItem], pause: int) -> Iterable[ReviewItem]:
     """What is worth a look, each place once: an exchange is found from either side.
 
     Args:
@@ -144,7 +144,7 @@ def _joins(run: Run) -> bool:
     return run.smoothed is not None and run.smoothed.joined is not None
 
 
-def _linked(run: Run, lanes: Lanes, backwards: Trajectories | None) -> Iterable[Doubt]:
+def _linked(run: Run, lanes: Lanes, backwards: Trajectories | None) -> Iterable[ReviewItem]:
     """Doubts about who goes on as whom: the moves, gathered by the place they change."""
     pieces, joined = moves.pieces_of(run, lanes)
     every: list[Move] = [] if joined is None else list(moves.of_joining(pieces, joined))
@@ -215,7 +215,7 @@ class _Site:
         return _Site(kept, told, float(weights.sum()) / total)
 
 
-def _doubt_of(run: Run, site: _Site, trust: Trust) -> Doubt | None:
+def _doubt_of(run: Run, site: _Site, trust: Trust) -> ReviewItem | None:
     best = site.move
     now = Alternative("as it is", 1.0 - site.wrong, _as_it_is(best))
     others = [one for one in site.alternatives if one.corrections][:_ALTERNATIVES]
@@ -237,7 +237,7 @@ def _doubt_of(run: Run, site: _Site, trust: Trust) -> Doubt | None:
     moments = (*(one.last for one in best.earlier), *(one.first for one in best.later))
     first, last = min(moments), max(moments)
     title, why = words_of(run, best)
-    return Doubt(
+    return ReviewItem(
         best.kind, title, why, first, last, tracks, places, site.wrong, stake, (now, *others)
     )
 
@@ -273,7 +273,7 @@ def _with_nobody_of_them(
         for a, b in told.pairs
         if _is(a, first) or _is(b, last)
     )
-    apart = [one for pair in pairs for one in unsaid("different", pair)]
+    apart = [one for pair in pairs for one in proposed("different", pair)]
     plain = [one for one in others if one.corrections and one.corrections[0].kind == "different"]
     chance = plain[0].probability if plain else 0.0
     rest = [one for one in others if one not in plain]
@@ -292,17 +292,17 @@ def _is(said: Place, place: Place) -> bool:
 def _as_it_is(move: Move) -> tuple[Correction, ...]:
     """What somebody says who says that the run is right."""
     if move.joins:
-        return unsaid("different", (move.earlier[0].end, move.later[0].begin))
+        return proposed("different", (move.earlier[0].end, move.later[0].begin))
     if len(move.earlier) == 2 and len(move.later) == 1:
-        return unsaid("same", (move.earlier[0].end, move.later[0].begin))
+        return proposed("same", (move.earlier[0].end, move.later[0].begin))
     return tuple(
         one
         for i, j in zip(move.earlier, move.later, strict=False)
-        for one in unsaid("same", (i.end, j.begin))
+        for one in proposed("same", (i.end, j.begin))
     )
 
 
-def settled(doubt: Doubt, corrections: Many[Correction], steps: int) -> bool:
+def settled(doubt: ReviewItem, corrections: Many[Correction], steps: int) -> bool:
     """Whether what somebody said speaks of the people of a doubtful place there.
 
     Args:

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from tracker.review.queue.doubt import Lanes
+from tracker.review.queue.item import Lanes
 
 _MOST = 0.95
 """Probability of a mistake beyond which none is taken for sure."""

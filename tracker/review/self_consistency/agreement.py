@@ -41,7 +41,7 @@ class Difference:
 
 
 @dataclass(frozen=True, slots=True)
-class Doubt:
+class ReviewItem:
     """A moment at which runs disagree."""
 
     step: int
@@ -113,7 +113,7 @@ def _stretches(
     return found
 
 
-def doubts(found: Items[tuple[str, Items[Difference]]], step_time: float) -> tuple[Doubt, ...]:
+def doubts(found: Items[tuple[str, Items[Difference]]], step_time: float) -> tuple[ReviewItem, ...]:
     """The moments of all differences: those that most runs see otherwise first; of as many, who
     somebody is before whether he is there, and the longer before the shorter.
 
@@ -142,7 +142,7 @@ def doubts(found: Items[tuple[str, Items[Difference]]], step_time: float) -> tup
     return tuple(_doubt(moment) for moment in sorted(moments, key=rank))
 
 
-def _doubt(moment: list[tuple[str, Difference]]) -> Doubt:
+def _doubt(moment: list[tuple[str, Difference]]) -> ReviewItem:
     first = moment[0][1]
     names = tuple(dict.fromkeys(name for name, _ in moment))
     others = sorted({one.other for _, one in moment if one.other is not None})
@@ -152,4 +152,4 @@ def _doubt(moment: list[tuple[str, Difference]]) -> Doubt:
         why = f"{first.person} is taken for {' or '.join(map(str, others))}"
     else:
         why = f"{first.person} is somebody else"
-    return Doubt(first.first, (first.person, *others), names, f"{why} {', '.join(names)}")
+    return ReviewItem(first.first, (first.person, *others), names, f"{why} {', '.join(names)}")

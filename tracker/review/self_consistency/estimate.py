@@ -9,7 +9,7 @@ import numpy as np
 
 from tracker.fusion.trajectories import Trajectories
 from tracker.review.self_consistency.agreement import (
-    Doubt,
+    ReviewItem,
     agreement,
     compared,
     differences,
@@ -39,7 +39,7 @@ class Estimate:
     """IDF1 without each camera; empty where there is only one."""
     overlaps: tuple[float | None, ...]
     """Of each camera's boxes with the people that the others found: a low one is a veto."""
-    doubts: tuple[Doubt, ...]
+    doubts: tuple[ReviewItem, ...]
     """The moments at which the runs disagree, the most doubtful first."""
 
     @property

@@ -76,7 +76,7 @@ class Likeness:
         return told
 
 
-def looks_of(
+def appearance_of(
     picture: UInt8[ndarray, "h w 3"], boxes: Float[ndarray, "N 4"]
 ) -> Float16[ndarray, "N A"]:
     """The root of each box's colour histogram: a unit vector, 0 outside the picture.

@@ -29,7 +29,7 @@ from tracker.single_view.pictures.foreground import (
     integral,
     learn,
 )
-from tracker.single_view.protocol import DOUBT
+from tracker.single_view.protocol import UNCERTAINTY
 
 if TYPE_CHECKING:
     from tracker.parameters import RunParameters
@@ -155,7 +155,7 @@ class _Foreground:
         state, found = self._model.step(state, picture)
         information = {
             "foreground share": float(found.mask.mean()),
-            DOUBT: self._model.doubt if isinstance(self._model, MovingForeground) else 0.0,
+            UNCERTAINTY: self._model.doubt if isinstance(self._model, MovingForeground) else 0.0,
         }
         dropped = Dropped.none()
         if self._sizes is None:

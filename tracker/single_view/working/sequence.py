@@ -13,7 +13,7 @@ from tracker.sequences.pictures.frames import Picture, Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.pictures.foreground import pack, unpack
 from tracker.single_view.protocol import ViewResult
-from tracker.single_view.working.steadying import SteadyReader
+from tracker.single_view.working.stabilisation import SteadyReader
 from tracker.single_view.working.view import WorkingView, working_view
 
 if TYPE_CHECKING:

@@ -10,9 +10,9 @@ from numpy import ndarray
 
 from tracker.parameters import SmoothingParams
 from tracker.smoothing.identity import pieces
+from tracker.smoothing.identity.constraints import Seeker
 from tracker.smoothing.identity.exchanges import exchange_breaks
 from tracker.smoothing.identity.odds import FASTEST
-from tracker.smoothing.identity.ties import Seeker
 from tracker.smoothing.lifetimes import independence, lifetimes
 from tracker.smoothing.paths import Paths
 from tracker.smoothing.smoother import Fitted, Shared, Smoother

@@ -22,13 +22,13 @@ from tracker.geometry.assignment import names_by_majority
 from tracker.parameters import SmoothingParams
 from tracker.smoothing.identity import cutting, joining, odds, pieces
 from tracker.smoothing.identity import decisions as decided
+from tracker.smoothing.identity.constraints import Seeker, Ties
 from tracker.smoothing.identity.cutting import Tracked
 from tracker.smoothing.identity.ends import Ends
 from tracker.smoothing.identity.people import Seen, told_of_people
 from tracker.smoothing.identity.people import of_chains as people_of_chains
 from tracker.smoothing.identity.program import Cut
 from tracker.smoothing.identity.staying import Staying
-from tracker.smoothing.identity.ties import Seeker, Ties
 from tracker.smoothing.paths import Links, Paths
 from tracker.smoothing.protocol import Earlier, Nothing
 from tracker.smoothing.result import Decision, Joined

@@ -14,7 +14,7 @@ from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import breadth_first_order, connected_components
 
 from tracker.smoothing.identity import program
-from tracker.smoothing.identity.ties import Ties
+from tracker.smoothing.identity.constraints import Ties
 
 _FREE = Ties()
 

@@ -15,7 +15,7 @@ from numpy import ndarray
 from scipy.optimize import Bounds, LinearConstraint, milp
 from scipy.sparse import coo_array, csr_array
 
-from tracker.smoothing.identity.ties import Ties
+from tracker.smoothing.identity.constraints import Ties
 
 _REACH = 40.0
 """What the ways cost at most that are looked at first: few corrections cost more."""

@@ -79,7 +79,7 @@ BESIDE: dict[str, Objective] = {
 """What trials are shown with beside their objectives, where it is known of them."""
 
 WITH_TRUTH = ("hota", "idf1", "speed")
-WITHOUT_TRUTH = ("identity",)
+SELF_CONSISTENCY = ("identity",)
 
 VETO = 0.05
 """By how much the overlap in a left-out camera may be below the default's before a trial is
@@ -97,7 +97,7 @@ def chosen(objectives: Sequence[str], has_truth: Mapping[str, bool]) -> tuple[Ob
         StudyError: If one needs a truth that a recording does not have.
     """
     if not objectives:
-        objectives = WITH_TRUTH if all(has_truth.values()) else WITHOUT_TRUTH
+        objectives = WITH_TRUTH if all(has_truth.values()) else SELF_CONSISTENCY
     found = tuple(OBJECTIVES[key] for key in dict.fromkeys(objectives))
     for one in found:
         for recording, there in has_truth.items():

@@ -9,7 +9,7 @@ from app.web.views.timeline import Timelines, Window
 from tests.engine.synthetic import crossing, sequence
 from tracker.parameters import RunParameters
 from tracker.review.queue import queue
-from tracker.review.queue.doubt import Lanes
+from tracker.review.queue.item import Lanes
 from tracker.review.queue.moves import pieces_of
 from tracker.runs import pipeline
 from tracker.smoothing import Decision, names_of

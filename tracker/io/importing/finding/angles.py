@@ -20,15 +20,15 @@ def open_turns(cameras: Sequence[RawCamera]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(names))
 
 
-def told_turns(name: str) -> str:
+def turns_in_words(name: str) -> str:
     """How angles are composed and measured, in words."""
-    words = told_product(name)
+    words = product_in_words(name)
     if not name:
         return words
     return words + (IN_DEGREES if name.endswith(IN_DEGREES) else " in radians")
 
 
-def told_product(name: str) -> str:
+def product_in_words(name: str) -> str:
     """How angles are composed, in words."""
     product = name.removesuffix(IN_DEGREES).removesuffix(INVERSE)
     if product in ("", VECTOR):

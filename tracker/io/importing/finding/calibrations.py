@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from tracker.io.importing.finding.names import match, short_names
-from tracker.io.importing.gathering import Taken
+from tracker.io.importing.gathering import ParsedFiles
 from tracker.io.read.pieces import CalibrationPiece, FormatError, RawCamera
 
 MOST_CAMERAS = 1000
@@ -35,7 +35,7 @@ class CameraSet:
         return all(c.projection is not None or c.intrinsics is not None for c in self.cameras)
 
 
-def camera_sets(taken: Sequence[Taken]) -> tuple[list[CameraSet], list[str]]:
+def camera_sets(taken: Sequence[ParsedFiles]) -> tuple[list[CameraSet], list[str]]:
     """Complete sets of cameras, and what is told of the others.
 
     Returns:
@@ -92,7 +92,7 @@ def _mixed(one: CameraSet) -> str:
     return f"{one.label}: some cameras have no lens, others no pose ({', '.join(lacking[:3])} …)"
 
 
-def _sets(taken: Sequence[Taken]) -> list[CameraSet]:
+def _sets(taken: Sequence[ParsedFiles]) -> list[CameraSet]:
     """Files with several cameras each, and the files of a folder with one camera each."""
     sets: list[CameraSet] = []
     single: dict[tuple[str, str, bool], list[tuple[str, RawCamera]]] = {}
@@ -126,7 +126,7 @@ def _sets(taken: Sequence[Taken]) -> list[CameraSet]:
     return sets
 
 
-def _in_a_folder_each(taken: Sequence[Taken]) -> set[tuple[Path, str]]:
+def _in_a_folder_each(taken: Sequence[ParsedFiles]) -> set[tuple[Path, str]]:
     """Names of files that lie in several folders beside each other: a camera a folder."""
     sources = [
         piece.source

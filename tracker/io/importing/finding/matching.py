@@ -8,7 +8,7 @@ from pathlib import Path
 
 from tracker.io.importing.finding.calibrations import CameraSet
 from tracker.io.importing.finding.names import How, match, words_of
-from tracker.io.importing.gathering import Taken
+from tracker.io.importing.gathering import ParsedFiles
 from tracker.io.importing.options import ImportOptions
 from tracker.io.read.pieces import (
     DetectionPiece,
@@ -62,7 +62,7 @@ class Matched:
 
 
 def match_all(
-    taken: Sequence[Taken],
+    taken: Sequence[ParsedFiles],
     sets: Sequence[CameraSet],
     options: ImportOptions,
     incomplete: Sequence[str] = (),
@@ -112,7 +112,9 @@ _Pictures = list[tuple[str, VideoPiece | ImagesPiece]]
 _Boxes = list[tuple[str, DetectionPiece]]
 
 
-def _by_kind(taken: Sequence[Taken]) -> tuple[_Pictures, _Boxes, list[tuple[str, TruthPiece]]]:
+def _by_kind(
+    taken: Sequence[ParsedFiles],
+) -> tuple[_Pictures, _Boxes, list[tuple[str, TruthPiece]]]:
     pictures: _Pictures = []
     boxes: _Boxes = []
     truths: list[tuple[str, TruthPiece]] = []
@@ -128,7 +130,7 @@ def _by_kind(taken: Sequence[Taken]) -> tuple[_Pictures, _Boxes, list[tuple[str,
     return pictures, boxes, truths
 
 
-def _own_label(one: Taken, source: Path, label: str) -> str:
+def _own_label(one: ParsedFiles, source: Path, label: str) -> str:
     """Of a series whose files are a camera each, the label of this file."""
     if len(one.files) < 2 or len(one.pieces) < 2:
         return label
@@ -239,7 +241,7 @@ def _in_folders_of(cameras: Sequence[MatchedCamera], labels: Sequence[str]) -> d
     return found
 
 
-def _times(taken: Sequence[Taken]) -> list[tuple[str, TimesPiece]]:
+def _times(taken: Sequence[ParsedFiles]) -> list[tuple[str, TimesPiece]]:
     """Time stamps with what says of which camera they are."""
     return [
         (piece.camera or one.label.rsplit(".", 1)[0], piece)
@@ -325,7 +327,7 @@ def _by_pictures(
 
 
 def nothing_of(
-    cameras: Sequence[MatchedCamera], taken: Sequence[Taken], told: Sequence[str]
+    cameras: Sequence[MatchedCamera], taken: Sequence[ParsedFiles], told: Sequence[str]
 ) -> FormatError:
     """Why a calibration is alone: what is wrong with the file that could have been of a camera."""
     complaints = [one.complaint for one in taken if one.complaint and not one.pieces] or list(told)

@@ -7,7 +7,7 @@ from typing import Any
 from tracker.parameters import PARAMETERS
 from tracker.studies.judging import usable
 from tracker.studies.kept.records import Trial
-from tracker.studies.told.summary import Summary
+from tracker.studies.reporting.summary import Summary
 
 _HEIGHT = 340
 _FAINT, _ACCENT, _DEFAULT = "#6b7a90", "#d9480f", "#1971c2"

@@ -37,7 +37,7 @@ class Told:
     """How far around, metres."""
 
 
-def told_by_step(corrections: Iterable[Correction]) -> dict[int, Told]:
+def constraints_by_step(corrections: Iterable[Correction]) -> dict[int, Told]:
     """What is said of each step, where anything is."""
     here: dict[int, list[tuple[ndarray, float, ndarray]]] = {}
     empty: dict[int, list[tuple[tuple[float, float], float]]] = {}

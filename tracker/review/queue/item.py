@@ -16,7 +16,7 @@ from tracker.corrections import Correction, CorrectionError, Place
 from tracker.corrections.kinds import make
 from tracker.fusion.trajectories import Trajectories
 
-DoubtKind = Literal[
+ItemKind = Literal[
     "exchange", "join", "cut", "crossing", "gap", "short", "begins", "ends", "missing", "fast"
 ]
 
@@ -38,10 +38,10 @@ class Alternative:
 
 
 @dataclass(frozen=True, slots=True)
-class Doubt:
+class ReviewItem:
     """One doubtful place."""
 
-    kind: DoubtKind
+    kind: ItemKind
     title: str
     why: str
     """One sentence."""
@@ -70,7 +70,7 @@ class Doubt:
         return self.probability * self.stake
 
 
-def unsaid(kind: str, places: Iterable[Place], **values: Any) -> tuple[Correction, ...]:
+def proposed(kind: str, places: Iterable[Place], **values: Any) -> tuple[Correction, ...]:
     """A correction that somebody may make; none where it could not be one."""
     try:
         return (make(kind=kind, places=[tuple(p) for p in places], time=_UNSAID, **values),)
@@ -78,7 +78,7 @@ def unsaid(kind: str, places: Iterable[Place], **values: Any) -> tuple[Correctio
         return ()
 
 
-def said(corrections: Iterable[Correction], note: str = "") -> tuple[Correction, ...]:
+def confirmed(corrections: Iterable[Correction], note: str = "") -> tuple[Correction, ...]:
     """What was only possible, said now."""
     now = datetime.now(UTC).replace(microsecond=0)
     return tuple(

@@ -15,9 +15,9 @@ from tracker.files.atomic import replacing
 from tracker.sequences.sequence import SequenceError
 from tracker.studies.kept.records import Trial
 from tracker.studies.kept.store import Store
-from tracker.studies.told.commands import track_commands
-from tracker.studies.told.figures import importance_figure, objective_figure, parameter_figures
-from tracker.studies.told.summary import Summary, summary_of
+from tracker.studies.reporting.commands import track_commands
+from tracker.studies.reporting.figures import importance_figure, objective_figure, parameter_figures
+from tracker.studies.reporting.summary import Summary, summary_of
 
 _STYLE = """
 :root { color-scheme: light dark; --line: #8884; }
