@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from importlib import import_module
 from importlib.util import find_spec
 from typing import Annotated, Any
 
@@ -18,6 +17,7 @@ from tracker.io.read.registry import FORMATS
 from tracker.parameters import PARAMETERS, methods
 from tracker.parameters.definition import Params, ui
 from tracker.parameters.registry import BUILT_IN, ENTRY_POINTS
+from tracker.single_view import maker
 from tracker.single_view.protocol import SingleViewMethod, ViewResult
 
 PAGE = (PAGES / "contributing.md").read_text(encoding="utf-8")
@@ -85,9 +85,9 @@ def test_the_example_of_a_description_is_one() -> None:
     names: dict[str, Any] = {**vars(methods), "MyTrackerParams": Params}
     method = eval(re.sub(r"^    ", "", found.group(1), flags=re.M), names)
     assert method.own_group == "my_tracker"
-    module, _, made = method.made_by.partition(":")
-    assert (module, made) == ("tracker.single_view.my_tracker", "MyTracker")
-    assert import_module(module.rpartition(".")[0])
+    assert method.made_by is None
+    with pytest.raises(ValueError, match="my_tracker: made_by names nothing"):
+        maker(method)
 
 
 def test_sweeps_are_chosen_by_group_and_by_key() -> None:

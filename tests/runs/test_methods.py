@@ -29,6 +29,7 @@ from tracker.parameters.registry import FOLLOWING, ORIGINS, REGISTERED
 from tracker.runs import pipeline, warm_up
 from tracker.runs.fitting import default_parameters, unfit_methods
 from tracker.runs.run import Run
+from tracker.runs.warm_up import MAKERS
 from tracker.sequences.library import with_detector
 from tracker.sequences.sequence import Sequence
 
@@ -160,7 +161,7 @@ def test_every_method_is_registered_once_and_made(key: Any, recording: Sequence)
     for name, method in REGISTERED[key].items():
         assert method.name == name
         assert method.help.endswith(".")
-        assert callable(method.load())
+        assert callable(MAKERS[key](method))
         parameters = with_values(RunParameters(), {key: name})
         assert parameters.method(key) is method
         used = method.used(parameters)
@@ -173,7 +174,11 @@ def test_every_method_is_registered_once_and_made(key: Any, recording: Sequence)
 
 def test_every_file_of_a_method_is_registered() -> None:
     """A class that has a method's steps and is in no list would be forgotten code."""
-    loaded = {m.load().__module__ for methods in REGISTERED.values() for m in methods.values()}
+    loaded = {
+        maker(method).__module__
+        for key, maker in MAKERS.items()
+        for method in REGISTERED[key].values()
+    }
     root = Path(pipeline.__file__).parents[1]
     found = set()
     for folder in ("single_view", "fusion"):

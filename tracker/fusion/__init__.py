@@ -1,19 +1,34 @@
 """Stage 2: the boxes of all cameras into one 3D posterior. One protocol, one file a method.
 
-The methods are registered in :mod:`tracker.parameters.registry`.
+The methods are described in :mod:`tracker.parameters.groups` and chosen in :func:`maker`.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from tracker.fusion.protocol import FusionMethod, FusionResult
 
 if TYPE_CHECKING:
-    from tracker.parameters import RunParameters
+    from tracker.parameters import Method, RunParameters
     from tracker.sequences.sequence import Sequence
 
-__all__ = ["FusionMethod", "FusionResult", "create"]
+__all__ = ["FusionMethod", "FusionResult", "create", "maker"]
+
+
+def maker(method: Method) -> Callable[[Sequence, RunParameters], FusionMethod]:
+    """The class that a method of stage 2 is made by; each is imported when it is chosen."""
+    match method.name:
+        case "sequential_phd":
+            from tracker.fusion.sequential_phd import SequentialPhd
+
+            return SequentialPhd
+        case "multi_bernoulli":
+            from tracker.fusion.multi_bernoulli import MultiBernoulli
+
+            return MultiBernoulli
+    return method.load()
 
 
 def create(sequence: Sequence, parameters: RunParameters) -> FusionMethod:
@@ -22,5 +37,4 @@ def create(sequence: Sequence, parameters: RunParameters) -> FusionMethod:
     Raises:
         ValueError: If the sequence lacks what it needs.
     """
-    method: FusionMethod = parameters.method("fusion_method").load()(sequence, parameters)
-    return method
+    return maker(parameters.method("fusion_method"))(sequence, parameters)

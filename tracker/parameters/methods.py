@@ -73,7 +73,8 @@ class Method:
         name: By which it is chosen; a word in snake_case.
         help: What it is, in one sentence.
         made_by: A class or function, or where it stands as ``module:name``, which is
-            imported when the method is first made. Stage 1 calls it with ``(sequence,
+            imported when the method is first made; None for a method of this project,
+            which the package of its stage imports by its name. Stage 1 calls it with ``(sequence,
             camera_index, parameters, reader)`` and takes a
             :class:`~tracker.single_view.protocol.SingleViewMethod`; stage 2 with
             ``(sequence, parameters)`` and takes a
@@ -88,7 +89,7 @@ class Method:
 
     name: str
     help: str
-    made_by: str | Callable[..., Any]
+    made_by: str | Callable[..., Any] | None = None
     uses: Uses | Callable[[RunParameters], Uses] = field(default_factory=Uses)
     parameters: type[Params] | None = None
     group: str = ""
@@ -105,7 +106,13 @@ class Method:
         return self.uses if isinstance(self.uses, Uses) else self.uses(parameters)
 
     def load(self) -> Callable[..., Any]:
-        """The class or function that it is made by, imported if it was not yet."""
+        """The class or function that another package's method is made by, imported now.
+
+        Raises:
+            ValueError: If nothing is named, and the method is none of this project's.
+        """
+        if self.made_by is None:
+            raise ValueError(f"{self.name}: made_by names nothing; name a class or function")
         if not isinstance(self.made_by, str):
             return self.made_by
         module, _, name = self.made_by.partition(":")

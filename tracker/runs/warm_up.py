@@ -24,12 +24,20 @@ from typing import Any
 import cv2
 import numpy as np
 
+from tracker import fusion, single_view, smoothing
 from tracker.geometry.camera import Camera
 from tracker.kernels import compilation
-from tracker.parameters import METHODS, PRESETS, MethodKey, RunParameters, with_values
+from tracker.parameters import METHODS, PRESETS, Method, MethodKey, RunParameters, with_values
 from tracker.parameters.registry import FOLLOWING, ORIGINS, REGISTERED
 from tracker.runs import pipeline
 from tracker.sequences.sequence import Detections, Entrance, Room, Sequence, Template, View
+
+MAKERS: dict[MethodKey, Callable[[Method], Callable[..., Any]]] = {
+    "single_view": single_view.maker,
+    "fusion_method": fusion.maker,
+    "smoothing_method": smoothing.maker,
+}
+"""What imports a method of each stage."""
 
 STEPS = 36
 EMPTY = 12
@@ -72,10 +80,10 @@ def compile_kernels(
         ready: Called by the first half when the method that a sequence with templates starts
             with has the kernels that cannot run as plain Python.
     """
-    for methods in REGISTERED.values():
-        for method in methods.values():
+    for key, maker in MAKERS.items():
+        for method in REGISTERED[key].values():
             if method.name not in ORIGINS:
-                method.load()  # its kernels are counted from the beginning
+                maker(method)  # its kernels are counted from the beginning
     with (
         tempfile.TemporaryDirectory() as folder,
         compilation.followed(lambda: told(*compilation.counts())),

@@ -1,20 +1,59 @@
 """Stage 1: what each camera sees by itself. One protocol, one file a method.
 
-The methods are registered in :mod:`tracker.parameters.registry`.
+The methods are described in :mod:`tracker.parameters.groups` and chosen in :func:`maker`.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from tracker.single_view.protocol import SingleViewMethod, ViewResult
 
 if TYPE_CHECKING:
-    from tracker.parameters import RunParameters
+    from tracker.parameters import Method, RunParameters
     from tracker.sequences.pictures.frames import Pictures
     from tracker.sequences.sequence import Sequence
 
-__all__ = ["SingleViewMethod", "ViewResult", "create"]
+__all__ = ["SingleViewMethod", "ViewResult", "create", "maker"]
+
+
+def maker(method: Method) -> Callable[..., SingleViewMethod]:
+    """The class that a method of stage 1 is made by; each is imported when it is chosen."""
+    match method.name:
+        case "colour_phd":
+            from tracker.single_view.colour_phd import ColourPhd
+
+            return ColourPhd
+        case "shapes":
+            from tracker.single_view.shape.method import ShapesInCamera
+
+            return ShapesInCamera
+        case "jpda":
+            from tracker.single_view.jpda import Jpda
+
+            return Jpda
+        case "pseudo_particle":
+            from tracker.single_view.pseudo_particle.method import PseudoParticle
+
+            return PseudoParticle
+        case "association_matrix":
+            from tracker.single_view.association_matrix.method import AssociationMatrix
+
+            return AssociationMatrix
+        case "onnx_detector":
+            from tracker.single_view.onnx.method import OnnxDetector
+
+            return OnnxDetector
+        case "detection_phd":
+            from tracker.single_view.detection_phd import DetectionPhd
+
+            return DetectionPhd
+        case "none":
+            from tracker.single_view.none import DetectionBoxes
+
+            return DetectionBoxes
+    return method.load()
 
 
 def create(
@@ -31,6 +70,5 @@ def create(
     """
     from tracker.parameters import method_of  # with those of other packages, which import this
 
-    make = method_of("single_view", name).load()
-    method: SingleViewMethod = make(sequence, camera_index, parameters, reader)
-    return method
+    make = maker(method_of("single_view", name))
+    return make(sequence, camera_index, parameters, reader)

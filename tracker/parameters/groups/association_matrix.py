@@ -129,7 +129,6 @@ class AssociationMatrixParams(Params):
 METHOD = Method(
     name="association_matrix",
     help="Tracks of foreground objects by decision matrices.",
-    made_by="tracker.single_view.association_matrix.method:AssociationMatrix",
     uses=Uses(
         pictures=True,
         reads=(Reads("association_matrix"), Reads("pictures"), Reads("foreground")),

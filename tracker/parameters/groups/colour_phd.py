@@ -200,7 +200,6 @@ def _uses(parameters: RunParameters) -> Uses:
 METHOD = Method(
     name="colour_phd",
     help="GM-PHD filter on peaks of the colour likelihood.",
-    made_by="tracker.single_view.colour_phd:ColourPhd",
     uses=_uses,
     parameters=ColourPhdParams,
 )

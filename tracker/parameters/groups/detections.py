@@ -97,7 +97,6 @@ class DetectionPhdParams(DetectionBoxParams):
 AS_THEY_ARE = Method(
     name="none",
     help="An outside detector's boxes, without a filter in the picture.",
-    made_by="tracker.single_view.none:DetectionBoxes",
     uses=Uses(detections=True, reads=(Reads("detection_boxes"),)),
     parameters=DetectionBoxParams,
     group="detection_boxes",
@@ -106,7 +105,6 @@ AS_THEY_ARE = Method(
 FILTERED = Method(
     name="detection_phd",
     help="GM-PHD filter on an outside detector's boxes.",
-    made_by="tracker.single_view.detection_phd:DetectionPhd",
     uses=Uses(detections=True, reads=(Reads("detection_phd"),)),
     parameters=DetectionPhdParams,
 )

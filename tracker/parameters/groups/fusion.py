@@ -250,13 +250,11 @@ _RECOGNITION_ONLY = frozenset(
 SEQUENTIAL_PHD = Method(
     name="sequential_phd",
     help="GM-PHD filter updated by one camera after another.",
-    made_by="tracker.fusion.sequential_phd:SequentialPhd",
     uses=Uses(reads=(Reads("fusion", without=_RECOGNITION_ONLY),)),
 )
 
 MULTI_BERNOULLI = Method(
     name="multi_bernoulli",
     help="Poisson multi-Bernoulli filter with belief propagation.",
-    made_by="tracker.fusion.multi_bernoulli:MultiBernoulli",
     uses=_multi_bernoulli_uses,
 )

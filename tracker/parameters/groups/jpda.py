@@ -234,7 +234,6 @@ def _uses(parameters: RunParameters) -> Uses:
 METHOD = Method(
     name="jpda",
     help="Joint probabilistic data association with five cases.",
-    made_by="tracker.single_view.jpda:Jpda",
     uses=_uses,
     parameters=JpdaParams,
 )

@@ -43,7 +43,6 @@ _PICTURES = Reads("pictures", without=frozenset({"steady_from"}))  # it knows no
 METHOD = Method(
     name="onnx_detector",
     help="The boxes of a detection network of your own (ONNX), without a filter in the picture.",
-    made_by="tracker.single_view.onnx.method:OnnxDetector",
     uses=Uses(pictures=True, detector=True, reads=(Reads("onnx_detector"), _PICTURES)),
     parameters=OnnxDetectorParams,
 )

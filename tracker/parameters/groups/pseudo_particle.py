@@ -207,7 +207,6 @@ def _uses(parameters: RunParameters) -> Uses:
 METHOD = Method(
     name="pseudo_particle",
     help="Particle filter on colour whose clusters are the targets.",
-    made_by="tracker.single_view.pseudo_particle.method:PseudoParticle",
     uses=_uses,
     parameters=PseudoParticleParams,
 )

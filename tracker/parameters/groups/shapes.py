@@ -78,7 +78,6 @@ _TRACKING = frozenset(
 METHOD = Method(
     name="shapes",
     help="People by the shape of head and trunk, tracked in the picture by data association.",
-    made_by="tracker.single_view.shape.method:ShapesInCamera",
     uses=Uses(
         pictures=True,
         reads=(Reads("shapes"), Reads("jpda", without=_TRACKING), Reads("pictures")),

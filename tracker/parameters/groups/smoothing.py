@@ -63,20 +63,17 @@ _IDENTITIES_ONLY = frozenset(
 NONE = Method(
     name="none",
     help="The filter's tracks as they are: what a live system would see.",
-    made_by="tracker.smoothing.protocol:NoSmoothing",
 )
 
 POSITIONS = Method(
     name="positions",
     help="Each track of the filter, smoothed over its whole life.",
-    made_by="tracker.smoothing.stage:Positions",
     uses=Uses(reads=(Reads("smoothing", without=_IDENTITIES_ONLY),)),
 )
 
 IDENTITIES = Method(
     name="identities",
     help="Smoothed, and who is who settled over the whole recording.",
-    made_by="tracker.smoothing.stage:Identities",
     uses=Uses(reads=(Reads("smoothing"),)),
     settles_who=True,
 )
