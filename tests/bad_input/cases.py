@@ -20,8 +20,9 @@ from tracker.export import tracks_csv
 from tracker.io.checks import check
 from tracker.runs import gaps, pipeline
 from tracker.sequences import library
+from tracker.sequences.errors import SequenceError
 from tracker.sequences.reader import FILE, read_sequence
-from tracker.sequences.sequence import Sequence, SequenceError
+from tracker.sequences.sequence import Sequence
 
 STEPS = 12
 LONGEST_SECONDS = 10.0

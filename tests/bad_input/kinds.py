@@ -34,8 +34,8 @@ from tracker.library.bundle import unpack_bundle, write_bundle
 from tracker.library.errors import LibraryError
 from tracker.library.keeping import recording_of
 from tracker.library.store import Library
+from tracker.sequences.errors import SequenceError
 from tracker.sequences.reader import read_sequence
-from tracker.sequences.sequence import SequenceError
 from tracker.single_view.onnx.network import Network
 from tracker.studies.defined.defining import read_definition
 from tracker.studies.errors import StudyError

@@ -16,8 +16,8 @@ from tests.bad_input.cases import make_bases, try_case
 from tests.bad_input.drawing import Damage
 from tests.synthetic import write_sequence
 from tracker.sequences.csv_columns import read_columns
+from tracker.sequences.errors import SequenceError
 from tracker.sequences.reader import FILE, read_sequence, read_summary
-from tracker.sequences.sequence import SequenceError
 
 CORPUS: list[dict[str, Any]] = json.loads(
     Path(__file__).with_name("corpus.json").read_text(encoding="utf-8")

@@ -24,13 +24,14 @@ from tests.fusion.rooms import (
 from tracker.corrections.kinds import make
 from tracker.filters.gaussian_mixture import GaussianMixture, gate_distance
 from tracker.fusion import missing_frames
+from tracker.fusion.constraint_update import obey
 from tracker.fusion.labels.memory import Memory, recall
 from tracker.fusion.labels.reidentification import Identities
 from tracker.fusion.measurement_births import Newborns
 from tracker.fusion.missing_frames import Glimpse
 from tracker.fusion.model import FusionModel, all_boxes
 from tracker.fusion.multi_bernoulli import MultiBernoulli, MultiBernoulliState
-from tracker.fusion.place_constraints import constraints_by_step, obey
+from tracker.fusion.place_constraints import constraints_by_step
 from tracker.fusion.protocol import FusionResult
 from tracker.fusion.record import Ledger, Record, summed
 from tracker.fusion.sequential_phd import SequentialPhd, SequentialPhdState

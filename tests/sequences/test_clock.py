@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 from tests.synthetic import number_in, write_lines, write_sequence
 from tracker.sequences.clock import Timing
+from tracker.sequences.errors import SequenceError
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.reader import read_sequence, read_summary
-from tracker.sequences.sequence import SequenceError
 
 
 @given(

@@ -15,9 +15,10 @@ from tests.single_view.pictures.furnished import empty_room, person_mask, photog
 from tests.synthetic import camera_toml, head_toml, write_sequence
 from tracker.library import bundle
 from tracker.parameters import ForegroundParams, RunParameters
+from tracker.sequences.errors import SequenceError
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.reader import read_sequence
-from tracker.sequences.sequence import Sequence, SequenceError
+from tracker.sequences.sequence import Sequence
 from tracker.single_view.pictures.foreground import BackgroundModel, learn, learn_background
 from tracker.single_view.working.sequence import Working
 

@@ -15,11 +15,12 @@ from tests import world
 from tracker.sequences.built_in import BUILT_IN, ROOMS, earlier_key, key_of
 from tracker.sequences.clock import Clock, Timing, read_timing
 from tracker.sequences.csv_columns import Columns
+from tracker.sequences.errors import SequenceError
 from tracker.sequences.fields import Fields
 from tracker.sequences.filling import check_missing, find_room, find_time
 from tracker.sequences.pictures.media import Pictures, check_pictures
 from tracker.sequences.pictures.video import VideoIndex, index_video
-from tracker.sequences.sequence import SequenceError, View
+from tracker.sequences.sequence import View
 from tracker.sequences.tables import BoxTable, Reading
 from tracker.sequences.views import Source, read_views
 from tracker.sequences.writing.teaching import Values, carried_over, changes

@@ -19,9 +19,9 @@ from tracker.sequences.built_in import (
     key_of,
     opens_by_name,
 )
+from tracker.sequences.errors import SequenceError
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.reader import read_sequence
-from tracker.sequences.sequence import SequenceError
 from tracker.sequences.writing.saving import save, save_copy
 
 

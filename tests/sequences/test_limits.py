@@ -16,8 +16,9 @@ from tracker.sequences import csv_columns
 from tracker.sequences.calibration import POSE, check_sight, read_camera
 from tracker.sequences.clock import Clock, read_timing
 from tracker.sequences.csv_columns import Columns, guarded, read_columns, unguarded
+from tracker.sequences.errors import SequenceError
 from tracker.sequences.fields import Fields, did_you_mean, is_number, listed
-from tracker.sequences.sequence import Room, SequenceError, View
+from tracker.sequences.sequence import Room, View
 from tracker.sequences.tables import BoxTable, truth_of
 from tracker.sequences.writing.taught_fields import read_room, read_templates
 

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from tests.synthetic import camera_toml, head_toml, write_sequence, write_video
+from tracker.sequences.errors import SequenceError
 from tracker.sequences.reader import read_sequence, read_summary
-from tracker.sequences.sequence import SequenceError
 
 
 @pytest.fixture(scope="module")

@@ -17,8 +17,9 @@ from hypothesis import strategies as st
 from tests.synthetic import write_sequence
 from tracker.parameters import with_values
 from tracker.runs import pipeline
+from tracker.sequences.errors import SequenceError
 from tracker.sequences.reader import FILE, read_sequence
-from tracker.sequences.sequence import Sequence, SequenceError
+from tracker.sequences.sequence import Sequence
 from tracker.sequences.writing import saving
 from tracker.sequences.writing.rewriting import rewritten, taught_in
 from tracker.sequences.writing.teaching import Values, changes, taught_values, with_taught

@@ -22,9 +22,10 @@ from tracker.geometry.camera import Camera
 from tracker.parameters import RunParameters, with_values
 from tracker.runs import pipeline
 from tracker.runs.run import stage_keys
+from tracker.sequences.errors import SequenceError
 from tracker.sequences.library import with_detector
 from tracker.sequences.reader import read_sequence
-from tracker.sequences.sequence import Sequence, SequenceError
+from tracker.sequences.sequence import Sequence
 from tracker.single_view.onnx.file import ports_of
 from tracker.single_view.onnx.layouts import proposals
 from tracker.single_view.onnx.network import Network, Settings

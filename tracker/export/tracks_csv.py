@@ -26,7 +26,8 @@ from tracker.files.atomic import replacing
 from tracker.fusion.trajectories import Trajectories
 from tracker.parameters import METHODS, PARAMETERS, RunParameters, value
 from tracker.sequences.csv_columns import guarded, read_columns, unguarded
-from tracker.sequences.sequence import Sequence, SequenceError
+from tracker.sequences.errors import SequenceError
+from tracker.sequences.sequence import Sequence
 
 PROGRAM = "multiview-phd"
 BOX = ("left", "top", "width", "height")

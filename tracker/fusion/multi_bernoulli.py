@@ -18,13 +18,14 @@ from numpy import ndarray
 from tracker.filters import gaussian_mixture, models
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion import missing_frames
+from tracker.fusion.constraint_update import obey
 from tracker.fusion.labels import memory, reidentification
 from tracker.fusion.labels.memory import Memory
 from tracker.fusion.labels.reidentification import Identities
 from tracker.fusion.measurement_births import Evidence, Newborns
 from tracker.fusion.missing_frames import Recent
 from tracker.fusion.model import CONFIRMED, FusionModel, all_boxes
-from tracker.fusion.place_constraints import Told, obey
+from tracker.fusion.place_constraints import PlaceConstraints
 from tracker.fusion.protocol import FusionResult
 from tracker.fusion.record import WORTH_TELLING, Record, summed
 from tracker.geometry.camera import stacked
@@ -112,7 +113,10 @@ class MultiBernoulli:
         return MultiBernoulliState(empty, empty, 1, Memory.start(dimension), Identities.none())
 
     def step(
-        self, state: MultiBernoulliState, views: Many[ViewResult], told: Told | None = None
+        self,
+        state: MultiBernoulliState,
+        views: Many[ViewResult],
+        told: PlaceConstraints | None = None,
     ) -> tuple[MultiBernoulliState, FusionResult]:
         """Predict one step ahead and update with every camera's boxes, in the cameras' order."""
         p, before = self._parameters, state.tracks

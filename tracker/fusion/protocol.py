@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence as Many
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
 from tracker.filters.gaussian_mixture import GaussianMixture
+from tracker.fusion.place_constraints import PlaceConstraints
 from tracker.single_view.protocol import ViewResult
-
-if TYPE_CHECKING:
-    from tracker.fusion.place_constraints import Told
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,7 +61,7 @@ class FusionMethod(Protocol):
         ...
 
     def step(
-        self, state: Any, views: Many[ViewResult], told: Told | None = None
+        self, state: Any, views: Many[ViewResult], told: PlaceConstraints | None = None
     ) -> tuple[Any, FusionResult]:
         """Predict one step ahead and update with every camera's boxes, in the cameras' order.
 

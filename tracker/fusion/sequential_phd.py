@@ -17,12 +17,13 @@ from numpy import ndarray
 from tracker.filters import gaussian_mixture, models, phd
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion import missing_frames
+from tracker.fusion.constraint_update import obey
 from tracker.fusion.labels import memory, one_person
 from tracker.fusion.labels.memory import Memory
 from tracker.fusion.measurement_births import Evidence
 from tracker.fusion.missing_frames import Recent
 from tracker.fusion.model import CONFIRMED, FusionModel, all_boxes
-from tracker.fusion.place_constraints import Told, obey
+from tracker.fusion.place_constraints import PlaceConstraints
 from tracker.fusion.protocol import FusionResult
 from tracker.fusion.record import Ledger, Record
 from tracker.kernels import linear_algebra
@@ -84,7 +85,10 @@ class SequentialPhd:
         return SequentialPhdState(GaussianMixture.empty(dimension), 1, Memory.start(dimension))
 
     def step(
-        self, state: SequentialPhdState, views: Many[ViewResult], told: Told | None = None
+        self,
+        state: SequentialPhdState,
+        views: Many[ViewResult],
+        told: PlaceConstraints | None = None,
     ) -> tuple[SequentialPhdState, FusionResult]:
         """Predict one step ahead and update with every camera's boxes, in the cameras' order."""
         p = self._parameters

@@ -9,8 +9,8 @@ from jaxtyping import Float16
 from numpy import ndarray
 
 from tracker.files.text import shown
+from tracker.sequences.errors import SequenceError
 from tracker.sequences.fields import Fields
-from tracker.sequences.sequence import SequenceError
 
 LONGEST = 4096
 """Numbers of a vector: networks that tell people apart give 128 to 2048."""

@@ -10,8 +10,9 @@ from numpy import ndarray
 
 from tracker.files.text import shown
 from tracker.geometry.camera import Camera
+from tracker.sequences.errors import SequenceError
 from tracker.sequences.fields import LARGEST, Fields, listed
-from tracker.sequences.sequence import Room, SequenceError
+from tracker.sequences.sequence import Room
 
 POSE = ("K", "distortion", "lens", "R", "t")
 """The fields that, without ``projection``, say how a camera sees."""

@@ -14,8 +14,8 @@ from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
 from tracker.files.text import not_utf_8, shown
+from tracker.sequences.errors import SequenceError
 from tracker.sequences.fields import LARGEST, did_you_mean, listed
-from tracker.sequences.sequence import SequenceError
 
 _FORMULA = re.compile(r"(^|[,;\t]\s*)(?='*[=+\-@\t\r])")
 _GUARDED = re.compile(r"(^|[,;\t]\s*)'(?='*[=+\-@\t\r])")

@@ -13,7 +13,7 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from tracker.files.text import shown
-from tracker.sequences.sequence import SequenceError
+from tracker.sequences.errors import SequenceError
 
 LARGEST = 1e6
 """Metres or pixels: a number beyond is no measurement of a room, and its powers overflow."""

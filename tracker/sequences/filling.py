@@ -10,8 +10,9 @@ from numpy import ndarray
 
 from tracker.geometry.consistency.observed import upright_rays
 from tracker.geometry.consistency.suggestion import agreement, suggest
+from tracker.sequences.errors import SequenceError
 from tracker.sequences.fields import Fields, listed
-from tracker.sequences.sequence import Room, SequenceError, View
+from tracker.sequences.sequence import Room, View
 from tracker.sequences.views import Source, Time
 
 _SAME_RATE = 0.01  # share by which videos of one rate may differ

@@ -11,9 +11,10 @@ from typing import Literal
 
 from tracker.files.atomic import size_of
 from tracker.sequences.built_in import BUILT_IN, ROOMS, cached_rooms
+from tracker.sequences.errors import SequenceError
 from tracker.sequences.fields import did_you_mean, listed
 from tracker.sequences.reader import FILE, given_folder, read_sequence, read_summary
-from tracker.sequences.sequence import DetectorFile, Sequence, SequenceError
+from tracker.sequences.sequence import DetectorFile, Sequence
 
 _SEEDED = re.compile(r"random-\d{1,9}")
 """A room that an earlier version of the program rendered by a seed."""

@@ -16,9 +16,10 @@ from pathlib import Path
 
 from tracker.files.text import not_utf_8, shown
 from tracker.sequences.calibration import check_sight
+from tracker.sequences.errors import SequenceError
 from tracker.sequences.fields import LARGEST_COUNT, LONGEST_NAME, Fields, did_you_mean
 from tracker.sequences.filling import check_missing, find_room, find_time
-from tracker.sequences.sequence import FileState, Sequence, SequenceError
+from tracker.sequences.sequence import FileState, Sequence
 from tracker.sequences.tables import Reading, read_ground_truth
 from tracker.sequences.views import CAMERA, read_sources, read_views
 from tracker.sequences.writing.taught_fields import read_room, read_target, read_templates

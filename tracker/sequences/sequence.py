@@ -4,18 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import Bool, Float, Float16, Int
 from numpy import ndarray
 
-from tracker.files.text import visible
 from tracker.geometry.camera import Camera
-
-if TYPE_CHECKING:
-    from tracker.sequences.clock import Clock
-
+from tracker.sequences.clock import Clock
 
 PRESETS: dict[str, tuple[float, float, float]] = {
     "Person": (0.3, 0.3, 0.875),
@@ -23,13 +18,6 @@ PRESETS: dict[str, tuple[float, float, float]] = {
     "Head": (0.12, 0.12, 0.15),
 }
 """Usual targets: half width, depth and height, metres."""
-
-
-class SequenceError(ValueError):
-    """A sequence cannot be read; the message names file and field, expected and found."""
-
-    def __init__(self, message: str) -> None:
-        super().__init__(visible(message))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

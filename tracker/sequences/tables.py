@@ -14,9 +14,10 @@ from tracker.files.text import shown
 from tracker.sequences.appearance import read_appearance
 from tracker.sequences.clock import Clock
 from tracker.sequences.csv_columns import Columns, read_columns
+from tracker.sequences.errors import SequenceError
 from tracker.sequences.fields import SMALLEST, Fields
 from tracker.sequences.pictures.media import locate
-from tracker.sequences.sequence import Detections, GroundTruth, SequenceError
+from tracker.sequences.sequence import Detections, GroundTruth
 
 BOX = ("left", "top", "width", "height")
 

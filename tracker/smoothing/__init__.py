@@ -1,14 +1,44 @@
 """Stage 3: the filter's tracks with hindsight: places, ends, gaps, and who is who.
 
 The methods are described in :mod:`tracker.parameters.groups` and chosen in
-:func:`~tracker.smoothing.protocol.maker`.
+:func:`maker`.
 """
 
-from tracker.smoothing.protocol import SmoothingMethod, create, maker
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from tracker.smoothing.protocol import NoSmoothing, SmoothingMethod
 from tracker.smoothing.result import Decision, DecisionKind, Smoothed
 from tracker.smoothing.tracks import names_of, tracks_of
+
+if TYPE_CHECKING:
+    from tracker.parameters import Method, RunParameters
+    from tracker.sequences.sequence import Sequence
 
 __all__ = [
     "Decision", "DecisionKind", "Smoothed", "SmoothingMethod", "create", "maker", "names_of",
     "tracks_of",
 ]  # fmt: skip
+
+
+def maker(method: Method) -> Callable[[Sequence, RunParameters], SmoothingMethod]:
+    """The class that a method of stage 3 is made by; each is imported when it is chosen."""
+    match method.name:
+        case "none":
+            return NoSmoothing
+        case "positions":
+            from tracker.smoothing.stage import Positions
+
+            return Positions
+        case "identities":
+            from tracker.smoothing.stage import Identities
+
+            return Identities
+    return method.load()
+
+
+def create(sequence: Sequence, parameters: RunParameters) -> SmoothingMethod:
+    """The smoothing method that the parameters name, prepared for a sequence."""
+    return maker(parameters.method("smoothing_method"))(sequence, parameters)

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 
 from tracker.corrections import Correction
 from tracker.fusion.protocol import FusionResult
-from tracker.parameters import Method, RunParameters
+from tracker.parameters import RunParameters
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult
 from tracker.smoothing.result import Smoothed
@@ -81,24 +81,3 @@ class NoSmoothing:
         corrections: Many[Correction] = (),
     ) -> None:
         """Nothing is made of them."""
-
-
-def maker(method: Method) -> Callable[[Sequence, RunParameters], SmoothingMethod]:
-    """The class that a method of stage 3 is made by; each is imported when it is chosen."""
-    match method.name:
-        case "none":
-            return NoSmoothing
-        case "positions":
-            from tracker.smoothing.stage import Positions
-
-            return Positions
-        case "identities":
-            from tracker.smoothing.stage import Identities
-
-            return Identities
-    return method.load()
-
-
-def create(sequence: Sequence, parameters: RunParameters) -> SmoothingMethod:
-    """The smoothing method that the parameters name, prepared for a sequence."""
-    return maker(parameters.method("smoothing_method"))(sequence, parameters)

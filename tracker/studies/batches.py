@@ -18,10 +18,10 @@ from tracker.library.records import KeptRun
 from tracker.library.store import Library
 from tracker.parameters import changed, with_values
 from tracker.runs import pipeline
+from tracker.sequences.errors import SequenceError
 from tracker.sequences.library import open_sequence
 from tracker.sequences.reader import FILE
 from tracker.sequences.sequence import Sequence as Recording
-from tracker.sequences.sequence import SequenceError
 from tracker.studies.errors import StudyError
 from tracker.studies.work.cluster import Crew
 from tracker.studies.work.jobs import job_of

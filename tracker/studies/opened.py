@@ -9,8 +9,9 @@ from typing import Any
 from tracker.parameters import METHODS, RunParameters, changed, value, with_values
 from tracker.runs import pipeline
 from tracker.runs.fitting import unfit_methods
+from tracker.sequences.errors import SequenceError
 from tracker.sequences.library import open_sequence
-from tracker.sequences.sequence import Sequence, SequenceError
+from tracker.sequences.sequence import Sequence
 from tracker.studies.defined import objectives
 from tracker.studies.defined.definition import Definition
 from tracker.studies.defined.objectives import Objective

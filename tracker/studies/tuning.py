@@ -9,8 +9,8 @@ from typing import Any
 from tracker import parameters as table
 from tracker.parameters import PARAMETERS, RunParameters, with_values
 from tracker.runs.fitting import default_parameters
+from tracker.sequences.errors import SequenceError
 from tracker.sequences.library import open_sequence
-from tracker.sequences.sequence import SequenceError
 from tracker.studies.defined.definition import MOST_TRIALS, Definition
 from tracker.studies.defined.space import around
 from tracker.studies.errors import StudyError

@@ -25,7 +25,8 @@ from app.scene.worker import LatestWorker
 from app.state.snapshot import Change, Snapshot
 from app.state.teaching import Side, Teaching
 from app.state.workbench import Workbench
-from tracker.sequences.sequence import Room, SequenceError
+from tracker.sequences.errors import SequenceError
+from tracker.sequences.sequence import Room
 from tracker.sequences.writing.teaching import AXES
 
 LEAST_ROOM = 0.1

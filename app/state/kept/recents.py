@@ -21,9 +21,9 @@ from tracker.files.atomic import locked, write_whole
 from tracker.files.folders import cache_folder
 from tracker.sequences import library
 from tracker.sequences.built_in import opens_by_name
+from tracker.sequences.errors import SequenceError
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.reader import FILE
-from tracker.sequences.sequence import SequenceError
 
 logger = logging.getLogger("app")
 

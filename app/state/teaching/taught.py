@@ -23,8 +23,9 @@ from app.state.workbench import Workbench
 from tracker.parameters import RunParameters
 from tracker.runs import pipeline
 from tracker.sequences.built_in import EARLIER
+from tracker.sequences.errors import SequenceError
 from tracker.sequences.reader import FILE
-from tracker.sequences.sequence import Sequence, SequenceError
+from tracker.sequences.sequence import Sequence
 from tracker.sequences.writing import saving
 from tracker.sequences.writing.teaching import (
     Values,

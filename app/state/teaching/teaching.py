@@ -13,8 +13,9 @@ from app.state.teaching.values import METRE_DIGITS, at, rounded, take, within
 from app.state.workbench import Workbench
 from tracker.files.folders import home
 from tracker.review import template_suggestions
+from tracker.sequences.errors import SequenceError
 from tracker.sequences.reader import FILE, given_folder
-from tracker.sequences.sequence import Sequence, SequenceError
+from tracker.sequences.sequence import Sequence
 from tracker.sequences.writing import saving
 from tracker.sequences.writing.teaching import Values, taught_values, template_values
 

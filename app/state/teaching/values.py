@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from tracker.sequences.errors import SequenceError
 from tracker.sequences.reader import FILE
-from tracker.sequences.sequence import Sequence, SequenceError
+from tracker.sequences.sequence import Sequence
 from tracker.sequences.writing.teaching import Values
 
 PIXEL_DIGITS, METRE_DIGITS = 1, 3

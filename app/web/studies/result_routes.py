@@ -15,7 +15,7 @@ from app.web.studies import models, views
 from app.web.studies.dependencies import Named, no_study
 from app.web.views import results
 from tracker import parameters as table
-from tracker.sequences.sequence import SequenceError
+from tracker.sequences.errors import SequenceError
 from tracker.studies.errors import StudyError
 from tracker.studies.kept.store import Store
 from tracker.studies.reporting.commands import track_commands

@@ -20,8 +20,9 @@ from tests.app.folders import write_crossing
 from tests.synthetic import write_sequence
 from tracker.runs import pipeline
 from tracker.runs.pipeline import Cancelled, Run
+from tracker.sequences.errors import SequenceError
 from tracker.sequences.reader import read_sequence
-from tracker.sequences.sequence import Sequence, SequenceError
+from tracker.sequences.sequence import Sequence
 
 P_D = "fusion.detection_probability"
 

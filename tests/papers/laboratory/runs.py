@@ -15,9 +15,10 @@ from tracker.runs import pipeline
 from tracker.runs.pipeline import Cancelled, Progress, Run
 from tracker.runs.processes import WorkerControl
 from tracker.sequences.built_in import cached_rooms
+from tracker.sequences.errors import SequenceError
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.reader import read_sequence
-from tracker.sequences.sequence import Sequence, SequenceError
+from tracker.sequences.sequence import Sequence
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -13,10 +13,11 @@ from jaxtyping import Bool
 from numpy import ndarray
 
 from tracker.files.folders import files_matching
+from tracker.sequences.errors import SequenceError
 from tracker.sequences.fields import LONGEST_NAME, Fields, did_you_mean, listed
 from tracker.sequences.pictures.numbering import whole_row
 from tracker.sequences.pictures.video import VideoError, index_video, not_a_picture, read_image
-from tracker.sequences.sequence import SequenceError, View
+from tracker.sequences.sequence import View
 
 
 def locate(folder: Path, fields: Fields, name: str) -> Path:

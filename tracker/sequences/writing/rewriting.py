@@ -12,7 +12,8 @@ from typing import Any
 import tomlkit
 from tomlkit.items import AoT
 
-from tracker.sequences.sequence import Sequence, SequenceError
+from tracker.sequences.errors import SequenceError
+from tracker.sequences.sequence import Sequence
 from tracker.sequences.writing.teaching import (
     FACES,
     Pairs,

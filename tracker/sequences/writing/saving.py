@@ -17,8 +17,9 @@ from typing import Any
 from tracker.files.atomic import beside, replacing, sweep, sync_file, sync_folder
 from tracker.files.folders import cache_folder
 from tracker.sequences.built_in import built_in_name
+from tracker.sequences.errors import SequenceError
 from tracker.sequences.reader import FILE, check_own_file, given_folder, read_sequence
-from tracker.sequences.sequence import Sequence, SequenceError
+from tracker.sequences.sequence import Sequence
 
 BACKUP = f"{FILE}.bak"
 """What a file was before it was saved over; later ones have a number."""

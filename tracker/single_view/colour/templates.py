@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from tracker.geometry.boxes import Boxes
+from tracker.sequences.errors import SequenceError
 from tracker.sequences.pictures.frames import Picture, Pictures
-from tracker.sequences.sequence import Sequence, SequenceError
+from tracker.sequences.sequence import Sequence
 from tracker.single_view.pictures import colour
 from tracker.single_view.pictures.colour import ColourModel, ColourSpaceName, KernelName
 

@@ -12,7 +12,7 @@ from typing import Any
 from tracker import __version__
 from tracker.evaluation.report.tables import escaped
 from tracker.files.atomic import replacing
-from tracker.sequences.sequence import SequenceError
+from tracker.sequences.errors import SequenceError
 from tracker.studies.kept.records import Trial
 from tracker.studies.kept.store import Store
 from tracker.studies.reporting.commands import track_commands

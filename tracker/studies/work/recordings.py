@@ -12,9 +12,10 @@ from typing import Any
 
 from tracker.files.atomic import filling, write_whole
 from tracker.files.folders import cache_folder, files_matching
+from tracker.sequences.errors import SequenceError
 from tracker.sequences.library import open_sequence
 from tracker.sequences.reader import FILE
-from tracker.sequences.sequence import Sequence, SequenceError
+from tracker.sequences.sequence import Sequence
 from tracker.studies.errors import StudyError
 
 SENT_BYTES = 256 << 20

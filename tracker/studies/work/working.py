@@ -32,8 +32,9 @@ from tracker.runs import pipeline
 from tracker.runs.pipeline import Run
 from tracker.runs.stage_cache import StageCache
 from tracker.runs.stage_files import StageFiles
+from tracker.sequences.errors import SequenceError
 from tracker.sequences.pictures.frames import FrameReader
-from tracker.sequences.sequence import Sequence, SequenceError
+from tracker.sequences.sequence import Sequence
 from tracker.studies.defined.objectives import OBJECTIVES
 from tracker.studies.work import recordings
 from tracker.studies.work.jobs import Job, Outcome, code_version
