@@ -174,7 +174,7 @@ def test_what_was_not_used_for_long_is_deleted(
 def test_the_warm_up_calls_every_kernel_that_a_run_may_call() -> None:
     # in a fresh interpreter; what is read from disk brings the kernels that it calls with it
     code = """
-        from tracker import warm_up
+        from tracker.runs import warm_up
         from tracker.kernels import compilation
         told = []
         for half in warm_up.HALVES:

@@ -293,7 +293,7 @@ def test_ctrl_c_inside_a_compiled_kernel(
 BARRED = """
 import sys
 from app.command import main as cli
-from tracker import pipeline
+from tracker.runs import pipeline
 real = pipeline.compute
 def compute(*args, on_progress, **kwargs):
     told = []

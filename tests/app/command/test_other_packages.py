@@ -91,7 +91,7 @@ EVERYWHERE = """
 import json, sys, tempfile
 {first}
 from app.web.views.results import schema
-from tracker import pipeline, warm_up
+from tracker.runs import pipeline, warm_up
 from tracker.parameters import METHODS, RunParameters, changed, shown_keys
 from tracker.parameters import stage_values, with_values
 from tracker.runs.fitting import unfit_methods

@@ -118,7 +118,7 @@ _ALONE = """
 import resource, sys
 from tests.benchmarks.engine.growth import PEOPLE, ring, walkers
 from tests.engine import synthetic
-from tracker import pipeline
+from tracker.runs import pipeline
 count = int(sys.argv[1])
 whole = synthetic.sequence(walkers(3, count), count, ring(3), clutter_rate=0.5, pixel_noise=0.5)
 pipeline.compute(whole, PEOPLE)

@@ -1,4 +1,4 @@
-"""The rooms of the house and who may import whom, from the import contracts."""
+"""The packages and who may import whom, from the import contracts."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from tests.manual.places import PAGES, ROOT, between
 
 
 def page() -> str:
-    """The page of the architecture with its rooms made anew."""
+    """The page of the architecture with its packages made anew."""
     text = (PAGES / "architecture.md").read_text(encoding="utf-8")
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     contracts = settings["tool"]["importlinter"]["contracts"]
-    return between(text, "rooms", "\n\n".join(map(_section, contracts)))
+    return between(text, "packages", "\n\n".join(map(_section, contracts)))
 
 
 def _section(contract: dict[str, Any]) -> str:
@@ -26,9 +26,9 @@ def _section(contract: dict[str, Any]) -> str:
         return f"{title}{sources} imports none of {others}."
     container = contract.get("containers", [""])[0]
     lines = [
-        "Each line may import what stands below it; rooms of one line do not know each other.",
+        "Each line may import what stands below it.",
         "",
-        "| room | what it is |",
+        "| package | what it is |",
         "|---|---|",
     ]
     for layer in contract["layers"]:
