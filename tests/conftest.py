@@ -39,8 +39,8 @@ os.environ["MULTIVIEW_PHD_STUDIES"] = str(Path(_LIBRARY.name) / "studies")
 os.environ["MULTIVIEW_PHD_SETTINGS"] = str(Path(_LIBRARY.name) / "settings")
 
 
-LONGEST = 600
-"""Seconds after which a test is taken to hang; the slowest takes a tenth of it."""
+LONGEST = 1500
+"""Seconds after which a test is taken to hang: the slowest takes four minutes of two free cores."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
