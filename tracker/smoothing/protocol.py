@@ -79,5 +79,6 @@ class NoSmoothing:
         fused: Many[FusionResult],
         check: Callable[[], None] = lambda: None,
         corrections: Many[Correction] = (),
+        earlier: Earlier | None = None,
     ) -> None:
         """Nothing is made of them."""
