@@ -6,6 +6,7 @@ One edit goes one way round: browser → workbench → every other face.
 from __future__ import annotations
 
 import html
+import threading
 from collections.abc import Set
 from functools import partial
 from typing import Any
@@ -60,6 +61,7 @@ class Controls:
         self._workbench = workbench
         self._inputs = Inputs(server, lambda: self._worker.ask("edit"))
         self._resets: dict[Topic, viser.GuiButtonHandle] = {}
+        self._built = threading.Event()
         self._worker = LatestWorker("controls", self._work)
         server.gui.main_panel.dock_right()
         server.gui.main_panel.set_width(PANEL_WIDTH)
@@ -128,6 +130,7 @@ class Controls:
         """The inputs that are visible."""
         self._refresh(workbench.snapshot())
         self._unsubscribe = workbench.subscribe(self._note)
+        self._built.set()
         self._worker.ask("refresh")
 
     def wait(self, timeout: float) -> bool:
@@ -212,6 +215,7 @@ class Controls:
     # the worker's thread
 
     def _work(self, topics: Set[str]) -> None:
+        self._built.wait()  # a page that is open already may ask before all of it is there
         if "edit" in topics:
             self._take_edits()
         self._refresh(self._workbench.snapshot())

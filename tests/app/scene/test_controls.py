@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+import threading
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -64,6 +65,26 @@ def take_preset(panel: Controls, name: str) -> None:
 
 def value(workbench: Workbench, key: str) -> Any:
     return table.value(workbench.snapshot().parameters, key)
+
+
+class Eager:
+    """Curves that have something to say as soon as somebody follows them, and time to wait."""
+
+    def subscribe(self, follow: Callable[[], None]) -> None:
+        follow()
+        threading.Event().wait(0.2)
+
+    def curves(self) -> dict[str, Any]:
+        return {}
+
+
+def test_who_asks_before_the_panel_is_there_is_answered_when_it_is(
+    shared_server: viser.ViserServer, workbench: Workbench
+) -> None:
+    shared_server.gui.reset()
+    made = Controls(shared_server, workbench, Eager())  # type: ignore[arg-type]
+    assert made.wait(SECONDS)
+    made.close()
 
 
 # the scales
