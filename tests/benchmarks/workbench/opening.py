@@ -23,6 +23,7 @@ from tests.browser.serving import Server
 from tests.browser.work.test_opening import drop
 from tests.conftest import CHROMIUM_FLAGS
 from tests.manual.places import ROOT
+from tests.rooms import render_random
 from tracker.sequences.library import open_sequence
 from tracker.sequences.sequence import Sequence
 
@@ -34,7 +35,7 @@ def run(short: bool) -> Iterator[Measurement]:
     """The median of three runs; the short form has one."""
     with tempfile.TemporaryDirectory() as name:
         place = Path(name)
-        _app("render", "--random", str(SEED), "--detections", str(place / "room"))
+        render_random(SEED, place / "room", detections=True)
         sequence = open_sequence(place / "room")
         files = _as_of_others(sequence, place / "visit")
         runs = 1 if short else RUNS
