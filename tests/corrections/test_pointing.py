@@ -65,7 +65,7 @@ def test_what_says_nothing_of_a_place_is_refused() -> None:
 
 @pytest.mark.parametrize(("angle", "refused"), [(0.03, True), (0.05, False), (0.2, False)])
 def test_two_pictures_from_nearly_the_same_side_are_refused(angle: float, refused: bool) -> None:
-    """Of two rays the condition is 4 / θ²: below 0.04 rad they say nothing of how far away."""
+    """The condition of two rays is 4 / θ²: below 0.04 rad they say nothing of how far away."""
     point = np.array([0.0, 0.0, 1.0])
     cameras = [
         world.look_at(name, (5.0 * np.sin(turn), -5.0 * np.cos(turn), 1.0), point.tolist())

@@ -77,7 +77,7 @@ def exact(places: Many[Many[float]], cameras: Many[Camera] = CAMERAS, sigma: flo
 def births(
     kind: MeasurementKind = "box", margin: float = 0.0, p_d: float = 0.95, gap: float = 1.0
 ) -> MeasurementBirths:
-    """Of the room with four cameras."""
+    """The values are those of the room with four cameras."""
     model = BirthModel(
         0.005, p_d, np.full(4, 1e-8 if kind != "centre" else 1e-6), 21.0, margin, gap
     )
@@ -87,7 +87,7 @@ def births(
 def evidence(
     views: tuple[ViewResult, ...], kind: MeasurementKind = "box", unexplained: float = 1.0
 ) -> Evidence:
-    """Of boxes that are equally unexplained."""
+    """The boxes are equally unexplained."""
     seen, model = all_boxes(views), TargetModel(HALF_EXTENTS, kind)
     values, noises = model.measured_boxes(seen.boxes, seen.sigmas, 1.0)
     share = np.full(len(seen.boxes), unexplained)

@@ -21,7 +21,7 @@ LINK = re.compile(r"\[`([\w.]+)`\]\(api/(\w+)\.md#([\w.]+)\)")
 
 
 def linked() -> list[tuple[str, str, str]]:
-    """Of each link of the section its text, its page and its target."""
+    """The text, the page and the target of each link of the section."""
     text = (PAGES / "architecture.md").read_text(encoding="utf-8")
     section = text.partition("## The path of one detection")[2].partition("\n## ")[0]
     return LINK.findall(section)

@@ -31,7 +31,7 @@ class Known:
 
     whole: Sequence
     seen: list[world.Boxes]
-    """Of each camera; every box is somebody's."""
+    """The boxes of each camera; every one is a person's."""
     places: ndarray
     """(steps, people, 3), NaN where a person is not followed."""
 
