@@ -466,10 +466,12 @@ def try_all(mutants: Many[Mutant | Drawn], workers: int) -> list[Mutant | Drawn]
             mutant.text(Path(folder) / "0")
         # what fails anyway would notice everything
         every = sorted({test for one in mutants for tests in one.rounds for test in tests})
-        shares = [tuple(every[number::workers]) for number in range(workers)]
-        roots = [Path(folder) / str(number) for number in range(workers)]
+        # none without a test: pytest would run them all
+        shares = [tuple(every[number::workers]) for number in range(min(workers, len(every)))]
+        roots = [Path(folder) / str(number) for number in range(len(shares))]
         begin = time.monotonic()
-        for status, printed in pool.map(outcome, roots, shares, [len(every) * SECONDS] * workers):
+        limits = [len(every) * SECONDS] * len(shares)
+        for status, printed in pool.map(outcome, roots, shares, limits):
             if status != PASSED:
                 raise Unfit(f"the tests do not pass without a change:\n{printed[-4000:]}")
         # nothing that a change leaves alone takes so much longer than all of it together

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy import ndarray
 from numpy.testing import assert_allclose, assert_array_equal
-from scipy.stats import chi2
+from scipy.stats import chi2, multivariate_normal
 
 from tests import world
 from tests.filters.mixtures import (
@@ -23,6 +23,7 @@ from tests.filters.mixtures import (
 )
 from tracker.filters import gaussian_mixture, phd
 from tracker.filters.gaussian_mixture import GaussianMixture
+from tracker.kernels import gating
 from tracker.kernels import kalman as update_kernels
 from tracker.kernels.gating import Measurements
 from tracker.kernels.kalman import Expected
@@ -108,6 +109,34 @@ def test_update_agrees_with_the_recursion_pair_by_pair(
         assert_allclose(updated.posterior.means[k], mean, rtol=1e-7, atol=1e-6)
         assert_allclose(updated.posterior.covariances[k], covariance, rtol=1e-5, atol=1e-6)
     assert_array_equal(updated.posterior.labels, mixture.labels[updated.parents])
+
+
+@given(seeds, st.integers(1, 4), st.floats(0.5, 30.0), st.booleans())
+def test_the_gate_bounds_the_squared_mahalanobis_distance(
+    seed: int, size: int, gate: float, shared: bool
+) -> None:
+    """Of two measurements in one direction, one just inside and one just outside, one is left."""
+    rng = np.random.default_rng(seed)
+    own, noise = random_covariances(rng, 1, size), random_covariances(rng, 1, size)
+    direction = rng.normal(size=size)
+    on_gate = np.linalg.cholesky(own[0] + noise[0]) @ direction / np.linalg.norm(direction)
+    factors = np.sqrt(gate * np.array([1.0 - 1e-6, 1.0 + 1e-6]))
+    expected = rng.normal(size=(1, size))
+    pairs = gating.gated_pairs(
+        expected,
+        Measurements(
+            expected + factors[:, None] * on_gate, noise if shared else noise.repeat(2, 0)
+        ),
+        own,
+        gate,
+        np.empty((1, size, size)),
+    )
+    assert pairs.measured.tolist() == [0]
+    assert_allclose(
+        pairs.log_likelihoods,
+        multivariate_normal.logpdf(factors[0] * on_gate, cov=own[0] + noise[0]),
+        rtol=1e-6,
+    )
 
 
 @given(mixtures(), seeds, st.floats(0.0, 1.0), st.sampled_from((0.0, 1e-30, 0.1, 10.0)))
