@@ -32,9 +32,9 @@ def _section(contract: dict[str, Any]) -> str:
         "|---|---|",
     ]
     for layer in contract["layers"]:
-        rooms = [f"{container}.{name}".lstrip(".") for name in re.split(r" [|:] ", layer)]
-        words = "<br>".join(f"`{room}`: {_says(room)}" for room in rooms)
-        lines.append(f"| {_listed(room.rpartition('.')[2] for room in rooms)} | {words} |")
+        names = [f"{container}.{one}".lstrip(".") for one in re.split(r" [|:] ", layer)]
+        words = "<br>".join(f"`{name}`: {_purpose(name)}" for name in names)
+        lines.append(f"| {_listed(name.rpartition('.')[2] for name in names)} | {words} |")
     return title + "\n".join(lines)
 
 
@@ -42,9 +42,9 @@ def _listed(names: Any) -> str:
     return ", ".join(f"`{name}`" for name in names)
 
 
-def _says(room: str) -> str:
+def _purpose(name: str) -> str:
     """The first sentence of a package's or module's docstring."""
-    path = ROOT.joinpath(*room.split("."))
+    path = ROOT.joinpath(*name.split("."))
     file: Path = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
     text = ast.get_docstring(ast.parse(file.read_text(encoding="utf-8"))) or ""
     return " ".join(text.partition("\n\n")[0].split()).replace("|", "\\|")

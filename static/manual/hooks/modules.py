@@ -1,4 +1,4 @@
-"""The pages of the API: one for each room of the engine, with every public module in it."""
+"""The pages of the API: one for each package of the engine, with every public module in it."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ _ROLE = re.compile(r":(?:func|class|attr|meth|mod|data|exc|const):<code>~?")
 
 
 def modules() -> dict[str, list[str]]:
-    """Every public module of the engine, by its room: the first package below ``tracker``."""
-    rooms: dict[str, list[str]] = {}
+    """Every public module of the engine, by its package: the first below ``tracker``."""
+    packages: dict[str, list[str]] = {}
     for path in sorted((ROOT / PACKAGE).rglob("*.py")):
         parts = list(path.relative_to(ROOT).with_suffix("").parts)
         if parts[-1] == "__init__":
             parts.pop()
         if any(part.startswith("_") for part in parts):
             continue
-        own_room = len(parts) > 2 or path.name == "__init__.py"
-        room = parts[1] if own_room and len(parts) > 1 else ""
-        rooms.setdefault(room, []).append(".".join(parts))
-    return rooms
+        own_package = len(parts) > 2 or path.name == "__init__.py"
+        package = parts[1] if own_package and len(parts) > 1 else ""
+        packages.setdefault(package, []).append(".".join(parts))
+    return packages
 
 
 def first_sentence(module: str) -> str:
@@ -40,20 +40,20 @@ def first_sentence(module: str) -> str:
 
 def pages() -> dict[str, str]:
     """The Markdown of every page of the API, by its address."""
-    rooms = modules()
-    made = {"api/index.md": _index(rooms)}
-    for room, names in rooms.items():
-        title = f"{PACKAGE}.{room}" if room else f"{PACKAGE}: modules of its own"
+    packages = modules()
+    made = {"api/index.md": _index(packages)}
+    for package, names in packages.items():
+        title = f"{PACKAGE}.{package}" if package else f"{PACKAGE}: modules of its own"
         body = "\n\n".join(f"::: {name}" for name in names)
-        made[_page(room)] = f"# {title}\n\n{body}\n"
+        made[_page(package)] = f"# {title}\n\n{body}\n"
     return made
 
 
-def _page(room: str) -> str:
-    return f"api/{room or 'modules'}.md"
+def _page(package: str) -> str:
+    return f"api/{package or 'modules'}.md"
 
 
-def _index(rooms: dict[str, list[str]]) -> str:
+def _index(packages: dict[str, list[str]]) -> str:
     lines = [
         "# API",
         "",
@@ -65,18 +65,21 @@ def _index(rooms: dict[str, list[str]]) -> str:
         "The routes of a running workbench, with their types, are at `/docs` of its address.",
         "",
     ]
-    for room, names in rooms.items():
-        lines += [f"## [{f'{PACKAGE}.{room}' if room else PACKAGE}]({_page(room)[4:]})", ""]
+    for package, names in packages.items():
+        lines += [
+            f"## [{f'{PACKAGE}.{package}' if package else PACKAGE}]({_page(package)[4:]})",
+            "",
+        ]
         lines += ["| module | what it is |", "|---|---|"]
         for name in names:
             words = first_sentence(name).replace("|", "\\|")
-            lines.append(f"| [`{name}`]({_page(room)[4:]}#{name}) | {words} |")
+            lines.append(f"| [`{name}`]({_page(package)[4:]}#{name}) | {words} |")
         lines.append("")
     return "\n".join(lines)
 
 
 def on_config(config: MkDocsConfig) -> MkDocsConfig:
-    """MkDocs asks this first: the rooms' pages go below the entry of the API."""
+    """MkDocs asks this first: the packages' pages go below the entry of the API."""
     for section in config.nav or []:
         for entries in section.values():
             for entry in entries if isinstance(entries, list) else []:
