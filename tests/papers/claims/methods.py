@@ -33,9 +33,9 @@ ON_PICTURES = tuple(
 BOXES_RECORDING = "cmc1"
 """A recording with such boxes, and without pictures."""
 
-QUICK_STEPS = 320
-QUICK_RECORDED_STEPS = 80
-"""All three people are there, and have hidden each other."""
+QUICK_STEPS = 220
+QUICK_RECORDED_STEPS = 40
+"""Two people are there, and have passed each other."""
 
 FIGURES = ("mota", "idf1", "ospa", "position_error", "found_share")
 
