@@ -7,6 +7,7 @@ import shutil
 import signal
 import tempfile
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
 
@@ -134,14 +135,26 @@ PATIENCE = 90.0
 where other tests work too. How fast the page is, the benchmarks say."""
 
 
+@contextmanager
+def chromium(path: str) -> Iterator[Browser]:
+    """Chromium, headless, with time enough for a busy machine."""
+    with sync_playwright() as playwright:
+        launched = playwright.chromium.launch(executable_path=path, args=CHROMIUM_FLAGS)
+        launched.on("context", lambda context: context.set_default_timeout(1000 * PATIENCE))
+        yield launched
+        launched.close()
+
+
+def chromium_path() -> str | None:
+    """Where Debian's Chromium is, if it is installed."""
+    return shutil.which("chromium") or shutil.which("chromium-browser")
+
+
 @pytest.fixture(scope="session")
 def browser() -> Iterator[Browser]:
-    """Debian's Chromium, headless: one for all tests, since Playwright runs one loop a thread."""
-    path = shutil.which("chromium") or shutil.which("chromium-browser")
+    """Debian's Chromium: one for all tests, since Playwright runs one loop a thread."""
+    path = chromium_path()
     if path is None:
         pytest.skip("no Chromium on this machine: install it (Debian: apt-get install chromium)")
-    with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=path, args=CHROMIUM_FLAGS)
-        chromium.on("context", lambda context: context.set_default_timeout(1000 * PATIENCE))
-        yield chromium
-        chromium.close()
+    with chromium(path) as launched:
+        yield launched

@@ -3,7 +3,8 @@
 ``--record`` first runs experiments (all that are named, or every one) and keeps their tables,
 from which alone the page of results is made; ``--keep`` takes what one has written; ``--sweeps``
 runs short pieces over values of parameters, and keeps what the pictures of the page of tuning
-show; ``--machines`` exchanges what differs between machines, one thing at a time.
+show; ``--machines`` exchanges what differs between machines, one thing at a time; ``--pictures``
+takes the pictures of the page.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from pathlib import Path
 
 from tests.conftest import DATA
 from tests.manual.places import ROOT, made_pages
-from tests.manual.records import machines, results, sweeps
+from tests.manual.records import machines, pictures, results, sweeps
 from tests.papers.registry import EXPERIMENTS
 
 
@@ -30,6 +31,7 @@ def main() -> int:
     )  # fmt: skip
     parser.add_argument("--sweeps", nargs="*", metavar="GROUP|KEY", default=None)
     parser.add_argument("--machines", action="store_true")
+    parser.add_argument("--pictures", action="store_true")
     parser.add_argument("--data", type=Path, default=DATA, help="folder of the real recordings")
     arguments = parser.parse_args()
     if arguments.record is not None:
@@ -40,6 +42,8 @@ def main() -> int:
         sweeps.record(arguments.sweeps, arguments.data)
     if arguments.machines:
         machines.record()
+    if arguments.pictures:
+        pictures.record()
     for path, make in made_pages().items():
         text = make()
         if not path.is_file() or path.read_text(encoding="utf-8") != text:
