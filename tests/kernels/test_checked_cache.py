@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import importlib.util
+import os
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -82,3 +85,45 @@ def test_what_was_damaged_is_compiled_anew_and_kept_whole(
     after = load()
     assert after(2.0) == 6.0
     assert misses(after) == 0, "it is whole again"
+
+
+COUNTED = """
+import sys
+sys.path.insert(0, sys.argv[1])
+import squares
+print("ready", flush=True)
+sys.stdin.readline()
+assert squares.outer(2.0) == 12.0
+print(*(sum(each.stats.cache_misses.values()) for each in (squares.inner, squares.outer)))
+"""
+
+
+@pytest.mark.full
+def test_of_two_processes_at_once_one_compiles(tmp_path: Path) -> None:
+    """Both have imported the kernels before either is told to call them."""
+    (tmp_path / "squares.py").write_text(
+        "from tracker.kernels.compilation import compiled_later\n"
+        "@compiled_later\ndef inner(x):\n    return 3.0 * x\n"
+        "@compiled_later\ndef outer(x):\n    return inner(x) * x\n",
+        encoding="utf-8",
+    )
+    both = [
+        subprocess.Popen(
+            [sys.executable, "-c", COUNTED, str(tmp_path)],
+            env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "kernels")},
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        for _ in range(2)
+    ]
+    for process in both:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "ready\n"
+    for process in both:
+        assert process.stdin is not None
+        process.stdin.write("\n")
+        process.stdin.flush()
+    misses = [process.communicate()[0].split() for process in both]
+    assert [process.returncode for process in both] == [0, 0]
+    assert sorted(misses) == [["0", "0"], ["1", "1"]]

@@ -84,7 +84,7 @@ def compiled_later(function: _F) -> _F:
     try:
         compiled = numba.njit(cache=True, nogil=True)(function)
         if not _config.DISABLE_JIT:
-            checked_cache.check_files_of(compiled)
+            checked_cache.keep(compiled)
     except RuntimeError:  # nowhere to write to: it is compiled at every start
         compiled = numba.njit(nogil=True)(function)
     finally:

@@ -126,7 +126,7 @@ def _ways(half: str) -> Iterable[RunParameters]:
         for single_view in FOLLOWING
         for smoothing_method in _own("smoothing_method")
     )
-    # neither compiles what the other does just then: that would be done twice
+    # each begins with what the other does last: whoever asks for what is compiled just then waits
     if half == HALVES[0]:
         return of_views
     boxes = RunParameters(single_view="none")
