@@ -20,11 +20,11 @@ from tracker.kernels.intensity import mixture as mixture_kernels
 from tracker.kernels.linear_algebra import Gaussians
 
 _NO_OWNERS = np.zeros(0, dtype=np.int64)
-"""Stands for the owners where no component has one."""
+"""The owners in the case that no component has one."""
 
 
 class _Weighted(Protocol):
-    """What a compiled kernel gives of J components: (J,), (J, d) and (J, d, d)."""
+    """J components as a compiled kernel returns them: shapes (J,), (J, d) and (J, d, d)."""
 
     @property
     def weights(self) -> ndarray: ...
@@ -43,10 +43,13 @@ class GaussianMixture:
     """
 
     weights: Float[ndarray, " J"]
+    """Expected number of targets of each component."""
     means: Float[ndarray, "J d"]
+    """Position in metres and, for d = 6, velocity in metres per second, world frame."""
     covariances: Float[ndarray, "J d d"]
+    """Covariance of each component, in products of the units of the means."""
     labels: Int[ndarray, " J"]
-    """The birth that each component descends from; components may share one."""
+    """Label of the birth that each component descends from; components may share one."""
 
     def __post_init__(self) -> None:
         size, dimension = self.means.shape
@@ -63,7 +66,7 @@ class GaussianMixture:
 
     @staticmethod
     def empty(dimension: int) -> GaussianMixture:
-        """The intensity of nobody, over a state of the given dimension."""
+        """The intensity without components, over a state of the given dimension."""
         return GaussianMixture(
             weights=np.zeros(0),
             means=np.zeros((0, dimension)),
@@ -73,7 +76,7 @@ class GaussianMixture:
 
     @staticmethod
     def of(gaussians: _Weighted, labels: Int[ndarray, " J"]) -> GaussianMixture:
-        """The components that a compiled kernel gave, with their labels."""
+        """The components that a compiled kernel returned, with their labels."""
         return GaussianMixture(gaussians.weights, gaussians.means, gaussians.covariances, labels)
 
     @property
@@ -93,11 +96,11 @@ class GaussianMixture:
 
     @property
     def gaussians(self) -> Gaussians:
-        """The components in the form that the compiled kernels know."""
+        """The components in the form that the compiled kernels take."""
         return Gaussians(self.weights, self.means, self.covariances)
 
     def take(self, indices: ndarray | slice) -> GaussianMixture:
-        """The components at ``indices`` (integers, a mask or a slice), in that order."""
+        """Select the components at ``indices`` (integers, a mask or a slice), in that order."""
         if isinstance(indices, slice):
             return GaussianMixture(
                 self.weights[indices],
@@ -116,7 +119,7 @@ class GaussianMixture:
         )
 
     def relabelled(self, changed: dict[int, int]) -> GaussianMixture:
-        """The same components; each label that is a key becomes what it stands for."""
+        """The same components; each label that is a key of ``changed`` becomes its value."""
         labels = np.array(
             [changed.get(label, label) for label in self.labels.tolist()], dtype=np.int64
         )
@@ -144,10 +147,10 @@ def predict(
     w ← p_S w,  m ← F m,  P ← F P Fᵀ + Q: eq. (25)–(27) of [VM06]_ without births.
 
     Args:
-        mixture: J components. Labels are kept.
-        transition: F.
-        noise: Q, in squared state units per step, one for all or one a component.
-        survival_probability: p_S, one for all or one a component.
+        mixture: J components. The labels do not change.
+        transition: F, the transition matrix of one step.
+        noise: Q, in squared state units per step, one for all or one for each component.
+        survival_probability: p_S per step, one for all or one for each component.
     """
     moved = mixture_kernels.predict(
         mixture.means,
@@ -161,7 +164,7 @@ def predict(
 
 
 def prune(mixture: GaussianMixture, threshold: float) -> Int[ndarray, " K"]:
-    """Indices of the components whose weight is at least the threshold T, in order ([VM06]_)."""
+    """The indices of the components with a weight of at least the threshold T ([VM06]_)."""
     return (mixture.weights >= threshold).nonzero()[0]
 
 
@@ -181,13 +184,14 @@ def merge(
     Args:
         mixture: J components. An empty mixture is returned as it is.
         threshold: Squared Mahalanobis distance U >= 0, without unit.
-        owners: A component that has one (0 or more) is absorbed by components of the
-            same owner only; without any, everybody may absorb everybody.
+        owners: Owner of each component, -1 for none. A component that has one (0 or more) is
+            absorbed by components of the same owner only; with None every component may absorb
+            every other.
 
     Returns:
-        At most J components, the heaviest leader first, and for each the index
-        of the component that led it, so that what was known of the leader can
-        be carried along.
+        At most J components, the heaviest leader first, and for each the index of the
+        component l that absorbed the others, by which data about the leader can be carried
+        along.
 
     Raises:
         ValueError: If ``threshold`` is negative.
@@ -221,20 +225,20 @@ def reduce(
 ) -> tuple[GaussianMixture, Int[ndarray, " K"]]:
     """Prune, merge and cap: the step that keeps the recursion bounded (Table II of [VM06]_).
 
-    Where more than J_max components are left, the heaviest stay and take over the weight
-    of the others in proportion: what is expected of all is expected of fewer. Without
-    that, a crowd that needs more components than it may have fades away.
+    Where more than J_max components are left, the heaviest J_max remain and are scaled to the
+    weight of all, so that the expected cardinality does not change. Without that, the weight
+    of a crowd that needs more than J_max components would decrease at every step.
 
     Args:
         mixture: J components.
         pruning_threshold: T, the least weight a component must have.
         merging_threshold: U, the squared Mahalanobis distance of :func:`merge`.
-        max_components: J_max.
-        owners: Who may absorb whom, as in :func:`merge`.
+        max_components: J_max, the largest number of components.
+        owners: Owner of each component, -1 for none, as in :func:`merge`.
 
     Returns:
-        The reduced mixture, heaviest first, and the index into ``mixture`` of
-        the component that led each.
+        The reduced mixture, heaviest first, and for each component the index into ``mixture``
+        of the one that absorbed the others.
     """
     _check(merging_threshold)
     reduced = merging.reduce_mixture(
@@ -251,14 +255,14 @@ def reduce(
 
 
 def gate_distance(probability: float, dimension: int) -> float:
-    """Squared Mahalanobis distance within which a Gaussian has a share of its mass.
+    """The squared Mahalanobis distance within which a Gaussian has a share of its mass.
 
     The quantile of χ² with d degrees of freedom, 2 P⁻¹(d/2, P_G), with the regularised
     incomplete gamma function P. (``scipy.stats`` has it too, and is slow to import.)
 
     Args:
-        probability: P_G, 0 … 1.
-        dimension: d.
+        probability: P_G, the share of the mass, 0 … 1.
+        dimension: d, the degrees of freedom.
     """
     from scipy.special import gammaincinv  # a server starts without it
 

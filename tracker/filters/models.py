@@ -23,12 +23,14 @@ from tracker.sequences.sequence import Room
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
-    """A linear motion model over one step: position, and velocity where it has one."""
+    """A linear motion model over one step, of the position (d = 3) or with velocity (d = 6)."""
 
     transition: Float[ndarray, "d d"]
+    """F, from the state of one step to that of the next."""
     noise: Float[ndarray, "d d"]
+    """Q, the covariance of the process noise of one step, in metres and seconds."""
     start_velocity: float
-    """Standard deviation of a newcomer's velocity along each axis, m/s."""
+    """Standard deviation of a newborn target's velocity along each axis, m/s."""
 
     @staticmethod
     def of(parameters: FusionParams, step_time: float) -> Motion:
@@ -45,15 +47,15 @@ class Motion:
 
     @property
     def dimension(self) -> int:
-        """d: 3 for a random walk, 6 with velocity."""
+        """d, the size of the state: 3 for a random walk, 6 with velocity."""
         return len(self.transition)
 
     def predict(self, mixture: GaussianMixture, survival_probability: float) -> GaussianMixture:
-        """Every component one step ahead: :func:`tracker.filters.gaussian_mixture.predict`."""
+        """Predict every component one step: :func:`tracker.filters.gaussian_mixture.predict`."""
         return gaussian_mixture.predict(mixture, self.transition, self.noise, survival_probability)
 
     def at_rest(self, mixture: GaussianMixture) -> GaussianMixture:
-        """Components over positions (metres) as components over the whole state.
+        """Extend components over positions (metres) to components over the whole state.
 
         The velocity is 0 with the standard deviation :attr:`start_velocity` along each axis.
         """
@@ -70,16 +72,16 @@ class Motion:
 def constant_velocity(
     sigmas: Float[ndarray, " 3"], step_time: float, memory: float
 ) -> tuple[Float[ndarray, "6 6"], Float[ndarray, "6 6"]]:
-    """F and Q of nearly constant velocity that is forgotten slowly.
+    """The matrices F and Q of nearly constant velocity with exponentially decaying velocity.
 
     The velocity follows dv = −v/τ dt + σ dW (an Ornstein-Uhlenbeck process), so
-    that a hidden person is not carried through the wall. For τ → ∞ this is white
+    that an occluded person is not predicted far beyond a wall. For τ → ∞ this is white
     acceleration: F = [[I, Δt I], [0, I]], Q = σ² [[Δt³/3, Δt²/2], [Δt²/2, Δt]].
 
     Args:
         sigmas: σ along x, y and z, in m/s per √s.
         step_time: Δt in seconds.
-        memory: τ in seconds.
+        memory: Time constant τ of the velocity, in seconds.
     """
     dt, tau = step_time, memory
     kept = np.exp(-dt / tau)
@@ -101,9 +103,9 @@ def random_walk_noise(sigma: float, step_time: float, dimension: int) -> Float[n
     """Q = σ² Δt I: the covariance of one step of a random walk.
 
     Args:
-        sigma: Spread after one second, along each axis, in m/√s.
-        step_time: Δt in seconds, so that the frame rate does not change the walk.
-        dimension: d.
+        sigma: Standard deviation after one second, along each axis, in m/√s.
+        step_time: Δt in seconds, so that the walk does not depend on the frame rate.
+        dimension: d, the number of axes.
     """
     return sigma**2 * step_time * np.eye(dimension)
 
@@ -112,11 +114,11 @@ def entrance_births(room: Room, weight: float) -> GaussianMixture:
     """The birth intensity γ ([ZW21] §2.4): one component at each entrance, without labels yet.
 
     A room without entrances gives one broad component over its whole volume, so
-    that people are still found.
+    that people are still tracked.
 
     Args:
-        room: Entrances with mean and standard deviation in metres.
-        weight: Expected number of newcomers at each entrance in one step.
+        room: The tracked volume, whose entrances have mean and standard deviation in metres.
+        weight: Expected number of newborn targets at each entrance in one step.
     """
     if room.entrances:
         means = np.array([entrance.position for entrance in room.entrances])
@@ -140,12 +142,12 @@ def label_births(births: GaussianMixture, first_label: int) -> GaussianMixture:
 
 @lru_cache(maxsize=64)
 def visible_area(camera: Camera, room: Room) -> float:
-    """Area of the picture that the room's volume fills, in squared pixels.
+    """The area of the image that the room's volume fills, in squared pixels.
 
     False boxes are taken as uniform over it ([ZW21] §2.4: clutter uniform over
-    the volume, as this camera sees it). Never less than one per cent of the
-    picture, so that the clutter intensity stays finite for a camera that looks
-    elsewhere. The result is kept for the same camera and room: every run asks for it.
+    the volume, as this camera sees it). It is at least one per cent of the
+    image, so that the clutter intensity stays finite for a camera that looks
+    elsewhere. The result is cached for each camera and room, since every run needs it.
     """
     axes = np.linspace(room.minimum, room.maximum, 12).T
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
@@ -159,11 +161,11 @@ def visible_area(camera: Camera, room: Room) -> float:
 
 
 def measurement_volume(camera: Camera, room: Room, size: int) -> float:
-    """Volume of the space of possible boxes, in pixels to the power of ``size``.
+    """The volume of the space of possible boxes, in pixels to the power of ``size``.
 
-    The centre may fall anywhere that :func:`visible_area` counts. A box's height
-    and width, where they are measured, are taken as uniform up to half of the
-    picture's: that is what a detector's false boxes look like.
+    The centre is uniform over :func:`visible_area`. A box's height and width, where they are
+    measured, are taken as uniform up to half of the image's, as they are for the false boxes
+    of a detector.
     """
     width, height = camera.image_size
     volume = visible_area(camera, room)

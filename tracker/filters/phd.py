@@ -23,20 +23,20 @@ from tracker.kernels.intensity import mixture as mixture_kernels
 from tracker.kernels.kalman import Expected
 
 SPARE = 0.25
-"""How much more than one target, or than its weight, a component may stand for: weights are
-uncertain, but less than half a target cannot be reported."""
+"""Expected number of targets by which reported targets may exceed a component's weight, or 1 where
+that is less: weights are uncertain, but less than half a target cannot be reported."""
 
 
 @dataclass(frozen=True, slots=True)
 class PhdUpdate:
-    """The intensity after one measurement set, and from which pairs it was made."""
+    """The intensity after one measurement set, and the pairs of which it consists."""
 
     posterior: GaussianMixture
-    """First the J predicted components as missed, then one for every gated pair."""
+    """The J predicted components as missed, followed by one component for every gated pair."""
     parents: Int[ndarray, " K"]
     """The predicted component that each posterior component comes from."""
     measurements: Int[ndarray, " K"]
-    """The measurement that updated it, -1 where it was missed."""
+    """The measurement that updated each component, -1 where it was missed."""
     log_odds: Float[ndarray, " P"]
     """log(p_D w' q(z) / κ(z)) of each gated pair: this component against clutter."""
     measurement_weights: Float[ndarray, " M"]
@@ -64,13 +64,13 @@ def update(
     follow the recursion.
 
     Args:
-        predicted: v', J components.
-        measurements: z, one a row; none is allowed.
+        predicted: v', the predicted intensity of J components.
+        measurements: z, one a row; M may be 0.
         expected: h(m_j) for each component, for a linear model H m_j; H for each or one for
-            all; and what each adds to the noise where h is nonlinear (Ω of the unscented form).
-        noise: R, one for all measurements (N = 1) or one each (N = M).
-        detection_probability: p_D, one for all or one a component. Where it is
-            0 the component is left as it is.
+            all; and the noise that each adds where h is nonlinear (Ω of the unscented form).
+        noise: R, one for all measurements (N = 1) or one for each (N = M).
+        detection_probability: p_D, one for all or one for each component. Where it is
+            0 the component does not change.
         clutter_intensity: κ(z) per unit of the measurement space.
         gate: Squared Mahalanobis distance beyond which a pair is left out.
 
@@ -94,16 +94,16 @@ def update(
 
 
 def _filled(value: float | Float[ndarray, " N"], count: int) -> Float[ndarray, " N"]:
-    """One number for all as one each."""
+    """An array of ``count`` numbers, from one number for all or from one for each."""
     if isinstance(value, np.ndarray):
         return value
-    filled = np.empty(count)  # cheaper than np.full, and done at every update
+    filled = np.empty(count)  # faster than np.full, and this runs at every update
     filled.fill(value)
     return filled
 
 
 def extract(mixture: GaussianMixture, threshold: float) -> Int[ndarray, " K"]:
-    """Indices of the components heavier than ``threshold``, heaviest first ([ZW21] §2.4)."""
+    """The indices of the components heavier than ``threshold``, heaviest first ([ZW21] §2.4)."""
     above = (mixture.weights > threshold).nonzero()[0]
     return above.take(mixture_kernels.heaviest_first(mixture.weights.take(above)))
 
@@ -111,26 +111,26 @@ def extract(mixture: GaussianMixture, threshold: float) -> Int[ndarray, " K"]:
 def extract_measured(
     predicted: GaussianMixture, updated: PhdUpdate, threshold: float = 0.5
 ) -> GaussianMixture:
-    """One target for each measurement that most likely had one, after [RCV10].
+    """Extract one target for each measurement that probably has one, after [RCV10].
 
     Where targets are many, the weight of one is spread over several components and none
-    of them is heavy. So components are gathered by the measurement z that made them:
+    of them is heavy. So components are grouped by the measurement z that updated them:
 
         W_z = Σ_j w_j(z),   m_z = Σ_j w_j(z) m_j(z) / W_z
 
     is reported where W_z is above the threshold, beside heavy components that no
-    measurement updated. Beyond [RCV10], a predicted component pays for what it explains:
-    it stands for w'_j targets, or for one where that is less, and a little more
-    (:data:`SPARE`). The surest measurement is served first, so a false alarm beside a
-    target, which the PHD filter gives a weight near 1 as well, is not reported too.
+    measurement updated. Beyond [RCV10], the targets that a predicted component may explain
+    are limited: to min(w'_j, 1) and a tolerance (:data:`SPARE`). Measurements are processed
+    by decreasing W_z, so a false alarm beside a target, which the PHD filter gives a weight
+    near 1 as well, is not reported too.
 
     Args:
-        predicted: v', as it was updated.
-        updated: By one measurement set, not reduced yet.
-        threshold: Expected number of targets.
+        predicted: v', the predicted intensity before the update.
+        updated: The update of v' by one measurement set, before any reduction.
+        threshold: Expected number of targets above which one is reported.
 
     Returns:
-        The reported targets: first those of measurements, the surest first.
+        The reported targets: first those of measurements, by decreasing W_z.
     """
     posterior = updated.posterior
     found = extraction.report(

@@ -23,11 +23,12 @@ from tracker.kernels.labelled import marginals as marginal_kernels
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PmbUpdate:
-    """The Bernoulli tracks after one measurement set, and the association that made them."""
+    """The Bernoulli tracks after one measurement set, and the association probabilities."""
 
     tracks: GaussianMixture
-    """Weights are existence probabilities; one component a track, in the order given."""
+    """One component for each track, in the order given; weights are existence probabilities."""
     marginals: Marginals
+    """Association probabilities of the tracks and measurements."""
 
 
 def update(
@@ -41,25 +42,26 @@ def update(
     gate: float,
     resemblance: Float[ndarray, "k M"] | None = None,
 ) -> PmbUpdate:
-    """Update every track by the measurements that may be its own ([W15] TOMB/P).
+    """Update every track by the measurements in its gate ([W15] TOMB/P).
 
         w_i0 = 1 − r_i + r_i (1 − p_i),   w_ij = r_i p_i q_i(z_j)
 
     With the marginal association probabilities P, existence becomes
     r' = Σ_j P(i ← j) + P(i misses) r_i (1 − p_i) / w_i0, and the density is the
-    mixture of the updated and the missed Gaussians, kept as one Gaussian of its
+    mixture of the updated and the missed Gaussians, approximated by one Gaussian of its
     mean and covariance.
 
     Args:
-        tracks: n Bernoullis: existence as weight, Gaussian, label.
-        measurements: z, one a row; none is allowed.
-        expected: h(m_i), H_i, and what each track adds to the noise where h is nonlinear.
-        noise: R, one for all measurements (N = 1) or one each (N = M).
-        detection_probability: p_i of each track.
-        unexplained_intensity: ρ_j = κ(z_j) + e_j, clutter and newborns at each measurement.
+        tracks: n Bernoullis: existence probability as weight, Gaussian, label.
+        measurements: z, one a row; M may be 0.
+        expected: h(m_i), H_i, and the noise that each track adds where h is nonlinear.
+        noise: R, one for all measurements (N = 1) or one for each (N = M).
+        detection_probability: p_i, the detection probability of each track.
+        unexplained_intensity: ρ_j = κ(z_j) + e_j, intensity of clutter and of new targets at
+            each measurement.
         gate: Squared Mahalanobis distance beyond which a pair is left out.
-        resemblance: On w_ij of the first k tracks, by how much likelier each is to look as a
-            measurement does than anybody; None where nothing is known of looks.
+        resemblance: Factor on w_ij of the first k tracks: the likelihood ratio of the
+            measurement's appearance, of this track against any target; None for 1.
     """
     updated = marginal_kernels.bernoulli_update(
         tracks.gaussians,

@@ -20,10 +20,10 @@ TOLERANCE = 1e-6
 the precision to which an association probability matters."""
 
 ITERATIONS = 200
-"""At most so many, where the messages have not converged by then."""
+"""Largest number of iterations, where the messages have not converged before."""
 
 SETTLING = Settling(TOLERANCE, ITERATIONS)
-"""Both, as kernels take them."""
+"""Tolerance and number of iterations, in the form that the kernels take."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,9 +33,9 @@ class Marginals:
     detected: Float[ndarray, "n M"]
     """P(target i made measurement j)."""
     missed: Float[ndarray, " n"]
-    """P(target i made none); with :attr:`detected` a row sums to 1."""
+    """P(target i made no measurement); with :attr:`detected` a row sums to 1."""
     unexplained: Float[ndarray, " M"]
-    """P(no target made measurement j): it is clutter or somebody new."""
+    """P(no target made measurement j): it is clutter or of a new target."""
 
 
 def marginals(
@@ -58,7 +58,7 @@ def marginals(
         detected: w_ij, the weight of target i having made measurement j; 0 outside the gate.
         unexplained: ρ_j, clutter and newborn intensity at measurement j, > 0.
         tolerance: Largest change of a message at which the iteration stops.
-        iterations: At most this many.
+        iterations: Largest number of iterations.
     """
     found = belief_propagation(
         np.ascontiguousarray(missed, dtype=float),

@@ -1,4 +1,4 @@
-"""Joint events one by one: the K best, K that share no pair, and what they say together.
+"""Lists of joint events: the K best, or K that share no pair, and their marginals.
 
 [WW10] Wang, Wan, patent CN101783020A, 2010.
 [FBS83] Fortmann, Bar-Shalom, Scheffe, "Sonar tracking of multiple targets using joint
@@ -25,13 +25,13 @@ class JointEvents:
     """K joint events of n targets and M measurements."""
 
     sources: Int[ndarray, "K M"]
-    """The target of each measurement, -1 for nobody."""
+    """The target of each measurement, -1 for none."""
     targets: int
-    """n."""
+    """n, the number of targets."""
 
     @property
     def size(self) -> int:
-        """K."""
+        """K, the number of events."""
         return len(self.sources)
 
     @property
@@ -43,12 +43,12 @@ class JointEvents:
     def target_indicators(self) -> Bool[ndarray, "K n"]:
         """δ_t: whether target t has a measurement."""
         present = np.zeros((self.size, self.targets + 1), dtype=bool)
-        present[np.arange(self.size)[:, None], self.sources] = True  # nobody is the last column
+        present[np.arange(self.size)[:, None], self.sources] = True  # source -1 is the last column
         return np.asarray(present[:, : self.targets])
 
     @property
     def false_counts(self) -> Int[ndarray, " K"]:
-        """Φ: how many measurements are of nobody."""
+        """Φ: the number of measurements without a target."""
         return np.asarray((self.sources < 0).sum(axis=1))
 
 
@@ -65,11 +65,11 @@ def simplified_murty(
 
         ln(1 + w_ij / (w_i0 ρ_j))
 
-    the logarithm of how much likelier it is than none, where it is much likelier, and
-    always above 0. The heaviest matching, by the Hungarian method, is one event: who is
-    matched to a dummy is missed, or is clutter. Its pairs are taken out of the graph,
-    and the next is sought in what is left. Exact Murty would split the rest into n parts
-    and search each.
+    which is about the log odds of the pair where these are large, and always above 0. The
+    heaviest matching, by the Hungarian method, is one event: a target that is matched to a
+    dummy is missed, and a measurement that is matched to one is clutter. The pairs of that
+    matching are removed from the graph, and the next matching is that of the remaining graph.
+    Exact Murty would split the rest into n parts and search each.
 
     A heaviest matching leaves no two free ends of a pair, so a pair that is still there
     after r of them has lost a neighbour to each, of which there are n + M − 2: K = n + M
@@ -78,13 +78,13 @@ def simplified_murty(
     the more targets compete.
 
     Args:
-        missed: w_i0 > 0.
-        detected: w_ij; 0 outside the gate.
-        unexplained: ρ_j > 0.
-        count: K, at least 1; n + M if None.
+        missed: w_i0 > 0, the weight of target i being missed.
+        detected: w_ij, the weight of target i having made measurement j; 0 outside the gate.
+        unexplained: ρ_j > 0, clutter and newborn intensity at measurement j.
+        count: K, the largest number of events, at least 1; n + M if None.
 
     Returns:
-        Different events, in the order in which they are found; at least one.
+        At least one event; all differ, in the order of their matchings.
     """
     targets, measurements = detected.shape
     size = max(targets, measurements)
@@ -108,10 +108,10 @@ def murty(
     a dummy of its own for w_i0, and measurement j one for ρ_j.
 
     Args:
-        missed: w_i0 > 0.
-        detected: w_ij; 0 outside the gate.
-        unexplained: ρ_j > 0.
-        count: K; fewer where there are fewer events.
+        missed: w_i0 > 0, the weight of target i being missed.
+        detected: w_ij, the weight of target i having made measurement j; 0 outside the gate.
+        unexplained: ρ_j > 0, clutter and newborn intensity at measurement j.
+        count: K, the number of events; fewer are returned where fewer exist.
     """
     targets, measurements = detected.shape
     size = targets + measurements
@@ -145,14 +145,15 @@ def log_weights(
 
     Args:
         events: K events.
-        missed: w_i0.
-        detected: w_ij.
-        unexplained: ρ_j.
-        false_counts: g(0) … g(M); 1 if none, as of a Poisson number of false measurements.
+        missed: w_i0, the weight of target i being missed.
+        detected: w_ij, the weight of target i having made measurement j; 0 outside the gate.
+        unexplained: ρ_j, clutter and newborn intensity at measurement j.
+        false_counts: g(0) … g(M), the factor by the number of false measurements; None stands
+            for 1, which a Poisson number of false measurements has.
     """
     indices = np.arange(events.sources.shape[1])
     with np.errstate(divide="ignore"):
-        # the last row is of the measurements of nobody: source -1
+        # the last row is that of measurements without a target: source -1
         pairs = np.log(np.vstack([detected, unexplained]))
         total = pairs[events.sources, indices].sum(axis=1)
         total += np.where(events.target_indicators, 0.0, np.log(missed)).sum(axis=1)
@@ -162,10 +163,10 @@ def log_weights(
 
 
 def marginals_of(events: JointEvents, log_weight: Float[ndarray, " K"]) -> Marginals:
-    """Marginals of a few events: β_jt = Σ_θ P(θ) [t ← j], as if there were no others.
+    """Marginals over listed events alone: β_jt = Σ_θ P(θ) [t ← j].
 
     Args:
-        events: At least one, of a finite weight.
+        events: K events, at least one of them with a finite weight.
         log_weight: ln w(θ), up to a constant.
     """
     probabilities = np.exp(log_weight - log_weight.max())
@@ -173,7 +174,7 @@ def marginals_of(events: JointEvents, log_weight: Float[ndarray, " K"]) -> Margi
     measurements = events.sources.shape[1]
     rows = np.zeros((events.targets + 1, measurements))
     columns = np.broadcast_to(np.arange(measurements), events.sources.shape)
-    np.add.at(rows, (events.sources, columns), probabilities[:, None])  # nobody is the last row
+    np.add.at(rows, (events.sources, columns), probabilities[:, None])  # source -1 is the last row
     return Marginals(
         detected=rows[:-1],
         missed=probabilities @ ~events.target_indicators,
@@ -182,7 +183,7 @@ def marginals_of(events: JointEvents, log_weight: Float[ndarray, " K"]) -> Margi
 
 
 def _sources(columns: Int[ndarray, "K N"], targets: int, measurements: int) -> Int[ndarray, "K M"]:
-    """The target of each measurement, from the column of each row."""
+    """The target of each measurement, -1 for none, from the column assigned to each row."""
     sources = np.full((len(columns), measurements + 1), -1, dtype=np.int64)
     assigned = np.minimum(columns[:, :targets], measurements)
     sources[np.arange(len(columns))[:, None], assigned] = np.arange(targets)

@@ -1,9 +1,9 @@
 """Exact marginal association probabilities, by dynamic programming over subsets.
 
 The sum over all joint events of n targets and M measurements has more terms than can
-be written down, but after any number of measurements only the *set* of targets that
-are taken matters, not who took whom: M · 2ⁿ sums do (or n · 2ᴹ, whichever is less).
-The same observation carries efficient hypothesis management: S. Maskell, M. Briers,
+be enumerated, but after any number of measurements only the *set* of targets that are
+assigned matters, not which measurement each has: M · 2ⁿ sums suffice (or n · 2ᴹ, whichever
+is less). Efficient hypothesis management uses the same observation: S. Maskell, M. Briers,
 R. Wright, "Fast mutual exclusion", Signal and Data Processing of Small Targets, SPIE
 5428, 2004.
 """
@@ -18,7 +18,7 @@ from tracker.filters.association.belief_propagation import Marginals
 from tracker.kernels.association.subsets import subset_marginals
 
 MOST_ITEMS = 18
-"""The smaller of the numbers of targets and measurements: beyond, memory grows too large."""
+"""Largest value of min(n, M), beyond which the memory that is needed becomes too large."""
 
 
 def exact_marginals(
@@ -31,13 +31,14 @@ def exact_marginals(
     """Marginals of the one-to-one association over all joint events, to rounding.
 
     Args:
-        missed: w_i0.
-        detected: w_ij; 0 outside the gate.
-        unexplained: ρ_j.
-        false_counts: g(0) … g(M), by the number of measurements of nobody; 1 if none.
+        missed: w_i0, the weight of target i being missed.
+        detected: w_ij, the weight of target i having made measurement j; 0 outside the gate.
+        unexplained: ρ_j, clutter and newborn intensity at measurement j.
+        false_counts: g(0) … g(M), the factor by the number of measurements without a target;
+            None stands for 1.
 
     Returns:
-        Rows and columns that sum to 1.
+        Marginals whose rows and columns sum to 1.
 
     Raises:
         ValueError: If both numbers are above :data:`MOST_ITEMS`, or no joint event has a
@@ -50,13 +51,13 @@ def exact_marginals(
             f"must be at most {MOST_ITEMS}; split them into clusters, or use belief propagation"
         )
     factors = np.ones(count + 1) if false_counts is None else np.asarray(false_counts, float)
-    # by the number of targets that have a measurement: what is not theirs is nobody's
+    # by the number of targets that have a measurement: the other measurements are false
     factors = factors[::-1][: min(targets, count) + 1]
     factors = np.ascontiguousarray(factors / factors.max())
     weights = np.array(detected, dtype=float)
     missed, unexplained = np.array(missed, dtype=float), np.array(unexplained, dtype=float)
     # each measurement and each target has one factor in every event: scaled to at most 1,
-    # measurements first, since theirs are densities of any unit
+    # measurements first, since their weights are densities of any unit
     columns = np.maximum(unexplained, weights.max(axis=0, initial=0.0))
     columns[columns == 0.0] = 1.0
     weights /= columns
@@ -66,7 +67,7 @@ def exact_marginals(
     weights /= rows[:, None]
     missed /= rows
     if targets <= count:
-        # measurement by measurement, each of which takes a target or none
+        # measurement by measurement, each of which is assigned a target or none
         sums = subset_marginals(unexplained, np.ascontiguousarray(weights.T), missed, factors)
         detected, none, left = sums.chosen.T, sums.left, sums.none
     else:

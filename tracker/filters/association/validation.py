@@ -1,4 +1,4 @@
-"""Who may have made what: gates, the validation matrix, and clusters that share measurements."""
+"""Gating: the validation matrix, and clusters of targets that share measurements."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ def validation_matrix(
     Association*, 1988, §9.3).
 
     Args:
-        squared_distances: Squared Mahalanobis distances of targets and measurements.
-        bound: Of a gate, a quantile of χ².
+        squared_distances: Squared Mahalanobis distance of each measurement from each target.
+        bound: Squared Mahalanobis distance of the gate, a quantile of χ².
     """
     targets, count = squared_distances.shape
     matrix = np.ones((count, 1 + targets), dtype=bool)
@@ -36,8 +36,9 @@ def clusters(possible: Bool[ndarray, "n M"]) -> list[tuple[ndarray, ndarray]]:
         possible: Whether target i may have made measurement j.
 
     Returns:
-        Targets and measurements of each group, ascending. A target without any
-        measurement is a group of its own; measurements of nobody are in none.
+        Indices of the targets and of the measurements of each group, ascending. A target
+        without any measurement is a group of its own; a measurement outside every gate is in
+        no group.
     """
     targets = len(possible)
     left = np.ones(targets, dtype=bool)
