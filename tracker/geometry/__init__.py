@@ -1,1 +1,1 @@
-"""Cameras, boxes, projection, and what the boxes of several cameras say of each other."""
+"""Cameras, boxes, projection, and the consistency of boxes of several cameras."""

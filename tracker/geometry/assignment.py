@@ -1,7 +1,7 @@
-"""Who gets what: the assignment of least cost, and names by majority.
+"""Assignment of rows to columns at the least cost, and of names to groups by majority.
 
-SciPy's optimisers are slow to import; a server that only shows its page need not wait for them:
-they are read when they are first needed.
+SciPy's optimisers are imported when they are first needed, for their import is slow and a server
+starts without them.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ def linear_sum_assignment(
     As :func:`scipy.optimize.linear_sum_assignment`, which it calls [Crouse16].
 
     Args:
-        cost: Of pairing each row with each column; may hold +inf where a pair is forbidden.
-        maximize: Have the sum largest instead.
+        cost: Cost of pairing each row with each column; +inf for a forbidden pair.
+        maximize: Whether the sum is maximised instead.
 
     Returns:
         Rows, ascending, and the column of each: as many pairs as the shorter side has.
 
     Raises:
-        ValueError: If a number is NaN, or no assignment has a finite cost.
+        ValueError: If a cost is NaN, or no assignment has a finite cost.
 
     [Crouse16] Crouse, "On implementing 2D rectangular assignment algorithms", IEEE Transactions
     on Aerospace and Electronic Systems 52(4), 2016.
@@ -42,14 +42,14 @@ def linear_sum_assignment(
 def pairs_within(
     apart: Float[ndarray, "rows columns"], reach: float
 ) -> tuple[Int[ndarray, " pairs"], Int[ndarray, " pairs"]]:
-    """Pair who is less than a reach apart, one to one, so that the summed distance is least.
+    """Pair rows and columns less than a reach apart, one to one, at the least summed distance.
 
-    Who is left without a partner counts as far as the reach: else all others would move up to make
-    room for one whom nobody is near.
+    A distance beyond the reach costs as much as the reach: else one far column could change the
+    pairs of all others.
 
     Args:
         apart: Distance of each row from each column.
-        reach: In the same unit.
+        reach: Distance from which two are not paired, in the same unit.
 
     Returns:
         Rows, ascending, and the column of each.
@@ -60,21 +60,21 @@ def pairs_within(
 
 
 def names_by_majority(counts: Sequence[Mapping[int, int]], largest: int) -> list[int]:
-    """A name for each group: the one that it has most of, where no other group has more of it.
+    """Choose a name for each group: its most frequent one, unless another group has more of it.
 
     Args:
-        counts: Of each group how often it has each name.
-        largest: Groups that get none of theirs get new names from the next one on.
+        counts: Number of occurrences of each name in each group.
+        largest: The largest name so far; groups without a name of their own get the next ones.
     """
     votes = [
         (-count, name, group) for group, own in enumerate(counts) for name, count in own.items()
     ]
     names: dict[int, int] = {}
-    taken: set[int] = set()
+    used: set[int] = set()
     for _, name, group in sorted(votes):
-        if group not in names and name not in taken:
+        if group not in names and name not in used:
             names[group] = name
-            taken.add(name)
+            used.add(name)
     for group in range(len(counts)):
         if group not in names:
             largest += 1

@@ -1,8 +1,7 @@
-"""Boxes in a picture, and the three ways of saying where they are.
+"""Boxes in an image, and the conversion between three forms of coordinates.
 
 Arrays of boxes that are passed around are rows of ``centre_x, centre_y, half_width,
-half_height`` in pixels, unless their docstring says otherwise; whoever needs another form,
-or has another, comes by here.
+half_height`` in pixels, unless their docstring names another form.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ from numpy import ndarray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Boxes:
-    """Upright boxes, pixels; any number of leading axes."""
+    """Axis-parallel boxes, pixels, with any number of leading axes."""
 
     centred: Float[ndarray, "*N 4"]
     """Centre x, centre y, half width, half height."""
@@ -29,13 +28,13 @@ class Boxes:
 
     @staticmethod
     def from_left_top(boxes: Float[ndarray, "*N 4"]) -> Boxes:
-        """Of ``left, top, width, height``."""
+        """Make boxes from rows of ``left, top, width, height``."""
         half_sizes = boxes[..., 2:] / 2.0
         return Boxes(np.concatenate([boxes[..., :2] + half_sizes, half_sizes], axis=-1))
 
     @staticmethod
     def from_corners(low: Float[ndarray, "*N 2"], high: Float[ndarray, "*N 2"]) -> Boxes:
-        """Of ``left, top`` and ``right, bottom``."""
+        """Make boxes from rows of ``left, top`` and of ``right, bottom``."""
         return Boxes(np.concatenate([low + high, high - low], axis=-1) / 2.0)
 
     @property
@@ -72,11 +71,13 @@ class Boxes:
 def box_overlaps(
     first: Float[ndarray, "M 4"], second: Float[ndarray, "N 4"]
 ) -> Float[ndarray, "M N"]:
-    """Intersection over union of every box of one set with every box of the other.
+    """Compute the intersection over union of every box of one set with every box of the other.
+
+    It is 0 for boxes without area.
 
     Args:
-        first: left, top, width, height; 0 is shared by boxes without any area.
-        second: The same.
+        first: left, top, width, height of M boxes, pixels.
+        second: left, top, width, height of N boxes, pixels.
     """
     return paired_overlaps(first[:, None], second[None])
 
@@ -84,7 +85,12 @@ def box_overlaps(
 def paired_overlaps(
     first: Float[ndarray, "*#N 4"], second: Float[ndarray, "*#N 4"]
 ) -> Float[ndarray, "*N"]:
-    """Intersection over union of boxes with those in the same places, as :func:`box_overlaps`."""
+    """Compute the intersection over union of each box with the one at the same index.
+
+    Args:
+        first: left, top, width, height, pixels.
+        second: left, top, width, height, pixels.
+    """
     low = np.maximum(first[..., :2], second[..., :2])
     high = np.minimum(first[..., :2] + first[..., 2:], second[..., :2] + second[..., 2:])
     shared = np.maximum(high - low, 0.0).prod(axis=-1)

@@ -25,7 +25,7 @@ NEAREST_DEPTH = 0.05
 """Metres: a point nearer than this in front of the lens counts as behind the camera."""
 
 _LENS_ITERATIONS = 12
-"""Of Newton's method at most, which doubles the correct digits with each."""
+"""Largest number of Newton iterations, each of which doubles the correct digits."""
 
 _CORNER_SIGNS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
 
@@ -35,6 +35,7 @@ class Camera:
     """Intrinsics, lens and pose of one camera."""
 
     name: str
+    """Name of the camera in the sequence."""
     image_size: tuple[int, int]
     """Width and height in pixels."""
     intrinsics: Float[ndarray, "3 3"]
@@ -47,7 +48,7 @@ class Camera:
     """k1, k2, p1, p2, k3, zeros for a pinhole; with k4, k5, k6 of the rational model; or
     k1, k2, k3, k4 of a fisheye."""
     fisheye: bool = False
-    """Whether the lens draws by the angle (OpenCV's fisheye model) and not by its tangent."""
+    """Whether the lens projects by the angle (OpenCV's fisheye model), not by its tangent."""
 
     @staticmethod
     def from_projection(
@@ -56,7 +57,7 @@ class Camera:
         """Split P = K [R | t] into its parts, by an RQ decomposition.
 
         Args:
-            name: Of the camera.
+            name: Name of the camera.
             image_size: Width and height, pixels.
             projection: P, world metres to pixels, up to scale; without distortion.
 
@@ -64,7 +65,7 @@ class Camera:
             ValueError: If the left 3×3 part of P is singular.
         """
         left = projection[:, :3]
-        # P may bear any scale, so the determinant is judged against the entries
+        # P may have any scale, so the determinant is compared with the entries
         if abs(np.linalg.det(left)) <= 1e-12 * float(np.abs(left).max()) ** 3:
             raise ValueError("its left 3×3 part is singular, so it is not a camera")
         # RQ decomposition through QR of the row-reversed transpose
@@ -91,7 +92,7 @@ class Camera:
 
     @cached_property
     def is_pinhole(self) -> bool:
-        """Whether the lens draws straight lines straight."""
+        """Whether the lens has no distortion."""
         return not self.fisheye and not np.any(self.distortion)
 
     @cached_property
@@ -99,7 +100,7 @@ class Camera:
         """The normalised radius up to which the lens model is one-to-one.
 
         Beyond the first extremum of r (1 + k1 r² + k2 r⁴ + k3 r⁶) the polynomial
-        folds back and would draw far-outside points inside the picture.
+        folds back and would project far-outside points inside the image.
         """
         if len(self._lens) == lens.GENERAL:
             angles = np.linspace(0.0, np.pi / 2.0, 2000)[1:-1]
@@ -107,7 +108,7 @@ class Camera:
             drawn = np.array([r * lens.bend(r * r, self._lens)[0] for r in radii])
             folds = np.flatnonzero(np.diff(drawn) <= 0.0)
             return float(radii[folds[0]]) if len(folds) else np.inf
-        # a coefficient that bends nothing would be divided by
+        # a tiny coefficient has no effect, and is a divisor below
         k1, k2, _, _, k3 = np.where(np.abs(self._lens) < 1e-30, 0.0, self._lens)
         roots = np.roots([7.0 * k3, 5.0 * k2, 3.0 * k1, 1.0])  # in r²
         real = roots[(np.abs(roots.imag) < 1e-9) & (roots.real > 0.0)].real
@@ -115,7 +116,7 @@ class Camera:
 
     @cached_property
     def _lens(self) -> Float[ndarray, " n"]:
-        """The distortion as the kernels know it: 5 numbers where that is enough."""
+        """The distortion in the form that the kernels take: 5 coefficients where they suffice."""
         given = np.asarray(self.distortion, dtype=float)
         if self.fisheye:
             k1, k2, k3, k4 = given[:4]
@@ -126,7 +127,7 @@ class Camera:
 
     @cached_property
     def calibration(self) -> Calibration:
-        """The camera in the form that the compiled kernels know."""
+        """The camera in the form that the compiled kernels take."""
         return Calibration(
             np.array(self.image_size, dtype=float),
             np.ascontiguousarray(self.rotation, dtype=float),
@@ -138,22 +139,22 @@ class Camera:
         )
 
     def to_camera(self, points: Float[ndarray, "N 3"]) -> Float[ndarray, "N 3"]:
-        """World points (metres) in camera axes."""
+        """Transform world points (metres) to camera axes."""
         return np.asarray(points @ self.rotation.T + self.translation)
 
     def project(
         self, points: Float[ndarray, "N 3"]
     ) -> tuple[Float[ndarray, "N 2"], Bool[ndarray, " N"]]:
-        """Pixels of world points, and whether each is in front of the lens.
+        """Project world points (metres) to pixels, and say whether each is in front of the lens.
 
         Points behind the camera, and points so far aside that the lens model
-        does not hold, come back as NaN and False.
+        is not valid, result in NaN and False.
         """
         projection = self._project(points, with_jacobian=False)
         return projection.pixels, projection.valid
 
     def project_with_jacobian(self, points: Float[ndarray, "N 3"]) -> Projection:
-        """Pixels of world points, d pixel / d world (pixels a metre), and whether they hold."""
+        """Project world points, with d pixel / d world (pixels per metre) and their validity."""
         return self._project(points, with_jacobian=True)
 
     def _project(self, points: Float[ndarray, "N 3"], *, with_jacobian: bool) -> Projection:
@@ -161,10 +162,10 @@ class Camera:
         return lens.project_points(places, self.calibration, with_jacobian)
 
     def back_project(self, pixels: Float[ndarray, "N 2"]) -> Float[ndarray, "N 3"]:
-        """Unit directions, in world axes, of the rays from :attr:`centre` through the pixels.
+        """The unit directions, in world axes, of the rays from :attr:`centre` through the pixels.
 
         The lens model is inverted by Newton's method, to a thousandth of a pixel
-        inside the picture.
+        inside the image.
         """
         rays: ndarray = lens.directions(
             np.ascontiguousarray(pixels, dtype=float),
@@ -174,29 +175,29 @@ class Camera:
         return rays
 
     def contains(self, pixels: Float[ndarray, "N 2"]) -> Bool[ndarray, " N"]:
-        """Whether each pixel lies inside the picture; NaN does not."""
+        """Whether each pixel lies inside the image; NaN does not."""
         size = np.array(self.image_size)
         with np.errstate(invalid="ignore"):
             return np.asarray(((pixels >= -0.5) & (pixels < size - 0.5)).all(axis=1))
 
     def sees(self, points: Float[ndarray, "N 3"]) -> Bool[ndarray, " N"]:
-        """Whether each world point falls inside the picture."""
+        """Whether each world point (metres) is projected inside the image."""
         pixels, _ = self.project(points)
         return self.contains(pixels)
 
     def project_boxes(
         self, centres: Float[ndarray, "N 3"], half_extents: Float[ndarray, " 3"]
     ) -> tuple[Float[ndarray, "N 4"], Bool[ndarray, " N"]]:
-        """Picture boxes of upright targets: the bounds of the eight projected corners.
+        """Project upright targets to boxes: the bounds of the eight projected corners.
 
         Args:
-            centres: World metres.
+            centres: Centres of N targets, world metres.
             half_extents: Half width, depth and height of a target, metres.
 
         Returns:
             ``left, top, width, height`` in pixels, not clipped, NaN where invalid;
             and whether the target is wholly in front of the lens and its box
-            overlaps the picture.
+            overlaps the image.
         """
         count = len(centres)
         corners = (centres[:, None, :] + _CORNER_SIGNS * half_extents).reshape(-1, 3)
@@ -215,7 +216,7 @@ class Camera:
 
 
 def stacked(cameras: Many[Camera]) -> Calibrations:
-    """C cameras in the form that compiled kernels know."""
+    """Stack C cameras to the form that the compiled kernels take."""
     each = [camera.calibration for camera in cameras]
     longest = max((len(one.distortion) for one in each), default=5)
     return Calibrations(

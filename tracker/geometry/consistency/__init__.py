@@ -1,1 +1,1 @@
-"""Whether boxes of several cameras meet in 3D: what they tell of calibration, room and people."""
+"""Multi-view consistency of boxes: evidence for calibration, room, time offsets and people."""

@@ -1,9 +1,9 @@
-"""Do pairs of boxes triangulate to people: heads above feet, all of about one height, one way up.
+"""Consensus of pairs of boxes that triangulate to people of one height and one vertical direction.
 
 Two cameras see head and foot of a person as four rays. Rays of the same person meet, in front
-of both lenses; rays of different people, or through cameras that stand elsewhere than is said,
-meet by chance only. And all people stand the same way up and are of about one height, so the
-vectors from foot to head (here *rises*) agree with each other, in whatever axes and unit the
+of both lenses; rays of different people, or of cameras with a wrong calibration, meet by chance
+only. All people stand in the same direction and are of about one height, so the vectors from
+foot to head (here *rises*) agree with each other, in whatever axes and unit the
 world has. Points are triangulated by the midpoint method: the middle of the shortest segment
 between two rays (Hartley, Sturm, "Triangulation", Computer Vision and Image Understanding
 68(2), 1997, §5.3).
@@ -27,10 +27,10 @@ LARGEST_GAP = 0.15
 SPREAD = 0.25
 """Largest distance of a rise from the common one, as a share of the latter's length."""
 
-_LEAST_SINE = 0.05  # of the angle between two rays that are to meet: flatter ones tell no depth
+_LEAST_SINE = 0.05  # of the angle between two rays, below which their depth is undetermined
 _LARGEST_RATIO = 2.5  # between the heights that two cameras see; one may look down steeply
-_HYPOTHESES = 200
-_MOST_VOTES = 2000
+_HYPOTHESES = 200  # rises that are tried as the common one
+_MOST_VOTES = 2000  # rises that vote for each
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,42 +44,52 @@ class Meetings:
     rises: Float[ndarray, "N 3"]
     """Vectors from foot to head."""
     gaps: Float[ndarray, " N"]
-    """Distance between the two rays, the larger of head's and foot's, as a share of the height."""
+    """Distance between two rays, the larger of that at head and foot, as a share of the height."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Consensus:
-    """What the pairs of boxes agree on, in the world's own axes and unit."""
+    """The consensus of all pairs of boxes, with N agreeing pairs, in the world's axes and unit."""
 
     rise: Float[ndarray, " 3"]
-    """The common vector from foot to head; zero where nobody is found."""
+    """The common vector from foot to head; zero without any person."""
     share: float
     """:attr:`agreeing` / :attr:`possible`, 0 … 1."""
     shares: Mapping[tuple[int, int], float]
-    """The same of every pair of cameras that have boxes at the same steps."""
+    """The same share for every pair of cameras that have boxes at the same steps."""
     agreeing: int
-    """Pairs of boxes that meet and have the common rise, each box in one pair at most."""
+    """Number of pairs of boxes that meet with the common rise, each box in one pair at most."""
     possible: int
-    """The largest number of such pairs that there could be."""
+    """Largest possible number of such pairs."""
     steps: Int[ndarray, " N"]
-    """Of the agreeing pairs, as the following."""
+    """Step of each agreeing pair."""
     feet: Float[ndarray, "N 3"]
+    """Triangulated foot of each agreeing pair."""
     rises: Float[ndarray, "N 3"]
+    """Vector from foot to head of each agreeing pair."""
     gaps: Float[ndarray, " N"]
-    """As of :class:`Meetings`."""
+    """Distance between the rays of each agreeing pair, as in :class:`Meetings`."""
     fits: Float[ndarray, " N"]
-    """Weight of each: 1 for a perfect fit, 0 for one that only just agrees."""
+    """Weight of each agreeing pair: 1 for a perfect fit, 0 at the bound."""
     cameras: Int[ndarray, "N 2"]
-    """Indices of the two cameras."""
+    """Indices of the two cameras of each agreeing pair."""
 
     @property
     def height(self) -> float:
-        """Of the usual person, in the world's unit."""
+        """The length of the common rise, in the world's unit."""
         return float(np.linalg.norm(self.rise))
 
 
 def meet(pairs: PairsOfBoxes, first: Rays, second: Rays, one: Pose, other: Pose) -> Meetings:
-    """Those pairs of boxes whose heads and feet triangulate in front of both cameras."""
+    """Triangulate pairs of boxes; those whose heads and feet meet before both cameras remain.
+
+    Args:
+        pairs: Pairs of boxes of two cameras.
+        first: Rays of the first camera's boxes.
+        second: Rays of the second camera's boxes.
+        one: Pose of the first camera.
+        other: Pose of the second camera.
+    """
     whole = np.flatnonzero(first.whole[pairs.first] & second.whole[pairs.second])
     rows, columns = pairs.first[whole], pairs.second[whole]
     base = other.centre - one.centre
@@ -101,7 +111,12 @@ def meet(pairs: PairsOfBoxes, first: Rays, second: Rays, one: Pose, other: Pose)
 def _between(
     base: Float[ndarray, " 3"], one: Float[ndarray, "N 3"], other: Float[ndarray, "N 3"]
 ) -> tuple[ndarray, ndarray, ndarray, ndarray, ndarray]:
-    """Midpoints between rays from 0 and from ``base``, distances along both, gaps, and if ahead."""
+    """Triangulate rays from the origin and from ``base`` by the midpoint method.
+
+    Returns:
+        Midpoints, distances along both rays, gaps between the rays, and whether the midpoint is in
+        front of both cameras.
+    """
     together = np.einsum("ni,ni->n", one, other)
     sine_squared = np.maximum(1.0 - together**2, 1e-12)
     on_one, on_other = one @ base, other @ base
@@ -120,14 +135,14 @@ def consensus(
     pairs: Mapping[tuple[int, int], PairsOfBoxes],
     rng: np.random.Generator | None = None,
 ) -> Consensus:
-    """What the boxes of all cameras agree on, with the cameras standing like this.
+    """Find the consensus of the boxes of all cameras under some poses.
 
     Args:
-        rays: Of each camera.
-        poses: Of each camera.
-        pairs: Of pairs of cameras, as :func:`tracker.geometry.consistency.observed.pair_up` makes
-            them.
-        rng: Chooses among many; the same every time where none is given.
+        rays: Rays of the boxes of each camera.
+        poses: Pose of each camera.
+        pairs: Pairs of boxes by the indices of two cameras, of
+            :func:`tracker.geometry.consistency.observed.pair_up`.
+        rng: Generator that samples where there are many rises; None for a fixed seed.
     """
     rng = np.random.default_rng(0) if rng is None else rng
     found = {
@@ -181,7 +196,7 @@ def _agree(rises: Float[ndarray, "N 3"], rise: Float[ndarray, " 3"]) -> Bool[nda
 
 
 def _usual(rises: Float[ndarray, "N 3"], rng: np.random.Generator) -> Float[ndarray, " 3"]:
-    """The rise that most others are near to, then the median of those: a consensus (RANSAC)."""
+    """Find the rise with the most others near it, and then their median: a consensus (RANSAC)."""
     if not len(rises):
         return np.zeros(3)
     votes = rises
@@ -207,7 +222,7 @@ def _usual(rises: Float[ndarray, "N 3"], rng: np.random.Generator) -> Float[ndar
 def _one_to_one(
     first: Int[ndarray, " N"], second: Int[ndarray, " N"], gaps: Float[ndarray, " N"]
 ) -> Int[ndarray, " K"]:
-    """The pairs that are the best of both their boxes."""
+    """The pairs with the smallest gap of both their boxes."""
     order = np.argsort(gaps, kind="stable")
     best_of_first = np.zeros(len(gaps), dtype=bool)
     best_of_second = np.zeros(len(gaps), dtype=bool)

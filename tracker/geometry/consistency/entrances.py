@@ -1,4 +1,4 @@
-"""Where people come in and go out, worked out from where tracks begin and end."""
+"""Estimation of a room's entrances from the places at which tracks begin and end."""
 
 from __future__ import annotations
 
@@ -10,35 +10,36 @@ from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
 RADIUS = 1.0
-"""Metres on the floor: who begins this near to each other came through the same door."""
+"""Distance on the floor within which tracks begin at the same entrance, metres."""
 
 AT_THE_EDGE = 0.75
-"""Metres from the edge of where anybody was: a single beginning farther in is an accident."""
+"""Distance from the edge of the occupied area within which a single beginning counts, metres."""
 
 AGAIN_WITHIN = 1.5
-"""Metres and seconds: whoever begins so near where a track ended shortly before was lost there
-and found again, and did not come in."""
+"""Metres and seconds: a track that begins within both of the end of another one was lost there and
+found again, and did not come in."""
 
 SOON = 0.5
-"""Seconds: who begins this soon was there already, and a track so short is an accident."""
+"""Seconds at both ends of the recording in which tracks do not begin or end at an entrance, and the
+least duration of a track."""
 
 _LEAST_SIGMA = np.array([0.3, 0.3, 0.15])  # metres: a door, and people of several heights
-_PRIOR = 3.0  # beginnings that the least deviations count as
+_PRIOR = 3.0  # weight of the least deviations, in beginnings
 
 MOST = 12
-"""Entrances that are suggested; where people come from everywhere, more tell nothing."""
+"""Largest number of entrances that are suggested."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Door:
-    """A place where tracks begin and end: a Gaussian, as a room's entrances are."""
+    """A place where tracks begin and end, as a Gaussian, like the entrances of a room."""
 
     position: Float[ndarray, " 3"]
-    """World metres."""
+    """Mean position, world metres."""
     sigma: Float[ndarray, " 3"]
-    """Standard deviations, metres."""
+    """Standard deviation along each axis, metres."""
     tracks: int
-    """How many begin or end there."""
+    """Number of tracks that begin or end there."""
 
 
 def suggest_entrances(
@@ -49,19 +50,19 @@ def suggest_entrances(
     steps: int,
     fps: float,
 ) -> list[Door]:
-    """Places at which people seem to come in, those that most tracks tell of first.
+    """Estimate the entrances from the ends of tracks, by decreasing number of tracks.
 
-    What counts is where tracks begin and end, but for the first and the last half second of the
-    recording, when people were there already or still, for tracks shorter than half a second and
-    for those that are lost and found again at the same place. Ends that lie near each other are
-    one entrance; one that is alone counts at the edge of where anybody was.
+    The beginnings and ends of tracks are used, without those in the first and last half second of
+    the recording, of tracks shorter than half a second, and of tracks that are lost and found
+    again at the same place. Ends near each other are one entrance; a single one counts only at
+    the edge of the occupied area.
 
     Args:
-        frames: The step of each row of the tracks, 0-based.
-        ids: Whose row it is.
-        positions: World metres, z up.
-        steps: How many the recording has.
-        fps: Steps a second.
+        frames: Step of each of N rows of tracks, from 0.
+        ids: Track of each row.
+        positions: Position of each row, world metres, z up.
+        steps: Number of steps of the recording.
+        fps: Steps per second.
     """
     if not len(frames):
         return []
@@ -91,7 +92,7 @@ def suggest_entrances(
 
 
 def not_yet_there(doors: list[Door], known: Iterable[Float[ndarray, " 3"]]) -> list[Door]:
-    """Those that are at none of the places that are known, world metres."""
+    """Select the entrances that are near none of the known places, world metres."""
     places = [place[:2] for place in known]
     return [
         door
@@ -119,7 +120,7 @@ def _again(
 def _from_edge(
     points: Float[ndarray, "N 2"], places: Float[ndarray, "M 2"]
 ) -> Float[ndarray, " M"]:
-    """How far inside of the points' convex hull each place is, metres: 0 on its edge."""
+    """The distance of each place inside the convex hull of points from its edge, metres."""
     import cv2
 
     hull = cv2.convexHull(points.astype(np.float32))

@@ -1,4 +1,4 @@
-"""What a camera's boxes say before anybody knows where the camera stands: rays in its own axes."""
+"""Boxes of a camera as rays in its own axes, which do not depend on the camera's pose."""
 
 from __future__ import annotations
 
@@ -12,24 +12,25 @@ from tracker.geometry.camera import Camera
 from tracker.geometry.consistency.standing import ends, sides
 
 EDGE = 2.0
-"""Pixels: a box that comes this near to the picture's edge may be cut off there."""
+"""Distance from the image's edge within which a box may be clipped there, pixels."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rays:
-    """D boxes of one camera as rays through the middles of their tops and bottoms."""
+    """D boxes of one camera as rays to head and foot of the person."""
 
     frames: Int[ndarray, " D"]
-    """The step of each box."""
+    """Step of each box."""
     heads: Float[ndarray, "D 3"]
-    """Unit directions in camera axes: x right, y down, z ahead."""
+    """Unit directions to the heads in camera axes: x right, y down, z ahead."""
     feet: Float[ndarray, "D 3"]
+    """Unit directions to the feet in camera axes."""
     whole: Bool[ndarray, " D"]
-    """False where the box is cut off by the picture's edge, or has no size."""
+    """False where the box is clipped by the image's edge, or has no size."""
 
     @property
     def middles(self) -> Float[ndarray, "D 3"]:
-        """Unit directions between head and foot."""
+        """Unit directions to the middle between head and foot, in camera axes."""
         between = self.heads + self.feet
         return np.asarray(between / np.linalg.norm(between, axis=1, keepdims=True))
 
@@ -40,36 +41,39 @@ class Rays:
         return np.asarray(2.0 * np.arcsin(np.minimum(chord / 2.0, 1.0)))
 
     def take(self, rows: ndarray) -> Rays:
-        """Some of the boxes."""
+        """Select some of the boxes, by index or mask."""
         return Rays(self.frames[rows], self.heads[rows], self.feet[rows], self.whole[rows])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pose:
-    """Where a camera stands and looks, in world axes and in whatever unit the world has."""
+    """The pose of a camera, in world axes and in the unit of the world."""
 
     rotation: Float[ndarray, "3 3"]
     """R of x_camera = R (x_world − centre), OpenCV axes."""
     centre: Float[ndarray, " 3"]
+    """Position of the lens."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PairsOfBoxes:
-    """All pairs of boxes of two cameras at the same steps: rows of the one and of the other."""
+    """All P pairs of boxes of two cameras at the same steps."""
 
     first: Int[ndarray, " P"]
+    """Index of the box of the first camera."""
     second: Int[ndarray, " P"]
+    """Index of the box of the second camera."""
     most: int
-    """How many pairs of one person there can be: over the steps, the smaller number of boxes."""
+    """Largest number of pairs of one person: the smaller number of boxes, summed over the steps."""
 
 
 def pair_up(first: Rays, second: Rays, most_pairs: int = 20_000) -> PairsOfBoxes:
-    """The pairs of boxes that two cameras have at the same steps.
+    """List the pairs of boxes that two cameras have at the same steps.
 
     Args:
-        first: Of the one camera, sorted by step.
-        second: Of the other, sorted by step.
-        most_pairs: Where there are more, steps spread evenly over all of them are taken.
+        first: Rays of the first camera's boxes, sorted by step.
+        second: Rays of the second camera's boxes, sorted by step.
+        most_pairs: Number of pairs above which evenly spread steps are sampled.
     """
     steps = np.intersect1d(first.frames, second.frames)
     begin_first, end_first = _span(first.frames, steps)
@@ -107,12 +111,12 @@ def _span(frames: Int[ndarray, " D"], steps: Int[ndarray, " S"]) -> tuple[ndarra
 
 
 def in_world(pose: Pose, directions: Float[ndarray, "N 3"]) -> Float[ndarray, "N 3"]:
-    """Unit directions given in camera axes, turned into world axes."""
+    """Rotate unit directions from camera axes to world axes."""
     return np.asarray(directions @ pose.rotation)
 
 
 def uncut(boxes: Float[ndarray, "D 4"], image_size: tuple[int, int] | None) -> Bool[ndarray, " D"]:
-    """Which boxes (left, top, width, height) have a size and end inside the picture."""
+    """Whether each box (left, top, width, height) has a size and is not clipped by the image."""
     good = (boxes[:, 2] > 0.0) & (boxes[:, 3] > 0.0) & np.isfinite(boxes).all(axis=1)
     if image_size is None:
         return np.asarray(good)
@@ -123,7 +127,7 @@ def uncut(boxes: Float[ndarray, "D 4"], image_size: tuple[int, int] | None) -> B
 
 
 def pose_of(camera: Camera) -> Pose:
-    """Where a calibrated camera stands and looks, metres."""
+    """The pose of a calibrated camera, metres."""
     return Pose(camera.rotation, camera.centre)
 
 
@@ -135,16 +139,16 @@ def rays_of(
     up: Float[ndarray, " 3"] | None = None,
     turn: int = 0,
 ) -> Rays:
-    """The rays of boxes (left, top, width, height, pixels), sorted by step.
+    """Convert boxes to rays, sorted by step.
 
     Args:
-        frames: The step of each box.
-        boxes: Of one camera.
-        lens: Its lens; where it stands does not matter.
-        known_size: Whether the picture's size is known, so that boxes may be cut off by its edge.
-        up: The way in which people stand, a unit vector in camera axes, where it is known.
-        turn: Where it is not, the side of boxes where heads are, as
-            :func:`tracker.geometry.consistency.standing.sides` counts.
+        frames: Step of each of D boxes.
+        boxes: Left, top, width, height of the boxes of one camera, pixels.
+        lens: The camera, whose intrinsics and lens are used; its pose has no effect.
+        known_size: Whether the image size is known, so that clipped boxes are recognised.
+        up: Vertical direction, a unit vector in camera axes; None if unknown.
+        turn: Side of the boxes at which heads are, used without ``up``, as in
+            :func:`tracker.geometry.consistency.standing.sides`.
     """
     order = np.argsort(frames, kind="stable")
     boxes = boxes[order]
@@ -154,12 +158,12 @@ def rays_of(
             lens.back_project(np.nan_to_num(end)) @ lens.rotation.T for end in sides(boxes, turn)
         )
     else:
-        heads, feet, told = ends(boxes, lens, up)
-        whole &= told
+        heads, feet, visible = ends(boxes, lens, up)
+        whole &= visible
     whole &= np.isfinite(heads).all(axis=1) & np.isfinite(feet).all(axis=1)
     return Rays(np.asarray(frames)[order], heads, feet, whole)
 
 
 def upright_rays(frames: ndarray, boxes: Float[ndarray, "D 4"], camera: Camera) -> Rays:
-    """The rays of boxes in a calibrated camera of a world in which people stand along z."""
+    """Convert boxes of a calibrated camera to rays, in a world in which people stand along z."""
     return rays_of(frames, boxes, camera, up=camera.rotation[:, 2])

@@ -1,4 +1,4 @@
-"""How far people go from step to step, which tells how many steps a second there are."""
+"""Estimation of people's displacement per step, from which the frame rate follows."""
 
 from __future__ import annotations
 
@@ -16,35 +16,35 @@ from tracker.geometry.consistency.observed import Rays
 from tracker.geometry.consistency.suggestion import agreement
 
 WALKING = 1.2
-"""Metres a second at which people walk indoors and among others: a little below the 1.34 m/s of
-free walking (Weidmann, "Transporttechnik der Fussgänger", ETH Zürich, 1993, §3.1)."""
+"""Speed at which people walk indoors and among others, metres per second: a little below the
+1.34 m/s of free walking (Weidmann, "Transporttechnik der Fussgänger", ETH Zürich, 1993, §3.1)."""
 
 SHARE = 0.8
-"""Quantile of the ways: most people in a room stand, talk or sit at any moment."""
+"""Quantile of the displacements: most people in a room stand, talk or sit at any moment."""
 
 CLEAR = 0.3
-"""Metres: a way that is longer is none that a wrong measurement feigns."""
+"""Displacement above which it is not due to measurement errors, metres."""
 
 LAGS = (1, 2, 4, 8, 16, 32)
-"""Steps between two looks."""
+"""Numbers of steps over which displacements are measured."""
 
-_FARTHEST = 1.5  # metres from one look to the next: beyond it somebody else is taken for them
+_FARTHEST = 1.5  # metres: largest displacement, beyond which people are confused
 _SAME = 0.4  # metres: pairs of boxes that meet so near to each other show one person
-_LEAST_WAYS = 30
+_LEAST_WAYS = 30  # displacements
 _APART = 1e4  # metres between the points of one step and those of the next, in one tree
-_BLOCK = 2 * LAGS[-1]  # steps in a row
+_BLOCK = 2 * LAGS[-1]  # consecutive steps
 _MOST_BOXES = 12_000  # of all cameras
 
 
 def pace(cameras: Many[Camera], rays: Many[Rays]) -> float | None:
-    """Metres a step that those who walk go, from places where the boxes of two cameras meet.
+    """Estimate the displacement of walking people per step, from triangulated boxes.
 
     Args:
-        cameras: In metres, z up.
-        rays: Of each camera's boxes, in its own axes.
+        cameras: The calibrated cameras, in metres, z up.
+        rays: Rays of each camera's boxes, in its own axes.
 
     Returns:
-        None where nobody goes far enough to tell it from measurements that waver.
+        Metres per step; None where no displacement exceeds the measurement errors.
     """
     within = [own.take(np.flatnonzero(np.isin(own.frames, _looked_at(rays)))) for own in rays]
     agreed = agreement(cameras, within, most_pairs=10**9)
@@ -59,7 +59,7 @@ def pace(cameras: Many[Camera], rays: Many[Rays]) -> float | None:
 
 
 def _looked_at(rays: Many[Rays]) -> Int[ndarray, " K"]:
-    """Blocks of steps in a row, spread over the recording, with so many boxes in all."""
+    """Blocks of consecutive steps, spread over the recording, with a limited number of boxes."""
     frames = np.concatenate([np.zeros(0, dtype=np.int64), *(own.frames for own in rays)])
     if not len(frames):
         return frames
@@ -72,7 +72,7 @@ def _looked_at(rays: Many[Rays]) -> Int[ndarray, " K"]:
 def _people(
     steps: Int[ndarray, " N"], places: Float[ndarray, "N 2"]
 ) -> tuple[Int[ndarray, " M"], Float[ndarray, "M 2"]]:
-    """One place for all meetings that lie together at one step."""
+    """Average the triangulated places that lie together at one step."""
     near = KDTree(_in_one_tree(steps, places)).query_pairs(_SAME, output_type="ndarray")
     graph = coo_array((np.ones(len(near)), (near[:, 0], near[:, 1])), shape=(len(steps),) * 2)
     count, of = connected_components(graph, directed=False)
@@ -86,7 +86,7 @@ def _people(
 def _ways(
     steps: Int[ndarray, " M"], places: Float[ndarray, "M 2"], lag: int
 ) -> Float[ndarray, " W"]:
-    """How far people are from where they are some steps later: each other's nearest."""
+    """The distances between people ``lag`` steps apart, paired as mutual nearest neighbours."""
     if not len(steps):
         return np.zeros(0)
     now, later = _in_one_tree(steps, places), _in_one_tree(steps - lag, places)
@@ -98,7 +98,7 @@ def _ways(
 
 
 def _nearest(tree: Float[ndarray, "M 3"], points: Float[ndarray, "K 3"]) -> tuple[ndarray, ndarray]:
-    """How far the nearest of a tree is from each point, infinite beyond reach, and its row."""
+    """The distance of each point from the nearest of a tree, infinite beyond reach, and its row."""
     far, row = KDTree(tree).query(points, distance_upper_bound=_FARTHEST)
     return np.asarray(far), np.asarray(row)
 

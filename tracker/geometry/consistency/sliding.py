@@ -1,4 +1,4 @@
-"""How well two cameras' boxes agree when one of them is shifted in time."""
+"""Agreement of two cameras' boxes as a function of the time offset between them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ SIGMA = 0.06
 """σ of :func:`tracker.kernels.sliding.slide`: noise of a box's ends, as a share of its height."""
 
 DEPTH_SIGMA = 0.15
-"""σ_λ: standard deviation of the logarithm of the distance that one box's size tells."""
+"""σ_λ: standard deviation of the logarithm of the distance that is estimated from a box's size."""
 
 _LINKED = 0.5  # heights that a box may move in a step, and by which share its height may change
 _STEP = 0.05  # of the logarithm of the distance, for the derivative
@@ -25,26 +25,28 @@ _STEP = 0.05  # of the logarithm of the distance, for the derivative
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Course:
-    """The boxes of one camera over F steps. D boxes, sorted by step."""
+    """The D boxes of one camera over F steps, sorted by step."""
 
     camera: Camera
+    """The calibrated camera."""
     rays: Rays
+    """The boxes as rays to head and foot."""
     ends: Float[ndarray, "D 4"]
-    """x and y of head and foot, pixels; NaN where the box is cut off."""
+    """x and y of head and foot, pixels; NaN where the box is clipped."""
     starts: Int[ndarray, " F1"]
-    """Where each step's boxes begin, and the end."""
+    """Index of the first box of each step, and D at the end."""
     following: Int[ndarray, " D"]
-    """The box of the same person a step later, -1 for none."""
+    """Index of the box of the same person one step later, -1 for none."""
 
 
 def course(camera: Camera, rays: Rays, boxes: Float[ndarray, "D 4"], frames: int) -> Course:
-    """The boxes of a camera, linked from step to step.
+    """Link the boxes of a camera from step to step.
 
     Args:
-        camera: In metres, z up.
-        rays: Of its boxes, sorted by step.
+        camera: The calibrated camera, in metres, z up.
+        rays: Rays of its boxes, sorted by step.
         boxes: left, top, width, height, pixels, in the same order.
-        frames: F, how many steps the camera has.
+        frames: F, the number of steps of the camera.
     """
     middle = boxes[:, 0] + boxes[:, 2] / 2.0
     ends = np.stack([middle, boxes[:, 1], middle, boxes[:, 1] + boxes[:, 3]], axis=1)
@@ -54,7 +56,7 @@ def course(camera: Camera, rays: Rays, boxes: Float[ndarray, "D 4"], frames: int
 
 
 def _following(ends: Float[ndarray, "D 4"], starts: Int[ndarray, " F1"]) -> Int[ndarray, " D"]:
-    """The box of the next step that is nearest, where each is the nearest to the other."""
+    """The box of the next step that follows each, where both are mutual nearest neighbours."""
     following = np.full(len(ends), -1, dtype=np.int64)
     for first, last, end in zip(starts[:-2], starts[1:-1], starts[2:], strict=True):
         if first == last or last == end:
@@ -77,21 +79,21 @@ def slid(
     height: float,
     most_steps: int = 150,
 ) -> tuple[Float[ndarray, "O S"], Float[ndarray, "O S"]]:
-    """How well the boxes of two cameras agree, for offsets in time between them.
+    """Compute the agreement of two cameras' boxes for time offsets between them.
 
-    The size of a box in camera ``one`` gives the person's distance, and so where the other camera
-    should have a box: across the epipolar line within the noise, along it within the error of that
-    distance. The equation stands in :mod:`tracker.kernels.sliding`.
+    The size of a box in camera ``one`` gives the person's distance, and so the box in the other
+    camera: across the epipolar line within the noise, along it within the error of that
+    distance. :mod:`tracker.kernels.sliding` has the equation.
 
     Args:
-        one: Whose boxes say where people are.
-        other: What is seen by ``one`` at step k is sought here at step k + offset.
-        offsets: Steps; fractions are interpolated.
-        height: Of people, metres.
-        most_steps: So many of the steps where ``one`` has boxes are taken, evenly.
+        one: The boxes by which positions are predicted.
+        other: The boxes that are compared, at step k + offset for those of ``one`` at step k.
+        offsets: O offsets, steps; fractions are interpolated.
+        height: Height of people, metres.
+        most_steps: Largest number S of steps of ``one`` that are sampled evenly.
 
     Returns:
-        Of each offset and sampled step: the sum of the fits, 0 … 1 each, and their number.
+        Sum of the fits, 0 … 1 each, for every offset and sampled step, and their number.
     """
     counts = np.diff(one.starts)
     steps = np.flatnonzero(counts)
@@ -112,7 +114,17 @@ def slid(
 def _seen_by(
     camera: Camera, one: Course, rows: Int[ndarray, " N"], height: float
 ) -> tuple[Float[ndarray, "N 4"], Float[ndarray, "N 4"]]:
-    """Where another camera should see the heads and feet, and how that moves with depth."""
+    """Predict heads and feet in another camera, and their derivatives by the log distance.
+
+    Args:
+        camera: The other camera.
+        one: The boxes.
+        rows: Indices of N boxes of ``one``.
+        height: Height of people, metres.
+
+    Returns:
+        x and y of head and foot, pixels, NaN where not in the image; and the derivatives.
+    """
     heads = one.rays.heads[rows] @ one.camera.rotation
     feet = one.rays.feet[rows] @ one.camera.rotation
     # s u − t v = (0, 0, h) in the least squares, for unit vectors u, v

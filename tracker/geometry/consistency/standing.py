@@ -1,9 +1,9 @@
-"""Head and foot of an upright person in a picture, out of a box whose sides are the picture's.
+"""Head and foot of an upright person in an image, from a box that is parallel to the image.
 
 A detector's box touches the person on four sides. In a level camera that looks straight ahead its
 top and bottom are head and foot. In a camera that is rolled by a quarter, left and right are; in
 one that is slanted, none is: a body with the length L and the breadth T, which lies along the unit
-vector d in the picture, has as an ellipse the box
+vector d in the image, has as an ellipse the box
 
     height² = L² d_y² + T² d_x²,        width² = L² d_x² + T² d_y²,
 
@@ -30,17 +30,17 @@ from tracker.geometry.camera import Camera
 
 _SLIMMEST, _BROADEST = 0.2, 0.8  # T / L of people and of parts of them
 _USUAL = 0.4
-_APART = 0.25  # of d_x² and d_y²: nearer to each other they do not tell L from T
-_LEAST_SINE = 0.25  # of φ: who is seen from above shows no height
-_STEP = 1e-3  # of a ray, to see which way it moves in the picture
+_APART = 0.25  # least difference of d_x² and d_y² for which L and T are determined
+_LEAST_SINE = 0.25  # of φ: a person seen from above shows no height
+_STEP = 1e-3  # of a ray, for the direction of its motion in the image
 
 
 def sides(boxes: Float[ndarray, "D 4"], turn: int) -> tuple[ndarray, ndarray]:
-    """Middles of the side that is the head's and of the other one, pixels.
+    """The middles of the side with the head and of the opposite side, pixels.
 
     Args:
-        boxes: Left, top, width, height.
-        turn: Where heads are: 0 at the top, 1 at the right, 2 at the bottom, 3 at the left.
+        boxes: Left, top, width, height of D boxes, pixels.
+        turn: Side with the head: 0 for the top, 1 the right, 2 the bottom, 3 the left.
     """
     middle = boxes[:, :2] + boxes[:, 2:] / 2.0
     half = np.zeros((len(boxes), 2))
@@ -50,7 +50,7 @@ def sides(boxes: Float[ndarray, "D 4"], turn: int) -> tuple[ndarray, ndarray]:
 
 
 def turn_of(up: Float[ndarray, " 3"]) -> int:
-    """The side of a box where heads are, as :func:`sides` counts, by the way up in camera axes."""
+    """The side of a box with the head, as in :func:`sides`, for a vertical in camera axes."""
     if abs(up[1]) >= abs(up[0]):
         return 0 if up[1] <= 0.0 else 2
     return 1 if up[0] > 0.0 else 3
@@ -59,12 +59,15 @@ def turn_of(up: Float[ndarray, " 3"]) -> int:
 def ends(
     boxes: Float[ndarray, "D 4"], lens: Camera, up: Float[ndarray, " 3"]
 ) -> tuple[Float[ndarray, "D 3"], Float[ndarray, "D 3"], Bool[ndarray, " D"]]:
-    """Unit directions to head and foot of upright people, in camera axes, and if they are told.
+    """Compute unit directions to head and foot of upright people, in camera axes.
 
     Args:
-        boxes: Left, top, width, height, pixels.
-        lens: Where it stands does not matter.
-        up: The way in which people stand, a unit vector in camera axes.
+        boxes: Left, top, width, height of D boxes, pixels.
+        lens: The camera, whose pose has no effect.
+        up: Vertical direction, a unit vector in camera axes.
+
+    Returns:
+        Directions to heads and to feet, and whether the vertical is visible in the image there.
     """
     own = replace(lens, rotation=np.eye(3), translation=np.zeros(3))
     middle = boxes[:, :2] + boxes[:, 2:] / 2.0
@@ -102,7 +105,7 @@ def ends(
 def _along(
     lens: Camera, rays: Float[ndarray, "D 3"], up: Float[ndarray, " 3"]
 ) -> tuple[Float[ndarray, "D 2"], Bool[ndarray, " D"]]:
-    """The way up in the picture where these rays are, and whether it can be seen there."""
+    """The vertical direction in the image at some rays, and whether it is visible there."""
     across = up - (rays @ up)[:, None] * rays
     sine = np.linalg.norm(across, axis=1)
     across /= np.maximum(sine, 1e-9)[:, None]

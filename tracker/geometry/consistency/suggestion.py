@@ -1,4 +1,4 @@
-"""Room, floor and size of people, worked out where a recording does not state them."""
+"""Estimation of room, floor and size of people for a recording without them."""
 
 from __future__ import annotations
 
@@ -14,41 +14,42 @@ from tracker.geometry.consistency.consensus import Consensus, consensus
 from tracker.geometry.consistency.observed import Rays, pair_up, pose_of
 
 STANDING = np.array([0.3, 0.3, 0.85])
-"""Half extents of a standing person, metres: what is tracked where nothing is known."""
+"""Half width, depth and height of a standing person, metres, the target by default."""
 
 LEAST_AGREEING = 20
-"""Fewer pairs of boxes that meet say nothing of room and people."""
+"""Least number of agreeing pairs of boxes for an estimate of room and people."""
 
 _SHORTEST_STANDING, _TALLEST_STANDING = 1.45, 2.3  # metres, of boxes: a detector's may be padded
-_USUAL_HEIGHT, _TRUST = 1.70, 0.3  # of people who stand; what a box's height says against it
-_USUAL_SLENDERNESS = 0.36  # width of a standing person's box, as the model has it, by its height
-_MARGIN = 0.5  # metres around where feet were seen
+_USUAL_HEIGHT, _TRUST = 1.70, 0.3  # metres, of standing people; weight of the boxes against it
+_USUAL_SLENDERNESS = 0.36  # ratio of width and height of a standing person's box in the model
+_MARGIN = 0.5  # metres around the places of feet
 _OUTLIERS = 0.01  # share on either side
-_FARTHEST = 30.0  # metres: where views overlap farther away nobody can be told apart
+_FARTHEST = 30.0  # metres: farther overlaps of views are of no use
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Suggestion:
-    """What the boxes, or the cameras alone, tell of the room and of who is in it."""
+    """An estimate of the room and of the size of people."""
 
     minimum: Float[ndarray, " 3"]
-    """Of the room, metres."""
+    """Least corner of the room, world metres."""
     maximum: Float[ndarray, " 3"]
+    """Largest corner of the room, world metres."""
     half_extents: Float[ndarray, " 3"]
-    """Of what is tracked, metres."""
+    """Half width, depth and height of a target, metres."""
     floor: float
-    """z of what people stand on, metres."""
+    """Height z of the floor, world metres."""
     people: int
-    """Pairs of boxes that it was made from; 0 where it follows from the cameras alone."""
+    """Number of pairs of boxes behind the estimate; 0 where it is from the cameras alone."""
 
 
 def agreement(cameras: Many[Camera], rays: Many[Rays], most_pairs: int = 20_000) -> Consensus:
-    """What the boxes of calibrated cameras agree on, metres.
+    """Find the consensus of the boxes of calibrated cameras, metres.
 
     Args:
-        cameras: Where they stand.
-        rays: Of each camera's boxes, in its own axes.
-        most_pairs: Of boxes of two cameras.
+        cameras: The calibrated cameras.
+        rays: Rays of each camera's boxes, in its own axes.
+        most_pairs: Largest number of pairs of boxes for each two cameras.
     """
     count = len(cameras)
     pairs = {
@@ -65,21 +66,21 @@ def suggest(
     agreed: Consensus | None,
     half_extents: Float[ndarray, " 3"] | None = None,
 ) -> Suggestion | None:
-    """A room in which everybody is, and how large they are.
+    """Estimate a room that contains all people, and their size.
 
-    The room reaches from the floor to above the heads, and by half a metre around where feet
-    were seen. Boxes end lower than feet: detectors pad them, and seen from above their lower
-    edge is at the toe that is nearest. Their middle has no such fault, so the floor is sought
-    half a person below it, and a person who stands is taken to be nearer to 1.70 m than the
-    boxes are. Without boxes the room is where the views of two cameras overlap.
+    The room extends from the floor to above the heads, and half a metre around the places of
+    feet. Boxes end lower than feet: detectors pad them, and seen from above their lower
+    edge is at the nearest toe. Their middle has no such bias, so the floor is half a person
+    below it, and the height of a standing person is shrunk from that of the boxes towards
+    1.70 m. Without boxes the room is where the views of two cameras overlap.
 
     Args:
-        cameras: In metres, z up.
-        agreed: What their boxes agree on; None without boxes.
-        half_extents: Of what is tracked, where it is known.
+        cameras: The calibrated cameras, in metres, z up.
+        agreed: The consensus of their boxes; None without boxes.
+        half_extents: Half width, depth and height of a target, metres, if known.
 
     Returns:
-        None where neither boxes nor views meet.
+        The estimate; None where neither boxes meet nor views overlap.
     """
     if agreed is None or agreed.agreeing < LEAST_AGREEING:
         return _from_views(cameras, half_extents)
@@ -89,7 +90,7 @@ def suggest(
     floor = float(np.median(middles[:, 2])) - float(size[2])
     if stands(agreed.height):
         bottom, top = floor, floor + max(2.0, 2.5 * float(size[2]))
-    else:  # heads, people at tables: how far below them the floor is nobody knows
+    else:  # heads, people at tables: the distance of the floor below them is unknown
         floor = bottom = low[2] - 2.0 * float(size[2])
         top = high[2] + 2.0 * float(size[2])
     minimum = np.array([*(low[:2] - _MARGIN), bottom])
@@ -104,7 +105,7 @@ def suggest(
 
 
 def stands(height: float) -> bool:
-    """Whether boxes so tall, metres, are of people who stand."""
+    """Whether boxes of a height in metres are of standing people."""
     return _SHORTEST_STANDING <= height <= _TALLEST_STANDING
 
 
@@ -121,7 +122,7 @@ def _size(agreed: Consensus) -> Float[ndarray, " 3"]:
 def _from_views(
     cameras: Many[Camera], half_extents: Float[ndarray, " 3"] | None
 ) -> Suggestion | None:
-    """Where two cameras see the same place, between the floor at z = 0 and 2 m."""
+    """Estimate the room from the overlap of two views, between the floor at z = 0 and 2 m."""
     size = STANDING if half_extents is None else half_extents
     centres = np.array([camera.centre for camera in cameras])
     low, high = centres.min(axis=0) - _FARTHEST, centres.max(axis=0) + _FARTHEST
