@@ -15,7 +15,7 @@ from tracker.kernels.pictures.channels import ORIENTATIONS, gradients
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import upright_boxes
-from tracker.single_view.colour.evidence import colour_ratios
+from tracker.single_view.colour.peaks import colour_ratios
 from tracker.single_view.colour.trust import taught_well
 from tracker.single_view.pictures.foreground import BackgroundModel, tone_curve
 from tracker.single_view.pictures.foreground.exposure import square_roots

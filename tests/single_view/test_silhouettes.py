@@ -13,7 +13,7 @@ from tests.world import HEAD as HALF_EXTENTS
 from tests.world import SMALL_CAMERAS as CAMERAS
 from tests.world import SMALL_ROOM as ROOM
 from tracker.parameters import AssociationMatrixParams
-from tracker.single_view.association_matrix.joining import join
+from tracker.single_view.association_matrix.method import join
 from tracker.single_view.association_matrix.silhouettes import Fits, Silhouettes
 from tracker.single_view.box_sizes import upright_boxes
 from tracker.single_view.pictures.blobs import blobs

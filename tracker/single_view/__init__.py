@@ -1,4 +1,4 @@
-"""Stage 1: what each camera sees by itself. One protocol, one file a method.
+"""Stage 1: detection and tracking in each camera by itself. One protocol, one file a method.
 
 The methods are described in :mod:`tracker.parameters.groups` and chosen in :func:`maker`.
 """
@@ -19,7 +19,7 @@ __all__ = ["SingleViewMethod", "ViewResult", "create", "maker"]
 
 
 def maker(method: Method) -> Callable[..., SingleViewMethod]:
-    """The class that a method of stage 1 is made by; each is imported when it is chosen."""
+    """The class of a method of stage 1, which is imported only when it is chosen."""
     match method.name:
         case "colour_phd":
             from tracker.single_view.colour_phd import ColourPhd
@@ -63,10 +63,17 @@ def create(
     parameters: RunParameters,
     reader: Pictures,
 ) -> SingleViewMethod:
-    """The single-view method of that name, prepared for one camera of a sequence.
+    """Create a single-view method for one camera of a sequence.
+
+    Args:
+        name: Name of the method.
+        sequence: The sequence.
+        camera_index: Index of the camera.
+        parameters: The parameters of the run.
+        reader: Reader of the images.
 
     Raises:
-        ValueError: If there is no such method, or the sequence lacks what it needs.
+        ValueError: If there is no such method, or the sequence lacks data that it needs.
     """
     from tracker.parameters import method_of  # with those of other packages, which import this
 

@@ -1,4 +1,4 @@
-"""How large a target can look at each place of a picture: the calibrated camera tells."""
+"""Possible sizes of a target's box at each place of an image, from the calibrated camera."""
 
 from __future__ import annotations
 
@@ -15,29 +15,29 @@ from tracker.geometry.camera import Camera
 from tracker.sequences.sequence import Room, Sequence
 
 CELLS = 24
-"""The picture is cut into about so many cells a side: sizes hardly change within one, and each
-still holds some hundred of the positions."""
+"""Number of cells along the longer side of the image: sizes hardly change within one, and each
+still contains some hundred of the positions."""
 
 POSITIONS = 60_000
-"""Positions in the room that are projected, once a camera: enough for every cell."""
+"""Number of positions in the room that are projected for each camera: enough for every cell."""
 
 AT_ENTRANCE_HEIGHT, HEIGHT_FACTOR = 0.9, 2.0
 """Share of the positions at the entrances' heights, and the factor on those heights'
 spread: some people sit or bend, and entrances are drawn by eye."""
 
 BELOW_FLOOR = 0.1
-"""Metres that a target may reach below the room's volume, whose floor is drawn by eye."""
+"""Extent of a target below the room's volume that is allowed, for a floor drawn by eye, metres."""
 
 
 def geometry(sequence: Sequence, camera_index: int) -> Hashable:
-    """Where people can be and how large they look, as part of the name of what is made once.
+    """A key of cached data that depends on the camera, the room and the target.
 
-    The pictures stay the same while a person moves the room's walls; what follows from both
-    does not.
+    Data that depend on the images alone do not need it: they remain when a user moves the room's
+    walls.
 
     Args:
         sequence: The room and the target.
-        camera_index: Whose lens and place.
+        camera_index: Index of the camera.
     """
     camera, room = sequence.cameras[camera_index], sequence.room
     lens = camera.calibration
@@ -51,21 +51,21 @@ def geometry(sequence: Sequence, camera_index: int) -> Hashable:
 def upright_boxes(
     camera: Camera, positions: Float[ndarray, "N 3"], half_extents: Float[ndarray, "*N 3"]
 ) -> tuple[Float[ndarray, "N 4"], Bool[ndarray, " N"]]:
-    """The picture boxes of upright targets that face the camera.
+    """Project upright targets that face the camera to boxes.
 
-    Centre: the picture of the target's centre. Half sizes: half the picture of its
-    width (the mean of the two horizontal extents, seen from the front) and of its
-    height. That is how a person draws a box around a head or a body; the bounds of
-    a solid block's corners are wider.
+    The centre is the projection of the target's centre, the half sizes are half the projections
+    of its width (the mean of the two horizontal extents, seen from the front) and of its
+    height. Boxes drawn by hand around a head or a body are like that; the bounds of
+    the corners of a cuboid are wider.
 
     Args:
         camera: The calibrated camera.
-        positions: World metres.
+        positions: Centres of N targets, world metres.
         half_extents: Half width, depth and height, metres, of all or of each.
 
     Returns:
         ``centre_x, centre_y, half_width, half_height`` in pixels, NaN where invalid;
-        and whether all of it is in front of the lens and the centre in the picture.
+        and whether the whole target is in front of the lens with its centre in the image.
     """
     right = camera.rotation[0] * [1.0, 1.0, 0.0]
     norm = np.linalg.norm(right)
@@ -88,20 +88,22 @@ def upright_boxes(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BoxSizes:
-    """The sizes that targets anywhere in the room have, by the place of their centre."""
+    """The sizes of targets anywhere in the room, by the cell of the image with their centre."""
 
     cell: float
     """Side of a cell, pixels."""
     columns: int
+    """Number of cells across."""
     rows: int
+    """Number of cells down."""
     starts: Int[ndarray, " cells1"]
-    """Where the sizes of each cell begin; one more at the end."""
+    """Index of the first size of each cell, and P at the end."""
     sizes: Float[ndarray, "P 2"]
     """Half width and half height, pixels, cell by cell."""
     smallest: Float[ndarray, " 2"]
-    """Half width and half height, pixels; 1 if nothing is seen."""
+    """Smallest half width and half height, pixels; 1 without any position in the image."""
     largest: Float[ndarray, " 2"]
-    """Half width and half height, pixels; 2 if nothing is seen."""
+    """Largest half width and half height, pixels; 2 without any position in the image."""
 
     @staticmethod
     def of(
@@ -115,10 +117,10 @@ class BoxSizes:
 
         Args:
             camera: The calibrated camera.
-            room: Its volume and entrances.
-            half_extents: Of a target, metres.
-            at_entrance_heights: Whether most of them are at the heights at which people
-                come in, which they mostly keep, rather than at any height.
+            room: The room, with volume and entrances.
+            half_extents: Half width, depth and height of a target, metres.
+            at_entrance_heights: Whether most positions are at the heights of the entrances, which
+                do not change much for a person, rather than at any height.
         """
         width, height = camera.image_size
         cell = max(width, height) / CELLS
@@ -139,26 +141,26 @@ class BoxSizes:
         return BoxSizes(cell, columns, rows, starts, sizes, smallest, largest)
 
     def contains(self, centres: Float[ndarray, "N 2"]) -> Bool[ndarray, " N"]:
-        """Whether a target's centre can be there at all."""
+        """Whether the centre of a target can be at each place, pixels."""
         place = _cells(centres, self.cell, self.columns, self.rows)
         return np.asarray(self.starts[place + 1] > self.starts[place])
 
     def cells(self, centres: Float[ndarray, "N 2"]) -> Int[ndarray, " N"]:
-        """The cell of each place; places outside the picture go to the nearest one."""
+        """The cell of each place, pixels; the nearest one for a place outside the image."""
         return _cells(centres, self.cell, self.columns, self.rows)
 
     def places(self) -> Float[ndarray, "cells 2"]:
-        """The middle of each cell, pixels."""
+        """The centre of each cell, pixels."""
         rows, columns = np.indices((self.rows, self.columns)).reshape(2, -1)
         return np.stack([columns, rows], axis=1) * self.cell + (self.cell - 1.0) / 2.0
 
     def quantiles(
         self, count: int
     ) -> tuple[Float[ndarray, "cells count 2"], Bool[ndarray, " cells"]]:
-        """Sizes from small to large at the places of each cell, and whether there are any.
+        """Quantiles of the sizes in each cell, from small to large, and whether it has any size.
 
         Args:
-            count: So many: the middles of as many equally likely parts.
+            count: Number of quantiles: the medians of as many equally likely parts.
         """
         number = np.diff(self.starts)
         shares = (np.arange(count) + 0.5) / count
@@ -173,7 +175,7 @@ class BoxSizes:
     def typical(
         self, centres: Float[ndarray, "N 2"]
     ) -> tuple[Float[ndarray, "N 2"], Bool[ndarray, " N"]]:
-        """The middle size at each place, and whether there is one (else NaN)."""
+        """The median size at each place, pixels, and whether there is one (else NaN)."""
         places = _cells(centres, self.cell, self.columns, self.rows)
         cells, owners = np.unique(places, return_inverse=True)
         middles = np.full((len(cells), 2), np.nan)
@@ -187,7 +189,7 @@ class BoxSizes:
     def draw(
         self, centres: Float[ndarray, "N 2"], rng: np.random.Generator
     ) -> tuple[Float[ndarray, "N 2"], Bool[ndarray, " N"]]:
-        """A plausible size at each place, and whether there is one (else NaN)."""
+        """Draw a possible size at each place, pixels, and say whether there is one (else NaN)."""
         place = _cells(centres, self.cell, self.columns, self.rows)
         first, count = self.starts[place], self.starts[place + 1] - self.starts[place]
         chosen = first + (rng.random(len(centres)) * count).astype(np.int64)
@@ -202,8 +204,8 @@ def _bring_to_entrance_heights(positions: Float[ndarray, "N 3"], room: Room) -> 
     moved = positions[: round(AT_ENTRANCE_HEIGHT * len(positions))]
     spread = _normals(_even_points(len(moved))[:, 2])
     for number, entrance in enumerate(room.entrances):
-        mine = slice(number, None, len(room.entrances))
-        moved[mine, 2] = entrance.position[2] + HEIGHT_FACTOR * entrance.sigma[2] * spread[mine]
+        own = slice(number, None, len(room.entrances))
+        moved[own, 2] = entrance.position[2] + HEIGHT_FACTOR * entrance.sigma[2] * spread[own]
 
 
 def _even_points(count: int) -> Float[ndarray, "N 3"]:
@@ -214,7 +216,7 @@ def _even_points(count: int) -> Float[ndarray, "N 3"]:
 
 
 def _normals(points: Float[ndarray, " *S"]) -> Float[ndarray, " *S"]:
-    """The values below which a standard normal one lies with these probabilities."""
+    """The quantiles of the standard normal distribution for some probabilities."""
     from scipy.special import ndtri  # a server starts without it
 
     normals: Float[ndarray, " *S"] = ndtri(points)
@@ -224,7 +226,7 @@ def _normals(points: Float[ndarray, " *S"]) -> Float[ndarray, " *S"]:
 def _cells(
     centres: Float[ndarray, "N 2"], cell: float, columns: int, rows: int
 ) -> Int[ndarray, " N"]:
-    """The cell of each place; places outside the picture go to the nearest one."""
+    """The cell of each place, pixels; the nearest one for a place outside the image."""
     column = np.clip((centres[:, 0] + 0.5) // cell, 0, columns - 1).astype(np.int64)
     row = np.clip((centres[:, 1] + 0.5) // cell, 0, rows - 1).astype(np.int64)
     return row * columns + column
@@ -233,16 +235,16 @@ def _cells(
 def entrance_boxes(
     camera: Camera, room: Room, half_extents: Float[ndarray, " 3"], weight: float
 ) -> GaussianMixture:
-    """The entrances as a camera sees them: one Gaussian over boxes for each it can see.
+    """The birth intensity in a camera: one Gaussian over boxes for each visible entrance.
 
     Mean and covariance are those of the boxes of targets drawn from the entrance.
-    A room without entrances gives one component of everything that can be seen.
+    A room without entrances gives one component over its visible volume.
 
     Args:
         camera: The calibrated camera.
-        room: Its entrances have mean and standard deviation in metres.
-        half_extents: Of a target, metres.
-        weight: Of each component.
+        room: The room, whose entrances have mean and standard deviation in metres.
+        half_extents: Half width, depth and height of a target, metres.
+        weight: Weight of each component, expected targets per step.
     """
     births = models.entrance_births(room, weight)
     normals = _normals(_even_points(500))

@@ -1,4 +1,4 @@
-"""The published single-view filter: a GM-PHD over boxes, fed by peaks of the colour likelihood.
+"""The published single-view filter: a GM-PHD over boxes on peaks of the colour likelihood.
 
 [ZW21] Zhu, Wang, "3D target position tracking based on probability hypothesis
 density filtering", 2021, §2.1–2.3.
@@ -31,20 +31,22 @@ if TYPE_CHECKING:
     from tracker.parameters import RunParameters
 
 EXPLAINED = 0.5
-"""A peak that people explain with less than this weight may be somebody new: it is more likely
-nobody's than somebody's."""
+"""Expected number of targets below which a peak may be of a new target: it is more likely
+unexplained than not."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ColourPhdState:
-    """The posterior of the step before, what it left unexplained, and the next free label."""
+    """The posterior of a step and all that the next step needs of it."""
 
     mixture: GaussianMixture
+    """The intensity over boxes."""
     unexplained: Float[ndarray, "B 4"]
-    """Peaks that no component explained: where somebody may have appeared."""
+    """Peaks that no component explained, at which targets may be born."""
     next_label: int
+    """The first label that is free."""
     foreground: Any
-    """Of the foreground model."""
+    """The state of the foreground model."""
 
 
 class ColourPhd:
@@ -58,9 +60,9 @@ class ColourPhd:
 
     Beyond the paper, and switched off by the preset ``published``: part of the
     samples is drawn from the foreground, with the sizes that the calibrated camera
-    allows there; the likelihood is multiplied by what the foreground says of the
-    box; peaks must be good enough; births are at unexplained peaks ([RCVV12]); the
-    peaks themselves go to the fusion.
+    allows there; the likelihood is multiplied by that of the foreground in the
+    box; peaks must exceed a threshold; births are at unexplained peaks ([RCVV12]); the
+    peaks themselves are passed to the fusion.
     """
 
     def __init__(
@@ -70,7 +72,7 @@ class ColourPhd:
         parameters: RunParameters,
         reader: Pictures,
     ) -> None:
-        """Read the templates and learn the background.
+        """Read the templates and learn the background of one camera.
 
         Raises:
             ValueError: If there are no pictures or templates, or a template cannot be read.
@@ -89,14 +91,14 @@ class ColourPhd:
             births.weights * self._step_time, births.means, births.covariances, births.labels
         )
         width, height = camera.image_size
-        # uniform over the picture and the range of half sizes, of which a pixel each at least
+        # uniform over the image and the range of half sizes, each of at least a pixel
         possible = self._finder.sizes
         sizes = np.maximum(possible.largest - possible.smallest, 1.0)
         volume = width * height * float(np.prod(sizes))
         self._clutter = p.clutter_rate / volume
 
     def start(self) -> ColourPhdState:
-        """Nobody is in the picture."""
+        """The state without targets, before the first step."""
         return ColourPhdState(GaussianMixture.empty(4), np.zeros((0, 4)), 1, self._finder.start())
 
     def step(
@@ -106,7 +108,7 @@ class ColourPhd:
         picture: UInt8[ndarray, "h w 3"] | None,
         rng: np.random.Generator,
     ) -> tuple[ColourPhdState, ViewResult]:
-        """One step; without a picture the intensity is predicted only."""
+        """Predict one step, and update by the peaks of the image, if there is one."""
         p = self._parameters
         births = models.label_births(self._births(state.unexplained), state.next_label)
         predicted = gaussian_mixture.concatenate([self._predict(state.mixture), births])
@@ -145,7 +147,7 @@ class ColourPhd:
         return gaussian_mixture.concatenate([around, self._entrances])
 
     def _predict(self, mixture: GaussianMixture) -> GaussianMixture:
-        """Random walk, in half sizes: a person nearby moves further in the picture."""
+        """Predict by a random walk, in half sizes: a person nearby moves more pixels."""
         p = self._parameters
         half_sizes = np.maximum(mixture.means[:, 2:], 0.5)
         sigmas = np.concatenate([p.motion_sigma * half_sizes, p.growth_sigma * half_sizes], axis=1)

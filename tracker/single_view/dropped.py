@@ -1,4 +1,4 @@
-"""What was looked at more closely in a picture and not believed, and at which gate it fell."""
+"""Rejected candidates of one image, with the gates that rejected them."""
 
 from __future__ import annotations
 
@@ -10,52 +10,52 @@ from jaxtyping import Bool, Float, Float32, Int8
 from numpy import ndarray
 
 CANDIDATES, DROPPED = "candidates", "dropped for "
-"""Names in a result's information: how many places were looked at more closely, and, followed
-by the name of a gate, how many of them fell there."""
+"""Names in a result's information: the number of candidates, and, followed by the name of a gate,
+the number that it rejected."""
 
 GATES = (
     "colour", "foreground", "surroundings", "shape", "another at its place", "another's shoulders",
 )  # fmt: skip
-"""All that a method may have, by number."""
+"""All gates that methods may have, by number."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Dropped:
-    """D candidates of one picture that fell."""
+    """The D rejected candidates of one image."""
 
     boxes: Float32[ndarray, "D 4"]
     """``centre_x, centre_y, half_width, half_height`` in pixels."""
     gates: Int8[ndarray, " D"]
-    """Of each its place in :data:`GATES`."""
+    """Index into :data:`GATES` of the gate that rejected each."""
 
     @staticmethod
     def none() -> Dropped:
-        """Nothing fell, or the method has no gates."""
+        """No rejected candidate, as for a method without gates."""
         return Dropped(np.zeros((0, 4), np.float32), np.zeros(0, np.int8))
 
     @staticmethod
     def of(candidates: Float[ndarray, "M 4"], fell: Mapping[str, Bool[ndarray, " M"]]) -> Dropped:
-        """Of some candidates those that fell.
+        """Select the rejected ones of M candidates.
 
         Args:
-            candidates: Boxes.
-            fell: Which of them, by gate; no two gates take the same one.
+            candidates: Boxes of the candidates, pixels.
+            fell: Which of them each gate rejected; at most one gate for each.
         """
         gates = np.full(len(candidates), -1, np.int8)
-        for gate, taken in fell.items():
-            gates[taken] = GATES.index(gate)
+        for gate, rejected in fell.items():
+            gates[rejected] = GATES.index(gate)
         gone = gates >= 0
         return Dropped(candidates[gone].astype(np.float32), gates[gone])
 
     def information(self, passed: int) -> dict[str, float]:
-        """How many candidates there were and fell where, by name.
+        """The number of candidates and of those that each gate rejected, by name.
 
         Args:
-            passed: How many fell nowhere.
+            passed: Number of candidates that no gate rejected.
         """
         counts = np.bincount(self.gates, minlength=len(GATES))
-        told = {CANDIDATES: float(passed + len(self.gates))}
-        return told | {
+        total = {CANDIDATES: float(passed + len(self.gates))}
+        return total | {
             DROPPED + gate: float(count)
             for gate, count in zip(GATES, counts.tolist(), strict=True)
             if count

@@ -1,4 +1,4 @@
-"""Which object of one step is which object of the next: distance and overlap, decided to a matrix.
+"""Decision matrices between the objects of two steps, by distance and by overlap.
 
 Rows are the objects of the step before, columns those of this one.
 
@@ -20,11 +20,11 @@ ColumnCase = Literal["new", "continues", "merges"]
 
 
 def distances(before: Float[ndarray, "I 2"], now: Float[ndarray, "J 2"]) -> Float[ndarray, "I J"]:
-    """Distance between where each object was expected and where each one is now, pixels.
+    """Compute the distances of predicted and present centres, pixels.
 
     Args:
-        before: Expected centres of the objects of the step before, pixels.
-        now: Centres of this step's objects.
+        before: Predicted centres of the I objects of the step before, pixels.
+        now: Centres of this step's J objects, pixels.
     """
     return np.asarray(np.linalg.norm(before[:, None] - now[None, :], axis=2))
 
@@ -32,11 +32,11 @@ def distances(before: Float[ndarray, "I 2"], now: Float[ndarray, "J 2"]) -> Floa
 def decide_by_distance(
     apart: Float[ndarray, "I J"], reach: Float[ndarray, " I"]
 ) -> Bool[ndarray, "I J"]:
-    """R while the count of objects stays: each other's nearest, and within reach.
+    """Decide R for an equal number of objects: mutual nearest neighbours within reach.
 
     Args:
-        apart: Distances.
-        reach: How far each object of the step before may be found, pixels.
+        apart: Distances, pixels.
+        reach: Largest distance of each object of the step before, pixels.
     """
     if apart.size == 0:
         return np.zeros(apart.shape, dtype=bool)
@@ -48,11 +48,11 @@ def decide_by_distance(
 def box_overlaps(
     before: Float[ndarray, "I 4"], now: Float[ndarray, "J 4"]
 ) -> Float[ndarray, "I J"]:
-    """Area that the boxes of two objects share, square pixels.
+    """Compute the area that the boxes of two objects share, square pixels.
 
     Args:
-        before: Objects of the step before: centre and half sizes, pixels.
-        now: This step's.
+        before: Boxes of the objects of the step before: centre and half sizes, pixels.
+        now: Boxes of this step's objects.
     """
     low = np.maximum((before[:, :2] - before[:, 2:])[:, None], (now[:, :2] - now[:, 2:])[None, :])
     high = np.minimum((before[:, :2] + before[:, 2:])[:, None], (now[:, :2] + now[:, 2:])[None, :])
@@ -62,11 +62,11 @@ def box_overlaps(
 def pixel_overlaps(
     before: Int[ndarray, "h w"], now: Int[ndarray, "h w"], rows: int, columns: int
 ) -> Int[ndarray, "I J"]:
-    """Pixels that two objects themselves share.
+    """Count the pixels that two objects share.
 
     Args:
-        before: The object that each pixel was of, -1 for none.
-        now: The object that it is of.
+        before: Object of each pixel at the step before, -1 for none.
+        now: Object of each pixel at this step, -1 for none.
         rows: Number of objects before.
         columns: Number of objects now.
     """
@@ -81,22 +81,22 @@ def is_one_to_one(decision: Bool[ndarray, "I J"]) -> bool:
 
 
 def row_case(decision: Bool[ndarray, "I J"], row: int) -> RowCase:
-    """What happened to an object of the step before: sum 0, 1 or more."""
+    """The case of an object of the step before, by its row sum: 0, 1 or more."""
     total = int(decision[row].sum())
     return "interrupted" if total == 0 else "continues" if total == 1 else "splits"
 
 
 def column_case(decision: Bool[ndarray, "I J"], column: int) -> ColumnCase:
-    """Where an object of this step comes from: sum 0, 1 or more."""
+    """The case of an object of this step, by its column sum: 0, 1 or more."""
     total = int(decision[:, column].sum())
     return "new" if total == 0 else "continues" if total == 1 else "merges"
 
 
 def families(decision: Bool[ndarray, "I J"]) -> list[tuple[list[int], list[int]]]:
-    """Rows and columns that hang together; each object is in exactly one family.
+    """Find the connected components of R; each object is in exactly one family.
 
-    A family of one row and one column continues; of no row is new; of no column is
-    interrupted; with several rows merges, with several columns splits, or both at once.
+    A family of one row and one column continues; without a row it is new; without a column it is
+    interrupted; with several rows it merges, with several columns it splits, or both at once.
     """
     rows, columns = decision.shape
     graph = np.zeros((rows + columns, rows + columns), dtype=bool)

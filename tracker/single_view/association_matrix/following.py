@@ -1,4 +1,4 @@
-"""Two who are one piece of foreground, followed apart by their colours.
+"""Tracking of two people in one foreground component separately by their colours.
 
 [CRM03] Comaniciu, Ramesh, Meer, "Kernel-based object tracking", IEEE TPAMI 25(5), 2003.
 """
@@ -12,20 +12,20 @@ from numpy import ndarray
 from tracker.kernels.pictures.following import follow_colours
 
 ITERATIONS = 20
-"""At most; a climb that goes on for longer goes nowhere."""
+"""Largest number of mean-shift iterations."""
 
 TOLERANCE = 0.1
-"""Pixels: a shift shorter than this is the last one."""
+"""Length of a shift below which the mean shift ends, pixels."""
 
 
 def object_histograms(
     bins: UInt16[ndarray, "h w"], owners: Int[ndarray, "h w"], count: int, size: int
 ) -> Float[ndarray, "N bins"]:
-    """The colours of the pixels of each object, each summing to 1.
+    """Compute the colour histogram of each object, with sum 1.
 
     Args:
         bins: The histogram bin of each pixel.
-        owners: The object that each pixel is of, -1 for none.
+        owners: Object of each pixel, -1 for none.
         count: Number of objects.
         size: Number of bins.
     """
@@ -39,9 +39,9 @@ def object_histograms(
 def coefficients(
     first: Float[ndarray, "I bins"], second: Float[ndarray, "J bins"]
 ) -> Float[ndarray, "I J"]:
-    """Bhattacharyya coefficients Σ_u sqrt(p(u) q(u)) of all pairs of histograms ([CRM03]).
+    """Compute Bhattacharyya coefficients Σ_u sqrt(p(u) q(u)) of all pairs of histograms ([CRM03]).
 
-    1 for equal, 0 for disjoint ones; each histogram sums to 1.
+    They are 1 for equal, 0 for disjoint histograms, each of which has the sum 1.
     """
     return np.asarray(np.sqrt(first) @ np.sqrt(second).T)
 
@@ -52,7 +52,7 @@ def follow(
     box: Float[ndarray, " 4"],
     histogram: Float[ndarray, " bins"],
 ) -> Float[ndarray, " 2"]:
-    """Where the colours went: mean shift over the moving pixels, [CRM03].
+    """Track a colour histogram by mean shift over the moving pixels, [CRM03].
 
         y ← Σ_i w_i x_i / Σ_i w_i,  w_i = sqrt(q(u_i) / p_y(u_i))
 
@@ -62,12 +62,12 @@ def follow(
 
     Args:
         bins: The histogram bin of each pixel.
-        moving: The pixels that count.
-        box: Where the target was, centre and half sizes, pixels.
-        histogram: q, of the time when it was alone.
+        moving: Whether each pixel is in the foreground.
+        box: Box of the target before, centre and half sizes, pixels.
+        histogram: q, of the last step at which the target was alone.
 
     Returns:
-        The centre; where it was if there is nothing of it.
+        The centre, pixels; that of the box if no pixel has the target's colours.
     """
     centre: ndarray = follow_colours(
         bins, moving, np.asarray(box, dtype=float), histogram, ITERATIONS, TOLERANCE

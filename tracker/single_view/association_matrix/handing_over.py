@@ -1,4 +1,4 @@
-"""One step of the objects: decided by matrices, tracks handed over, newcomers named.
+"""One step of the objects: the decision matrix, the transfer of tracks, and new tracks.
 
 [CMQ07] Chang, Ma, Qiao, "Human oriented multi-target tracking algorithm in video
 sequence", Control and Decision 22(4), 2007.
@@ -25,10 +25,10 @@ from tracker.single_view.protocol import ViewEvent
 def decide(
     situation: Situation, seen: Blobs, parameters: AssociationMatrixParams
 ) -> tuple[Bool[ndarray, "I J"], Float[ndarray, "I J"]]:
-    """The decision matrix R, and the pixels that the objects of both steps share.
+    """Decide the matrix R, and count the pixels that the objects of both steps share.
 
-    While the count stays, by distance; where it changes, or where not each object has
-    its own by distance, by overlap.
+    It is decided by distance for an equal number of objects, and by overlap where the number
+    changes or where the distances give no one-to-one matrix.
     """
     objects, p = situation.objects, parameters
     before = np.array([one.box for one in objects]).reshape(-1, 4)
@@ -55,17 +55,17 @@ def advance(
     histograms: Float[ndarray, "J bins"],
     parameters: AssociationMatrixParams,
 ) -> tuple[Situation, list[ViewEvent]]:
-    """Hand the tracks of the objects before to the objects now ([CMQ07]).
+    """Transfer the tracks of the objects before to the objects now ([CMQ07]).
 
     Args:
-        situation: After the step before.
+        situation: Objects and tracks after the step before.
         seen: This step's objects.
-        histograms: Their colours.
-        parameters: The numbers.
+        histograms: Colour histograms of these objects.
+        parameters: The parameters of the method.
 
     Returns:
-        The situation, in which those who are followed apart are still where they were;
-        and what happened.
+        Objects and tracks after this step, in which tracks that are followed separately are still
+        at their places before; and the events.
     """
     work = _Step(situation, seen, histograms, parameters)
     for rows, columns in decision_matrices.families(work.decision):
@@ -81,7 +81,7 @@ def advance(
 
 
 class _Step:
-    """One step's bookkeeping."""
+    """The data of one step while it is computed."""
 
     def __init__(
         self,
@@ -97,19 +97,19 @@ class _Step:
         self.decision, self.shared = decide(situation, seen, parameters)
         self.labels: list[list[int]] = [[] for _ in range(seen.size)]
         self.sources: list[set[int]] = [set() for _ in range(seen.size)]
-        """Which objects before each one's tracks come from."""
+        """For each object the objects before from which its tracks come."""
         self.lost: list[MovingObject] = list(situation.lost)
         self.unknown: list[int] = []
         self.next_label = situation.next_label
         self.events: list[ViewEvent] = []
         self.partings: list[list[int]] = []
-        """The objects that each one that split became."""
+        """For each object that split the objects that it became."""
 
     def tell(self, kind: str, labels: Iterable[int]) -> None:
         self.events.append(ViewEvent(kind, tuple(sorted(set(labels)))))  # type: ignore[arg-type]
 
     def hand_over(self, rows: list[int], columns: list[int]) -> None:
-        """The tracks of a family: all to its one object now, or each to the one it fits best."""
+        """Transfer the tracks of a family: all to one object, or each to the one it fits best."""
         owners = [(label, row) for row in rows for label in self.before.objects[row].labels]
         if len(columns) == 1:
             for label, row in owners:
@@ -126,10 +126,10 @@ class _Step:
                 self.partings.append(np.flatnonzero(self.decision[row]).tolist())
 
     def benefit(self, label: int, row: int, columns: list[int]) -> Float[ndarray, " J"]:
-        """How well each object now fits a track, 0 … 1: by place if he was alone, else by colour.
+        """How well each object now fits a track, 0 … 1: by place if it was alone, else by colour.
 
-        [CMQ07]: after a split an object is the track's whose histogram before the merge
-        is most like its own.
+        [CMQ07]: after a split an object belongs to the track whose histogram before the merge
+        is most similar to its own.
         """
         if len(self.before.objects[row].labels) == 1:
             pixels = self.shared[row, columns]
@@ -142,7 +142,7 @@ class _Step:
         self.sources[column].add(row)
 
     def take_back(self) -> None:
-        """Continue interrupted tracks with free objects that are near and of their colours."""
+        """Continue interrupted tracks with free objects nearby of similar colours."""
         if not self.unknown or not self.lost:
             return
         p = self.parameters
@@ -173,13 +173,13 @@ class _Step:
         self.unknown = [one for index, one in enumerate(self.unknown) if index not in taken]
 
     def name_newcomers(self) -> None:
-        """Start a track at every object that is left."""
+        """Begin a track at every object that is left."""
         for column in self.unknown:
             self.labels[column] = [self.next_label]
             self.next_label += 1
 
     def result(self) -> tuple[Situation, list[ViewEvent]]:
-        """Objects and tracks after this step; those interrupted for too long have ended."""
+        """Objects and tracks after this step, without those interrupted for too long."""
         objects: list[MovingObject] = []
         tracks: dict[int, Track] = {}
         for column in range(self.seen.size):
@@ -204,14 +204,14 @@ class _Step:
         return after, self.events
 
     def _sure(self, track: Track) -> bool:
-        """Whether a track was alone in its object for long enough to be confirmed."""
+        """Whether a track was alone in its object for enough steps to be confirmed."""
         return track.age >= self.parameters.confirmation_steps
 
     def _settled(self, labels: list[int]) -> list[int]:
-        """Of tracks that merge the confirmed ones; where none is, the oldest alone.
+        """The confirmed ones of tracks that merge; without any, the oldest one alone.
 
-        A piece that splits off a person for a moment is not a second person once it has
-        merged with him again.
+        A component that splits off a person for a moment is not a second person once it has
+        merged again.
         """
         if len(labels) < 2:
             return labels
@@ -238,7 +238,7 @@ class _Step:
         return MovingObject(labels, box, area, velocity, followed=followed)
 
     def _tracks(self, column: int, one: MovingObject) -> list[Track]:
-        """The tracks of an object: alone they learn, followed apart they stay, else they move."""
+        """The tracks of an object: a single one is updated, separate ones stay, others move."""
         known = [self.before.tracks.get(label) for label in one.labels]
         if len(known) == 1:
             histogram, area, age = self.histograms[column], float(one.area), 1

@@ -12,13 +12,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from jaxtyping import Float, Int, UInt8, UInt16
 from numpy import ndarray
+from scipy.sparse.csgraph import connected_components
 
+from tracker.geometry.boxes import Boxes
 from tracker.parameters import AssociationMatrixParams
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.association_matrix.following import follow, object_histograms
 from tracker.single_view.association_matrix.handing_over import advance
-from tracker.single_view.association_matrix.joining import join
 from tracker.single_view.association_matrix.moving_objects import MovingObject, Situation
 from tracker.single_view.association_matrix.silhouettes import Fits, Silhouettes
 from tracker.single_view.pictures import colour
@@ -36,26 +37,28 @@ class AssociationMatrixState:
     """Objects and tracks after a step, and the foreground model's state."""
 
     situation: Situation
+    """The objects and tracks."""
     foreground: Any
+    """The state of the foreground model."""
 
 
 class AssociationMatrix:
     """Tracks of foreground objects in one camera ([CMQ07]).
 
-    Per step: the foreground's pieces are the objects. A decision matrix R says which
-    object of the step before is which now: by distance while their count stays, by
-    overlap where it changes. A column of R that sums to 0 is somebody new, to 1 goes
-    on, to more is a merge; a row that sums to 0 is interrupted, and ended after N
-    steps, to more is a split. Two who merge and stay mostly visible are followed apart
-    by mean shift on their HSI histograms until their centres meet; else the merged
-    object carries all its tracks. After a split each object goes to the track whose
-    histogram before the merge is most like its own.
+    Per step: the foreground components are the objects. A decision matrix R relates the
+    objects of the step before to those now: by distance while their number is equal, by
+    overlap where it changes. A column of R with sum 0 is new, with sum 1 it continues,
+    with a larger sum it is a merge; a row with sum 0 is interrupted, and ended after N
+    steps, with a larger sum it is a split. Two people who merge and stay mostly visible are
+    followed separately by mean shift on their HSI histograms until their centres meet; else the
+    merged object has all its tracks. After a split each object belongs to the track whose
+    histogram before the merge is most similar to its own.
 
-    Beyond the paper: an object that continues nobody may be somebody interrupted, near
-    and of his colours. And an object is all of a person, or several, where the fusion
-    asks for targets, perhaps only heads: what it gets are the target boxes that the
-    objects' outlines fit, as many as an object has tracks, more where an outline says
-    so. The preset ``published`` hands over the objects themselves.
+    Beyond the paper: a new object may be an interrupted one nearby of similar colours. And an
+    object is all of a person, or several, while the fusion needs targets, perhaps only heads:
+    the boxes for the fusion are target boxes that fit the outlines of the objects, as many as an
+    object has tracks, more where its outline shows them. The preset ``published`` passes on the
+    objects themselves.
     """
 
     def __init__(
@@ -65,7 +68,7 @@ class AssociationMatrix:
         parameters: RunParameters,
         reader: Pictures,
     ) -> None:
-        """Learn the background.
+        """Learn the background of one camera.
 
         Raises:
             ValueError: If the camera has no pictures.
@@ -82,7 +85,7 @@ class AssociationMatrix:
         self._silhouettes = Silhouettes(view.camera, sequence.room, sequence.target_half_extents)
 
     def start(self) -> AssociationMatrixState:
-        """Nobody is in the picture."""
+        """The state without objects, before the first step."""
         state = None if self._foreground is None else self._foreground.start()
         return AssociationMatrixState(Situation.start(), state)
 
@@ -93,7 +96,7 @@ class AssociationMatrix:
         picture: UInt8[ndarray, "h w 3"] | None,
         rng: np.random.Generator,
     ) -> tuple[AssociationMatrixState, ViewResult]:
-        """One step; without a picture everything stays as it is and nothing is found."""
+        """Process one step; without an image the state does not change and no box is returned."""
         if picture is None or self._foreground is None:
             return state, self._nothing(state.situation)
         background, segmentation = self._foreground.step(state.foreground, picture)
@@ -113,7 +116,7 @@ class AssociationMatrix:
     def _follow(
         self, situation: Situation, seen: Blobs, bins: UInt16[ndarray, "h w"]
     ) -> tuple[Situation, list[ViewEvent]]:
-        """Move those who are followed apart; who cannot be told apart any more are one object."""
+        """Move tracks that are followed separately; those that cannot be separated are merged."""
         tracks, objects, events = dict(situation.tracks), list(situation.objects), []
         for index, one in enumerate(situation.objects):
             if not one.followed:
@@ -174,7 +177,7 @@ class AssociationMatrix:
         )
 
     def _nothing(self, situation: Situation) -> ViewResult:
-        """Without a picture."""
+        """The result without an image."""
         estimates, labels = _estimates(situation, self._parameters.confirmation_steps)
         none = ViewResult.of_boxes(np.zeros((0, 4)), np.zeros(0), np.zeros((0, 4)))
         return replace(
@@ -189,7 +192,7 @@ class AssociationMatrix:
         return np.concatenate([p.centre_sigma * half_sizes, p.size_sigma * half_sizes], axis=1)
 
     def _gates(self, objects: tuple[MovingObject, ...]) -> Float[ndarray, "G 5"]:
-        """How far each object may be found in the next step."""
+        """The gates of the objects in the next step."""
         gates = np.zeros((len(objects), 5))
         for index, one in enumerate(objects):
             gates[index, :2] = one.expected
@@ -200,7 +203,7 @@ class AssociationMatrix:
 def _estimates(
     situation: Situation, confirmation: int
 ) -> tuple[Float[ndarray, "E 4"], Int[ndarray, " E"]]:
-    """Every confirmed track that has an object: his own box if alone, else the merged object's."""
+    """Every confirmed track with an object: its own box if alone, else the merged object's."""
     held = sorted(label for one in situation.objects for label in one.labels)
     labels = [label for label in held if situation.tracks[label].age >= confirmation]
     boxes = np.array([situation.tracks[label].box for label in labels]).reshape(-1, 4)
@@ -208,7 +211,7 @@ def _estimates(
 
 
 def _apart(situation: Situation) -> tuple[Float[ndarray, "N 4"], Int[ndarray, " N"]]:
-    """The objects; two who are followed apart are two; who is merged has no label."""
+    """The objects; one followed as two tracks is two; a merged one has no label."""
     boxes: list[ndarray] = []
     labels: list[int] = []
     for one in situation.objects:
@@ -219,9 +222,9 @@ def _apart(situation: Situation) -> tuple[Float[ndarray, "N 4"], Int[ndarray, " 
 
 
 def _labels_of_fits(fits: Fits, situation: Situation) -> Int[ndarray, " N"]:
-    """Whose each fitted box is: the best of a lone track's object is his; -1 where unknown.
+    """The label of each fitted box: that of a single track for its best box; -1 if unknown.
 
-    Of two who are followed apart each has the box nearest across the picture, if both have one.
+    Of two tracks followed separately each has the box nearest along x, if both have one.
     """
     labels = np.full(len(fits.boxes), -1, dtype=np.int64)
     for index, one in enumerate(situation.objects):
@@ -233,3 +236,37 @@ def _labels_of_fits(fits: Fits, situation: Situation) -> Int[ndarray, " N"]:
             in_order = mine[:2][np.argsort(fits.boxes[mine[:2], 0], kind="stable")]
             labels[in_order] = np.array(one.labels)[np.argsort(centres, kind="stable")]
     return labels
+
+
+def join(pieces: Blobs, gaps: Float[ndarray, " N"]) -> Blobs:
+    """Merge components that lie above each other.
+
+    Two are merged where they share at least half of the width of the narrower one, and where the
+    gap between them is at most the larger of their two bounds.
+
+    Args:
+        pieces: N foreground components.
+        gaps: Largest gap above or below each component to another of the same person, pixels.
+    """
+    count = pieces.size
+    if count < 2:
+        return pieces
+    low, high = Boxes(pieces.boxes).low, Boxes(pieces.boxes).high
+    common = np.minimum(high[:, None], high[None]) - np.maximum(low[:, None], low[None])
+    narrower = np.minimum(pieces.boxes[:, None, 2], pieces.boxes[None, :, 2])
+    near = (common[..., 0] >= narrower) & (-common[..., 1] <= np.maximum(gaps[:, None], gaps[None]))
+    groups, owner = connected_components(near, directed=False)
+    if groups == count:
+        return pieces
+    # the order by top edges remains: a group has the place of its first component
+    _, first = np.unique(owner, return_index=True)
+    rank = np.empty(groups, dtype=np.int64)
+    rank[np.argsort(first, kind="stable")] = np.arange(groups)
+    owners = rank[owner]
+    lows, highs = np.full((groups, 2), np.inf), np.full((groups, 2), -np.inf)
+    np.minimum.at(lows, owners, low)
+    np.maximum.at(highs, owners, high)
+    boxes = Boxes.from_corners(lows, highs).centred
+    areas = np.bincount(owners, weights=pieces.areas, minlength=groups).astype(np.int64)
+    names = np.append(owners, -1).astype(np.int32)  # -1, the background, is the last of them
+    return Blobs(boxes, areas, names[pieces.owners])

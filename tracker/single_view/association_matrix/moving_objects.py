@@ -1,4 +1,4 @@
-"""Pieces of foreground and the tracks that each of them carries, as values.
+"""Foreground components and the tracks in each, as immutable values.
 
 [CMQ07] Chang, Ma, Qiao, "Human oriented multi-target tracking algorithm in video
 sequence", Control and Decision 22(4), 2007.
@@ -15,33 +15,36 @@ from numpy import ndarray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Track:
-    """Somebody, as he was when he was last alone in his piece of foreground."""
+    """A person, with the appearance when the person was last alone in a component."""
 
     label: int
+    """Id of the track."""
     box: Float[ndarray, " 4"]
-    """Where he is now: his object, or what the mean shift found; centre and half sizes, pixels."""
+    """Present box: the object's, or that of the mean shift; centre and half sizes, pixels."""
     area: float
-    """Pixels, when alone."""
+    """Area when alone, pixels."""
     histogram: Float[ndarray, " bins"]
-    """Colours, when alone."""
+    """Colour histogram when alone."""
     age: int = 1
-    """For how many steps he was alone in an object."""
+    """Number of steps alone in an object."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MovingObject:
-    """A piece of foreground and whom it shows."""
+    """A foreground component and its tracks."""
 
     labels: tuple[int, ...]
     """Its tracks, ascending; several where people merged."""
     box: Float[ndarray, " 4"]
+    """Centre and half sizes, pixels."""
     area: int
+    """Number of pixels."""
     velocity: Float[ndarray, " 2"]
-    """Pixels a step."""
+    """Pixels per step."""
     missing: int = 0
-    """For how many steps it has been gone."""
+    """Number of steps since the object was interrupted."""
     followed: bool = False
-    """Whether its two tracks are followed apart."""
+    """Whether its two tracks are followed separately."""
 
     @property
     def size(self) -> float:
@@ -50,25 +53,26 @@ class MovingObject:
 
     @property
     def expected(self) -> Float[ndarray, " 2"]:
-        """Where it should be one step later."""
+        """The predicted centre one step later, pixels."""
         return np.asarray(self.box[:2] + self.velocity * (1 + min(self.missing, 3)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Situation:
-    """What one step leaves to the next."""
+    """Objects and tracks after a step."""
 
     tracks: dict[int, Track]
-    """By label; never changed in place."""
+    """Tracks by label; never changed in place."""
     objects: tuple[MovingObject, ...]
-    """In the order of the step's blobs."""
+    """Objects in the order of the step's components."""
     lost: tuple[MovingObject, ...]
-    """Interrupted and not yet ended."""
+    """Objects that are interrupted and have not ended."""
     owners: Int[ndarray, "h w"] | None
-    """The object that each pixel is of, -1 for none; None before the first picture."""
+    """Object of each pixel, -1 for none; None before the first image."""
     next_label: int
+    """The first label that is free."""
 
     @staticmethod
     def start() -> Situation:
-        """Nobody is there."""
+        """The situation without objects."""
         return Situation({}, (), (), None, 1)

@@ -1,9 +1,9 @@
-"""Target boxes in outlines: where in a piece of foreground a head, or a head and torso, can be.
+"""Target boxes in outlines: possible heads, or heads and torsos, in foreground components.
 
-A piece of foreground shows all of a person, what is tracked may be a part of it: a
-target's box begins at the crown, and its size is known from the calibrated camera. How
-many targets a piece shows is known from its tracks; without such a prior
-:mod:`~tracker.single_view.jpda.crowns` finds them.
+A foreground component shows all of a person, while the target may be a part of it: a
+target's box begins at the crown, and its size is known from the calibrated camera. The
+number of targets in a component is known from its tracks; without such a prior
+:mod:`~tracker.single_view.jpda.crowns` detects them.
 """
 
 from __future__ import annotations
@@ -24,46 +24,46 @@ from tracker.single_view.pictures.blobs import Blobs
 from tracker.single_view.pictures.foreground import integral, shape_scores
 
 SIZES = 6
-"""Sizes of targets that are tried at each place; the best are averaged, so few are enough."""
+"""Number of sizes tried at each place; the best are averaged, so few are enough."""
 
 STRIDE = 2
-"""Pixels between the columns of a piece of foreground in which crowns are looked for; the best
+"""Distance between the columns of a component in which crowns are tried, pixels; the best
 are averaged, so not every column is needed."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fits:
-    """Boxes that outlines fit, piece by piece, the best of a piece first."""
+    """Boxes that fit the outlines, component by component, the best of each first."""
 
     boxes: Float[ndarray, "N 4"]
     """Centre and half sizes, pixels."""
     scores: Float[ndarray, " N"]
-    """At most about 0; e raised to it is taken for a likelihood."""
+    """Log likelihood up to a constant, at most about 0."""
     owners: Int[ndarray, " N"]
-    """The piece of foreground that each is in."""
+    """Index of the foreground component of each box."""
 
 
 class Silhouettes:
-    """Finds targets in the foreground of one camera by nothing but its outline.
+    """A detector of targets in the foreground of one camera by its outline alone.
 
-    In every second column of a piece of foreground its highest pixel may be a crown;
+    In every second column of a component its highest pixel may be a crown;
     boxes of the sizes that a target can have there hang from it. A good one is full of
     foreground, with background above and beside it (:func:`shape_scores`); the best
-    one, averaged with its neighbours, is taken, those near it are dropped, and so on.
+    one, averaged with its neighbours, is accepted, those near it are rejected, and so on.
 
-    How large a target is at a place depends on its distance, which one camera does not
-    tell. People keep about the height at which they come in, so most of the sizes are
+    The size of a target at a place depends on its distance, which one camera does not
+    determine. People keep about the height at which they come in, so most of the sizes are
     those at the heights of the entrances.
     """
 
     def __init__(self, camera: Camera, room: Room, half_extents: Float[ndarray, " 3"]) -> None:
-        """Work out the sizes at each place of the picture."""
+        """Compute the possible sizes at each place of the image."""
         self._sizes = BoxSizes.of(camera, room, half_extents, at_entrance_heights=True)
         self._table, self._possible = self._sizes.quantiles(SIZES)
         self._usual = (self._sizes.smallest[1] + self._sizes.largest[1]) / 2.0
 
     def half_heights(self, centres: Float[ndarray, "N 2"]) -> Float[ndarray, " N"]:
-        """The usual half height of a target at each place, pixels."""
+        """The median half height of a target at each place, pixels."""
         place = self._sizes.cells(centres)
         usual = self._table[place, SIZES // 2, 1]
         return np.asarray(np.where(self._possible[place], usual, self._usual))
@@ -75,14 +75,14 @@ class Silhouettes:
         wanted: Int[ndarray, " J"],
         parameters: AssociationMatrixParams,
     ) -> Fits:
-        """The targets in each piece of foreground.
+        """Fit target boxes to each foreground component.
 
         Args:
-            mask: Foreground.
-            pieces: Its pieces.
-            wanted: How many targets each piece is believed to hold.
-            parameters: How scores are made, and the least of a piece's best box, of its others
-                and of boxes beyond the number that is believed.
+            mask: The foreground mask.
+            pieces: The components of the mask.
+            wanted: Estimated number of targets in each component.
+            parameters: Parameters of the scores, and the least scores of a component's best box,
+                of further ones and of boxes beyond the estimated number.
         """
         p = parameters
         sizes = SizeTable(

@@ -1,4 +1,4 @@
-"""What people look like to one camera: their colours against the templates, and the foreground.
+"""Appearance of people in one camera: colours against the templates, and the foreground.
 
 Boxes are ``centre_x, centre_y, half_width, half_height`` in pixels.
 """
@@ -26,28 +26,28 @@ from tracker.single_view.pictures.foreground import ForegroundModel, integral, l
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scene:
-    """One picture, prepared for the comparison of many boxes."""
+    """One image, prepared for the comparison of many boxes."""
 
     bins: UInt16[ndarray, "h w"]
     """The histogram bin of each pixel."""
     mask: UInt8[ndarray, "h w"] | None
-    """1 on the foreground; None where no background was learnt."""
+    """1 on the foreground; None without a background."""
     sums: Int[ndarray, "h1 w1"] | None
-    """The mask's integral."""
+    """Integral image of the mask."""
 
     @property
     def foreground_share(self) -> float:
-        """Of the picture; 0 where no background was learnt."""
+        """Share of foreground in the image; 0 without a background."""
         if self.mask is None or self.sums is None:
             return 0.0
         return float(self.sums[-1, -1]) / self.mask.size
 
 
 class Appearance:
-    """The templates' colours, the foreground model and the sizes that a target can have.
+    """The colours of the templates, the foreground model and the possible sizes of a target.
 
-    Made once per camera and run. What changes from step to step is the foreground
-    model's state, which the method carries.
+    It is created once per camera and run. Only the state of the foreground model changes from
+    step to step, and the method carries it.
     """
 
     def __init__(
@@ -62,17 +62,17 @@ class Appearance:
         foreground: ForegroundParams | None,
         carry_templates: bool = False,
     ) -> None:
-        """Read the templates and learn the background.
+        """Read the templates and learn the background of one camera.
 
         Args:
-            sequence: Its templates and target.
-            camera_index: Whose pictures.
-            reader: Of the pictures.
-            colour_space: The histograms' bins.
-            histogram_kernel: How the pixels of a box count.
+            sequence: The sequence with its templates and target.
+            camera_index: Index of the camera.
+            reader: Reader of the images.
+            colour_space: The bins of the histograms.
+            histogram_kernel: The weights of the pixels of a box.
             size_jitter: Relative spread of drawn boxes around the size of a target there.
-            foreground: Numbers of the foreground model; None where none is needed.
-            carry_templates: Whether cameras without a template of a person get one carried over.
+            foreground: Parameters of the foreground model; None for no foreground.
+            carry_templates: Whether templates are transferred to cameras without any of a person.
 
         Raises:
             ValueError: If there are no pictures or templates, or a template cannot be read.
@@ -83,7 +83,7 @@ class Appearance:
             sequence = with_carried(sequence, colour_space, histogram_kernel, reader)
         self.model = read_templates(sequence, colour_space, histogram_kernel, reader)
         camera, room, half_extents = view.camera, sequence.room, sequence.target_half_extents
-        # no parameter has a say in it, so that a moved slider does not wait for it again
+        # no parameter has an effect on it, so that a change of one does not repeat it
         self.sizes = reader.once(
             ("sizes", geometry(sequence, camera_index)),
             lambda: BoxSizes.of(camera, room, half_extents),
@@ -94,21 +94,21 @@ class Appearance:
         if foreground is not None:
             self._foreground = learn(sequence, camera_index, reader, foreground)
         self.trust = np.ones(len(self.model.names))
-        """How far the foreground is to be believed about each person, 0 … 1."""
+        """Trust in the foreground at each person, 0 … 1."""
         if foreground is not None and self._foreground is not None:
             trust = template_trust(sequence, camera_index, reader, foreground)
             self.trust = np.array([trust[name] for name in self.model.names])
 
     def start(self) -> Any:
-        """The state of the foreground model before the first picture."""
+        """The state of the foreground model before the first image."""
         return None if self._foreground is None else self._foreground.start()
 
     def look(self, state: Any, picture: UInt8[ndarray, "h w 3"]) -> tuple[Any, Scene]:
-        """Prepare a picture.
+        """Prepare an image.
 
         Args:
-            state: Of the foreground model, from :meth:`start` or the picture before.
-            picture: BGR.
+            state: The state of :meth:`start`, or after the image before.
+            picture: The image, BGR.
         """
         bins = colour.bin_map(picture, self.model.space)
         if self._foreground is None:
@@ -117,7 +117,7 @@ class Appearance:
         return state, Scene(bins, found.mask, integral(found.mask))
 
     def distances(self, scene: Scene, boxes: Float[ndarray, "N 4"]) -> Float[ndarray, "N G"]:
-        """Bhattacharyya distance D of each box to each person's nearest template."""
+        """Compute the Bhattacharyya distance D of each box to each person's nearest template."""
         return self.model.distances(scene.bins, boxes)
 
     def shape_scores(
@@ -128,16 +128,16 @@ class Appearance:
         inside_weight: float,
         around_weight: float,
     ) -> tuple[Float[ndarray, " N"], Float[ndarray, " N"]]:
-        """What the foreground says of each box: log factors of the likelihood, and shares inside.
+        """Compute the foreground's log factors of the likelihood of boxes, and shares inside.
 
-        As :func:`tracker.single_view.pictures.foreground.shape_scores`; without a foreground model
+        See :func:`tracker.single_view.pictures.foreground.shape_scores`; without a foreground model
         the factors are 0 and the shares 1.
 
         Args:
-            scene: The picture.
-            boxes: Pixels.
-            inside_weight: a.
-            around_weight: b.
+            scene: The image.
+            boxes: Centre and half sizes of N boxes, pixels.
+            inside_weight: a, the weight of the share inside.
+            around_weight: b, the weight of the share around.
         """
         if scene.sums is None:
             return np.zeros(len(boxes)), np.ones(len(boxes))
@@ -148,9 +148,9 @@ class Appearance:
     def draw_on_foreground(
         self, count: int, scene: Scene, rng: np.random.Generator
     ) -> Float[ndarray, "N 4"]:
-        """Boxes centred on foreground pixels, of the sizes that a target can have there.
+        """Draw boxes centred on foreground pixels, with possible sizes of a target there.
 
-        Fewer than ``count`` where no target can be; none without foreground.
+        Fewer than ``count`` result where no target can be; none without foreground.
         """
         if scene.mask is None or count == 0:
             return np.zeros((0, 4))
@@ -161,9 +161,9 @@ class Appearance:
         return self._with_sizes(np.stack([columns, rows], axis=1), rng)
 
     def draw_anywhere(self, count: int, rng: np.random.Generator) -> Float[ndarray, "N 4"]:
-        """Boxes centred anywhere in the picture, of the sizes that a target can have there.
+        """Draw boxes centred anywhere in the image, with possible sizes of a target there.
 
-        Fewer than ``count`` where no target can be.
+        Fewer than ``count`` result where no target can be.
         """
         width, height = self._image_size
         return self._with_sizes(rng.integers(0, [width, height], (count, 2)), rng)
@@ -177,7 +177,7 @@ class Appearance:
         return np.concatenate([centres[possible], sizes[possible]], axis=1)
 
     def within(self, boxes: Float[ndarray, "N 4"]) -> Float[ndarray, "N 4"]:
-        """The boxes whose centre is in the picture, with sizes that a target can have."""
+        """Select boxes with their centres in the image, and clip them to possible sizes."""
         clipped = boxes.copy()
         clipped[:, 2:] = np.clip(boxes[:, 2:], self.sizes.smallest, self.sizes.largest)
         last = np.array(self._image_size) - 1

@@ -1,8 +1,8 @@
-"""Templates carried from the cameras in which they were taught to those that have none.
+"""Transfer of templates to cameras that have none of a person.
 
-A person looks different to another camera: other light, another side. But the calibration
-tells where to look. The box of a template fixes a ray, and its size about how far along
-it the person stands; there, at the same moment, every other camera has a box of its own.
+A person has another appearance in another camera: other light, another side. The calibration
+predicts the place: the box of a template gives a ray, and its size the approximate distance
+along it; at that place, at the same step, every other camera has a box of its own.
 """
 
 from __future__ import annotations
@@ -23,45 +23,48 @@ from tracker.single_view.pictures import colour
 from tracker.single_view.pictures.colour import ColourSpaceName, KernelName
 
 DEPTHS = 400
-"""Places along a template's ray, a hundredth of the distance apart."""
+"""Number of places along a template's ray, a hundredth of the distance apart."""
 
 DEPTH_SPREAD = 0.12
-"""Standard deviation of the logarithm of the distance that a drawn box's size tells: people
-differ, and so do those who draw."""
+"""Standard deviation of the logarithm of the distance that is estimated from a drawn box's size:
+people differ, and so do those who draw."""
 
 _STEPS = np.linspace(-0.5, 0.5, 5)
 _SHIFTS = np.stack(np.meshgrid(_STEPS, _STEPS), axis=-1).reshape(-1, 2)
-"""Half sizes by which the place in another camera may be off, across and down: a box is drawn
-by eye, and a person is not where the ray through its middle is."""
+"""Shifts of the box in another camera that are tried, half sizes across and down: a box is drawn
+by eye, and a person is not exactly on the ray through its centre."""
 
 _SHIFT_COST = 0.5 * (_SHIFTS**2).sum(axis=1) / 0.25**2
-"""That they are is less likely: their standard deviation is a quarter of a half size."""
+"""Cost of these shifts: their standard deviation is a quarter of a half size."""
 
 HEIGHT_SPREAD = 0.2
-"""Metres: standard deviation of the height of a body's middle above where it stands."""
+"""Standard deviation of the height of a body's centre above its ground, metres."""
 
 LARGEST_DISTANCE = 0.75
-"""A box further than this from the template's colours is somebody else, or nobody in sight."""
+"""Distance of colours from the template above which a box is of another person or occluded."""
 
 LIKELIER = 0.15
-"""Nor may more than this share of the boxes elsewhere in the picture look more like it."""
+"""Largest share of boxes elsewhere in the image that may be more similar to the template."""
 
 _AT_ONCE = 4096
-"""Boxes whose histograms are in memory together: of somebody far away there are many."""
+"""Number of boxes whose histograms are computed at once, which bounds the memory."""
 
 _SIGMA = 0.2
-"""Spread of the colour distance along the ray, that of the filters' likelihood."""
+"""Standard deviation of the colour distance along the ray, that of the filters' likelihood."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Picture:
-    """One camera's picture, in which boxes are compared with a template of another."""
+    """One camera's image, in which boxes are compared with a template of another."""
 
     bins: UInt16[ndarray, "h w"]
+    """The histogram bin of each pixel."""
     space: ColourSpaceName
+    """The bins of the histograms."""
     kernel: KernelName
+    """The weights of the pixels of a box."""
     weights: Float[ndarray, " bins"]
-    """v = q / (q + b), with b of the whole picture: what much of the room has tells little."""
+    """v = q / (q + b), with b of the whole image, so that frequent colours have low weight."""
     roots: Float[ndarray, " bins"]
     """sqrt(q v / Σ q v)."""
     total: float
@@ -89,23 +92,23 @@ class _Picture:
 def with_carried(
     sequence: Sequence, space: ColourSpaceName, kernel: KernelName, reader: Pictures
 ) -> Sequence:
-    """The recording with templates in every camera in which its people's places are sure.
+    """Add templates in every camera in which the place of a person is certain.
 
-    For each person and each camera without a template of theirs, those of the other
-    cameras are carried over. The distance d along the ray of a template's middle is the
+    For each person and each camera without a template of that person, those of the other
+    cameras are transferred. The distance d along the ray of a template's centre is the
     most likely one of
 
         L(d) = - Σ_c D_c(d)² / 2σ² - ln²(d / d_0) / 2τ² - h(d)² / 2σ_h²
 
-    over the cameras c that see the target there; D_c is the Bhattacharyya distance of its
-    box to the template, d_0 is where the target would be as high as the template's box, and h
-    how far the feet of a target that is a whole body would be above the floor.
+    over the cameras c that view the target there; D_c is the Bhattacharyya distance of its
+    box to the template, d_0 the distance at which the target is as high as the template's box, and
+    h the height of the feet above the floor for a target that is a whole body.
 
     Args:
-        sequence: Its templates, cameras and target.
-        space: Of the histograms.
-        kernel: How the pixels of a box count.
-        reader: Of the pictures.
+        sequence: The sequence with its templates, cameras and target.
+        space: The bins of the histograms.
+        kernel: The weights of the pixels of a box.
+        reader: Reader of the images.
     """
     what = [(t.name, t.camera, t.frame, t.box.tobytes()) for t in sequence.templates]
     where = [geometry(sequence, camera) for camera in range(len(sequence.cameras))]
@@ -154,7 +157,7 @@ def _carry(
     box: Float[ndarray, " 4"],
     pictures: dict[int, _Picture],
 ) -> dict[int, Float[ndarray, " 4"]]:
-    """Where each other camera has the person of a template's box, if it is sure of it."""
+    """The box of a template's person in each other camera, where it is certain."""
     half_extents = sequence.target_half_extents
     nobody = float(_cost(np.array(LARGEST_DISTANCE)))
     positions, score = _along_ray(sequence.cameras[own], sequence, box)
@@ -186,14 +189,14 @@ def _carry(
 def _along_ray(
     camera: Camera, sequence: Sequence, box: Float[ndarray, " 4"]
 ) -> tuple[Float[ndarray, "D 3"], Float[ndarray, " D"]]:
-    """Places in the room along the ray of a box's middle, and how likely its size makes each."""
+    """Places in the room along the ray of a box's centre, with log likelihoods of its size."""
     room, half_extents = sequence.room, sequence.target_half_extents
     direction = camera.back_project(box[None, :2])[0]
     corners = np.array(np.meshgrid(*zip(room.minimum, room.maximum, strict=True))).reshape(3, -1).T
     reach = float(np.linalg.norm(corners - camera.centre, axis=1).max())
     distances = np.geomspace(0.05 * reach, reach, DEPTHS)
     positions = camera.centre + distances[:, None] * direction
-    # a target's middle is drawn somewhat off: the room is as wide as half a target more
+    # a target's centre is drawn with an error: the room is extended by half a target
     inside = (
         (positions >= room.minimum - half_extents) & (positions <= room.maximum + half_extents)
     ).all(axis=1)
@@ -216,12 +219,12 @@ def _stands(sequence: Sequence) -> bool:
 
 
 def _cost(distances: Float[ndarray, "*N"]) -> Float[ndarray, "*N"]:
-    """How unlikely colours are to be a template's: -ln of the filters' likelihood."""
+    """The cost of colour distances: -ln of the filters' likelihood."""
     return 0.5 * (distances / _SIGMA) ** 2
 
 
 def _around(boxes: Float[ndarray, "N 4"]) -> Float[ndarray, "N K 4"]:
-    """Each box and those a little beside it."""
+    """Each box, and the same box with small shifts."""
     near = np.repeat(boxes[:, None, :], len(_SHIFTS), axis=1)
     near[:, :, :2] += _SHIFTS * near[:, :, 2:]
     return near
@@ -232,7 +235,7 @@ def _stands_out(
     place: Float[ndarray, " 4"],
     distance: float,
 ) -> bool:
-    """Whether few boxes of that size elsewhere in the picture look more like the template."""
+    """Whether few boxes of that size elsewhere in the image are more similar to the template."""
     height, width = picture.bins.shape
     x = np.arange(place[2] / 2.0, width, place[2] / 2.0)
     y = np.arange(place[3] / 2.0, height, place[3] / 4.0)

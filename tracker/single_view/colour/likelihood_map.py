@@ -1,7 +1,7 @@
-"""The colour likelihood of a person's box at every place of a picture, on a coarse grid.
+"""The colour likelihood of a target's box at every place of an image, on a coarse grid.
 
-What the filters see through the few boxes that they draw, seen everywhere: good for
-looking at, and for judging templates before any filter runs.
+It shows everywhere what filters evaluate at their samples: for display, and for judging
+templates before any filter runs.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from tracker.single_view.pictures import colour
 from tracker.single_view.pictures.colour import ColourModel
 
 COLUMNS = 72
-"""Places across a picture: as fine as the eye follows in a pane."""
+"""Number of cells across an image, as fine as a pane can show."""
 
 
 def likelihood_map(
@@ -25,18 +25,18 @@ def likelihood_map(
     sigma: float,
     columns: int = COLUMNS,
 ) -> Float[ndarray, "rows columns"]:
-    """ln l = −D² / 2σ² of the box that a target centred in each cell would have.
+    """Compute ln l = −D² / 2σ² of the box of a target centred in each cell.
 
-    It is 0 where the colours are just a template's; D is the distance to the nearest
-    template, as in :meth:`ColourModel.distances`. A box's size is the middle one that
-    the calibrated camera allows there; where no target can be centred l is 0.
+    It is 0 where the colours equal a template's; D is the distance to the nearest
+    template, as in :meth:`ColourModel.distances`. A box has the median size of a target at that
+    place; where no target can be centred l is 0.
 
     Args:
-        picture: BGR.
-        model: The templates.
-        sizes: What targets look like to this camera.
+        picture: The image, BGR.
+        model: The colour model of the templates.
+        sizes: Possible sizes of targets in this camera.
         sigma: σ of the likelihood, in units of D.
-        columns: Cells across; they are square, so their rows follow from the picture.
+        columns: Number of cells across; they are square.
     """
     height, width = picture.shape[:2]
     rows = max(1, round(columns * height / width))

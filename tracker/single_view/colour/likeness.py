@@ -1,4 +1,4 @@
-"""Whose colours the boxes of one camera have: added to the results of every single-view method.
+"""Colour likelihoods of the boxes of one camera, added to the results of every method.
 
 [ZW21] Zhu, Wang, "3D target position tracking based on probability hypothesis
 density filtering", 2021.
@@ -23,16 +23,16 @@ from tracker.single_view.pictures.colour import ColourModel, ColourSpaceName
 logger = logging.getLogger(__name__)
 
 _NUMBERS = ColourPhdParams()
-"""The same colour parameters whichever method found the boxes, so that likenesses compare."""
+"""The colour parameters, the same for all methods, so that likelihoods are comparable."""
 
 
 class Likeness:
-    """The people with templates, and what a box's colours say of them.
+    """The people with templates, and the likelihood of a box's colours for each of them.
 
         p_g(z) ∝ exp(−D_g(z)² / 2σ²)
 
     with the Bhattacharyya distance D_g to the nearest template of person g: the
-    likelihood of [ZW21] for each person, so that a box of nobody's colours tells nothing.
+    likelihood of [ZW21] for each person, so that a box of other colours is uninformative.
     """
 
     def __init__(self, model: ColourModel) -> None:
@@ -40,9 +40,9 @@ class Likeness:
 
     @staticmethod
     def of(sequence: Sequence, reader: Pictures) -> Likeness | None:
-        """Read the templates; None where there are not two people to tell apart.
+        """Read the templates; None with fewer than two people.
 
-        A template that cannot be read is told to the log: a method that needs none goes on.
+        A template that cannot be read is reported in the log, for a method may need none.
         """
         if len({template.name for template in sequence.templates}) < 2:
             return None
@@ -58,11 +58,11 @@ class Likeness:
     def of_boxes(
         self, picture: UInt8[ndarray, "h w 3"], boxes: Float[ndarray, "N 4"]
     ) -> Float[ndarray, "N P"]:
-        """Probability of each of P people for each box, if it is one's.
+        """Compute the probability of each of P people for each box, given that it is of one.
 
         Args:
-            picture: BGR.
-            boxes: Centre and half sizes, pixels; equal probabilities outside the picture.
+            picture: The image, BGR.
+            boxes: Centre and half sizes, pixels; equal probabilities outside the image.
         """
         from scipy.special import softmax  # a server starts without it
 
@@ -79,7 +79,7 @@ class Likeness:
 def appearance_of(
     picture: UInt8[ndarray, "h w 3"], boxes: Float[ndarray, "N 4"]
 ) -> Float16[ndarray, "N A"]:
-    """The root of each box's colour histogram: a unit vector, 0 outside the picture.
+    """Compute the root of each box's colour histogram: a unit vector, 0 outside the image.
 
     The product of two is the Bhattacharyya coefficient of their histograms.
     """
@@ -94,10 +94,10 @@ def appearance_of(
 def _covered(
     picture: UInt8[ndarray, "h w 3"], boxes: Float[ndarray, "N 4"], space: ColourSpaceName
 ) -> tuple[Int[ndarray, " K"], UInt16[ndarray, "h2 w2"], Float[ndarray, " 4"]]:
-    """Which boxes lie in the picture, the histogram bins of what they cover together, and what
-    is taken off a box to have it there.
+    """The boxes in the image, the histogram bins of the area that they cover together, and the
+    offset that is subtracted from a box in that area.
 
-    Boxes are few and the picture may be large: the rest of it is not looked at.
+    Boxes are few and the image may be large: the rest of it is not processed.
     """
     height, width = picture.shape[:2]
     low = np.floor(np.clip(Boxes(boxes).low - 1.0, 0.0, [width, height]))

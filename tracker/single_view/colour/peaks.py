@@ -1,4 +1,4 @@
-"""Peaks of the colour likelihood: where in a picture somebody of the templates' colours is.
+"""Peaks of the colour likelihood in an image, as measurements of people with templates.
 
 [ZW21] Zhu, Wang, "3D target position tracking based on probability hypothesis
 density filtering", 2021, §2.2.
@@ -21,7 +21,6 @@ from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import BoxSizes
 from tracker.single_view.colour.appearance import Appearance, Scene
-from tracker.single_view.colour.evidence import colour_ratios
 from tracker.single_view.colour.trust import shapes_of_templates, taught_well, template_trust
 from tracker.single_view.dropped import Dropped
 from tracker.single_view.pictures import mean_shift
@@ -30,59 +29,80 @@ from tracker.single_view.shape.evidence import log_ratios, shape_sigmas
 from tracker.single_view.shape.finder import SAME_PERSON, ShapeFinder, Shapes
 
 LEAST_LIKELY = 0.02
-"""Added to the probability of a person by shape, as to the share of foreground in a box."""
+"""Constant added to the probability of a person by shape, as to the share of foreground."""
 
 BELIEVED = 0.9
-"""A foreground that is trusted less than this about somebody is helped by shapes."""
+"""Trust in the foreground at a person below which shapes are used as well."""
 
 FITTING = 0.25
-"""Mean intersection over union with the templates from which people by shape are where the
-templates say: boxes drawn by hand around heads and trunks share 0.4 to 0.5, around bodies 0.6."""
+"""Least mean intersection over union of templates and people by shape for shapes to be used: boxes
+drawn by hand around heads and trunks have 0.4 to 0.5, around bodies 0.6."""
 
 SHAPE_OVERLAP = 0.3
-"""Windows of the shapes that share more than this of what both cover are of one person."""
+"""Intersection over union above which windows of the shapes are of one person."""
 
 _SHAPES = ShapesParams()
+
+PEAK_EVEN = 0.45
+"""Distance to a template at which a peak at a shape is equally likely of a person and of something
+else: at a peak colours are most similar, so those of plants, screens and walls are near as well."""
+
+SHAPE_EVEN = 0.56
+"""The same for the colours in a shape's own box, without a peak at its place."""
+
+LARGEST = 2.0
+"""Bound of the log likelihood ratio of a peak at a shape: the effects of light, and of a side
+without a template, are as large."""
+
+UNLIKE = 1.0
+"""Bound of the log likelihood ratio against a shape with other colours: strangers have none of the
+templates'."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Passed:
-    """People by colour and by shape, as the fusion gets them."""
+    """People by colour and by shape, as they are passed to the fusion."""
 
     boxes: Float[ndarray, "N 4"]
+    """Centre and half sizes, pixels."""
     scores: Float[ndarray, " N"]
-    """Of the colours, 0 … 1."""
+    """Score of the colours, 0 … 1."""
     sigmas: Float[ndarray, "N 4"]
+    """Standard deviations of the four numbers of each box, pixels."""
     log_ratios: Float[ndarray, " N"]
-    """As :attr:`tracker.single_view.protocol.ViewResult.log_ratios`."""
+    """Log likelihood ratios, :attr:`tracker.single_view.protocol.ViewResult.log_ratios`."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Peaks:
-    """What was found in one picture, and from which samples."""
+    """The M peaks of one image, and the samples from which they are."""
 
     boxes: Float[ndarray, "M 4"]
+    """Centre and half sizes, pixels."""
     scores: Float[ndarray, " M"]
     """Likelihood of each relative to that of a template's own colours, 0 … 1."""
     samples: Float[ndarray, "S 4"]
+    """Sampled boxes."""
     sample_weights: Float[ndarray, " S"]
-    """Relative to the largest."""
+    """Their weights relative to the largest."""
     mask: UInt8[ndarray, "h w"] | None
-    """The foreground, where it was asked for."""
+    """The foreground mask, where it is used."""
     information: dict[str, float]
+    """Numbers about this step for display, by name."""
     dropped: Dropped
+    """Candidates that were rejected."""
     passed: Passed | None = None
-    """What the fusion is to get instead of the boxes, where shapes are looked at, too."""
+    """The boxes for the fusion instead of the peaks, where shapes are used as well."""
 
 
 class PeakFinder:
-    """Finds the peaks in the pictures of one camera, by mean shift over weighted samples.
+    """A detector of peaks in the images of one camera, by mean shift over weighted samples.
 
     Boxes are sampled from an intensity and weighted by the likelihood, ṽ = l_z(x) v(x);
-    the peaks of ṽ that look enough like a person are kept, one at each place. Where
-    the parameters ask for it, part of the samples is drawn from the foreground, with
+    the peaks of ṽ that are similar enough to a person are accepted, one at each place. Where
+    the parameters enable it, part of the samples is drawn from the foreground, with
     the sizes that the calibrated camera allows there, and the likelihood is multiplied
-    by what the foreground says of the box.
+    by that of the foreground in the box.
     """
 
     def __init__(
@@ -94,7 +114,7 @@ class PeakFinder:
         reader: Pictures,
         shapes: ShapesParams = _SHAPES,
     ) -> None:
-        """Read the templates and learn the background.
+        """Read the templates and learn the background of one camera.
 
         Raises:
             ValueError: If there are no pictures or templates, or a template cannot be read.
@@ -113,9 +133,9 @@ class PeakFinder:
         )
         wanted = p.shapes == "always"
         self._fits = False
-        """Whether people by shape lie where the templates are."""
+        """Whether people by shape are at the places of the templates."""
         if p.shapes in ("unsure", "fitting") and p.asks_foreground:
-            # who is doubted in one camera is sought by shape in all: one alone tells no place
+            # a person not seen by one camera's foreground is detected by shape in all cameras
             wanted = any(
                 trust < BELIEVED
                 for camera in range(len(sequence.views))
@@ -128,10 +148,10 @@ class PeakFinder:
             wanted = wanted or self._fits
         self._shapes = ShapeFinder.of(sequence, camera_index, reader) if wanted else None
         self._instead = np.zeros(len(self._appearance.model.names))
-        """How far the shape stands in for the foreground about each person, 0 … 1."""
+        """How far the shape replaces the foreground at each person, 0 … 1."""
         self._shape_numbers = shapes
         self._by_shape = np.zeros(len(self._appearance.model.names))
-        """How far the shapes are to be believed about each person, 0 … 1."""
+        """Trust in the shapes at each person, 0 … 1."""
         if self._shapes is not None:
             names = self._appearance.model.names
             self._by_shape = np.array([by_shape.trust[name] for name in names])
@@ -139,11 +159,11 @@ class PeakFinder:
 
     @property
     def sizes(self) -> BoxSizes:
-        """The sizes that a target can have."""
+        """The possible sizes of a target."""
         return self._appearance.sizes
 
     def start(self) -> Any:
-        """The state of the foreground model and of the shapes before the first picture."""
+        """The state of the foreground model and of the shapes before the first image."""
         shapes = None if self._shapes is None else self._shapes.start()
         return self._appearance.start(), shapes
 
@@ -154,16 +174,16 @@ class PeakFinder:
         intensity: GaussianMixture,
         rng: np.random.Generator,
     ) -> tuple[Any, Peaks]:
-        """The peaks of one picture.
+        """Find the peaks of one image.
 
         Args:
-            state: As :meth:`start` gives it, or the picture before.
-            picture: BGR.
-            intensity: Where people are expected, over boxes.
-            rng: Draws the samples.
+            state: The state of :meth:`start`, or after the image before.
+            picture: The image, BGR.
+            intensity: The predicted intensity of people, over boxes.
+            rng: The generator of the samples.
 
         Returns:
-            The state for the next picture, and what was found.
+            The state for the next image, and the peaks.
         """
         background, shape_state = state
         p, s = self._parameters, self._shape_numbers
@@ -210,13 +230,13 @@ class PeakFinder:
         distances: Float[ndarray, " N"],
         person: Int[ndarray, " N"],
     ) -> Passed:
-        """People by shape, surer where a peak is of the same, and peaks where there is no shape.
+        """Combine people by shape with peaks, and add peaks at places without a shape.
 
-        A peak vouches for the surest shape at its place: others there are parts of the same
-        person. What the colours say of a shape multiplies what the shape says; that they lie on the
-        foreground is no excuse for a poor one, for so do parts of people, shadows and plants. Of a
-        peak without any shape ln (t Λ + 1 - t) tells what it means that nobody would take it for
-        a person, where t says how far the shapes are to be believed about whose colours it has.
+        A peak supports the most likely shape at its place: others there are parts of the same
+        person. The likelihood ratio of the colours multiplies that of the shape; the foreground
+        does not, for parts of people, shadows and plants are foreground as well. For a peak
+        without a shape ln (t Λ + 1 - t) is the ratio of not being detected by shape, with the
+        trust t in the shapes at the person whose colours it has.
         """
         s = self._shape_numbers
         near = self._near(found, peaks)
@@ -231,7 +251,7 @@ class PeakFinder:
         least = log_ratios(np.array(s.passed_odds), s.even_odds, s.odds_weight, s.largest_ratio)
         told = self._by_shape[person[alone]]
         of_alone = np.log(told * np.exp(least) + 1.0 - told)
-        # of who is hidden behind another's shape the foreground takes the peak for somebody
+        # the foreground replaces the shape for a person occluded by another one's shape
         seen = np.where(behind[alone], self._trusted(person[alone]), 0.0)
         return Passed(
             np.concatenate([found.boxes, peaks[alone]]),
@@ -252,8 +272,8 @@ class PeakFinder:
         person: Int[ndarray, " N"],
         vouched: Bool[ndarray, "K N"],
     ) -> Bool[ndarray, " N"]:
-        """Which peaks are of somebody else than the one whose colours are nearest to the shape:
-        of two people before each other the picture has one shape."""
+        """Whether each peak is of another person than the one nearest in colours to the shape:
+        two people in front of each other have one shape in the image."""
         behind = np.zeros(len(peaks), dtype=bool)
         for k in np.flatnonzero(vouched.sum(axis=1) > 1):
             own = np.flatnonzero(vouched[k])
@@ -263,7 +283,7 @@ class PeakFinder:
         return behind
 
     def _nearest(self, scene: Scene, boxes: Float[ndarray, "N 4"]) -> Float[ndarray, " N"]:
-        """The distance of each box to the nearest template."""
+        """The distance of each box to the nearest template, D."""
         if not len(boxes):
             return np.zeros(0)
         return np.asarray(self._appearance.distances(scene, boxes).min(axis=1))
@@ -273,12 +293,12 @@ class PeakFinder:
 
     @staticmethod
     def _near(found: Shapes, boxes: Float[ndarray, "N 4"]) -> Bool[ndarray, "K N"]:
-        """Which of some boxes is at the place of each person by shape."""
+        """Whether each box is at the place of each person by shape."""
         apart = (found.boxes[:, None, :2] - boxes[None, :, :2]) / found.sizes[:, None]
         return np.asarray((np.abs(apart) < SAME_PERSON).all(axis=2))
 
     def sigmas(self, boxes: Float[ndarray, "N 4"]) -> Float[ndarray, "N 4"]:
-        """Standard deviations of peaks: proportional to the box, and no more of a large one."""
+        """Standard deviations of peaks: proportional to the box, with an upper bound."""
         p = self._parameters
         half_sizes = np.maximum(boxes[:, 2:], 0.5)
         half_sizes = half_sizes * np.minimum(1.0, p.sigma_height / half_sizes[:, 1:])
@@ -287,7 +307,7 @@ class PeakFinder:
     def _sample(
         self, intensity: GaussianMixture, scene: Scene, rng: np.random.Generator
     ) -> Float[ndarray, "S 4"]:
-        """Boxes from the intensity and from the foreground."""
+        """Sample boxes from the intensity and from the foreground."""
         p = self._parameters
         everywhere = round(p.samples * p.foreground_samples)
         if intensity.size == 0 and p.foreground_samples > 0.0:
@@ -310,10 +330,10 @@ class PeakFinder:
     def _score(
         self, scene: Scene, shapes: Shapes | None, boxes: Float[ndarray, "N 4"]
     ) -> tuple[Float[ndarray, "N G"], Float[ndarray, "N G"], Float[ndarray, " N"]]:
-        """Log-likelihood and distance D of each box for each person, and share of foreground.
+        """Log likelihood and distance D of each box for each person, and share of foreground.
 
-        About somebody whom the foreground does not see the shape says instead whether there
-        is a person: a ln(P + 0.02), with the probability P of one.
+        At a person whom the foreground does not show, the shape replaces it:
+        a ln(P + 0.02), with the probability P of a person by shape.
         """
         p = self._parameters
         distances = self._appearance.distances(scene, boxes)
@@ -335,7 +355,7 @@ class PeakFinder:
         return scores, distances, inside
 
     def _trusted(self, person: Int[ndarray, " N"]) -> Float[ndarray, " N"]:
-        """How far the foreground is believed about each person of some boxes."""
+        """Trust in the foreground at the person of each box, 0 … 1."""
         trust = self._appearance.trust
         if not self._parameters.peaks_per_person:
             trust = np.full(1, trust.min())
@@ -344,7 +364,7 @@ class PeakFinder:
     def _climb(
         self, samples: Float[ndarray, "S 4"], scores: Float[ndarray, "S G"]
     ) -> Float[ndarray, "M 4"]:
-        """The peaks of the weighted samples, by each person's colours for themselves."""
+        """Climb to the peaks of the weighted samples, separately for each person's colours."""
         p = self._parameters
         found = [np.zeros((0, 4))]
         for person in range(scores.shape[1] if len(samples) else 0):
@@ -365,8 +385,11 @@ class PeakFinder:
     def _accept(
         self, scene: Scene, shapes: Shapes | None, candidates: Float[ndarray, "M 4"]
     ) -> tuple[Float[ndarray, "K 4"], Float[ndarray, " K"], Int[ndarray, " K"], Dropped]:
-        """The peaks that look enough like a person, their distances, and like whom; one at each
-        place. And where the others fell."""
+        """Select the peaks similar enough to a person, one at each place.
+
+        Returns:
+            The peaks, their distances D, their persons, and the rejected candidates.
+        """
         p = self._parameters
         scores, distances, inside = self._score(scene, shapes, candidates)
         best, nearest, person = scores.max(axis=1), distances.min(axis=1), scores.argmax(axis=1)
@@ -397,7 +420,37 @@ class PeakFinder:
 def _at_least(
     log_ratios: Float[ndarray, " N"], share: Float[ndarray, " N"]
 ) -> Float[ndarray, " N"]:
-    """ln (t + (1 - t) Λ) of the likelihood ratios Λ below 1: with probability t what somebody
-    looks like does not speak against him."""
+    """Compute ln (t + (1 - t) Λ) of likelihood ratios Λ below 1, which are uninformative with
+    probability t."""
     mixed = np.log(share + (1.0 - share) * np.exp(np.minimum(log_ratios, 0.0)))
     return np.asarray(np.where(log_ratios < 0.0, mixed, log_ratios))
+
+
+def colour_ratios(
+    vouched: Bool[ndarray, "K N"],
+    of_peaks: Float[ndarray, " N"],
+    of_shapes: Float[ndarray, " K"],
+    sigma: float,
+) -> Float[ndarray, " K"]:
+    """Compute ln Λ of the colours of people by shape, to be added to that of the shape itself.
+
+    With the distance D to the nearest template and the spread σ of the colour likelihood, for a
+    shape with a peak at its place and for one without
+
+        ln Λ = (D_p - D) / σ  within ±2,      ln Λ = (D_s - D) / σ  within -1 … 0.
+
+    In rendered rooms the logarithm of the ratio of people and other things at such places
+    decreases by about 1 / σ per unit of D, whatever the shape's odds: the two are independent,
+    and their ratios multiply. A false shape near a person has that person's colours, so its
+    own colours are no evidence for it: only a peak is.
+
+    Args:
+        vouched: Whether each of N peaks is at the place of each of K shapes.
+        of_peaks: D of each peak.
+        of_shapes: D of each shape's box.
+        sigma: σ, in units of D.
+    """
+    nearest = np.where(vouched, of_peaks, np.inf).min(axis=1, initial=np.inf)
+    by_peak = np.clip((PEAK_EVEN - nearest) / sigma, -LARGEST, LARGEST)
+    by_box = np.clip((SHAPE_EVEN - of_shapes) / sigma, -UNLIKE, 0.0)
+    return np.asarray(np.where(vouched.any(axis=1), by_peak, by_box))

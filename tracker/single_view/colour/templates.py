@@ -15,16 +15,16 @@ from tracker.single_view.pictures.colour import ColourModel, ColourSpaceName, Ke
 def read_templates(
     sequence: Sequence, space: ColourSpaceName, kernel: KernelName, reader: Pictures
 ) -> ColourModel:
-    """The colour model of the sequence's templates, read once for all cameras that ask for it.
+    """Read the colour model of the sequence's templates, once for all cameras.
 
     Args:
-        sequence: Templates of one name are of one person.
-        space: The histograms' bins.
-        kernel: How the pixels of a box count.
-        reader: Of the pictures.
+        sequence: The sequence; templates of one name are of one person.
+        space: The bins of the histograms.
+        kernel: The weights of the pixels of a box.
+        reader: Reader of the images.
 
     Raises:
-        ValueError: If there is none, or one's picture or box cannot be used.
+        ValueError: If there is no template, or the image or box of one cannot be used.
     """
     if not sequence.templates:
         raise ValueError(
@@ -38,12 +38,12 @@ def read_templates(
 
 
 def template_picture(reader: Pictures, camera: int, step: int) -> Picture | None:
-    """The picture of a template, read once: in a video it is far from all that is read otherwise.
+    """Read the image of a template, once: in a video it is far from the frames read otherwise.
 
     Args:
-        reader: Of the pictures.
-        camera: Its index.
-        step: Of the template.
+        reader: Reader of the images.
+        camera: Index of the camera.
+        step: Step of the template.
     """
     return reader.once(("template picture", camera, step), lambda: reader.picture(camera, step))
 

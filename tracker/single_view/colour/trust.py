@@ -1,9 +1,9 @@
-"""How far foreground and shape are to be believed about each person, by their templates.
+"""Trust in foreground and shape at each person, estimated at their templates.
 
-Somebody who never leaves is learnt as background. A template is proof that a person
-was there: where it lies on background, the foreground is wrong and not the template.
-So it is with shapes: somebody who lies, or whose template nobody would take for a person, is
-not found by shape.
+A person who never leaves is learnt as background. A template is proof of a person:
+where it lies on background, the foreground is wrong and not the template.
+The same holds for shapes: a person who lies, or whose template does not look like a person, is
+not detected by shape.
 """
 
 from __future__ import annotations
@@ -27,38 +27,38 @@ from tracker.single_view.pictures.foreground import box_shares, integral, learn
 from tracker.single_view.shape.finder import ShapeFinder
 
 PICTURES_BEFORE = 8
-"""Before a template's, that are looked at for what moves."""
+"""Number of images before a template's that are used for the detection of motion."""
 
 TEMPLATES_BY_SHAPE = 2
-"""Of each person, that are looked at: each takes a moment before the first step."""
+"""Number of templates of each person that are used: each takes a moment before the first step."""
 
 PASSED, OVERLAP = -1.5, 0.3
-"""Log odds from which somebody is there by shape, and what two people there share at most."""
+"""Log odds from which a person is detected by shape, and the largest overlap of two people."""
 
 NOTHING, ENOUGH = 0.1, 0.3
-"""Shares of foreground in a template's box: below the first the foreground knows nothing of the
-person, from the second on it is believed. Boxes drawn by hand around people whom it sees hold
+"""Shares of foreground in a template's box: below the first the foreground does not show the
+person, from the second on it is trusted. Boxes drawn by hand around people in the foreground have
 0.38 to 0.86."""
 
 
 def template_trust(
     sequence: Sequence, camera_index: int, reader: Pictures, parameters: ForegroundParams
 ) -> dict[str, float]:
-    """Trust in a camera's foreground about each person with templates, 0 … 1.
+    """Estimate the trust in a camera's foreground at each person with templates, 0 … 1.
 
     It rises smoothly from 0 to 1 with the mean share f of foreground in the person's
     templates,
 
         t = 3 u² - 2 u³,  u = (f - f_0) / (f_1 - f_0) within 0 … 1.
 
-    Who has no template in this camera is judged by those in the others, for who stays
-    there stays here.
+    A person without a template in this camera is judged by those in the others, for a person who
+    does not move there does not move here.
 
     Args:
-        sequence: Its templates.
-        camera_index: Whose foreground.
-        reader: Of the pictures.
-        parameters: Of the foreground model.
+        sequence: The sequence with its templates.
+        camera_index: Index of the camera of the foreground.
+        reader: Reader of the images.
+        parameters: Parameters of the foreground model.
     """
     camera = sequence.views[camera_index].camera.name
     trust: dict[str, float] = {}
@@ -81,8 +81,8 @@ def template_trust(
 def taught_well(sequence: Sequence) -> bool:
     """Whether every person has a template in every camera, and several in one.
 
-    What somebody's colours are in another camera, by another light, is guessed from those in
-    one, and from the other side from those of one side.
+    A person's colours in another camera, with other light, are predicted from those in
+    one, and those of the other side from those of one side.
     """
     taught = Counter((template.name, template.camera) for template in sequence.templates)
     names = {template.name for template in sequence.templates}
@@ -93,23 +93,23 @@ def taught_well(sequence: Sequence) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class ShapesOfTemplates:
-    """What people by shape are at the templates, which are proof of a person."""
+    """Agreement of people by shape with the templates, which are proof of a person."""
 
     trust: dict[str, float]
-    """Of each person with templates, the probability by shape at the likeliest of them."""
+    """Probability by shape at the likeliest template of each person, by name, 0 … 1."""
     fit: float
     """Mean intersection over union of a template and the person by shape there, 0 … 1."""
 
 
 def shapes_of_templates(sequence: Sequence, reader: Pictures) -> ShapesOfTemplates:
-    """How far shapes are to be believed: whether they see who is there, and where he is.
+    """Estimate the trust in shapes: whether they detect the people of templates, and where.
 
-    Who lies, or whose template nobody would take for a person, is not seen by shape. A target
-    that is no head or body, or a floor that is not where the room begins, puts them elsewhere.
+    A person who lies, or whose template does not look like a person, is not detected. A target
+    that is no head or body, or a floor that is not that of the room, shifts the detections.
 
     Args:
-        sequence: Its templates, as stage 1 sees its pictures.
-        reader: Of the pictures.
+        sequence: The sequence with its templates, as stage 1 gets its images.
+        reader: Reader of the images.
     """
     trust: dict[str, float] = {}
     fits = []
@@ -123,8 +123,8 @@ def shapes_of_templates(sequence: Sequence, reader: Pictures) -> ShapesOfTemplat
 
 
 def _by_shape(sequence: Sequence, template: Template, reader: Pictures) -> tuple[float, float]:
-    """The probability of a person by shape in a template's box, and how much of it they share;
-    0 where nothing can be said."""
+    """The probability of a person by shape in a template's box, and their overlap; 0 where the
+    image cannot be used."""
     names = [view.camera.name for view in sequence.views]
     if template.camera not in names:
         return 0.0, 0.0
@@ -134,7 +134,7 @@ def _by_shape(sequence: Sequence, template: Template, reader: Pictures) -> tuple
     def look() -> tuple[float, float]:
         finder = ShapeFinder.of(sequence, camera, reader)
         state = finder.start()
-        # the pictures before show what moves
+        # the images before are needed for motion
         before = min(template.frame, PICTURES_BEFORE)
         pictures = reader.iterate(camera, template.frame - before)
         for picture in islice(pictures, before):
@@ -156,7 +156,7 @@ def _by_shape(sequence: Sequence, template: Template, reader: Pictures) -> tuple
 def _share(
     sequence: Sequence, template: Template, reader: Pictures, parameters: ForegroundParams
 ) -> float | None:
-    """The share of foreground in a template's box; None where nothing can be said."""
+    """The share of foreground in a template's box; None where the image cannot be used."""
     names = [view.camera.name for view in sequence.views]
     if template.camera not in names:
         return None

@@ -1,7 +1,7 @@
 """Tracking in one camera by joint probabilistic data association, with five cases.
 
-:mod:`~tracker.single_view.jpda.method` puts together where the measurements come from,
-the association matrix, the cases it tells apart, and what they do to the targets.
+:mod:`~tracker.single_view.jpda.method` combines the sources of measurements, the association
+matrix, its cases, and their effect on the targets.
 """
 
 from __future__ import annotations

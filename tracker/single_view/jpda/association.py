@@ -1,4 +1,4 @@
-"""The association matrix of one step: which target may have made which measurement."""
+"""The association matrix of one step: probabilities of all pairs of target and measurement."""
 
 from __future__ import annotations
 
@@ -19,25 +19,25 @@ def associate(
     area: float,
     parameters: JpdaParams,
 ) -> tuple[Float[ndarray, "n M"], Int[ndarray, " n"]]:
-    """Association probabilities β_tj, and the likeliest joint event.
+    """Compute association probabilities β_tj, and the likeliest joint event.
 
     By Bayes' rule a joint event has the weight Π_t P_D Λ_tj or 1 − P_D P_G, times
 
     * **poisson**: λ_c / area for each false measurement;
-    * **diffuse**, as published: Φ! / V^Φ, of whose number Φ nothing is known. V is one
-      number for all gates, so it is taken in units of √|S|, as is then Λ.
+    * **diffuse**, as published: Φ! / V^Φ, for an unknown number Φ. V is one
+      number for all gates, so it is in units of √|S|, as is then Λ.
 
     Groups of targets that share no measurement are independent.
 
     Args:
-        found: How the measurements lie to the predictions.
-        possible: What lies in whose gate: the validation matrix without its column of false
-            alarms, transposed.
-        area: Of the picture, square pixels.
-        parameters: P_D, P_G, which joint events, and what is known of Φ.
+        found: Innovations of all targets and measurements.
+        possible: Whether each measurement is in the gate of each target: the validation matrix
+            without its column of false alarms, transposed.
+        area: Area of the image, square pixels.
+        parameters: P_D, P_G, the kind of joint events, and the model of Φ.
 
     Returns:
-        β_tj, and the measurement that the likeliest joint event gives each target, or -1.
+        β_tj, and the measurement of each target in the likeliest joint event, -1 for none.
     """
     p = parameters
     targets, count = possible.shape
@@ -48,7 +48,7 @@ def associate(
         densities = densities * np.sqrt(np.linalg.det(found.covariances))
         clutter = 1.0 / p.gate_volume
     detected = np.where(possible, p.detection_probability * densities, 0.0)
-    # a density may underflow to 0 inside its gate; the pair stays possible
+    # a density may underflow to 0 inside its gate; the pair remains possible
     detected[possible] = np.maximum(detected[possible], np.finfo(float).tiny)
     miss = 1.0 - p.detection_probability * p.gate_probability
     for members, shared in association.clusters(possible):

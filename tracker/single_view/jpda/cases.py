@@ -1,4 +1,4 @@
-"""Five cases that the association matrix tells apart: normal, new, vanished, occluded, split.
+"""Five cases of the association matrix: normal, new, vanished, occluded, split.
 
 [WW10] Wang, Wan, "Fast tracking of multiple targets in video by joint probabilistic
 data association", patent CN101783020A, 2010.
@@ -20,18 +20,18 @@ UNREACHED = 1e6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Cases:
-    """What the rows and columns of one association matrix say of n targets and M measurements."""
+    """The cases of n targets and M measurements, from the rows and columns of a matrix."""
 
     own: Int[ndarray, " n"]
-    """The measurement that the likeliest joint event gives each target, -1 for none."""
+    """The measurement of each target in the likeliest joint event, -1 for none."""
     shared: Int[ndarray, " n"]
-    """Occluded: the measurement that it shares with others, -1 for none."""
+    """For an occluded target the measurement that it shares with others, else -1."""
     split: Bool[ndarray, " n"]
-    """Several measurements are its own and nobody else's."""
+    """Whether a target has several measurements that no other target has."""
     missed: Bool[ndarray, " n"]
-    """Its column is zero: vanished, once that lasts."""
+    """Whether its column is zero: it vanishes if that lasts."""
     new: Bool[ndarray, " M"]
-    """Its row is zero: somebody new, or back."""
+    """Whether its row is zero: it is of a new or a returned target."""
 
 
 def tell_apart(
@@ -41,23 +41,23 @@ def tell_apart(
     *,
     every_shared_row: bool,
 ) -> Cases:
-    """Read the association matrix ([WW10]_; there measurements are rows and targets columns).
+    """Determine the cases of the association matrix ([WW10]_, with measurements as rows there).
 
     Entries up to ``least_probability`` count as 0.
 
     * **New**: a measurement whose row is zero.
     * **Vanished**: a target whose column is zero.
     * **Occluded**: a row with several positive entries. Two targets close together with a
-      measurement each have such rows too: as published, they go to the measurements of
-      the greatest Π β_tj, one each as far as there are enough; else only those count of
-      which some have no measurement of their own.
+      measurement each have such rows too: as published, they are assigned to the measurements of
+      the greatest Π β_tj, one each as far as there are enough; else only rows count with
+      a target that has no measurement of its own.
     * **Split**: a column with several positive entries in rows of which it has the largest.
     * **Normal**: all others.
 
     Args:
-        matrix: β_tj.
-        own: The likeliest joint event.
-        least_probability: β_min.
+        matrix: β_tj, association probabilities.
+        own: The measurement of each target in the likeliest joint event.
+        least_probability: β_min, the bound for zero.
         every_shared_row: Whether targets with a measurement each can be occluded.
     """
     targets, count = matrix.shape
@@ -83,7 +83,7 @@ def tell_apart(
 
 
 def _one_each(shared: Float[ndarray, "n M"], wanted: Int[ndarray, " n"]) -> Int[ndarray, " n"]:
-    """As many targets as possible at measurements of their own, of the greatest Π β_tj."""
+    """Assign as many targets as possible to measurements of their own, with the greatest Π β_tj."""
     possible = shared > 0.0
     cost = np.where(possible, -np.log(np.where(possible, shared, 1.0)), UNREACHED)
     targets, chosen = linear_sum_assignment(cost)
@@ -99,17 +99,17 @@ def part_strangers(
     expected: Float[ndarray, "n 4"],
     boxes: Float[ndarray, "M 4"],
 ) -> tuple[Cases, Float[ndarray, "n M"]]:
-    """Beyond [WW10]_: of a target that splits, only what lies in its own box is a part of it.
+    """Beyond [WW10]_: for a split target only measurements in its own box belong to it.
 
-    Between two people who have come apart the weighted state would stand still, and its
-    gate would widen with their distance. What lies outside the target's box is somebody
-    new, and its probability goes to the measurement that is the target's own.
+    Between two people who have parted the weighted state would stand still, and its
+    gate would widen with their distance. A measurement outside the target's box is a new
+    target, and its probability is added to that of the target's own measurement.
 
     Args:
-        cases: As the matrix has them.
-        matrix: β_tj.
-        expected: The targets' boxes, pixels.
-        boxes: The measurements.
+        cases: The cases of the matrix.
+        matrix: β_tj, association probabilities.
+        expected: Predicted boxes of the targets, pixels.
+        boxes: Boxes of the measurements, pixels.
 
     Returns:
         The cases and the matrix.
@@ -135,18 +135,18 @@ def look_into_pieces(
     pieces: Float[ndarray, "M 4"],
     furthest: float,
 ) -> Cases:
-    """Beyond [WW10]_: what comes together makes a measurement outside everybody's gate.
+    """Beyond [WW10]_: people who merge give a measurement outside all gates.
 
-    A target whose column is zero, and whose expected centre lies in what a measurement was
-    found in, has not vanished. If that measurement is nobody's and near, it is the
-    target's; all other such targets are hidden there.
+    A target with a zero column, and a predicted centre in the foreground component of a
+    measurement, has not vanished. If that measurement has no target and is near, it is the
+    target's; all other such targets are occluded there.
 
     Args:
-        cases: As the matrix has them.
-        expected: The targets' boxes, pixels.
-        boxes: The measurements.
-        pieces: What each was found in.
-        furthest: Half sizes within which a measurement of nobody may be such a target's.
+        cases: The cases of the matrix.
+        expected: Predicted boxes of the targets, pixels.
+        boxes: Boxes of the measurements, pixels.
+        pieces: Box of the foreground component of each measurement, pixels.
+        furthest: Half sizes within which a measurement without target may be such a target's.
     """
     lost = np.flatnonzero(cases.missed)
     if not len(lost) or not len(boxes):
@@ -160,7 +160,7 @@ def look_into_pieces(
         covering = np.flatnonzero(reach[i] <= 1.0)
         if not len(covering):
             continue
-        # of the measurements of one piece the nearest
+        # the nearest of the measurements of one component
         j = int(covering[leap[i, covering].argmin()])
         missed[lost[i]] = False
         if new[j] and leap[i, j] <= furthest:

@@ -1,12 +1,12 @@
-"""Targets in a foreground mask, without any prior of where they are: the tops of its pieces.
+"""Targets in a foreground mask without any prior, from the tops of its components.
 
 People stand; seen from the side, the crown of the head is on top, however many people one
-connected piece of foreground shows and whatever hides their legs. The calibrated camera gives
+connected component shows and whatever occludes their legs. The calibrated camera gives
 the size of a target whose height above the floor is roughly known.
 
-Where the number of people in each piece is known from tracks,
-:mod:`~tracker.single_view.association_matrix.silhouettes` looks for that number: it accepts
-poorer boxes for those who are expected, and only very good ones beyond.
+Where the number of people in each component is known from tracks,
+:mod:`~tracker.single_view.association_matrix.silhouettes` fits that number: it accepts
+poorer boxes for expected targets, and only very good ones beyond.
 
 Boxes are ``centre_x, centre_y, half_width, half_height`` in pixels.
 """
@@ -32,23 +32,24 @@ from tracker.single_view.pictures.foreground import integral, shape_shares
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Crowns:
-    """The targets of one mask."""
+    """The N targets of one mask."""
 
     boxes: Float[ndarray, "N 4"]
+    """Boxes of the targets, pixels."""
     inside: Float[ndarray, " N"]
     """Share of foreground in each box."""
     pieces: Float[ndarray, "N 4"]
-    """The box of the piece of foreground that each is the top of."""
+    """Box of the foreground component of each target, pixels."""
     dropped: Dropped
-    """Where other tops fell."""
+    """Tops that were rejected."""
 
 
 class TargetSizes:
-    """The middle size of a target at each place of a picture.
+    """The median size of a target at each place of an image.
 
-    Of targets whose centres are as high above the floor as where people come in; of lower
-    ones, who sit or bend, where none of those can be. What is higher, an open door for
-    instance, is nobody. A room without entrances says nothing of heights.
+    It is that of targets with centres at the heights of the entrances, or of lower
+    ones, for people who sit or bend, where none of those can be. Anything higher, such as an
+    open door, is no target. A room without entrances has no prior of heights.
     """
 
     def __init__(
@@ -58,13 +59,13 @@ class TargetSizes:
         half_extents: Float[ndarray, " 3"],
         height_sigmas: float,
     ) -> None:
-        """Work out the sizes at each place.
+        """Compute the sizes at each place.
 
         Args:
             camera: The calibrated camera.
-            room: Where targets are, and where they come in.
-            half_extents: Of a target, metres.
-            height_sigmas: Deviations of the entrances' heights within which they keep.
+            room: The room with its entrances.
+            half_extents: Half width, depth and height of a target, metres.
+            height_sigmas: Range of heights around the entrances', in standard deviations.
         """
         upright, lower = (
             BoxSizes.of(camera, part, half_extents)
@@ -75,14 +76,14 @@ class TargetSizes:
         self._table = np.where(there[:, None], standing, lower.typical(places)[0])
         somewhere = np.isfinite(self._table[:, 0])
         self.middle = np.median(self._table[somewhere], axis=0) if somewhere.any() else np.ones(2)
-        """Half width and half height in the middle of all places, pixels."""
+        """Median half width and half height over all places, pixels."""
 
     def at(self, centres: Float[ndarray, "N 2"]) -> Float[ndarray, "N 2"]:
-        """Half width and half height of a target there, NaN where none can be."""
+        """The half width and half height of a target at each place, pixels, NaN for none."""
         return np.asarray(self._table[self._grid.cells(centres)])
 
     def under(self, tops: Float[ndarray, "N 2"]) -> Float[ndarray, "N 2"]:
-        """The sizes of targets whose crowns are there."""
+        """The sizes of targets with their crowns at each place, pixels."""
         half_heights = np.full(len(tops), self.middle[1])
         for _ in range(2):
             sizes = self.at(np.stack([tops[:, 0], tops[:, 1] + half_heights], axis=1))
@@ -91,13 +92,13 @@ class TargetSizes:
 
 
 def _walked(room: Room, half_height: float, sigmas_wide: float) -> tuple[Room, Room]:
-    """The parts of the room's volume that the centres of upright, and of all, targets are in."""
+    """The parts of the room's volume with the centres of upright targets, and of all targets."""
     if not room.entrances:
         return room, room
     heights = np.array([entrance.position[2] for entrance in room.entrances])
     sigmas = np.array([entrance.sigma[2] for entrance in room.entrances])
     low, high = room.minimum.copy(), room.maximum.copy()
-    # the volume of box sizes begins where a target stands on its floor
+    # the volume of box sizes begins at the centre of a target on its floor
     low[2] = (heights - sigmas_wide * sigmas).min() - half_height + BELOW_FLOOR
     high[2] = (heights + sigmas_wide * sigmas).max()
     return Room(low, high), Room(room.minimum, high)
@@ -106,19 +107,19 @@ def _walked(room: Room, half_height: float, sigmas_wide: float) -> tuple[Room, R
 def crowns(
     mask: UInt8[ndarray, "h w"], sizes: TargetSizes, minimum_area: int, parameters: JpdaParams
 ) -> Crowns:
-    """The targets that a mask shows from above the shoulders.
+    """Detect the targets of a mask by their heads and shoulders.
 
-    Cracks across a piece are closed. A column of a piece is a top where its first pixel
-    is the highest within a target's half width; of neighbours the middle one. A
-    target's box hangs from the top, centred on the pixels of its upper half. Boxes that
-    hold too little foreground, or have too much above or beside them, are nobody;
-    nor is a top that lies where a higher one's shoulders are.
+    Cracks across a component are closed. A column of a component is a top where its first pixel
+    is the highest within a target's half width; the middle one of neighbouring tops is used. A
+    target's box hangs from the top, centred on the pixels of its upper half. Boxes with
+    too little foreground inside, or too much above or beside them, are rejected;
+    so is a top at the shoulders of a higher one.
 
     Args:
-        mask: Foreground is what is not 0.
-        sizes: Of targets in this camera.
-        minimum_area: Smaller pieces are nobody.
-        parameters: What a target under a top must look like.
+        mask: The foreground mask, not 0 on the foreground.
+        sizes: Possible sizes of targets in this camera.
+        minimum_area: Area below which a component is ignored, pixels.
+        parameters: Thresholds for a target under a top.
     """
     p = parameters
     crack = max(3, round(p.crack * float(sizes.middle[1])) | 1)
@@ -149,7 +150,7 @@ def crowns(
 
 
 def _tops(pieces: Blobs, piece: int, sizes: TargetSizes, top_reach: float) -> Float[ndarray, "N 4"]:
-    """The boxes of targets under every top of one piece."""
+    """The boxes of targets under every top of one component."""
     x, y, half_width, half_height = pieces.boxes[piece]
     left, top = round(x - half_width + 0.5), round(y - half_height + 0.5)
     width, height = round(2.0 * half_width), round(2.0 * half_height)

@@ -1,4 +1,4 @@
-"""What the data association is given: boxes of the foreground, of colour peaks, of a detector.
+"""Sources of the measurements: boxes of the foreground, of colour peaks, or of a detector.
 
 Boxes are ``centre_x, centre_y, half_width, half_height`` in pixels.
 """
@@ -37,33 +37,40 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Measured:
-    """The measurements of one step, and what there is to see of how they were found."""
+    """The M measurements of one step, and data about them for display."""
 
     boxes: Float[ndarray, "M 4"]
+    """Boxes of the measurements, pixels."""
     scores: Float[ndarray, " M"]
-    """0 … 1."""
+    """Score of each, 0 … 1."""
     sigmas: Float[ndarray, "M 4"]
     """Standard deviations of the boxes' numbers, pixels."""
     pieces: Float[ndarray, "M 4"]
-    """The box of what each was found in: whoever it hides is inside."""
+    """Box of the foreground component of each; targets that it occludes are inside."""
     shown: Float[ndarray, "S 4"] | None = None
-    """Boxes worth showing that were found out to be nobody's; None for no others."""
+    """Rejected boxes for display; None for none."""
     shown_scores: Float[ndarray, " S"] | None = None
+    """Their scores."""
     samples: Float[ndarray, "S 4"] = field(default_factory=lambda: np.zeros((0, 4)))
+    """Samples of the intensity, where the source has any."""
     sample_weights: Float[ndarray, " S"] = field(default_factory=lambda: np.zeros(0))
+    """Their weights relative to the largest."""
     mask: UInt8[ndarray, "h w"] | None = None
+    """The foreground mask, where the source has one."""
     information: dict[str, float] = field(default_factory=dict)
+    """Numbers about this step for display, by name."""
     dropped: Dropped = field(default_factory=Dropped.none)
+    """Candidates that were rejected."""
 
     @staticmethod
     def nothing() -> Measured:
-        """There was no picture."""
+        """No measurements, as without an image."""
         none = np.zeros((0, 4))
         return Measured(none, np.zeros(0), none, none)
 
 
 class Source(Protocol):
-    """Where one camera's measurements come from."""
+    """A source of measurements of one camera."""
 
     def start(self) -> Any:
         """The state before the first step."""
@@ -77,32 +84,31 @@ class Source(Protocol):
         expected: GaussianMixture,
         rng: np.random.Generator,
     ) -> tuple[Any, Measured]:
-        """The measurements of one step.
+        """Return the measurements of one step.
 
         Args:
-            state: What the step before returned.
-            frame: The step.
-            picture: BGR; None where there is none.
-            expected: The targets as they are expected, over boxes.
+            state: The state that the step before returned.
+            frame: Index of the step, from 0.
+            picture: The image, BGR; None where there is none.
+            expected: The predicted targets, as an intensity over boxes.
             rng: The only source of randomness.
         """
         ...
 
     def sigmas(self, boxes: Float[ndarray, "N 4"]) -> Float[ndarray, "N 4"]:
-        """Measurement noise of boxes of this size: standard deviations of their numbers, pixels."""
+        """Measurement noise of boxes: standard deviations of their four numbers, pixels."""
         ...
 
 
 def source_of(
     sequence: Sequence, camera_index: int, parameters: RunParameters, reader: Pictures
 ) -> Source:
-    """The chosen source, prepared for one camera.
+    """Create the chosen source for one camera.
 
-    Without a single template there are no colours to look for; the foreground says then
-    where people are.
+    Without any template the colours are replaced by the foreground.
 
     Raises:
-        ValueError: If the camera lacks what the source needs.
+        ValueError: If the camera lacks data that the source needs.
     """
     p = parameters.of(JpdaParams)
     if p.measurements == "detections":
@@ -115,7 +121,7 @@ def source_of(
 
 
 class _Foreground:
-    """Boxes of the pieces of foreground, or of a target under each top of a piece."""
+    """Boxes of foreground components, or of a target under each top of a component."""
 
     def __init__(
         self,
@@ -185,7 +191,7 @@ class _Foreground:
 
 
 class _Colours:
-    """Peaks of the colour likelihood, with the numbers of ``colour_phd``."""
+    """Peaks of the colour likelihood, with the parameters of ``colour_phd``."""
 
     def __init__(
         self,
@@ -230,7 +236,7 @@ class _Colours:
 
 
 class _Detector:
-    """An outside detector's boxes, with the numbers of ``detection_boxes``."""
+    """The boxes of an external detector, with the parameters of ``detection_boxes``."""
 
     def __init__(self, sequence: Sequence, camera_index: int, parameters: RunParameters) -> None:
         self._cover = parameters.of(JpdaParams).cover

@@ -31,39 +31,40 @@ if TYPE_CHECKING:
     from tracker.parameters import RunParameters
 
 BELIEVED = 0.5
-"""A measurement that targets explain with more than this probability is somebody's: more likely
-than not."""
+"""Probability above which a measurement belongs to a target: more likely than not."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JpdaState:
-    """Who is there, who was until a moment ago, and the next free label."""
+    """The targets after a step, and all that the next step needs."""
 
     targets: Targets
+    """The present targets."""
     vanished: Targets
-    """Their misses count since they were last measured."""
+    """Targets that vanished recently; their misses count since the last measurement."""
     next_label: int
+    """The first label that is free."""
     source: Any
-    """Of the measurements' source."""
+    """The state of the source of measurements."""
 
 
 class Jpda:
-    """Kalman filters that share the measurements by their association probabilities ([WW10]_).
+    """Kalman filters with joint probabilistic data association ([WW10]_).
 
     State [p_x, v_x, p_y, v_y], constant velocity, measured at the position; the box's
-    size is smoothed along. Per step: the validation matrix says what lies in whose gate;
-    joint events, and Bayes' rule for each, make the association matrix β; its rows and
-    columns tell five cases apart (:func:`~tracker.single_view.jpda.cases.tell_apart`):
+    size is smoothed separately. Per step: the validation matrix has the gated pairs;
+    joint events, and Bayes' rule for each, give the association matrix β; its rows and
+    columns determine five cases (:func:`~tracker.single_view.jpda.cases.tell_apart`):
 
-    * normal and split targets take the mean over all associations;
-    * occluded ones take the measurement's position and stand still, or, beyond the patent,
-      go on as they were, but inside the piece that hides them;
-    * a target without measurement goes on, and has vanished after three steps;
-    * a measurement of nobody is compared with who vanished in the last few steps before
-      it is somebody new; both begin at rest.
+    * normal and split targets are updated by the mean over all associations;
+    * occluded ones are put at the measurement with velocity 0, or, beyond the patent,
+      predicted inside the foreground component that occludes them;
+    * a target without measurement is predicted, and has vanished after three steps;
+    * a measurement without target is compared with the targets that vanished in the last
+      steps, and else begins a target; both have velocity 0.
 
-    Without the five cases this is the classical filter: targets begin where nothing is
-    expected, end when they are not measured, and everybody else takes the mean.
+    Without the five cases this is the classical filter: targets begin at measurements outside
+    all gates, end without measurements, and all others are updated by the mean.
     """
 
     def __init__(
@@ -74,17 +75,17 @@ class Jpda:
         reader: Pictures,
         source: Source | None = None,
     ) -> None:
-        """Prepare for one camera.
+        """Prepare the filter of one camera.
 
         Args:
-            sequence: Whose camera.
-            camera_index: Which one.
-            parameters: Of the association, and of the measurements.
-            reader: Of the pictures.
-            source: Where the measurements come from; what the parameters say where None.
+            sequence: The sequence.
+            camera_index: Index of the camera.
+            parameters: Parameters of the association and of the measurements.
+            reader: Reader of the images.
+            source: The source of measurements; None for that of the parameters.
 
         Raises:
-            ValueError: If the camera lacks what the measurements are made from.
+            ValueError: If the camera lacks data for the measurements.
         """
         self._parameters = p = parameters.of(JpdaParams)
         self._source = source or source_of(sequence, camera_index, parameters, reader)
@@ -95,7 +96,7 @@ class Jpda:
         self._area = float(width * height)
 
     def start(self) -> JpdaState:
-        """Nobody is in the picture."""
+        """The state without targets, before the first step."""
         return JpdaState(Targets.empty(), Targets.empty(), 1, self._source.start())
 
     def step(
@@ -105,7 +106,7 @@ class Jpda:
         picture: UInt8[ndarray, "h w 3"] | None,
         rng: np.random.Generator,
     ) -> tuple[JpdaState, ViewResult]:
-        """One step; without a picture nothing is measured."""
+        """Process one step; without an image the targets are predicted only."""
         p = self._parameters
         expected = state.targets.predict(self._step_time, p.acceleration_sigma)
         vanished = state.vanished.predict(self._step_time, p.acceleration_sigma)
@@ -149,7 +150,7 @@ class Jpda:
         self, expected: Targets, seen: Measured, cases: Cases, moved: Moved, managed: Managed
     ) -> ViewResult:
         p, targets = self._parameters, managed.targets
-        # those that are back or new are where they were measured
+        # returned and new targets are at their measurements
         arrived = np.ones(len(managed.sources))
         weights = np.concatenate([_weights(moved, cases)[managed.stayed], arrived])
         counting = targets.labels > 0
@@ -160,7 +161,7 @@ class Jpda:
         else:
             seen_now = counting & (targets.misses == 0)
             if p.occlusion == "inside":
-                seen_now &= targets.hidden == 0  # nobody knows where exactly
+                seen_now &= targets.hidden == 0  # the position of an occluded target is uncertain
             chosen = np.flatnonzero(seen_now)
             boxes, box_weights = targets.boxes[chosen], weights[chosen]
             sigmas, labels = self._source.sigmas(boxes), targets.labels[chosen]
@@ -186,7 +187,7 @@ class Jpda:
     def _believed(
         self, seen: Measured, moved: Moved, managed: Managed
     ) -> tuple[ndarray, ndarray, ndarray, ndarray]:
-        """The measurements that are somebody's: boxes, sigmas, probabilities and labels."""
+        """The measurements that belong to targets: boxes, sigmas, probabilities and labels."""
         after = len(managed.targets.labels)
         matrix = np.zeros((after, len(seen.boxes)))
         matrix[: len(managed.stayed)] = moved.matrix[managed.stayed]
@@ -201,7 +202,7 @@ class Jpda:
         return seen.boxes[taken], seen.sigmas[taken], np.minimum(explained[taken], 1.0), whose
 
     def _gates(self, expected: Targets) -> ndarray:
-        """The gates of measurements of the targets' own sizes."""
+        """The gates of measurements with the targets' own sizes."""
         counting = expected.take(np.flatnonzero(expected.labels > 0))
         noise = self._source.sigmas(counting.boxes)[:, :2] ** 2
         spread = counting.place_covariances + noise[:, :, None] * np.eye(2)
@@ -210,7 +211,7 @@ class Jpda:
 
 
 def _weights(moved: Moved, cases: Cases) -> ndarray:
-    """The probability that each target was measured; of the hidden ones nobody knows."""
+    """The probability that each target was measured; that of occluded targets is unknown."""
     weights = np.minimum(moved.matrix.sum(axis=1), 1.0)
     return np.where(moved.hidden, 0.5, weights)
 
@@ -218,7 +219,7 @@ def _weights(moved: Moved, cases: Cases) -> ndarray:
 def _events(
     expected: Targets, cases: Cases, moved: Moved, managed: Managed
 ) -> tuple[ViewEvent, ...]:
-    """What happened to whom; of newcomers that do not count yet nothing is told."""
+    """The events of the step; new targets that are not confirmed yet have none."""
     labels = expected.labels
     events = []
     for j in np.unique(cases.shared[cases.shared >= 0]):

@@ -1,4 +1,4 @@
-"""Where the targets of one step are: by all associations, by one, or behind somebody."""
+"""Update of the targets of one step: by all associations, by one, or behind another target."""
 
 from __future__ import annotations
 
@@ -20,10 +20,11 @@ class Moved:
     """The targets after one step, in the order of before."""
 
     targets: Targets
+    """The updated targets."""
     matrix: Float[ndarray, "n M"]
     """β_tj as it was used."""
     hidden: Bool[ndarray, " n"]
-    """Occluded, and not the one in front."""
+    """Whether a target is occluded, and not the one in front."""
 
 
 def move(
@@ -37,12 +38,12 @@ def move(
     """Update every target by its case.
 
     Args:
-        targets: Predicted.
-        found: How the measurements lie to them.
-        matrix: β_tj.
-        cases: What is to be done with each.
-        seen: The measurements.
-        parameters: What occluded targets do, and those that come out.
+        targets: n predicted targets.
+        found: Innovations of all targets and measurements.
+        matrix: β_tj, association probabilities.
+        cases: The case of each target.
+        seen: The M measurements.
+        parameters: The treatment of occluded targets and of those that reappear.
     """
     p = parameters
     hidden = cases.shared >= 0
@@ -50,7 +51,7 @@ def move(
         hidden &= ~((cases.own == cases.shared) & _alike(targets, cases, seen, p.same_size))
     if p.five_cases and p.occlusion == "inside":
         matrix = _one_each(targets, cases, matrix, p.least_probability)
-    # occluded and missed targets take no part in the update by all associations
+    # occluded and missed targets are not updated by all associations
     matrix = np.where((hidden | cases.missed)[:, None], 0.0, matrix)
     moved = kalman.update(targets, found, matrix)
     moved = replace(moved, half_sizes=_sizes(targets, cases, hidden, matrix, seen, p))
@@ -62,7 +63,7 @@ def move(
             alone = (hidden & (cases.shared >= 0) & _in_piece(cases.shared, j, seen)).sum() == 1
             one = _behind(targets, int(t), j, seen, p.one_side, alone=bool(alone))
         moved = _put(moved, int(t), one)
-    # a target with a measurement of its own is not occluded, even where it takes a shared place
+    # a target with a measurement of its own is not occluded, even if another has it as well
     lost = hidden & ((cases.own != cases.shared) | (p.occlusion == "inside"))
     return Moved(
         replace(
@@ -77,7 +78,7 @@ def move(
 
 
 def _alike(targets: Targets, cases: Cases, seen: Measured, factor: float) -> Bool[ndarray, " n"]:
-    """Whether each target's own measurement is of about its size; false where it has none."""
+    """Whether each target's own measurement is of similar size; false for a target without one."""
     alike = np.zeros(targets.size, dtype=bool)
     there = np.flatnonzero(cases.own >= 0)
     ratios = np.log(seen.boxes[cases.own[there], 2:] / targets.half_sizes[there])
@@ -88,12 +89,12 @@ def _alike(targets: Targets, cases: Cases, seen: Measured, factor: float) -> Boo
 def _one_each(
     targets: Targets, cases: Cases, matrix: Float[ndarray, "n M"], least_probability: float
 ) -> Float[ndarray, "n M"]:
-    """The matrix with a single 1 in the rows of targets that take one measurement alone.
+    """Replace the rows of targets with exactly one measurement by a single 1.
 
-    These are targets in front of others; targets that come out of an occlusion; targets whose
+    These are targets in front of others; targets that reappear after an occlusion; targets whose
     measurement may as well be another's, since for two at one place the mean over all
-    associations would keep both between the two (track coalescence); and targets whose
-    measurement was found outside their gate.
+    associations would keep both between the two (track coalescence); and targets with a
+    measurement outside their gate.
     """
     there = np.flatnonzero(cases.own >= 0)
     leapt = matrix[there, cases.own[there]] == 0.0
@@ -114,7 +115,7 @@ def _sizes(
     seen: Measured,
     p: JpdaParams,
 ) -> Float[ndarray, "n 2"]:
-    """Half sizes after a step: they follow the measurements of targets that are seen whole."""
+    """Smooth the half sizes by the measurements of targets that are not occluded."""
     whole = ~(hidden | cases.split | cases.missed)
     shares = matrix.sum(axis=1, keepdims=True)
     measured = matrix @ seen.boxes[:, 2:] + (1.0 - shares) * targets.half_sizes
@@ -123,12 +124,12 @@ def _sizes(
 
 
 def _in_piece(shared: Int[ndarray, " n"], j: int, seen: Measured) -> Bool[ndarray, " n"]:
-    """Whether what each target is hidden by was found in the same piece as a measurement."""
+    """Whether the occluder of each target is in the same component as a measurement."""
     return np.asarray((seen.pieces[shared] == seen.pieces[j]).all(axis=1))
 
 
 def _at_rest(targets: Targets, t: int, j: int, seen: Measured, p: JpdaParams) -> Targets:
-    """One occluded target at the measurement, of velocity 0."""
+    """Put one occluded target at the measurement, with velocity 0."""
     one = targets.take(np.array([t]))
     place = np.concatenate([seen.boxes[j, :2], one.half_sizes[0]])
     rest = Targets.at_rest(place[None], seen.sigmas[[j]], p.velocity_sigma, one.labels)
@@ -138,17 +139,17 @@ def _at_rest(targets: Targets, t: int, j: int, seen: Measured, p: JpdaParams) ->
 def _behind(
     targets: Targets, t: int, j: int, seen: Measured, one_side: float, *, alone: bool
 ) -> Targets:
-    """One occluded target: it is predicted on inside its piece.
+    """Predict one occluded target inside its foreground component.
 
-    Where the boxes measured in a piece leave one of its edges free, and only one target is
-    hidden there, that edge is taken for the target's.
+    Where the boxes measured in a component leave one of its edges free, and only one target is
+    occluded there, that edge is taken as the target's.
     """
     one = targets.take(np.array([t]))
     piece, half_sizes = seen.pieces[j], one.half_sizes[0]
     room = np.maximum(piece[2:] - half_sizes, 0.0)
     low, high = piece[:2] - room, piece[:2] + room
     place = np.clip(one.positions[0], low, high)
-    # no innovation while it is inside; the extent of the piece is the measurement noise
+    # no innovation inside the component; its extent is the measurement noise
     unsure = np.hypot(room, seen.sigmas[j, :2])
     if alone:
         edges = _left_over(
@@ -169,11 +170,11 @@ def _left_over(
     half_sizes: Float[ndarray, " 2"],
     one_side: float,
 ) -> Int[ndarray, " 2"]:
-    """Which edge of a piece the boxes measured in it leave free, so that it is a hidden target's.
+    """The edges of a component that the boxes measured in it leave free for an occluded target.
 
     Returns:
         For x and y: −1 the lower edge, 1 the upper one; 0 neither, since one target explains
-        neither a margin on both sides nor one that is wider than the target.
+        neither a margin on both sides nor one wider than the target.
     """
     before = (shown[:, :2] - shown[:, 2:]).min(axis=0) - (piece[:2] - piece[2:])
     after = (piece[:2] + piece[2:]) - (shown[:, :2] + shown[:, 2:]).max(axis=0)
@@ -183,7 +184,7 @@ def _left_over(
 
 
 def _put(targets: Targets, t: int, one: Targets) -> Targets:
-    """The targets with one of them elsewhere."""
+    """Replace one of the targets."""
     means, covariances = targets.means.copy(), targets.covariances.copy()
     means[t], covariances[t] = one.means[0], one.covariances[0]
     return replace(targets, means=means, covariances=covariances)

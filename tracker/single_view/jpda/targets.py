@@ -16,7 +16,7 @@ from numpy import ndarray
 from tracker.filters.gaussian_mixture import GaussianMixture
 
 X, Y = 0, 2
-"""Where the position stands in the state."""
+"""Indices of the position in the state."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -24,21 +24,23 @@ class Targets:
     """n targets: state [p_x, v_x, p_y, v_y] in pixels and pixels per second, and a box."""
 
     means: Float[ndarray, "n 4"]
+    """State of each target."""
     covariances: Float[ndarray, "n 4 4"]
+    """Covariance of each state."""
     half_sizes: Float[ndarray, "n 2"]
     """Half width and half height, smoothed, pixels."""
     labels: Int[ndarray, " n"]
-    """Ids within this camera; 0 for a newcomer that does not count yet."""
+    """Ids within this camera; 0 for a new target that is not confirmed yet."""
     hits: Int[ndarray, " n"]
-    """At how many steps in a row it was measured, or hidden by who was."""
+    """Number of consecutive steps with a measurement, own or of the occluder."""
     misses: Int[ndarray, " n"]
-    """At how many steps in a row it was not."""
+    """Number of consecutive steps without a measurement."""
     hidden: Int[ndarray, " n"]
-    """At how many steps in a row it was occluded; 0 where it is not."""
+    """Number of consecutive steps of occlusion; 0 for a target that is not occluded."""
 
     @staticmethod
     def empty() -> Targets:
-        """Nobody."""
+        """No targets."""
         none = np.zeros(0, dtype=np.int64)
         return Targets(
             np.zeros((0, 4)), np.zeros((0, 4, 4)), np.zeros((0, 2)), none, none, none, none
@@ -51,13 +53,13 @@ class Targets:
         velocity_sigma: float,
         labels: Int[ndarray, " n"],
     ) -> Targets:
-        """Targets where something was measured, whose velocity is not known: 0, unsure.
+        """Make targets at measurements, with velocity 0 and its standard deviation.
 
         Args:
-            boxes: Pixels.
-            sigmas: Of the boxes' numbers.
-            velocity_sigma: Half sizes a second.
-            labels: 0 for who does not count yet.
+            boxes: Centre and half sizes of n boxes, pixels.
+            sigmas: Standard deviations of these four numbers, pixels.
+            velocity_sigma: Standard deviation of the velocity, half sizes per second.
+            labels: Id of each target; 0 for one that is not confirmed yet.
         """
         count = len(boxes)
         means, covariances = np.zeros((count, 4)), np.zeros((count, 4, 4))
@@ -70,30 +72,30 @@ class Targets:
 
     @property
     def size(self) -> int:
-        """n."""
+        """The number of targets n."""
         return len(self.labels)
 
     @property
     def positions(self) -> Float[ndarray, "n 2"]:
-        """Pixels."""
+        """Position of each target, pixels."""
         return self.means[:, [X, Y]]
 
     @property
     def boxes(self) -> Float[ndarray, "n 4"]:
-        """Centre and half sizes."""
+        """Centre and half sizes of each target, pixels."""
         return np.concatenate([self.positions, self.half_sizes], axis=1)
 
     @property
     def place_covariances(self) -> Float[ndarray, "n 2 2"]:
-        """Of the positions, pixels squared."""
+        """Covariance of each position, squared pixels."""
         return self.covariances[:, [[X], [Y]], [[X, Y]]]
 
     def take(self, indices: ndarray) -> Targets:
-        """Some of them."""
+        """Select some of the targets, by index or mask."""
         return Targets(**{f.name: getattr(self, f.name)[indices] for f in fields(self)})
 
     def predict(self, step_time: float, acceleration_sigma: float) -> Targets:
-        """One step ahead at constant velocity, under white acceleration:
+        """Predict one step at constant velocity, under white acceleration:
 
             F = [[1, T], [0, 1]],  Q = q [[T³/3, T²/2], [T²/2, T]]
 
@@ -117,7 +119,7 @@ class Targets:
         )
 
     def as_boxes(self, sigmas: Float[ndarray, "n 4"]) -> GaussianMixture:
-        """An intensity over boxes: one person each, as sure of the sizes as the sigmas say."""
+        """The targets as an intensity over boxes, with weight 1 and the sizes' sigmas, pixels."""
         covariances = np.zeros((self.size, 4, 4))
         covariances[:, :2, :2] = self.place_covariances
         covariances[:, [2, 3], [2, 3]] = sigmas[:, 2:] ** 2
@@ -125,28 +127,29 @@ class Targets:
 
 
 def concatenate(parts: Many[Targets]) -> Targets:
-    """All of them, one after the other."""
+    """Concatenate targets."""
     return Targets(
         **{f.name: np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(Targets)}
     )
 
 
 def scale_of(half_sizes: Float[ndarray, "n 2"]) -> Float[ndarray, " n"]:
-    """The size that a target's motion is measured by: the geometric mean, half a pixel at least."""
+    """The scale of a target's motion: the geometric mean of its half sizes, at least 0.5 px."""
     return np.asarray(np.sqrt(np.maximum(half_sizes, 0.5).prod(axis=1)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Innovations:
-    """How every measurement lies to every target's prediction."""
+    """The innovations of n targets and M measurements."""
 
     offsets: Float[ndarray, "n M 2"]
     """ν_tj = z_j − H x_t, pixels."""
     covariances: Float[ndarray, "n M 2 2"]
     """S_tj = H P_t Hᵀ + R_j."""
     precisions: Float[ndarray, "n M 2 2"]
+    """S_tj⁻¹."""
     squared: Float[ndarray, "n M"]
-    """ν_tjᵀ S_tj⁻¹ ν_tj."""
+    """ν_tjᵀ S_tj⁻¹ ν_tj, squared Mahalanobis distances."""
     densities: Float[ndarray, "n M"]
     """Λ_tj = N(ν_tj; 0, S_tj), per square pixel."""
 
@@ -154,12 +157,12 @@ class Innovations:
 def innovations(
     targets: Targets, places: Float[ndarray, "M 2"], sigmas: Float[ndarray, "M 2"]
 ) -> Innovations:
-    """Set every measurement against every target.
+    """Compute the innovation of every target and measurement.
 
     Args:
-        targets: Predicted.
-        places: z_j, pixels.
-        sigmas: Standard deviations of the places, pixels.
+        targets: n predicted targets.
+        places: z_j, positions of M measurements, pixels.
+        sigmas: Standard deviations of the places along x and y, pixels.
     """
     offsets = places[None] - targets.positions[:, None]
     noise = np.maximum(sigmas, 1e-3)[:, :, None] ** 2 * np.eye(2)
@@ -172,21 +175,21 @@ def innovations(
 
 
 def update(targets: Targets, found: Innovations, detected: Float[ndarray, "n M"]) -> Targets:
-    """The mean over all associations, and the covariance around it ([FBS83]_).
+    """Update by the mean over all associations, with the covariance around it ([FBS83]_).
 
-    A target's posterior is a mixture: with probability β_t0 no measurement is its own and
-    the prediction stands, with β_tj the Kalman update by measurement j holds, with gain
+    A target's posterior is a mixture: with probability β_t0 it has no measurement and
+    the prediction remains, with β_tj it has the Kalman update by measurement j, with gain
     W = P Hᵀ S⁻¹. Its first two moments are, for measurements of equal noise,
 
         x ← x + W Σ_j β_tj ν_tj
         P ← β_t0 P + (1 − β_t0) (P − W S Wᵀ) + W (Σ_j β_tj ν_tj ν_tjᵀ − ν_t ν_tᵀ) Wᵀ
 
-    Here each measurement may have a noise of its own.
+    Here each measurement may have its own noise.
 
     Args:
-        targets: Predicted.
-        found: Of the same targets.
-        detected: β_tj; what a row lacks of 1 is β_t0.
+        targets: n predicted targets.
+        found: Innovations of the same targets.
+        detected: β_tj; β_t0 is the difference of a row's sum to 1.
     """
     gains = targets.covariances[:, None][..., [X, Y]] @ found.precisions
     moves = np.einsum("nmab,nmb->nma", gains, found.offsets)

@@ -1,4 +1,4 @@
-"""Track management of one camera: which targets begin, which end, and which are back."""
+"""Track management of one camera: targets that begin, end, or return."""
 
 from __future__ import annotations
 
@@ -14,24 +14,29 @@ from tracker.single_view.jpda.measurements import Measured
 from tracker.single_view.jpda.targets import Targets, concatenate, innovations
 
 FAR = 1e9
-"""Instead of a distance, where a measurement is out of reach."""
+"""Distance of an inadmissible pair."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Managed:
-    """The targets after the track management of one step, and what it did."""
+    """The targets after the track management of one step, and its decisions."""
 
     targets: Targets
-    """Those that were there and still are, then those that are back, then newcomers."""
+    """The targets that remain, followed by the returned and by the new ones."""
     vanished: Targets
+    """The targets that vanished recently."""
     next_label: int
+    """The first label that is free."""
     stayed: Int[ndarray, " s"]
-    """The indices, before, of those that still are."""
+    """Indices, before, of the targets that remain."""
     sources: Int[ndarray, " a"]
-    """The measurements that those who are back, and then the newcomers, were found at."""
+    """Measurement of each returned and then of each new target."""
     new_labels: tuple[int, ...]
+    """Ids of the targets that were confirmed at this step."""
     returned_labels: tuple[int, ...]
+    """Ids of the targets that returned."""
     vanished_labels: tuple[int, ...]
+    """Ids of the targets that vanished."""
 
 
 def manage(
@@ -45,24 +50,24 @@ def manage(
     gate: float,
     longest_hidden: int,
 ) -> Managed:
-    """End the tracks that have ended, and begin or continue those that a measurement is left for.
+    """End targets, and begin or continue targets at measurements without a target.
 
     Args:
-        targets: After the update of this step.
-        vanished: Predicted to this step; their misses count since they were last measured.
-        next_label: The next free one.
-        new: The measurements of nobody.
+        targets: The targets after the update of this step.
+        vanished: Vanished targets, predicted to this step; misses since the last measurement.
+        next_label: The first label that is free.
+        new: The measurements without a target.
         seen: All measurements.
-        parameters: How many steps each takes.
-        gate: Bound of the squared distance from one who vanished.
-        longest_hidden: Steps after which somebody occluded is given up.
+        parameters: The numbers of steps for confirmation and end.
+        gate: Largest squared Mahalanobis distance of a vanished target and its measurement.
+        longest_hidden: Number of steps after which an occluded target ends.
     """
     p = parameters
     counts = targets.labels > 0
     gone = np.where(
         counts,
         (targets.misses >= p.vanish_steps) | (targets.hidden >= longest_hidden),
-        (targets.misses > 0) | (targets.hidden > 0),  # a newcomer must be seen at every step
+        (targets.misses > 0) | (targets.hidden > 0),  # a new target must be measured at every step
     )
     kept, lost = targets.take(np.flatnonzero(~gone)), targets.take(np.flatnonzero(gone & counts))
     places = np.flatnonzero(new)
@@ -104,7 +109,7 @@ def manage(
 def _same(
     vanished: Targets, seen: Measured, places: Int[ndarray, " m"], gate: float
 ) -> tuple[Int[ndarray, " r"], Int[ndarray, " r"]]:
-    """Who vanished and is back, and at which measurement: nearest pairs, one to one."""
+    """Pair vanished targets with measurements, nearest first, one to one."""
     found = innovations(vanished, seen.boxes[places, :2], seen.sigmas[places, :2])
     distances: Float[ndarray, "v m"] = np.where(found.squared <= gate, found.squared, FAR)
     rows, columns = linear_sum_assignment(distances)

@@ -1,1 +1,1 @@
-"""A detector that somebody brings as an ONNX file, run by OpenCV on the cameras' pictures."""
+"""An external detector from an ONNX file, run by OpenCV on the cameras' images."""

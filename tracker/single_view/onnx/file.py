@@ -1,8 +1,8 @@
-"""What an ONNX file says of its inputs and outputs: names, shapes and kinds of numbers.
+"""Reader of an ONNX file's inputs and outputs: names, shapes and data types.
 
-OpenCV reads the network and does not tell these. The file is a Protocol Buffers message
+OpenCV reads the network without exposing these. The file is a Protocol Buffers message
 (onnx.proto3 of ONNX; encoding: "Encoding" of the Protocol Buffers documentation), of which
-only the few fields that are needed are walked through here.
+only the few fields that are needed are parsed here.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ _TENSOR_NAME = 8
 _VARINT, _FIXED64, _BYTES, _FIXED32 = 0, 1, 2, 5
 
 UINT8, INT64 = 2, 7
-"""Kinds of numbers, of ONNX's ``TensorProto.DataType``."""
+"""Data types, of ONNX's ``TensorProto.DataType``."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,25 +24,26 @@ class Port:
     """An input or output of the network."""
 
     name: str
+    """Name of the input or output."""
     kind: int
-    """Of its numbers, ONNX's ``TensorProto.DataType``."""
+    """Data type, of ONNX's ``TensorProto.DataType``."""
     shape: tuple[int, ...]
-    """0 where a size is left open."""
+    """Size of each dimension, 0 for a variable one."""
 
 
 @dataclass(frozen=True, slots=True)
 class Ports:
-    """The inputs that are not the network's own weights, and the outputs."""
+    """The inputs that are not weights of the network, and the outputs."""
 
     inputs: tuple[Port, ...]
     outputs: tuple[Port, ...]
 
 
 def ports_of(data: bytes) -> Ports:
-    """The inputs and outputs of a model.
+    """Read the inputs and outputs of a model.
 
     Raises:
-        ValueError: If this is no ONNX model.
+        ValueError: If the data are no ONNX model.
     """
     try:
         graph = next(value for field, value in _fields(memoryview(data)) if field == _GRAPH)
@@ -104,7 +105,7 @@ def _text(value: int | memoryview) -> str:
 
 
 def _port(message: memoryview) -> Port:
-    """A ``ValueInfoProto``: name 1, type 2 { tensor 1 { kind 1, shape 2 { dimension 1 } } }."""
+    """Read a ``ValueInfoProto``: name 1, type 2 { tensor 1 { type 1, shape 2 { size 1 } } }."""
     name, kind, shape = "", 0, []
     for field, value in _fields(message):
         if field == 1:
@@ -122,7 +123,7 @@ def _port(message: memoryview) -> Port:
 
 
 def _size(dimension: memoryview) -> int:
-    """A stated size; 0 for a named one."""
+    """The size of a dimension; 0 for a named one."""
     for field, value in _fields(dimension):
         if field == 1 and isinstance(value, int):
             return value if value < 1 << 62 else 0

@@ -1,12 +1,12 @@
-"""What a detector's outputs mean, found out from their shapes and names.
+"""Interpretation of a detector's outputs, by their shapes and names.
 
-Known are, with C classes and N boxes that the network proposes:
+The known layouts are, with C classes and N proposed boxes:
 
 - YOLOv5 to v7 [JCS22]: (1, N, 5 + C): centre, size, objectness, classes; YOLOv8 to v12, as they
   are exported: (1, 4 + C, N), without objectness;
 - end-to-end (YOLOv10 and exports with their own suppression): (1, K, 6): two corners, score,
   class; (K, 7): picture, two corners, class, score;
-- DETR [CMS20] and its kin: logits (1, N, C) and boxes (1, N, 4) as shares of the picture; RT-DETR
+- DETR [CMS20] and similar: logits (1, N, C) and boxes (1, N, 4) as shares of the image; RT-DETR
   [ZLX24] also as one (1, N, 4 + C), or as labels, boxes and scores;
 - SSD [LAE16]: (1, 1, N, 7): picture, class, score, two corners; or boxes and scores by class;
 - CenterNet [ZWK19]: heat map (1, C, h, w), sizes (1, 2, h, w) and offsets (1, 2, h, w).
@@ -28,37 +28,38 @@ from jaxtyping import Float
 from numpy import ndarray
 
 FOUND_OUT = -1
-"""In place of a class: that of people, by the usual order of such a network's classes."""
+"""Value for a class: that of people, by the usual order of such a network's classes."""
 _STRIDES = (8, 16, 32)
 _SHARE = 1.5
-"""Boxes none of whose numbers is larger are shares of the picture, not pixels."""
+"""Largest value of boxes that are shares of the image, not pixels."""
 _CENTRES = 200
-"""Most objects that are taken from a heat map."""
+"""Largest number of objects from a heat map."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Proposals:
-    """Boxes of one class in the network's own picture."""
+    """Boxes of one class in the network's input image."""
 
     corners: Float[ndarray, "N 4"]
-    """Left, top, right, bottom, pixels of the network's picture."""
+    """Left, top, right, bottom, pixels of the network's input image."""
     scores: Float[ndarray, " N"]
+    """Score of each box, 0 … 1."""
     suppressed: bool
-    """Whether the network itself leaves one box for each object."""
+    """Whether the network itself suppresses all but one box for each object."""
 
 
 def proposals(
     outputs: Mapping[str, ndarray], size: tuple[int, int], wanted: int = FOUND_OUT
 ) -> Proposals:
-    """The boxes of people among the outputs of a detector.
+    """Read the boxes of people from the outputs of a detector.
 
     Args:
-        outputs: By name, with the dimension of the batch, of one picture.
-        size: Width and height of the network's picture.
-        wanted: Index of the class; by default that of people.
+        outputs: The outputs by name, with the dimension of the batch, for one image.
+        size: Width and height of the network's input image, pixels.
+        wanted: Index of the class, or -1 for that of people.
 
     Raises:
-        ValueError: If the outputs are of no known layout.
+        ValueError: If the outputs have no known layout.
     """
     arrays = {name: np.asarray(a, dtype=np.float32) for name, a in outputs.items()}
     found = (
@@ -85,7 +86,7 @@ def _sigmoid(values: ndarray) -> ndarray:
 
 
 def _probabilities(scores: ndarray) -> ndarray:
-    """Scores as they are where they are probabilities; else they are logits."""
+    """The scores themselves if they are probabilities; else they are logits."""
     if scores.size and (scores.min() < 0.0 or scores.max() > 1.0):
         return _sigmoid(scores)
     return scores
@@ -103,7 +104,7 @@ def _from_centres(boxes: ndarray) -> ndarray:
 
 
 def _grid(size: tuple[int, int]) -> int:
-    """Cells of the grids of strides 8, 16 and 32."""
+    """Number of cells of the grids of strides 8, 16 and 32."""
     return sum((size[0] // s) * (size[1] // s) for s in _STRIDES)
 
 
@@ -123,7 +124,7 @@ def _column(scores: ndarray, index: int) -> ndarray:
 def _one_output(
     arrays: Mapping[str, ndarray], size: tuple[int, int], wanted: int
 ) -> Proposals | None:
-    """One table; outputs of more dimensions beside it (masks, of which none is asked for) wait."""
+    """Read a single table; other outputs of more dimensions (masks) are ignored."""
     tables = [a for a in arrays.values() if a.ndim in (2, 3)]
     if len(arrays) == 1:
         tables = list(arrays.values())
@@ -159,7 +160,7 @@ def _one_output(
     if columns > 7 and rows <= 1000:
         classes = _probabilities(_column(table[:, 4:], _class(wanted, 0)))
         return Proposals(_in_pixels(_from_centres(table[:, :4]), size), classes, True)
-    if 5 <= rows < columns:  # of another input's grid, as with four strides
+    if 5 <= rows < columns:  # the grid of another input size, as with four strides
         table = table.T
         classes = _probabilities(_column(table[:, 4:], _class(wanted, 0)))
         return Proposals(_in_pixels(_from_centres(table[:, :4]), size), classes, False)
@@ -172,7 +173,7 @@ def _ssd(table: ndarray, size: tuple[int, int], wanted: int) -> Proposals:
 
 
 def _named(arrays: Mapping[str, ndarray], size: tuple[int, int], wanted: int) -> Proposals | None:
-    """Labels, boxes and scores, one each for every object (RT-DETR, SSD, exports of frameworks)."""
+    """Read labels, boxes and scores for every object (RT-DETR, SSD, exports of frameworks)."""
     if len(arrays) < 3:
         return None
     boxes = next((n for n, a in arrays.items() if a.ndim >= 2 and a.shape[-1] == 4), None)
@@ -184,9 +185,9 @@ def _named(arrays: Mapping[str, ndarray], size: tuple[int, int], wanted: int) ->
     }
     if len(rest) < 2:
         return None
-    if not len(table):  # nobody is in the picture
+    if not len(table):  # no detection
         return Proposals(table, np.zeros(0, np.float32), True)
-    # who has no name is told by its numbers, also where people are all that is seen
+    # outputs without known names are distinguished by their values, also with a single class
     whole = [n for n, a in rest.items() if np.array_equal(a, np.round(a))]
     labels = next(
         (n for n in rest if "label" in n or "class" in n),
@@ -205,14 +206,14 @@ def _named(arrays: Mapping[str, ndarray], size: tuple[int, int], wanted: int) ->
 
 
 def _from_one(boxes: str) -> bool:
-    """Whether the classes are counted from 1, as an SSD's are, whose boxes are ``bboxes``."""
+    """Whether classes are counted from 1, as in an SSD with an output ``bboxes``."""
     return boxes == "bboxes"
 
 
 def _boxes_and_scores(
     arrays: Mapping[str, ndarray], size: tuple[int, int], wanted: int
 ) -> Proposals | None:
-    """Boxes (1, N, 4) and scores by class (1, N, C): DETR and its kin, and SSD."""
+    """Read boxes (1, N, 4) and scores by class (1, N, C): DETR and similar, and SSD."""
     tables = {n: a[0] for n, a in arrays.items() if a.ndim == 3 and a.shape[0] == 1}
     boxes = next((n for n, a in tables.items() if a.shape[1] == 4), None)
     scores = next(
@@ -244,7 +245,7 @@ def _boxes_and_scores(
 def _centre_net(
     arrays: Mapping[str, ndarray], size: tuple[int, int], wanted: int
 ) -> Proposals | None:
-    """Peaks of a heat map: cells that no neighbour exceeds."""
+    """Read peaks of a heat map: cells that no neighbour exceeds."""
     maps = {n: a[0] for n, a in arrays.items() if a.ndim == 4 and a.shape[0] == 1}
     pairs = [n for n, a in maps.items() if a.shape[0] == 2]
     heat = [n for n, a in maps.items() if n not in pairs]

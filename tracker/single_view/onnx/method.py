@@ -1,4 +1,4 @@
-"""The boxes of a detector that is brought as an ONNX file, found while they are tracked."""
+"""Detection by an ONNX model while a recording is tracked."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ if TYPE_CHECKING:
 
 
 class OnnxDetector:
-    """A detector on the pictures of one camera; what it finds is trusted as boxes of a file are.
+    """A detector on the images of one camera, with measurement noise like that of detections.
 
-    Boxes that contradict the room stay among the measurements and go no further. The
-    pictures are those that stage 1 works on, so people stand upright in them however a
+    Boxes that contradict the room remain among the measurements and are not passed on. The
+    images are those of stage 1, in which people are upright however a
     camera is turned, and one network serves all cameras.
     """
 
@@ -34,10 +34,10 @@ class OnnxDetector:
         parameters: RunParameters,
         reader: Pictures,
     ) -> None:
-        """Prepare for one camera.
+        """Prepare the detector for one camera.
 
         Raises:
-            ValueError: If the sequence has no detector or no pictures, or it cannot be used.
+            ValueError: If the sequence has no detector or no images, or it cannot be used.
         """
         model = sequence.detector
         if model is None:
@@ -56,19 +56,19 @@ class OnnxDetector:
         settings = Settings(
             p.person_class, p.score_threshold, p.suppression_overlap, p.input_side, p.pixel_values
         )
-        # no slider has a say in what is loaded, for what was made once stays
+        # no parameter has an effect on the model that is loaded, so it is created once
         network = reader.once(
             ("onnx_detector", model.digest), lambda: Network(model.path, Settings())
         )
         self._network = network.with_settings(settings)
 
     def start(self) -> None:
-        """There is no state."""
+        """The method has no state."""
 
     def step(
         self, state: None, frame: int, picture: ndarray | None, rng: np.random.Generator
     ) -> tuple[None, ViewResult]:
-        """The people that the network finds in the picture."""
+        """Detect the people in the image."""
         if picture is None:
             return None, ViewResult.of_no_frame()
         seen = self._network.look(picture)

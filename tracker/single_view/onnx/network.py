@@ -1,4 +1,4 @@
-"""A detection network in OpenCV: a picture in, boxes of people in the picture's pixels out."""
+"""A detection network in OpenCV: from an image to boxes of people in its pixels."""
 
 from __future__ import annotations
 
@@ -21,56 +21,57 @@ from tracker.single_view.onnx.layouts import FOUND_OUT, proposals
 Values = Literal["unit", "imagenet", "signed", "bytes"]
 
 MOST_BYTES = 2**31
-"""Of a Protocol Buffers message, which an ONNX file is."""
+"""Largest size of a Protocol Buffers message, and so of an ONNX file, bytes."""
 
 _GREY = 114
-"""Of the borders that fill a picture up to the network's shape, as YOLO's training has it."""
+"""Grey level of the borders that fill an image up to the network's shape, as in YOLO's training."""
 _IMAGENET_MEAN = np.array([0.485, 0.456, 0.406], np.float32)
 _IMAGENET_DEVIATION = np.array([0.229, 0.224, 0.225], np.float32)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Found:
-    """Boxes of people in one picture."""
+    """N boxes of people in one image."""
 
     boxes: Float[ndarray, "N 4"]
-    """left, top, width, height, pixels of the picture."""
+    """left, top, width, height, pixels of the image."""
     scores: Float[ndarray, " N"]
+    """Score of each box, 0 … 1."""
 
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """How a network is fed and read."""
+    """Parameters of the input and output of a network."""
 
     person: int = FOUND_OUT
     """Index of the class, or -1 for that of people by the layout."""
     score: float = 0.35
-    """Boxes with a lower score are left out."""
+    """Score below which boxes are left out, 0 … 1."""
     overlap: float = 0.6
-    """Of two boxes whose intersection over union is larger the better stays."""
+    """Intersection over union above which the weaker box is dropped, 0 … 1."""
     side: int = 640
-    """Of the network's picture, where the file leaves it open; pixels."""
+    """Side of the network's input image, where the file has a variable size, pixels."""
     values: Values = "unit"
-    """What a picture's bytes become."""
+    """Scaling of an image's bytes for the network."""
 
 
 _REMEDY = "export it to ONNX again with one picture at a time"
-"""Where a network is one, but not fit to be run here."""
+"""Remedy in messages about a network that cannot be run here."""
 
 
 class Network:
-    """A model ready to look at pictures; one at a time, whoever asks.
+    """A model that detects people, in one image at a time.
 
-    OpenCV spreads one picture over the cores by itself, so a second copy for another
-    camera would only take memory.
+    OpenCV distributes one image over the cores by itself, so a second copy for another
+    camera would only need memory.
     """
 
     def __init__(self, path: Path, settings: Settings) -> None:
         """Read a model.
 
         Raises:
-            ValueError: If the file is no ONNX model, or none that takes a picture; a
-                sentence that names it.
+            ValueError: If the file is no ONNX model, or none with an image as input; the
+                message names the file.
         """
         self._path, self._settings = path, settings
         try:
@@ -95,10 +96,10 @@ class Network:
 
     @classmethod
     def tried(cls, path: Path) -> Network:
-        """A model that has looked at an empty picture: one whose answers can be read.
+        """A model that was run on an empty image, so that its outputs can be read.
 
         Raises:
-            ValueError: As of the constructor and :meth:`look`.
+            ValueError: In the cases of the constructor and of :meth:`look`.
         """
         network = cls(path, Settings())
         width, height = network.size
@@ -106,14 +107,14 @@ class Network:
         return network
 
     def with_settings(self, settings: Settings) -> Network:
-        """The same model, fed and read otherwise; it is in memory once."""
+        """The same model with other parameters; it is in memory once."""
         other = copy.copy(self)
         other._settings = settings
         return other
 
     @property
     def size(self) -> tuple[int, int]:
-        """Width and height of the network's own picture."""
+        """Width and height of the network's input image, pixels."""
         shape = self._picture.shape
         height, width = shape[1:3] if self._channels_last else shape[2:4]
         return width or self._settings.side, height or self._settings.side
@@ -137,14 +138,13 @@ class Network:
         )
 
     def look(self, picture: UInt8[ndarray, "h w 3"]) -> Found:
-        """The people in a picture (blue, green, red).
+        """Detect the people in an image (blue, green, red).
 
-        It is made as large as fits into the network's picture, without a change of its
-        proportions, in the middle of grey borders; the boxes come back in its own pixels
-        and end where it ends.
+        The image is scaled to fit into the network's input with its aspect ratio, in the middle
+        of grey borders; the boxes are converted to its own pixels and clipped to it.
 
         Raises:
-            ValueError: If the network cannot work on it, or its outputs are of no known layout.
+            ValueError: If the network cannot run on it, or its outputs have no known layout.
         """
         width, height = self.size
         rows, columns = picture.shape[:2]
@@ -164,7 +164,7 @@ class Network:
             raise ValueError(f"the detector {self._path.name} cannot be used: {error}") from error
         kept = found.scores >= s.score
         corners, scores = found.corners[kept].astype(float), found.scores[kept].astype(float)
-        # where two pixels lie side by side their middles are one apart, and edges lie between
+        # centres of neighbouring pixels are 1 apart, and edges lie between them
         factors = np.tile(np.array(inner) / [columns, rows], 2)
         corners = (corners - np.tile(shift, 2)) / factors - 0.5
         corners[:, 0::2] = np.clip(corners[:, 0::2], -0.5, columns - 0.5)
@@ -202,7 +202,7 @@ class Network:
         try:
             with self._lock:
                 self._net.setInput(fed, self._picture.name)
-                for port in self._sizes:  # the size that boxes come back in, as RT-DETR asks
+                for port in self._sizes:  # the size to which boxes are scaled, for RT-DETR
                     kind = np.int64 if port.kind == INT64 else np.float32
                     self._net.setInput(np.array([self.size], kind), port.name)
                 outputs = self._net.forward(self._names)
@@ -212,7 +212,7 @@ class Network:
 
 
 def _content(path: Path) -> bytes:
-    """The bytes of a model: of an ordinary file, and of no more than ONNX allows."""
+    """Read the bytes of a model, from a regular file of at most the size that ONNX allows."""
     size = size_of(path)
     if size > MOST_BYTES:
         raise OSError(errno.EFBIG, f"it has {size >> 20:,} MB, expected at most 2,048")
@@ -220,6 +220,6 @@ def _content(path: Path) -> bytes:
 
 
 def _words(error: Exception) -> str:
-    """What OpenCV says, without where in its sources it says so."""
+    """The message of OpenCV without the place in its sources."""
     words = " ".join(str(error).split())
     return words.rsplit("error: ", 1)[-1][:160]

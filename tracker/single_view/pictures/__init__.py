@@ -1,1 +1,1 @@
-"""What is found in pictures: colours, what is not the background and its pieces, sets of boxes."""
+"""Image processing: colour histograms, foreground and its components, and sets of boxes."""

@@ -1,7 +1,7 @@
-"""Connected components of a foreground mask (pieces): what a camera has instead of a detector.
+"""Connected components of a foreground mask, the detections of a camera without a detector.
 
 Boxes are ``centre_x, centre_y, half_width, half_height`` in pixels, where the centre
-of the first pixel is (0, 0): a piece of one pixel has half sizes of one half.
+of the first pixel is (0, 0): a component of one pixel has half sizes of one half.
 """
 
 from __future__ import annotations
@@ -16,30 +16,30 @@ from numpy import ndarray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Blobs:
-    """The pieces of a mask that are large enough, in the order of their boxes' top edges."""
+    """The components of a mask that are large enough, by the top edges of their boxes."""
 
     boxes: Float[ndarray, "N 4"]
-    """The upright box around each piece."""
+    """The bounding box of each component."""
     areas: Int[ndarray, " N"]
-    """Pixels of each piece, not of its box."""
+    """Number of pixels of each component."""
     owners: Int[ndarray, "h w"]
-    """Which piece each pixel is of, 0 … N - 1; -1 for the background and for small pieces."""
+    """Component of each pixel, 0 … N - 1; -1 for the background and for small components."""
 
     @property
     def size(self) -> int:
-        """How many there are."""
+        """The number of components."""
         return len(self.areas)
 
 
 def blobs(mask: UInt8[ndarray, "h w"], minimum_area: int) -> Blobs:
-    """The pieces of a mask, connected over sides and corners.
+    """Find the components of a mask, connected over sides and corners.
 
     Args:
-        mask: Foreground is what is not 0.
-        minimum_area: Pieces of fewer pixels are dropped.
+        mask: The foreground mask, not 0 on the foreground.
+        minimum_area: Number of pixels below which a component is dropped.
 
     Raises:
-        ValueError: If ``mask`` is not a picture of one channel.
+        ValueError: If ``mask`` is not an image of one channel.
     """
     if mask.ndim != 2:
         raise ValueError(f"mask: expected (height, width), got shape {mask.shape}")
@@ -60,5 +60,5 @@ def blobs(mask: UInt8[ndarray, "h w"], minimum_area: int) -> Blobs:
 
 
 def foreground_boxes(mask: UInt8[ndarray, "h w"], minimum_area: int) -> Float[ndarray, "N 4"]:
-    """The boxes of :func:`blobs` alone."""
+    """The boxes of :func:`blobs` alone, pixels."""
     return blobs(mask, minimum_area).boxes

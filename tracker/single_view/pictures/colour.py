@@ -1,4 +1,4 @@
-"""What a target looks like: colour histograms of boxes and their distance to templates.
+"""Colour appearance of targets: histograms of boxes and their distance to templates.
 
 Boxes are ``centre_x, centre_y, half_width, half_height`` in pixels.
 
@@ -28,19 +28,19 @@ BINS: dict[str, int] = {"hue_saturation": 16 * 16 + 16, "rgb": 8 * 8 * 8, "hsi":
 """Bins of each histogram space."""
 
 LEAST_SATURATION, LEAST_VALUE = 40, 40
-"""Of 255: below either, a pixel's hue is mostly noise, and its value is counted instead."""
+"""Saturation and value of 255 below which a pixel's hue is mostly noise, and its value counts."""
 
 LONGEST_SIDE = 24
-"""Boxes wider or taller than this many pixels are read with a stride: enough for a histogram."""
+"""Side in pixels above which a box is sampled with a stride: enough for a histogram."""
 
 
 def bin_map(picture: UInt8[ndarray, "h w 3"], space: ColourSpaceName) -> UInt16[ndarray, "h w"]:
-    """The histogram bin of each pixel of a BGR picture.
+    """Compute the histogram bin of each pixel of a BGR image.
 
-    ``rgb`` cuts each channel into 8 (512 bins). ``hue_saturation`` takes 16 hues
+    ``rgb`` divides each channel into 8 (512 bins). ``hue_saturation`` has 16 hues
     × 16 saturations where the pixel is coloured and 16 values where it is not
-    (272 bins), so that brightness counts only where there is no colour. ``hsi``
-    takes 16 hues × 4 saturations × 4 intensities where it is coloured and 8
+    (272 bins), so that brightness has an effect only without colour. ``hsi``
+    has 16 hues × 4 saturations × 4 intensities where it is coloured and 8
     intensities where it is not (264 bins), of the five upper bits of each level 0 … 255:
 
         I = (R + G + B) / 3,  S = 1 - min(R, G, B) / I,
@@ -50,8 +50,8 @@ def bin_map(picture: UInt8[ndarray, "h w 3"], space: ColourSpaceName) -> UInt16[
     value reach :data:`LEAST_SATURATION` and :data:`LEAST_VALUE`.
 
     Args:
-        picture: BGR, 0 … 255.
-        space: Which bins.
+        picture: The image, BGR, 0 … 255.
+        space: The kind of bins.
 
     Raises:
         ValueError: If there is no such space.
@@ -74,7 +74,7 @@ def bin_map(picture: UInt8[ndarray, "h w 3"], space: ColourSpaceName) -> UInt16[
 
 
 def _hsi_bins() -> UInt16[ndarray, " 32768"]:
-    """The bin of every colour of five bits a channel, blue first."""
+    """The bin of every colour of five bits for each channel, blue first."""
     levels = np.arange(32) * 8.0 + 3.5
     blue, green, red = np.meshgrid(levels, levels, levels, indexing="ij")
     intensity = (red + green + blue) / 3.0
@@ -89,7 +89,7 @@ def _hsi_bins() -> UInt16[ndarray, " 32768"]:
     )
     coloured = cut[0] * 16 + cut[1] * 4 + cut[2]
     grey = 256 + np.floor(intensity / 32)
-    # the hue of what is pale or dark is mostly noise
+    # the hue of a pale or dark pixel is mostly noise
     has_hue = (saturation * 255 >= LEAST_SATURATION) & (intensity >= LEAST_VALUE)
     return np.asarray(np.where(has_hue, coloured, grey).reshape(-1), dtype=np.uint16)
 
@@ -100,11 +100,11 @@ _HSI_BINS = _hsi_bins()
 def distance(
     first: Float[ndarray, "*N bins"], second: Float[ndarray, "*N bins"]
 ) -> Float[ndarray, "*N"]:
-    """Bhattacharyya distance sqrt(1 - Σ_u sqrt(p(u) q(u))) of histograms, as in [CRM03].
+    """The Bhattacharyya distance sqrt(1 - Σ_u sqrt(p(u) q(u))) of histograms, as in [CRM03].
 
     Args:
-        first: Histograms p, each summing to 1; any number of leading axes.
-        second: Histograms q.
+        first: Histograms p, each with sum 1; any number of leading axes.
+        second: Histograms q, each with sum 1.
 
     Returns:
         0 for equal histograms, 1 for disjoint ones or where one is empty.
@@ -114,7 +114,7 @@ def distance(
 
 
 def likelihood(distances: Float[ndarray, " N"], sigma: float) -> Float[ndarray, " N"]:
-    """l_z = N(D; 0, σ²), the colour likelihood of [ZW21] §2.1.
+    """Compute l_z = N(D; 0, σ²), the colour likelihood of [ZW21] §2.1.
 
     Args:
         distances: Bhattacharyya distances D, 0 … 1.
@@ -125,16 +125,18 @@ def likelihood(distances: Float[ndarray, " N"], sigma: float) -> Float[ndarray, 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ColourModel:
-    """Templates in one histogram space, and how boxes are compared with them."""
+    """Templates in one histogram space, for comparison with boxes."""
 
     space: ColourSpaceName
+    """The kind of bins."""
     kernel: KernelName
+    """The weights of the pixels of a box."""
     names: tuple[str, ...]
-    """Whose templates they are, each person once."""
+    """Names of the people with templates, each person once."""
     roots: Float[ndarray, "n bins"]
     """Square roots of the histograms q_1 … q_n."""
     owners: Int[ndarray, " n"]
-    """Index into ``names`` of each."""
+    """Index into ``names`` of each histogram."""
 
     @staticmethod
     def of(
@@ -143,16 +145,16 @@ class ColourModel:
         space: ColourSpaceName,
         kernel: KernelName,
     ) -> ColourModel:
-        """A model of given histograms.
+        """Make a model of given histograms.
 
         Args:
-            templates: Histograms, each summing to 1.
-            names: Whose each is; several may be of one person.
-            space: The histograms' bins.
-            kernel: How the pixels of a box are to count.
+            templates: Histograms, each with sum 1.
+            names: Name of the person of each; several may be of one person.
+            space: The kind of bins.
+            kernel: The weights of the pixels of a box.
 
         Raises:
-            ValueError: If there is no template, or they have another number of bins.
+            ValueError: If there is no template, or the number of bins is wrong.
         """
         if len(templates) == 0:
             raise ValueError("a colour model needs at least one template, got none")
@@ -168,14 +170,14 @@ class ColourModel:
     def distances(
         self, bins: UInt16[ndarray, "h w"], boxes: Float[ndarray, "N 4"]
     ) -> Float[ndarray, "N G"]:
-        """D = min_i sqrt(1 - Σ_u sqrt(p(u) q_i(u))) over the templates of each of G people.
+        """Compute D = min_i sqrt(1 - Σ_u sqrt(p(u) q_i(u))) over the templates of each of G people.
 
-        The distance of [ZW21], over all templates, is the smallest of a row.
+        The distance of [ZW21], over all templates, is the smallest value of a row.
 
         Args:
-            bins: :func:`bin_map` of the picture, computed once a picture.
-            boxes: Pixels. Where a box lies partly outside, what is inside counts;
-                wholly outside, D is 1.
+            bins: :func:`bin_map` of the image.
+            boxes: Centre and half sizes of N boxes, pixels. Of a box partly outside the image the
+                part inside is used; wholly outside, D is 1.
         """
         boxes = np.ascontiguousarray(boxes, dtype=float)
         nearest: ndarray = images.template_distances(
@@ -190,15 +192,15 @@ def histograms(
     space: ColourSpaceName,
     kernel: KernelName,
 ) -> Float[ndarray, "N bins"]:
-    """The colour histogram of each box, summing to 1; all 0 where a box holds no pixel.
+    """Compute the colour histogram of each box, with sum 1; 0 for a box without pixels.
 
-    With the Epanechnikov kernel a pixel weighs 1 - r², r being 1 on the ellipse
-    inscribed in the box ([CRM03]): the middle counts, the corners do not.
+    With the Epanechnikov kernel a pixel has the weight 1 - r², r being 1 on the ellipse
+    inscribed in the box ([CRM03]), so that the corners have none.
 
     Args:
-        bins: :func:`bin_map` of the picture.
-        boxes: Pixels; what lies outside the picture does not count.
-        space: Of ``bins``.
+        bins: :func:`bin_map` of the image.
+        boxes: Centre and half sizes, pixels; the part outside the image is left out.
+        space: The kind of ``bins``.
         kernel: The weight of a pixel by its place in the box.
     """
     boxes = np.ascontiguousarray(boxes, dtype=float)

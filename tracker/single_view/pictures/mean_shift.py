@@ -1,7 +1,7 @@
 """Modes of a weighted sample of boxes, by mean shift.
 
 Boxes are ``centre_x, centre_y, half_width, half_height`` in pixels; distances are
-measured in half sizes of the box one stands at, so that nothing depends on scale.
+in half sizes of the current box, so that the result does not depend on scale.
 
 [CM02] Comaniciu, Meer, "Mean shift: a robust approach toward feature space analysis",
 IEEE TPAMI 24(5), 2002.
@@ -16,23 +16,23 @@ from numpy import ndarray
 from tracker.kernels.pictures import images
 
 ITERATIONS = 30
-"""Steps after which a climb ends; most converge well before."""
+"""Largest number of steps of a climb; most converge well before."""
 
 TOLERANCE = 0.01
-"""A climb ends when a step is shorter than this many half sizes: far below any peak's deviation."""
+"""Length of a step in half sizes below which a climb ends: far below any peak's deviation."""
 
 
 def starts(
     boxes: Float[ndarray, "S 4"], weights: Float[ndarray, " S"], most: int, *, spread: bool
 ) -> Int[ndarray, " K"]:
-    """Indices of the samples to climb from: the heaviest, at most ``most``.
+    """Select the indices of the heaviest samples as starts, at most ``most``.
 
     Args:
-        boxes: Samples.
-        weights: Not negative; samples of weight 0 are never taken.
-        most: At most so many.
-        spread: Whether a start keeps half a box's distance from heavier ones. Without,
-            all starts may sit on the one target that fits best.
+        boxes: Samples, pixels.
+        weights: Weights, not negative; samples of weight 0 are never selected.
+        most: Largest number of starts.
+        spread: Whether a start is at least half a box away from heavier ones. Without,
+            all starts may be at the one target that fits best.
     """
     order = np.argsort(-weights, kind="stable")
     if not spread:
@@ -52,20 +52,20 @@ def modes(
 ) -> tuple[Float[ndarray, "M 4"], Float[ndarray, " M"]]:
     """Climb from each start to a mode of the density Σ_i w_i k(x - x_i), [CM02].
 
-    The kernel is Gaussian, its width ``bandwidth`` half sizes of the box where the
-    climb stands, in the centre and in the half sizes alike.
+    The kernel is Gaussian, with a bandwidth of ``bandwidth`` half sizes of the current
+    box, in the centre and in the half sizes alike.
 
     Args:
-        boxes: Samples x_i.
+        boxes: Samples x_i, pixels.
         weights: w_i, not negative.
-        start_boxes: Where to begin; none is allowed.
-        bandwidth: In half sizes.
-        merge_distance: Modes whose centres are closer than this, in half sizes, are one:
-            the denser stays.
+        start_boxes: Boxes at which the climbs start; there may be none.
+        bandwidth: Bandwidth in half sizes.
+        merge_distance: Distance of centres, in half sizes, below which modes are merged to the
+            denser one.
 
     Returns:
-        The modes, densest first, and their densities. None for an empty sample, and
-        none from a start that no sample is near to.
+        The modes, densest first, and their densities. An empty sample has none, and neither has
+        a start without any sample near it.
     """
     climbed = images.mean_shift(
         np.ascontiguousarray(boxes, dtype=float),

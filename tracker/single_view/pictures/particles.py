@@ -1,4 +1,4 @@
-"""Particles over boxes: weights from colours, resampling, clusters, drawing anew.
+"""Particles over boxes: weights from colours, resampling, clusters, and redistribution.
 
 Boxes are ``centre_x, centre_y, half_width, half_height`` in pixels.
 
@@ -20,14 +20,14 @@ from numpy import ndarray
 from tracker.kernels import particles
 
 ITERATIONS = 30
-"""Steps after which a climb ends; most converge well before."""
+"""Largest number of steps of a climb; most converge well before."""
 
 TOLERANCE = 0.01
-"""A climb ends when a step is shorter than this many half sizes: far below any mode's deviation."""
+"""Length of a step in half sizes below which a climb ends: far below any mode's deviation."""
 
 
 def log_likelihoods(distances: Float[ndarray, "S G"], sharpness: float) -> Float[ndarray, " S"]:
-    """max_g -λ d_g: the logarithm of a particle's weight exp(-λ d), the best over G targets.
+    """Compute max_g -λ d_g: the log of a particle's weight exp(-λ d), the best over G targets.
 
     Args:
         distances: d of each particle to the colours of each target, 0 … 1; G ≥ 1.
@@ -37,7 +37,7 @@ def log_likelihoods(distances: Float[ndarray, "S G"], sharpness: float) -> Float
 
 
 def normalised(logarithms: Float[ndarray, " S"]) -> Float[ndarray, " S"]:
-    """Weights that sum to 1, from their logarithms, however small; none for none."""
+    """Normalise weights to the sum 1, from their logarithms, however small; empty for none."""
     if not len(logarithms):
         return np.zeros(0)
     weights = np.exp(logarithms - logarithms.max())
@@ -47,13 +47,13 @@ def normalised(logarithms: Float[ndarray, " S"]) -> Float[ndarray, " S"]:
 def normalised_by_group(
     logarithms: Float[ndarray, " S"], groups: Int[ndarray, " S"]
 ) -> Float[ndarray, " S"]:
-    """Weights that sum to 1, each group's to its share of the particles.
+    """Normalise weights to the sum 1, each group's to its share of the particles.
 
-    A target that fits its colours a little worse than another loses no particles to it.
+    A target with slightly less similar colours than another loses no particles to it.
 
     Args:
-        logarithms: Of the weights, however small.
-        groups: 0, 1, …, whom each particle belongs to.
+        logarithms: Logarithms of the weights, however small.
+        groups: Group of each particle, 0, 1, ….
     """
     if not len(logarithms):
         return np.zeros(0)
@@ -65,7 +65,7 @@ def normalised_by_group(
 
 
 def effective_number(weights: Float[ndarray, " S"]) -> float:
-    """1 / Σ w²: how many particles of equal weight would tell as much; 0 for none."""
+    """The effective sample size 1 / Σ w²; 0 for no particles."""
     squared = float((weights**2).sum())
     return 1.0 / squared if squared > 0.0 else 0.0
 
@@ -73,12 +73,12 @@ def effective_number(weights: Float[ndarray, " S"]) -> float:
 def resample(
     weights: Float[ndarray, " S"], count: int, rng: np.random.Generator
 ) -> Int[ndarray, " S"]:
-    """How often each particle is drawn in ``count`` multinomial draws ([GSS93]).
+    """Draw ``count`` particles multinomially; returns the number for each particle ([GSS93]).
 
     Args:
-        weights: Summing to 1; none gives none.
-        count: Draws, ≥ 0.
-        rng: Of the draws.
+        weights: Weights with sum 1; there may be none.
+        count: Number of draws, ≥ 0.
+        rng: The generator of the draws.
     """
     if not len(weights):
         return np.zeros(0, dtype=np.int64)
@@ -92,9 +92,9 @@ class Clusters:
     modes: Float[ndarray, "M 4"]
     """Fixed points of the mean shift."""
     shares: Float[ndarray, " M"]
-    """Of all particles, those that climb to each."""
+    """Share of all particles that climb to each."""
     owners: Int[ndarray, " S"]
-    """The mode that each particle climbs to; -1 for those of count 0."""
+    """Index of the mode that each particle climbs to; -1 for particles of count 0."""
 
 
 def clusters(
@@ -105,23 +105,23 @@ def clusters(
     bandwidth: float,
     merge_distance: float,
 ) -> Clusters:
-    """Mean-shift clusters with the Epanechnikov kernel ([CM02], [SG08]).
+    """Compute mean-shift clusters with the Epanechnikov kernel ([CM02], [SG08]).
 
     Every particle climbs to a fixed point of
 
         m ← Σ_i c_i [r_i < 1] x_i / Σ_i c_i [r_i < 1],  r_i = |(x_i - m) / (h H_m)|
 
-    with the half sizes H_m of the box it stands at: the bandwidth follows the target's radius.
+    with the half sizes H_m of the current box: the bandwidth follows the target's size.
 
     Args:
-        boxes: Particles, each once.
-        counts: How often each was drawn.
-        groups: Each group's particles have modes of their own; all the same for one group.
+        boxes: Particles, each once, pixels.
+        counts: Number of draws of each.
+        groups: Group of each particle; each group has modes of its own.
         bandwidth: h, in half sizes.
-        merge_distance: Fixed points nearer than this, in half sizes, are one mode: the densest.
+        merge_distance: Distance in half sizes below which fixed points are merged to the densest.
 
     Returns:
-        No modes for no particles.
+        The modes; none for no particles.
     """
     weights = np.ascontiguousarray(counts, dtype=float)
     climbed = particles.epanechnikov_climb(
@@ -145,16 +145,16 @@ def redistribute(
     count: int,
     rng: np.random.Generator,
 ) -> Float[ndarray, "S 4"]:
-    """Draw particles anew around targets, the same number around each ([SG08]).
+    """Draw new particles around targets, the same number around each ([SG08]).
 
-    Resampling leaves copies of a few particles (impoverishment), most of them on the
-    target that fits best; these are Gaussian around every target.
+    Resampling results in copies of a few particles (impoverishment), most of them at the
+    target that fits best; the new ones are Gaussian around every target.
 
     Args:
-        boxes: Of the targets; none gives none.
+        boxes: Boxes of the targets, pixels; there may be none.
         sigmas: Standard deviations of the centre, pixels.
-        count: Particles of all targets together, shared out as evenly as it goes.
-        rng: Of the draws.
+        count: Number of particles of all targets together, divided as evenly as possible.
+        rng: The generator of the draws.
     """
     if not len(boxes) or count == 0:
         return np.zeros((0, 4))

@@ -1,4 +1,4 @@
-"""Which mode of the particles is which target: the hypothesis matrix and its best assignment.
+"""Assignment of the particles' modes to targets: the hypothesis matrix and its best assignment.
 
 [SG08] Sun, Guo, "Multiple object tracking with a pseudo particle filter", 2008.
 """
@@ -15,7 +15,7 @@ from tracker.single_view.pseudo_particle.track_management import Targets
 
 
 def vacancies(targets: Targets, persons: int, per_person: int) -> Int[ndarray, " A"]:
-    """The persons that a newcomer may be, each as often as more targets may look like that one."""
+    """The persons of possible new targets, each as often as further targets may look like it."""
     taken = np.bincount(targets.persons, minlength=persons)
     return np.repeat(np.arange(persons), np.maximum(per_person - taken, 0))
 
@@ -32,25 +32,25 @@ def hypothesis_matrix(
     position_sigma: float,
     position_gate: float,
 ) -> Float[ndarray, "M columns"]:
-    """Logarithms of how likely each mode is each target, a newcomer, or background ([SG08]).
+    """Compute log likelihoods of each mode as a target, a new target, or background ([SG08]).
 
         h(m, t) = ε_m exp(-λ d(m, t)) exp(-½ |(x_m - x_t) / (σ_a H_t)|²)   of T targets
-        h(m, a) = ε_m exp(-λ d(m, a)) exp(-½ k_a²)                        of A newcomers
+        h(m, a) = ε_m exp(-λ d(m, a)) exp(-½ k_a²)                        of A new targets
         h(m, 0) = exp(-λ d_0) exp(-½ k_a²)                                of the background
 
-    A newcomer's and the background's place is unknown; they count as k_a standard
-    deviations off, so that a target that is followed may look a little worse than they.
+    The places of new targets and of the background are unknown; they count as k_a standard
+    deviations off, so that a tracked target may have less similar colours than they.
 
     Args:
-        modes: Pixels.
+        modes: Boxes of M modes, pixels.
         distances: d of each mode to the colours of each of G persons.
-        evidence: ln ε_m, what else speaks for a mode being a person.
-        expected: The targets, where they are expected.
-        vacant: Persons that newcomers may be.
+        evidence: ln ε_m, other log likelihood ratios of each mode being a person.
+        expected: The predicted targets.
+        vacant: Person of each possible new target.
         sharpness: λ.
         background_distance: d_0.
         position_sigma: σ_a, in half sizes H_t of a target.
-        position_gate: k_a: a target at an unknown place is as likely as one so many σ_a off.
+        position_gate: k_a, in σ_a, at which an unknown place is as likely as a target.
 
     Returns:
         T + A + 1 columns; the background is the last.
@@ -70,10 +70,10 @@ def hypothesis_matrix(
 
 
 def best_hypothesis(matrix: Float[ndarray, "M columns"]) -> Int[ndarray, " M"]:
-    """The column of each mode in the likeliest assignment; the background takes any number.
+    """Find the column of each mode in the likeliest assignment.
 
-    Every other column is given away once at most, and the sum of the logarithms is the
-    greatest there is.
+    The background may have any number of modes, every other column one at most, and the sum of
+    the logarithms is the largest possible.
     """
     count, columns = matrix.shape
     background = np.repeat(matrix[:, -1:], count, axis=1)
@@ -93,15 +93,15 @@ def apart(
     background: int,
     separation: float,
 ) -> Int[ndarray, " M"]:
-    """The same columns, with newcomers who stand too near to somebody sent to the background.
+    """Assign new targets too near to another target to the background instead.
 
     Args:
-        modes: Pixels.
-        existences: The surer of two newcomers stays.
-        columns: Of the hypothesis matrix, one a mode.
-        known: Number of the columns that are targets.
-        background: The background's column.
-        separation: In half sizes of whoever is there.
+        modes: Boxes of the modes, pixels.
+        existences: Existence probability of each; the larger of two new targets remains.
+        columns: Column of each mode in the hypothesis matrix.
+        known: Number of columns that are targets.
+        background: The column of the background.
+        separation: Least distance, in half sizes of the target that is there.
     """
     result = np.where(columns < known, columns, background)
     for mode in np.argsort(-existences, kind="stable"):

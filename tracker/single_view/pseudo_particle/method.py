@@ -33,19 +33,19 @@ if TYPE_CHECKING:
     from tracker.parameters import RunParameters
 
 CLASSICAL_LABEL = 1
-"""Of the one estimate that the classical filter has."""
+"""Label of the single estimate of the classical filter."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PseudoParticleState:
-    """What one step leaves to the next."""
+    """The particles and tracks after a step."""
 
     particles: Float[ndarray, "S 4"]
-    """Around the targets, or the classical filter's posterior; all of the same weight."""
+    """Particles around the targets, or the classical filter's posterior, of equal weights."""
     tracks: Tracks
     """Targets of the pseudo particle filter; the classical one has none."""
     foreground: Any
-    """Of the foreground model."""
+    """The state of the foreground model."""
 
 
 class PseudoParticle:
@@ -55,17 +55,17 @@ class PseudoParticle:
     distance between its histogram and the nearest of all targets' colours. One
     multinomial resampling for all targets together leaves clusters, whose modes are
     fixed points of the mean shift with the Epanechnikov kernel; small clusters are
-    dropped. The hypothesis matrix says which mode is which target, or background, and
+    dropped. The hypothesis matrix assigns modes to targets or background, and
     the particles of the next step are drawn around each target anew. Some particles
-    look for newcomers.
+    search for new targets.
 
     The classical filter, for contrast, has one posterior and its mean.
 
     Beyond the paper, and switched off by the preset ``published``: bins of hue and
-    saturation; what the foreground says of a box; newcomers looked for on it; each
-    target's particles resampled for themselves, and clusters for each person's colours;
-    targets that keep some of their velocity; newcomers who stand apart; all modes, not
-    the confirmed targets, go to the fusion.
+    saturation; the foreground in the box; new targets searched for on it; each
+    target's particles resampled separately, and clusters for each person's colours;
+    targets that retain some of their velocity; new targets that keep apart; all modes, not
+    the confirmed targets, are passed to the fusion.
     """
 
     def __init__(
@@ -75,7 +75,7 @@ class PseudoParticle:
         parameters: RunParameters,
         reader: Pictures,
     ) -> None:
-        """Read the templates and learn the background.
+        """Read the templates and learn the background of one camera.
 
         Raises:
             ValueError: If there are no pictures or templates, or a template cannot be read.
@@ -85,7 +85,7 @@ class PseudoParticle:
         self._step_time = sequence.step_time
 
     def start(self) -> PseudoParticleState:
-        """Nobody is in the picture."""
+        """The state without targets, before the first step."""
         return PseudoParticleState(np.zeros((0, 4)), Tracks.empty(), self._model.start())
 
     def step(
@@ -95,7 +95,7 @@ class PseudoParticle:
         picture: UInt8[ndarray, "h w 3"] | None,
         rng: np.random.Generator,
     ) -> tuple[PseudoParticleState, ViewResult]:
-        """One step; without a picture the particles only move."""
+        """Process one step; without an image the particles are only predicted."""
         moved = self._model.move(state.particles, rng)
         if picture is None:
             return replace(state, particles=moved), self._unseen(state)
@@ -116,7 +116,7 @@ class PseudoParticle:
         scene: Scene,
         rng: np.random.Generator,
     ) -> tuple[Float[ndarray, "S 4"], Tracks, ViewResult]:
-        """Clusters, the hypothesis matrix, drawing anew: particles, targets and result."""
+        """Clusters, hypothesis matrix, and new particles: particles, targets and result."""
         p = self._parameters
         samples = np.concatenate([moved, self._model.newcomers(p.samples - len(moved), scene, rng)])
         expected = tracks.targets.moved(p.velocity_share)
@@ -199,7 +199,7 @@ class PseudoParticle:
     def _classical(
         self, moved: Float[ndarray, "S 4"], scene: Scene, rng: np.random.Generator
     ) -> tuple[Float[ndarray, "S 4"], ViewResult]:
-        """Sampling, importance weights, resampling: one posterior, and its mean."""
+        """Sampling, importance weights and resampling: one posterior, and its mean."""
         p = self._parameters
         samples = moved if len(moved) else self._model.newcomers(p.samples, scene, rng)
         weights = particle_set.normalised(self._model.scores(scene, samples)[0])
@@ -225,7 +225,7 @@ class PseudoParticle:
         return np.repeat(samples, counts, axis=0), result
 
     def _nearest(self, boxes: Float[ndarray, "S 4"], targets: Targets) -> Int[ndarray, " S"]:
-        """Of each box the target within whose gate it lies, the nearest; T outside all gates."""
+        """The nearest target in whose gate each box lies; T outside all gates."""
         if not len(targets):
             return np.zeros(len(boxes), dtype=np.int64)
         apart = boxes[:, None, :2] - targets.boxes[None, :, :2]
@@ -237,7 +237,7 @@ class PseudoParticle:
     def _around(
         self, targets: Targets, resampled: Float[ndarray, "S 4"], rng: np.random.Generator
     ) -> Float[ndarray, "S 4"]:
-        """The particles that the next step begins with: anew around targets, or the resampled."""
+        """The particles for the next step: new ones around targets, or the resampled ones."""
         p = self._parameters
         if not len(targets):
             return np.zeros((0, 4))
@@ -245,14 +245,14 @@ class PseudoParticle:
         if p.redistribution == 0.0:
             return np.asarray(rng.permutation(resampled)[:count])
         expected = targets.moved(p.velocity_share)
-        # one that is not seen may be anywhere that it has strayed to since
+        # a target that is not detected may be anywhere within its drift since
         strayed = p.motion_sigma**2 * self._step_time * targets.misses
         spread = np.sqrt(p.redistribution**2 + strayed)
         sigmas = spread[:, None] * expected.boxes[:, 2:]
         return particle_set.redistribute(expected.boxes, sigmas, count, rng)
 
     def _gates(self, expected: Targets) -> Float[ndarray, "T 5"]:
-        """Ellipses within which the targets' modes are looked for."""
+        """Ellipses of the gates of the targets' modes."""
         p = self._parameters
         variances = (p.position_gate * p.position_sigma * expected.boxes[:, 2:]) ** 2
         across, down = variances.T
@@ -297,7 +297,7 @@ class PseudoParticle:
         )
 
     def _unseen(self, state: PseudoParticleState) -> ViewResult:
-        """Without a picture: the targets of the step before, and nothing for the fusion."""
+        """The result without an image: the targets of the step before, and no boxes."""
         none = np.zeros(0)
         confirmed = state.tracks.targets.take(state.tracks.targets.confirmed)
         return replace(
@@ -309,6 +309,6 @@ class PseudoParticle:
 
 
 def _relative(weights: Float[ndarray, " S"]) -> Float32[ndarray, " S"]:
-    """Weights as shares of the largest."""
+    """Weights as shares of the largest one."""
     largest = weights.max() if len(weights) else 1.0
     return np.asarray(weights / largest, dtype=np.float32)

@@ -1,4 +1,4 @@
-"""Boxes as particles on colour: how they move, where newcomers are looked for, what they weigh."""
+"""Boxes as particles with colour likelihoods: motion, search for new targets, and weights."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ class ColourParticles:
     """The models that the pseudo particle filter and the classical one share.
 
     Motion: a random walk in half sizes. Weight: exp(-λ d), d the Bhattacharyya distance
-    between the particle's histogram and the nearest of all targets' colours, times what
-    the foreground says of the box.
+    between the particle's histogram and the nearest of all targets' colours, times the
+    likelihood of the foreground in the box.
     """
 
     def __init__(
@@ -31,7 +31,7 @@ class ColourParticles:
         foreground: ForegroundParams,
         reader: Pictures,
     ) -> None:
-        """Read the templates and learn the background, where something asks for it.
+        """Read the templates and learn the background, where it is used.
 
         Raises:
             ValueError: If there are no pictures or templates, or a template cannot be read.
@@ -50,17 +50,17 @@ class ColourParticles:
         self.persons = len(self._appearance.model.names)
 
     def start(self) -> Any:
-        """The state of the foreground model before the first picture."""
+        """The state of the foreground model before the first image."""
         return self._appearance.start()
 
     def look(self, state: Any, picture: UInt8[ndarray, "h w 3"]) -> tuple[Any, Scene]:
-        """Prepare a picture."""
+        """Prepare an image."""
         return self._appearance.look(state, picture)
 
     def move(
         self, particles: Float[ndarray, "S 4"], rng: np.random.Generator
     ) -> Float[ndarray, "S 4"]:
-        """Random walk in half sizes; a box grows or shrinks as a whole."""
+        """Predict by a random walk in half sizes; width and height change together."""
         p, root = self._parameters, self._root_time
         noise = rng.standard_normal((len(particles), 3))
         moved = particles.copy()
@@ -71,7 +71,7 @@ class ColourParticles:
     def newcomers(
         self, count: int, scene: Scene, rng: np.random.Generator
     ) -> Float[ndarray, "N 4"]:
-        """Particles where somebody may have appeared."""
+        """Draw particles where new targets may be."""
         if self._parameters.birth == "foreground":
             drawn = self._appearance.draw_on_foreground(count, scene, rng)
         else:
@@ -81,7 +81,7 @@ class ColourParticles:
     def evidence(
         self, scene: Scene, boxes: Float[ndarray, "N 4"]
     ) -> tuple[Float[ndarray, " N"], Float[ndarray, " N"]]:
-        """What the foreground says of each box, and its share inside."""
+        """The foreground's log factor of the likelihood of each box, and its share inside."""
         p = self._parameters
         return self._appearance.shape_scores(
             scene, boxes, inside_weight=p.foreground_weight, around_weight=p.surroundings_weight
@@ -90,14 +90,14 @@ class ColourParticles:
     def scores(
         self, scene: Scene, boxes: Float[ndarray, "N 4"]
     ) -> tuple[Float[ndarray, " N"], Int[ndarray, " N"]]:
-        """The logarithm of each box's weight, and the person whose colours it fits best."""
+        """The log weight of each box, and the person whose colours it fits best."""
         distances = self._appearance.distances(scene, boxes)
         colours = particle_set.log_likelihoods(distances, self._parameters.sharpness)
         evidence, _ = self.evidence(scene, boxes)
         return np.asarray(colours + evidence), np.asarray(distances.argmin(axis=1))
 
     def distances(self, scene: Scene, boxes: Float[ndarray, "N 4"]) -> Float[ndarray, "N G"]:
-        """d of each box to each person's colours."""
+        """Compute d of each box to each person's colours."""
         return self._appearance.distances(scene, boxes)
 
     def sigmas(self, boxes: Float[ndarray, "N 4"]) -> Float[ndarray, "N 4"]:

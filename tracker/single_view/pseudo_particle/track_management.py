@@ -1,4 +1,4 @@
-"""Track management of one camera: who is there, who was and may return, who begins and ends."""
+"""Track management of one camera: targets that begin, end, or return."""
 
 from __future__ import annotations
 
@@ -11,27 +11,27 @@ from numpy import ndarray
 from tracker.single_view.protocol import ViewEvent
 
 UNCONFIRMED = 0
-"""Label of a target that has not been found often enough to have one."""
+"""Label of a target that has not been detected often enough."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Targets:
-    """T targets in one camera's picture, by columns."""
+    """T targets in one camera, by columns."""
 
     labels: Int[ndarray, " T"]
-    """From 1 on; :data:`UNCONFIRMED` for those that are not sure yet."""
+    """Ids from 1 on; :data:`UNCONFIRMED` for targets that are not confirmed yet."""
     persons: Int[ndarray, " T"]
-    """Whose templates each looks like: index into the colour model's names."""
+    """Person of each target's colours: index into the colour model's names."""
     boxes: Float[ndarray, "T 4"]
-    """Centre and half sizes, pixels; of one that was not found, where it is expected."""
+    """Centre and half sizes, pixels; predicted ones for a target that was not detected."""
     velocities: Float[ndarray, "T 2"]
-    """Mean displacement, pixels a step."""
+    """Mean displacement, pixels per step."""
     hits: Int[ndarray, " T"]
-    """Steps in which it was found."""
+    """Number of steps with a mode."""
     misses: Int[ndarray, " T"]
-    """Steps since it was last found."""
+    """Number of steps since the last mode."""
     existences: Float[ndarray, " T"]
-    """Probability that it is somebody; of one that was not found it fades."""
+    """Existence probability, which decreases without modes."""
 
     @staticmethod
     def nobody() -> Targets:
@@ -44,15 +44,15 @@ class Targets:
 
     @property
     def confirmed(self) -> Bool[ndarray, " T"]:
-        """Whether each counts."""
+        """Whether each target is confirmed."""
         return np.asarray(self.labels != UNCONFIRMED)
 
     def take(self, chosen: ndarray) -> Targets:
-        """Some of them, by index or mask."""
+        """Select some of the targets, by index or mask."""
         return Targets(*(column[chosen] for column in self._columns))
 
     def joined(self, other: Targets) -> Targets:
-        """These and others behind them."""
+        """Append other targets."""
         pairs = zip(self._columns, other._columns, strict=True)
         return Targets(*(np.concatenate(pair) for pair in pairs))
 
@@ -61,10 +61,10 @@ class Targets:
         return tuple(getattr(self, column.name) for column in fields(self))
 
     def moved(self, velocity_share: float) -> Targets:
-        """Where they are expected a step later.
+        """Predict the targets one step.
 
         Args:
-            velocity_share: How much of its mean displacement each repeats; 0 for none.
+            velocity_share: Share of its mean displacement that each repeats; 0 for none.
         """
         boxes = self.boxes.copy()
         boxes[:, :2] += velocity_share * self.velocities
@@ -73,35 +73,40 @@ class Targets:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Departed:
-    """Those who vanished and may return. V of them."""
+    """V targets that vanished and may return."""
 
     labels: Int[ndarray, " V"]
+    """Id of each target."""
     persons: Int[ndarray, " V"]
+    """Person of each target's colours."""
     ages: Int[ndarray, " V"]
-    """Steps since each vanished."""
+    """Number of steps since each vanished."""
 
     @staticmethod
     def nobody() -> Departed:
-        """None."""
+        """No vanished targets."""
         none = np.zeros(0, dtype=np.int64)
         return Departed(none, none, none)
 
     def take(self, chosen: ndarray) -> Departed:
-        """Some of them."""
+        """Select some of the targets."""
         return Departed(self.labels[chosen], self.persons[chosen], self.ages[chosen])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tracks:
-    """Who is there, who was, and the next free label."""
+    """Present and vanished targets, and the next free label."""
 
     targets: Targets
+    """The present targets."""
     departed: Departed
+    """The targets that vanished and may return."""
     next_label: int
+    """The first label that is free."""
 
     @staticmethod
     def empty() -> Tracks:
-        """Nobody has been seen yet."""
+        """The tracks before the first step."""
         return Tracks(Targets.nobody(), Departed.nobody(), next_label=1)
 
 
@@ -119,25 +124,25 @@ def manage(
     newcomer_misses: int,
     velocity_memory: float,
 ) -> tuple[Tracks, tuple[ViewEvent, ...]]:
-    """Who is there after a step's modes have been assigned.
+    """Update the targets after a step's modes have been assigned.
 
-    A target takes its mode; without one it stays where it is expected for ``patience``
-    steps, then it has vanished. A mode that no target takes is a newcomer; found in
-    ``confirmation`` steps it is new, or, if somebody of the same colours vanished within
-    ``memory`` steps, he has returned.
+    A target has the box of its mode; without one it is predicted for ``patience``
+    steps, then it has vanished. A mode without target is a new target; detected in
+    ``confirmation`` steps it is confirmed, or, if a target of the same colours vanished within
+    ``memory`` steps, it has returned.
 
     Args:
-        tracks: Before the step.
-        expected: Its targets, where they were expected.
-        modes: This step's, pixels.
-        existences: Probability that each is somebody.
-        columns: Of the hypothesis matrix, one a mode.
-        vacant: Persons of the newcomers' columns.
-        confirmation: Steps, ≥ 1.
-        patience: Steps.
-        memory: Steps.
-        newcomer_misses: Steps without a mode after which an unconfirmed target is given up.
-        velocity_memory: Share of the mean displacement that a new one leaves as it is.
+        tracks: The tracks before the step.
+        expected: The predicted targets.
+        modes: Boxes of this step's modes, pixels.
+        existences: Existence probability of each mode.
+        columns: Column of each mode in the hypothesis matrix.
+        vacant: Persons of the new targets' columns.
+        confirmation: Number of steps, at least 1.
+        patience: Number of steps.
+        memory: Number of steps.
+        newcomer_misses: Steps without a mode after which an unconfirmed target ends.
+        velocity_memory: Weight of the old mean displacement, 0 … 1.
     """
     count = len(expected)
     known = columns < count
@@ -174,7 +179,7 @@ def manage(
     labels, next_label = targets.labels.copy(), tracks.next_label
     due = ~targets.confirmed & (targets.hits >= confirmation) & (targets.misses == 0)
     for index in np.flatnonzero(due):
-        # the last who vanished of those who look like this one
+        # the last vanished target with the same colours
         alike = np.flatnonzero(departed.persons == targets.persons[index])
         if len(alike):
             back = alike[departed.ages[alike].argmin()]
@@ -203,7 +208,7 @@ def _updated(
     patience: int,
     velocity_memory: float,
 ) -> Targets:
-    """Targets that were found at their modes, the others where they are expected."""
+    """Targets with modes get their boxes, the others remain as predicted."""
     boxes, velocities = expected.boxes.copy(), expected.velocities.copy()
     hits, misses = expected.hits.copy(), expected.misses + 1
     existences = expected.existences * np.exp(-1.0 / (patience + 1.0))

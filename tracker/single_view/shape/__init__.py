@@ -1,1 +1,1 @@
-"""People by their shape: edges, what is not background and what moved, weighed by boosted trees."""
+"""Detection of people by shape: edges, background difference and motion, with boosted trees."""

@@ -1,4 +1,4 @@
-"""What a window on a person is judged by: edges, difference from the background, motion.
+"""Channels of the windows: edges, difference from the background, and motion.
 
 [DTPB09] Dollár, Tu, Perona, Belongie, "Integral channel features", BMVC 2009.
 """
@@ -17,54 +17,54 @@ from tracker.single_view.pictures.foreground import BackgroundModel, tone_curve
 from tracker.single_view.pictures.foreground.exposure import square_roots
 
 LAG = 0.12
-"""Seconds between two pictures that are compared: a moving hand leaves its place."""
+"""Time between two images that are compared, seconds: a moving hand leaves its place."""
 
 MEMORY = 2.0
-"""Seconds after which motion has faded to a third."""
+"""Time constant of the fading mean of motion, seconds."""
 
 BLUR = 1.0
-"""Pixels: noise and blocks of compression are smoothed before pictures are compared."""
+"""Standard deviation of the blur against noise and compression, before comparison, pixels."""
 
 _AROUND = 0.35
-"""Metres to either side over which the strength of edges is set against its mean."""
+"""Distance to either side over which edges are averaged for normalisation, metres."""
 
 _CALM = 4.0
-"""Levels a pixel that are added to that mean: on a plain wall noise is no edge."""
+"""Constant added to that average, levels per pixel: on a plain wall noise is no edge."""
 
 _EDGE = 64.0
-"""Value of an edge as strong as those around it."""
+"""Value of an edge as strong as the average around it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ChannelState:
-    """The pictures of the last moment, and how much has moved."""
+    """The images of the last moment, and the mean motion."""
 
     before: tuple[UInt8[ndarray, "h w 3"], ...]
-    """Square-rooted, smoothed, the oldest first."""
+    """Square-rooted and blurred, the oldest first."""
     activity: Float32[ndarray, "h w"] | None
-    """The fading mean of motion; None before the first picture."""
+    """The fading mean of motion; None before the first image."""
 
 
 class Channels:
-    """The channels of one camera's pictures, reduced to one size of people.
+    """The channels of one camera's images, reduced to one resolution of people.
 
-    Colours are taken as 16 √level, whose noise is alike in dark and light. Edges count by
-    their strength relative to those around them, by direction and in all [DTPB09]_. Beside
-    them stand the difference from the background, brought to the picture's exposure; the
-    difference from a moment ago; its fading mean, which shows who moves in place; and what a
-    background pixel varies by itself.
+    Colours are 16 √level, whose noise is equal in dark and light. Edges are normalised by
+    those around them, by direction and in total [DTPB09]_. Further channels are the
+    difference from the background at the image's exposure; the
+    difference from a moment ago; its fading mean, which shows people moving in place; and the
+    variation of a background pixel.
     """
 
     def __init__(
         self, background: BackgroundModel, factor: float, pixels_per_metre: float, step_time: float
     ) -> None:
-        """Prepare for one camera.
+        """Prepare the channels of one camera.
 
         Args:
-            background: Of the pictures as they come.
-            factor: By which they are reduced, 1 at most.
-            pixels_per_metre: Of people in the middle of the room, after that.
-            step_time: Seconds between two pictures.
+            background: The background, at the resolution of the images.
+            factor: Factor of the reduction, at most 1.
+            pixels_per_metre: Resolution at people in the middle of the room, after the reduction.
+            step_time: Time between two images, seconds.
         """
         self._background = background
         height, width = background.picture.shape[:2]
@@ -76,22 +76,22 @@ class Channels:
 
     @property
     def factors(self) -> tuple[float, float]:
-        """Reduced pixels in a pixel, across and down."""
+        """Reduced pixels per pixel, across and down."""
         height, width = self._background.picture.shape[:2]
         return self._size[0] / width, self._size[1] / height
 
     def initial(self) -> ChannelState:
-        """Nothing was seen yet."""
+        """The state before the first image."""
         return ChannelState((), None)
 
     def watch(self, state: ChannelState, picture: UInt8[ndarray, "h w 3"]) -> ChannelState:
-        """The state after a picture in which nobody is sought: what moves, and no channels."""
+        """Update the state by an image without computing its channels."""
         return self._watch(state, self._reduced(square_roots(picture)))[0]
 
     def step(
         self, state: ChannelState, picture: UInt8[ndarray, "h w 3"]
     ) -> tuple[ChannelState, Int32[ndarray, "h1 w1 C"]]:
-        """The integral images of a picture's channels."""
+        """Compute the integral images of an image's channels, and the next state."""
         empty = self._background.picture
         shown = cv2.LUT(empty, square_roots(tone_curve(empty, picture)))
         roots = self._reduced(square_roots(picture))
@@ -130,7 +130,7 @@ class Channels:
 
 
 def _moved(old: UInt8[ndarray, "h w 3"], new: UInt8[ndarray, "h w 3"]) -> UInt8[ndarray, "h w"]:
-    """How much each pixel changed, beyond what most of the picture did: exposure and noise."""
+    """The change of each pixel beyond that of most of the image: exposure and noise."""
     shift = [int(np.median(new[::4, ::4, c].astype(int) - old[::4, ::4, c])) for c in range(3)]
     if any(shift):
         levels = np.arange(256)[:, None] + shift

@@ -1,4 +1,4 @@
-"""What people by shape tell the fusion: how well they are placed, and how likely each is one.
+"""Likelihood ratio and measurement noise of people detected by shape, for the fusion.
 
 [LBS93] Lerro, Bar-Shalom, "Interacting multiple model tracking with target amplitude feature",
 IEEE TAES 29(2), 1993.
@@ -16,13 +16,13 @@ from tracker.parameters.groups.shapes import ShapesParams
 def log_ratios(
     log_odds: Float[ndarray, " N"], even: float, weight: float, largest: float
 ) -> Float[ndarray, " N"]:
-    """ln Λ of people by shape, of their odds.
+    """Convert the log odds of people by shape to log likelihood ratios, min(a ln o/o_0, ln Λ_max).
 
     Args:
-        log_odds: ln o.
+        log_odds: ln o of N people.
         even: ln o_0, at which Λ is 1.
-        weight: a.
-        largest: ln Λ_max.
+        weight: a, the factor on the log odds.
+        largest: ln Λ_max, the upper bound.
     """
     return np.asarray(np.minimum(weight * (log_odds - even), largest))
 
@@ -30,12 +30,12 @@ def log_ratios(
 def shape_sigmas(
     boxes: Float[ndarray, "N 4"], half_extents: Float[ndarray, " 3"], parameters: ShapesParams
 ) -> Float[ndarray, "N 4"]:
-    """Measurement noise: the same in metres for who is near and far, and some pixels.
+    """Measurement noise: standard deviations that are constant in metres, and some pixels.
 
     Args:
-        boxes: Centre and half sizes, pixels.
-        half_extents: Of the target, metres.
-        parameters: The noise.
+        boxes: Centre and half sizes of N boxes, pixels.
+        half_extents: Half width, depth and height of the target, metres.
+        parameters: The standard deviations in metres, pixels and shares of the size.
     """
     p = parameters
     extents = np.array([(half_extents[0] + half_extents[1]) / 2.0, half_extents[2]])

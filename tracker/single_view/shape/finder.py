@@ -1,4 +1,4 @@
-"""People in one camera's pictures, by the shape of head and trunk, without anybody's colours."""
+"""Detection of people in one camera by the shape of head and trunk, without colours."""
 
 from __future__ import annotations
 
@@ -17,37 +17,38 @@ from tracker.single_view.shape.trees import Trees
 from tracker.single_view.shape.windows import Windows
 
 PIXELS_PER_METRE = 48.0
-"""Pictures are reduced until people in the middle of the room are this large: what the trees
-learnt from. Smaller ones are left as they are."""
+"""Resolution to which images are reduced, at people in the middle of the room: that of the training
+set. Images of lower resolution are not changed."""
 
 SAME_PERSON = np.array([0.35, 0.5])
-"""Metres across and down within which two places in a picture are of one person."""
+"""Distance across and down within which two places in an image are of one person, metres."""
 
 _NEAR = 2.0
-"""Log odds below the best of a person's windows from which another says nothing of the place."""
+"""Log odds below the best of a person's windows at which others do not contribute to the place."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Shapes:
-    """N people in one picture."""
+    """N people that were detected in one image."""
 
     boxes: Float[ndarray, "N 4"]
-    """Of the target: centre and half sizes, pixels."""
+    """Boxes of the target: centre and half sizes, pixels."""
     log_odds: Float[ndarray, " N"]
+    """Log odds of a person in each box."""
     sizes: Float[ndarray, "N 2"]
-    """Pixels a metre there, across and down."""
+    """Pixels per metre at each box, across and down."""
     unlikely: Float[ndarray, "U 4"]
-    """Boxes of those that were not likely enough."""
+    """Boxes with log odds below the threshold."""
     windows: Windows
-    """Those that were looked at to the end."""
+    """The W windows that were not rejected."""
     odds: Float[ndarray, " W"]
-    """Log odds that a person is in each of them."""
+    """Log odds of a person in each of these windows."""
 
     def support(self, boxes: Float[ndarray, "M 4"]) -> Float[ndarray, " M"]:
-        """Log odds that somebody is in each of some boxes: of the best window there, -inf for none.
+        """Log odds of a person in each of M boxes: those of the best window there, -inf for none.
 
         Args:
-            boxes: Of the target: centre and half sizes, pixels.
+            boxes: Centre and half sizes of the target's boxes, pixels.
         """
         apart = np.abs(boxes[:, None, :2] - self.windows.boxes[None, :, :2])
         there = (apart < SAME_PERSON * self.windows.sizes).all(axis=2)
@@ -55,15 +56,15 @@ class Shapes:
 
 
 class ShapeFinder:
-    """Looks at every window where a person can be, and keeps the best of those that overlap."""
+    """A sliding-window detector over the possible windows, with non-maximum suppression."""
 
     def __init__(self, sequence: Sequence, camera_index: int, reader: Pictures) -> None:
         """Learn the background of one camera.
 
         Args:
-            sequence: Whose camera, upright.
-            camera_index: Which one.
-            reader: Of its pictures.
+            sequence: The sequence, with upright cameras.
+            camera_index: Index of the camera.
+            reader: Reader of the images.
         """
         camera = sequence.cameras[camera_index]
         background = learn_background(sequence, camera_index, reader)
@@ -80,12 +81,12 @@ class ShapeFinder:
 
     @staticmethod
     def of(sequence: Sequence, camera_index: int, reader: Pictures) -> ShapeFinder:
-        """The one of a camera, made when it is first asked for: it keeps nothing of what it sees.
+        """The detector of a camera, created once, since it has no state.
 
         Args:
-            sequence: Whose camera, upright.
-            camera_index: Which one.
-            reader: Of its pictures.
+            sequence: The sequence, with upright cameras.
+            camera_index: Index of the camera.
+            reader: Reader of the images.
         """
         return reader.once(
             ("shape finder", camera_index, sequence.step_time, geometry(sequence, camera_index)),
@@ -93,17 +94,17 @@ class ShapeFinder:
         )
 
     def start(self) -> ChannelState | None:
-        """The state before the first picture."""
+        """The state before the first image."""
         return None if self._channels is None else self._channels.initial()
 
     def watch(
         self, state: ChannelState | None, picture: UInt8[ndarray, "h w 3"]
     ) -> ChannelState | None:
-        """The state after a picture in which nobody is sought: without windows and their trees.
+        """Update the state by an image without detecting people in it.
 
         Args:
-            state: After the picture before.
-            picture: BGR.
+            state: The state after the image before.
+            picture: The image, BGR.
         """
         if self._channels is None or state is None:
             return state
@@ -116,13 +117,13 @@ class ShapeFinder:
         least: float,
         overlap: float,
     ) -> tuple[ChannelState | None, Shapes]:
-        """The people of one picture.
+        """Detect the people of one image.
 
         Args:
-            state: After the picture before.
-            picture: BGR.
-            least: Log odds from which somebody is there.
-            overlap: Windows that share more than this of what both cover are of one person.
+            state: The state after the image before.
+            picture: The image, BGR.
+            least: Log odds from which a person is detected.
+            overlap: Intersection over union above which windows are of one person, 0 … 1.
         """
         if self._channels is None or state is None:
             none = np.zeros((0, 4))
@@ -148,15 +149,15 @@ class ShapeFinder:
 def strongest(
     edges: Float[ndarray, "N 4"], scores: Float[ndarray, " N"], overlap: float
 ) -> tuple[Int[ndarray, " N"], Int[ndarray, " K"]]:
-    """Windows that are better than all that overlap them, greedily, the best first.
+    """Select windows by greedy non-maximum suppression, the best first.
 
     Args:
-        edges: Left, top, right and bottom, pixels.
-        scores: Of the windows.
-        overlap: Intersection over union.
+        edges: Left, top, right and bottom of N windows, pixels.
+        scores: Score of each window.
+        overlap: Intersection over union from which the weaker window is suppressed, 0 … 1.
 
     Returns:
-        To which each window belongs, and those themselves.
+        Index of the selected window that each belongs to, and the indices of the selected ones.
     """
     areas = (edges[:, 2] - edges[:, 0]) * (edges[:, 3] - edges[:, 1])
     owners = np.full(len(edges), -1)

@@ -1,4 +1,4 @@
-"""People by shape: tracked in one camera by data association, and passed on with their odds.
+"""People by shape: tracked in one camera by data association, with likelihood ratios.
 
 [LBS93] Lerro, Bar-Shalom, "Interacting multiple model tracking with target amplitude feature",
 IEEE TAES 29(2), 1993.
@@ -32,14 +32,14 @@ if TYPE_CHECKING:
 
 
 class ShapesInCamera:
-    """:class:`~tracker.single_view.jpda.Jpda` over people by shape.
+    """The tracker :class:`~tracker.single_view.jpda.Jpda` on people by shape.
 
-    To the fusion goes everything that looks like a person a little, with the logarithm of how
-    much likelier a person looks so than something else does ([LBS93]_),
+    Everything that is slightly similar to a person is passed to the fusion, with the log
+    likelihood ratio of its shape ([LBS93]_),
 
         ln Λ = min(a (ln o - ln o_0), ln Λ_max),
 
-    of the odds o that the shapes tell: what is little in one camera may be a person where
+    of the log odds ln o by shape: weak evidence in one camera may be a person where
     others agree.
     """
 
@@ -58,7 +58,7 @@ class ShapesInCamera:
         self._tracking = Jpda(sequence, camera_index, parameters, reader, source=self._source)
 
     def start(self) -> JpdaState:
-        """Nobody is in the picture."""
+        """The state without targets, before the first step."""
         return self._tracking.start()
 
     def step(
@@ -68,7 +68,7 @@ class ShapesInCamera:
         picture: UInt8[ndarray, "h w 3"] | None,
         rng: np.random.Generator,
     ) -> tuple[JpdaState, ViewResult]:
-        """One step; without a picture nothing is measured."""
+        """Process one step; without an image there are no measurements."""
         p = self._parameters
         state, result = self._tracking.step(state, frame, picture, rng)
         boxes, probabilities = result.measurements, result.measurement_scores
@@ -87,7 +87,7 @@ class ShapesInCamera:
 
 
 class ShapeSource:
-    """People by the shape of head and trunk, who may be anywhere on the room's floor."""
+    """People by the shape of head and trunk, anywhere on the room's floor."""
 
     def __init__(
         self, sequence: Sequence, camera_index: int, parameters: ShapesParams, reader: Pictures
@@ -95,10 +95,10 @@ class ShapeSource:
         """Learn the background of one camera.
 
         Args:
-            sequence: Whose camera.
-            camera_index: Which one.
-            parameters: From which odds on somebody is there, and the measurement noise.
-            reader: Of the pictures.
+            sequence: The sequence.
+            camera_index: Index of the camera.
+            parameters: The least log odds, and the measurement noise.
+            reader: Reader of the images.
         """
         self._parameters = parameters
         self._half_extents = sequence.target_half_extents
@@ -116,7 +116,7 @@ class ShapeSource:
         expected: GaussianMixture,
         rng: np.random.Generator,
     ) -> tuple[ChannelState | None, Measured]:
-        """The people of one picture; nobody where there is none."""
+        """Detect the people of one image; none without an image."""
         if picture is None:
             return state, Measured.nothing()
         p = self._parameters

@@ -1,4 +1,4 @@
-"""Where people can be in a picture: windows on the heads and trunks of people in the room."""
+"""Possible windows in an image: around heads and trunks of people anywhere in the room."""
 
 from __future__ import annotations
 
@@ -13,41 +13,41 @@ from tracker.sequences.sequence import Room
 from tracker.single_view.box_sizes import upright_boxes
 
 SPACING = 0.15
-"""Metres between the places on the floor."""
+"""Distance between the places on the floor, metres."""
 
 MOST_PLACES = 60_000
-"""On the floor; in a hall with more of them they lie further apart."""
+"""Largest number of places on the floor; in a larger hall their distance is increased."""
 
 CROWNS = (1.05, 1.2, 1.35, 1.5, 1.62, 1.74, 1.86)
-"""Metres from the floor to the crown of people who sit, bend and stand."""
+"""Heights of the crown above the floor of people who sit, bend and stand, metres."""
 
 WIDTH, ABOVE, BELOW = 1.0, 0.15, 1.1
-"""Of a window, metres: across, above the crown and below it."""
+"""Extent of a window, metres: across, above the crown and below it."""
 
 _SAME_PLACE, _SAME_SIZE = 0.1, 0.16
-"""Windows are one that differ by less, in shares of their width, and in log of their sizes."""
+"""Differences below which windows are merged: shares of their width, and log of their sizes."""
 
 _INSIDE = 0.35
-"""A window of which a smaller share lies in the picture is left out."""
+"""Least share of a window that must lie in the image."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Windows:
-    """N places at which a person may be seen in one camera."""
+    """N windows of an image in which a person may be."""
 
     edges: Float[ndarray, "N 4"]
     """Left, top, right and bottom, pixels."""
     boxes: Float[ndarray, "N 4"]
-    """The target's box there: centre and half sizes, pixels."""
+    """The target's box in each window: centre and half sizes, pixels."""
 
     @property
     def sizes(self) -> Float[ndarray, "N 2"]:
-        """Pixels a metre, across and down."""
+        """Pixels per metre, across and down."""
         spans = self.edges[:, 2:] - self.edges[:, :2]
         return np.asarray(spans / [WIDTH, ABOVE + BELOW])
 
     def take(self, indices: ndarray) -> Windows:
-        """Some of them."""
+        """Select some of the windows, by index."""
         return Windows(self.edges[indices], self.boxes[indices])
 
     @staticmethod
@@ -57,16 +57,16 @@ class Windows:
         half_extents: Float[ndarray, " 3"],
         floor: float = -np.inf,
     ) -> tuple[Windows, ndarray]:
-        """The windows of people whose crowns are there, and which of them can be seen.
+        """The windows of people with given crowns, and which of them are visible.
 
-        A target that is a whole body reaches down to the floor however low the crown is: of
-        somebody who sits or bends the middle is half as high as the crown.
+        A target that is a whole body extends down to the floor however low the crown is: the
+        centre of a sitting or bent person is at half the height of the crown.
 
         Args:
             camera: The calibrated camera, upright.
-            crowns: World metres.
-            half_extents: Of the target, metres, whose top is the crown.
-            floor: Its height, metres.
+            crowns: Positions of N crowns, world metres.
+            half_extents: Half width, depth and height of the target below the crown, metres.
+            floor: Height of the floor, world metres.
         """
         middles = crowns - [0.0, 0.0, (BELOW - ABOVE) / 2.0]
         around = np.array([WIDTH / 2.0, WIDTH / 2.0, (ABOVE + BELOW) / 2.0])
@@ -85,7 +85,7 @@ class Windows:
 
     @staticmethod
     def of(camera: Camera, room: Room, half_extents: Float[ndarray, " 3"]) -> Windows:
-        """People everywhere on the room's floor, of every height; one window of those alike."""
+        """The windows of people of every height anywhere on the floor, without similar ones."""
         across = _places(room.minimum[:2], room.maximum[:2])
         floor = room.minimum[2]
         grid = np.meshgrid(*across, floor + np.array(CROWNS), indexing="ij")
@@ -102,11 +102,11 @@ class Windows:
 
 
 def _places(low: Float[ndarray, " 2"], high: Float[ndarray, " 2"]) -> list[Float[ndarray, " K"]]:
-    """Places along both sides of the floor, of which there are not too many together."""
+    """Places along both sides of the floor, with a limited number together."""
     spacing, lengths = SPACING, high - low
     while np.prod(np.ceil(lengths / spacing)) > MOST_PLACES:
         spacing *= 2.0
-    halves = np.minimum(lengths, spacing) / 2.0  # a side that is shorter has one
+    halves = np.minimum(lengths, spacing) / 2.0  # a side shorter than the spacing has one place
     return [
         np.arange(begin + half, end, spacing)
         for begin, end, half in zip(low, high, halves, strict=True)

@@ -1,1 +1,1 @@
-"""The pictures that stage 1 works on: reduced to what it needs, and turned upright."""
+"""The images of stage 1: reduced to the resolution that it needs, upright, and stabilised."""

@@ -1,4 +1,4 @@
-"""A recording as stage 1 looks at it, and its results as everybody else knows them."""
+"""Conversion of a recording for stage 1, and of its results to the camera's own pixels."""
 
 from __future__ import annotations
 
@@ -24,23 +24,23 @@ _Made = TypeVar("_Made")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Working:
-    """A recording whose pictures are reduced and turned for stage 1."""
+    """A recording whose images are reduced and rotated for stage 1."""
 
     sequence: Sequence
-    """With the working pictures' calibrations and templates."""
+    """The sequence with the calibrations and templates of the working images."""
     reader: Pictures
-    """Of the working pictures."""
+    """Reader of the working images."""
     views: tuple[WorkingView | None, ...]
-    """None where a camera's own pictures are used as they are."""
+    """The conversion of each camera; None where its own images are used."""
 
     @staticmethod
     def of(sequence: Sequence, parameters: RunParameters, reader: Pictures) -> Working:
-        """What the chosen method of stage 1 is to work on.
+        """Prepare the images for the chosen method of stage 1.
 
         Args:
             sequence: The recording.
-            parameters: The method, and how large the pictures are to be.
-            reader: Of the recording's pictures.
+            parameters: The method, and the resolution of the images.
+            reader: Reader of the recording's images.
         """
         views: tuple[WorkingView | None, ...] = (None,) * len(sequence.views)
         used = parameters.method("single_view").used(parameters)
@@ -60,14 +60,14 @@ class Working:
         return Working(sequence, reader, views)
 
     def shake(self, camera: int) -> float:
-        """Standard deviation in the camera's own pixels of a shake that is undone, else 0."""
+        """Standard deviation of a shake that is compensated, in the camera's own pixels, else 0."""
         if not isinstance(self.reader, SteadyReader):
             return 0.0
         view = self.views[camera]
         return self.reader.shake(camera) / (1.0 if view is None else view.scale)
 
     def back(self, camera: int, result: ViewResult) -> ViewResult:
-        """A result in working pixels as one in the camera's own."""
+        """Convert a result from working pixels to the camera's own."""
         view = self.views[camera]
         if view is None:
             return result
@@ -88,7 +88,7 @@ class Working:
 
 
 def _reduced(sequence: Sequence, views: tuple[WorkingView | None, ...]) -> Sequence:
-    """The recording with the working pictures' calibrations and templates."""
+    """The recording with the calibrations and templates of the working images."""
     cameras = {view.full.name: view for view in views if view is not None}
     templates = []
     for template in sequence.templates:
@@ -109,7 +109,7 @@ def _reduced(sequence: Sequence, views: tuple[WorkingView | None, ...]) -> Seque
 
 
 class _WorkingReader:
-    """The working pictures, made of another reader's."""
+    """A reader of the working images, from another reader's images."""
 
     def __init__(self, reader: Pictures, views: tuple[WorkingView | None, ...]) -> None:
         self._reader = reader

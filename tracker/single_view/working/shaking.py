@@ -1,4 +1,4 @@
-"""Does a camera shake: its stand is weak, or somebody holds it."""
+"""Check for cameras that shake, on a weak stand or in a hand."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ _NAME = "cameras hold still"
 
 
 def check_shake(sequence: Sequence, reader: Pictures | None = None) -> list[Check]:
-    """Which cameras shake by more than a run puts up with, ``pictures.steady_from``.
+    """Find the cameras that shake by more than a run tolerates, ``pictures.steady_from``.
 
     Args:
-        sequence: As it was read.
-        reader: Of its pictures; one is opened if none is given.
+        sequence: The sequence.
+        reader: Reader of its images; None to open one.
 
     Returns:
-        A warning for each that does; one check where none does, or where nobody can tell.
+        A warning for each camera that shakes; one check without any, or if it is unknown.
 
     Raises:
-        OSError: If a picture file cannot be read.
+        OSError: If an image file cannot be read.
     """
     if not sequence.has_pictures:
         return [absent(_NAME, "it needs pictures of every camera")]

@@ -1,9 +1,9 @@
-"""A camera that shakes, held still: every picture is brought to where most of them look.
+"""Stabilisation of a camera that shakes: every image is aligned to the most frequent view.
 
-What does not move in a room does so in the pictures of a camera on a weak stand, by a few
-pixels; a background learnt of them is blurred, and every edge is foreground. Corners of the
-still scene are followed from the scene as most pictures show it into each picture ([LK81]_ in
-pyramids), and the shift and turn on which most of them agree are undone.
+The static parts of a room move in the images of a camera on a weak stand, by a few
+pixels; a background learnt from these is blurred, and every edge is foreground. Corners of the
+static scene are tracked from the scene of most images into each image ([LK81]_ in
+pyramids), and the shift and rotation on which most of them agree are inverted.
 
 [LK81] Lucas, Kanade, "An iterative image registration technique with an application to stereo
 vision", IJCAI 1981.
@@ -29,26 +29,26 @@ from tracker.single_view.working.view import WorkingView
 _Made = TypeVar("_Made")
 
 LINES = 320
-"""Pixels of the shorter side down to which a picture is reduced to be followed."""
+"""Length of the shorter side to which an image is reduced for the tracking, pixels."""
 
 CORNERS, APART = 160, 1.0 / 30.0
-"""Corners that are followed, at most, and how far they lie apart, in shorter sides."""
+"""Largest number of corners, and their least distance in shorter sides."""
 
 LEAST_CORNERS = 12
-"""Fewer that agree say nothing."""
+"""Least number of corners that agree."""
 
 LARGEST = 0.05
-"""Shorter sides: what moved further is another view and no shake."""
+"""Largest shift, in shorter sides: beyond it is another view and no shake."""
 
 _WINDOW = 15
 _AGREES = 0.6
-"""Reduced pixels within which a corner agrees with the others."""
+"""Distance within which a corner agrees with the others, reduced pixels."""
 
 _SMOOTH, _CONTRAST = 12, 4.0
-"""Pixels over which brightness and contrast are evened out, and the levels that are noise."""
+"""Scale in pixels on which brightness and contrast are normalised, and the noise in levels."""
 
 _STILL = 3
-"""Of so many pictures one is looked at to tell whether a camera shakes at all."""
+"""Distance in images of those that are checked for a shake at all."""
 
 _MEDIAN_OF_SQUARE = 2.0 * np.log(2.0)
 """Median of the square of a shift in both axes of standard deviation 1."""
@@ -56,16 +56,16 @@ _MEDIAN_OF_SQUARE = 2.0 * np.log(2.0)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Steadying:
-    """The still scene of one camera, and how far its pictures are from it."""
+    """The static scene of one camera, and the deviation of its images from it."""
 
     scene: UInt8[ndarray, "h w"]
-    """Reduced and evened out."""
+    """The reduced and normalised scene."""
     corners: Float32[ndarray, "N 1 2"]
-    """Reduced pixels."""
+    """Corners of the scene, reduced pixels."""
     reduction: float
-    """Reduced pixels in a pixel."""
+    """Reduced pixels per pixel."""
     shake: float
-    """Standard deviation of a picture's place along an axis, pixels; 0 where nothing is known."""
+    """Standard deviation of the shift of images along an axis, pixels; 0 if unknown."""
 
     @staticmethod
     def learn(
@@ -74,13 +74,13 @@ class Steadying:
         least: float,
         check: Callable[[], None] = lambda: None,
     ) -> Steadying | None:
-        """Where a camera looks; None where there are no pictures.
+        """Learn the static scene of a camera; None without images.
 
         Args:
-            pictures: BGR, spread over the clip; people may be on them.
-            shown: Not 0 where a picture shows what the camera sees; None for everywhere.
-            least: Pixels of shake below which nobody asks for more than that.
-            check: Called every so often; what it raises ends the work.
+            pictures: Images, BGR, spread over the clip; people may be on them.
+            shown: Not 0 where an image shows the camera's view; None for everywhere.
+            least: Shake below which the scene is not computed precisely, pixels.
+            check: A function that is called now and then; an exception of it ends the work.
         """
         whole = list(pictures)
         if not whole:
@@ -90,7 +90,7 @@ class Steadying:
         first = _looked_at(some, shown, reduction, check=check)
         if first.shake < least:
             return first
-        # of pictures brought to one place the median is sharp
+        # the median of aligned images is sharp
         every = [_evened(picture, reduction) for picture in whole]
         calm = []
         for picture in every:
@@ -99,7 +99,7 @@ class Steadying:
         return _looked_at(calm, shown, reduction, every, check)
 
     def still(self, picture: UInt8[ndarray, "h w 3"]) -> UInt8[ndarray, "h w 3"]:
-        """The picture as the camera would have taken it at rest; as it is where nobody can tell."""
+        """Align an image with the scene; an image whose shift is unknown is not changed."""
         moved = self._moved(_evened(picture, self.reduction))
         return picture if moved is None else _back(picture, moved, self.reduction)
 
@@ -108,7 +108,7 @@ class Steadying:
         return evened if moved is None else _back(evened, moved, 1.0)
 
     def _moved(self, evened: UInt8[ndarray, "h w"]) -> Float[ndarray, " 3"] | None:
-        """How far right and down, reduced pixels, and turned, radians, about the middle."""
+        """Shift to the right and down, reduced pixels, and rotation about the middle, radians."""
         if len(self.corners) < LEAST_CORNERS:
             return None
         found, there, _ = cv2.calcOpticalFlowPyrLK(
@@ -132,7 +132,7 @@ def _looked_at(
     measured: list[UInt8[ndarray, "h w"]] | None = None,
     check: Callable[[], None] = lambda: None,
 ) -> Steadying:
-    """The scene of pictures, and how far these, or others, are from it."""
+    """The scene of images, and the shifts of these, or of others, from it."""
     scene = median(pictures, check)
     height, width = scene.shape
     mask = None
@@ -149,7 +149,7 @@ def _looked_at(
         moved = found._moved(picture)
         if moved is not None:
             shifts.append(moved[:2])
-    if 2 * len(shifts) < len(pictures):  # what half of them do not show is no still scene
+    if 2 * len(shifts) < len(pictures):  # a scene that less than half of them show is not static
         return found
     square = float(np.median((np.array(shifts) ** 2).sum(axis=1)))
     shake = float(np.sqrt(square / _MEDIAN_OF_SQUARE)) / reduction
@@ -159,15 +159,15 @@ def _looked_at(
 def agreed(
     places: Float[ndarray, "N 2"], shifts: Float[ndarray, "N 2"], side: float
 ) -> Float[ndarray, " 3"] | None:
-    """The shift and turn on which most corners agree: d and θ of s = d + θ J p.
+    """Find the shift and rotation on which most corners agree: d and θ of s = d + θ J p.
 
     Args:
-        places: p, from the middle of the picture.
-        shifts: s.
-        side: The shorter of the picture.
+        places: p, from the middle of the image, reduced pixels.
+        shifts: s, reduced pixels.
+        side: Shorter side of the image, reduced pixels.
 
     Returns:
-        d_x, d_y and θ; None where too few agree, or they are too far away.
+        d_x, d_y and θ; None if too few corners agree, or the shift is too large.
     """
     if len(places) < LEAST_CORNERS:
         return None
@@ -179,7 +179,7 @@ def agreed(
     near = np.zeros(0)
     for _ in range(4):
         left = np.linalg.norm(shifts - columns @ moved, axis=1)
-        # the nearer half at least, until the turn is known
+        # at least the nearer half, until the rotation is known
         near = left <= max(_AGREES, float(np.median(left)))
         rows = columns[near].reshape(-1, 3)
         moved = np.linalg.lstsq(rows, shifts[near].reshape(-1), rcond=None)[0]
@@ -190,7 +190,7 @@ def agreed(
 
 
 def _evened(picture: UInt8[ndarray, "h w 3"], reduction: float) -> UInt8[ndarray, "h2 w2"]:
-    """Grey levels of one mean and contrast everywhere, whatever the light does."""
+    """Normalise mean and contrast of the grey levels locally, against changes of light."""
     grey = cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY)
     if reduction < 1.0:
         grey = cv2.resize(grey, None, fx=reduction, fy=reduction, interpolation=cv2.INTER_AREA)
@@ -205,7 +205,7 @@ def _evened(picture: UInt8[ndarray, "h w 3"], reduction: float) -> UInt8[ndarray
 def _back(
     picture: UInt8[ndarray, "h w *c"], moved: Float[ndarray, " 3"], reduction: float
 ) -> UInt8[ndarray, "h w *c"]:
-    """What the still scene shows where the moved picture shows it: p → c + R (p - c) + d."""
+    """Warp a shifted image to the static scene: p → c + R (p - c) + d."""
     height, width = picture.shape[:2]
     middle = np.array([(width - 1) / 2.0, (height - 1) / 2.0])
     cos, sin = np.cos(moved[2]), np.sin(moved[2])
@@ -221,7 +221,7 @@ def _back(
 
 
 class SteadyReader:
-    """The pictures of another reader; those of cameras that shake are held still."""
+    """A reader that stabilises the images of cameras that shake."""
 
     def __init__(
         self,
@@ -230,23 +230,23 @@ class SteadyReader:
         views: tuple[WorkingView | None, ...],
         least: float,
     ) -> None:
-        """Nothing is looked at yet.
+        """Wrap a reader; cameras are examined when their images are needed.
 
         Args:
-            sequence: Whose pictures.
-            reader: Of them.
-            views: What each camera's picture is turned by.
-            least: From how many pixels of shake on a camera is held still.
+            sequence: The sequence.
+            reader: Reader of its images.
+            views: Conversion of each camera's images.
+            least: Shake from which a camera is stabilised, pixels.
         """
         self._frames = sequence.frames
         self._reader = reader
         self._views = views
         self._least = least
         self._read: dict[tuple[int, int], Picture | None] = {}
-        """What was looked at and is about to be asked for again: a background is learnt of it."""
+        """Images that were read for the scene and will be needed again, for the background."""
 
     def shake(self, camera: int) -> float:
-        """Standard deviation in pixels of a shake that is undone, else 0."""
+        """Standard deviation of the shake that is compensated, pixels, else 0."""
         steadying = self._steadying(camera)
         return 0.0 if steadying is None else steadying.shake
 
@@ -273,7 +273,7 @@ class SteadyReader:
         self._reader.check()
 
     def _steadying(self, camera: int) -> Steadying | None:
-        """That of a camera that shakes."""
+        """The static scene of a camera that shakes, else None."""
 
         def made() -> Steadying | None:
             view = self._views[camera]

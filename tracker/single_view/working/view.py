@@ -1,4 +1,4 @@
-"""One camera as stage 1 looks at it: its picture reduced and turned, its calibration likewise."""
+"""Conversion of one camera for stage 1: its image and calibration are reduced and rotated."""
 
 from __future__ import annotations
 
@@ -16,47 +16,47 @@ from tracker.sequences.sequence import Room
 from tracker.single_view.box_sizes import BoxSizes
 
 _SMALLER = 0.95
-"""A picture that would keep more than this of its size is left as it is."""
+"""Factor of the reduction above which an image is not reduced."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WorkingView:
-    """The map between a camera's pixels and those that stage 1 works on.
+    """The mapping between a camera's pixels and those of stage 1.
 
-    A picture is reduced by the factors s along its axes and then turned by the camera's
-    roll θ, so that what stands in the room stands in the picture. Both are exact for the
-    calibration: with K of square pixels after the reduction, and Q the turn,
+    An image is reduced by the factors s along its axes and then rotated by the camera's
+    roll θ, so that people are upright in the image. Both are exact for the
+    calibration: with K of square pixels after the reduction, and Q the rotation,
 
         K' = T diag(s, 1) K,  R' = Q R,  t' = Q t,  (p2', p1') = Q (p2, p1)
 
-    for the lens's radial part does not know of turns, and its tangential one is a vector.
-    A box keeps its centre; its sizes are those of the upright target, and in the camera's
-    own picture it is as large as the axes of that target reach.
+    for the lens's radial part is rotation invariant, and its tangential one is a vector.
+    A box retains its centre; its sizes are those of the upright target, and in the camera's
+    own image it extends as far as the axes of that target.
     """
 
     camera: Camera
-    """The calibration of the working picture."""
+    """The calibration of the working image."""
     full: Camera
-    """That of the camera's own."""
+    """The calibration of the camera's own image."""
     factors: Float[ndarray, " 2"]
     """s, horizontal and vertical."""
     turn: Float[ndarray, "2 3"] | None
-    """From the reduced picture's pixels to the working picture's; None for no turn."""
+    """Affine map from the reduced image's pixels to the working image's; None for no rotation."""
     roll: float
-    """θ, radians: how far the picture is turned, clockwise."""
+    """θ, clockwise rotation of the image, radians."""
 
     @property
     def scale(self) -> float:
-        """Working pixels in a full one."""
+        """Working pixels per full pixel."""
         return float(np.sqrt(self.factors.prod()))
 
     @property
     def key(self) -> tuple[float, ...]:
-        """Of what is made from working pictures."""
+        """A key of data that are made from the working images."""
         return (*self.camera.image_size, *self.factors.tolist(), self.roll)
 
     def picture(self, full: UInt8[ndarray, "h w 3"]) -> UInt8[ndarray, "h2 w2 3"]:
-        """The working picture: areas are averaged; beyond the camera's own picture it is black."""
+        """Compute the working image: areas are averaged; it is black outside the camera's image."""
         reduced = _reduced(full, self._reduced_size)
         if self.turn is not None:
             reduced = cv2.warpAffine(reduced, self.turn, self.camera.image_size)
@@ -64,7 +64,7 @@ class WorkingView:
 
     @property
     def shown(self) -> UInt8[ndarray, "h2 w2"] | None:
-        """1 where the working picture shows what the camera sees; None for everywhere."""
+        """1 where the working image shows the camera's image; None for everywhere."""
         if self.turn is None:
             return None
         width, height = self._reduced_size
@@ -73,21 +73,21 @@ class WorkingView:
         return np.asarray(cv2.warpAffine(whole, self.turn, self.camera.image_size, flags=flags))
 
     def mask(self, working: UInt8[ndarray, "h2 w2"]) -> UInt8[ndarray, "h1 w1"]:
-        """A mask of the working picture as one of the camera's own, reduced."""
+        """Convert a mask of the working image to one of the camera's own, reduced."""
         if self.turn is None:
             return working
         flags = cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP
         return np.asarray(cv2.warpAffine(working, self.turn, self._reduced_size, flags=flags))
 
     def points(self, full: Float[ndarray, "N 2"]) -> Float[ndarray, "N 2"]:
-        """Full pixels as working pixels."""
+        """Convert full pixels to working pixels."""
         reduced = (full + 0.5) * self.factors - 0.5
         if self.turn is not None:
             reduced = reduced @ self.turn[:, :2].T + self.turn[:, 2]
         return np.asarray(reduced)
 
     def points_back(self, working: Float[ndarray, "N 2"]) -> Float[ndarray, "N 2"]:
-        """Working pixels as full pixels."""
+        """Convert working pixels to full pixels."""
         reduced = working
         if self.turn is not None:
             reduced = (working - self.turn[:, 2]) @ self.turn[:, :2]
@@ -96,18 +96,18 @@ class WorkingView:
     def drawn_box(
         self, box: Float[ndarray, " 4"], half_extents: Float[ndarray, " 3"]
     ) -> Float[ndarray, " 4"]:
-        """The upright box of a target around which one was drawn in the camera's own picture.
+        """The upright box of a target around which a box was drawn in the camera's own image.
 
-        A person is more an ellipse than a rectangle. Of one with half axes w and h that is
-        turned by θ the bounds reach
+        A person is more an ellipse than a rectangle. The bounds of one with half axes w and h,
+        rotated by θ, are
 
             W² = w² cos² θ + h² sin² θ,  H² = w² sin² θ + h² cos² θ
 
-        which is undone with the proportions w / h of the target.
+        which is inverted for the aspect ratio w / h of the target.
 
         Args:
             box: Centre and half sizes, pixels.
-            half_extents: Of a target, metres.
+            half_extents: Half width, depth and height of a target, metres.
         """
         aspect = float(half_extents[:2].mean() / half_extents[2])
         across, along = abs(math.cos(self.roll)), abs(math.sin(self.roll))
@@ -121,23 +121,23 @@ class WorkingView:
         return np.concatenate([self.points(box[None, :2])[0], sizes])
 
     def boxes_back(self, working: Float[ndarray, "N 4"]) -> Float[ndarray, "N 4"]:
-        """Boxes of upright targets as the camera's own picture has them.
+        """Convert boxes of upright targets to the camera's own image.
 
-        Half sizes are how far the longer-reaching of the target's two axes comes, drawn turned:
-        what the fusion expects of a rolled camera's box is where the ends of the upright axis are.
+        The half sizes are the extent of the longer one of the target's two axes, rotated:
+        the fusion expects the ends of the upright axis of a rolled camera's box.
         """
         centres = self.points_back(working[:, :2])
         return np.concatenate([centres, self._reach(working[:, 2:])], axis=1)
 
     def sigmas_back(self, working: Float[ndarray, "N 4"]) -> Float[ndarray, "N 4"]:
-        """Standard deviations of boxes likewise."""
+        """Convert standard deviations of boxes in the same way."""
         across, along = abs(math.cos(self.roll)), abs(math.sin(self.roll))
         turned = np.array([[across, along], [along, across]])
         centres = np.sqrt(working[:, :2] ** 2 @ (turned**2).T) / self.factors
         return np.concatenate([centres, self._reach(working[:, 2:])], axis=1)
 
     def gates_back(self, working: Float[ndarray, "G 5"]) -> Float[ndarray, "G 5"]:
-        """Ellipses, centre and xx, xy, yy of their matrix, likewise."""
+        """Convert ellipses, centre and xx, xy, yy of their matrix, in the same way."""
         matrix = working[:, [2, 3, 3, 4]].reshape(-1, 2, 2)
         turn = np.eye(2) if self.turn is None else self.turn[:, :2]
         back = turn.T / self.factors[:, None]
@@ -159,13 +159,13 @@ class WorkingView:
 def working_view(
     camera: Camera, room: Room, half_extents: Float[ndarray, " 3"], parameters: PictureParams
 ) -> WorkingView | None:
-    """What stage 1 is to see of a camera; None where its own pictures are just right.
+    """The conversion of a camera for stage 1; None where its own images are suitable.
 
     Args:
-        camera: As calibrated.
-        room: Where targets are.
-        half_extents: Of a target, metres.
-        parameters: How large, and from which roll on it is turned.
+        camera: The calibrated camera.
+        room: The tracked volume.
+        half_extents: Half width, depth and height of a target, metres.
+        parameters: The resolution, and the least roll that is compensated.
     """
     scale = _scale(camera, room, half_extents, parameters)
     roll = _roll(camera)
@@ -187,8 +187,8 @@ def working_view(
 
 
 def _reduced(full: UInt8[ndarray, "h w 3"], size: tuple[int, int]) -> UInt8[ndarray, "h2 w2 3"]:
-    """Areas are averaged: of whole pixels first, which takes a seventh of the time, so that less
-    than a third is left to interpolate between."""
+    """Average areas: first of whole pixels, which takes a seventh of the time, so that a factor of
+    less than three remains for the interpolation."""
     height, width = full.shape[:2]
     whole = min(width // size[0], height // size[1])
     if whole < 2:
@@ -210,7 +210,7 @@ def _turned(
     size = np.ceil(places.max(axis=0) - low)
     shift = -low - 0.5
     intrinsics = reduced.intrinsics.copy()
-    # the pixels are square to a rounding; what is left of it is shared
+    # the pixels are square up to rounding; the rest is shared by both axes
     focal = math.sqrt(intrinsics[0, 0] * intrinsics[1, 1])
     intrinsics[0, 0] = intrinsics[1, 1] = focal
     intrinsics[:2, 2] = rotation @ intrinsics[:2, 2] + shift
@@ -233,7 +233,7 @@ def _turned(
 def _scale(
     camera: Camera, room: Room, half_extents: Float[ndarray, " 3"], parameters: PictureParams
 ) -> float:
-    """How far a picture may be reduced."""
+    """The factor by which an image may be reduced."""
     shorter = min(camera.image_size)
     if shorter <= parameters.lines:
         return 1.0
@@ -247,13 +247,13 @@ def _scale(
 
 
 def _can_turn(camera: Camera) -> bool:
-    """Whether the lens is the same after a turn: of a skewed picture it is not."""
+    """Whether the lens is rotation invariant, which it is not for a skewed image."""
     return bool(abs(camera.intrinsics[0, 1]) < 1e-6 * camera.intrinsics[0, 0])
 
 
 def _roll(camera: Camera) -> float:
-    """By how much what stands on the optical axis leans to the right in the picture, radians."""
+    """The inclination to the right of a vertical on the optical axis in the image, radians."""
     across, down, _ = camera.rotation[:, 2]
-    if math.hypot(across, down) < 0.2:  # seen from above or below, where upright is every way
+    if math.hypot(across, down) < 0.2:  # seen from above or below there is no vertical
         return 0.0
     return math.atan2(across, -down)

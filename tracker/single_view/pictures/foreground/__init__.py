@@ -1,9 +1,9 @@
-"""What in a picture is not the background.
+"""Segmentation of images into foreground and background.
 
-Two models, exchangeable behind :class:`ForegroundModel`: one learnt once from the clip
-(:mod:`~tracker.single_view.pictures.foreground.exposure`), with a memory of motion where people
+There are two models behind :class:`ForegroundModel`: one learnt once from the clip
+(:mod:`~tracker.single_view.pictures.foreground.exposure`), with a memory of motion for people who
 stay (:mod:`~tracker.single_view.pictures.foreground.motion`), and one whose thresholds and
-background follow the pictures (:mod:`~tracker.single_view.pictures.foreground.adaptive`).
+background adapt to the images (:mod:`~tracker.single_view.pictures.foreground.adaptive`).
 """
 
 from __future__ import annotations
@@ -58,8 +58,8 @@ __all__ = [
 ]
 
 BACKGROUND_PICTURES = 32
-"""Pictures spread over the clip that a background is learnt from: a median needs the scene empty in
-half of them, and each takes time before the first step."""
+"""Number of images spread over the clip from which a background is learnt: a median needs the scene
+empty in half of them, and each takes time before the first step."""
 
 
 def learn(
@@ -70,18 +70,18 @@ def learn(
     *,
     motion: bool = False,
 ) -> ForegroundModel | None:
-    """The chosen foreground model of one camera; None where it has not a single picture.
+    """Learn the chosen foreground model of one camera; None without any image.
 
     Args:
-        sequence: Whose camera.
-        camera_index: Which one.
-        reader: Of its pictures.
-        parameters: Which model, and its numbers.
-        motion: Whether what moved lately counts where the background is not to be believed, for
-            who knows nothing else of people.
+        sequence: The sequence.
+        camera_index: Index of the camera.
+        reader: Reader of the images.
+        parameters: The kind of model and its parameters.
+        motion: Whether recent motion counts as foreground where the background is uncertain, for
+            methods without other information about people.
     """
 
-    # no slider has a say in a background, so that a moved one does not wait for it again
+    # no parameter has an effect on a background, so that a change of one does not repeat it
     if parameters.model == "adaptive":
         follow = parameters.follow_exposure
         first = reader.once(
@@ -106,15 +106,15 @@ def learn(
 def learn_background(
     sequence: Sequence, camera_index: int, reader: Pictures
 ) -> BackgroundModel | None:
-    """The empty scene as one camera sees it, learnt once; None where it has not a single picture.
+    """Learn the empty scene of one camera once; None without any image.
 
-    Where the recording says what the empty scene looks like, the clip tells only how much
-    its pixels vary.
+    Where the recording has an image of the empty scene, the clip is used only for the
+    variation of its pixels.
 
     Args:
-        sequence: Whose camera.
-        camera_index: Which one.
-        reader: Of its pictures.
+        sequence: The sequence.
+        camera_index: Index of the camera.
+        reader: Reader of the images.
     """
 
     def made() -> BackgroundModel | None:
@@ -130,7 +130,7 @@ def learn_background(
 def _empty(
     sequence: Sequence, camera_index: int, reader: Pictures
 ) -> list[UInt8[ndarray, "h w 3"]]:
-    """Pictures on which nobody is, as far as the recording tells of some."""
+    """The images without people, where the recording names any."""
     stated = sequence.views[camera_index].background
     if isinstance(stated, range):
         return _spread(sequence, camera_index, reader, stated)
@@ -141,14 +141,14 @@ def _empty(
 def _spread(
     sequence: Sequence, camera_index: int, reader: Pictures, among: range | None = None
 ) -> list[UInt8[ndarray, "h w 3"]]:
-    """Pictures spread over the clip, or over some of its steps."""
+    """Images spread over the clip, or over some of its steps."""
     steps = spread_steps(range(sequence.frames) if among is None else among)
     found = (reader.picture(camera_index, step) for step in steps)
     return [picture for picture in found if picture is not None]
 
 
 def spread_steps(among: range) -> list[int]:
-    """The steps whose pictures a background is learnt from."""
+    """The steps of the images from which a background is learnt."""
     count = min(BACKGROUND_PICTURES, len(among))
     steps: list[int] = np.linspace(among[0], among[-1], count).astype(int).tolist()
     return steps

@@ -1,4 +1,4 @@
-"""Foreground by thresholds that each picture sets itself, over a background that follows the light.
+"""Foreground by thresholds from each image, with a background that adapts to the illumination.
 
 [CMQ07] Chang, Ma, Qiao, "Human oriented multi-target tracking algorithm in video
 sequence", Control and Decision 22(4), 2007.
@@ -20,13 +20,13 @@ from tracker.single_view.pictures.foreground.exposure import BackgroundModel, me
 from tracker.single_view.pictures.foreground.segmentation import Segmentation
 
 ITERATIONS = 20
-"""Of the c-means at most; the thresholds usually come to rest well before."""
+"""Largest number of iterations of the c-means; the thresholds usually converge well before."""
 
 CLOSING = np.ones((3, 3), dtype=np.uint8)
-"""Gaps that are closed, as published."""
+"""Structuring element of the closing, as published."""
 
 AROUND_FOREGROUND = np.ones((5, 5), dtype=np.uint8)
-"""What is this near to the foreground does not change the background."""
+"""Neighbourhood of the foreground in which the background is not updated."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,28 +34,28 @@ class AdaptiveState:
     """The background of one camera, and how long each pixel has shown it."""
 
     background: UInt16[ndarray, "h w 3"]
-    """256 times the grey level, BGR: slow changes are below one level a picture."""
+    """256 times the grey level, BGR: slow changes are below one level per image."""
     still: UInt8[ndarray, "h w"]
-    """For how many pictures each pixel has been away from the foreground, 255 at most."""
+    """Number of images for which each pixel has been away from the foreground, 255 at most."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Iterations:
-    """What the c-means went through, and where it stopped."""
+    """The iterations of the c-means, and the one that is chosen."""
 
     thresholds: Float[ndarray, "K 3"]
-    """Of each iteration, grey levels in B, G, R."""
+    """Thresholds of each iteration, grey levels in B, G, R."""
     counts: Int[ndarray, " K"]
-    """n(k): foreground pixels of each."""
+    """n(k): number of foreground pixels of each iteration."""
     chosen: int
-    """k*."""
+    """k*, the chosen iteration."""
 
 
 def choose_iteration(counts: Int[ndarray, " K"]) -> int:
-    """k* = argmin (n(k) - n(k - 1)) over the k with n(k) > n(k - 1), [CMQ07].
+    """Choose k* = argmin (n(k) - n(k - 1)) over the k with n(k) > n(k - 1), [CMQ07].
 
     Where the foreground grows least it has reached its border: before, parts of people
-    are missing, after, noise comes in. Where it never grows, the iteration's end.
+    are missing, after, noise is included. Without any growth it is the last iteration.
     """
     growth = np.diff(counts)
     growing = np.flatnonzero(growth > 0)
@@ -63,15 +63,15 @@ def choose_iteration(counts: Int[ndarray, " K"]) -> int:
 
 
 def cluster(difference: UInt8[ndarray, "h w 3"], parameters: ForegroundParams) -> Iterations:
-    """The modified c-means of [CMQ07] on the difference of a picture and its background.
+    """Cluster the difference of an image and its background by the modified c-means of [CMQ07].
 
-    The distances to the classes' centres m_b and m_f are taken in units of the classes'
+    The distances to the classes' centres m_b and m_f are in units of the classes'
     deviations, whose ratio r is given: |d - m_b| / r against |d - m_f|. Differences
-    beyond the foreground's centre are foreground, and below the background's background.
+    beyond the foreground's centre are foreground, and below the background's are background.
 
     Args:
-        difference: |I - M|.
-        parameters: Start centres, ratio r, least threshold, least number of pixels.
+        difference: |I - M|, grey levels.
+        parameters: Initial centres, ratio r, least threshold, least number of pixels.
     """
     found = two_classes(
         difference,
@@ -91,12 +91,12 @@ def first_background(
     follow_exposure: bool,
     check: Callable[[], None] = lambda: None,
 ) -> UInt8[ndarray, "h w 3"] | None:
-    """The median of pictures spread over the clip; None where there is none.
+    """Compute the median of images spread over the clip; None without any.
 
     Args:
-        pictures: BGR, of one size.
+        pictures: Images, BGR, of one size.
         follow_exposure: Whether they are brought to one exposure first.
-        check: Called every so often; what it raises ends the work.
+        check: A function that is called now and then; an exception of it ends the work.
     """
     if not follow_exposure:
         return median(pictures, check) if pictures else None
@@ -107,33 +107,33 @@ def first_background(
 class AdaptiveForeground:
     """The segmentation of [CMQ07] in one camera.
 
-    The difference D = |I - M| of each channel falls into two classes by a c-means
-    iteration (:func:`cluster`); a pixel is background only where all three channels
-    are. Small pieces are dropped and gaps closed (3×3). The background follows,
-    M ← M + α (I - M), where a pixel lies away from the foreground (5×5), differs by
-    less than Th and has been background for w pictures.
+    The difference D = |I - M| of each channel is divided into two classes by a c-means
+    iteration (:func:`cluster`); a pixel is background only if all three channels
+    are. Small components are dropped and gaps closed (3×3). The background is updated by
+    M ← M + α (I - M), where a pixel is away from the foreground (5×5), differs by
+    less than Th and has been background for w images.
 
     Beyond the paper, and switched off by the preset ``published``: the background is
-    brought to each picture's exposure first, and a shadow's difference is no difference.
+    brought to each image's exposure first, and the difference of a shadow is ignored.
     """
 
     def __init__(self, first: UInt8[ndarray, "h w 3"], parameters: ForegroundParams) -> None:
-        """Take the background to begin with.
+        """Set the initial background.
 
         Args:
-            first: From :func:`first_background`, or any other picture of the empty scene, BGR.
-            parameters: The numbers.
+            first: Result of :func:`first_background`, or another image of the empty scene, BGR.
+            parameters: The parameters of the segmentation.
         """
         self._first = first
         self._parameters = parameters
 
     def start(self) -> AdaptiveState:
-        """The median, which counts as seen for long enough."""
+        """The initial background, which counts as shown for long enough."""
         still = np.full(self._first.shape[:2], 255, dtype=np.uint8)
         return AdaptiveState(self._first.astype(np.uint16) * 256, still)
 
     def thresholds(self, difference: UInt8[ndarray, "h w 3"]) -> Float[ndarray, " 3"]:
-        """What a pixel must differ by in each channel, grey levels: those of iteration k*."""
+        """The thresholds of each channel, grey levels: those of iteration k*."""
         found = cluster(difference, self._parameters)
         chosen: ndarray = found.thresholds[found.chosen]
         return chosen
@@ -141,14 +141,14 @@ class AdaptiveForeground:
     def step(
         self, state: AdaptiveState, picture: UInt8[ndarray, "h w 3"]
     ) -> tuple[AdaptiveState, Segmentation]:
-        """Segment one picture and let the background follow it.
+        """Segment one image and update the background.
 
-        A blank picture, or one of which most differs from the background, has no foreground
-        and leaves the background as it is.
+        A blank image, or one that differs mostly from the background, has no foreground
+        and does not change the background.
 
         Args:
-            state: After the picture before.
-            picture: BGR, of the background's size.
+            state: The state after the image before.
+            picture: The image, BGR, of the background's size.
         """
         p = self._parameters
         shown = cv2.convertScaleAbs(state.background, alpha=1.0 / 256.0)
@@ -182,17 +182,17 @@ def clean(mask: UInt8[ndarray, "h w"], minimum_area: int) -> UInt8[ndarray, "h w
     """Drop connected components of fewer pixels, then close gaps (morphological closing, 3×3).
 
     Args:
-        mask: Foreground is what is not 0.
-        minimum_area: Pixels.
+        mask: The foreground mask, not 0 on the foreground.
+        minimum_area: Number of pixels below which a component is dropped.
 
     Returns:
-        1 on the foreground, 0 elsewhere.
+        A mask with 1 on the foreground, 0 elsewhere.
     """
     left, top, width, height = cv2.boundingRect(mask)
     cleaned = np.zeros_like(mask)
     if width == 0:
         return cleaned
-    # most of a picture is empty; the closing needs a pixel more on every side
+    # most of an image is empty; the closing needs a pixel more on every side
     rows, columns = (
         slice(max(0, top - 1), top + height + 1),
         slice(max(0, left - 1), left + width + 1),

@@ -1,10 +1,10 @@
-"""A background learnt once from the clip, brought to each picture's exposure; shadows left out.
+"""A background learnt once from the clip, with exposure compensation and shadow removal.
 
-The background is the median of pictures spread over the clip, so no empty picture
-is needed; whoever stands in one place for more than half of the clip becomes part
-of it. Cameras that expose automatically change the whole picture: each frame's
+The background is the median of images spread over the clip, so no empty image
+is needed; a person who stands in one place for more than half of the clip becomes part
+of it. Cameras with automatic exposure change the whole image: each frame's
 tone curve is estimated against the background, and the background is mapped to the
-frame's exposure, never the frame to the background, whose colours it would spoil.
+frame's exposure, never the frame to the background, which would change its colours.
 """
 
 from __future__ import annotations
@@ -23,32 +23,32 @@ from tracker.parameters.groups.foreground import ForegroundParams
 from tracker.single_view.pictures.foreground.segmentation import Segmentation
 
 LEVELS = 16
-"""Levels of the source at which a tone curve is measured; between them it is interpolated."""
+"""Number of levels at which a tone curve is measured; between them it is interpolated."""
 
 SAMPLED_PIXELS = 6000
-"""About so many pixels a tone curve is measured on: a few hundred for each level's median."""
+"""Number of pixels from which a tone curve is measured: a few hundred for each level's median."""
 
 MEDIAN_VALUES = 50_000
-"""Values of a picture of which medians are taken between two looks at whether to stop."""
+"""Number of values of an image for which medians are computed between two calls of ``check``."""
 
 OFTEN = 0.3
-"""Share of the pictures in which a pixel that is only passed by seldom shows who passes."""
+"""Share of the images in which a pixel of a passage seldom shows a person."""
 
 AWAY = 24
-"""On the scale 16 √level: what differs more than this from the median shows something else."""
+"""Difference from the median, on the scale 16 √level, above which a pixel shows something else."""
 
 LEAST_CHANGING = 0.005
-"""Of the picture: of fewer changing pixels nothing is said."""
+"""Least share of changing pixels in the image for an estimate of :attr:`restlessness`."""
 
 _ROOTS = np.rint(16.0 * np.sqrt(np.arange(256))).clip(0, 255).astype(np.uint8)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BackgroundModel:
-    """The empty scene as one camera sees it."""
+    """The empty scene of one camera."""
 
     picture: UInt8[ndarray, "h w 3"]
-    """BGR."""
+    """The image, BGR."""
     spread: UInt8[ndarray, "h w"]
     """Typical (median) deviation of a background pixel once exposures are aligned, on the
     scale of 16 √level."""
@@ -57,7 +57,7 @@ class BackgroundModel:
     :data:`OFTEN` of the pictures."""
 
     def doubt(self, parameters: ForegroundParams) -> float:
-        """How little the median is to be believed, 0 … 1: people who stay made it."""
+        """The uncertainty of the median, 0 … 1, which is large if people stay in one place."""
         low, high = parameters.restless_from, parameters.restless_to
         u = float(np.clip((self.restlessness - low) / max(high - low, 1e-6), 0.0, 1.0))
         return u * u * (3.0 - 2.0 * u)
@@ -66,19 +66,19 @@ class BackgroundModel:
     def learn(
         pictures: Iterable[UInt8[ndarray, "h w 3"]], check: Callable[[], None] = lambda: None
     ) -> BackgroundModel | None:
-        """The median of pictures spread over the clip, all brought to one exposure.
+        """Learn the median of images spread over the clip, all brought to one exposure.
 
         Args:
-            pictures: BGR, of one size; 15 to 40 are enough.
-            check: Called every so often; what it raises ends the work.
+            pictures: Images, BGR, of one size; 15 to 40 are enough.
+            check: A function that is called now and then; an exception of it ends the work.
 
         Returns:
-            None where there is no picture.
+            The model; None without images.
         """
         stack = list(pictures)
         if not stack:
             return None
-        # the first median is blurred by the exposures, but good enough to align them by
+        # the first median is blurred by the exposures, but sufficient to align them
         reference = median(stack, check)
         aligned = []
         for picture in stack:
@@ -92,13 +92,13 @@ class BackgroundModel:
     def foreground(
         self, picture: UInt8[ndarray, "h w 3"], parameters: ForegroundParams
     ) -> UInt8[ndarray, "h w"]:
-        """1 where a pixel is neither background nor shadow, 0 elsewhere; single pixels cleaned off.
+        """Segment an image: 1 on the foreground without shadows and single pixels, 0 elsewhere.
 
         Args:
-            picture: BGR, of the background's size.
-            parameters: The threshold, a difference in the channel that differs most on the scale
-                16 √level (0 … 255), on which comes what a pixel varies by itself; and what a
-                shadow may do.
+            picture: The image, BGR, of the background's size.
+            parameters: The threshold, on the largest difference of the channels on the scale
+                16 √level (0 … 255), to which the variation of a pixel is added; and the bounds
+                of a shadow.
         """
         mask = images.foreground_mask(
             picture,
@@ -116,17 +116,17 @@ class BackgroundModel:
 def tone_curve(
     source: UInt8[ndarray, "h w 3"], target: UInt8[ndarray, "h w 3"]
 ) -> UInt8[ndarray, "1 256 3"]:
-    """The look-up table, one a channel, that maps one picture to another's exposure.
+    """Estimate the look-up table of each channel that maps one image to another's exposure.
 
     At each of some levels of the source the median of the target's values there is
-    taken, which holds while less than half of those pixels show something else;
-    the levels between are interpolated. The curve never falls: where medians do, a
-    person hides most of what has that level, and the commoner levels decide. Levels
-    beyond those measured follow the last one's shift.
+    used, which is robust while less than half of those pixels show something else;
+    the levels between are interpolated. The curve never decreases: where medians do, a
+    person hides most of the pixels of a level, and the more frequent levels determine it. Levels
+    beyond those measured have the last one's shift.
 
     Args:
-        source: A picture of the background alone; its levels make the groups.
-        target: Of the same size and view.
+        source: An image of the background alone, whose levels make the groups.
+        target: An image of the same size and view.
     """
     from scipy import optimize  # slow to import, and a server starts without it
 
@@ -152,15 +152,15 @@ def tone_curve(
 
 
 def square_roots(picture: UInt8[ndarray, "h w 3"]) -> UInt8[ndarray, "h w 3"]:
-    """16 √level, whose noise is the same in dark and light."""
+    """Compute 16 √level, whose noise is the same in dark and light."""
     return np.asarray(cv2.LUT(picture, _ROOTS), dtype=np.uint8)
 
 
 def _restlessness(deviations: list[UInt8[ndarray, "h w"]]) -> float:
-    """Share of the changing pixels that are often away from their median.
+    """The share of the changing pixels that are often away from their median.
 
     Args:
-        deviations: Of each picture from the median, on the scale 16 √level.
+        deviations: Deviation of each image from the median, on the scale 16 √level.
     """
     counts = np.zeros(deviations[0].shape, dtype=np.int64)
     for deviation in deviations:
@@ -172,11 +172,11 @@ def _restlessness(deviations: list[UInt8[ndarray, "h w"]]) -> float:
 
 
 def _inverse(curve: UInt8[ndarray, "1 256 3"]) -> UInt8[ndarray, "1 256 3"]:
-    """The curve that undoes a rising one, as far as it can be undone."""
+    """The inverse of a rising curve, as far as it is invertible."""
     levels = np.arange(256)
     inverse = np.empty_like(curve)
     for channel in range(3):
-        # of levels that became one, the middle; np.interp needs strictly rising points
+        # the middle of levels that became one; np.interp needs strictly increasing points
         values, first = np.unique(curve[0, :, channel], return_index=True)
         last = np.append(first[1:], 256) - 1
         inverse[0, :, channel] = np.rint(np.interp(levels, values, (first + last) / 2.0))
@@ -186,11 +186,11 @@ def _inverse(curve: UInt8[ndarray, "1 256 3"]) -> UInt8[ndarray, "1 256 3"]:
 def median(
     pictures: list[ndarray], check: Callable[[], None] = lambda: None
 ) -> UInt8[ndarray, "h w *c"]:
-    """Each value's median over pictures of one size; of an even number the upper one.
+    """Compute each value's median over images of one size, the upper one for an even number.
 
     Args:
-        pictures: At least one.
-        check: Called before every few rows: a median of large pictures takes its time.
+        pictures: At least one image.
+        check: A function that is called before every few rows; an exception of it ends the work.
     """
     result = np.empty_like(pictures[0])
     rows = max(1, MEDIAN_VALUES // pictures[0][0].size)
@@ -203,30 +203,30 @@ def median(
 
 
 def _largest(picture: UInt8[ndarray, "h w 3"]) -> UInt8[ndarray, "h w"]:
-    """The largest of each pixel's channels."""
+    """The largest value of each pixel's channels."""
     blue, green, red = cv2.split(picture)
     largest: ndarray = cv2.max(cv2.max(blue, green), red)
     return largest
 
 
 class LearntForeground:
-    """A :class:`BackgroundModel` that stays as it was learnt, and one threshold."""
+    """A :class:`BackgroundModel` that does not change, with one threshold."""
 
     def __init__(self, background: BackgroundModel, parameters: ForegroundParams) -> None:
-        """Take the background.
+        """Set the background.
 
         Args:
-            background: As learnt.
-            parameters: As :meth:`BackgroundModel.foreground` takes them.
+            background: The background.
+            parameters: The parameters of :meth:`BackgroundModel.foreground`.
         """
         self._background = background
         self._parameters = parameters
 
     def start(self) -> None:
-        """Nothing changes from picture to picture."""
+        """The model has no state."""
         return None
 
     def step(self, state: None, picture: UInt8[ndarray, "h w 3"]) -> tuple[None, Segmentation]:
-        """The foreground of a picture."""
+        """Segment an image."""
         mask = self._background.foreground(picture, self._parameters)
         return None, Segmentation(mask, np.full(3, self._parameters.threshold))

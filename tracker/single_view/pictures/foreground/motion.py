@@ -1,9 +1,9 @@
-"""Foreground where the background cannot be known: what has changed lately counts as well.
+"""Foreground by difference from the background or by recent motion, for uncertain backgrounds.
 
 People who never leave are learnt as background, however they move their arms. Then many of
-the pixels that change at all show something else than their median for much of the time. A
-background that is passed by does so seldom. How often tells how far the median is to be
-believed; where it is not, a memory of the last moments' changes shows who moves in place.
+the pixels that change at all differ from their median for much of the time, while pixels of a
+passage do so seldom. This frequency gives the uncertainty of the median; where it is large, a
+memory of recent changes shows people moving in place.
 """
 
 from __future__ import annotations
@@ -20,23 +20,23 @@ from tracker.single_view.pictures.foreground.exposure import BackgroundModel, sq
 from tracker.single_view.pictures.foreground.segmentation import Segmentation
 
 LAG = 0.1
-"""Seconds between two pictures that are compared: within it a moving hand leaves its place."""
+"""Time between two images that are compared, seconds: within it a moving hand leaves its place."""
 
 BLUR = 1.0
-"""Pixels: noise and blocks of compression are smoothed before pictures are compared."""
+"""Standard deviation of the blur against noise and compression, before comparison, pixels."""
 
 BLIND = 0.5
-"""A picture of which more than this share changed at once shows another light: nobody moved."""
+"""Share of an image above which a simultaneous change is one of light and not of motion."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MotionState:
-    """The pictures of the last moment, and how long ago each pixel changed."""
+    """The images of the last moment, and the time since each pixel changed."""
 
     before: tuple[UInt8[ndarray, "h w 3"], ...]
-    """Square-rooted and smoothed, the oldest first; empty before the first picture."""
+    """Square-rooted and blurred, the oldest first; empty before the first image."""
     since: UInt8[ndarray, "h w"] | None
-    """Pictures since the last change, 255 for never or long ago."""
+    """Number of images since the last change, 255 for never or long ago."""
 
 
 class MovingForeground:
@@ -44,36 +44,36 @@ class MovingForeground:
 
     A pixel is foreground where it differs from the background, or where it changed by more
     than the threshold within the last moments: |r(t) − r(t − l)| of the square-rooted grey
-    levels r, in the channel that differs most.
+    levels r, in the channel with the largest difference.
     """
 
     def __init__(
         self, background: BackgroundModel, parameters: ForegroundParams, step_time: float
     ) -> None:
-        """Take the background.
+        """Set the background.
 
         Args:
-            background: As learnt; its doubt scales the memory.
+            background: The background, whose uncertainty scales the memory.
             parameters: Thresholds, and the length of the memory.
-            step_time: Seconds between two pictures.
+            step_time: Time between two images, seconds.
         """
         self._background = background
         self._parameters = parameters
         self._lag = max(1, round(LAG / step_time))
         self.doubt = background.doubt(parameters)
-        """How little the background is believed, 0 … 1."""
+        """The uncertainty of the background, 0 … 1."""
         lasting = parameters.motion_memory * self.doubt
         self.memory = min(254, round(lasting / step_time))
-        """Pictures for which a change counts; with 0 this is the background alone."""
+        """Number of images for which a change counts; with 0 this is the background alone."""
 
     def start(self) -> MotionState:
-        """Nothing has moved yet."""
+        """The state before the first image."""
         return MotionState((), None)
 
     def step(
         self, state: MotionState, picture: UInt8[ndarray, "h w 3"]
     ) -> tuple[MotionState, Segmentation]:
-        """The foreground of a picture."""
+        """Segment an image."""
         p = self._parameters
         mask = self._background.foreground(picture, p)
         smooth = cv2.GaussianBlur(square_roots(picture), (0, 0), BLUR)

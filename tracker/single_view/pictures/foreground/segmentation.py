@@ -1,4 +1,4 @@
-"""What every foreground model gives, and the interface by which they can be exchanged."""
+"""The result of a segmentation, and the interface of foreground models."""
 
 from __future__ import annotations
 
@@ -13,38 +13,38 @@ from numpy import ndarray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Segmentation:
-    """What of one picture is foreground."""
+    """The segmentation of one image."""
 
     mask: UInt8[ndarray, "h w"]
     """1 on the foreground, 0 elsewhere."""
     thresholds: Float[ndarray, " 3"]
-    """What a pixel had to differ by in blue, green and red, in the model's own units."""
+    """The thresholds in blue, green and red, in the model's own units."""
 
 
 class ForegroundModel(Protocol):
-    """A background and how pictures are compared with it; a state goes from picture to picture."""
+    """A background model that segments images; a state goes from image to image."""
 
     def start(self) -> Any:
-        """The state before the first picture."""
+        """The state before the first image."""
         ...
 
     def step(self, state: Any, picture: UInt8[ndarray, "h w 3"]) -> tuple[Any, Segmentation]:
-        """The foreground of the next picture, BGR."""
+        """Segment the next image, BGR."""
         ...
 
 
 def pack(mask: UInt8[ndarray, "h w"]) -> UInt8[ndarray, " bytes"]:
-    """A mask in a few hundred bytes: its size, then its bits, compressed."""
+    """Pack a mask into a few hundred bytes: its size, then its bits, compressed."""
     height, width = mask.shape
     size = np.array([height, width], dtype="<u4").tobytes()
     return np.frombuffer(size + zlib.compress(np.packbits(mask).tobytes(), 1), dtype=np.uint8)
 
 
 def unpack(packed: UInt8[ndarray, " bytes"]) -> UInt8[ndarray, "h w"]:
-    """The mask that :func:`pack` was given.
+    """Unpack a mask of :func:`pack`.
 
     Raises:
-        ValueError: If it is not one.
+        ValueError: If the bytes are no packed mask.
     """
     try:
         height, width = np.frombuffer(packed[:8].tobytes(), dtype="<u4").tolist()

@@ -1,4 +1,4 @@
-"""How much of a rectangle is foreground: many rectangles at once, from sums made once a mask."""
+"""Shares of foreground in rectangles, for many at once, from the integral image of a mask."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ _PARTS = np.array(
 
 
 def integral(mask: UInt8[ndarray, "h w"]) -> Int[ndarray, "h1 w1"]:
-    """The integral image: sums above and to the left of each pixel corner (h + 1, w + 1)."""
+    """Compute the integral image: sums above and left of each pixel corner (h + 1, w + 1)."""
     sums: ndarray = cv2.integral(mask)
     return sums
 
 
 def box_shares(sums: Int[ndarray, "h1 w1"], edges: Float[ndarray, "N 4"]) -> Float[ndarray, " N"]:
-    """The share of foreground in rectangles given by left, top, right, bottom.
+    """Compute the share of foreground in rectangles given by left, top, right, bottom.
 
-    Of a rectangle partly outside the picture only what is inside counts; wholly
+    Of a rectangle partly outside the image only the part inside is used; wholly
     outside the share is 0.
 
     Args:
-        sums: :func:`integral` of the mask.
+        sums: Integral image of the mask, of :func:`integral`.
         edges: Left, top, right, bottom, pixels, not rounded.
     """
     shares: ndarray = images.box_means(sums, np.ascontiguousarray(edges, dtype=float))
@@ -43,11 +43,11 @@ def box_shares(sums: Int[ndarray, "h1 w1"], edges: Float[ndarray, "N 4"]) -> Flo
 def shape_shares(
     sums: Int[ndarray, "h1 w1"], boxes: Float[ndarray, "N 4"]
 ) -> tuple[Float[ndarray, " N"], Float[ndarray, " N"], Float[ndarray, " N"]]:
-    """The shares of foreground inside boxes, above them, and beside their upper parts.
+    """Compute the shares of foreground inside boxes, above them, and beside their upper parts.
 
     Args:
-        sums: :func:`integral` of the mask.
-        boxes: Centre and half sizes, pixels.
+        sums: Integral image of the mask, of :func:`integral`.
+        boxes: Centre and half sizes of N boxes, pixels.
     """
     middles, half_sizes = boxes[:, [0, 1, 0, 1]], boxes[:, [2, 3, 2, 3]]
     inside, above, left, right = (box_shares(sums, middles + part * half_sizes) for part in _PARTS)
@@ -61,16 +61,16 @@ def shape_scores(
     inside_weight: float,
     around_weight: float,
 ) -> tuple[Float[ndarray, " N"], Float[ndarray, " N"]]:
-    """What the foreground says of boxes: log factors of their likelihood, and shares inside.
+    """Compute log factors of the likelihood of boxes from the foreground, and shares inside.
 
     A box on a person is full of foreground, with background above and beside it:
     a ln(inside + 0.02) - b (above + beside), of :func:`shape_shares`.
 
     Args:
-        sums: :func:`integral` of the mask.
-        boxes: Centre and half sizes, pixels.
-        inside_weight: a.
-        around_weight: b.
+        sums: Integral image of the mask, of :func:`integral`.
+        boxes: Centre and half sizes of N boxes, pixels.
+        inside_weight: a, the weight of the share inside.
+        around_weight: b, the weight of the shares around.
     """
     inside, above, beside = shape_shares(sums, boxes)
     return inside_weight * np.log(inside + 0.02) - around_weight * (above + beside), inside
