@@ -18,12 +18,11 @@ from tests import world
 from tracker.corrections import Correction, CorrectionError, Place
 from tracker.corrections.contradictions import along, find_repeated, refuse_contradiction
 from tracker.corrections.kinds import content_of, digest, leeway, make
+from tracker.corrections.lookup import TrackIndex, mostly_inside
 from tracker.corrections.merging import difference, merge
-from tracker.corrections.outcomes import Outcome, names_by_track, outcomes
+from tracker.corrections.outcomes import Outcome, names_by_track, outcomes, supporting_corrections
 from tracker.corrections.pointing import foot_on_floor, ground_under, stands, triangulated
 from tracker.corrections.relabelling import relabelled
-from tracker.corrections.resting import resting
-from tracker.corrections.seeking import Whereabouts, mostly_inside
 from tracker.corrections.truth import checked_ranges, write_truth
 
 ABOVE = 1e-6
@@ -100,7 +99,7 @@ def test_who_is_mostly_inside_is_nobody(
 def test_a_place_means_the_nearest_within_reach_and_leeway(
     place: tuple[int, float, float], leeway: int, found: int | None
 ) -> None:
-    where = Whereabouts(np.array([2, 3]), np.zeros((2, 3)))
+    where = TrackIndex(np.array([2, 3]), np.zeros((2, 3)))
     assert where.nearest(Place(*place, 1.0), leeway=leeway) == found
 
 
@@ -108,23 +107,23 @@ def test_who_is_not_there_is_meant_where_the_way_leads() -> None:
     """A gap of two steps halves the pace; beyond an end the path goes on as it came."""
     steps, x = np.array([0, 2, 3]), np.array([0.0, 1.0, 3.0])
     places = np.stack([x, np.zeros(3), np.zeros(3)], axis=1)
-    where = Whereabouts(steps, places, np.array([4, 4, 4]))
+    where = TrackIndex(steps, places, np.array([4, 4, 4]))
     for step, expected, row in ((1, 0.5, 0), (4, 5.0, 2)):
         reach = 0.5 + ABOVE  # the leeway costs half the reach of 1 m
         assert where.nearest(Place(step, expected, 0.0, 1.0), leeway=1) in (row, 1)
         assert where.nearest(Place(step, expected, reach, 1.0), leeway=1) is None
     assert where.nearest(Place(-1, -0.5, 0.5, 1.0), leeway=1) == 0
     assert where.nearest(Place(4, 5.0, 0.5, 1.0), leeway=1) == 2
-    alone = Whereabouts(steps, places, np.array([4, 5, 6]))
+    alone = TrackIndex(steps, places, np.array([4, 5, 6]))
     assert alone.nearest(Place(4, 3.0, 0.5, 1.0), leeway=1) == 2
     assert alone.nearest(Place(4, 3.5 + ABOVE, 0.0, 1.0), leeway=1) is None
 
 
 def test_here_means_who_is_at_the_place_and_else_whom_it_names() -> None:
-    where = Whereabouts(np.zeros(2, dtype=int), np.array([[0.0, 0, 0], [4.0, 0, 0]]))
+    where = TrackIndex(np.zeros(2, dtype=int), np.array([[0.0, 0, 0], [4.0, 0, 0]]))
 
     def meant(x: float, *more: list[float]) -> int | None:
-        return where.stated(make(kind="here", places=[at(0, x), *more]))
+        return where.row_of(make(kind="here", places=[at(0, x), *more]))
 
     assert meant(0.25, at(0, 4.0)) == 0
     assert meant(0.35, at(0, 4.0)) == 1
@@ -144,7 +143,7 @@ def test_nobody_is_along_its_places_from_the_first_step_to_the_last(
     step: int, x: float, inside: bool
 ) -> None:
     said = make(kind="nobody", places=[at(2), at(4, 2.0)], accuracy=0.5)
-    where = Whereabouts(np.array([step]), np.array([[x, 0.0, 1.0]]))
+    where = TrackIndex(np.array([step]), np.array([[x, 0.0, 1.0]]))
     assert where.inside(said).tolist() == [inside]
     way = along(said.places, step)
     assert way == (None if step in (1, 5) else (pytest.approx(step - 2.0), 0.0))
@@ -328,7 +327,9 @@ def test_a_track_rests_on_a_join_from_where_it_holds(
 ) -> None:
     steps, ids, where = standing([(1, *span) for span in spans])
     said = make(kind="same", places=places)
-    rests = resting(steps, ids, where, [said], outcomes(steps, ids, where, [said], leeway=2))
+    rests = supporting_corrections(
+        steps, ids, where, [said], outcomes(steps, ids, where, [said], leeway=2)
+    )
     assert [bool(name) for name in rests] == (steps >= begins).tolist()
 
 
@@ -340,13 +341,17 @@ def test_what_rests_on_what_ends_where_the_next_begins() -> None:
     other = make(kind="different", places=[at(4), at(5, 5.0)])
     away = make(kind="same", places=[at(4), at(5, 5.0)])
     told = [late, early, here, other, away]
-    rests = np.array(resting(steps, ids, where, told, outcomes(steps, ids, where, told, leeway=2)))
+    rests = np.array(
+        supporting_corrections(steps, ids, where, told, outcomes(steps, ids, where, told, leeway=2))
+    )
     names = {late.id: "L", early.id: "E", here.id: "H", other.id: "D", "": "."}
     assert "".join(names[one] for one in rests[ids == 1]) == "...EEEELLL"
     assert "".join(names[one] for one in rests[ids == 2]) == "...EEDDDDD"
     assert rests[(ids == 1) & (steps == 8)] == late.id, "a later join goes over a place"
     alone = np.array(
-        resting(steps, ids, where, [here], outcomes(steps, ids, where, [here], leeway=2))
+        supporting_corrections(
+            steps, ids, where, [here], outcomes(steps, ids, where, [here], leeway=2)
+        )
     )
     assert steps[alone == here.id].tolist() == [8]
 

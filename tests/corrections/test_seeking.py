@@ -6,9 +6,9 @@ import numpy as np
 
 from tracker.corrections import Place
 from tracker.corrections.kinds import make
+from tracker.corrections.lookup import TrackIndex
 from tracker.corrections.outcomes import outcomes
 from tracker.corrections.relabelling import relabelled
-from tracker.corrections.seeking import Whereabouts
 
 
 def walked() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -21,7 +21,7 @@ def walked() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def test_who_is_not_there_yet_is_meant_where_he_comes_from() -> None:
     steps, positions, owners = walked()
-    whereabouts = Whereabouts(steps, positions, owners)
+    whereabouts = TrackIndex(steps, positions, owners)
 
     def meant(step: int, x: float) -> int:
         row = whereabouts.nearest(Place(step, x, 0.0, 1.0), leeway=2)

@@ -7,10 +7,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
+from tracker.corrections.inflation import inflation
 from tracker.corrections.kinds import make
 from tracker.corrections.outcomes import outcomes
-from tracker.corrections.stating import doubted
-from tracker.smoothing.place_constraints import Stated
+from tracker.smoothing.place_constraints import PlaceMeasurements
 
 SIGMAS = st.floats(0.01, 2.0)
 WAYS = st.lists(st.floats(-3.0, 3.0), min_size=3, max_size=3).map(np.array)
@@ -29,7 +29,7 @@ def covariances(draw: st.DrawFn) -> np.ndarray:
 def test_what_is_left_of_the_way_to_a_place_is_its_accuracy_at_most(
     way: np.ndarray, rest: np.ndarray, sigma: float
 ) -> None:
-    widened = doubted(way, rest, sigma)
+    widened = inflation(way, rest, sigma)
     total = rest + widened + sigma**2 * np.eye(3)
     plain = way @ np.linalg.solve(rest + sigma**2 * np.eye(3), way)
     assert_allclose(way @ np.linalg.solve(total, way), min(plain, 1.0), rtol=1e-5, atol=1e-12)
@@ -50,8 +50,8 @@ def test_what_all_else_says_is_found_again_from_everything(
     gain = rest @ np.linalg.inv(rest + noise)
     states, spreads = (mean + gain @ way)[None], (gain @ noise)[None]
     said = [make(kind="here", places=[[0, *place.tolist()]], accuracy=sigma)]
-    stated = Stated.of(np.zeros(1, dtype=np.int64), said).weighed(states, spreads)
-    widened = doubted(way, rest, sigma)
+    stated = PlaceMeasurements.of(np.zeros(1, dtype=np.int64), said).weighed(states, spreads)
+    widened = inflation(way, rest, sigma)
     assert_allclose(stated.noises[0], noise + widened, atol=1e-3 * np.trace(noise + widened))
 
 

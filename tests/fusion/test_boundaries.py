@@ -24,16 +24,16 @@ from tests.fusion.rooms import (
 from tracker.corrections.kinds import make
 from tracker.filters.gaussian_mixture import GaussianMixture, gate_distance
 from tracker.fusion import missing_frames
-from tracker.fusion.constraint_update import obey
-from tracker.fusion.labels.memory import Memory, recall
-from tracker.fusion.labels.reidentification import Identities
+from tracker.fusion.constraint_update import apply_constraints
 from tracker.fusion.measurement_births import Newborns
-from tracker.fusion.missing_frames import Glimpse
+from tracker.fusion.memory import Memory, recall
+from tracker.fusion.missing_frames import StepEvidence
 from tracker.fusion.model import FusionModel, all_boxes
 from tracker.fusion.multi_bernoulli import MultiBernoulli, MultiBernoulliState
 from tracker.fusion.place_constraints import constraints_by_step
 from tracker.fusion.protocol import FusionResult
 from tracker.fusion.record import Ledger, Record, summed
+from tracker.fusion.reidentification import Identities
 from tracker.fusion.sequential_phd import SequentialPhd, SequentialPhdState
 from tracker.fusion.target_model import TargetModel
 from tracker.fusion.trajectories import Bounds, by_boxes, extract
@@ -246,9 +246,9 @@ def test_who_returns_is_within_the_gate_of_both_uncertainties() -> None:
 # ── cameras whose frames fall on different steps
 
 
-def glimpse(views: tuple[ViewResult, ...], unexplained: float = 1.0) -> Glimpse:
+def step_evidence(views: tuple[ViewResult, ...], unexplained: float = 1.0) -> StepEvidence:
     seen = all_boxes(views)
-    return Glimpse(
+    return StepEvidence(
         evidence(views, unexplained=unexplained), seen.boxes, np.array([v.blind for v in views])
     )
 
@@ -260,7 +260,7 @@ def test_what_was_left_unexplained_is_remembered_for_a_fifth_of_a_second(
     step_time: float, count: int
 ) -> None:
     recent: missing_frames.Recent = ()
-    steps = [glimpse(some(exact([PLACE]), k % 4)) for k in range(7)]
+    steps = [step_evidence(some(exact([PLACE]), k % 4)) for k in range(7)]
     for one in steps:
         recent = missing_frames.remember(recent, one, step_time)
     assert list(recent) == steps[::-1][:count]
@@ -269,10 +269,10 @@ def test_what_was_left_unexplained_is_remembered_for_a_fifth_of_a_second(
 @pytest.mark.parametrize("age", [1, 2])
 def test_the_last_frame_of_a_blind_camera_counts_the_less_the_older_it_is(age: int) -> None:
     own = exact([PLACE, PLACE + np.array([0.5, 0.5, 0.0])])
-    before = glimpse(own)
+    before = step_evidence(own)
     before.evidence.unexplained[:] = np.tile([0.5, 0.5 + ABOVE], 4)
-    now = glimpse((NO_FRAME, own[1], NO_FRAME, own[3]))
-    between = glimpse((NO_FRAME, own[1], NO_FRAME, own[3]))
+    now = step_evidence((NO_FRAME, own[1], NO_FRAME, own[3]))
+    between = step_evidence((NO_FRAME, own[1], NO_FRAME, own[3]))
     recent = (before,) if age == 1 else (between, before)
     found = missing_frames.with_recent(now, recent, 0.1, 0.85)
     assert found.starts.tolist() == [0, 1, 3, 4, 6]
@@ -353,7 +353,7 @@ def test_nobody_is_born_where_nobody_is(apart: float, label: int, born: bool) ->
     )
     assert sorted(told) == [3, 4, 5]
     mixture = people((label, 0.9, apart))
-    found, record, free = obey(
+    found, record, free = apply_constraints(
         mixture, Record.blank(2, 1), told[5], MODEL, first_new_label=10, next_label=13
     )
     assert (found.size, record.sources.shape[1], free) == (int(born), int(born), 13)
@@ -369,7 +369,7 @@ def test_a_stated_place_updates_whom_it_means_or_begins_somebody() -> None:
         told = constraints_by_step(
             [make(kind="here", places=[[2, x, 0.0, 0.85], *more], accuracy=0.2)]
         )
-        found, record, free = obey(
+        found, record, free = apply_constraints(
             mixture, Record.blank(4, 2), told[2], MODEL, first_new_label=9, next_label=9
         )
         assert record.sources.shape[1] == found.size
@@ -403,9 +403,11 @@ def test_a_stated_place_updates_whom_it_means_or_begins_somebody() -> None:
 def test_the_heavier_of_two_is_meant_where_both_are_as_near() -> None:
     mixture = people((3, 0.3, -0.1), (4, 0.8, 0.1))
     told = constraints_by_step([make(kind="here", places=[[0, 0.0, 0.0, 0.85]], accuracy=0.1)])[0]
-    found, _, _ = obey(mixture, Record.blank(1, 2), told, MODEL, first_new_label=9, next_label=9)
+    found, _, _ = apply_constraints(
+        mixture, Record.blank(1, 2), told, MODEL, first_new_label=9, next_label=9
+    )
     assert found.weights.tolist() == [0.3, pytest.approx(0.999)]
-    nobody, record, free = obey(
+    nobody, record, free = apply_constraints(
         people(), Record.blank(1, 0), told, MODEL, first_new_label=9, next_label=9
     )
     assert (nobody.labels.tolist(), record.sources.shape, free) == ([9], (1, 1), 10)

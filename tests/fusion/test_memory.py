@@ -8,7 +8,7 @@ from numpy import ndarray
 
 from tests.fusion.rooms import empty_room
 from tracker.filters.gaussian_mixture import GaussianMixture
-from tracker.fusion.labels.memory import Memory, recall
+from tracker.fusion.memory import Memory, recall
 from tracker.fusion.model import FusionModel
 from tracker.parameters import FusionParams
 

@@ -14,7 +14,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from tracker.filters import phd
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.filters.phd import PhdUpdate
-from tracker.fusion.labels import one_person
+from tracker.fusion import sequential_phd
 from tracker.kernels.kalman import Expected
 
 R = 0.04 * np.eye(2)
@@ -47,7 +47,7 @@ def shared(
     before: GaussianMixture, boxes: ndarray, p_d: float, births: range = NO_BIRTHS
 ) -> PhdUpdate:
     """The same with one person a label."""
-    return one_person.share_boxes(
+    return sequential_phd.share_boxes(
         before,
         plain(before, boxes, p_d),
         np.full(before.size, p_d),
@@ -141,4 +141,4 @@ def test_nobody_and_nothing() -> None:
 
 def test_sure_people_are_merged_with_nobody_else() -> None:
     people = mixture([0.4, 0.4, 0.3, 0.9], [[0.0, 0.0]] * 4, [1, 1, 2, 3])
-    assert_array_equal(one_person.owners(people), [1, 1, -1, 3])
+    assert_array_equal(sequential_phd.merging_owners(people), [1, 1, -1, 3])

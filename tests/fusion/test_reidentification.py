@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 from tests.fusion.rooms import NO_BOXES, exact, filtered
 from tracker.filters.gaussian_mixture import GaussianMixture
-from tracker.fusion.labels.reidentification import Identities, reidentify, resemblance
 from tracker.fusion.multi_bernoulli import MultiBernoulli
 from tracker.fusion.protocol import Associations
+from tracker.fusion.reidentification import Identities, reidentify, resemblance
 from tracker.single_view.protocol import ViewResult
 
 NOBODY = np.zeros(0, dtype=np.int64)
@@ -86,7 +86,7 @@ def test_who_is_known_by_his_colours_is_likelier_to_make_a_box_that_has_them() -
     view = replace(view, likenesses=np.array([FIRST, SECOND, EITHER]))
     alike = resemblance(names, np.array([2, 1, 9]), [view, view])
     assert alike.shape == (3, 6)
-    own = np.exp(names.looks[1]) / np.exp(names.looks[1]).sum()
+    own = np.exp(names.log_beliefs[1]) / np.exp(names.log_beliefs[1]).sum()
     assert alike[0, :3] == pytest.approx(
         [0.5 + 1.0 * own @ seen for seen in (FIRST, SECOND, EITHER)]
     )
@@ -114,7 +114,7 @@ def test_a_track_is_named_once_the_odds_are_twenty_to_one() -> None:
     for _ in range(12):
         _, names = step(names, [1], [FIRST])
         named.append(bool(names.owners[0] == 1))
-        assert named[-1] == (np.ptp(names.looks[0]) > np.log(20.0))
+        assert named[-1] == (np.ptp(names.log_beliefs[0]) > np.log(20.0))
     assert named == sorted(named)
     assert 3 < sum(named) < 9
 
@@ -124,7 +124,7 @@ def test_looks_that_nobody_renews_are_forgotten_at_the_rate_of_the_leak() -> Non
 
     def share() -> float:
         """π of the first person in the first track's looks."""
-        chances = np.exp(names.looks[names.labels.tolist().index(1)])
+        chances = np.exp(names.log_beliefs[names.labels.tolist().index(1)])
         return float(chances[0] / chances.sum())
 
     begin, seconds, steps = share(), 0.2, 40
@@ -137,7 +137,7 @@ def test_looks_that_nobody_renews_are_forgotten_at_the_rate_of_the_leak() -> Non
 def test_no_evidence_lasts_for_ever() -> None:
     soon = watched(Identities.none(), [1, 2], [FIRST, SECOND], 200)
     late = watched(soon, [1, 2], [FIRST, SECOND], 400)
-    odds = [float(np.ptp(names.looks[0])) for names in (soon, late)]
+    odds = [float(np.ptp(names.log_beliefs[0])) for names in (soon, late)]
     assert odds[1] == pytest.approx(odds[0], abs=0.01)
     assert odds[1] < 10.0
 
@@ -148,7 +148,7 @@ def test_pictures_of_one_moment_count_as_one_look() -> None:
         names = Identities.none()
         for _ in range(round(1.0 / seconds)):
             _, names = step(names, [1, 2], [FIRST, SECOND], seconds)
-        odds.append(float(np.ptp(names.looks[0])))
+        odds.append(float(np.ptp(names.log_beliefs[0])))
     assert odds[0] == pytest.approx(odds[1], rel=0.03), "the frame rate makes nobody surer"
 
 

@@ -28,11 +28,11 @@ from tests.fusion.rooms import (
 )
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion import trajectories
-from tracker.fusion.labels.memory import Memory
-from tracker.fusion.labels.reidentification import Identities
+from tracker.fusion.memory import Memory
 from tracker.fusion.model import FusionModel
 from tracker.fusion.multi_bernoulli import MultiBernoulli, MultiBernoulliState
 from tracker.fusion.protocol import FusionResult
+from tracker.fusion.reidentification import Identities
 from tracker.fusion.sequential_phd import SequentialPhd, SequentialPhdState
 from tracker.parameters import PRESETS, FusionParams, RunParameters, with_values
 

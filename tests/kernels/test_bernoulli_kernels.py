@@ -188,12 +188,12 @@ def test_of_equal_boxes_the_first_is_the_likeliest_and_none_is_where_a_miss_is_l
 
 
 def test_pairs_are_returned_from_their_least_probability_on() -> None:
-    everything = by_hand(boxes=(0.1, 2.0, 90.0), least_told=0.0).pairs
+    everything = by_hand(boxes=(0.1, 2.0, 90.0), reporting_threshold=0.0).pairs
     assert everything.tracks.tolist() == [0, 0, 1, 1], "beyond the gate there is no pair"
     assert everything.boxes.tolist() == [0, 1, 0, 1]
     least = float(np.sort(everything.probabilities)[1])
     for bound, count in ((least, 3), (np.nextafter(least, 1.0), 2)):
-        found = by_hand(boxes=(0.1, 2.0, 90.0), least_told=bound).pairs
+        found = by_hand(boxes=(0.1, 2.0, 90.0), reporting_threshold=bound).pairs
         assert_array_equal(
             found.probabilities, everything.probabilities[everything.probabilities >= bound]
         )

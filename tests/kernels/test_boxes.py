@@ -139,7 +139,7 @@ def test_without_softness_the_middle_is_inside_or_not(x: float, y: float, expect
     assert found[0] == expected
 
 
-RULE = kernels.Occlusion(near=0.3, strength=0.8, worth_telling=0.1)
+RULE = kernels.Occlusion(near=0.3, strength=0.8, reporting_share=0.1)
 
 
 def hidden(

@@ -44,13 +44,13 @@ class Paths:
         self.information = slopes.transpose(0, 2, 1) @ slopes  # of rank 2: one camera
         self.information[2] = 0.0
         self.vectors = rng.normal(size=(5, 3)) * (self.information.any(axis=(1, 2))[:, None])
-        self.restlessness = rng.uniform(0.5, 2.0, 5)
+        self.noise_scales = rng.uniform(0.5, 2.0, 5)
 
     def smoothed(self) -> passes.SmoothedRows:
         """By the kernel."""
         found: passes.SmoothedRows = passes.smooth_paths(
             self.starts, self.begins, self.information, self.vectors, self.motion,
-            self.restlessness,
+            self.noise_scales,
         )  # fmt: skip
         return found
 
@@ -65,7 +65,7 @@ class Paths:
             for j in range(k):
                 covariance[k, :, j] = f @ covariance[k - 1, :, j]
                 covariance[j, :, k] = covariance[k, :, j].T
-            noise = self.restlessness[first + k] * self.motion.noise
+            noise = self.noise_scales[first + k] * self.motion.noise
             covariance[k, :, k] = f @ covariance[k - 1, :, k - 1] @ f.T + noise
         whole, flat = np.zeros((n, d, n, d)), np.zeros((n, d))
         for k in range(known):
@@ -214,7 +214,7 @@ def test_however_sure_the_votes_a_probability_is_a_number(sign: float) -> None:
 CAMERA = ring(1)[0]
 RULE = CameraRule(
     gate=16.0, soft=True, detection_probability=0.9, confirmed=0.5, near=0.3, strength=0.8,
-    worth_telling=0.1, tolerance=1e-9, iterations=500, least_told=0.01,
+    reporting_share=0.1, tolerance=1e-9, iterations=500, reporting_threshold=0.01,
 )  # fmt: skip
 
 
@@ -332,7 +332,7 @@ def test_at_its_threshold_a_track_hides_nobody_and_a_pair_is_returned() -> None:
     every = scene.shared().links
     least = float(np.sort(every.shares)[1])
     for bound in (least, np.nextafter(least, 1.0)):
-        found = scene.shared(rule=RULE._replace(least_told=bound)).links
+        found = scene.shared(rule=RULE._replace(reporting_threshold=bound)).links
         assert_array_equal(found.shares, every.shares[every.shares >= bound])
 
 

@@ -32,10 +32,10 @@ RULE = CameraRule(
     confirmed=CONFIRMED,
     near=NEAR,
     strength=STRENGTH,
-    worth_telling=COVERED,
+    reporting_share=COVERED,
     tolerance=1e-6,
     iterations=200,
-    least_told=TOLD,
+    reporting_threshold=TOLD,
 )
 TRANSITION = np.eye(6) + 0.1 * np.eye(6, k=3)
 NOISE = np.diag([1e-3, 1e-3, 1e-4, 0.01, 0.01, 1e-3])
@@ -266,7 +266,7 @@ def test_a_track_begins_above_its_least_existence_and_is_a_pair_from_the_least_o
         assert len(found.existences) == count
         assert found.next_label == 49 + count
     for told, pairs in ((existence, [50]), (np.nextafter(existence, 1.0), [])):
-        found = one_step(far, [box], unseen=0.3, least_told=told)
+        found = one_step(far, [box], unseen=0.3, reporting_threshold=told)
         assert found.pair_labels.tolist() == pairs
         assert found.pair_probabilities.tolist() == [existence] * len(pairs)
 
@@ -280,7 +280,7 @@ def test_of_many_pairs_none_is_lost() -> None:
         corners = model.expected(camera, crowd.means[:1]).boxes
         box = np.concatenate([corners[:, :2] + corners[:, 2:], corners[:, 2:] - corners[:, :2]], 1)
         boxes.append(box / 2.0 + rng.normal(0.0, 3.0, (10, 4)))
-    found = one_step(crowd, boxes, least_told=0.0)
+    found = one_step(crowd, boxes, reporting_threshold=0.0)
     table = np.zeros((2, 8, 10))
     table[found.pair_cameras, found.pair_labels - 1, found.pair_boxes] = found.pair_probabilities
     assert len(found.pair_labels) == np.count_nonzero(table) == table.size

@@ -21,7 +21,7 @@ from tracker.runs import pipeline
 from tracker.runs.pipeline import Run
 from tracker.runs.stage_cache import StageCache
 from tracker.sequences.sequence import Sequence
-from tracker.smoothing.identity import cutting, identities
+from tracker.smoothing.identity import identities, splitting
 
 STEPS = 80
 FUSIONS = ("multi_bernoulli", "sequential_phd")
@@ -283,21 +283,21 @@ def test_what_other_corrections_left_changes_nothing(told: list[Correction]) -> 
 
 def test_what_was_settled_before_is_not_settled_again(monkeypatch: pytest.MonkeyPatch) -> None:
     solves: list[list[Correction]] = []
-    settled = identities._settled
+    settled = identities._linked
 
     def counted(*given: Any) -> Any:
         solves.append(given[3])
         return settled(*given)
 
     looked: list[object] = []
-    cuts = cutting.cuts
+    cuts = splitting.cuts
 
     def looked_at(*given: Any) -> Any:
         looked.append(given)
         return cuts(*given)
 
-    monkeypatch.setattr(identities, "_settled", counted)
-    monkeypatch.setattr(cutting, "cuts", looked_at)
+    monkeypatch.setattr(identities, "_linked", counted)
+    monkeypatch.setattr(splitting, "cuts", looked_at)
     cache = StageCache()
     same, parted = _CHOICES[0], _CHOICES[1]
     as_it_is = make(kind="same", places=[place(_BEFORE, 5, -0.7), place(_BEFORE, 9, -0.7)])

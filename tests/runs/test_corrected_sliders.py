@@ -6,7 +6,7 @@ import numpy as np
 
 from tests.runs.test_corrected_runs import place, run_of, with_a_gap
 from tracker.corrections.kinds import make
-from tracker.corrections.resting import resting
+from tracker.corrections.outcomes import supporting_corrections
 from tracker.parameters import PARAMETERS, RunParameters, with_values
 from tracker.runs import pipeline
 
@@ -54,7 +54,9 @@ def test_rows_that_rest_on_a_correction_name_it() -> None:
     lost = make(kind="same", places=[[3, 90.0, 0.0, 1.0], [9, 90.0, 0.0, 1.0]])
     run = run_of(whole, (same, here, lost))
     tracks = run.tracks
-    found = resting(tracks.frames, tracks.ids, tracks.positions, run.corrections, run.outcomes)
+    found = supporting_corrections(
+        tracks.frames, tracks.ids, tracks.positions, run.corrections, run.outcomes
+    )
     assert set(found) == {"", same.id, here.id}
     own = [
         step for step, name in zip(tracks.frames.tolist(), found, strict=True) if name == same.id

@@ -32,9 +32,9 @@ def measured(places: list[ndarray], sigma: float) -> tuple[Paths, partial[Smooth
     return paths, partial(passes.smooth_paths, paths.starts, begins, matrices, vectors, rule)
 
 
-def fitted_to(paths: Paths, found: SmoothedRows, restlessness: ndarray) -> Fitted:
+def fitted_to(paths: Paths, found: SmoothedRows, noise_scales: ndarray) -> Fitted:
     """Paths with what the kernel gave."""
     return Fitted(
         paths.with_states(found.means, found.covariances),
-        found.fits, found.ahead, found.ahead_covariances, found.traces, restlessness,
+        found.fits, found.ahead, found.ahead_covariances, found.traces, noise_scales,
     )  # fmt: skip

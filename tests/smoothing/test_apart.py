@@ -12,8 +12,7 @@ from tests import world
 from tests.smoothing.known import PLAIN, Known, Step, known
 from tracker.parameters import METHODS, RunParameters, method_of, with_values
 from tracker.smoothing import create
-from tracker.smoothing.apart import shown_apart
-from tracker.smoothing.lifetimes import lifetimes
+from tracker.smoothing.lifetimes import lifetimes, shown_apart
 from tracker.smoothing.paths import Paths
 from tracker.smoothing.smoother import Shared, Smoother
 
@@ -41,11 +40,11 @@ def doubtful(scene: Known) -> list[Step]:
 
 
 def tracked(
-    other: ndarray, *, swapped: bool = False, several: bool = True, looks: bool = True
+    other: ndarray, *, swapped: bool = False, several: bool = True, embeddings: bool = True
 ) -> tuple[Smoother, Paths, Shared]:
     """Both as they were, and whose box each is."""
     scene = known(world.together(*([other, ALONE] if swapped else [ALONE, other])))
-    views = doubtful(scene) if looks else scene.views
+    views = doubtful(scene) if embeddings else scene.views
     smoother = Smoother(scene.whole, PLAIN.fusion, views, several_boxes=several)
     paths, _ = scene.paths(sigma=0.03)
     return smoother, paths, smoother.share(paths)
@@ -101,8 +100,8 @@ def test_doubtful_boxes_beside_somebody_are_nobodys_and_elsewhere_somebodys() ->
 
 def test_what_a_detector_keeps_beside_another_box_shows_somebody_more() -> None:
     other = second(0.6 * WIDTH, 0.9 * WIDTH)
-    drawn = tracked(other, looks=False)
-    kept = tracked(other, looks=False, several=False)
+    drawn = tracked(other, embeddings=False)
+    kept = tracked(other, embeddings=False, several=False)
     assert lifetimes(*drawn, PLAIN.smoothing)[1][1] < 0.0, "two boxes around one person"
     assert lifetimes(*kept, PLAIN.smoothing)[1][1] > 0.0
 

@@ -14,9 +14,9 @@ from tracker.filters.models import Motion
 from tracker.kernels.gating import Measurements
 from tracker.parameters import FusionParams
 from tracker.smoothing.identity.appearance import Appearance
-from tracker.smoothing.identity.constraints import Said, Ties, possible
+from tracker.smoothing.identity.constraints import Constraint, LinkConstraints, possible
 from tracker.smoothing.identity.ends import Ends
-from tracker.smoothing.identity.pieces import (
+from tracker.smoothing.identity.tracklets import (
     Pairs,
     log_integral,
     motion_gains,
@@ -43,11 +43,11 @@ def standing(*pieces: tuple[int, int, int, float]) -> Paths:
     return Paths.of(labels, firsts, states, spread, 6)
 
 
-def fitted(paths: Paths, restlessness: ndarray | float = 1.0) -> Fitted:
+def fitted(paths: Paths, noise_scales: ndarray | float = 1.0) -> Fitted:
     """Paths that are fitted already."""
     rows = len(paths.states)
-    restless = np.broadcast_to(restlessness, rows).astype(float)
-    return Fitted(paths, np.zeros(rows), paths.states, paths.covariances, np.zeros(rows), restless)
+    scales = np.broadcast_to(noise_scales, rows).astype(float)
+    return Fitted(paths, np.zeros(rows), paths.states, paths.covariances, np.zeros(rows), scales)
 
 
 def pairs_of(found: Pairs) -> list[tuple[int, int]]:
@@ -83,28 +83,28 @@ def test_a_piece_goes_on_under_its_label_as_the_next_that_does_not_overlap() -> 
 @pytest.mark.parametrize(("gap", "near"), [(10, True), (11, False)])
 def test_a_constraint_over_the_longest_gap_is_one_over_a_short_gap(gap: int, near: bool) -> None:
     cut = standing((1, 0, 4, 0.0), (2, 4 + gap, 30, 0.0))
-    now, later = Ties(together=((0, 1),), apart=((0, 1),)).parted(cut, 10)
-    assert now.together == (((0, 1),) if near else ())
-    assert later.together == (() if near else ((0, 1),))
-    assert now.apart == later.apart == ((0, 1),)
+    now, later = LinkConstraints(must_link=((0, 1),), cannot_link=((0, 1),)).parted(cut, 10)
+    assert now.must_link == (((0, 1),) if near else ())
+    assert later.must_link == (() if near else ((0, 1),))
+    assert now.cannot_link == later.cannot_link == ((0, 1),)
 
 
 def test_pieces_of_one_person_follow_one_another() -> None:
     firsts = np.array([0, 5, 6])
     for last, together in ((4, ((0, 1),)), (5, ())):
-        found = possible(firsts, np.array([last, 8, 9]), [Said([(0, 1)])])
+        found = possible(firsts, np.array([last, 8, 9]), [Constraint([(0, 1)])])
         assert found is not None
-        assert found.together == together
-    assert possible(firsts, np.array([5, 8, 9]), [Said([(0, 1)])], strict=True) is None
+        assert found.must_link == together
+    assert possible(firsts, np.array([5, 8, 9]), [Constraint([(0, 1)])], strict=True) is None
 
 
 def test_who_is_not_somebody_else_ends_before_that_one_begins() -> None:
     cut = standing((1, 0, 4, 0.0), (2, 8, 9, 0.0), (3, 2, 6, 0.0))
-    apart = Ties(apart=((1, 0), (0, 2)))
+    apart = LinkConstraints(cannot_link=((1, 0), (0, 2)))
     assert apart.limits([[0], [1], [2]], cut) == {
         0: (0, 7), 1: (5, int(np.iinfo(np.int64).max))
     }  # fmt: skip
-    own = Ties(firsts=frozenset({1}), lasts=frozenset({0}))
+    own = LinkConstraints(firsts=frozenset({1}), lasts=frozenset({0}))
     assert own.limits([[0], [1]], cut)[0] == (0, 4)
     assert own.limits([[0], [1]], cut)[1][0] == 8
     assert own.limits([[0, 1]], cut) == {0: (0, int(np.iinfo(np.int64).max))}
@@ -134,9 +134,9 @@ def test_a_link_is_worth_as_much_as_its_motion_is_likelier_than_a_newcomer() -> 
     restless as the one is at its end and the other at its beginning."""
     motion = Motion.of(FusionParams(), 0.1)
     paths = standing((1, 0, 4, 0.0), (2, 7, 9, 0.4))
-    restless = np.array([9.0, 1.0, 1.0, 1.0, 0.04, 0.25, 1.0, 9.0])
-    known = Ends.alone(fitted(paths, restless), PRIOR)
-    assert_allclose(known.restlessness, [[9.0, 0.04], [0.25, 9.0]])
+    scales = np.array([9.0, 1.0, 1.0, 1.0, 0.04, 0.25, 1.0, 9.0])
+    known = Ends.alone(fitted(paths, scales), PRIOR)
+    assert_allclose(known.noise_scales, [[9.0, 0.04], [0.25, 9.0]])
     pair = Pairs(np.array([0]), np.array([1]), np.array([3]), np.zeros(1))
     found = motion_gains(paths, pair, known, motion, PRIOR, 1.5)[0]
     f, q = np.eye(6), np.zeros((6, 6))
@@ -161,7 +161,7 @@ def test_the_first_pieces_own_prior_is_not_evidence() -> None:
     centre = np.array([0.7, 0.0, 0.85, 0.0, 0.0, 0.0])
     mean = np.linalg.solve(total, known.vectors[0] + np.linalg.solve(PRIOR, centre))
     assert_allclose(mean, paths.states[0], atol=1e-9)
-    half = known.told_by(0.5)
+    half = known.discounted(0.5)
     assert_allclose(half.covariances, 2.0 * known.covariances)
     assert_allclose(half.information, 0.5 * known.information)
     assert_allclose(half.vectors, 0.5 * known.vectors)
@@ -176,7 +176,7 @@ def test_the_share_of_new_evidence_is_a_steps_time_over_the_memory(
     assert independence(step_time, memory) == pytest.approx(share)
 
 
-# ── looks
+# ── embeddings
 
 
 def looking(angles: list[list[float]], first: int = 0) -> tuple[Paths, Links, CameraBoxes, ndarray]:
@@ -192,20 +192,20 @@ def looking(angles: list[list[float]], first: int = 0) -> tuple[Paths, Links, Ca
     rows = np.arange(len(boxes))
     of = np.array([step * len(angles) + k for k in range(len(angles)) for step in range(steps)])
     links = Links(np.zeros(len(rows), dtype=np.int64), rows, of, np.ones(len(rows)))
-    looks = np.array([[np.cos(angles[k][s]), np.sin(angles[k][s])] for s in range(steps)
+    embeddings = np.array([[np.cos(angles[k][s]), np.sin(angles[k][s])] for s in range(steps)
                       for k in range(len(angles))])  # fmt: skip
-    return paths, links, camera, looks
+    return paths, links, camera, embeddings
 
 
 def test_looks_are_compared_by_the_medians_of_the_recording() -> None:
     """Of few pieces the medians are 0.15 + 0.05 for one person and 0.8 for two: between these the
     ratio is that of the two normal densities, with a doubt of 0.02 on either side."""
-    paths, links, camera, looks = looking([[0.0] * 4, [2.0] * 4, [4.0] * 4])
-    found = Appearance(paths, links, [camera], [looks], 0.1)
+    paths, links, camera, embeddings = looking([[0.0] * 4, [2.0] * 4, [4.0] * 4])
+    found = Appearance(paths, links, [camera], [embeddings], 0.1)
     ratio, known = found.log_ratio(np.array([0, 0, 1]), np.array([1, 2, 2]))
     assert known.all()
-    common = looks[:3].mean(axis=0)
-    own = looks[:3] - common
+    common = embeddings[:3].mean(axis=0)
+    own = embeddings[:3] - common
     own /= np.linalg.norm(own, axis=1, keepdims=True)
     for (i, j), value in zip(((0, 1), (0, 2), (1, 2)), ratio, strict=True):
         d = np.clip((1.0 - own[i] @ own[j]) / 2.0, 0.2, 0.8)
@@ -224,14 +224,14 @@ def test_looks_are_compared_by_the_medians_of_the_recording() -> None:
 def test_looks_need_three_boxes_and_a_fifth_of_a_second(
     steps: int, step_time: float, known: bool
 ) -> None:
-    paths, links, camera, looks = looking([[0.0] * steps, [2.0] * steps])
-    found = Appearance(paths, links, [camera], [looks], step_time)
+    paths, links, camera, embeddings = looking([[0.0] * steps, [2.0] * steps])
+    found = Appearance(paths, links, [camera], [embeddings], step_time)
     assert found.log_ratio(np.array([0]), np.array([1]))[1].tolist() == [known]
 
 
 @pytest.mark.parametrize(("share", "known"), [(0.7, False), (0.7 + 1e-9, True)])
 def test_a_box_that_is_hardly_ones_own_tells_nothing_of_looks(share: float, known: bool) -> None:
-    paths, links, camera, looks = looking([[0.0] * 4, [2.0] * 4])
+    paths, links, camera, embeddings = looking([[0.0] * 4, [2.0] * 4])
     less = replace(links, shares=np.full(len(links.shares), share))
-    found = Appearance(paths, less, [camera], [looks], 0.1)
+    found = Appearance(paths, less, [camera], [embeddings], 0.1)
     assert found.log_ratio(np.array([0]), np.array([1]))[1].tolist() == [known]

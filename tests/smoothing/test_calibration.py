@@ -81,14 +81,14 @@ def test_offsets_and_sizes_are_means_drawn_to_nothing_by_their_priors() -> None:
     scene = standing(12)
     smoother = planted(scene, [offset + 0.1 * U, offset - 0.1 * U])
     paths, links = scene.paths(sigma=0.01)
-    found = smoother.learn(paths, links, smoother.stated(paths))
+    found = smoother.learn(paths, links, smoother.uncalibrated(paths))
     expected = offset * 24.0 / (24.0 + OFFSET_RIDGE)
     assert_allclose(found.offsets, np.tile(expected, (3, 1)), atol=1e-9)
     rest = (offset - expected) @ U / 2.0
     assert_allclose(found.sizes, np.array([0.1 + rest, rest - 0.1]) * 36.0 / (36.0 + SIZE_RIDGE))
     assert_allclose(found.noises, 1.0)
     # what is known of the sizes is no offset
-    known_sizes = replace(smoother.stated(paths), sizes=np.array([0.1, -0.1]))
+    known_sizes = replace(smoother.uncalibrated(paths), sizes=np.array([0.1, -0.1]))
     assert_allclose(smoother.learn(paths, links, known_sizes).offsets, found.offsets, atol=1e-9)
 
 
@@ -97,7 +97,7 @@ def test_a_box_of_another_posture_is_no_witness(off: float, tells: bool) -> None
     scene = standing(3)
     smoother = planted(scene, [np.array([0.0, off, 0.0])] * 2)
     paths, links = scene.paths(sigma=0.01)
-    found = smoother.learn(paths, links, smoother.stated(paths))
+    found = smoother.learn(paths, links, smoother.uncalibrated(paths))
     assert (found.offsets[:, 1] > 0.0).tolist() == [tells] * 3
 
 
@@ -107,7 +107,7 @@ def test_a_box_that_is_hardly_somebodys_is_no_witness(share: float, tells: bool)
     smoother = planted(scene, [np.array([0.0, 0.1, 0.0])] * 2)
     paths, links = scene.paths(sigma=0.01)
     less = replace(links, shares=np.full(len(links.shares), share))
-    assert smoother.learn(paths, less, smoother.stated(paths)).offsets.any() == tells
+    assert smoother.learn(paths, less, smoother.uncalibrated(paths)).offsets.any() == tells
 
 
 @pytest.mark.parametrize("steps", [FEWEST - 1, FEWEST])
@@ -116,7 +116,7 @@ def test_noise_is_learnt_from_enough_boxes(steps: int) -> None:
     stated = replace(scene, seen=[replace(o, sigmas=2.0 * o.sigmas) for o in scene.seen])
     paths, links = scene.paths(sigma=0.001)
     smoother = stated.smoother()
-    found = smoother.learn(paths, links, smoother.stated(paths)).noises
+    found = smoother.learn(paths, links, smoother.uncalibrated(paths)).noises
     assert ((found != 1.0) == (steps >= FEWEST)).all()
 
 
@@ -128,7 +128,7 @@ def test_the_noise_is_that_of_the_boxes_as_a_factor_of_what_is_stated(
     stated = replace(scene, seen=[replace(o, sigmas=o.sigmas / factor) for o in scene.seen])
     paths, links = scene.paths(sigma=1e-4)
     smoother = stated.smoother()
-    learnt = smoother.learn(paths, links, smoother.stated(paths))
+    learnt = smoother.learn(paths, links, smoother.uncalibrated(paths))
     assert_allclose(learnt.noises, found, rtol=0.15)
 
 
@@ -137,12 +137,12 @@ def test_the_error_of_the_path_itself_adds_to_the_noise_and_boxes_that_err_alike
     wide = replace(scene, seen=[replace(o, sigmas=0.0 * o.sigmas + 4.0) for o in scene.seen])
     smoother = wide.smoother()
     paths, links = scene.paths(sigma=1e-4)
-    plain = smoother.learn(paths, links, smoother.stated(paths)).noises
+    plain = smoother.learn(paths, links, smoother.uncalibrated(paths)).noises
     loose, _ = scene.paths(sigma=0.01)
-    found = smoother.learn(loose, links, smoother.stated(paths)).noises
+    found = smoother.learn(loose, links, smoother.uncalibrated(paths)).noises
     assert (found > plain).all()
     # every box of a person as the one before: wrong for as long as they are
     first = [np.repeat(o.boxes[:2][None], 100, axis=0).reshape(-1, 4) for o in scene.seen]
     alike = replace(wide, seen=[replace(o, boxes=b) for o, b in zip(wide.seen, first, strict=True)])
     same = alike.smoother()
-    assert (same.learn(paths, links, same.stated(paths)).noises > 1.5 * plain).all()
+    assert (same.learn(paths, links, same.uncalibrated(paths)).noises > 1.5 * plain).all()

@@ -11,7 +11,12 @@ from numpy import ndarray
 from tests.smoothing.test_boundaries import fitted, standing
 from tracker.corrections import Correction
 from tracker.corrections.kinds import make
-from tracker.smoothing.identity.constraints import Said, Seeker, Ties, possible
+from tracker.smoothing.identity.constraints import (
+    Constraint,
+    ConstraintResolver,
+    LinkConstraints,
+    possible,
+)
 from tracker.smoothing.paths import Paths
 
 PATHS = standing((1, 0, 9, 0.0), (2, 0, 9, 5.0), (3, 14, 19, 0.0))
@@ -27,8 +32,8 @@ def said(kind: str, *places: list[float], **more: object) -> Correction:
     return make(kind=kind, places=list(places), **more)
 
 
-def seeker(*corrections: Correction, paths: Paths = PATHS, leeway: int = 2) -> Seeker:
-    return Seeker(fitted(paths), corrections, leeway)
+def resolver(*corrections: Correction, paths: Paths = PATHS, leeway: int = 2) -> ConstraintResolver:
+    return ConstraintResolver(fitted(paths), corrections, leeway)
 
 
 def pieces() -> tuple[Paths, ndarray]:
@@ -56,7 +61,7 @@ def pieces() -> tuple[Paths, ndarray]:
     ],
 )
 def test_where_a_correction_cuts(one: Correction, rows: list[int]) -> None:
-    assert np.flatnonzero(seeker(one).breaks()).tolist() == rows
+    assert np.flatnonzero(resolver(one).breaks()).tolist() == rows
 
 
 def test_who_is_not_the_same_later_is_cut_before_the_largest_jump_in_between() -> None:
@@ -69,50 +74,53 @@ def test_who_is_not_the_same_later_is_cut_before_the_largest_jump_in_between() -
     jumping = replace(jumping, ahead=ahead, ahead_covariances=2.0 * paths.covariances)
     for first, last, cut in ((1, 6, 4), (1, 9, 8), (3, 4, 4), (7, 8, 8)):
         one = said("different", at(first, states[first, 0]), at(last, states[last, 0]))
-        assert np.flatnonzero(Seeker(jumping, [one], 2).breaks()).tolist() == [cut]
+        assert np.flatnonzero(ConstraintResolver(jumping, [one], 2).breaks()).tolist() == [cut]
 
 
 @pytest.mark.parametrize(
-    ("told", "ties"),
+    ("told", "constraints"),
     [
-        ([said("same", at(2), at(5, 5.0))], Ties()),  # both are there at once
-        ([said("same", at(8), at(15))], Ties(((2, 4),), somebody=frozenset({2, 4}))),
+        ([said("same", at(2), at(5, 5.0))], LinkConstraints()),  # both are there at once
+        ([said("same", at(8), at(15))], LinkConstraints(((2, 4),), targets=frozenset({2, 4}))),
         # before the first place what ends is meant, after the second what begins
-        ([said("same", at(3), at(14))], Ties(((0, 4),), somebody=frozenset({0, 4}))),
-        ([said("same", at(3), at(6))], Ties(((0, 2),), somebody=frozenset({0, 2}))),
-        ([said("same", at(2), at(4))], Ties(((0, 1),), somebody=frozenset({0, 1}))),
-        ([said("same", at(4), at(5))], Ties()),
-        ([said("different", at(3), at(6))], Ties(apart=((0, 2),))),
-        ([said("different", at(2), at(6))], Ties(apart=((0, 2),))),
-        ([said("same", at(8), at(15, 2.0))], Ties()),  # nobody is at the second place
-        ([said("came", at(6))], Ties(somebody=frozenset({2}), firsts=frozenset({2}))),
-        ([said("left", at(6))], Ties(somebody=frozenset({1}), lasts=frozenset({1}))),
-        ([said("here", at(6))], Ties(somebody=frozenset({1}))),
-        ([said("here", at(6, 2.0), at(6))], Ties(somebody=frozenset({1}))),
-        ([said("nobody", at(4), at(5))], Ties(nobody=frozenset({1}))),
-        ([said("nobody", at(0), at(9))], Ties(nobody=frozenset({0, 1, 2}))),
-        ([said("name", at(4), name="Anna")], Ties()),
-        ([make(kind="checked", first=0, last=9)], Ties()),
+        ([said("same", at(3), at(14))], LinkConstraints(((0, 4),), targets=frozenset({0, 4}))),
+        ([said("same", at(3), at(6))], LinkConstraints(((0, 2),), targets=frozenset({0, 2}))),
+        ([said("same", at(2), at(4))], LinkConstraints(((0, 1),), targets=frozenset({0, 1}))),
+        ([said("same", at(4), at(5))], LinkConstraints()),
+        ([said("different", at(3), at(6))], LinkConstraints(cannot_link=((0, 2),))),
+        ([said("different", at(2), at(6))], LinkConstraints(cannot_link=((0, 2),))),
+        ([said("same", at(8), at(15, 2.0))], LinkConstraints()),  # nobody is at the second place
+        ([said("came", at(6))], LinkConstraints(targets=frozenset({2}), firsts=frozenset({2}))),
+        ([said("left", at(6))], LinkConstraints(targets=frozenset({1}), lasts=frozenset({1}))),
+        ([said("here", at(6))], LinkConstraints(targets=frozenset({1}))),
+        ([said("here", at(6, 2.0), at(6))], LinkConstraints(targets=frozenset({1}))),
+        ([said("nobody", at(4), at(5))], LinkConstraints(clutter=frozenset({1}))),
+        ([said("nobody", at(0), at(9))], LinkConstraints(clutter=frozenset({0, 1, 2}))),
+        ([said("name", at(4), name="Anna")], LinkConstraints()),
+        ([make(kind="checked", first=0, last=9)], LinkConstraints()),
         # whom one correction joins the next does not take away
         ([said("same", at(8), at(15)), said("nobody", at(7), at(9))],
-         Ties(((2, 4),), somebody=frozenset({2, 4}))),
-        ([said("nobody", at(7), at(9)), said("same", at(8), at(15))], Ties(nobody=frozenset({2}))),
+         LinkConstraints(((2, 4),), targets=frozenset({2, 4}))),
+        ([said("nobody", at(7), at(9)), said("same", at(8), at(15))],
+         LinkConstraints(clutter=frozenset({2}))),
     ],
 )  # fmt: skip
-def test_what_a_correction_says_of_pieces(told: list[Correction], ties: Ties) -> None:
-    assert seeker(*told).ties(*pieces()) == ties
+def test_what_a_correction_says_of_pieces(
+    told: list[Correction], constraints: LinkConstraints
+) -> None:
+    assert resolver(*told).constraints(*pieces()) == constraints
 
 
 def test_two_who_exchange_are_tied_across_and_parted() -> None:
     cut = standing((1, 0, 4, 0.0), (1, 5, 9, 0.0), (2, 0, 4, 5.0), (2, 5, 9, 5.0))
     paths = standing((1, 0, 9, 0.0), (2, 0, 9, 5.0))
     one = said("exchanged", at(3), at(3, 5.0), at(6, 5.0), at(6))
-    found = seeker(one, paths=paths).ties(cut, np.arange(20))
-    assert found.together == ((0, 3), (2, 1))
-    assert found.apart == ((0, 1), (2, 3))
-    assert found.somebody == {0, 1, 2, 3}
+    found = resolver(one, paths=paths).constraints(cut, np.arange(20))
+    assert found.must_link == ((0, 3), (2, 1))
+    assert found.cannot_link == ((0, 1), (2, 3))
+    assert found.targets == {0, 1, 2, 3}
     # cut at the same step of both, between the places
-    rows = np.flatnonzero(seeker(one, paths=paths).breaks())
+    rows = np.flatnonzero(resolver(one, paths=paths).breaks())
     assert len(rows) == 2
     assert rows[1] == rows[0] + 10
     assert 4 <= rows[0] <= 6
@@ -121,39 +129,52 @@ def test_two_who_exchange_are_tied_across_and_parted() -> None:
 def test_all_pieces_that_are_spoken_of_are_meant() -> None:
     cut, kept = pieces()
     told = [said("same", at(8), at(15)), said("here", at(4)), said("nobody", at(0), at(2))]
-    assert seeker(*told).meant(cut, kept) == {0, 1, 2, 4}
-    assert seeker(said("same", at(8), at(15, 2.0))).meant(cut, kept) == {2}
+    assert resolver(*told).meant(cut, kept) == {0, 1, 2, 4}
+    assert resolver(said("same", at(8), at(15, 2.0))).meant(cut, kept) == {2}
     nothing = np.zeros(0, dtype=np.int64)
     empty = Paths.of([], [], [], [], 6)
-    assert seeker(*told).meant(empty, nothing) == set()
+    assert resolver(*told).meant(empty, nothing) == set()
 
 
 def test_limits_and_ties_of_chains_are_those_of_their_pieces() -> None:
     cut, _ = pieces()
-    ties = Ties(together=((2, 4),), apart=((0, 3),), firsts=frozenset({0}), lasts=frozenset({4}))
-    found = ties.of_chains([[0, 1], [2], [3], [4]], cut)
+    constraints = LinkConstraints(
+        must_link=((2, 4),), cannot_link=((0, 3),), firsts=frozenset({0}), lasts=frozenset({4})
+    )
+    found = constraints.of_chains([[0, 1], [2], [3], [4]], cut)
     assert found is not None
-    assert (found.together, found.apart) == (((1, 3),), ((0, 2),))
+    assert (found.must_link, found.cannot_link) == (((1, 3),), ((0, 2),))
     assert (found.firsts, found.lasts) == ({0}, {3})
-    assert found.somebody == {0, 1, 3}
+    assert found.targets == {0, 1, 3}
     # who is in no chain says nothing; two of one person's that overlap cannot both be
-    assert Ties(apart=((0, 3),), firsts=frozenset({3})).of_chains([[0]], cut) == Ties()
-    assert Ties(together=((0, 3),)).of_chains([[0], [3]], cut) is None
+    assert (
+        LinkConstraints(cannot_link=((0, 3),), firsts=frozenset({3})).of_chains([[0]], cut)
+        == LinkConstraints()
+    )
+    assert LinkConstraints(must_link=((0, 3),)).of_chains([[0], [3]], cut) is None
 
 
 def test_one_person_is_in_one_place_whatever_the_order_of_pairs() -> None:
     firsts, lasts = np.array([0, 5, 10, 7]), np.array([4, 9, 14, 12])
-    found = possible(firsts, lasts, [Said([(1, 2)]), Said([(0, 2)])])
+    found = possible(firsts, lasts, [Constraint([(1, 2)]), Constraint([(0, 2)])])
     assert found is not None
-    assert found.together == ((0, 1), (1, 2))
+    assert found.must_link == ((0, 1), (1, 2))
     # the fourth overlaps two of them
-    assert possible(firsts, lasts, [Said([(0, 1)]), Said([(0, 3)])]) == Ties(
-        ((0, 1),), somebody=frozenset({0, 1})
+    assert possible(firsts, lasts, [Constraint([(0, 1)]), Constraint([(0, 3)])]) == LinkConstraints(
+        ((0, 1),), targets=frozenset({0, 1})
     )
     # two of one person who are told apart later, and two who are told apart joined by a third
-    later = possible(firsts, lasts, [Said([(0, 1)]), Said([(1, 2)]), Said(apart=[(0, 2)])])
+    later = possible(
+        firsts,
+        lasts,
+        [Constraint([(0, 1)]), Constraint([(1, 2)]), Constraint(cannot_link=[(0, 2)])],
+    )
     assert later is not None
-    assert (later.apart, later.together) == ((), ((0, 1), (1, 2)))
-    first = possible(firsts, lasts, [Said(apart=[(0, 2)]), Said([(0, 1)]), Said([(1, 2)])])
+    assert (later.cannot_link, later.must_link) == ((), ((0, 1), (1, 2)))
+    first = possible(
+        firsts,
+        lasts,
+        [Constraint(cannot_link=[(0, 2)]), Constraint([(0, 1)]), Constraint([(1, 2)])],
+    )
     assert first is not None
-    assert (first.apart, first.together) == (((0, 2),), ((0, 1),))
+    assert (first.cannot_link, first.must_link) == (((0, 2),), ((0, 1),))

@@ -12,8 +12,8 @@ from numpy.testing import assert_array_equal
 from tests import world
 from tests.smoothing.known import Known, known
 from tracker.parameters import SmoothingParams
-from tracker.smoothing.identity.constraints import Seeker
-from tracker.smoothing.identity.cutting import Cuts, Tracked, cut, cuts
+from tracker.smoothing.identity.constraints import ConstraintResolver
+from tracker.smoothing.identity.splitting import Cuts, Tracked, cut, cuts
 
 STEPS = 30
 P = SmoothingParams(change=20.0, gap=0.5)
@@ -125,7 +125,7 @@ def test_short_pieces_beside_longer_ones_are_left_out_and_names_are_the_filters(
     clear = np.ones(STEPS, dtype=bool)
     clear[[10, 14, 18, 29]] = False
     plain = Cuts(np.zeros(STEPS, dtype=np.int64), clear, np.zeros(STEPS, dtype=bool))
-    nobody = Seeker(one.fitted, (), 10)
+    nobody = ConstraintResolver(one.fitted, (), 10)
     pieces, kept = cut(one, plain, nobody)
     assert pieces.firsts.tolist() == [0, 19]
     assert pieces.lasts.tolist() == [9, 28]

@@ -13,9 +13,9 @@ from numpy.testing import assert_allclose
 from tracker.filters.models import Motion
 from tracker.kernels.smoothing.presence import Habits, presence
 from tracker.parameters import FusionParams
+from tracker.smoothing.identity.association import chains, join
 from tracker.smoothing.identity.ends import Ends
-from tracker.smoothing.identity.joining import chains, join
-from tracker.smoothing.identity.pieces import Pairs, contested, cut, motion_gains, near_pairs
+from tracker.smoothing.identity.tracklets import Pairs, contested, cut, motion_gains, near_pairs
 from tracker.smoothing.paths import Links, Paths
 from tracker.smoothing.smoother import Fitted
 
@@ -131,12 +131,12 @@ def together(*paths: Paths) -> Paths:
     )
 
 
-def as_fitted(paths: Paths, restlessness: float = 1.0) -> Fitted:
+def as_fitted(paths: Paths, noise_scales: float = 1.0) -> Fitted:
     """Paths that are fitted already."""
     rows = len(paths.states)
     return Fitted(
         paths, np.zeros(rows), paths.states, paths.covariances, np.zeros(rows),
-        np.full(rows, restlessness),
+        np.full(rows, noise_scales),
     )  # fmt: skip
 
 
@@ -172,7 +172,7 @@ def test_boxes_that_err_alike_contradict_each_other_less() -> None:
     known = Ends.alone(as_fitted(paths), prior)
     gains = [
         float(motion_pairs(paths, told, prior).gains[0])
-        for told in (known, known.told_by(0.2), known.told_by(1.0))
+        for told in (known, known.discounted(0.2), known.discounted(1.0))
     ]
     assert gains[1] > gains[0] + 1.0
     assert gains[2] == gains[0]

@@ -17,8 +17,7 @@ from tracker.geometry.camera import Camera
 from tracker.parameters import with_values
 from tracker.sequences.sequence import Sequence, Template
 from tracker.smoothing import create
-from tracker.smoothing.calibration import Calibration, lower, upright
-from tracker.smoothing.marks import RIDGE, Marks, shifts
+from tracker.smoothing.calibration import RIDGE, Calibration, Marks, lower, shifts, upright
 from tracker.smoothing.paths import Paths
 
 LOW = 0.2
@@ -157,7 +156,7 @@ def test_what_is_known_of_the_shift_is_not_learnt_again_as_an_offset() -> None:
     scene = one_walker()
     smoother, path = scene.smoother(), path_of(scene.whole)
     _, links = scene.paths()
-    nothing = smoother.stated(path)
+    nothing = smoother.uncalibrated(path)
     known = replace(nothing, shifts=np.array([LOW]))
     for c, camera in enumerate(smoother.cameras):
         own = links.take(links.cameras == c)

@@ -12,10 +12,10 @@ from numpy.testing import assert_allclose
 from tests.smoothing.test_boundaries import PRIOR, fitted, looking, standing
 from tracker.filters.models import Motion
 from tracker.parameters import FusionParams, SmoothingParams
-from tracker.smoothing.identity import decisions, odds
+from tracker.smoothing.identity import identities, odds
 from tracker.smoothing.identity.appearance import Appearance
 from tracker.smoothing.identity.ends import Ends
-from tracker.smoothing.identity.pieces import Pairs, motion_gains
+from tracker.smoothing.identity.tracklets import Pairs, motion_gains
 from tracker.smoothing.paths import Links
 from tracker.smoothing.smoother import Shared
 
@@ -48,7 +48,7 @@ def test_a_piece_is_worth_its_boxes_less_its_misses_and_comes_and_goes_inside_th
     chances, missed = np.full((2, rows), 0.5), np.zeros((2, rows))
     chances[1], missed[0, 0], missed[1, 20] = 1.0, 1.0, 0.5
     shared = Shared(NOBODYS, chances, missed, np.full((2, rows), -1))
-    worths, births, deaths = odds.of_pieces(smoother(), own, shared, P)
+    worths, births, deaths = odds.of_tracklets(smoother(), own, shared, P)
     bounds = ((0, 19), (19, 38), (38, 41))
     expected = [own.odds[a:b].sum() + (b - a) * np.log(SURVIVAL) + 1.5 for a, b in bounds]
     expected[0] += 0.4 * np.log(0.5)
@@ -68,7 +68,7 @@ def test_a_link_survives_its_gap_and_its_motion_tells_as_much_as_is_new() -> Non
     for name in ("earlier", "later", "gaps"):
         assert getattr(found, name).tolist() == getattr(pairs, name).tolist()
     motion = motion_gains(
-        paths, pairs, known.told_by(0.4), smoother().model.motion, PRIOR, smoother().log_place
+        paths, pairs, known.discounted(0.4), smoother().model.motion, PRIOR, smoother().log_place
     )
     assert_allclose(found.gains, motion + pairs.gaps * np.log(SURVIVAL))
 
@@ -95,15 +95,15 @@ def test_who_comes_back_is_one_of_those_who_left() -> None:
 
 @pytest.mark.parametrize("weight", [1.0, 0.5])
 def test_looks_weigh_in_a_link_and_in_a_return(weight: float) -> None:
-    _, links, camera, looks = looking([[0.0] * 4, [2.0] * 4, [0.1] * 4])
+    _, links, camera, embeddings = looking([[0.0] * 4, [2.0] * 4, [0.1] * 4])
     # the third comes after both
     later = standing((0, 0, 3, 0.0), (1, 0, 3, 3.0), (2, 4, 7, 0.1))
     p = SmoothingParams(appearance=weight, memory=0.25)
-    alike = Appearance(later, links, [camera], [looks], STEP)
+    alike = Appearance(later, links, [camera], [embeddings], STEP)
     ratio, known = alike.log_ratio(np.array([0, 1]), np.array([2, 2]))
     assert known.all()
     assert ratio[0] > ratio[1]
-    found = odds.comes_back(smoother(camera), later, links, [[0], [1], [2]], p, [looks])
+    found = odds.comes_back(smoother(camera), later, links, [[0], [1], [2]], p, [embeddings])
     newcomer = np.log(BIRTH * STEP * (1.0 - SURVIVAL))
     assert_allclose(found.gains, newcomer - np.log(2.0) + weight * ratio)
     assert list(zip(found.earlier.tolist(), found.later.tolist(), strict=True)) == [(0, 2), (1, 2)]
@@ -126,18 +126,18 @@ def test_a_cut_is_told_where_a_track_does_not_go_on_as_the_filter_had_it() -> No
         every = np.full(20, 3)
         every[4:6] = reasons
         every[[3, 6]] = 1  # the pieces' own rows do not count
-        found = decisions.cuts(cut, before, kept, every, [[0], [1], [2, 3]], [4, 9, 6])
+        found = identities.split_decisions(cut, before, kept, every, [[0], [1], [2, 3]], [4, 9, 6])
         (one,) = found
         assert (one.kind, one.step, one.label, one.other) == ("cut", 8, 4, 4)
         assert one.reason.startswith(why)
-    assert decisions.cuts(cut, before, kept, every, [[1], [2, 3]], [9, 6]) == []
+    assert identities.split_decisions(cut, before, kept, every, [[1], [2, 3]], [9, 6]) == []
 
 
 def test_a_join_is_told_with_its_odds_against_the_best_other() -> None:
     cut = standing((4, 0, 5, 0.0), (7, 6, 9, 0.0), (8, 0, 4, 1.0), (9, 12, 14, 0.0), (9, 16, 19, 0))
     pairs = Pairs(np.array([0, 2, 1]), np.array([1, 1, 3]), np.array([1, 2, 3]),
                   np.array([2.0, 1.0, -1.0]))  # fmt: skip
-    found = decisions.joins(cut, pairs, [[0, 1, 3, 4], [2]], [4, 8], -3.0, set())
+    found = identities.join_decisions(cut, pairs, [[0, 1, 3, 4], [2]], [4, 8], -3.0, set())
     weights = np.exp([2.0, 1.0, -3.0])
     first, second = found
     assert (first.step, first.label, first.other) == (6, 4, 7)
@@ -145,7 +145,7 @@ def test_a_join_is_told_with_its_odds_against_the_best_other() -> None:
     assert first.reason == "one person goes on"
     assert (second.step, second.other, second.reason) == (12, 9, "one person")
     assert second.probability == pytest.approx(1.0 / (1.0 + np.exp(-2.0)))
-    told = decisions.joins(cut, pairs, [[0, 1], [2]], [7, 8], -3.0, {(0, 1)})[0]
+    told = identities.join_decisions(cut, pairs, [[0, 1], [2]], [7, 8], -3.0, {(0, 1)})[0]
     assert (told.other, told.probability, told.reason) == (4, 1.0, "a person said so")
-    (tied,) = decisions.joins(cut, pairs, [[2, 3]], [8], -3.0, set())
+    (tied,) = identities.join_decisions(cut, pairs, [[2, 3]], [8], -3.0, set())
     assert tied.reason == "a person said so"

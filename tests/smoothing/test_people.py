@@ -12,7 +12,7 @@ from numpy import ndarray
 
 from tracker.kernels.gating import Measurements
 from tracker.single_view.protocol import ViewResult
-from tracker.smoothing.identity.people import Seen, of_chains, told_of_people
+from tracker.smoothing.identity.people import Seen, of_chains, template_log_odds
 from tracker.smoothing.paths import Links, Paths
 from tracker.smoothing.recording import CameraBoxes
 from tracker.smoothing.smoother import Smoother
@@ -36,7 +36,7 @@ def told(likenesses: list[list[float]], places: list[list[float]], weight: float
     piece = Paths.of([1], [0], [np.zeros((steps, 6))], [np.zeros((steps, 6, 6))], 6)
     rows = np.arange(steps)
     links = Links(np.zeros(steps, dtype=np.int64), rows, starts[:-1].copy(), np.ones(steps))
-    return told_of_people(piece, links, smoother, Seen(None, [every]), weight)[0]
+    return template_log_odds(piece, links, smoother, Seen(None, [every]), weight)[0]
 
 
 def test_boxes_of_ones_colours_count_by_the_time_that_they_last() -> None:

@@ -244,13 +244,13 @@ def test_who_comes_back_on_the_other_side_is_known_by_looks(weight: float) -> No
     scene = Known(world.sequence(CAMERAS, paths, seen), seen, paths)
     views = []
     for step, own in enumerate(scene.views):
-        looks = []
+        embeddings = []
         for view, one in zip(own, seen, strict=True):
             noisy = vectors[one.people[one.frames == step]]
             noisy = noisy + 0.3 * rng.normal(size=noisy.shape)
             noisy /= np.linalg.norm(noisy, axis=1, keepdims=True)
-            looks.append(replace(view, looks=noisy))
-        views.append(tuple(looks))
+            embeddings.append(replace(view, embeddings=noisy))
+        views.append(tuple(embeddings))
     labels = np.tile([4, 7], (45, 1))
     labels[10:35], labels[35:] = -1, [8, 9]
     p = with_values(SETTLED, {"smoothing.appearance": weight})

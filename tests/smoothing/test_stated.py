@@ -8,15 +8,15 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.smoothing.test_boundaries import standing
 from tracker.corrections.kinds import make
-from tracker.smoothing.place_constraints import ASIDE, Stated
+from tracker.smoothing.place_constraints import ASIDE, PlaceMeasurements
 
 SPREAD = np.diag([0.01, 0.02, 0.03, 0.1, 0.1, 0.1])
 
 
-def stated(x: float, sigma: float = 0.1, row: int = 0) -> Stated:
+def stated(x: float, sigma: float = 0.1, row: int = 0) -> PlaceMeasurements:
     """Somebody is said to be at (x, 0)."""
     one = make(kind="here", places=[[row, x, 0.0, 0.85]], accuracy=sigma)
-    return Stated.of(np.array([row]), [one])
+    return PlaceMeasurements.of(np.array([row]), [one])
 
 
 def test_a_place_adds_its_precision_to_its_row_alone() -> None:
@@ -30,7 +30,7 @@ def test_a_place_adds_its_precision_to_its_row_alone() -> None:
     assert_array_equal(matrices[1], np.eye(3), "the boxes' own information stays")
 
 
-def with_place(place: Stated, rest: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def with_place(place: PlaceMeasurements, rest: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The state at the origin, of covariance ``rest``, with a place as it is weighed."""
     mean, origin = np.zeros(6), np.array([0.0, 0.0, 0.85, 0.0, 0.0, 0.0])
     gain = rest[:, :3] @ np.linalg.inv(rest[:3, :3] + place.noises[0])
@@ -70,7 +70,7 @@ def test_who_is_somewhere_else_leaves_the_way_and_finds_back_as_fast_as_one_walk
     paths = standing((1, 0, 7, 0.0), (2, 0, 3, 5.0))
     one = stated(2.0, row=6)
     aside = np.array([[0.0, 2.0, 0.0]])
-    led = Stated(one.rows, one.points, one.sigmas, one.noises, aside).led_to(paths, 0.4)
+    led = PlaceMeasurements(one.rows, one.points, one.sigmas, one.noises, aside).led_to(paths, 0.4)
     assert ASIDE == 1.5
     expected = np.zeros(12)
     expected[[3, 4, 5, 7]] = 0.2, 0.8, 1.4, 1.4
@@ -82,11 +82,15 @@ def test_who_is_somewhere_else_leaves_the_way_and_finds_back_as_fast_as_one_walk
 def test_the_way_to_a_place_ends_at_the_next_one() -> None:
     paths = standing((1, 0, 7, 0.0))
     said = [make(kind="here", places=[[row, 0.0, 0.0, 0.85]]) for row in (3, 5)]
-    both = Stated.of(np.array([3, 5]), said)
+    both = PlaceMeasurements.of(np.array([3, 5]), said)
     asides = np.array([[0.0, 0.0, 0.0], [0.0, 2.0, 0.0]])
-    led = Stated(both.rows, both.points, both.sigmas, both.noises, asides).led_to(paths, 0.4)
+    led = PlaceMeasurements(both.rows, both.points, both.sigmas, both.noises, asides).led_to(
+        paths, 0.4
+    )
     assert_allclose(led.states[:, 1], [0, 0, 0, 0, 1.4, 0, 1.4, 0.8], atol=1e-12)
     # six steps of a third of the way: at exactly nothing left it ends
     third = np.array([[0.0, 0.0, 0.0], [0.0, 0.6, 0.0]])
-    led = Stated(both.rows, both.points, both.sigmas, both.noises, third).led_to(paths, 0.4)
+    led = PlaceMeasurements(both.rows, both.points, both.sigmas, both.noises, third).led_to(
+        paths, 0.4
+    )
     assert not led.states[:, 1].any()

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from tracker.smoothing.identity.constraints import Ties
-from tracker.smoothing.identity.joining import chains, join
-from tracker.smoothing.identity.pieces import Pairs
-from tracker.smoothing.identity.staying import Staying
+from tracker.smoothing.identity.association import chains, join
+from tracker.smoothing.identity.constraints import LinkConstraints
+from tracker.smoothing.identity.identities import PriorLinks
+from tracker.smoothing.identity.tracklets import Pairs
 from tracker.smoothing.paths import Paths
 
 PIECES = 6
@@ -26,31 +26,31 @@ PAIRS = Pairs(EARLIER, LATER, np.full(5, 2), np.array([5.0, 5.0, 5.0, 5.5, 5.5])
 """All three best go on as themselves; two alone, the first as the second and he as the third."""
 
 
-def joined(gains: np.ndarray, ties: Ties) -> list[list[int]]:
+def joined(gains: np.ndarray, constraints: LinkConstraints) -> list[list[int]]:
     alone = np.full(PIECES, -1.0)
-    following, used = join(np.full(PIECES, 9.0), alone, alone, EARLIER, LATER, gains, ties)
+    following, used = join(np.full(PIECES, 9.0), alone, alone, EARLIER, LATER, gains, constraints)
     return chains(following, used)
 
 
 def test_who_is_parted_takes_nobody_elses_place() -> None:
     rows = np.arange(2 * PIECES)
-    plain, staying = Staying(), Staying(WHO)
-    assert joined(plain.gains(PAIRS, CUT, rows), Ties()) == [[0, 3], [1, 4], [2, 5]]
-    said = Ties(apart=((0, 3),), somebody=frozenset({3}))
+    plain, prior_links = PriorLinks(), PriorLinks(WHO)
+    assert joined(plain.gains(PAIRS, CUT, rows), LinkConstraints()) == [[0, 3], [1, 4], [2, 5]]
+    said = LinkConstraints(cannot_link=((0, 3),), targets=frozenset({3}))
     moved = joined(plain.gains(PAIRS, CUT, rows), said)
     assert moved != [[0], [1, 4], [2, 5], [3]], "its own odds would move those nobody spoke of"
-    assert joined(staying.gains(PAIRS, CUT, rows), said) == [[0], [1, 4], [2, 5], [3]]
+    assert joined(prior_links.gains(PAIRS, CUT, rows), said) == [[0], [1, 4], [2, 5], [3]]
 
 
 def test_what_was_in_no_piece_of_anybody_and_what_was_two_peoples_has_its_own_odds() -> None:
     rows = np.arange(2 * PIECES)
     lost = np.where(WHO == 0, -1, WHO)
-    more = Staying(lost).gains(PAIRS, CUT, rows) - PAIRS.gains
+    more = PriorLinks(lost).gains(PAIRS, CUT, rows) - PAIRS.gains
     assert (more[[0, 3, 4]] == 0.0).all()
     assert (more[[1, 2]] > 0.0).all()
     # of those who were one person every join stays, the first label's too
-    assert ((Staying(WHO).gains(PAIRS, CUT, rows) - PAIRS.gains) > 0.0).tolist() == [
+    assert ((PriorLinks(WHO).gains(PAIRS, CUT, rows) - PAIRS.gains) > 0.0).tolist() == [
         True, True, True, False, False
     ]  # fmt: skip
     nothing = Pairs(EARLIER[:0], LATER[:0], LATER[:0], np.zeros(0))
-    assert len(Staying(WHO).gains(nothing, CUT, rows)) == 0
+    assert len(PriorLinks(WHO).gains(nothing, CUT, rows)) == 0

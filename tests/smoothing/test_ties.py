@@ -9,12 +9,12 @@ import pytest
 from numpy import ndarray
 
 from tests.smoothing.test_joining import worth_of
-from tracker.smoothing.identity.constraints import Said, Ties, possible
-from tracker.smoothing.identity.joining import chains, join
+from tracker.smoothing.identity.association import chains, join
+from tracker.smoothing.identity.constraints import Constraint, LinkConstraints, possible
 
 
-def obeys(following: tuple[int, ...], used: tuple[bool, ...], ties: Ties) -> bool:
-    """Whether chains are as ties want them."""
+def obeys(following: tuple[int, ...], used: tuple[bool, ...], constraints: LinkConstraints) -> bool:
+    """Whether chains are as constraints want them."""
     of = {
         piece: number
         for number, chain in enumerate(chains(np.array(following), np.array(used)))
@@ -22,21 +22,21 @@ def obeys(following: tuple[int, ...], used: tuple[bool, ...], ties: Ties) -> boo
     }
     followed = {j for j in following if j >= 0}
     direct = {(i, j) for i, j in enumerate(following) if j >= 0}
-    tied = set(ties.together)
+    tied = set(constraints.must_link)
     return (
-        all(i in of and of[i] == of.get(j) for i, j in ties.together)
-        and all(of.get(i, -1) != of.get(j, -2) for i, j in ties.apart)
-        and all(piece in of for piece in ties.somebody)
-        and not any(piece in of for piece in ties.nobody)
+        all(i in of and of[i] == of.get(j) for i, j in constraints.must_link)
+        and all(of.get(i, -1) != of.get(j, -2) for i, j in constraints.cannot_link)
+        and all(piece in of for piece in constraints.targets)
+        and not any(piece in of for piece in constraints.clutter)
         and all(
             p not in followed or any((i, p) in tied for i, j in direct if j == p)
-            for p in ties.firsts
+            for p in constraints.firsts
         )
-        and all(following[p] < 0 or (p, following[p]) in tied for p in ties.lasts)
+        and all(following[p] < 0 or (p, following[p]) in tied for p in constraints.lasts)
     )
 
 
-def drawn_ties(rng: np.random.Generator, count: int) -> Ties:
+def drawn_ties(rng: np.random.Generator, count: int) -> LinkConstraints:
     """Some that can be obeyed: pieces begin one after another."""
     firsts = np.arange(count) * 10
     lasts = firsts + rng.integers(1, 9, count)
@@ -46,7 +46,7 @@ def drawn_ties(rng: np.random.Generator, count: int) -> Ties:
         return [(pair[0], pair[1])] if rng.random() < 0.6 else []
 
     told = [
-        Said(
+        Constraint(
             pairs(),
             pairs(),
             {int(rng.integers(count))} if rng.random() < 0.2 else set(),
@@ -72,13 +72,13 @@ def test_the_best_of_all_ways_that_obey(seed: int) -> None:
     gain: ndarray = np.where(
         np.triu(rng.random((count, count)) < 0.8, 1), rng.normal(-3.0, 5.0, (count, count)), -np.inf
     )
-    ties = drawn_ties(rng, count)
+    constraints = drawn_ties(rng, count)
     earlier, later = np.nonzero(np.isfinite(gain))
     following, used = join(
         numbers["worths"], numbers["births"], numbers["deaths"], earlier, later,
-        gain[earlier, later], ties,
+        gain[earlier, later], constraints,
     )  # fmt: skip
-    for i, j in ties.together:  # what no pair connects may be, with no odds of its own
+    for i, j in constraints.must_link:  # what no pair connects may be, with no odds of its own
         if not np.isfinite(gain[i, j]):
             gain[i, j] = numbers["deaths"][i] + numbers["births"][j]
     best = max(
@@ -87,17 +87,17 @@ def test_the_best_of_all_ways_that_obey(seed: int) -> None:
         for there in itertools.product((False, True), repeat=count)
         if len({j for j in one if j >= 0}) == sum(j >= 0 for j in one)
         and all(there[i] and there[j] for i, j in enumerate(one) if j >= 0)
-        and obeys(one, there, ties)
+        and obeys(one, there, constraints)
     )
-    assert obeys(tuple(following.tolist()), tuple(used.tolist()), ties)
+    assert obeys(tuple(following.tolist()), tuple(used.tolist()), constraints)
     found = worth_of(tuple(following.tolist()), tuple(used.tolist()), numbers, gain)
     assert found == pytest.approx(best, abs=1e-6)
 
 
 def test_the_earlier_of_two_that_cannot_both_be_counts() -> None:
     firsts, lasts = np.array([0, 5, 20]), np.array([10, 15, 30])
-    ties = possible(firsts, lasts, [Said([(0, 2)]), Said([(1, 2)])])
-    assert ties == Ties(((0, 2),), somebody=frozenset({0, 2}))
-    assert possible(firsts, lasts, [Said([(0, 2), (1, 2)])], strict=True) is None
-    parted = possible(firsts, lasts, [Said(apart=[(0, 2)]), Said([(0, 2)])])
-    assert parted == Ties(apart=((0, 2),))
+    constraints = possible(firsts, lasts, [Constraint([(0, 2)]), Constraint([(1, 2)])])
+    assert constraints == LinkConstraints(((0, 2),), targets=frozenset({0, 2}))
+    assert possible(firsts, lasts, [Constraint([(0, 2), (1, 2)])], strict=True) is None
+    parted = possible(firsts, lasts, [Constraint(cannot_link=[(0, 2)]), Constraint([(0, 2)])])
+    assert parted == LinkConstraints(cannot_link=((0, 2),))

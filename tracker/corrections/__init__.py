@@ -1,8 +1,8 @@
-"""What a person put right: corrections as evidence that every run of a recording obeys.
+"""Corrections by a user, as evidence that every run of a recording takes into account.
 
-A correction says something of the world, by step and place, and nothing of one run's numbers:
-so it holds for any other run, after any change of values or method. See
-:mod:`tracker.corrections.kinds` for what there is, :mod:`tracker.corrections.log` for the file.
+A correction is a statement about the world, by step and place, and does not refer to the ids of
+a run: so it applies to any other run, after any change of parameters or method. See
+:mod:`tracker.corrections.kinds` for the kinds, :mod:`tracker.corrections.log` for the file.
 """
 
 from tracker.corrections.kinds import Correction, CorrectionError, Kind, Place

@@ -1,4 +1,4 @@
-"""Corrections that cannot both be true are refused when they are made."""
+"""Contradictions between corrections, which are refused when the later one is made."""
 
 from __future__ import annotations
 
@@ -9,21 +9,26 @@ import numpy as np
 from tracker.corrections.kinds import Correction, CorrectionError, Place
 
 NEAR = 0.3
-"""Metres on the ground within which two places of one step are one person's."""
+"""Distance on the ground within which two places of one step are of one person, metres."""
 
 APART = 2.0
-"""Metres on the ground from which two places of one step are two people's for sure."""
+"""Distance on the ground from which two places of one step are of two people, metres."""
 
 
 def refuse_contradiction(before: Many[Correction], new: Correction) -> None:
-    """Say so where a correction cannot be true together with those before.
+    """Refuse a correction that cannot be true together with those before.
 
-    Two places of one step within :data:`NEAR` are one person's. People that *same* and *exchanged*
-    tie together must not be parted by *different* and must not be in two places at once; and
-    nobody is where somebody is. Who left may come back.
+    Two places of one step within :data:`NEAR` are of one person. Places that *same* and
+    *exchanged* attribute to one person must not be attributed to two by *different*, and must not
+    be apart at one step; and no target may be where *nobody* states that none is. A person who
+    left may return.
+
+    Args:
+        before: The corrections so far.
+        new: The correction to add; one of the same id among those before is left out.
 
     Raises:
-        CorrectionError: With both of them in the sentence.
+        CorrectionError: If there is a contradiction; the message names both corrections.
     """
     known = [one for one in before if one.id != new.id]
     try:
@@ -37,13 +42,13 @@ def refuse_contradiction(before: Many[Correction], new: Correction) -> None:
 
 
 def refuse_two_names(first: Many[Correction], second: Many[Correction]) -> None:
-    """Say so where two logs call one person by two names; within a log the later name counts.
+    """Refuse two logs that give one person two names; within a log the later name holds.
 
-    One person's are places within :data:`NEAR` at one step, and those that *same* and *exchanged*
-    of either log tie together. Whom they name elsewhere is seen by a run alone.
+    Places are of one person within :data:`NEAR` at one step, and where *same* and *exchanged* of
+    either log attribute them so. Other identities are known only after a run.
 
     Raises:
-        CorrectionError: With both of them in the sentence.
+        CorrectionError: If a person has two names; the message names both corrections.
     """
     people = _People.tied((*first, *second))
     numbers = [[(people.of(one.places[0], one), one) for one in log if one.kind == "name"]
@@ -61,11 +66,15 @@ def refuse_two_names(first: Many[Correction], second: Many[Correction]) -> None:
 def find_repeated(
     before: Many[Correction], new: Correction
 ) -> tuple[Correction | None, Correction]:
-    """Whoever is moved again at a step is where it was said last.
+    """Find the *is here* correction that a new one of the same track and step replaces.
+
+    Args:
+        before: The corrections so far.
+        new: The new correction.
 
     Returns:
-        The *is here* among those before that put whom the new one means where it finds him; and the
-        new one, which means him by where he was before any of both.
+        The correction that is replaced, None for none; and the new one, which then refers to
+        the track by its place before either of the two.
     """
     if new.kind != "here" or len(new.places) < 2:
         return None, new
@@ -85,7 +94,7 @@ class _Contradiction(Exception):
 
 
 class _People:
-    """Places that are one person's, tied together: union-find."""
+    """Places grouped by person, in a union-find structure."""
 
     def __init__(self) -> None:
         self.places: list[tuple[Place, Correction]] = []
@@ -93,7 +102,7 @@ class _People:
 
     @classmethod
     def tied(cls, corrections: Many[Correction]) -> _People:
-        """As corrections tie them together."""
+        """Group the places of corrections by their pairs of one person."""
         people = cls()
         for one in corrections:
             for earlier, later in one.pairs:
@@ -101,7 +110,7 @@ class _People:
         return people
 
     def of(self, place: Place, correction: Correction) -> int:
-        """The number of a place; that of one near it at its step where there is one."""
+        """The index of a place, or of one within :data:`NEAR` at its step; a new one is added."""
         for number, (other, _) in enumerate(self.places):
             if other.step == place.step and _distance(other, place) <= NEAR:
                 return number
@@ -110,13 +119,13 @@ class _People:
         return len(self.places) - 1
 
     def root(self, number: int) -> int:
-        """Whom a place stands for."""
+        """The index that represents the group of a place."""
         while self._parents[number] != number:
             number = self._parents[number]
         return number
 
     def tie(self, one: int, other: int) -> None:
-        """They are one person's."""
+        """Unite the groups of two places."""
         self._parents[self.root(one)] = self.root(other)
 
 
@@ -183,7 +192,7 @@ def _check_empty(one: Correction, corrections: list[Correction]) -> None:
 
 
 def along(places: Many[Place], step: int) -> tuple[float, float] | None:
-    """Where the way through places, straight in between, is at a step; None before and after."""
+    """Interpolate places linearly at a step: (x, y) in world metres, None before and after them."""
     if not places[0].step <= step <= places[-1].step:
         return None
     steps = [place.step for place in places]

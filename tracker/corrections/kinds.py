@@ -1,4 +1,4 @@
-"""The kinds of corrections, and what each must say."""
+"""The kinds of corrections, and the fields that each must have."""
 
 from __future__ import annotations
 
@@ -19,53 +19,57 @@ Kind = Literal[
 ]
 
 REACH = 1.0
-"""Metres on the ground within which the nearest person is the one that a place means."""
+"""Distance on the ground within which a place refers to the nearest track, metres."""
 
 
 LEEWAY = 1.0
-"""Seconds within which somebody counts as meant who is not there at the very step."""
+"""Time by which a track may miss the step of a place that refers to it, seconds."""
 
 
 def leeway(step_time: float) -> int:
-    """:data:`LEEWAY` in steps."""
+    """:data:`LEEWAY` as a number of steps of ``step_time`` seconds, at least 1."""
     return max(round(LEEWAY / step_time), 1)
 
 
 class CorrectionError(ValueError):
-    """A correction, or a log of them, is not as it must be."""
+    """A correction or a log of corrections is invalid."""
 
 
 class Place(NamedTuple):
-    """Where somebody is meant."""
+    """A position at a step, by which a correction refers to a track."""
 
     step: int
+    """Index of the step, from 0."""
     x: float
+    """World metres."""
     y: float
+    """World metres."""
     z: float
-    """World metres, the middle of the target."""
+    """Height of the centre of the target, world metres."""
 
     @property
     def point(self) -> Float[ndarray, " 3"]:
-        """World metres."""
+        """The position, world metres."""
         return np.array(self[1:])
 
     @property
     def words(self) -> str:
-        """As a sentence names it."""
+        """The place as messages name it."""
         return f"({self.x:.2f}, {self.y:.2f}) at step {self.step}"
 
 
 @dataclass(frozen=True, slots=True)
 class KindOf:
-    """What a kind of correction means and has."""
+    """The meaning and the fields of a kind of correction."""
 
     word: str
-    """As a person reads it."""
+    """Name of the kind as the page shows it."""
     places: tuple[int, int | None]
-    """The fewest and the most; None for any number."""
+    """Smallest and largest number of places; None for any number."""
     means: str
+    """Meaning of the kind, as the manual shows it."""
     accuracy: float | None = None
-    """Metres, where it has one and none is said."""
+    """Default accuracy, metres; None for a kind without one."""
 
 
 KINDS: dict[Kind, KindOf] = {
@@ -94,11 +98,11 @@ KINDS: dict[Kind, KindOf] = {
     "name": KindOf("name", (1, 1), "who is at this place has this name"),
     "checked": KindOf("checked", (0, 0), "a person has looked at these steps: they are right"),
 }
-"""By name. Places of one correction go forward in time."""
+"""The kinds by name. The places of a correction are in the order of time."""
 
 
 class Correction(BaseModel):
-    """One thing that a person said."""
+    """One correction by a user."""
 
     model_config = ConfigDict(
         frozen=True, extra="forbid", use_attribute_docstrings=True, allow_inf_nan=False
@@ -106,21 +110,22 @@ class Correction(BaseModel):
 
     kind: Kind
     id: str = Field(default="", max_length=40, pattern=r"^[A-Za-z0-9_-]*$")
-    """By which a log that was copied knows it again; made of its content where none is given."""
+    """Identifier, by which copies of a log are compared; a hash of the content by default."""
     time: datetime = Field(default_factory=lambda: datetime.now(UTC).replace(microsecond=0))
-    """When it was said."""
+    """Time at which the correction was made."""
     note: str = Field(default="", max_length=1000)
+    """Free text of the user."""
     places: tuple[Place, ...] = ()
     """Each ``[step, x, y, z]``: a step from 0 on, and world metres."""
     accuracy: Annotated[float, Field(ge=0.01, le=5.0)] | None = None
-    """Metres. Of *here* the standard deviation of the place; of *nobody* how far around its
-    places nobody is."""
+    """Metres. For *here* the standard deviation of the place; for *nobody* the radius around its
+    places in which nobody is."""
     name: str | None = Field(default=None, min_length=1, max_length=80)
-    """Of *name*."""
+    """Name of the person, for *name*."""
     first: int | None = Field(default=None, ge=0)
-    """Of *checked*: the first step."""
+    """First step, for *checked*."""
     last: int | None = Field(default=None, ge=0)
-    """Of *checked*: the last step, included."""
+    """Last step, included, for *checked*."""
 
     @model_validator(mode="before")
     @classmethod
@@ -175,7 +180,7 @@ class Correction(BaseModel):
 
     @property
     def steps(self) -> tuple[int, int]:
-        """The first and the last step that it speaks of."""
+        """The first and the last step that the correction refers to."""
         if self.kind == "checked":
             return self.first or 0, self.last or 0
         steps = [place.step for place in self.places]
@@ -183,7 +188,7 @@ class Correction(BaseModel):
 
     @property
     def pairs(self) -> tuple[tuple[Place, Place], ...]:
-        """Pairs of places that are one person's, the earlier first."""
+        """Pairs of places of one person, the earlier first."""
         if self.kind == "same":
             return ((self.places[0], self.places[1]),)
         if self.kind == "exchanged":
@@ -193,7 +198,7 @@ class Correction(BaseModel):
 
     @property
     def apart(self) -> tuple[tuple[Place, Place], ...]:
-        """Pairs of places that are two people's, the earlier first."""
+        """Pairs of places of two people, the earlier first."""
         if self.kind == "different":
             return ((self.places[0], self.places[1]),)
         if self.kind == "exchanged":
@@ -203,7 +208,7 @@ class Correction(BaseModel):
 
     @property
     def words(self) -> str:
-        """What it says, in a few words."""
+        """The correction in a few words."""
         first, last = self.steps
         span = f"step {first}" if first == last else f"steps {first} – {last}"
         if self.kind == "checked":
@@ -218,16 +223,16 @@ _ONLY = {
 }  # fmt: skip
 
 IN_THE_FUSION: tuple[Kind, ...] = ("here", "nobody")
-"""The kinds that the filter itself obeys; the others say who is who, afterwards."""
+"""The kinds that the fusion filter takes into account; the others are about identity."""
 
 OF_PEOPLE: tuple[Kind, ...] = (
     "same", "different", "exchanged", "here", "nobody", "came", "left", "name",
 )  # fmt: skip
-"""The kinds that say something of people, and may be met or not."""
+"""The kinds about people, which a run may meet or not."""
 
 
 def _rounded(places: Any) -> Any:
-    """As the log writes them, so that a log that is read again gives the same run."""
+    """Round places as the log writes them, so that a log that is read again gives the same run."""
     if not isinstance(places, list | tuple):
         return places
     return tuple(
@@ -244,10 +249,10 @@ def _id_of(values: dict[str, Any]) -> str:
 
 
 def make(**values: Any) -> Correction:
-    """A correction of these values.
+    """Make a correction from the values of its fields.
 
     Raises:
-        CorrectionError: In one sentence: field, expected, found.
+        CorrectionError: If a value is invalid; the message has field, expected and found value.
     """
     try:
         return Correction.model_validate(values)
@@ -256,7 +261,7 @@ def make(**values: Any) -> Correction:
 
 
 def sentence_of(error: ValidationError) -> str:
-    """The first thing that is wrong: field, expected and found."""
+    """The message of the first error: field, expected and found value."""
     first = error.errors()[0]
     place = ".".join(str(part) for part in first["loc"])
     message = first["msg"].removeprefix("Value error, ")
@@ -266,19 +271,19 @@ def sentence_of(error: ValidationError) -> str:
 
 
 def digest(corrections: Iterable[Correction], kinds: Iterable[Kind]) -> str:
-    """A hash of what corrections of some kinds say, in their order; empty where there is none.
+    """Hash the corrections of some kinds, in their order; empty where there is none.
 
-    Note, time and id say nothing to a run.
+    Note, time and id are left out, for they have no effect on a run.
     """
     chosen = set(kinds)
-    told = [_content(one) for one in corrections if one.kind in chosen]
-    if not told:
+    contents = [_content(one) for one in corrections if one.kind in chosen]
+    if not contents:
         return ""
-    return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()[:16]
+    return hashlib.sha256(json.dumps(contents, sort_keys=True).encode()).hexdigest()[:16]
 
 
 def content_of(correction: Correction) -> str:
-    """What it says, whoever said it when: the same for two that say the same."""
+    """The content of a correction as text, without note, time and id."""
     return json.dumps(_content(correction), sort_keys=True)
 
 

@@ -1,7 +1,7 @@
-"""The log of corrections, ``corrections.toml``: read, written whole or not at all, found.
+"""The log of corrections, ``corrections.toml``: its place, its reading and its atomic writing.
 
-It lies beside ``sequence.toml``; where that folder may only be read, or is the program's own, in
-the user's settings.
+The file lies beside ``sequence.toml``; for a folder that is read-only or part of the program it
+lies in the user's settings.
 """
 
 from __future__ import annotations
@@ -34,20 +34,21 @@ _MOST_BYTES = 32 << 20
 
 @dataclass(frozen=True, slots=True)
 class Log:
-    """What a log says."""
+    """A log that was read."""
 
     path: Path
+    """The file."""
     corrections: tuple[Correction, ...] = ()
-    """In their order."""
+    """The corrections in the order of the file."""
     problem: str | None = None
-    """Why it cannot be used, with its line; None where it can."""
+    """Why the log cannot be used, with the line; None where it can."""
 
 
 def place_of(folder: Path) -> Path:
-    """Where the log of a recording lies or would be written.
+    """The path of the log of a recording, whether it exists or not.
 
     Args:
-        folder: Of the recording.
+        folder: Folder of the recording.
     """
     beside = folder / FILE
     if opens_by_name(folder):
@@ -57,12 +58,12 @@ def place_of(folder: Path) -> Path:
     if os.access(beside if beside.exists() else folder, os.W_OK):
         return beside
     own = own_place(folder)
-    # what came with a recording that may only be read counts until something is added to it
+    # the log beside a read-only recording is used until a correction is added
     return own if own.exists() or not beside.exists() else beside
 
 
 def _leads_out(beside: Path) -> bool:
-    """Whether the log of a recording is a link, which its reader and writer must not follow."""
+    """Whether the log is a link out of its folder, which must not be followed."""
     try:
         return beside.is_symlink() and not beside.resolve().is_relative_to(beside.parent.resolve())
     except (OSError, RuntimeError):  # a circle of links
@@ -70,7 +71,7 @@ def _leads_out(beside: Path) -> bool:
 
 
 def own_place(folder: Path) -> Path:
-    """Where the log of a recording lies that may only be read: in the user's settings."""
+    """The path of the log of a read-only recording, in the user's settings."""
     return _kept_as(key_of(folder))
 
 
@@ -79,14 +80,14 @@ def _kept_as(key: str) -> Path:
 
 
 def _earlier_if_alone(folder: Path) -> Path:
-    """The log of a built-in sequence as it was rendered before counts until something is added."""
+    """The log of a built-in sequence: that of an earlier rendering until a correction is added."""
     own, key = own_place(folder), earlier_key(folder)
     earlier = own if key is None else _kept_as(key)
     return earlier if earlier.exists() and not own.exists() else own
 
 
 def remark_on(folder: Path) -> str | None:
-    """What must be said of a recording's log: that it is of an earlier rendering; else None."""
+    """The remark that a recording's log is of an earlier rendering; None where it is not."""
     earlier = earlier_key(folder)
     if earlier is None or place_of(folder) != _kept_as(earlier):
         return None
@@ -94,7 +95,7 @@ def remark_on(folder: Path) -> str | None:
 
 
 def writing_place(folder: Path) -> Path:
-    """Where the log of a recording is written."""
+    """The path to which the log of a recording is written."""
     if opens_by_name(folder):
         return own_place(folder)
     found = place_of(folder)
@@ -104,10 +105,11 @@ def writing_place(folder: Path) -> Path:
 
 
 def read_log(path: Path) -> tuple[Correction, ...]:
-    """The corrections of a file, in its order; none where there is no file.
+    """Read the corrections of a file, in its order; none where there is no file.
 
     Raises:
-        CorrectionError: In one sentence: file, line, field, expected, found.
+        CorrectionError: If the file is invalid; the message has file, line, field, expected and
+            found value.
     """
     try:
         if not path.exists():
@@ -131,7 +133,7 @@ def read_log(path: Path) -> tuple[Correction, ...]:
 
 
 def open_log(folder: Path) -> Log:
-    """The log of a recording; one that cannot be used says so, and the recording stays usable."""
+    """Read the log of a recording; for an invalid one the result has the problem instead."""
     path = place_of(folder)
     try:
         return Log(path, read_log(path))
@@ -140,14 +142,15 @@ def open_log(folder: Path) -> Log:
 
 
 def parse(text: str, where: str) -> tuple[Correction, ...]:
-    """The corrections of a log.
+    """Parse the corrections of a log.
 
     Args:
-        text: TOML.
-        where: The file, as the messages begin.
+        text: The log as TOML.
+        where: The name of the file, with which messages begin.
 
     Raises:
-        CorrectionError: In one sentence: file, line, field, expected, found.
+        CorrectionError: If the text is invalid; the message has file, line, field, expected and
+            found value.
     """
     try:
         values = tomllib.loads(text)
@@ -199,7 +202,7 @@ def _correction(table: dict[str, Any], text: str, where: str, line: int) -> Corr
             f"{table['kind']!r}"
         )
     try:
-        # as a file that somebody wrote says it, a day or a time alone is none
+        # the types of TOML are checked, and a date or a time alone is not converted
         return Correction.model_validate(table)
     except ValidationError as error:
         first = error.errors()[0]
@@ -210,7 +213,7 @@ def _correction(table: dict[str, Any], text: str, where: str, line: int) -> Corr
 
 
 def _line_of(text: str, field: str, first: int = 1) -> int:
-    """The line on which a field stands, from its table's header on; else that of the header."""
+    """The line of a field after the header of its table at ``first``; else that of the header."""
     begins = re.compile(rf'^\s*(\[+\s*)?"?{re.escape(field)}"?\s*([=\].])')
     for number, line in enumerate(text.splitlines()[first - 1 :], first):
         if number > first and _HEADER.match(line):
@@ -221,7 +224,7 @@ def _line_of(text: str, field: str, first: int = 1) -> int:
 
 
 def dump(corrections: Iterable[Correction]) -> str:
-    """The log as text."""
+    """Format corrections as the text of a log."""
     import tomlkit
 
     document = tomlkit.document()
@@ -265,10 +268,10 @@ def _places(one: Correction) -> Any:
 
 
 def write_log(path: Path, corrections: Iterable[Correction]) -> None:
-    """Write a log: wholly or not at all, whatever interrupts it.
+    """Write a log atomically.
 
     Raises:
-        OSError: With a sentence, if it cannot be written; what was there still is.
+        OSError: If it cannot be written; the file before is then unchanged.
     """
     text = dump(corrections)
     path.parent.mkdir(parents=True, exist_ok=True)

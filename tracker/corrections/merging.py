@@ -1,4 +1,4 @@
-"""Two logs of one recording: what differs, and both as one."""
+"""Comparison and merging of two logs of one recording."""
 
 from __future__ import annotations
 
@@ -11,21 +11,23 @@ from tracker.corrections.kinds import Correction, CorrectionError, content_of
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """What one log says and the other does not."""
+    """The difference of two logs."""
 
     only_first: tuple[Correction, ...]
+    """Corrections of the first log alone, by id."""
     only_second: tuple[Correction, ...]
+    """Corrections of the second log alone, by id."""
     changed: tuple[tuple[Correction, Correction], ...]
-    """Known by their id in both, with other content."""
+    """Corrections with the same id and different content."""
 
     @property
     def empty(self) -> bool:
-        """Whether both say the same."""
+        """Whether both logs have the same corrections."""
         return not (self.only_first or self.only_second or self.changed)
 
 
 def difference(first: Many[Correction], second: Many[Correction]) -> Difference:
-    """What differs, each in the order of its own log."""
+    """Compare two logs; each list is in the order of its log."""
     ones, others = {one.id: one for one in first}, {one.id: one for one in second}
     return Difference(
         tuple(one for one in first if one.id not in others),
@@ -35,23 +37,25 @@ def difference(first: Many[Correction], second: Many[Correction]) -> Difference:
 
 
 def merge(first: Many[Correction], second: Many[Correction]) -> tuple[Correction, ...]:
-    """All of both, in the order of their times; what both say counts once, as it was said first.
+    """Merge two logs in the order of time; of corrections with equal content the first remains.
 
     Raises:
-        CorrectionError: If one says another thing under the same id, contradicts one, or gives
-            another name to somebody.
+        CorrectionError: If two corrections have the same id and different content, contradict
+            each other, or give one person two names.
     """
-    told = difference(first, second)
-    if told.changed:
-        one, other = told.changed[0]
+    differing = difference(first, second)
+    if differing.changed:
+        one, other = differing.changed[0]
         raise CorrectionError(
             f'correction {one.id}: expected the same in both logs, found "{one.words}" and '
             f'"{other.words}"; give one of them another id'
         )
     refuse_two_names(first, second)
-    again = {content_of(one) for one in told.only_first}
-    again &= {content_of(one) for one in told.only_second}
-    everything = sorted((*first, *told.only_second), key=lambda one: (one.time.timestamp(), one.id))
+    again = {content_of(one) for one in differing.only_first}
+    again &= {content_of(one) for one in differing.only_second}
+    everything = sorted(
+        (*first, *differing.only_second), key=lambda one: (one.time.timestamp(), one.id)
+    )
     merged: list[Correction] = []
     there: set[str] = set()
     for one in everything:

@@ -1,4 +1,4 @@
-"""Whether a run meets its corrections, and where it does not, why."""
+"""Outcomes of corrections in a run: whether each is met, and which rows depend on it."""
 
 from __future__ import annotations
 
@@ -10,37 +10,38 @@ from jaxtyping import Float, Int
 from numpy import ndarray
 
 from tracker.corrections.kinds import Correction, Place
-from tracker.corrections.seeking import Whereabouts, mostly_inside
+from tracker.corrections.lookup import TrackIndex, mostly_inside
 
 _GATE = 3.0
-"""Standard deviations of a stated place within which somebody is at it."""
+"""Distance within which a track is at the place of a correction, in its standard deviations."""
 
 
 _WHO = ("same", "different", "exchanged")
-"""The kinds that say who is who, and may stand against another sentence."""
+"""The kinds about identity, which may contradict an unmet correction."""
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What became of one correction in one run."""
+    """The outcome of one correction in one run."""
 
     id: str
-    """Of the correction."""
+    """Identifier of the correction."""
     met: bool
+    """Whether the tracks meet the correction."""
     why: str = ""
-    """Where it is not: in one sentence."""
+    """Why it is not met, in one sentence; empty where it is."""
     tracks: tuple[int, ...] = ()
-    """The ids of whom it means, in the order of its places; as far as they are found."""
+    """Ids of the tracks that it refers to, in the order of its places; empty if one is missing."""
 
 
-class _Nobody(Exception):
-    """A correction no longer finds its people."""
+class _NotFound(Exception):
+    """A place of a correction refers to no track."""
 
 
 class _Tracks:
     def __init__(self, frames: ndarray, ids: ndarray, positions: ndarray, leeway: int) -> None:
         self.frames, self.ids, self.leeway = frames, ids, leeway
-        self.whereabouts = Whereabouts(frames, positions, ids)
+        self.whereabouts = TrackIndex(frames, positions, ids)
         self.positions = positions
 
     def who(self, place: Place) -> int:
@@ -50,7 +51,7 @@ class _Tracks:
     def row(self, place: Place) -> int:
         row = self.whereabouts.nearest(place, leeway=self.leeway)
         if row is None:
-            raise _Nobody(f"found nobody near {place.words}")
+            raise _NotFound(f"found nobody near {place.words}")
         return row
 
 
@@ -62,23 +63,23 @@ def outcomes(
     *,
     leeway: int,
 ) -> tuple[Outcome, ...]:
-    """What became of each correction in a run's tracks.
+    """Determine the outcome of each correction in the tracks of a run.
 
     Args:
-        frames: The step of each row.
-        ids: The track of each.
-        positions: World metres.
-        corrections: Those of the run.
-        leeway: Steps within which somebody counts as meant who is not there at the very step, and
-            within which who came or left is not there.
+        frames: Step of each of N rows.
+        ids: Track of each row.
+        positions: Position of each row, world metres.
+        corrections: The corrections of the run.
+        leeway: Number of steps by which a track may miss the step of a place, and by which it may
+            begin before *came* or end after *left*.
     """
     tracks = _Tracks(frames, ids, positions, leeway)
     found = []
     for one in corrections:
         try:
             who, why = _looked(tracks, one)
-        except _Nobody as nobody:
-            found.append(Outcome(one.id, False, str(nobody)))
+        except _NotFound as error:
+            found.append(Outcome(one.id, False, str(error)))
         else:
             found.append(Outcome(one.id, not why, why, who))
     both = list(zip(corrections, found, strict=True))
@@ -87,8 +88,13 @@ def outcomes(
 
 
 def _against(own: Correction, unmet: Outcome, holds: Many[tuple[Correction, Outcome]]) -> Outcome:
-    """With the sentence that stands against one that is not met: the last that holds of the same
-    people and steps."""
+    """Add to an unmet outcome the last met correction about the same tracks and steps.
+
+    Args:
+        own: The unmet correction.
+        unmet: Its outcome.
+        holds: Met corrections of identity and their outcomes.
+    """
     if own.kind == "here":
         return unmet
     first, last = own.steps
@@ -100,7 +106,7 @@ def _against(own: Correction, unmet: Outcome, holds: Many[tuple[Correction, Outc
 
 
 def _looked(tracks: _Tracks, one: Correction) -> tuple[tuple[int, ...], str]:
-    """Whom it means, and why it is not met; empty where it is."""
+    """The tracks that a correction refers to, and why it is not met; empty where it is."""
     if one.kind == "checked":
         return (), ""
     if one.kind == "nobody":
@@ -122,7 +128,7 @@ def _looked(tracks: _Tracks, one: Correction) -> tuple[tuple[int, ...], str]:
         row = tracks.row(one.places[0])
         before = one.kind == "came"
         step = one.places[0].step + (-1 if before else 1) * (tracks.leeway + 1)
-        # Who is there at the recording's very end, or from its beginning on, has not left or come.
+        # a track up to the end of the recording, or from its beginning, has not left or come
         step = min(max(step, 0), int(tracks.frames.max()))
         own = tracks.frames[tracks.ids == who[0]]
         between = own[(own - step) * (own - tracks.frames[row]) <= 0]
@@ -147,9 +153,10 @@ def _here(tracks: _Tracks, one: Correction) -> tuple[tuple[int, ...], str]:
 
 
 def names_by_track(outcomes: Many[Outcome], corrections: Many[Correction]) -> dict[int, str]:
-    """The names that people were given, by track; of two for one track the later.
+    """The names of tracks by their ids; the later of two names of one track.
 
-    Outcomes of corrections that are not among these, as of one that was just dropped, name nobody.
+    Outcomes of corrections that are not among ``corrections``, such as one just undone, are left
+    out.
     """
     names = {one.id: one.name for one in corrections}
     return {
@@ -157,3 +164,54 @@ def names_by_track(outcomes: Many[Outcome], corrections: Many[Correction]) -> di
         for outcome in outcomes
         if outcome.met and (name := names.get(outcome.id)) is not None
     }
+
+
+def supporting_corrections(
+    frames: Int[ndarray, " N"],
+    ids: Int[ndarray, " N"],
+    positions: Float[ndarray, "N 3"],
+    corrections: Many[Correction],
+    found_outcomes: Many[Outcome],
+) -> list[str]:
+    """The id of the correction that each row of tracks depends on, empty for none.
+
+    The identity of a track depends on a correction of identity from the later place on, up to the
+    next correction; where the track has a gap before that place, from the end of the gap. A row
+    at the place of *is here* depends on that correction. Unmet corrections are left out.
+
+    Args:
+        frames: Step of each of N rows.
+        ids: Track of each row.
+        positions: Position of each row, world metres.
+        corrections: The corrections in the order in which they were made.
+        found_outcomes: Their outcomes in these tracks.
+    """
+    by_id = {one.id: one for one in corrections}
+    found = [""] * len(frames)
+    begins: list[tuple[int, int, str]] = []
+    for outcome in found_outcomes:
+        one = by_id.get(outcome.id)
+        if one is None or not outcome.met:
+            continue
+        if one.kind == "here":
+            own = np.flatnonzero((frames == one.places[0].step) & (ids == outcome.tracks[0]))
+            for row in own.tolist():
+                found[row] = one.id
+        later = {"same": 1, "different": 1, "exchanged": 2}.get(one.kind)
+        if later is not None:
+            pairs = zip(one.places, one.places[later:], outcome.tracks[later:], strict=False)
+            for earlier, place, track in pairs:
+                between = (ids == track) & (frames > earlier.step) & (frames <= place.step)
+                begins.append((track, _back(frames[between], place.step), one.id))
+    begins.sort(key=lambda begin: begin[1])
+    for track, step, name in begins:
+        for row in np.flatnonzero((ids == track) & (frames >= step)).tolist():
+            found[row] = name
+    return found
+
+
+def _back(own: Int[ndarray, " K"], step: int) -> int:
+    """The first step after the last gap among some steps; ``step`` where there is no gap."""
+    own = np.unique(own)
+    gaps = np.flatnonzero(np.diff(own) > 1)
+    return int(own[gaps[-1] + 1]) if len(gaps) else step

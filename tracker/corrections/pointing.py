@@ -1,4 +1,4 @@
-"""A click in a picture as a place in the room."""
+"""Conversion of clicks in images to positions in the room."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from tracker.corrections.kinds import CorrectionError
 from tracker.geometry.camera import Camera
 
 _FLAT = 0.02
-"""Sine of the angle to the floor below which a ray says nothing of how far away somebody is."""
+"""Sine of the angle between a ray and the floor below which the distance is undetermined."""
 
 _MISS = 0.5
-"""Metres by which the rays of two clicks on one person may miss each other."""
+"""Largest distance between the rays of two clicks on one person, metres."""
 
 
 _OFF_FLOOR = 0.3
-"""Metres, of a person's height: what is nearer to the floor than this stands on it."""
+"""Height below which a target of a person's size stands on the floor, metres."""
 
 
 def ground_under(feet: float | None, *, floor: float, half_height: float) -> float:
-    """The height of what a target stands on: the floor, or the air below somebody's head.
+    """The height at which the lower end of a target is: the floor, or above it for heads.
 
     Args:
-        feet: Where the target's lower end was found, world metres; None if it was not.
+        feet: Estimated height of the target's lower end, world metres; None if unknown.
         floor: Height of the floor, world metres.
-        half_height: Of the target, metres.
+        half_height: Half height of the target, metres.
     """
     if feet is None or abs(feet - floor) <= _near_floor(half_height):
         return floor
@@ -36,26 +36,32 @@ def ground_under(feet: float | None, *, floor: float, half_height: float) -> flo
 
 
 def stands(height: float, *, ground: float, half_height: float) -> bool:
-    """Whether a point at a height is one of a target that stands on a ground."""
+    """Whether a point at a height may lie on a target whose lower end is at ``ground``.
+
+    Args:
+        height: Height of the point, world metres.
+        ground: Height of the target's lower end, world metres.
+        half_height: Half height of the target, metres.
+    """
     margin = _near_floor(half_height)
     return ground - margin <= height <= ground + 2.0 * half_height + margin
 
 
 def _near_floor(half_height: float) -> float:
-    """For a target lower than a person, such as a head, no more than a sixth of it."""
+    """The tolerance of heights, metres: at most a sixth of the target's height."""
     return min(_OFF_FLOOR, half_height / 3.0)
 
 
 def foot_on_floor(
     camera: Camera, pixel: tuple[float, float], *, floor: float, half_height: float
 ) -> Float[ndarray, " 3"]:
-    """The middle of a target whose feet are at a pixel.
+    """The centre of a target whose feet are at a pixel, world metres.
 
     Args:
-        camera: Whose picture.
-        pixel: Where the target meets the floor.
+        camera: The calibrated camera of the image.
+        pixel: Point at which the target meets the floor, pixels.
         floor: Height of the floor, world metres.
-        half_height: Of the target, metres.
+        half_height: Half height of the target, metres.
 
     Raises:
         CorrectionError: If the pixel does not show the floor.
@@ -72,9 +78,12 @@ def foot_on_floor(
 
 
 def triangulated(points: Many[tuple[Camera, tuple[float, float]]]) -> Float[ndarray, " 3"]:
-    """The point nearest to the rays of a pixel in each of two pictures or more.
+    """Triangulate the point nearest to the rays of pixels in two or more images, world metres.
 
     It is the least-squares solution of Σ_c |(I − r_c r_cᵀ)(x − o_c)|², of rays r_c from o_c.
+
+    Args:
+        points: Camera and pixel of each ray.
 
     Raises:
         CorrectionError: If the rays are nearly parallel, or miss each other.
@@ -90,7 +99,7 @@ def triangulated(points: Many[tuple[Camera, tuple[float, float]]]) -> Float[ndar
             "clicks: the two pictures look from the same side; click in another one"
         )
     place: Float[ndarray, " 3"] = np.linalg.solve(total, np.einsum("cij,cj->i", across, centres))
-    # the place lies in the middle, half as far from each of two rays as they are apart
+    # the point lies between two rays, at half their distance from each
     away = np.linalg.norm(np.einsum("cij,cj->ci", across, place - centres), axis=1)
     miss = 2.0 * float(away.max())
     ahead = np.einsum("ci,ci->c", rays, place - centres)

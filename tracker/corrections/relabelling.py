@@ -1,6 +1,6 @@
-"""Corrections in finished tracks, where no stage settles who is who: cut, joined, left out.
+"""Corrections applied to finished tracks by splitting, joining and removing them.
 
-Also what shows at once, while a run that obeys them is computed.
+They are used for methods that do not take corrections, and as a preview while a run is computed.
 """
 
 from __future__ import annotations
@@ -13,16 +13,16 @@ from jaxtyping import Int
 from numpy import ndarray
 
 from tracker.corrections.kinds import Correction, Place
-from tracker.corrections.seeking import Whereabouts, mostly_inside
+from tracker.corrections.lookup import TrackIndex, mostly_inside
 from tracker.geometry.assignment import names_by_majority
 
 
 class _Segments:
-    """Tracks cut into segments, each followed by at most one."""
+    """Tracks split into segments, each followed by at most one other."""
 
     def __init__(self, frames: ndarray, ids: ndarray, positions: ndarray, leeway: int) -> None:
         self.frames, self.positions = frames, positions
-        self.whereabouts = Whereabouts(frames, positions, ids)
+        self.whereabouts = TrackIndex(frames, positions, ids)
         self.leeway = leeway
         order = np.lexsort((frames, ids))
         _names, begins = np.unique(ids[order], return_index=True)
@@ -33,11 +33,11 @@ class _Segments:
             self.of_row[rows] = number
 
     def find(self, place: Place) -> int | None:
-        """The row that is meant."""
+        """The row that a place refers to, None for none."""
         return self.whereabouts.nearest(place, leeway=self.leeway)
 
     def cut(self, row: int) -> None:
-        """Let the segment of a row begin at it; what was before goes on in it."""
+        """Split the segment of a row before it; the second part follows the first."""
         number = int(self.of_row[row])
         rows = self.rows[number]
         place = int(np.searchsorted(self.frames[rows], self.frames[row]))
@@ -51,23 +51,37 @@ class _Segments:
         self.of_row[rows[place:]] = new
 
     def nearest(self, one: int, other: int, after: int, until: int) -> int | None:
-        """The step after one and up to another at which two segments are nearest to each other;
-        None where they are not both there."""
-        mine, theirs = (
+        """The step at which two segments are nearest to each other.
+
+        Args:
+            one: Index of the first segment.
+            other: Index of the second.
+            after: Step after which the search begins.
+            until: Last step of the search.
+
+        Returns:
+            The step; None where the segments have none in common.
+        """
+        own, others = (
             rows[(self.frames[rows] > after) & (self.frames[rows] <= until)]
             for rows in (self.rows[one], self.rows[other])
         )
         steps, at, there = np.intersect1d(
-            self.frames[mine], self.frames[theirs], return_indices=True
+            self.frames[own], self.frames[others], return_indices=True
         )
         if not len(steps):
             return None
         ground = self.positions[:, :2]
-        apart = np.hypot(*(ground[mine[at]] - ground[theirs[there]]).T)
+        apart = np.hypot(*(ground[own[at]] - ground[others[there]]).T)
         return int(steps[np.argmin(apart)])
 
     def longest_way(self, earlier: int, later: int) -> int:
-        """The row up to a later one of a segment before which it goes farthest in one step."""
+        """The row with the longest way from the row before, between two rows of a segment.
+
+        Args:
+            earlier: The first row.
+            later: The last row, in the segment that is searched.
+        """
         rows = self.rows[self.of_row[later]]
         frames = self.frames[rows]
         own = rows[(frames >= self.frames[earlier]) & (frames <= self.frames[later])]
@@ -77,29 +91,29 @@ class _Segments:
         return int(own[1 + np.argmax(way)])
 
     def cut_from(self, number: int, step: int) -> int:
-        """The segment that begins at a step, cut off where it does not."""
+        """The segment that begins at a step, split there from its first part."""
         rows = self.rows[number]
         row = int(rows[np.searchsorted(self.frames[rows], step)])
         self.cut(row)
         return int(self.of_row[row])
 
     def before(self, number: int) -> int:
-        """What a segment follows, -1 for nothing."""
+        """The segment that a segment follows, -1 for none."""
         return self.following.index(number) if number in self.following else -1
 
     def part(self, number: int) -> None:
-        """Let a segment follow nothing."""
+        """Separate a segment from the one that it follows."""
         earlier = self.before(number)
         if earlier >= 0:
             self.following[earlier] = -1
 
     def tie(self, earlier: int, later: int) -> None:
-        """Let a segment follow another, and what followed that follow nothing."""
+        """Let a segment follow another, instead of the one that followed that."""
         self.part(later)
         self.following[earlier] = later
 
     def chain(self, number: int) -> list[int]:
-        """The segments of one person, in the order of time."""
+        """The segments of the track that a segment is in, in the order of time."""
         while (earlier := self.before(number)) >= 0:
             number = earlier
         found = [number]
@@ -116,18 +130,18 @@ def relabelled(
     *,
     leeway: int,
 ) -> tuple[Int[ndarray, " N"], Int[ndarray, " K"]]:
-    """Who is who with the corrections, one after another; what finds nobody is left alone.
+    """Apply corrections to tracks, one after another, without those that refer to no track.
 
     Args:
-        frames: The step of each row of N.
-        ids: Whose each is.
-        positions: (N, 3) world metres.
-        corrections: In their order.
-        leeway: Steps within which somebody counts as meant who is not there at the very step.
+        frames: Step of each of N rows.
+        ids: Track of each row.
+        positions: Position of each row (N, 3), world metres.
+        corrections: The corrections in the order in which they were made.
+        leeway: Number of steps by which a track may miss the step of a place.
 
     Returns:
-        The id of each row: a person keeps the one of most of his rows, others get new numbers. And
-        the rows that stay, ascending.
+        The id of each row, that of most rows of its track or else a new one; and the indices of
+        the rows that remain, ascending.
     """
     segments = _Segments(frames, ids, positions, leeway)
     gone: set[int] = set()
@@ -161,28 +175,28 @@ def _tie(segments: _Segments, one: Correction) -> None:
         return
     pairs: list[tuple[int, int]] = [(a, b) for a, b in found if a is not None and b is not None]
     if len({segments.of_row[b] for _, b in pairs}) < len(pairs):
-        return  # both are the same one there
-    ties = []
+        return  # both places refer to one segment
+    joins = []
     for a, b in pairs:
         earlier, later = int(segments.of_row[a]), int(segments.of_row[b])
         if later in segments.chain(earlier):
-            continue  # so it is
+            continue  # they are one track already
         if not segments.frames[a] < segments.frames[b]:
             return
-        # where both are there at once for a while, they turn into each other where they meet
+        # where both exist at the same time, they are exchanged where they are nearest
         turn = segments.nearest(
             earlier, later, int(segments.frames[[a for a, _ in pairs]].max()),
             int(segments.frames[[b for _, b in pairs]].min()),
         )  # fmt: skip
-        ties.append((a, b, turn))
-    for a, b, turn in ties:
+        joins.append((a, b, turn))
+    for a, b, turn in joins:
         if turn is not None:
             for row in (a, b):
                 number = int(segments.of_row[row])
                 own = segments.frames[segments.rows[number]]
                 if own[0] < turn <= own[-1]:
                     segments.cut_from(number, turn)
-    for a, b, _ in ties:
+    for a, b, _ in joins:
         earlier, later = int(segments.of_row[a]), int(segments.of_row[b])
         if later not in segments.chain(earlier):
             segments.tie(earlier, later)

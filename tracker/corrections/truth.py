@@ -1,4 +1,4 @@
-"""Corrected tracks as a truth: of the steps that a person has looked at, and of no other."""
+"""Export of corrected tracks as ground truth, for the steps that a user has checked."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ from tracker.sequences.tables import KNOWN_STEPS
 
 
 class Tracks(Protocol):
-    """Labelled positions by columns, by step and then id."""
+    """Labelled positions as N rows, by step and then id."""
 
     @property
     def frames(self) -> Int[ndarray, " N"]:
-        """The step of each row."""
+        """Step of each row."""
 
     @property
     def ids(self) -> Int[ndarray, " N"]:
-        """The target of each row."""
+        """Track of each row."""
 
     @property
     def positions(self) -> Float[ndarray, "N 3"]:
-        """World metres."""
+        """Position of each row, world metres."""
 
 
 def checked_ranges(corrections: Iterable[Correction]) -> list[tuple[int, int]]:
-    """The steps that somebody has looked at: ranges without overlap, both ends included."""
+    """The checked steps as ranges without overlap, ascending, both ends included."""
     found: list[tuple[int, int]] = []
     for first, last in sorted(one.steps for one in corrections if one.kind == "checked"):
         if found and first <= found[-1][1] + 1:
@@ -44,13 +44,12 @@ def checked_ranges(corrections: Iterable[Correction]) -> list[tuple[int, int]]:
 def write_truth(stream: TextIO, tracks: Tracks, corrections: Iterable[Correction]) -> None:
     """Write the tracks of the checked steps in the form of a sequence's ground truth.
 
-    A comment at the top says which steps these are: of others nothing is known, and nothing
-    counts there.
+    A comment at the top names these steps: other steps have no truth and are not evaluated.
 
     Args:
-        stream: Text, opened with ``newline=""``.
-        tracks: Of the run that obeys the corrections.
-        corrections: With those that say what was checked.
+        stream: Text stream, opened with ``newline=""``.
+        tracks: Tracks of a run with the corrections.
+        corrections: The corrections, among them those of kind ``checked``.
 
     Raises:
         CorrectionError: If no step was checked.

@@ -1,4 +1,4 @@
-"""Stage 2: the boxes of all cameras into one 3D posterior. One protocol, one file a method.
+"""Stage 2: the boxes of all cameras become one 3D posterior. One protocol, one file a method.
 
 The methods are described in :mod:`tracker.parameters.groups` and chosen in :func:`maker`.
 """
@@ -18,7 +18,7 @@ __all__ = ["FusionMethod", "FusionResult", "create", "maker"]
 
 
 def maker(method: Method) -> Callable[[Sequence, RunParameters], FusionMethod]:
-    """The class that a method of stage 2 is made by; each is imported when it is chosen."""
+    """The class of a method of stage 2, which is imported only when it is chosen."""
     match method.name:
         case "sequential_phd":
             from tracker.fusion.sequential_phd import SequentialPhd
@@ -32,9 +32,9 @@ def maker(method: Method) -> Callable[[Sequence, RunParameters], FusionMethod]:
 
 
 def create(sequence: Sequence, parameters: RunParameters) -> FusionMethod:
-    """The fusion method that the parameters name, prepared for a sequence.
+    """Create the fusion method that the parameters name for a sequence.
 
     Raises:
-        ValueError: If the sequence lacks what it needs.
+        ValueError: If the sequence lacks data that the method needs.
     """
     return maker(parameters.method("fusion_method"))(sequence, parameters)

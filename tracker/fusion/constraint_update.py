@@ -1,4 +1,4 @@
-"""The posterior of a step as it is with the constraints of places that a person gave."""
+"""The update of a step's posterior by the place constraints of a user's corrections."""
 
 from __future__ import annotations
 
@@ -6,58 +6,63 @@ import numpy as np
 from numpy import ndarray
 
 from tracker.corrections.contradictions import NEAR
-from tracker.corrections.stating import doubted
+from tracker.corrections.inflation import inflation
 from tracker.filters import gaussian_mixture, models
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion.model import FusionModel
 from tracker.fusion.place_constraints import PlaceConstraints
 from tracker.fusion.record import Record
 
-_SURE = 0.999
-"""Existence of a person who is there because it was said."""
+_EXISTENCE = 0.999
+"""Existence probability of a target that a place constraint states to be present."""
 
 
-def obey(
+def apply_constraints(
     mixture: GaussianMixture,
     record: Record,
-    told: PlaceConstraints,
+    constraints: PlaceConstraints,
     model: FusionModel,
     *,
     first_new_label: int,
     next_label: int,
 ) -> tuple[GaussianMixture, Record, int]:
-    """The posterior of a step as it is with what a person said of it.
+    """Apply the place constraints of a step to its posterior.
 
-    Who was born in this step where nobody is, is not. A place z of standard deviation σ is a
-    measurement that is sure to be made and is no clutter: it goes to the component j of the
-    largest w_j N(z; m_j, P_j + σ²I) within the gate, or so near that two people could not both
-    stand there, which is there then, and as wide as the place asks for (see
-    :func:`tracker.corrections.stating.doubted`); where there is none, somebody begins there.
+    Components born in this step within an area that is stated to be empty are removed. A
+    place z of standard deviation σ is a measurement with p_D = 1 and without clutter: it
+    updates the component j of the largest w_j N(z; m_j, P_j + σ²I) within the gate, or so near
+    that two people could not both stand there. The covariance of that component is inflated as
+    far as the place requires (see :func:`tracker.corrections.inflation.inflation`) and its label's
+    existence raised to 0.999. Where there is no such component, a new one begins at the place.
 
     Args:
-        mixture: Components of this step.
-        record: The same ones.
-        told: Of this step.
-        model: Motion, and the gate.
+        mixture: J components of this step.
+        record: The evidence of these J components.
+        constraints: The place constraints of this step.
+        model: The model of the filter: motion, gates and size of a target.
         first_new_label: The first label that was given in this step.
-        next_label: The first that is free.
+        next_label: The first label that is free.
 
     Returns:
-        The components, their record, and the label that is free now.
+        The components, their record, and the first label that is free afterwards.
     """
-    if len(told.empty):
-        apart = np.linalg.norm(mixture.means[:, None, :2] - told.empty, axis=2)
-        forbidden = (apart <= told.around).any(axis=1) & (mixture.labels >= first_new_label)
-        kept = np.flatnonzero(~forbidden)
-        mixture, record = mixture.take(kept), record.take(kept)
-    for place, sigma, whom in zip(told.places, told.sigmas.tolist(), told.meant, strict=True):
+    if len(constraints.empty):
+        apart = np.linalg.norm(mixture.means[:, None, :2] - constraints.empty, axis=2)
+        forbidden = (apart <= constraints.around).any(axis=1) & (mixture.labels >= first_new_label)
+        allowed = np.flatnonzero(~forbidden)
+        mixture, record = mixture.take(allowed), record.take(allowed)
+    for place, sigma, reference in zip(
+        constraints.places, constraints.sigmas.tolist(), constraints.references, strict=True
+    ):
         noise = sigma**2 * np.eye(3)
-        best = _meant(mixture, whom, NEAR**2 * np.eye(3), model) if whom[0] == whom[0] else None
+        best = None
+        if reference[0] == reference[0]:
+            best = _component_at(mixture, reference, NEAR**2 * np.eye(3), model)
         if best is None:
-            best = _meant(mixture, place, noise, model)
+            best = _component_at(mixture, place, noise, model)
         if best is None:
-            nameless = np.zeros(1, dtype=np.int64)
-            one = GaussianMixture(np.array([_SURE]), place[None], noise[None], nameless)
+            unlabelled = np.zeros(1, dtype=np.int64)
+            one = GaussianMixture(np.array([_EXISTENCE]), place[None], noise[None], unlabelled)
             born = models.label_births(model.motion.at_rest(one), next_label)
             next_label += born.size
             mixture = gaussian_mixture.concatenate([mixture, born])
@@ -67,10 +72,10 @@ def obey(
     return mixture, record, next_label
 
 
-def _meant(
+def _component_at(
     mixture: GaussianMixture, place: ndarray, noise: ndarray, model: FusionModel
 ) -> int | None:
-    """The component that a place means; None for nobody yet."""
+    """The component that a place belongs to, as an index; None where it belongs to none."""
     if not mixture.size:
         return None
     offsets = place - mixture.means[:, :3]
@@ -87,11 +92,11 @@ def _meant(
 def _updated(
     mixture: GaussianMixture, component: int, place: ndarray, noise: ndarray
 ) -> GaussianMixture:
-    """One component updated by a place, and its label sure to be there: Joseph's form."""
+    """Update one component by a place, in Joseph's form, and raise its label's existence."""
     mean, covariance = mixture.means[component], mixture.covariances[component].copy()
     sigma = float(np.sqrt(noise[0, 0]))
-    doubt = doubted(place - mean[:3], covariance[:3, :3], sigma)
-    covariance[:3, :3] += doubt
+    extra = inflation(place - mean[:3], covariance[:3, :3], sigma)
+    covariance[:3, :3] += extra
     gain = np.linalg.solve(covariance[:3, :3] + noise, covariance[:3]).T
     rest = np.eye(len(mean))
     rest[:, :3] -= gain
@@ -99,8 +104,8 @@ def _updated(
     weights = mixture.weights.copy()
     means[component] = mean + gain @ (place - mean[:3])
     covariances[component] = rest @ covariance @ rest.T + gain @ noise @ gain.T
-    # the boxes of the next step err as those of this one do: they are still this person's
-    covariances[component, :3, :3] += doubt
+    # the boxes of the next step err as those of this one do and must stay within the gate
+    covariances[component, :3, :3] += extra
     own = mixture.labels == mixture.labels[component]
-    weights[component] += max(_SURE - float(weights[own].sum()), 0.0)
+    weights[component] += max(_EXISTENCE - float(weights[own].sum()), 0.0)
     return GaussianMixture(weights, means, covariances, mixture.labels)

@@ -1,4 +1,4 @@
-"""Newcomers from what nobody explains: boxes of two or more cameras that agree on a place."""
+"""Births from unexplained boxes of two or more cameras that agree on a place."""
 
 from __future__ import annotations
 
@@ -15,43 +15,46 @@ from tracker.kernels.births import Refinement
 from tracker.kernels.gating import Measurements
 from tracker.sequences.sequence import Room
 
-_REFINEMENTS = 3  # Gauss-Newton steps: from where two rays meet, the third moves hardly
-_MOST_SEEDS = 1000  # of a crowd of boxes that nobody explains, where the rays meet best
-_LEAST_VOLUME = 1e-250  # m³: in a room that is flat to the last digits no density overflows
-_START_SIGMA = 1.0  # metres: how loosely the meeting point of two rays binds the refinement
-_UNEXPLAINED = 0.5  # a box that somebody made with more than this probability starts nobody
+_REFINEMENTS = 3  # Gauss-Newton steps: the third hardly changes the position
+_MOST_SEEDS = 1000  # of a crowd of unexplained boxes, those whose rays pass closest
+_LEAST_VOLUME = 1e-250  # m³: keeps the density finite in a room without height
+_START_SIGMA = 1.0  # metres: prior of the refinement around the meeting point of two rays
+_UNEXPLAINED = 0.5  # probability of having no target above which a box may begin a track
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Evidence:
-    """What the cameras leave unexplained at one step: B boxes, camera after camera."""
+    """The B boxes of all cameras at one step, camera after camera, and what explains them."""
 
     centres: Float[ndarray, "B 2"]
-    """Of the boxes, pixels."""
+    """Centre (x, y) of each box, pixels."""
     measurements: Measurements
-    """Of the target model, each with its noise, pixels."""
+    """The boxes as measurements of the target model, with their noise, pixels."""
     unexplained: Float[ndarray, " B"]
     """Probability that no target made the box."""
     starts: Int[ndarray, " C1"]
-    """Where each camera's boxes begin, and the end."""
+    """Index of the first box of each camera, and B at the end."""
     clutter_factors: Float[ndarray, " B"]
-    """On κ: by what each box looks like, it is the likelier false the larger this is."""
+    """Factor on κ from each box's appearance: the larger, the likelier the box is false."""
     seeing: Bool[ndarray, " C"] | None = None
-    """Which cameras have a frame at this step: others miss nobody; None where all have."""
+    """Which cameras have a frame at this step, and so may miss a target; None where all have."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Newborns:
-    """N newcomers: position, existence, and the box of each of C cameras behind them."""
+    """N newborn targets: position, existence, and the box of each of C cameras."""
 
     positions: Float[ndarray, "N 3"]
+    """World metres."""
     covariances: Float[ndarray, "N 3 3"]
+    """Covariance of each position, squared metres."""
     existences: Float[ndarray, " N"]
+    """Existence probability, 0 … 1."""
     sources: Int[ndarray, "C N"]
     """Index of the box in each camera, -1 for none."""
 
     def take(self, indices: ndarray) -> Newborns:
-        """Some of them, in that order."""
+        """Select some of the targets, in that order."""
         return Newborns(
             self.positions[indices],
             self.covariances[indices],
@@ -62,49 +65,49 @@ class Newborns:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BirthModel:
-    """The model of births, of their detection, and of the clutter that is mistaken for them."""
+    """The model of births, of their detection, and of clutter."""
 
     birth_rate: float
-    """λ_b, expected newcomers a step."""
+    """λ_b, expected number of newborn targets per step."""
     detection_probability: float
     """p_D of a target in the picture."""
     clutter: Float[ndarray, " C"]
     """κ of each camera, per unit of the measurement space."""
     gate: float
-    """Squared Mahalanobis distance of a box that belongs to a newcomer."""
+    """Squared Mahalanobis distance within which a box belongs to a newborn target."""
     margin: float
-    """Metres outside the room's volume within which newcomers are taken, too."""
+    """Distance from the room's volume within which targets are born as well, metres."""
     largest_gap: float
-    """Metres by which the rays of two boxes of one target may miss each other."""
+    """Largest distance between the rays of two boxes of one target, metres."""
 
 
 class MeasurementBirths:
     """Adaptive birth over several cameras.
 
     For boxes z_c of two or more cameras, with a birth intensity λ_b spread evenly
-    over the room's volume V, the odds that one newcomer made them rather than
+    over the room's volume V, the odds that one newborn target made them rather than
     clutter are
 
         Λ = λ_b/V ∫ Π_{c sees} p_c g(z_c | x) / κ_c  Π_{c misses} (1 − p_c) dx
 
-    and the newcomer's existence is Λ / (1 + Λ): the rule for new tracks of the
-    Poisson multi-Bernoulli filter, taken over all cameras at once; κ_c is that of such a box as
-    z_c, where stage 1 tells how likely each is somebody's. The integral
-    is approximated by Laplace's method, around the place that fits the boxes best. After the
-    adaptive birth of Ristic, Clark, Vo and Vo (IEEE TAES 48(2), 2012), with the rule for new
-    tracks of Williams (IEEE TAES 51(3), 2015).
+    and the existence probability of that target is Λ / (1 + Λ): the rule for new tracks of the
+    Poisson multi-Bernoulli filter, applied to all cameras at once; κ_c is multiplied by the
+    box's clutter factor, where stage 1 gives one. The integral is approximated by Laplace's
+    method, around the place that fits the boxes best. This follows the adaptive birth of
+    Ristic, Clark, Vo and Vo (IEEE TAES 48(2), 2012), with the rule for new tracks of Williams
+    (IEEE TAES 51(3), 2015).
     """
 
     def __init__(
         self, cameras: tuple[Camera, ...], room: Room, target: TargetModel, model: BirthModel
     ) -> None:
-        """Prepare for one room.
+        """Prepare the births of one room.
 
         Args:
-            cameras: Their evidence will come in this order.
-            room: Newcomers appear evenly in its volume.
-            target: Of a target's box.
-            model: Of births, detection and clutter.
+            cameras: The C cameras, in the order of the evidence.
+            room: The volume over which births are uniform.
+            target: The measurement model of a target's box.
+            model: The rates of births, detection and clutter.
         """
         self._cameras = cameras
         self._room = room
@@ -122,23 +125,23 @@ class MeasurementBirths:
         self._refinement = Refinement(_START_SIGMA, _REFINEMENTS, model.gate)
 
     def propose(self, evidence: Evidence) -> Newborns | None:
-        """Newcomers that share no box, the surest first; None for nobody."""
+        """Propose newborn targets that share no box, by decreasing existence; None for none."""
         seeds = self._meeting_points(evidence)
         if not len(seeds):
             return None
         found = self._fit(seeds, evidence)
-        taken: set[tuple[int, int]] = set()
+        used: set[tuple[int, int]] = set()
         chosen: list[int] = []
         for index in np.argsort(-found.existences, kind="stable").tolist():
             boxes = enumerate(found.sources[:, index].tolist())
             own = {(camera, box) for camera, box in boxes if box >= 0}
-            if not own & taken:
-                taken |= own
+            if not own & used:
+                used |= own
                 chosen.append(index)
         return found.take(np.array(chosen)) if chosen else None
 
     def _meeting_points(self, evidence: Evidence) -> Float[ndarray, "N 3"]:
-        """Where the rays of unexplained boxes of two cameras pass close by each other."""
+        """The points where rays of unexplained boxes of two cameras pass close by each other."""
         free = births.free_boxes(evidence.unexplained, evidence.starts, _UNEXPLAINED)
         if free.cameras < 2:
             return np.zeros((0, 3))
@@ -159,7 +162,7 @@ class MeasurementBirths:
         return np.asarray(points)
 
     def _fit(self, seeds: Float[ndarray, "N 3"], evidence: Evidence) -> Newborns:
-        """The places that fit best to the nearest box in every camera, and their odds.
+        """Fit each seed to the nearest box in every camera, and compute its existence probability.
 
         A seed that ends outside the room or with fewer than two boxes is left out.
         """
@@ -188,7 +191,7 @@ class MeasurementBirths:
     def _log_odds(
         self, found: Newborns, fits: Float[ndarray, "C N"], evidence: Evidence
     ) -> Float[ndarray, " N"]:
-        """log Λ of each newcomer, of whose boxes ``fits`` are the log likelihoods."""
+        """Compute log Λ of each newborn target from the log likelihoods ``fits`` of its boxes."""
         log_odds = self._log_density + 1.5 * np.log(2.0 * np.pi)
         log_odds = log_odds + 0.5 * np.linalg.slogdet(found.covariances)[1]
         for c, camera in enumerate(self._cameras):

@@ -1,8 +1,8 @@
-"""Cameras without a frame at a step: they give no evidence there, neither a box nor a miss.
+"""Asynchronous cameras: one without a frame at a step gives neither detections nor a miss there.
 
-A person is not less likely to exist for a picture that was never taken: such a camera's p_D
-is 0. What nobody explained in its last frame is remembered for a moment, so that cameras whose
-frames fall on different steps can still begin a track together.
+Such a camera has p_D = 0, so that the existence of a target does not decrease. The unexplained
+boxes of its last frame are stored for a moment, so that cameras whose frames fall on different
+steps can still begin a track together.
 """
 
 from __future__ import annotations
@@ -21,33 +21,33 @@ from tracker.kernels.labelled.step import CameraBoxes
 from tracker.single_view.protocol import ViewResult
 
 LONGEST = 0.2
-"""Seconds within which boxes of two cameras may start a person."""
+"""Largest time between boxes of two cameras that begin one track, seconds."""
 
 WALKING = 1.0
-"""Metres a second that somebody may have walked meanwhile, one standard deviation."""
+"""Standard deviation of a person's speed between these frames, metres per second."""
 
 _UNEXPLAINED = 0.5
 
 
 def seeing(views: Many[ViewResult]) -> Int[ndarray, " S"] | None:
-    """The cameras that have a frame at this step; None where all have."""
+    """The indices of the S cameras that have a frame at this step; None where all have."""
     if not any(view.blind for view in views):
         return None
     return np.array([c for c, view in enumerate(views) if not view.blind], dtype=np.int64)
 
 
 def boxes_of(seen: CameraBoxes, cameras: Int[ndarray, " S"]) -> CameraBoxes:
-    """The boxes of all C cameras, listed for the S cameras that have a frame: others have none."""
+    """Restrict the boxes of all C cameras to the S cameras that have a frame."""
     return seen._replace(starts=np.append(seen.starts[:-1][cameras], seen.starts[-1]))
 
 
 def spread(record: Record, cameras: Int[ndarray, " S"], count: int) -> Record:
-    """The record of some cameras extended to all C: the others gave no evidence, with p_D 0.
+    """Extend the record of S cameras to all C: the others have no sources and p_D = 0.
 
     Args:
-        record: Of the cameras that had a frame.
-        cameras: Their indices.
-        count: C.
+        record: Evidence of the S cameras that have a frame.
+        cameras: Indices of these cameras.
+        count: C, the number of cameras.
     """
     every = Record.blank(count, record.sources.shape[1])
     if len(cameras):
@@ -59,38 +59,41 @@ def spread(record: Record, cameras: Int[ndarray, " S"], count: int) -> Record:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Glimpse:
-    """What all cameras left unexplained at one step."""
+class StepEvidence:
+    """The boxes of all cameras at one step and how far tracks explain them."""
 
     evidence: Evidence
+    """Measurements and probabilities of the B boxes."""
     boxes: Float[ndarray, "B 4"]
     """centre_x, centre_y, half_width, half_height, pixels."""
     blind: Bool[ndarray, " C"]
-    """Which cameras had no frame."""
+    """Which cameras have no frame at this step."""
 
     def of(self, camera: int) -> slice:
-        """The boxes of one camera."""
+        """The rows of the boxes of one camera."""
         starts = self.evidence.starts
         return slice(int(starts[camera]), int(starts[camera + 1]))
 
 
-Recent = tuple[Glimpse, ...]
-"""The last steps, the latest first, as far back as they may still begin a track."""
+Recent = tuple[StepEvidence, ...]
+"""The evidence of the last steps, the latest first, as far back as it may still begin a track."""
 
 
-def remember(recent: Recent, glimpse: Glimpse, step_time: float) -> Recent:
-    """The last steps at the end of this one: as many as lie within :data:`LONGEST` seconds."""
-    return (glimpse, *recent)[: int(LONGEST / step_time + 1e-9)]
+def remember(recent: Recent, latest: StepEvidence, step_time: float) -> Recent:
+    """Prepend a step to the recent ones and drop those older than :data:`LONGEST` seconds."""
+    return (latest, *recent)[: int(LONGEST / step_time + 1e-9)]
 
 
-def with_recent(now: Glimpse, recent: Recent, step_time: float, half_height: float) -> Evidence:
-    """The evidence of a step, with that of the last frames of the cameras that have none now.
+def with_recent(
+    now: StepEvidence, recent: Recent, step_time: float, half_height: float
+) -> Evidence:
+    """The evidence of a step, with the last frames of the cameras that have no frame now.
 
     Args:
-        now: This step.
-        recent: Those before it.
-        step_time: Seconds.
-        half_height: Of what is tracked, metres: it makes metres walked into pixels.
+        now: The evidence of this step.
+        recent: The evidence of the steps before, the latest first.
+        step_time: Time between two steps, seconds.
+        half_height: Half height of a target, metres, which converts metres to pixels.
     """
     parts = [_last(camera, now, recent, step_time, half_height) for camera in range(len(now.blind))]
     starts = np.cumsum([0, *(len(part.centres) for part in parts)])
@@ -108,9 +111,9 @@ def with_recent(now: Glimpse, recent: Recent, step_time: float, half_height: flo
 
 
 def _last(
-    camera: int, now: Glimpse, recent: Recent, step_time: float, half_height: float
+    camera: int, now: StepEvidence, recent: Recent, step_time: float, half_height: float
 ) -> Evidence:
-    """One camera's part: of this step, or of its last frame, known the less well the older."""
+    """One camera's evidence, of this step or of its last frame, with noise that grows with age."""
     age, seen = 0, now
     if now.blind[camera]:
         found = ((n, g) for n, g in enumerate(recent, 1) if not g.blind[camera])
@@ -132,11 +135,11 @@ def _last(
 
 
 def of_this_step(found: Newborns, blind: Bool[ndarray, " C"]) -> Newborns:
-    """The newcomers with a box of this step; boxes of earlier frames are no sources of theirs.
+    """Select the newborn targets with a box of this step; boxes of earlier frames are no sources.
 
     Args:
-        found: Proposed from this step's boxes and remembered ones.
-        blind: Which cameras have no frame now, so that their boxes were remembered.
+        found: N targets proposed from the boxes of this step and of earlier frames.
+        blind: Which cameras have no frame now, so that their boxes are of earlier frames.
     """
     now = (found.sources[~blind] >= 0).any(axis=0)
     sources = np.where(blind[:, None], -1, found.sources)

@@ -1,4 +1,4 @@
-"""The models that every fusion method shares: motion, birth, measurement, visibility, clutter."""
+"""The models that all fusion methods share: motion, birth, measurement, visibility, clutter."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tracker.filters import association, gaussian_mixture, models
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion import missing_frames, visibility
 from tracker.fusion.measurement_births import BirthModel, Evidence, MeasurementBirths, Newborns
-from tracker.fusion.missing_frames import Glimpse, Recent
+from tracker.fusion.missing_frames import Recent, StepEvidence
 from tracker.fusion.target_model import ExpectedBoxes, TargetModel
 from tracker.fusion.visibility import Visibility
 from tracker.kernels import linear_algebra
@@ -23,12 +23,11 @@ from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult
 
 CONFIRMED = 0.5
-"""A component surer than this stands for a person, who may hide others: he is there more likely
-than not."""
+"""Weight above which a component is a confirmed track, which may occlude others."""
 
 
 class FusionModel:
-    """A room, its cameras and its people, as the parameters describe them."""
+    """The models of one sequence: its room, its cameras and its targets, with the parameters."""
 
     def __init__(self, sequence: Sequence, parameters: FusionParams) -> None:
         p = self.parameters = parameters
@@ -42,7 +41,7 @@ class FusionModel:
         self.births = self.motion.at_rest(
             models.entrance_births(sequence.room, p.birth_rate * sequence.step_time)
         )
-        """γ: one component an entrance, with the weight of one step."""
+        """γ: one component for each entrance, with the weight of one step."""
         self.clutter = np.array(
             [
                 p.clutter_rate / models.measurement_volume(camera, sequence.room, self.target.size)
@@ -51,18 +50,18 @@ class FusionModel:
         )
         """κ of each camera, per unit of the measurement space."""
         self.gate = gaussian_mixture.gate_distance(p.gate_probability, self.target.size)
-        """Squared Mahalanobis distance of the innovation."""
+        """Largest squared Mahalanobis distance of an innovation."""
         self.memory_reach = gaussian_mixture.gate_distance(p.memory_gate_probability, 3)
-        """Squared Mahalanobis distance within which a newcomer may be somebody lately lost."""
+        """Squared Mahalanobis distance within which a new track may take over a lost label."""
         self.gate_of_places = gaussian_mixture.gate_distance(p.gate_probability, 3)
-        """Squared Mahalanobis distance within which a place that somebody names is a target's."""
+        """Squared Mahalanobis distance within which a place constraint belongs to a target."""
         self.near = p.duplicate_distance * 2.0 * float(np.mean(sequence.target_half_extents[:2]))
-        """Metres within which two components may be one person."""
+        """Distance within which two components may be one person, metres."""
         self.height = 2.0 * float(sequence.target_half_extents[2])
-        """Metres from which one target is above another."""
+        """Height of a target, and the vertical distance from which two are above each other."""
         margin = p.followed_margin
         self.followed = (self.room.minimum - margin, self.room.maximum + margin)
-        """The corners between which people are followed."""
+        """Minimum and maximum of the volume in which targets are tracked, world metres."""
         self._newborns = MeasurementBirths(
             self.cameras,
             sequence.room,
@@ -78,13 +77,13 @@ class FusionModel:
         )
 
     def expected(self, index: int, mixture: GaussianMixture) -> ExpectedBoxes:
-        """The box that a camera should give of every component."""
+        """Predict the box of every component in one camera."""
         return self.target.expected(self.cameras[index], mixture.means, mixture.covariances)
 
     def detection_probabilities(
         self, index: int, expected: ExpectedBoxes, mixture: GaussianMixture
     ) -> Float[ndarray, " J"]:
-        """p_D of every component in one camera where nobody hides anybody."""
+        """The p_D of every component in one camera without occlusion."""
         return self.parameters.detection_probability * visibility.inside_probability(
             self.cameras[index],
             expected,
@@ -99,13 +98,13 @@ class FusionModel:
         mixture: GaussianMixture,
         occluders: Float[ndarray, " J"],
     ) -> Visibility:
-        """p_D of every component in one camera, and who hides it.
+        """The p_D of every component in one camera, with occlusion.
 
         Args:
-            index: Of the camera.
-            expected: The boxes that the components should give there.
-            mixture: The components.
-            occluders: Weight of each component where it may hide others, else 0.
+            index: Index of the camera.
+            expected: The predicted boxes of the components in that camera.
+            mixture: J components.
+            occluders: Weight of each component that may occlude others, else 0.
         """
         hiding = np.flatnonzero(occluders > CONFIRMED)
         return visibility.visibility(
@@ -118,11 +117,11 @@ class FusionModel:
             near=self.near,
         )
 
-    def camera_rule(self, least_told: float) -> CameraRule:
-        """How one camera's boxes are shared among the components.
+    def camera_rule(self, reporting_threshold: float) -> CameraRule:
+        """The parameters of one camera's update, in the form that the kernels take.
 
         Args:
-            least_told: Association probability from which a pair is told.
+            reporting_threshold: Association probability from which a pair is reported, 0 … 1.
         """
         p = self.parameters
         return CameraRule(
@@ -132,15 +131,18 @@ class FusionModel:
             confirmed=CONFIRMED,
             near=self.near,
             strength=p.occlusion,
-            worth_telling=visibility.WORTH_TELLING,
+            reporting_share=visibility.REPORTING_SHARE,
             tolerance=association.TOLERANCE,
             iterations=association.ITERATIONS,
-            least_told=least_told,
+            reporting_threshold=reporting_threshold,
         )
 
     def newborns(self, evidence: Evidence) -> tuple[GaussianMixture, Newborns] | None:
-        """Newcomers where unexplained boxes of several cameras agree: components without labels,
-        and what says so; None for nobody."""
+        """Propose births where unexplained boxes of several cameras agree on a place.
+
+        Returns:
+            Components without labels, and the boxes behind each; None for no birth.
+        """
         found = self._newborns.propose(evidence)
         return None if found is None else self._at_rest(found)
 
@@ -151,16 +153,20 @@ class FusionModel:
         views: Many[ViewResult],
         recent: Recent,
     ) -> tuple[tuple[GaussianMixture, Newborns] | None, Recent]:
-        """As :meth:`newborns`, with what cameras that have no frame now left unexplained lately.
+        """Propose births as :meth:`newborns` does, also from recent frames of asynchronous cameras.
 
         Args:
-            evidence: What the cameras leave unexplained.
-            boxes: Camera after camera, centre and half sizes, pixels.
-            views: Which cameras have a frame.
-            recent: What was remembered at the end of the step before; empty at the start.
+            evidence: The B boxes of this step and how far tracks explain them.
+            boxes: centre_x, centre_y, half_width, half_height of these boxes, pixels.
+            views: The result of each camera, which says whether it has a frame.
+            recent: The evidence of the last steps; empty at the start.
+
+        Returns:
+            Components and the boxes behind them, or None for no birth; and the recent evidence
+            for the next step.
         """
         blind = np.array([view.blind for view in views])
-        now = Glimpse(evidence, boxes, blind)
+        now = StepEvidence(evidence, boxes, blind)
         later = missing_frames.remember(recent, now, self.step_time)
         if not blind.any():
             return self.newborns(evidence), later
@@ -172,12 +178,12 @@ class FusionModel:
         return (self._at_rest(found) if len(found.existences) else None), later
 
     def _at_rest(self, found: Newborns) -> tuple[GaussianMixture, Newborns]:
-        nameless = np.zeros(len(found.existences), dtype=np.int64)
-        born = GaussianMixture(found.existences, found.positions, found.covariances, nameless)
+        unlabelled = np.zeros(len(found.existences), dtype=np.int64)
+        born = GaussianMixture(found.existences, found.positions, found.covariances, unlabelled)
         return self.motion.at_rest(born), found
 
     def stays(self, mixture: GaussianMixture) -> Int[ndarray, " K"]:
-        """Indices of the components that have not strayed from the room."""
+        """The indices of the components that lie in the tracked volume."""
         inside: ndarray = linear_algebra.inside_bounds(mixture.means, *self.followed)
         return inside
 
@@ -188,13 +194,19 @@ class FusionModel:
         labels: Int[ndarray, " n"],
         sources: Int[ndarray, "C n"],
     ) -> Bool[ndarray, " n"]:
-        """Which of n tracks are duplicates, which repeat a surer or older one at the same place.
+        """Which of n tracks are duplicates of a heavier or older one at the same place.
 
-        Two nearer than ``near`` are one person, unless some camera gave each a box of
-        its own; who stand on the floor within half of it are one even so, for a detector may
-        draw two boxes around one person, one higher than the other, and two people cannot
-        stand in one place. Among sure ones
-        the older label stays; an unsure one never displaces a sure one.
+        Two tracks nearer than ``near`` are one person, unless some camera has a box for each;
+        two on the floor within half of it are one in any case, for a detector may draw two
+        boxes around one person, one above the other, and two people cannot stand in one
+        place. Among confirmed tracks the older label remains; an unconfirmed one never
+        displaces a confirmed one.
+
+        Args:
+            means: State of each track, position first, world metres.
+            weights: Existence of each track.
+            labels: Label of each track; older ones are smaller.
+            sources: Index of the box of each track in each camera, -1 for none.
         """
         found: ndarray = linear_algebra.duplicates(
             means, weights, labels, np.ascontiguousarray(sources), self.near, self.height,
@@ -204,7 +216,7 @@ class FusionModel:
 
 
 def all_boxes(views: Many[ViewResult]) -> CameraBoxes:
-    """The boxes of all cameras, one after another."""
+    """Concatenate the boxes of all cameras, with their standard deviations and clutter factors."""
     starts = [0]
     for view in views:
         starts.append(starts[-1] + len(view.boxes))

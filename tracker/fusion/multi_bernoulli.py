@@ -1,4 +1,4 @@
-"""Fusion by the Poisson multi-Bernoulli filter: one existence, one place and one label a person.
+"""Fusion by the Poisson multi-Bernoulli filter: each track has existence, Gaussian and label.
 
 [W15] J. L. Williams, "Marginal multi-Bernoulli filters: RFS derivation of MHT,
 JIPDA, and association-based MeMBer", IEEE Transactions on Aerospace and
@@ -17,17 +17,16 @@ from numpy import ndarray
 
 from tracker.filters import gaussian_mixture, models
 from tracker.filters.gaussian_mixture import GaussianMixture
-from tracker.fusion import missing_frames
-from tracker.fusion.constraint_update import obey
-from tracker.fusion.labels import memory, reidentification
-from tracker.fusion.labels.memory import Memory
-from tracker.fusion.labels.reidentification import Identities
+from tracker.fusion import memory, missing_frames, reidentification
+from tracker.fusion.constraint_update import apply_constraints
 from tracker.fusion.measurement_births import Evidence, Newborns
+from tracker.fusion.memory import Memory
 from tracker.fusion.missing_frames import Recent
 from tracker.fusion.model import CONFIRMED, FusionModel, all_boxes
 from tracker.fusion.place_constraints import PlaceConstraints
 from tracker.fusion.protocol import FusionResult
-from tracker.fusion.record import WORTH_TELLING, Record, summed
+from tracker.fusion.record import REPORTING_THRESHOLD, Record, summed
+from tracker.fusion.reidentification import Identities
 from tracker.geometry.camera import stacked
 from tracker.kernels.gating import Measurements
 from tracker.kernels.labelled import step as step_kernels
@@ -43,24 +42,29 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MultiBernoulliState:
-    """Tracks, people never yet detected, the first free label, and who is lost from sight."""
+    """The posterior of a step and all that the next step needs of it."""
 
     tracks: GaussianMixture
+    """The Bernoulli tracks: existence probability as weight, one component a label."""
     undetected: GaussianMixture
+    """The Poisson intensity of targets that were never detected."""
     next_label: int
+    """The first label that is free."""
     memory: Memory
+    """The confirmed tracks and those lost a short while ago."""
     identities: Identities
+    """Beliefs of the tracks over the people with templates."""
     recent: Recent = ()
-    """What each camera left unexplained in the last frames."""
+    """Unexplained boxes of the last frames, for cameras that have none at a step."""
 
 
 class MultiBernoulli:
     """Fusion by TOMB/P with belief propagation, camera after camera ([W15]).
 
-    A person who was detected is a Bernoulli: an existence probability, one
-    Gaussian and a label for life. People not yet detected are the Poisson
-    intensity of the PHD filter; a measurement that it explains begins a track,
-    and so do unexplained boxes of several cameras that agree on a place.
+    A detected target is a Bernoulli: an existence probability, one Gaussian and a
+    label that does not change. Targets not yet detected are a Poisson intensity; a
+    measurement that it explains begins a track, and so do unexplained boxes of
+    several cameras that agree on a place.
     """
 
     def __init__(self, sequence: Sequence, parameters: RunParameters) -> None:
@@ -86,17 +90,21 @@ class MultiBernoulli:
         )
         self._cameras = stacked(model.cameras)
         self._seen_by: dict[bytes, tuple[StepModel, Calibrations]] = {}
-        """Model and cameras where some have no frame, by those that have."""
+        """Model and cameras of a step, by the cameras that have a frame."""
         self._target = target.target(motion.dimension)
-        self._camera_rule = model.camera_rule(WORTH_TELLING)
+        self._camera_rule = model.camera_rule(REPORTING_THRESHOLD)
         low, high = model.followed
         self._keeping_rule = KeepingRule(
             p.pruning_threshold, low, high, p.max_components, model.near, model.height, CONFIRMED
         )
 
     def _with_frame(self, cameras: Int[ndarray, " S"] | None) -> tuple[StepModel, Calibrations]:
-        """The step's model and cameras where only these have a frame, or all where None is said;
-        where none has, the kernel asks for nothing of them."""
+        """The model and cameras of a step at which some cameras have a frame.
+
+        Args:
+            cameras: Indices of the cameras that have a frame, None for all. Where none has, all
+                cameras are returned, which the kernel then does not use.
+        """
         if cameras is None:
             return self._step_model, self._cameras
         key = cameras.tobytes()
@@ -107,7 +115,7 @@ class MultiBernoulli:
         return self._seen_by[key]
 
     def start(self) -> MultiBernoulliState:
-        """Nobody is in the room."""
+        """The state without tracks, before the first step."""
         dimension = self._model.motion.dimension
         empty = GaussianMixture.empty(dimension)
         return MultiBernoulliState(empty, empty, 1, Memory.start(dimension), Identities.none())
@@ -116,7 +124,7 @@ class MultiBernoulli:
         self,
         state: MultiBernoulliState,
         views: Many[ViewResult],
-        told: PlaceConstraints | None = None,
+        constraints: PlaceConstraints | None = None,
     ) -> tuple[MultiBernoulliState, FusionResult]:
         """Predict one step ahead and update with every camera's boxes, in the cameras' order."""
         p, before = self._parameters, state.tracks
@@ -159,9 +167,9 @@ class MultiBernoulli:
                 tracks, record = self._with_newborns(
                     tracks, record, born, newborns, state.next_label, cameras
                 )
-        if told is not None:
-            tracks, record, next_label = obey(
-                tracks, record, told, self._model,
+        if constraints is not None:
+            tracks, record, next_label = apply_constraints(
+                tracks, record, constraints, self._model,
                 first_new_label=state.next_label, next_label=next_label,
             )  # fmt: skip
         kept = step_kernels.kept_tracks(
@@ -215,11 +223,22 @@ class MultiBernoulli:
         first_new_label: int,
         cameras: Int[ndarray, " S"] | None,
     ) -> tuple[GaussianMixture, Record]:
-        """The tracks with those that begin where unexplained boxes of several cameras agree."""
+        """Append the tracks born from boxes of several cameras.
+
+        Tracks that one of the same boxes began at an entrance in this step are removed.
+
+        Args:
+            tracks: J tracks before.
+            record: Evidence of the J tracks.
+            born: N tracks to append, with labels.
+            newborns: The boxes behind the N tracks.
+            first_new_label: The first label that was given in this step.
+            cameras: Indices of the cameras that have a frame, None for all.
+        """
         seeing = slice(None) if cameras is None else cameras
         # a track begun at an entrance by one of the same boxes is the same person
-        own, theirs = record.sources[:, :, None], newborns.sources[:, None, :]
-        shared = ((own == theirs) & (theirs >= 0)).any(axis=(0, 2))
+        own, proposed = record.sources[:, :, None], newborns.sources[:, None, :]
+        shared = ((own == proposed) & (proposed >= 0)).any(axis=(0, 2))
         others = np.flatnonzero(~(shared & (tracks.labels >= first_new_label)))
         first = len(others)
         tracks = gaussian_mixture.concatenate([tracks.take(others), born])

@@ -1,4 +1,4 @@
-"""What a person said of a step: somebody is here, nobody is there."""
+"""Place constraints from a user's corrections: a target is here, no target begins there."""
 
 from __future__ import annotations
 
@@ -15,29 +15,29 @@ from tracker.corrections.contradictions import along
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlaceConstraints:
-    """Corrections of one step."""
+    """The place constraints of one step."""
 
     places: Float[ndarray, "K 3"]
-    """Where somebody is, world metres."""
+    """Positions of targets that are present, world metres."""
     sigmas: Float[ndarray, " K"]
-    """Standard deviations of the places, metres."""
-    meant: Float[ndarray, "K 3"]
-    """Where who is there was found, world metres; NaN where nobody is meant in particular."""
+    """Standard deviation of each place along every axis, metres."""
+    references: Float[ndarray, "K 3"]
+    """Estimated position of the track that a place belongs to, world metres; NaN for any track."""
     empty: Float[ndarray, "E 2"]
-    """Where nobody begins, on the ground, world metres."""
+    """Centres of the areas in which no track begins, on the ground, world metres."""
     around: Float[ndarray, " E"]
-    """How far around, metres."""
+    """Radius of each of these areas, metres."""
 
 
 def constraints_by_step(corrections: Iterable[Correction]) -> dict[int, PlaceConstraints]:
-    """What is said of each step, where anything is."""
-    here: dict[int, list[tuple[ndarray, float, ndarray]]] = {}
+    """Collect the place constraints of each step, for the steps that have any."""
+    present: dict[int, list[tuple[ndarray, float, ndarray]]] = {}
     empty: dict[int, list[tuple[tuple[float, float], float]]] = {}
     for one in corrections:
         if one.kind == "here":
             place, *meant = one.places
-            whom = meant[0].point if meant else np.full(3, np.nan)
-            here.setdefault(place.step, []).append((place.point, one.accuracy or 0.0, whom))
+            reference = meant[0].point if meant else np.full(3, np.nan)
+            present.setdefault(place.step, []).append((place.point, one.accuracy or 0.0, reference))
         elif one.kind == "nobody":
             first, last = one.steps
             for step in range(first, last + 1):
@@ -45,11 +45,11 @@ def constraints_by_step(corrections: Iterable[Correction]) -> dict[int, PlaceCon
                     empty.setdefault(step, []).append((where, one.accuracy or 0.0))
     return {
         step: PlaceConstraints(
-            np.array([place for place, _, _ in here.get(step, [])]).reshape(-1, 3),
-            np.array([sigma for _, sigma, _ in here.get(step, [])]),
-            np.array([whom for _, _, whom in here.get(step, [])]).reshape(-1, 3),
+            np.array([place for place, _, _ in present.get(step, [])]).reshape(-1, 3),
+            np.array([sigma for _, sigma, _ in present.get(step, [])]),
+            np.array([reference for _, _, reference in present.get(step, [])]).reshape(-1, 3),
             np.array([where for where, _ in empty.get(step, [])]).reshape(-1, 2),
             np.array([reach for _, reach in empty.get(step, [])]),
         )
-        for step in sorted(here.keys() | empty.keys())
+        for step in sorted(present.keys() | empty.keys())
     }

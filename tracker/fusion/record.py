@@ -1,4 +1,4 @@
-"""What each camera said of each component, carried along with the components."""
+"""The evidence of each camera for each component, carried along with the components."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion.protocol import Associations, FusionResult
 from tracker.kernels.linear_algebra import sum_pairs
 
-WORTH_TELLING = 0.01
-"""Association probability below which a pair is left out of the result, which it keeps small."""
+REPORTING_THRESHOLD = 0.01
+"""Association probability below which a pair is left out of the result, to keep it small."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -21,18 +21,22 @@ class Record:
     """The evidence of C cameras for J components, of which a :class:`FusionResult` is made."""
 
     detection_probabilities: Float[ndarray, "C J"]
+    """p_D of each component in each camera."""
     sources: Int[ndarray, "C J"]
+    """Index of the box associated with each component, -1 for none."""
     source_weights: Float[ndarray, "C J"]
+    """Association probability of the component and that box, 0 … 1."""
     hidden_by: Int[ndarray, "C J"]
+    """Label of the target that occludes the component, -1 for none."""
 
     @staticmethod
     def blank(cameras: int, size: int) -> Record:
-        """No evidence yet."""
-        nobody = np.full((cameras, size), -1, dtype=np.int64)
-        return Record(np.zeros((cameras, size)), nobody, np.zeros((cameras, size)), nobody.copy())
+        """The record without evidence, of C cameras and J components."""
+        none = np.full((cameras, size), -1, dtype=np.int64)
+        return Record(np.zeros((cameras, size)), none, np.zeros((cameras, size)), none.copy())
 
     def take(self, indices: ndarray) -> Record:
-        """The columns of some components, in that order, as a copy."""
+        """Copy the columns of some components, in that order."""
         return Record(
             self.detection_probabilities.take(indices, 1),
             self.sources.take(indices, 1),
@@ -41,7 +45,7 @@ class Record:
         )
 
     def extended(self, count: int) -> Record:
-        """With blank columns for ``count`` more components."""
+        """Append blank columns for ``count`` more components."""
         blank = Record.blank(len(self.sources), count)
         return Record(
             np.concatenate([self.detection_probabilities, blank.detection_probabilities], axis=1),
@@ -51,7 +55,7 @@ class Record:
         )
 
     def result(self, posterior: GaussianMixture, associations: Associations) -> FusionResult:
-        """The step's result, these being the components of ``posterior``."""
+        """Make the result of the step, whose posterior has the components of this record."""
         return FusionResult(
             posterior,
             self.detection_probabilities,
@@ -78,20 +82,20 @@ class Ledger:
         boxes: Int[ndarray, " A"],
         probabilities: Float[ndarray, " A"],
     ) -> None:
-        """Note one camera's pairs of label and box, but for those below :data:`WORTH_TELLING`."""
-        told = (probabilities >= WORTH_TELLING).nonzero()[0]
-        if not len(told):
+        """Add one camera's pairs of label and box of at least :data:`REPORTING_THRESHOLD`."""
+        reported = (probabilities >= REPORTING_THRESHOLD).nonzero()[0]
+        if not len(reported):
             return
-        self._cameras.append(np.full(len(told), camera, dtype=np.int64))
-        self._labels.append(labels.take(told))
-        self._boxes.append(boxes.take(told))
-        self._probabilities.append(probabilities.take(told))
+        self._cameras.append(np.full(len(reported), camera, dtype=np.int64))
+        self._labels.append(labels.take(reported))
+        self._boxes.append(boxes.take(reported))
+        self._probabilities.append(probabilities.take(reported))
 
     def associations(self, labels: Int[ndarray, " J"]) -> Associations:
-        """The pairs of those labels that lived on; several of one label and box are summed.
+        """Sum the pairs by label and box, as :func:`summed` does.
 
         Args:
-            labels: Of the posterior's components, the heaviest first.
+            labels: Labels of the posterior's components, the heaviest first.
         """
         if not self._cameras:
             return Associations.none()
@@ -111,14 +115,14 @@ def summed(
     boxes: Int[ndarray, " A"],
     probabilities: Float[ndarray, " A"],
 ) -> Associations:
-    """The pairs of those labels that lived on; several of one label and box are summed.
+    """Sum association probabilities by label and box, for the labels that are in the posterior.
 
     Args:
-        labels: Of the posterior's components, the heaviest first.
-        cameras: Of the pairs, as the further ones.
-        of_pairs: Their labels.
-        boxes: Their boxes.
-        probabilities: Theirs.
+        labels: Labels of the posterior's J components, the heaviest first.
+        cameras: Camera of each of A pairs.
+        of_pairs: Label of each pair.
+        boxes: Index of the box of each pair, in its camera.
+        probabilities: Association probability of each pair, 0 … 1.
     """
     if not len(labels) or not len(cameras):
         return Associations.none()

@@ -14,13 +14,13 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
-from tracker.filters import gaussian_mixture, models, phd
+from tracker.filters import association, gaussian_mixture, models, phd
 from tracker.filters.gaussian_mixture import GaussianMixture
-from tracker.fusion import missing_frames
-from tracker.fusion.constraint_update import obey
-from tracker.fusion.labels import memory, one_person
-from tracker.fusion.labels.memory import Memory
+from tracker.filters.phd import PhdUpdate
+from tracker.fusion import memory, missing_frames
+from tracker.fusion.constraint_update import apply_constraints
 from tracker.fusion.measurement_births import Evidence
+from tracker.fusion.memory import Memory
 from tracker.fusion.missing_frames import Recent
 from tracker.fusion.model import CONFIRMED, FusionModel, all_boxes
 from tracker.fusion.place_constraints import PlaceConstraints
@@ -29,50 +29,66 @@ from tracker.fusion.record import Ledger, Record
 from tracker.kernels import linear_algebra
 from tracker.kernels.gating import Measurements
 from tracker.kernels.intensity import mixture as mixture_kernels
+from tracker.kernels.labelled import marginals
+from tracker.kernels.labelled.marginals import LabelledWeights, PairOdds
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult
 
 if TYPE_CHECKING:
     from tracker.parameters import RunParameters
 
+_LARGEST_LOG_ODDS = 600.0  # exp of it is far below the largest float
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SequentialPhdState:
-    """The posterior of the step before, the first label that is still free, and who is lost."""
+    """The posterior of a step and all that the next step needs of it."""
 
     mixture: GaussianMixture
+    """The intensity; components that share a label are one track."""
     next_label: int
+    """The first label that is free."""
     memory: Memory
+    """The confirmed tracks and those lost a short while ago."""
     recent: Recent = ()
-    """What each camera left unexplained in the last frames."""
+    """Unexplained boxes of the last frames, for cameras that have none at a step."""
 
 
 @dataclass(slots=True, eq=False)
 class _Work:
-    """One step while the cameras update it one after another."""
+    """The mutable data of one step while the cameras update it one after another."""
 
     mixture: GaussianMixture
+    """The intensity after the cameras so far."""
     record: Record
+    """The evidence for its components."""
     next_label: int
+    """The first label that is free."""
     births: range
     """Labels of this step's births."""
     sure: dict[int, float]
-    """Predicted weight of each label, where it is enough to hide others."""
+    """Predicted weight of each confirmed label, which may occlude others."""
     measured: list[Measurements]
     """The boxes of each camera as measurements."""
     unexplained: list[ndarray]
-    """What nobody explains of each camera's boxes."""
+    """Probability of each camera's boxes that no target made them."""
     ledger: Ledger
+    """Association probabilities so far."""
 
 
 class SequentialPhd:
     """Fusion by the sequential-sensor GM-PHD filter ([ZW21] §2.4).
 
     The intensity is predicted once, with births; then camera 1's boxes update it,
-    the result is the prior for camera 2, and so on. The published scheme takes the
-    centre of a box, a random walk of (x, y, z), births at the entrances only, one
-    p_D inside the picture and the plain recursion of camera after camera; each is
+    the result is the prior for camera 2, and so on. The published scheme measures the
+    centre of a box and has a random walk of (x, y, z), births at the entrances only, one
+    p_D inside the image and the plain recursion of camera after camera; each is
     one value of a parameter, and the ``published`` preset sets them all.
+
+    The plain recursion takes targets as Poisson: a miss multiplies every weight by 1 − p_D
+    whatever the cameras before detected, one component may explain two boxes, and two labels
+    may share one target. With ``misses`` at ``per_person`` a label is one target instead, which
+    exists with the sum of its components' weights; see :func:`share_boxes`.
     """
 
     def __init__(self, sequence: Sequence, parameters: RunParameters) -> None:
@@ -80,7 +96,7 @@ class SequentialPhd:
         self._model = FusionModel(sequence, parameters.fusion)
 
     def start(self) -> SequentialPhdState:
-        """Nobody is in the room."""
+        """The state without tracks, before the first step."""
         dimension = self._model.motion.dimension
         return SequentialPhdState(GaussianMixture.empty(dimension), 1, Memory.start(dimension))
 
@@ -88,12 +104,12 @@ class SequentialPhd:
         self,
         state: SequentialPhdState,
         views: Many[ViewResult],
-        told: PlaceConstraints | None = None,
+        constraints: PlaceConstraints | None = None,
     ) -> tuple[SequentialPhdState, FusionResult]:
         """Predict one step ahead and update with every camera's boxes, in the cameras' order."""
         p = self._parameters
         mixture = self._model.motion.predict(state.mixture, p.survival_probability)
-        # components are heaviest first; read from the end, a label keeps its heaviest one's place
+        # components are heaviest first; read from the end, a label gets its heaviest one's place
         previous = dict(zip(mixture.labels[::-1].tolist(), mixture.means[::-1, :3], strict=True))
         sure = _confirmed_labels(mixture)
         next_label = state.next_label
@@ -116,9 +132,9 @@ class SequentialPhd:
         recent = state.recent
         if p.birth != "entrances":
             recent = self._add_newborns(work, views, recent)
-        if told is not None:
-            mixture, record, work.next_label = obey(
-                work.mixture, work.record, told, self._model,
+        if constraints is not None:
+            mixture, record, work.next_label = apply_constraints(
+                work.mixture, work.record, constraints, self._model,
                 first_new_label=state.next_label, next_label=work.next_label,
             )  # fmt: skip
             heaviest_first = np.argsort(-mixture.weights, kind="stable")
@@ -137,7 +153,7 @@ class SequentialPhd:
         return after, record.result(mixture, associations)
 
     def _update(self, work: _Work, index: int, view: ViewResult) -> None:
-        """The update by the boxes of one camera, and its reduction."""
+        """Update by the boxes of one camera, and reduce the mixture."""
         p, model, mixture = self._parameters, self._model, work.mixture
         measurements = model.target.measured(view, p.measurement_sigma)
         if view.blind:
@@ -157,7 +173,7 @@ class SequentialPhd:
         )
         owners = None
         if p.misses == "per_person":
-            updated = one_person.share_boxes(
+            updated = share_boxes(
                 mixture,
                 updated,
                 seen.detection_probabilities,
@@ -165,7 +181,7 @@ class SequentialPhd:
                 next_label=work.next_label,
             )
             work.next_label += len(measurements.values)
-            owners = one_person.owners(updated.posterior)
+            owners = merging_owners(updated.posterior)
         posterior, parents, sources = updated.posterior, updated.parents, updated.measurements
         record = work.record.take(parents)
         record.detection_probabilities[index] = seen.detection_probabilities[parents]
@@ -186,8 +202,11 @@ class SequentialPhd:
         work.unexplained.append(1.0 - updated.measurement_weights)
 
     def _add_newborns(self, work: _Work, views: Many[ViewResult], recent: Recent) -> Recent:
-        """Components where unexplained boxes of several cameras agree on a place; what is to be
-        remembered of this step's frames."""
+        """Append births where unexplained boxes of several cameras agree on a place.
+
+        Returns:
+            The recent evidence for the next step.
+        """
         measured = Measurements(
             np.concatenate([each.values for each in work.measured]),
             np.concatenate([each.noises for each in work.measured]),
@@ -214,11 +233,11 @@ class SequentialPhd:
         return later
 
     def _without_duplicates(self, mixture: GaussianMixture, record: Record) -> Int[ndarray, " K"]:
-        """Indices of the components of those labels that do not only repeat another."""
+        """The indices of the components whose labels are no duplicates of another."""
         grouped = linear_algebra.group_labels(mixture.labels)
         labels, label = grouped.labels, grouped.places
         held = np.bincount(label, mixture.weights, len(labels))
-        # the heaviest component of a label says where its person is
+        # the heaviest component of a label stands for its position
         heaviest = mixture_kernels.heaviest_of_groups(mixture.weights, label, len(labels))
         duplicate = self._model.duplicates(
             mixture.means[heaviest], held, labels, record.sources[:, heaviest]
@@ -232,15 +251,15 @@ def _relabelled(mixture: GaussianMixture, labels: Int[ndarray, " J"]) -> Gaussia
 
 
 def _confirmed_labels(mixture: GaussianMixture) -> dict[int, float]:
-    """The labels that stand for a person, with their weight."""
+    """The weight of each confirmed label."""
     sure = np.flatnonzero(mixture.weights > CONFIRMED)
     return dict(zip(mixture.labels[sure].tolist(), mixture.weights[sure].tolist(), strict=True))
 
 
 def _occluders(mixture: GaussianMixture, sure: dict[int, float]) -> Float[ndarray, " J"]:
-    """The weight with which each component hides others, 0 for most.
+    """The weight with which each component occludes others, 0 for most.
 
-    A person hides others once: by the heaviest component of the label, which comes first.
+    A track occludes others by the heaviest component of its label alone, which comes first.
     """
     weights = np.zeros(mixture.size)
     left = dict(sure)
@@ -254,8 +273,16 @@ def _one_person_a_label(
 ) -> tuple[Int[ndarray, " J"], int]:
     """Give a new label to every confirmed component but one that shares a label.
 
-    The one nearest to where the label was predicted keeps it: two people who
-    were born as one component go on as two tracks from the step they part.
+    The one nearest to the predicted position of the label retains it: two people
+    born as one component become two tracks at the step at which they part.
+
+    Args:
+        mixture: J components, the heaviest first.
+        previous: Predicted position of each label, world metres.
+        next_label: The first label that is free.
+
+    Returns:
+        The labels of the J components, and the first label that is free afterwards.
     """
     labels = mixture.labels.copy()
     confirmed = np.flatnonzero(mixture.weights > CONFIRMED)
@@ -269,3 +296,69 @@ def _one_person_a_label(
             labels[other] = next_label
             next_label += 1
     return labels, next_label
+
+
+def share_boxes(
+    predicted: GaussianMixture,
+    updated: PhdUpdate,
+    detection_probability: Float[ndarray, " J"],
+    *,
+    births: range,
+    next_label: int,
+) -> PhdUpdate:
+    """Weight the update anew: each label makes at most one box, each box has at most one label.
+
+    With o_l(z) = Σ_{j∈l} p_j w_j q_j(z) / κ the odds of label l for box z, the
+    association probabilities P(l ← z) and P(l misses) are the marginals of the
+    one-to-one association with weights 1 − Σ_{j∈l} p_j w_j for a miss and o_l(z) for a
+    box, by belief propagation. Then
+
+        w_j(z) = P(l ← z) p_j w_j q_j(z) / (κ o_l(z))
+        w_j ← w_j (1 − p_j) P(l misses) / (1 − Σ_{i∈l} p_i w_i)
+
+    For one label alone that is Bayes' rule for existence, r' = r(1 − p)/(1 − r p) on
+    a miss, which does not depend on the order of the cameras. Births of this step stay
+    Poisson: they compete with the clutter, and a component updated by a box from them gets
+    a label of its own.
+
+    Args:
+        predicted: J components before this camera.
+        updated: The plain PHD update by the boxes of this camera.
+        detection_probability: p_j of each component.
+        births: The labels of this step's births.
+        next_label: The first label that is free.
+
+    Returns:
+        The update with these weights and labels.
+    """
+    size, boxes = predicted.size, len(updated.measurement_weights)
+    owner, box = updated.parents[size:], updated.measurements[size:]
+    shared = marginals.share_boxes(
+        LabelledWeights(predicted.weights, predicted.labels, detection_probability),
+        births.start,
+        births.stop,
+        PairOdds(owner, box, updated.log_odds, boxes),
+        _LARGEST_LOG_ODDS,
+        association.SETTLING,
+    )
+    labels = np.where(shared.of_people, predicted.labels[owner], next_label + box)
+    posterior = GaussianMixture(
+        np.concatenate([updated.posterior.weights[:size] * shared.factors, shared.shares]),
+        updated.posterior.means,
+        updated.posterior.covariances,
+        np.concatenate([predicted.labels, labels]),
+    )
+    return PhdUpdate(
+        posterior,
+        updated.parents,
+        updated.measurements,
+        updated.log_odds,
+        np.bincount(box, shared.shares, boxes),
+    )
+
+
+def merging_owners(mixture: GaussianMixture) -> Int[ndarray, " J"]:
+    """The owner of each component in merging: the label of a confirmed track, else -1."""
+    label = linear_algebra.group_labels(mixture.labels).places
+    sure = np.bincount(label, mixture.weights) > CONFIRMED
+    return np.asarray(np.where(sure[label], mixture.labels, -1))

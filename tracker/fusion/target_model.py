@@ -1,4 +1,4 @@
-"""What a camera's box should be, given where an upright target stands: the measurement model."""
+"""The measurement model: the box that a camera gives of an upright target at a position."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ MeasurementKind = Literal["centre", "box", "box_and_width"]
 UpdateKind = Literal["extended", "unscented"]
 
 SIZES: dict[MeasurementKind, int] = {"centre": 2, "box": 3, "box_and_width": 4}
-"""How many numbers of a box each kind of measurement uses."""
+"""Dimension m of each kind of measurement."""
 
 # from (centre_x, centre_y, half_width, half_height) to what each kind measures
 _FROM_BOX: dict[MeasurementKind, Float[ndarray, "m 4"]] = {
@@ -38,13 +38,13 @@ _NO_COVARIANCES = np.zeros((0, 3, 3))
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ExpectedBoxes:
-    """What one camera should measure of J states."""
+    """The predicted measurements of J states in one camera."""
 
     expected: Expected
-    """Values: centre (x, y), or horizontal centre, top, bottom (and width), in pixels. Their
-    derivatives by the state, pixels a metre; zero for velocities. What the nonlinearity of the
-    projection adds to the noise, squared pixels: one each, or nothing. The same of a person
-    who lies or is bent, where that is asked for."""
+    """The values are centre (x, y), or horizontal centre, top, bottom (and width), in pixels; the
+    Jacobians are pixels per metre, and zero for velocities; the spreads are the noise added by the
+    nonlinearity of the projection, squared pixels, one for each state or none. The same is given
+    for the second posture, lying or bent, where it is modelled."""
     boxes: Float[ndarray, "J 4"]
     """left, top, right, bottom in pixels, not clipped."""
     depths: Float[ndarray, " J"]
@@ -54,17 +54,17 @@ class ExpectedBoxes:
 
     @property
     def values(self) -> Float[ndarray, "J m"]:
-        """Of the upright."""
+        """Predicted measurement of each upright target, pixels."""
         return self.expected.values
 
     @property
     def jacobians(self) -> Float[ndarray, "J m d"]:
-        """Of the upright."""
+        """Derivative of the values by the state, of each upright target, pixels per metre."""
         return self.expected.jacobians
 
     @property
     def spreads(self) -> Float[ndarray, "K m m"]:
-        """Of the upright."""
+        """Noise added by the nonlinearity, of upright targets, squared pixels; K is J or 0."""
         return self.expected.spreads
 
 
@@ -73,23 +73,23 @@ class TargetModel:
 
     The box is predicted from the target's vertical axis: top and bottom are the
     projected ends of the axis, the horizontal centre lies between them, the
-    width is that of a cylinder of the target's mean half width. So do the boxes of
-    person detectors end; the bounds of a projected cuboid reach further below the feet.
-    The camera may be rolled in any way: in a picture turned by a quarter the box is as
+    width is that of a cylinder of the target's mean half width. The boxes of person
+    detectors have these bounds; those of a projected cuboid reach further below the feet.
+    The camera may have any roll: in an image turned by a quarter the box is as
     high as the target is wide.
 
     The projection is nonlinear. ``extended`` linearises it at the mean (extended Kalman
     filter). With ``unscented`` the values are the mean over the state's uncertainty, the
     Jacobian is that of the best linear fit through it (statistical linear regression:
     Lefebvre, Bruyninckx, De Schutter, IEEE Transactions on Automatic Control 47(8), 2002)
-    and ``spreads`` holds what is left. The tests compare both with a particle reference: of
-    a person who is followed (known to 0.08 m) they agree within 5 mm; of a newcomer (known
-    to 0.4 m) the unscented one is nearer. A newcomer is one for a few steps only, and the
+    and ``spreads`` is the covariance of the residual. The tests compare both with a particle
+    reference: for an established track (σ = 0.08 m) they agree within 5 mm; for a new one
+    (σ = 0.4 m) the unscented one is nearer. A track is new for a few steps only, and the
     unscented update takes more time: so the extended one is the default.
 
-    A person may also lie, crouch or bend, or half of him is behind a table. Then the
-    box is of another shape: with ``posture_share`` a box is one of two kinds, and
-    ``expected`` holds the second, too, low and broad and known loosely.
+    A person may also lie, crouch or bend, or be half occluded by furniture, and the
+    box then has another shape: with ``posture_share`` a box is of one of two kinds, and
+    ``expected`` includes the second, low and broad and with large noise.
     """
 
     def __init__(
@@ -100,15 +100,15 @@ class TargetModel:
         posture_share: float = 0.0,
         parameters: FusionParams = _DEFAULTS,
     ) -> None:
-        """Prepare for targets of one size.
+        """Prepare the model for targets of one size.
 
         Args:
-            half_extents: Half width, depth and height, metres.
-            kind: What is used of a box.
-            update: How the nonlinear projection is handled.
+            half_extents: Half width, depth and height of a target, metres.
+            kind: The quantities of a box that are measured.
+            update: Approximation of the nonlinear projection, extended or unscented.
             posture_share: Share of the boxes that show a person in another posture than upright:
                 lying, crouching, bent.
-            parameters: What the box of such a person should be, and how far it may be off.
+            parameters: Size and noise of the box of such a person.
         """
         self.kind: MeasurementKind = kind
         self.size = SIZES[kind]
@@ -121,7 +121,7 @@ class TargetModel:
         # R = T diag(σ²) Tᵀ is linear in σ²
         products = np.einsum("pa,qa->apq", transform, transform).reshape(4, self.size**2).copy()
         self.transforms = transform, products
-        """T (m, 4) and (4, m²), as :func:`tracker.kernels.measurement.measured_boxes` has them."""
+        """T (m, 4) and (4, m²), as :func:`tracker.kernels.measurement.measured_boxes` takes."""
         p = parameters
         sigmas = np.array(
             [
@@ -137,7 +137,7 @@ class TargetModel:
         self._targets: dict[int, Target] = {}
 
     def target(self, dimension: int) -> Target:
-        """The target as kernels know it, for states of ``dimension``."""
+        """The target in the form that the kernels take, for states of size ``dimension``."""
         if dimension not in self._targets:
             p = self._parameters
             drift = np.zeros((dimension, dimension))
@@ -165,8 +165,8 @@ class TargetModel:
 
         Args:
             camera: The calibrated camera.
-            states: Position first, metres, world frame.
-            covariances: Their uncertainty, for the unscented kind; none is taken as 0.
+            states: J states, position first, metres, world frame.
+            covariances: Covariance of each state, for the unscented kind; None stands for 0.
         """
         target = self.target(states.shape[1])
         if covariances is None:
@@ -180,18 +180,18 @@ class TargetModel:
         return ExpectedBoxes(found.expected, found.boxes, found.depths, found.valid)
 
     def measured(self, view: ViewResult, factor: float) -> Measurements:
-        """The boxes of a camera as measurements z, and their noise R in squared pixels.
+        """Convert the boxes of a camera to measurements z with noise R in squared pixels.
 
         Args:
-            view: Boxes and how far each is to be trusted.
-            factor: On the standard deviations.
+            view: Boxes and their standard deviations, pixels.
+            factor: Factor on the standard deviations.
         """
         return self.measured_boxes(view.boxes, view.sigmas, factor)
 
     def measured_boxes(
         self, boxes: Float[ndarray, "M 4"], sigmas: Float[ndarray, "M 4"], factor: float
     ) -> Measurements:
-        """As :meth:`measured`, of boxes and their standard deviations, pixels."""
+        """Convert M boxes with standard deviations, pixels, as :meth:`measured` does."""
         return measurement.measured_boxes(
             np.ascontiguousarray(boxes, dtype=float),
             np.ascontiguousarray((factor * sigmas) ** 2, dtype=float),

@@ -1,4 +1,4 @@
-"""The labelled result of a run, by columns."""
+"""The labelled tracks of a run, by columns, and their extraction from the posteriors."""
 
 from __future__ import annotations
 
@@ -22,28 +22,29 @@ from tracker.kernels.intensity import mixture as mixture_kernels
 from tracker.sequences.sequence import Room
 
 Rule = Literal["components", "boxes"]
-"""What counts as a target: a component, or what one box made of all components together."""
+"""Unit of extraction: a component, or all components that one box updated."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trajectories:
-    """One row a target a step, sorted by step and then id."""
+    """Tracks as N rows, one for each target at each step, sorted by step and then id."""
 
     frames: Int[ndarray, " N"]
+    """Step of the row, an index from 0."""
     ids: Int[ndarray, " N"]
-    """Counted from 1, in the order of first appearance."""
+    """Number of the track, from 1 in the order of first appearance."""
     positions: Float[ndarray, "N 3"]
-    """World metres."""
+    """Position of the target's centre, world metres."""
     existences: Float[ndarray, " N"]
     """Weight (PHD) or existence probability (multi-Bernoulli)."""
     sigmas: Float[ndarray, "N 3"]
     """Standard deviation of the position along x, y and z, metres."""
     seen: Bool[ndarray, "N C"]
-    """Whether a box of each camera fed the target at this step; none: it is coasting."""
+    """Whether a box of each camera updated the target at this step; without any it is coasting."""
     components: Int[ndarray, " N"]
     """Index of the component in the step's posterior; -1 where smoothed tracks have none."""
     labels: Int[ndarray, " N"]
-    """The component's label, of which the filter's id is the short form; -1 for none."""
+    """The label of the component, for which the filter's id is the short form; -1 for none."""
 
     def __len__(self) -> int:
         return len(self.frames)
@@ -54,12 +55,12 @@ class Trajectories:
         return slice(int(first), int(last))
 
     def take(self, rows: ndarray) -> Trajectories:
-        """Some of the rows, by mask or ascending index."""
+        """Select some of the rows, by mask or ascending index."""
         return Trajectories(*(getattr(self, name)[rows] for name in type(self).__slots__))
 
     @staticmethod
     def empty(cameras: int) -> Trajectories:
-        """No rows."""
+        """The tracks without rows, of ``cameras`` cameras."""
         return Trajectories(
             frames=np.zeros(0, dtype=np.int64),
             ids=np.zeros(0, dtype=np.int64),
@@ -74,17 +75,17 @@ class Trajectories:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Bounds:
-    """Where people are tracked."""
+    """The volume in which targets are extracted."""
 
     room: Room
+    """The tracked volume."""
     margin: float = np.inf
-    """Metres beyond the room's volume within which a target still counts."""
+    """Distance from the room's volume within which a target is still extracted, metres."""
     below: float = 0.0
-    """Metres more under its floor, where the middle of nobody can be: a person who lies there
-    has an error of height."""
+    """Further distance below its floor, metres: a centre there is an error of height."""
 
     def contain(self, positions: Float[ndarray, "N 3"]) -> Bool[ndarray, " N"]:
-        """Whether each position, world metres, counts."""
+        """Whether each position, world metres, lies in the volume."""
         return self.room.contains(positions, self.margin, self.below)
 
 
@@ -98,21 +99,21 @@ def extract(
     first_frame: int = 0,
     ids: dict[int, int] | None = None,
 ) -> Trajectories:
-    """The targets of each step: components above the threshold, one a label.
+    """Extract the targets of each step: components above the threshold, one for each label.
 
-    Of several components with one label the heaviest stands for it. With the rule
-    ``boxes``, for a PHD intensity, the components that one box made count together;
+    The heaviest of several components with one label represents it. With the rule
+    ``boxes``, for a PHD intensity, the components that one box updated are merged first;
     see :func:`by_boxes`.
 
     Args:
         results: The posterior of each step, from ``first_frame`` on.
-        cameras: C.
-        extraction_threshold: T_e; a component is a target where its weight is above it.
-        rule: Whether the components that one box made count by themselves or together.
-        bounds: Where people are tracked; None for everywhere.
+        cameras: C, the number of cameras.
+        extraction_threshold: T_e, the weight above which a component is a target.
+        rule: Whether components are extracted each by itself or merged by box.
+        bounds: The volume in which targets are extracted; None for everywhere.
         first_frame: The step of the first result.
-        ids: Label → id so far; new labels are added. To go on from an earlier
-            piece, pass the same one again.
+        ids: The id of each label so far; new labels are added. To continue an earlier
+            extraction, pass the same dictionary again.
     """
     ids = {} if ids is None else ids
     results = list(results)
@@ -159,34 +160,35 @@ def extract(
 def corrected(
     tracks: Trajectories, corrections: Many[Correction], step_time: float
 ) -> Trajectories:
-    """Who is who as a person said, by the tracks' rows alone; see
-    :func:`tracker.corrections.relabelling.relabelled`.
+    """Apply the corrections of identity to finished tracks, without any image or box.
+
+    See :func:`tracker.corrections.relabelling.relabelled`.
 
     Args:
-        tracks: As some run has them.
-        corrections: In their order.
-        step_time: Seconds between two steps.
+        tracks: The tracks of a run.
+        corrections: The corrections in the order in which they were made.
+        step_time: Time between two steps, seconds.
     """
     if not len(tracks) or not corrections:
         return tracks
-    ids, kept = relabelled(
+    ids, remaining = relabelled(
         tracks.frames, tracks.ids, tracks.positions, corrections, leeway=leeway(step_time)
     )
-    changed = replace(tracks, ids=ids).take(kept)
+    changed = replace(tracks, ids=ids).take(remaining)
     return changed.take(np.lexsort((changed.ids, changed.frames)))
 
 
 def by_boxes(result: FusionResult) -> tuple[GaussianMixture, Int[ndarray, " K"]]:
-    """The intensity gathered by the boxes that made it: W_z of Ristic, Clark and Vo (FUSION 2010).
+    """Merge the components that one box updated: W_z of Ristic, Clark and Vo (FUSION 2010).
 
-    The components that one box z of the last camera made become one, with the weight
+    The components that one box z of the last camera updated become one, with the weight
     W_z = Σ_j w_j(z), the mean Σ_j w_j(z) m_j / W_z and the label of the heaviest; those
-    that this camera missed are gathered by the boxes of the camera before, and so on;
-    what no camera saw stays as it is. So a person whose weight is spread over several
-    components is found, and a box is nobody's twice.
+    that this camera missed are merged by the boxes of the camera before, and so on;
+    components without any box do not change. So a target whose weight is spread over several
+    components is extracted, and no box gives two targets.
 
     Returns:
-        One component a group, and the heaviest component of each.
+        One component for each group, and the index of the heaviest component of each.
     """
     posterior, group = result.posterior, np.full(result.posterior.size, -1, dtype=np.int64)
     count = 0
@@ -206,7 +208,7 @@ def by_boxes(result: FusionResult) -> tuple[GaussianMixture, Int[ndarray, " K"]]
 
 
 def concatenate(parts: Iterable[Trajectories], cameras: int) -> Trajectories:
-    """Parts of one run, in the order of their steps."""
+    """Concatenate parts of one run, given in the order of their steps."""
     all_parts = [Trajectories.empty(cameras), *parts]
     return Trajectories(
         *(

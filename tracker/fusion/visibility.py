@@ -1,4 +1,4 @@
-"""How likely a camera is to detect each target: the picture's edge, and people behind people."""
+"""Detection probability of each target in a camera: the edge of the image, and occlusion."""
 
 from __future__ import annotations
 
@@ -14,18 +14,19 @@ from tracker.geometry.camera import Camera
 from tracker.kernels import boxes as box_kernels
 from tracker.kernels.boxes import Occlusion
 
-WORTH_TELLING = 0.2
-"""Share of a target's box that must be covered for its occluder to be named in the result. It
-changes what is reported, not what is tracked."""
+REPORTING_SHARE = 0.2
+"""Share of a target's box that must be covered for its occluder to be reported. It has no effect
+on the tracks."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Visibility:
-    """Detection probabilities of one camera for J targets, and what lowers them."""
+    """Detection probabilities of one camera for J targets, and their occluders."""
 
     detection_probabilities: Float[ndarray, " J"]
+    """p_D of each target, 0 … 1."""
     hidden_by: Int[ndarray, " J"]
-    """Label of the occluder that covers most of each target, -1 where nobody does."""
+    """Label of the occluder that covers most of each target, -1 for none."""
 
 
 def inside_probability(
@@ -35,16 +36,16 @@ def inside_probability(
     *,
     soft: bool = True,
 ) -> Float[ndarray, " J"]:
-    """Probability that the middle of each target falls inside the picture.
+    """Compute the probability that the centre of each target lies inside the image.
 
-    The predicted position is taken as Gaussian in the picture, so the value falls
+    The predicted position is taken as Gaussian in the image, so the value falls
     smoothly towards the edge, over the width of its own uncertainty; it is 0 where
     head or foot is behind the lens.
 
     Args:
-        camera: Its picture's size counts.
-        expected: The boxes that the targets should give there.
-        covariances: Of their states.
+        camera: The camera, whose image size is used.
+        expected: The predicted boxes of J targets in that camera.
+        covariances: Covariance of each target's state, metres and seconds.
         soft: False for the published edge: 1 inside, 0 outside.
     """
     inside: ndarray = box_kernels.inside_probability(
@@ -68,27 +69,27 @@ def visibility(
     strength: float,
     near: float,
 ) -> Visibility:
-    """Lower each p_D where other people stand in front.
+    """Lower each p_D where other targets stand in front.
 
         p_j ← p_j Π_l (1 − ρ w_l a(j, l))
         a(j, l) = [l is nearer to the lens than j] · area(box_j ∩ box_l) / area(box_j)
 
-    over the occluders that are somebody else: the chance that nobody hides j, for
+    over the occluders with another label: the probability that none hides j, for
     independent occluders that exist with probability w_l.
 
     Args:
         detection_probabilities: p_j without occlusion.
-        expected: The boxes that the components should give in this camera.
-        mixture: The components, with their labels.
-        occluders: Indices of the components that may hide others: sure ones, one a person.
-        weights: Their existence; at most 1 counts.
-        strength: ρ, 0 for no occlusion at all, 1 where a covered person is never seen.
-        near: Metres within which an occluder may be the target's duplicate; a target must
-            not hide behind itself.
+        expected: The predicted boxes of the components in this camera.
+        mixture: J components, with their labels.
+        occluders: Indices of the components that may occlude others: confirmed ones, one a label.
+        weights: Existence of each occluder; values above 1 count as 1.
+        strength: ρ, 0 for no occlusion, 1 where a covered target is never detected.
+        near: Distance within which an occluder may be a duplicate of the target, metres; a
+            duplicate does not occlude.
     """
     if strength == 0.0 or not len(occluders):
-        nobody = np.full(len(detection_probabilities), -1, dtype=np.int64)
-        return Visibility(detection_probabilities, nobody)
+        unoccluded = np.full(len(detection_probabilities), -1, dtype=np.int64)
+        return Visibility(detection_probabilities, unoccluded)
     found = box_kernels.hide(
         detection_probabilities,
         expected.boxes,
@@ -97,6 +98,6 @@ def visibility(
         mixture.labels,
         occluders,
         weights,
-        Occlusion(near, strength, WORTH_TELLING),
+        Occlusion(near, strength, REPORTING_SHARE),
     )
     return Visibility(found.detection_probabilities, found.hidden_by)

@@ -1,1 +1,1 @@
-"""The hot loops, compiled by numba: plain functions of arrays."""
+"""The compiled kernels of the hot loops, plain functions of arrays, by numba."""

@@ -1,4 +1,4 @@
-"""Newcomers from the boxes of several cameras, compiled: where rays meet, and what fits best."""
+"""Births from the boxes of several cameras, compiled: meeting points of rays, and their fit."""
 
 from __future__ import annotations
 
@@ -16,29 +16,29 @@ from tracker.kernels.linear_algebra import factorise, solve, squared_length
 from tracker.kernels.measurement import Target
 
 STEEPEST = 1e8
-"""A box says nothing of a place whose uncertainty adds so many times its own to it: such a place
-lies far aside of what the camera sees, where a lens's polynomial makes a millimetre many pictures,
-and the numbers do not hold both."""
+"""Ratio of the covariances of a place, projected, and of a box above which the box is left out:
+such a place lies far aside of the camera's view, where a lens's polynomial makes a millimetre many
+image widths, and the floating-point numbers do not hold both."""
 
 
 class FreeBoxes(NamedTuple):
-    """F boxes that nobody explains."""
+    """F boxes that no track explains."""
 
     indices: ndarray
-    """(F,), among all boxes."""
+    """(F,), indices among all boxes."""
     starts: ndarray
-    """(C + 1,), where each camera's begin among them."""
+    """(C + 1,), index of each camera's first box among them, and F."""
     cameras: int
-    """How many cameras have any."""
+    """Number of cameras that have any."""
 
 
 class MeetingPoints(NamedTuple):
-    """N places where rays of two cameras pass close by each other."""
+    """N points where rays of two cameras pass close by each other."""
 
     points: ndarray
     """(N, 3), world metres."""
     gaps: ndarray
-    """(N,), metres between the rays."""
+    """(N,), distances between the rays, metres."""
 
 
 class FittedPlaces(NamedTuple):
@@ -47,31 +47,32 @@ class FittedPlaces(NamedTuple):
     positions: ndarray
     """(N, 3), world metres."""
     covariances: ndarray
-    """(N, 3, 3)."""
+    """(N, 3, 3), squared metres."""
     sources: ndarray
-    """(C, N) the box in each camera, counted within it, -1 for none."""
+    """(C, N) index of the box in each camera, -1 for none."""
     fits: ndarray
     """(C, N) log N(z; h(x), R) of that box."""
 
 
 class Refinement(NamedTuple):
-    """How places are fitted."""
+    """Parameters of the fit of places."""
 
     start_sigma: float
-    """Metres; how loosely a seed binds."""
+    """Prior standard deviation around the seed, metres."""
     passes: int
+    """Number of Gauss-Newton steps."""
     gate: float
-    """Squared Mahalanobis distance of a box that belongs to the place."""
+    """Squared Mahalanobis distance within which a box belongs to the place."""
 
 
 @kernel
 def free_boxes(unexplained: ndarray, starts: ndarray, least: float) -> FreeBoxes:
-    """The boxes that nobody explains.
+    """Select the boxes that no track explains.
 
     Args:
-        unexplained: (B,), probability that nobody made each box.
-        starts: (C + 1,), where each camera's boxes begin.
-        least: A box is free above this probability.
+        unexplained: (B,), probability that no track made each box.
+        starts: (C + 1,), index of each camera's first box, and B.
+        least: Probability above which a box is free.
     """
     free = np.flatnonzero(unexplained > least)
     begins = np.searchsorted(free, starts)
@@ -85,13 +86,13 @@ def free_boxes(unexplained: ndarray, starts: ndarray, least: float) -> FreeBoxes
 def meeting_points(
     rays: ndarray, starts: ndarray, centres: ndarray, largest_gap: float
 ) -> MeetingPoints:
-    """The middles between rays of two cameras that pass close by each other, ahead of both.
+    """Compute the midpoints between rays of two cameras that pass close by, ahead of both.
 
     Args:
         rays: (B, 3) unit directions, camera after camera, world axes.
-        starts: (C + 1,), where each camera's begin.
-        centres: (C, 3) of the cameras' lenses, world metres.
-        largest_gap: Metres between two rays that count as meeting.
+        starts: (C + 1,), index of each camera's first ray, and B.
+        centres: (C, 3), positions of the cameras' lenses, world metres.
+        largest_gap: Largest distance between two rays that meet, metres.
     """
     cameras = len(centres)
     room = 0
@@ -139,17 +140,17 @@ def fit_places(
 ) -> FittedPlaces:
     """Move each seed to the place that explains the nearest free box of every camera best.
 
-    Gauss-Newton over the boxes' residuals, bound loosely to the seed; each pass chooses
+    Gauss-Newton over the boxes' residuals, with a weak prior at the seed; each pass chooses
     the nearest boxes anew. A camera that a place lies far aside of is left out.
 
     Args:
         seeds: (N, 3), world metres.
-        measurements: Of B boxes, camera after camera, each with its noise.
-        free: (B,), whether a box may be a newcomer's.
-        starts: (C + 1,), where each camera's boxes begin.
-        target: Upright.
-        cameras: C of them.
-        refinement: How far and how often.
+        measurements: The B boxes as measurements, camera after camera, each with its noise.
+        free: (B,), whether a box may be of a new target.
+        starts: (C + 1,), index of each camera's first box, and B.
+        target: The model of an upright target.
+        cameras: The C cameras.
+        refinement: Parameters of the fit.
     """
     values, noises = measurements.values, measurements.noises
     start_sigma, gate = refinement.start_sigma, refinement.gate
@@ -195,7 +196,7 @@ def fit_places(
                         residual[p] = values[box, p] - expected[n, p]
                         for q in range(size):
                             spread[p, q] = noises[box, p, q] + own[p, q]
-                        # no number of a box alone may be beyond the gate
+                        # no component of a box alone may be beyond the gate
                         near = near and residual[p] ** 2 <= gate * spread[p, p]
                         near = near and own[p, p] <= STEEPEST * noises[box, p, p]
                     if not near:

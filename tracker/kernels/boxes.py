@@ -1,4 +1,4 @@
-"""What a camera should see of upright targets, compiled: their boxes, and who hides whom."""
+"""Expected boxes of upright targets in a camera, their visibility and occlusion, compiled."""
 
 from __future__ import annotations
 
@@ -13,36 +13,36 @@ from tracker.kernels.lens import Calibration, project_points
 
 
 class UprightBoxes(NamedTuple):
-    """The boxes that a camera should give of J upright targets."""
+    """The predicted boxes of J upright targets in a camera."""
 
     values: ndarray
-    """(J, m), what is measured of each, pixels."""
+    """(J, m), predicted measurements, pixels."""
     jacobians: ndarray
-    """(J, m, d), the derivatives, pixels a metre."""
+    """(J, m, d), derivatives of the measurements by the state, pixels per metre."""
     boxes: ndarray
     """(J, 4) left, top, right and bottom, not clipped, pixels."""
     depths: ndarray
     """(J,), distance from the lens, metres."""
     valid: ndarray
-    """(J,), whether middle, head and foot lie in front of it."""
+    """(J,), whether middle, head and foot lie in front of the lens."""
 
 
 class Occlusion(NamedTuple):
-    """How far targets hide those behind them."""
+    """Parameters of the occlusion of targets by others in front of them."""
 
     near: float
-    """Metres within which an occluder may be the target's duplicate: it hides nothing."""
+    """Distance within which an occluder may be a duplicate, which does not occlude, metres."""
     strength: float
-    """ρ."""
-    worth_telling: float
-    """Share of a box from which its occluder is named."""
+    """ρ, 0 … 1, the factor on every occlusion."""
+    reporting_share: float
+    """Share of a box that must be covered for its occluder to be reported, 0 … 1."""
 
 
 class Hidden(NamedTuple):
-    """How likely J targets are detected, and who hides them."""
+    """Detection probabilities of J targets, and their occluders."""
 
     detection_probabilities: ndarray
-    """(J,)."""
+    """(J,), p_D of each target."""
     hidden_by: ndarray
     """(J,), the label of the strongest occluder, -1 for none."""
 
@@ -55,19 +55,19 @@ def expected_boxes(
     size: int,
     camera: Calibration,
 ) -> UprightBoxes:
-    """The box that a camera should give of each upright target, and its derivative.
+    """Predict the box of each upright target in a camera, and its derivative.
 
     It spans the projected axis from head to foot, whichever is above: a camera may hang upside
-    down. In a picture that is turned by about a quarter the axis lies, and the target's width
-    reaches further up and down than its ends: then the box spans that.
+    down. In an image that is turned by about a quarter the axis is horizontal, and the target's
+    width extends beyond its ends: then the box spans that.
 
     Args:
         states: (J, d), position first, world metres.
-        half_height: Of the target, metres.
-        half_width: Of the target, metres.
-        size: How much of a box is measured: 2 for its centre, 3 for horizontal centre,
+        half_height: Half height of the target, metres.
+        half_width: Half width of the target, metres.
+        size: Number of measured components of a box: 2 for its centre, 3 for horizontal centre,
             top and bottom, 4 for the width as well.
-        camera: Its picture, lens and pose.
+        camera: Image size, lens and pose of the camera.
     """
     rotation, translation = camera.rotation, camera.translation
     count, dimension = states.shape
@@ -119,7 +119,7 @@ def expected_boxes(
                 for a in range(3):
                     jacobians[j, row, a] = slopes[middle, row, a]
             continue
-        # a box ends at the picture's edge, and what lies beyond tells nothing of depth
+        # a box ends at the image's edge, and a clipped edge has no information about depth
         values[j, 0] = across
         values[j, 1] = min(max(top, 0.0), last)
         values[j, 2] = min(max(bottom, 0.0), last)
@@ -155,15 +155,15 @@ def inside_probability(
     image_size: ndarray,
     soft: bool,
 ) -> ndarray:
-    """Probability that the middle of each target falls inside the picture.
+    """Compute the probability that the centre of each target lies inside the image.
 
     Args:
         boxes: (J, 4) left, top, right, bottom, pixels.
         jacobians: (J, m, d), of which the first row belongs to x and the second to y.
-        covariances: (J, d, d).
-        valid: (J,), False where there is nothing to see.
+        covariances: (J, d, d), covariances of the states.
+        valid: (J,), False where a target is not in front of the lens.
         image_size: (2,) width and height, pixels.
-        soft: Whether the target's uncertainty counts, and a pixel more; else it is 0 or 1.
+        soft: Whether the target's uncertainty and a pixel more are included; else it is 0 or 1.
     """
     count = len(boxes)
     dimension = covariances.shape[1]
@@ -207,12 +207,12 @@ def hide(
     Args:
         detection_probabilities: (J,), p_j without occlusion.
         boxes: (J, 4) left, top, right, bottom, pixels.
-        depths: (J,) metres.
-        means: (J, d), position first.
-        labels: (J,).
-        occluders: (L,), indices of those that may hide others.
-        weights: (L,), their existence; at most 1 counts.
-        occlusion: How far they do.
+        depths: (J,) distances from the lens, metres.
+        means: (J, d) states, position first, world metres.
+        labels: (J,) labels of the components.
+        occluders: (L,), indices of the components that may occlude others.
+        weights: (L,), their existence; values above 1 count as 1.
+        occlusion: Parameters of the occlusion.
     """
     near, strength = occlusion.near, occlusion.strength
     count = len(detection_probabilities)
@@ -220,7 +220,7 @@ def hide(
     hidden_by = np.full(count, -1, dtype=np.int64)
     for j in range(count):
         area = max((boxes[j, 2] - boxes[j, 0]) * (boxes[j, 3] - boxes[j, 1]), 1e-9)
-        strongest = occlusion.worth_telling
+        strongest = occlusion.reporting_share
         for k in range(len(occluders)):
             other = occluders[k]
             if labels[other] == labels[j] or not depths[other] < depths[j]:
@@ -244,10 +244,11 @@ def hide(
 
 @kernel
 def alone(boxes: ndarray, starts: ndarray) -> ndarray:
-    """Which of a camera's boxes (B, 4), centre and half sizes, touch no other of their step.
+    """Whether each of a camera's boxes overlaps no other box of its step.
 
     Args:
-        starts: (T + 1,), where each step's boxes begin, and the end.
+        boxes: (B, 4) centre and half sizes, pixels.
+        starts: (T + 1,), index of each step's first box, and B.
     """
     result = np.ones(len(boxes), dtype=np.bool_)
     for step in range(len(starts) - 1):

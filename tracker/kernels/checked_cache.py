@@ -1,10 +1,10 @@
-"""Machine code on disk with a checksum, compiled by one process at a time.
+"""Storage of machine code with a checksum, and compilation by one process at a time.
 
-numba reads back what it kept without looking at it: an empty file is an exception at every
-start, a flipped bit a crash. Here the SHA-256 of a file's content stands at its end. And two
-processes that need a kernel at once would both compile it, as they would the kernels that it
-calls; here one does, and the other waits and reads what that has written. This leans on numba's
-insides, and so does the exact version in the project's requirements.
+numba reads stored code without verifying it: an empty file is an exception at every start, a
+flipped bit a crash. Here the SHA-256 of a file's content stands at its end, and a file that was
+cut off or changed is compiled anew. And two processes that need a kernel at once would both
+compile it and the kernels that it calls; here one does, and the other waits and reads the stored
+code. This uses numba's internals, which is why the project requires its exact version.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _Base: Any = caching.IndexDataCacheFile
 
 
 class CheckedFiles(_Base):  # type: ignore[misc]  # numba has no types
-    """The index and the machine code of one kernel."""
+    """Storage of the index and the machine code of one kernel, with checksums."""
 
     def _load_index(self) -> dict[Any, str]:
         try:
@@ -41,7 +41,7 @@ class CheckedFiles(_Base):  # type: ignore[misc]  # numba has no types
         return overloads if stamp == self._source_stamp else {}
 
     def holds(self, key: Any) -> bool:
-        """Whether there is machine code of a version of the kernel, whole or not."""
+        """Whether machine code for a key is stored, intact or not."""
         return key in self._load_index()
 
     def _load_data(self, name: str) -> Any:
@@ -57,10 +57,10 @@ class CheckedFiles(_Base):  # type: ignore[misc]  # numba has no types
 
 
 def keep(dispatcher: Any) -> None:
-    """Have a kernel's machine code kept with a checksum, and compiled by one process at a time.
+    """Let numba store a kernel's machine code with a checksum, and compile it in one process.
 
     Args:
-        dispatcher: numba's, with caching enabled.
+        dispatcher: A dispatcher of numba with caching enabled.
     """
     cache = dispatcher._cache
     plain = cache._cache_file
@@ -73,10 +73,10 @@ def keep(dispatcher: Any) -> None:
 
 
 class _OneProcess:
-    """What compiles a kernel for given types, or reads its machine code from disk.
+    """The compilation of a kernel for given types, which locks it against other processes.
 
-    No two processes wait for each other: whoever holds a kernel waits only for those that it
-    calls.
+    No two processes wait for each other: one that holds the lock of a kernel waits only for the
+    locks of the kernels that it calls.
     """
 
     def __init__(self, dispatcher: Any) -> None:
@@ -87,7 +87,7 @@ class _OneProcess:
     def __call__(self, signature: Any) -> Any:
         with global_compiler_lock, ExitStack() as held:
             if not self._is_held and self._is_missing(signature):
-                with suppress(OSError):  # where there is no place for a lock each compiles it
+                with suppress(OSError):  # without a place for a lock each process compiles it
                     held.enter_context(locked(Path(self._files._index_path)))
                     held.enter_context(self._holding())
             return self._compile(signature)
@@ -107,7 +107,7 @@ class _OneProcess:
 
     @contextmanager
     def _holding(self) -> Iterator[None]:
-        """A kernel that calls itself is asked for again while it is compiled."""
+        """A context in which a recursive kernel does not lock itself again."""
         self._is_held = True
         try:
             yield
@@ -116,13 +116,13 @@ class _OneProcess:
 
 
 def _content(path: Path) -> bytes:
-    """What a file holds before its checksum.
+    """Read the content of a file before its checksum.
 
     Raises:
-        OSError: If it cannot be read, or the two do not agree; numba then compiles anew.
+        OSError: If it cannot be read, or the checksum does not match; numba then compiles anew.
     """
     whole = path.read_bytes()
-    content, told = whole[:-_SIZE], whole[-_SIZE:]
-    if hashlib.sha256(content).digest() != told:
+    content, checksum = whole[:-_SIZE], whole[-_SIZE:]
+    if hashlib.sha256(content).digest() != checksum:
         raise OSError(f"{path} was changed or cut off since it was written")
     return content

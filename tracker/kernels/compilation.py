@@ -1,16 +1,16 @@
-"""How kernels are compiled: once a machine, into a folder that can be written to.
+"""Compilation of kernels: once on each machine, into a writable folder.
 
-numba keeps machine code beside the source, where an installed package may be read-only,
-and looks at the file of a kernel only, not at those of the kernels that it calls. So the
-code goes to the cache folder, under the hash of the kernel's file and of those that it
-takes kernels, tuples and constants from: a change leaves nothing stale behind, and what
-does not depend on it stays. ``NUMBA_CACHE_DIR`` names another place.
+numba stores machine code beside the source, where an installed package may be read-only,
+and its stamp covers the file of a kernel only, not those of the kernels that it calls. So the
+code is stored in the cache folder, under the hash of the kernel's file and of those that it
+imports kernels, tuples and constants from: after a change no stale code is used, and code that
+does not depend on it remains. ``NUMBA_CACHE_DIR`` names another folder.
 
-While another process compiles (:func:`while_compiling`), a kernel whose machine code is
-not there yet runs as plain Python: the same source, and so the same numbers, far slower,
-which a room with a few people bears. Those that loop over pixels or samples would take seconds
-a picture; they are :func:`pixel_kernel`, and are always compiled. So is what is called with a
-large array, such as the rays of all pixels that a room is rendered through.
+While another process compiles (:func:`while_compiling`), a kernel without machine code runs as
+plain Python: with the same numbers and far slower, which is bearable for a few people. Kernels
+that loop over pixels or samples would take seconds for each image; they are
+:func:`pixel_kernel`, and are always compiled. So is a kernel that is called with a large array,
+such as the rays of all pixels that a room is rendered through.
 """
 
 from __future__ import annotations
@@ -44,11 +44,11 @@ _KERNELS: list[Any] = []
 """Every kernel of the modules that have been imported, in the order of definition."""
 
 _KEPT_SECONDS = 30 * 86400.0
-"""Machine code that was not used for so long is deleted."""
+"""Time after which unused machine code is deleted, seconds."""
 
 _LARGE = 50_000
-"""Elements of an array for which plain Python takes longer than the compilation, some two seconds
-at 30 microseconds each."""
+"""Number of elements of an array from which plain Python takes longer than the compilation, some
+two seconds at 30 microseconds each."""
 
 _config: Any = numba.config
 
@@ -59,11 +59,11 @@ _IMPORT = re.compile(
     rb"^[ \t]*((?:from[ \t]+[\w.]+[ \t]+)?import[ \t]+(?:\([^()]*\)|[\w., \t]+))[ \t]*(?:#.*)?$",
     re.MULTILINE,
 )
-"""A statement that imports, alone on its lines."""
+"""An import statement that has its lines for itself."""
 
 
 def kernel(function: _F) -> _F:
-    """Compile on the first call, keep the machine code on disk, release the interpreter."""
+    """Compile on the first call, store the machine code on disk, release the interpreter's lock."""
     compiled: Any = pixel_kernel(function)
     if not _config.DISABLE_JIT:  # numba's own variable: then it is the function itself
         compiled._compile_for_args = _Chooser(compiled)
@@ -71,21 +71,21 @@ def kernel(function: _F) -> _F:
 
 
 def pixel_kernel(function: _F) -> _F:
-    """As :func:`kernel`, for loops over pixels or samples: never run as plain Python."""
+    """Compile like :func:`kernel`, for loops over pixels or samples, never run as plain Python."""
     compiled = compiled_later(function)
     _KERNELS.append(compiled)
     return compiled
 
 
 def compiled_later(function: _F) -> _F:
-    """As :func:`kernel`, and not counted among the kernels."""
+    """Compile like :func:`kernel` a function that is not counted among the kernels."""
     before = _config.CACHE_DIR
     _config.CACHE_DIR = str(_folder_of(Path(function.__code__.co_filename)))
     try:
         compiled = numba.njit(cache=True, nogil=True)(function)
         if not _config.DISABLE_JIT:
             checked_cache.keep(compiled)
-    except RuntimeError:  # nowhere to write to: it is compiled at every start
+    except RuntimeError:  # no writable folder: it is compiled at every start
         compiled = numba.njit(nogil=True)(function)
     finally:
         _config.CACHE_DIR = before
@@ -93,9 +93,10 @@ def compiled_later(function: _F) -> _F:
 
 
 class _Chooser:
-    """What a kernel asks when it is called with arguments that it was not compiled for.
+    """The choice between machine code and plain Python for arguments of new types.
 
-    numba calls whatever function it is given back: the machine code, or plain Python.
+    It replaces the function of numba that compiles for given arguments; numba calls the function
+    that it returns.
     """
 
     def __init__(self, dispatcher: Any) -> None:
@@ -115,29 +116,29 @@ class _Chooser:
         return by_hand(self._dispatcher)
 
     def _is_kept(self, arguments: tuple[Any, ...]) -> bool:
-        """Whether the other process has put the machine code on disk by now."""
+        """Whether the other process has stored the machine code by now."""
         dispatcher = self._dispatcher
         signature = tuple(dispatcher.typeof_pyval(each) for each in arguments)
-        with global_compiler_lock:  # what it reads into is shared by all threads
+        with global_compiler_lock:  # the code is read into memory that all threads share
             found = dispatcher._cache.load_overload(signature, dispatcher.targetctx)
         return found is not None
 
 
 class _Elsewhere:
-    """Whether another process compiles, and how often it has told of something new."""
+    """The state of compilation in another process."""
 
     compiles = False
     news = 0
 
 
 def while_compiling() -> None:
-    """From now on another process compiles: what is not ready runs as plain Python."""
+    """Note that another process compiles: kernels without machine code run as plain Python."""
     _Elsewhere.compiles = True
 
 
 @contextmanager
 def only_of_pixels() -> Iterator[None]:
-    """Within it none but :func:`pixel_kernel` is compiled."""
+    """A context in which only :func:`pixel_kernel` is compiled."""
     while_compiling()
     try:
         yield
@@ -146,23 +147,23 @@ def only_of_pixels() -> Iterator[None]:
 
 
 def news_of_compiling() -> None:
-    """The other process has more machine code on disk: look again."""
+    """Note that the other process has stored more machine code."""
     _Elsewhere.news += 1
 
 
 def no_longer_compiling() -> None:
-    """No other process compiles: what is still missing is compiled here, when it is called."""
+    """Note that no other process compiles: missing kernels are compiled when they are called."""
     _Elsewhere.compiles = False
 
 
 @cache
 def by_hand(dispatcher: Any) -> Callable[..., Any]:
-    """A kernel as plain Python, and so are all kernels that it calls."""
+    """A kernel as plain Python, together with all kernels that it calls."""
     plain = _plain(dispatcher)
 
     @wraps(plain)
     def silently(*arguments: Any) -> Any:
-        # machine code divides and overflows without a word
+        # machine code gives no warnings for division by zero and overflow
         with np.errstate(all="ignore"):
             return plain(*arguments)
 
@@ -179,19 +180,19 @@ def _plain(dispatcher: Any) -> Callable[..., Any]:
             names[name] = _plain(called)
     plain = types.FunctionType(function.__code__, names, closure=function.__closure__)
     plain.__defaults__ = function.__defaults__
-    names[function.__name__] = plain  # for those that call themselves
+    names[function.__name__] = plain  # for recursive kernels
     return plain
 
 
 def kernel_folder() -> Path:
-    """Where machine code is kept: ``$NUMBA_CACHE_DIR``, else in the cache folder."""
+    """The folder of machine code: ``$NUMBA_CACHE_DIR``, else one in the cache folder."""
     given = os.environ.get("NUMBA_CACHE_DIR")
     return Path(given) if given else cache_folder() / "kernels"
 
 
 @cache
 def _folder_of(file: Path) -> Path:
-    """Where the machine code of a file's kernels is kept; it is marked as used."""
+    """The folder of the machine code of a file's kernels, which is marked as used."""
     folder = kernel_folder() / _digest(_with_used(file, set()))
     with contextlib.suppress(OSError):
         folder.mkdir(parents=True, exist_ok=True)
@@ -200,7 +201,7 @@ def _folder_of(file: Path) -> Path:
 
 
 def _with_used(file: Path, known: set[Path]) -> set[Path]:
-    """A file and those that make part of its machine code, which it imports, however far."""
+    """A file and all files that are part of its machine code by direct or indirect import."""
     if file not in known:
         compiled_in, imported = _looked_at(file)
         if compiled_in or (not known and file.is_file()):
@@ -210,9 +211,9 @@ def _with_used(file: Path, known: set[Path]) -> set[Path]:
     return known
 
 
-@cache  # each file is asked for by many kernel files
+@cache  # each file is imported by many kernel files
 def _looked_at(file: Path) -> tuple[bool, tuple[Path, ...]]:
-    """Whether a file may make part of machine code, and the files that it may import."""
+    """Whether a file may be part of machine code, and the files that it may import."""
     if not file.is_file():
         return False, ()
     text = file.read_bytes()
@@ -222,16 +223,16 @@ def _looked_at(file: Path) -> tuple[bool, tuple[Path, ...]]:
 
 
 def _is_compiled_in(file: Path, text: bytes) -> bool:
-    """Whether a file has kernels, or the tuples and constants of the kernels' room."""
-    in_room = _ROOT / "kernels" in file.parents and file.name != Path(__file__).name
-    return in_room or _HAS_KERNELS.search(text) is not None
+    """Whether a file has kernels, or the tuples and constants of the package of kernels."""
+    in_package = _ROOT / "kernels" in file.parents and file.name != Path(__file__).name
+    return in_package or _HAS_KERNELS.search(text) is not None
 
 
 def _imported(source: bytes) -> tuple[str, ...]:
-    """Every module of the engine that a source may import, in whatever way it says so."""
-    said = [match.group(1) for match in _IMPORT.finditer(source)]
-    if len(said) == len(_IMPORT_WORD.findall(source)):  # parsing all the rest takes far longer
-        source = b"\n".join(said)
+    """Every module of the engine that a source may import, by any form of import statement."""
+    statements = [match.group(1) for match in _IMPORT.finditer(source)]
+    if len(statements) == len(_IMPORT_WORD.findall(source)):  # parsing all takes far longer
+        source = b"\n".join(statements)
     found: list[str] = []
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.Import):
@@ -250,12 +251,12 @@ def _digest(files: Iterable[Path]) -> str:
 
 @cache
 def _version() -> str:
-    """A digest of all files that make part of machine code."""
+    """A digest of all files that are part of machine code."""
     return _digest(p for p in _ROOT.rglob("*.py") if _is_compiled_in(p, p.read_bytes()))
 
 
 def _mark() -> Path:
-    """A file that says that all kernels were compiled."""
+    """The path of a file that exists once all kernels were compiled."""
     return kernel_folder() / f"{_version()}.complete"
 
 
@@ -265,7 +266,7 @@ def is_compiled() -> bool:
 
 
 def mark_compiled() -> None:
-    """Remember that every kernel was compiled; forget those of versions long out of use."""
+    """Note that every kernel was compiled, and delete machine code long out of use."""
     with contextlib.suppress(OSError):
         _mark().parent.mkdir(parents=True, exist_ok=True)
         _mark().touch()
@@ -276,25 +277,25 @@ def mark_compiled() -> None:
 
 
 def counts() -> tuple[int, int]:
-    """How many kernels are ready for some arguments, and how many there are."""
+    """The number of kernels that are compiled for some arguments, and the number of all."""
     return sum(1 for each in _KERNELS if each.signatures), len(_KERNELS)
 
 
 def without_signature() -> list[str]:
-    """The names of the kernels that nobody has called."""
+    """The names of the kernels that were never called."""
     return [each.py_func.__qualname__ for each in _KERNELS if not each.signatures]
 
 
 @contextmanager
-def followed(told: Callable[[], None]) -> Iterator[None]:
-    """Tell whenever a kernel has been compiled rather than read from disk."""
+def followed(on_compiled: Callable[[], None]) -> Iterator[None]:
+    """A context that calls a function whenever a kernel is compiled rather than read from disk."""
 
     class Listener(event.Listener):
         def on_start(self, _: object) -> None:
-            told()
+            on_compiled()
 
         def on_end(self, _: object) -> None:
-            told()
+            on_compiled()
 
     listener = Listener()
     event.register("numba:compile", listener)  # type: ignore[no-untyped-call]

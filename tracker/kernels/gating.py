@@ -1,4 +1,4 @@
-"""Which measurements lie within the gates of which components, compiled."""
+"""Gating: the pairs of components and measurements within the gates, compiled."""
 
 from __future__ import annotations
 
@@ -13,28 +13,28 @@ from tracker.kernels.compilation import kernel
 
 
 class Measurements(NamedTuple):
-    """M measurements of m numbers each."""
+    """M measurements of m components each."""
 
     values: ndarray
-    """(M, m)."""
+    """(M, m), pixels."""
     noises: ndarray
-    """(1, m, m), one covariance for all, or (M, m, m)."""
+    """(1, m, m), one covariance for all, or (M, m, m), squared pixels."""
 
 
 class GatedPairs(NamedTuple):
     """P pairs of a component and a measurement inside its gate."""
 
     components: ndarray
-    """(P,)."""
+    """(P,), index of the component."""
     measured: ndarray
-    """(P,), the measurement."""
+    """(P,), index of the measurement."""
     log_likelihoods: ndarray
     """(P,), log N(z; h, S)."""
 
 
 @kernel
 def _widest_axis(values: ndarray, reach: ndarray) -> int:
-    """The axis along which values (N, d) lie furthest apart, measured by the mean reach (J, d)."""
+    """The axis along which values (N, d) are spread most, in units of the mean reach (J, d)."""
     best = 0
     most = -1.0
     for a in range(values.shape[1]):
@@ -57,12 +57,12 @@ def _widest_axis(values: ndarray, reach: ndarray) -> int:
 def factor_innovation(
     own: ndarray, j: int, noises: ndarray, n: int, lower: ndarray, place: int, rows: Sequence[int]
 ) -> float:
-    """Cholesky factor of S = own + R into ``lower[place]``, and log of 1 / √det(2π S).
+    """Cholesky factor of S = own + R into ``lower[place]``; returns log of 1 / √det(2π S).
 
-    On its diagonal is 1 / L_pp instead of L_pp: whoever solves with it multiplies.
+    The diagonal has 1 / L_pp instead of L_pp, so that solving multiplies.
 
     Args:
-        rows: Of the measurement: a range, or, so that loops are unrolled, a tuple of as many.
+        rows: Components of the measurement: a range, or a tuple of as many for unrolled loops.
     """
     constant: float = -0.5 * len(rows) * math.log(2.0 * math.pi)
     product = 1.0
@@ -86,19 +86,19 @@ def factor_innovation(
 def gated_pairs(
     expected: ndarray, measurements: Measurements, own: ndarray, gate: float, lower: ndarray
 ) -> GatedPairs:
-    """The pairs inside their gates, measurement by measurement.
+    """List the pairs inside their gates, measurement by measurement.
 
-    What lies within the gate of S lies within √(gate S_pp) along every axis p: only such
-    measurements are looked at, found by bisection along one axis. The result is that of
-    looking at all.
+    A measurement within the gate of S lies within √(gate S_pp) along every axis p: only such
+    measurements are compared, found by bisection along one axis. The result equals that of
+    comparing all.
 
     Args:
-        expected: (J, m).
-        measurements: With their noise.
-        own: (J, m, m), what each component adds to the noise.
-        gate: Squared Mahalanobis distance.
-        lower: (J, m, m) with one noise for all, else (1, m, m): takes what
-            :func:`factor_innovation` gives for each component, or at last.
+        expected: (J, m), predicted measurement of each component.
+        measurements: M measurements with their noise.
+        own: (J, m, m), H P Hᵀ of each component, which is added to the noise.
+        gate: Squared Mahalanobis distance of the gate.
+        lower: (J, m, m) with one noise for all, else (1, m, m): receives the result of
+            :func:`factor_innovation` for each component, or for the last one.
     """
     size, order = expected.shape
     count = len(measurements.values)
@@ -121,7 +121,7 @@ def _gated(
     lower: ndarray,
     rows: Sequence[int],
 ) -> GatedPairs:
-    """:func:`gated_pairs`, component by component; rows as of :func:`factor_innovation`."""
+    """List the pairs as :func:`gated_pairs`, component by component, with its kind of ``rows``."""
     size, order = expected.shape
     values, noises = measurements.values, measurements.noises
     count = len(values)
@@ -132,7 +132,7 @@ def _gated(
         for j in range(size):
             if not own[j, p, p] + noise > 0.0:
                 raise np.linalg.LinAlgError("H P H' + R is not positive definite")
-            # a little more than the bound, so that rounding excludes nothing
+            # a little more than the bound, so that rounding excludes no measurement
             reach[j, p] = math.sqrt(gate * (own[j, p, p] + noise)) * (1.0 + 1e-9)
     axis = _widest_axis(values, reach)
     by_axis = np.argsort(values[:, axis])
@@ -156,7 +156,7 @@ def _gated(
         last = np.searchsorted(coordinates, expected[j, axis] + reach[j, axis], "right")
         found = 0
         for k in range(first, last):
-            # without a branch, which nobody could foresee
+            # without a branch, which would be unpredictable
             near = True
             for p in range(len(rows)):
                 near &= abs(ordered[k, p] - expected[j, p]) <= reach[j, p]
@@ -194,7 +194,7 @@ def _gated(
 
 @kernel
 def _by_measurement(pairs: GatedPairs, count: int) -> GatedPairs:
-    """The same pairs, measurement by measurement; in the order they had where it is one."""
+    """Sort pairs measurement by measurement, retaining their order within each."""
     component, measured, likelihood = pairs.components, pairs.measured, pairs.log_likelihoods
     place_of = np.zeros(count + 1, dtype=np.int64)
     for z in measured:

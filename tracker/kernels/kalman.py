@@ -14,19 +14,19 @@ from tracker.kernels.gating import GatedPairs, Measurements, factor_innovation, 
 
 
 class Expected(NamedTuple):
-    """What J components predict of a measurement, linearised: of a target in one of two postures.
+    """The linearised predicted measurements of J components, of a target in one of two postures.
 
         g(z|x) = (1 − ε) N(z; h(x), R + Ω) + ε N(z; h'(x'), R + Ω'),  x' = x + N(0, D)
 
-    What belongs to the other posture has no rows where there is none.
+    The arrays of the other posture have no rows where there is none.
     """
 
     values: ndarray
-    """h (J, m) of each mean."""
+    """h (J, m), the predicted measurement of each mean, pixels."""
     jacobians: ndarray
-    """H (J, m, d), or (1, m, d), one for all."""
+    """H (J, m, d), or (1, m, d), one for all, pixels per metre."""
     spreads: ndarray
-    """Ω (J, m, m), what a component adds to the noise, or (0, m, m) for nothing."""
+    """Ω (J, m, m), noise that a component adds by nonlinearity, or (0, m, m) for none."""
     posture_values: ndarray
     """h' (J, m), or (0, m)."""
     posture_jacobians: ndarray
@@ -34,13 +34,13 @@ class Expected(NamedTuple):
     posture_spreads: ndarray
     """Ω' (J, m, m), or (0, m, m)."""
     posture_drift: ndarray
-    """D (d, d), how far a state may have moved with the change of posture."""
+    """D (d, d), covariance of the change of a state with the posture."""
     posture_share: float
-    """ε, of the measurements, above 0 and below 1."""
+    """ε, share of the measurements in the other posture, above 0 and below 1."""
 
     @staticmethod
     def of(values: ndarray, jacobians: ndarray, spreads: ndarray | None = None) -> Expected:
-        """Of one posture: arrays of any kind, as kernels take them; no spread is none."""
+        """Make predictions of one posture, from arrays of any memory layout; None for no spread."""
         size, dimension = jacobians.shape[1:]
         return Expected(
             np.ascontiguousarray(values, dtype=float),
@@ -55,48 +55,48 @@ class Expected(NamedTuple):
 
 
 class Pairs(NamedTuple):
-    """P components, each updated by a measurement inside its gate."""
+    """P pairs, each a component updated by a measurement inside its gate."""
 
     components: ndarray
-    """(P,), which component."""
+    """(P,), index of the component."""
     measured: ndarray
-    """(P,), by which measurement."""
+    """(P,), index of the measurement."""
     log_likelihoods: ndarray
     """(P,), log N(z; h, S)."""
     means: ndarray
-    """(P, d)."""
+    """(P, d), updated states."""
     covariances: ndarray
-    """(P, d, d), in Joseph form, which stays symmetric and positive."""
+    """(P, d, d), updated covariances in Joseph form, which stays symmetric and positive."""
 
 
 class _Innovations(NamedTuple):
-    """What J components make of the innovations' covariances S."""
+    """The contributions of J components to the innovation covariances S."""
 
     cross: ndarray
     """P Hᵀ (J, d, m)."""
     own: ndarray
-    """H P Hᵀ + Ω (J, m, m), what a component adds to the noise."""
+    """H P Hᵀ + Ω (J, m, m)."""
 
 
 class _Spot(NamedTuple):
-    """One filtered covariance: of whom, and where it is written."""
+    """Indices of one updated covariance."""
 
     component: int
     noise: int
     factored: int
-    """Where the Cholesky factor of its S is."""
+    """Index of the Cholesky factor of its S."""
     place: int
 
 
 class _Filtered(NamedTuple):
-    """Gains and covariances of all spots, and room to write in while one is worked out."""
+    """Gains and covariances of all spots, and working memory for one of them."""
 
     gains: ndarray
     """K (N, d, m)."""
     covariances: ndarray
     """(I − K H) P (I − K H)ᵀ + K R Kᵀ (N, d, d)."""
     noise: ndarray
-    """(m, m)."""
+    """(m, m), working memory as the following."""
     factor: ndarray
     """(d, d)."""
     half: ndarray
@@ -109,13 +109,13 @@ class _Filtered(NamedTuple):
 def _innovations(
     covariances: ndarray, expected: Expected, axes: Sequence[int], rows: Sequence[int]
 ) -> _Innovations:
-    """P Hᵀ and H P Hᵀ + Ω of every component.
+    """Compute P Hᵀ and H P Hᵀ + Ω of every component.
 
     Args:
         covariances: P (J, d, d).
-        expected: With H and Ω.
-        axes: Of the state: a range, or, so that loops are unrolled, a tuple of as many.
-        rows: Of the measurement, likewise.
+        expected: The predictions, with H and Ω.
+        axes: Axes of the state: a range, or a tuple of as many for unrolled loops.
+        rows: Components of the measurement, likewise.
     """
     jacobians, spreads = expected.jacobians, expected.spreads
     size = len(covariances)
@@ -149,17 +149,17 @@ def _filter(
     filtered: _Filtered,
     axes_and_rows: tuple[Sequence[int], Sequence[int]],
 ) -> None:
-    """Gain and covariance of one spot, in place.
+    """Compute gain and covariance of one spot, in place.
 
     Args:
-        spot: Of whom, and where.
-        cross: Of :class:`_Innovations`.
+        spot: Component, noise and indices of the result.
+        cross: P Hᵀ, as in :class:`_Innovations`.
         lower: Cholesky factors of S, of :func:`tracker.kernels.gating.factor_innovation`.
         covariances: P (J, d, d).
-        expected: With H and Ω.
+        expected: The predictions, with H and Ω.
         noises: R (N, m, m).
-        filtered: Takes the result.
-        axes_and_rows: Of :func:`_innovations`.
+        filtered: Receives the result.
+        axes_and_rows: Axes and rows, as in :func:`_innovations`.
     """
     axes, rows = axes_and_rows
     j, n, factored, place = spot.component, spot.noise, spot.factored, spot.place
@@ -223,7 +223,7 @@ def _updated(
     lower: ndarray,
     axes_and_rows: tuple[Sequence[int], Sequence[int]],
 ) -> Pairs:
-    """The pairs with their means and covariances."""
+    """Compute means and covariances of the gated pairs."""
     axes, rows = axes_and_rows
     component, measured = pairs.components, pairs.measured
     noises = measurements.noises
@@ -275,14 +275,14 @@ def kalman_pairs(
     measurements: Measurements,
     gate: float,
 ) -> Pairs:
-    """The Kalman update of every component by every measurement inside its gate.
+    """Compute the Kalman update of every component by every measurement inside its gate.
 
     Args:
-        means: (J, d).
-        covariances: (J, d, d).
+        means: (J, d), states.
+        covariances: (J, d, d), covariances.
         expected: The measurement that each component predicts.
-        measurements: M of them.
-        gate: Squared Mahalanobis distance of the innovation; infinity for none.
+        measurements: M measurements with their noise.
+        gate: Squared Mahalanobis distance of the innovation; infinity for no gate.
 
     Returns:
         The pairs, measurement by measurement.
@@ -292,7 +292,7 @@ def kalman_pairs(
     """
     dimension, order = means.shape[1], measurements.values.shape[1]
     lower = np.empty((len(means) if len(measurements.noises) == 1 else 1, order, order))
-    # places in the plane and velocities are so frequent that their loops are unrolled
+    # positions and velocities in common sizes are so frequent that their loops are unrolled
     if dimension == 4 and order == 2:
         axes, rows = (0, 1, 2, 3), (0, 1)
         innovations = _innovations(covariances, expected, axes, rows)
@@ -308,7 +308,7 @@ def kalman_pairs(
 
 @kernel
 def _in_posture(expected: Expected) -> Expected:
-    """What is predicted of those in the other posture, as of the only one."""
+    """The predictions of the other posture, as those of a single posture."""
     return Expected(
         expected.posture_values,
         expected.posture_jacobians,
@@ -329,13 +329,13 @@ def all_pairs(
     measurements: Measurements,
     gate: float,
 ) -> Pairs:
-    """:func:`kalman_pairs` of a measurement of a target in one of two postures.
+    """Compute the Kalman update as :func:`kalman_pairs`, of a target in one of two postures.
 
     Args:
-        means: As the further ones, of :func:`kalman_pairs`.
+        means: (J, d), states; the other arguments are those of :func:`kalman_pairs`.
 
     Returns:
-        The pairs of the first posture and then those of the other.
+        The pairs of the first posture, followed by those of the other.
     """
     first = kalman_pairs(means, covariances, expected, measurements, gate)
     if len(expected.posture_values) == 0:

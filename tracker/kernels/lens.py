@@ -1,4 +1,4 @@
-"""Pinhole and radial-tangential lens, compiled: forth with its derivative, and back."""
+"""Camera projection, pinhole with lens distortion, compiled: with its derivative, and inverted."""
 
 from __future__ import annotations
 
@@ -25,44 +25,44 @@ class Calibration(NamedTuple):
     distortion: ndarray
     """(5,), k1 k2 p1 p2 k3, or the :data:`GENERAL` numbers of another model."""
     nearest_depth: float
-    """Metres; what is nearer than this does not count."""
+    """Depth below which a point is invalid, metres."""
     largest_radius: float
-    """What is further aside, in units of the depth, does not count."""
+    """Radius, in units of the depth, beyond which a point is invalid."""
 
 
 class Calibrations(NamedTuple):
     """C calibrated cameras: the fields of :class:`Calibration`, stacked."""
 
     image_sizes: ndarray
-    """(C, 2)."""
+    """(C, 2), width and height, pixels."""
     rotations: ndarray
-    """(C, 3, 3)."""
+    """(C, 3, 3), world to camera axes."""
     translations: ndarray
-    """(C, 3)."""
+    """(C, 3), metres, camera axes."""
     intrinsics: ndarray
-    """(C, 3, 3)."""
+    """(C, 3, 3), pixels."""
     distortions: ndarray
-    """(C, 5)."""
+    """(C, 5), or (C, :data:`GENERAL`) where a lens has another model."""
     nearest_depth: float
-    """Of all."""
+    """Depth below which a point is invalid, metres, for all cameras."""
     largest_radii: ndarray
-    """(C,)."""
+    """(C,), radii beyond which a point is invalid."""
 
 
 class Projection(NamedTuple):
-    """N world points in a picture."""
+    """N world points in an image."""
 
     pixels: ndarray
-    """(N, 2), NaN where the point does not count."""
+    """(N, 2), NaN where the point is invalid."""
     jacobians: ndarray
-    """(N, 2, 3) pixels a metre, 0 where the point does not count; or (0, 2, 3)."""
+    """(N, 2, 3) pixels per metre, 0 where the point is invalid; or (0, 2, 3)."""
     valid: ndarray
-    """(N,), whether it counts."""
+    """(N,), whether the point is valid."""
 
 
 @kernel
 def one_camera(cameras: Calibrations, index: int) -> Calibration:
-    """One of several cameras."""
+    """Select one of several cameras."""
     return Calibration(
         cameras.image_sizes[index],
         cameras.rotations[index],
@@ -75,12 +75,12 @@ def one_camera(cameras: Calibrations, index: int) -> Calibration:
 
 
 GENERAL = 9
-"""Numbers of a lens that is not plain: k1 k2 p1 p2 k3 k4 k5 k6 and 1 for a fisheye, else 0."""
+"""Number of coefficients of a general lens: k1 k2 p1 p2 k3 k4 k5 k6, and 1 if a fisheye, else 0."""
 
 
 @kernel
 def bend(r2: float, distortion: ndarray) -> tuple[float, float]:
-    """How much farther from the middle a lens draws, and twice its derivative by r².
+    """The radial factor of a lens, and twice its derivative by r².
 
     Plain: 1 + k1 r² + k2 r⁴ + k3 r⁶; rational: that, divided by 1 + k4 r² + k5 r⁴ + k6 r⁶;
     fisheye: θ (1 + k1 θ² + k2 θ⁴ + k3 θ⁶ + k4 θ⁸) / r with r = tan θ (OpenCV, calib3d; the
@@ -88,7 +88,7 @@ def bend(r2: float, distortion: ndarray) -> tuple[float, float]:
 
     Args:
         r2: Squared radius, in units of the depth.
-        distortion: As :class:`Calibration` has it.
+        distortion: Coefficients, as in :class:`Calibration`.
     """
     k1, k2, k3 = distortion[0], distortion[1], distortion[4]
     if len(distortion) == GENERAL and distortion[8] > 0.0:
@@ -113,7 +113,7 @@ def bend(r2: float, distortion: ndarray) -> tuple[float, float]:
 
 @kernel
 def unbend_fisheye(drawn: float, distortion: ndarray, iterations: int) -> float:
-    """tan θ / θ_d of a point that a fisheye draws at the radius θ_d: Newton's method on θ."""
+    """tan θ / θ_d of a point that a fisheye projects at radius θ_d, by Newton's method on θ."""
     if drawn < 1e-8:
         return 1.0
     k1, k2, k3, k4 = distortion[0], distortion[1], distortion[4], distortion[5]
@@ -125,7 +125,7 @@ def unbend_fisheye(drawn: float, distortion: ndarray, iterations: int) -> float:
         if rise < 1e-6:
             break
         step = error / rise
-        # the plane of the picture holds what is less than a right angle aside
+        # the image plane holds angles of less than 90 degrees
         angle = min(max(angle - step, 1e-9), 1.57)
         if step * step < 1e-24:
             break
@@ -134,12 +134,12 @@ def unbend_fisheye(drawn: float, distortion: ndarray, iterations: int) -> float:
 
 @kernel
 def project_points(points: ndarray, camera: Calibration, with_jacobian: bool) -> Projection:
-    """Draw world points through a radial-tangential lens.
+    """Project world points through a lens.
 
     Args:
         points: (N, 3), world metres.
-        camera: With its lens.
-        with_jacobian: Whether the derivative is wanted.
+        camera: The calibrated camera.
+        with_jacobian: Whether the derivative is computed.
     """
     translation, intrinsics = camera.translation, camera.intrinsics
     nearest_depth, largest_radius = camera.nearest_depth, camera.largest_radius
@@ -185,15 +185,15 @@ def project_points(points: ndarray, camera: Calibration, with_jacobian: bool) ->
 
 @kernel
 def undistort(distorted: ndarray, distortion: ndarray, iterations: int) -> ndarray:
-    """Undo the lens model by Newton's method.
+    """Invert the lens model by Newton's method.
 
     Args:
-        distorted: (N, 2), normalised image coordinates as the lens draws them.
-        distortion: As :class:`Calibration` has it.
-        iterations: At most so many; four or five are enough inside a picture.
+        distorted: (N, 2), normalised image coordinates with distortion.
+        distortion: Coefficients, as in :class:`Calibration`.
+        iterations: Largest number of iterations; four or five suffice inside an image.
 
     Returns:
-        (N, 2), the coordinates that a pinhole would have drawn.
+        (N, 2), normalised coordinates without distortion.
     """
     p1, p2 = distortion[2], distortion[3]
     straight = distorted.copy()
@@ -228,12 +228,12 @@ def undistort(distorted: ndarray, distortion: ndarray, iterations: int) -> ndarr
 
 @kernel
 def directions(pixels: ndarray, camera: Calibration, iterations: int) -> ndarray:
-    """Unit directions of the rays that a lens draws at some pixels: the way back.
+    """Compute the unit directions of the rays through pixels.
 
     Args:
         pixels: (N, 2).
-        camera: With its lens.
-        iterations: Of :func:`undistort`; 0 for a pinhole.
+        camera: The calibrated camera.
+        iterations: Largest number of iterations of :func:`undistort`; 0 for a pinhole.
 
     Returns:
         (N, 3), world axes.

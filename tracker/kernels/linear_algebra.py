@@ -1,6 +1,6 @@
-"""The hot loops, compiled by numba: plain functions of arrays, called without the interpreter.
+"""Kernels of linear algebra, grouping and duplicates, compiled.
 
-Every kernel has a NumPy or SciPy counterpart in the tests that it must agree with.
+Every kernel must agree with a NumPy or SciPy counterpart in the tests.
 """
 
 from __future__ import annotations
@@ -18,36 +18,36 @@ class Gaussians(NamedTuple):
     """J weighted Gaussians over a d-dimensional state."""
 
     weights: ndarray
-    """(J,)."""
+    """(J,), expected numbers of targets."""
     means: ndarray
-    """(J, d)."""
+    """(J, d), states."""
     covariances: ndarray
-    """(J, d, d)."""
+    """(J, d, d), covariances."""
 
 
 class LabelGroups(NamedTuple):
-    """Which of J components share a label."""
+    """The groups of J components that share a label."""
 
     labels: ndarray
     """The distinct labels, ascending."""
     places: ndarray
-    """(J,), the place of each component's label among them."""
+    """(J,), index of each component's label among them."""
 
 
 class SummedPairs(NamedTuple):
     """K pairs of a component and a box, in the order of camera, component and box."""
 
     cameras: ndarray
-    """(K,) int32, as the next two."""
+    """(K,) int32, as the next two: camera, component and box."""
     components: ndarray
     boxes: ndarray
     probabilities: ndarray
-    """(K,) float32, at most 1."""
+    """(K,) float32, association probabilities, at most 1."""
 
 
 @kernel
 def factorise(matrix: ndarray, lower: ndarray) -> float:
-    """Cholesky factor of a symmetric positive definite matrix, and its log determinant.
+    """Compute the Cholesky factor of a symmetric positive definite matrix; returns log det.
 
     Raises:
         numpy.linalg.LinAlgError: If the matrix is not positive definite.
@@ -70,7 +70,7 @@ def factorise(matrix: ndarray, lower: ndarray) -> float:
 
 @kernel
 def solve(lower: ndarray, right: ndarray, solution: ndarray) -> None:
-    """The vector x with L Lᵀ x = b, for a Cholesky factor L."""
+    """Solve L Lᵀ x = b for a Cholesky factor L."""
     size = len(lower)
     for p in range(size):
         total = right[p]
@@ -86,7 +86,7 @@ def solve(lower: ndarray, right: ndarray, solution: ndarray) -> None:
 
 @kernel
 def squared_length(residual: ndarray, lower: ndarray) -> float:
-    """Squared Mahalanobis length of a vector, by the Cholesky factor of its covariance."""
+    """The squared Mahalanobis length of a vector, by the Cholesky factor of its covariance."""
     total, solved = 0.0, np.empty(len(residual))
     for p in range(len(residual)):
         value = residual[p]
@@ -101,9 +101,9 @@ def squared_length(residual: ndarray, lower: ndarray) -> float:
 def merge_moments(
     weights: ndarray, means: ndarray, covariances: ndarray, group: ndarray, count: int
 ) -> Gaussians:
-    """Weight, mean and covariance (spread of the means included) of each group.
+    """Compute weight, mean and covariance (with the spread of the means) of each group.
 
-    In a group without any weight all count the same. Who is in the group -1 is left out.
+    In a group without weight all components count equally. The group -1 is left out.
     """
     size, dimension = means.shape
     merged_weights = np.zeros(count)
@@ -137,7 +137,7 @@ def merge_moments(
 
 @kernel
 def group_labels(labels: ndarray) -> LabelGroups:
-    """The distinct labels, ascending, and for each of (J,) labels its place among them."""
+    """Find the distinct labels, ascending, and the index of each of (J,) labels among them."""
     order = np.argsort(labels, kind="mergesort")
     distinct = np.empty(len(labels), dtype=np.int64)
     place = np.empty(len(labels), dtype=np.int64)
@@ -152,7 +152,7 @@ def group_labels(labels: ndarray) -> LabelGroups:
 
 @kernel
 def inside_bounds(points: ndarray, low: ndarray, high: ndarray) -> ndarray:
-    """Indices of the points (N, d), of which the first coordinates count, within bounds."""
+    """The indices of the points (N, d) whose first coordinates lie within bounds."""
     inside = np.empty(len(points), dtype=np.int64)
     count = 0
     for i in range(len(points)):
@@ -175,18 +175,17 @@ def duplicates(
     height: float,
     confirmed: float,
 ) -> ndarray:
-    """Which of n people only repeat a surer or older one at the same place.
+    """Whether each of n tracks is a duplicate of a heavier or older one at the same place.
 
     Args:
-        means: (n, d), position first.
-        weights: (n,).
-        labels: (n,); the smaller one is older.
-        sources: (C, n), the box that each camera gave each, -1 for none.
-        near: Two nearer than this are one, unless some camera gave each a box of its own; two
-            who stand nearer than half of it on the floor even so, as far as they are not above
-            each other.
-        height: From how far above another somebody is above them.
-        confirmed: Whoever has more weight is sure, and is never displaced by an unsure one.
+        means: (n, d) states, position first, world metres.
+        weights: (n,), existence of each track.
+        labels: (n,); the smaller label is older.
+        sources: (C, n), box of each track in each camera, -1 for none.
+        near: Distance below which two are one, metres, unless some camera has a box for each; two
+            on the floor within half of it are one even then, unless one is above the other.
+        height: Vertical distance from which one is above the other, metres.
+        confirmed: Weight above which a track is confirmed; an unconfirmed one never displaces it.
     """
     size, cameras = len(means), len(sources)
     duplicate = np.zeros(size, dtype=np.bool_)
@@ -219,14 +218,14 @@ def duplicates(
 def sum_pairs(
     labels: ndarray, cameras: ndarray, of_pairs: ndarray, boxes: ndarray, weights: ndarray
 ) -> SummedPairs:
-    """Sum the pairs of one camera, component and box; pairs of absent labels are left out.
+    """Sum the pairs of one camera, label and box; pairs of absent labels are left out.
 
     Args:
-        labels: (J,) of the components; of several with one label the first stands for it.
-        cameras: (A,) of the pairs, as the further ones.
-        of_pairs: (A,) labels, known or not.
-        boxes: (A,), counted within the camera.
-        weights: (A,).
+        labels: (J,), labels of the components; the first of several with one label represents it.
+        cameras: (A,), camera of each pair.
+        of_pairs: (A,), label of each pair, present or not.
+        boxes: (A,), index of the box in its camera.
+        weights: (A,), association probability of each pair.
     """
     count = len(of_pairs)
     width = 1

@@ -1,4 +1,4 @@
-"""What a camera measures of targets, and what it should: the measurement model, compiled."""
+"""The measurement model, compiled: measured boxes, and the expected boxes of targets."""
 
 from __future__ import annotations
 
@@ -15,65 +15,65 @@ from tracker.kernels.lens import Calibration
 from tracker.kernels.linear_algebra import factorise, solve
 
 _SIGMA_POINTS = 6
-"""Of a 3D position: its axes at ±√3 standard deviations, each with 1/6 of the weight."""
+"""Number of sigma points of a 3D position: at ±√3 standard deviations, with the weight 1/6 each."""
 
 
 class Target(NamedTuple):
     """A target of known size, upright or in another posture: lying, crouching, bent."""
 
     half_height: float
-    """Of the upright target, metres."""
+    """Half height of the upright target, metres."""
     half_width: float
-    """Likewise."""
+    """Half width of the upright target, metres."""
     size: int
-    """m, how much of a box is measured: see :func:`tracker.kernels.boxes.expected_boxes`."""
+    """m, size of a measurement: see :func:`tracker.kernels.boxes.expected_boxes`."""
     unscented: bool
-    """Whether the projection's bend over a state's uncertainty counts."""
+    """Whether the nonlinearity of the projection is handled by the unscented transform."""
     posture_half_height: float
-    """In the other posture, metres."""
+    """Half height in the other posture, metres."""
     posture_half_width: float
-    """Likewise."""
+    """Half width in the other posture, metres."""
     posture_noise: ndarray
-    """(m, m), how far the box may then be off, for one pixel of the upright box's half height;
-    (0, 0) where there is no other posture."""
+    """(m, m), noise covariance of the box in the other posture, for one pixel of the upright box's
+    half height; (0, 0) where there is no other posture."""
     posture_drift: ndarray
-    """(d, d), as ``posture_share``, of :class:`tracker.kernels.kalman.Expected`."""
+    """(d, d), as ``posture_share`` a field of :class:`tracker.kernels.kalman.Expected`."""
     posture_share: float
 
 
 class ExpectedBoxes(NamedTuple):
-    """What a camera should measure of J targets."""
+    """The predicted measurements of J targets in a camera."""
 
     expected: Expected
-    """Of those who stand, and, infinite where there is nothing to see, in the other posture."""
+    """Measurements of the upright targets, infinite where invalid, and in the other posture."""
     boxes: ndarray
-    """(J, 4) left, top, right, bottom of those who stand, not clipped, pixels."""
+    """(J, 4) left, top, right, bottom of the upright targets, not clipped, pixels."""
     depths: ndarray
     """(J,), distance from the lens, metres."""
     valid: ndarray
-    """(J,), whether there is anything to see."""
+    """(J,), whether the target lies in front of the lens."""
 
 
 class _SigmaPoints(NamedTuple):
-    """The unscented points of J positions."""
+    """The sigma points of J positions."""
 
     points: ndarray
-    """χ (6 J, 3)."""
+    """χ (6 J, 3), world metres."""
     offsets: ndarray
-    """χ − m (6 J, 3)."""
+    """χ − m (6 J, 3), metres."""
 
 
 @kernel
 def measured_boxes(
     boxes: ndarray, variances: ndarray, transform: ndarray, products: ndarray
 ) -> Measurements:
-    """Boxes as measurements z = T b, and their noise T diag(σ²) Tᵀ.
+    """Convert boxes to measurements z = T b, with noise T diag(σ²) Tᵀ.
 
     Args:
-        boxes: b (M, 4).
-        variances: σ² (M, 4).
+        boxes: b (M, 4), centre and half sizes, pixels.
+        variances: σ² (M, 4), squared pixels.
         transform: T (m, 4).
-        products: (4, m²), what each variance adds to each entry of the noise.
+        products: (4, m²), coefficient of each variance in each entry of the noise.
     """
     count, size = len(boxes), len(transform)
     values = np.zeros((count, size))
@@ -91,13 +91,13 @@ def measured_boxes(
 def expected_measurements(
     states: ndarray, covariances: ndarray, target: Target, camera: Calibration
 ) -> ExpectedBoxes:
-    """What a camera should measure of each target: upright, and in the other posture.
+    """Predict the measurement of each target: upright, and in the other posture.
 
     Args:
         states: (J, d), position first, world metres.
-        covariances: (J, d, d); they count for an unscented target.
-        target: Its sizes and postures.
-        camera: Its picture, lens and pose.
+        covariances: (J, d, d) covariances, which are used for an unscented target.
+        target: Sizes and postures of the target.
+        camera: Image size, lens and pose of the camera.
     """
     size = target.size
     seen = expected_boxes(states, target.half_height, target.half_width, size, camera)
@@ -141,7 +141,7 @@ def expected_measurements(
 
 @kernel
 def _sigma_points(states: ndarray, covariances: ndarray) -> _SigmaPoints:
-    """The unscented points of each position."""
+    """Compute the sigma points of each position."""
     count = len(states)
     offsets = np.empty((_SIGMA_POINTS * count, 3))
     points = np.empty((_SIGMA_POINTS * count, 3))
@@ -166,7 +166,7 @@ def _regress(
     jacobian: ndarray,
     spread: ndarray,
 ) -> None:
-    """The statistical linear regression over one state's uncertainty, into the last three.
+    """Compute the statistical linear regression over one state's uncertainty, into the last three.
 
         ẑ = Σ w h(χ),  H = [Σ w (h(χ) − ẑ)(χ − m)ᵀ] P⁻¹,
         Ω = Σ w (h(χ) − ẑ)(h(χ) − ẑ)ᵀ − H P Hᵀ
@@ -174,7 +174,7 @@ def _regress(
     Args:
         drawn: h(χ) (6, m).
         offsets: χ − m (6, 3).
-        covariance: (d, d), of which the position P counts.
+        covariance: (d, d), of which the part P of the position is used.
         value: ẑ (m,).
         jacobian: H (m, d).
         spread: Ω (m, m).

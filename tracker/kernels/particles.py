@@ -1,6 +1,6 @@
-"""The hot loops over particles, compiled by numba: plain functions of arrays.
+"""Kernels over particles, compiled.
 
-Every kernel has a NumPy counterpart in the tests that it must agree with.
+Every kernel must agree with a NumPy counterpart in the tests.
 """
 
 from __future__ import annotations
@@ -14,21 +14,21 @@ from tracker.kernels.compilation import pixel_kernel
 
 
 class FixedPoints(NamedTuple):
-    """Where S climbs ended."""
+    """The ends of S climbs."""
 
     points: ndarray
-    """(S, 4), centre x, centre y, half width, half height."""
+    """(S, 4), centre x, centre y, half width, half height, pixels."""
     densities: ndarray
-    """(S,), there."""
+    """(S,), density at each end."""
 
 
 class Modes(NamedTuple):
     """M modes of S fixed points."""
 
     owners: ndarray
-    """(S,), the mode of each point, -1 for none."""
+    """(S,), index of the mode of each point, -1 for none."""
     leaders: ndarray
-    """(M,), the point of each mode."""
+    """(M,), index of the densest point of each mode."""
 
 
 @pixel_kernel
@@ -43,16 +43,16 @@ def epanechnikov_climb(
     """Climb from every box to a fixed point of the mean shift with the Epanechnikov kernel.
 
     The density is Σ_i c_i max(0, 1 - r_i²), r_i the distance between the centres in units of
-    bandwidth × half size of where one stands. Its gradient points to the mean of the boxes
-    with r_i < 1, so that is where each step goes.
+    bandwidth × half size of the current box. Its gradient points to the mean of the boxes
+    with r_i < 1, which is where each step goes.
 
     Args:
         boxes: (S, 4), centre x, centre y, half width, half height.
-        counts: (S,), how many particles each stands for; those of 0 are not there.
-        groups: (S,); the boxes of other groups are not there either.
-        bandwidth: In half sizes.
-        iterations: At most so many steps.
-        tolerance: Stop when a step is shorter than this many half sizes.
+        counts: (S,), number of particles at each box; boxes of 0 are ignored.
+        groups: (S,), group of each box; boxes of other groups are ignored.
+        bandwidth: Bandwidth, in half sizes.
+        iterations: Largest number of steps.
+        tolerance: Length of a step, in half sizes, below which the climb stops.
     """
     size = len(boxes)
     points = boxes.copy()
@@ -80,7 +80,7 @@ def epanechnikov_climb(
                     shifted[a] += counts[i] * boxes[i, a]
             densities[k] = density
             if not total > 0.0:
-                break  # the kernel shrank away from all boxes: this is no mode
+                break  # the kernel has shrunk and contains no box: this is no mode
             for a in range(4):
                 shifted[a] /= total
             u = (shifted[0] - points[k, 0]) / points[k, 2]
@@ -93,13 +93,13 @@ def epanechnikov_climb(
 
 @pixel_kernel
 def join_modes(points: ndarray, counts: ndarray, order: ndarray, distance: float) -> Modes:
-    """Fixed points that lie close to a denser one belong to its mode.
+    """Assign fixed points that lie close to a denser one to its mode.
 
     Args:
         points: (S, 4), fixed points.
-        counts: (S,), how many particles climbed to each; those of 0 have no mode.
+        counts: (S,), number of particles that climbed to each; points of 0 have no mode.
         order: (S,) indices, densest first.
-        distance: In half sizes of the denser one, between the centres.
+        distance: Distance between the centres, in half sizes of the denser one.
     """
     size = len(points)
     owners = np.full(size, -1, dtype=np.int64)

@@ -1,4 +1,4 @@
-"""One camera's boxes slid in time along where another camera says that people are, compiled."""
+"""Agreement of one camera's boxes, shifted in time, with predictions from another, compiled."""
 
 from __future__ import annotations
 
@@ -22,27 +22,27 @@ def _slide(
     sigma: float,
     depth_sigma: float,
 ) -> tuple[ndarray, ndarray]:
-    """How well boxes fit to where they are expected, for every offset and step.
+    """Compute how well boxes fit their predictions, for every offset and step.
 
-    A box z fits to an expected one z₀ whose depth is known up to a factor exp(λ), of a tangent
+    A box z fits a predicted one z₀, whose depth is known up to a factor exp(λ) with the tangent
     g = dz₀/dλ, with r = (z − z₀) / height by
 
         exp(−m²/2),  m² = min over λ of |r − λ g / height|² / σ² + λ² / σ_λ²
 
     Args:
-        expected: (N, 4), x and y of head and foot, pixels; NaN where nothing is expected.
-        tangents: (N, 4).
-        starts: (S + 1,), where the expected boxes of each of the S sampled steps begin.
+        expected: (N, 4), x and y of head and foot, pixels; NaN for no prediction.
+        tangents: (N, 4), g, pixels.
+        starts: (S + 1,), index of the first prediction of each of the S sampled steps, and N.
         steps: (S,), the steps.
-        boxes: (D, 4), x and y of head and foot, pixels; NaN for a box that is cut off.
-        following: (D,), the box of the same person a step later, -1 for none.
-        box_starts: (F + 1,), where the boxes of each of F steps begin.
-        offsets: (O,), steps, also parts of one: what is seen at k is sought at k + offset.
+        boxes: (D, 4), x and y of head and foot, pixels; NaN for a clipped box.
+        following: (D,), index of the box of the same person one step later, -1 for none.
+        box_starts: (F + 1,), index of the first box of each of F steps, and D.
+        offsets: (O,) offsets, steps, also fractions: step k is compared with k + offset.
         sigma: σ, heights of a box.
-        depth_sigma: σ_λ.
+        depth_sigma: σ_λ, standard deviation of the logarithm of the depth.
 
     Returns:
-        (O, S), the sum of the best fits, and how many were expected where there is a frame.
+        (O, S), the sum of the best fits, and the number of predictions at steps with a frame.
     """
     frames = len(box_starts) - 1
     fits = np.zeros((len(offsets), len(steps)))

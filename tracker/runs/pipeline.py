@@ -187,7 +187,7 @@ def _fuse(
     """Compute what is missing of the first ``total`` steps."""
     telling.now()
     method = fusion.create(run.sequence, run.parameters)
-    told = constraints_by_step(run.corrections) if _takes(method.step, "told") else {}
+    told = constraints_by_step(run.corrections) if _takes(method.step, "constraints") else {}
     state = run.fusion_state if run.fused else method.start()
     with ExitStack() as stack:
         if len(run.views) < total:

@@ -9,8 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from tracker.corrections.kinds import IN_THE_FUSION, OF_PEOPLE, Correction, Kind, digest
-from tracker.corrections.outcomes import Outcome, names_by_track
-from tracker.corrections.resting import resting
+from tracker.corrections.outcomes import Outcome, names_by_track, supporting_corrections
 from tracker.fusion.protocol import FusionResult
 from tracker.fusion.trajectories import Trajectories
 from tracker.parameters import RunParameters, Stage, stage_values
@@ -136,7 +135,9 @@ def resting_of(run: Run) -> list[str]:
     if not run.corrections:
         return []
     tracks = run.tracks
-    return resting(tracks.frames, tracks.ids, tracks.positions, run.corrections, run.outcomes)
+    return supporting_corrections(
+        tracks.frames, tracks.ids, tracks.positions, run.corrections, run.outcomes
+    )
 
 
 def given_names(run: Run) -> dict[int, str]:

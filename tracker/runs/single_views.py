@@ -142,7 +142,7 @@ class _CameraWorker:
                 likenesses = self._likeness.of_boxes(picture, result.boxes)
                 result = replace(result, likenesses=likenesses)
             if picture is not None:
-                result = replace(result, looks=appearance_of(picture, result.boxes))
+                result = replace(result, embeddings=appearance_of(picture, result.boxes))
             if self._shake > 0.0:
                 result = replace(result, information={**result.information, SHAKE: self._shake})
             done.append((self._working.back(self._camera, result), self._state))

@@ -1,4 +1,4 @@
-"""GM-PHD filter in one camera on the boxes of an outside detector.
+"""GM-PHD filter in one camera on the boxes of an external detector.
 
 [VM06] B.-N. Vo, W.-K. Ma, "The Gaussian mixture probability hypothesis density
 filter", IEEE Transactions on Signal Processing 54(11), 2006.
@@ -29,31 +29,33 @@ if TYPE_CHECKING:
     from tracker.sequences.pictures.frames import Pictures
 
 BELIEVED = 0.5
-"""A box that people explain with more than this weight goes to the fusion: it is more likely
-somebody's than nobody's."""
+"""Expected number of targets above which a box is passed to the fusion: it is more likely a target
+than clutter."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DetectionPhdState:
-    """The posterior of the step before, what it left unexplained, and the next free label."""
+    """The posterior of a step and all that the next step needs of it."""
 
     mixture: GaussianMixture
+    """The intensity over boxes."""
     unexplained: Float[ndarray, "B 4"]
-    """Boxes that no component explained: where somebody may have appeared."""
+    """Boxes that no component explained, at which targets may be born."""
     next_label: int
+    """The first label that is free."""
 
 
 class DetectionPhd:
-    """The GM-PHD filter of a single view, fed by a detector instead of colour peaks.
+    """The GM-PHD filter of a single view, with a detector's boxes instead of colour peaks.
 
     State {x_c, y_c, H_x, H_y}: a box by its centre and half sizes, in pixels; random
     walk; H = I. The clutter intensity of a box falls with its score s,
 
         κ(z) = λ_c exp(2 b_s (½ − s)) / V
 
-    with V the volume of the picture and the sizes. People appear where a box of the
-    step before was left unexplained ([RCVV12]), so a newcomer counts from the second
-    box on. Boxes that contradict the room are shown and not used.
+    with V the volume of the image and the sizes. Targets are born at boxes of the step before
+    that no component explained ([RCVV12]), so a new target is updated from its second
+    box on. Boxes that contradict the room are reported and not used.
     """
 
     def __init__(
@@ -63,7 +65,7 @@ class DetectionPhd:
         parameters: RunParameters,
         reader: Pictures | None = None,
     ) -> None:
-        """Prepare for one camera.
+        """Prepare the filter of one camera.
 
         Raises:
             ValueError: If the camera has no detections.
@@ -73,11 +75,11 @@ class DetectionPhd:
         self._gate = gaussian_mixture.gate_distance(p.gate_probability, 4)
         self._step_time = sequence.step_time
         width, height = sequence.cameras[camera_index].image_size
-        # half sizes up to half of the picture's, as the fusion's clutter has them
+        # half sizes up to half of the image's, as in the fusion's clutter
         self._clutter = p.clutter_rate / (width * height * width / 2.0 * height / 2.0)
 
     def start(self) -> DetectionPhdState:
-        """Nobody is in the picture."""
+        """The state without targets, before the first step."""
         return DetectionPhdState(GaussianMixture.empty(4), np.zeros((0, 4)), next_label=1)
 
     def step(
@@ -87,7 +89,7 @@ class DetectionPhd:
         picture: ndarray | None,
         rng: np.random.Generator,
     ) -> tuple[DetectionPhdState, ViewResult]:
-        """One step."""
+        """Predict one step, update by the boxes, and prune and merge."""
         p, found = self._parameters, self._boxes.at(frame)
         good = np.flatnonzero(found.plausible)
         births = models.label_births(self._births(state.unexplained), state.next_label)
@@ -123,7 +125,7 @@ class DetectionPhd:
         )
 
     def _walk(self, boxes: Float[ndarray, "N 4"]) -> Float[ndarray, "N 4"]:
-        """Variances of one step of the random walk: a person nearby moves further."""
+        """Variances of one step of the random walk: a person nearby moves more pixels."""
         p, sizes = self._parameters, np.maximum(boxes[:, 2:], 0.5)
         across = p.motion_sigma * sizes[:, 1:]
         sigmas = np.concatenate([across, across, p.growth_sigma * sizes], axis=1)
@@ -144,14 +146,14 @@ class DetectionPhd:
         labels = mixture.labels[chosen]
         if p.output == "estimates":
             boxes, box_weights, box_labels = estimates, weights, labels
-            looks = np.zeros((0, 0), np.float16)  # no single box is an estimate's
+            embeddings = np.zeros((0, 0), np.float16)  # an estimate has no single box
             sigmas = np.sqrt(np.diagonal(mixture.covariances[chosen], axis1=1, axis2=2))
         else:
             believed = updated.measurement_weights > BELIEVED
             taken = good[believed]
             boxes, sigmas = found.boxes[taken], found.sigmas[taken]
             box_weights = updated.measurement_weights[believed]
-            looks = found.looks_of(taken)
+            embeddings = found.embeddings_of(taken)
             box_labels = _labels_of_boxes(updated, len(good))[believed]
         return ViewResult(
             boxes=boxes,
@@ -169,12 +171,12 @@ class DetectionPhd:
                 "boxes outside the room": float((~found.plausible).sum()),
                 "cardinality": mixture.cardinality,
             },
-            looks=looks,
+            embeddings=embeddings,
         )
 
 
 def _labels_of_boxes(updated: PhdUpdate, count: int) -> ndarray:
-    """The label that explains most of each box, -1 where nobody explains any of it."""
+    """The label that explains most of each box, -1 for a box without any."""
     labels = np.full(count, -1, dtype=np.int64)
     pairs = updated.measurements >= 0
     order = np.argsort(updated.posterior.weights[pairs], kind="stable")

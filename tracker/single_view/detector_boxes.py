@@ -1,4 +1,4 @@
-"""The boxes of an outside detector: their measurement noise, and which contradict the room."""
+"""Boxes of an external detector: their measurement noise, and their consistency with the room."""
 
 from __future__ import annotations
 
@@ -16,39 +16,42 @@ from tracker.sequences.sequence import Room, Sequence
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Detected:
-    """The boxes of one camera at one step whose score is high enough."""
+    """The N boxes of one camera at one step with a sufficient score."""
 
     boxes: Float[ndarray, "N 4"]
     """centre_x, centre_y, half_width, half_height, pixels."""
     scores: Float[ndarray, " N"]
+    """Score of the detector, 0 … 1."""
     sigmas: Float[ndarray, "N 4"]
     """Standard deviations of the same four numbers, pixels."""
     plausible: Bool[ndarray, " N"]
-    """False where the box contradicts the room: it is clutter."""
-    looks: Float16[ndarray, "N A"] = field(default_factory=lambda: np.zeros((0, 0), np.float16))
-    """What each looks like, as a unit vector; (0, 0) where nobody told."""
+    """Whether the box is consistent with the room; other boxes are clutter."""
+    embeddings: Float16[ndarray, "N A"] = field(
+        default_factory=lambda: np.zeros((0, 0), np.float16)
+    )
+    """Embedding of each box's appearance, a unit vector; (0, 0) where there is none."""
 
     def take(self, rows: slice) -> Detected:
-        """Some of them."""
-        looks = self.looks_of(rows)
+        """Select some of the boxes."""
+        embeddings = self.embeddings_of(rows)
         return Detected(
-            self.boxes[rows], self.scores[rows], self.sigmas[rows], self.plausible[rows], looks
+            self.boxes[rows], self.scores[rows], self.sigmas[rows], self.plausible[rows], embeddings
         )
 
-    def looks_of(
+    def embeddings_of(
         self, chosen: slice | Bool[ndarray, " N"] | Int[ndarray, " K"]
     ) -> Float16[ndarray, "K A"]:
-        """The looks of some of them; (0, 0) where nobody told."""
-        return self.looks[chosen] if self.looks.shape[1] else self.looks
+        """The embeddings of some of the boxes; (0, 0) where there are none."""
+        return self.embeddings[chosen] if self.embeddings.shape[1] else self.embeddings
 
 
 class DetectorBoxes:
-    """The ``detections`` of one camera, with the measurement noise that the parameters state."""
+    """The ``detections`` of one camera, with the measurement noise of the parameters."""
 
     def __init__(
         self, sequence: Sequence, camera_index: int, parameters: DetectionBoxParams
     ) -> None:
-        """Prepare for one camera.
+        """Select the boxes of one camera.
 
         Raises:
             ValueError: If the camera has no detections.
@@ -63,9 +66,9 @@ class DetectorBoxes:
         above = all_boxes.scores >= p.score_threshold
         self._frames = all_boxes.frames[above]
         found = judged(sequence, view.camera, all_boxes.boxes[above], all_boxes.scores[above], p)
-        looks = all_boxes.looks[above] if all_boxes.looks.shape[1] else all_boxes.looks
-        self._found = replace(found, looks=looks)
-        """Of all steps: the judgement of a box asks for no other."""
+        embeddings = all_boxes.looks[above] if all_boxes.looks.shape[1] else all_boxes.looks
+        self._found = replace(found, embeddings=embeddings)
+        """The boxes of all steps, for the consistency of a box does not depend on others."""
 
     def at(self, frame: int) -> Detected:
         """The boxes of one step."""
@@ -80,14 +83,14 @@ def judged(
     scores: Float[ndarray, " N"],
     parameters: DetectionBoxParams,
 ) -> Detected:
-    """Boxes of a detector with how far each is to be trusted, and whether its place is possible.
+    """Compute measurement noise and consistency of a detector's boxes.
 
     Args:
-        sequence: Whose room and target they are set against.
-        camera: That they were found in.
-        boxes: left, top, width, height, pixels.
-        scores: 0 … 1.
-        parameters: The trust.
+        sequence: The sequence, with the room and the target.
+        camera: The camera of the boxes.
+        boxes: left, top, width, height of N boxes, pixels.
+        scores: Score of each box, 0 … 1.
+        parameters: The parameters of the noise and of the consistency.
     """
     p, centred = parameters, Boxes.from_left_top(boxes).centred
     sigmas = trust(centred, p)
@@ -102,10 +105,10 @@ def judged(
 
 
 def _within(boxes: Float[ndarray, "N 4"], camera: Camera) -> Float[ndarray, "N 4"]:
-    """The boxes with top and bottom inside the picture, as the measurement model expects them.
+    """Clip top and bottom of the boxes to the image, as the measurement model expects them.
 
-    Some detectors and annotations draw a whole person also where the picture ends; what
-    lies wholly outside is left as it is.
+    Some detectors and annotations have boxes of whole persons also at the edge of the image; a
+    box that lies wholly outside is not changed.
     """
     last = camera.image_size[1] - 1.0
     top = np.clip(boxes[:, 1] - boxes[:, 3], 0.0, last)
@@ -118,7 +121,7 @@ def _within(boxes: Float[ndarray, "N 4"], camera: Camera) -> Float[ndarray, "N 4
 
 
 def trust(boxes: Float[ndarray, "N 4"], parameters: DetectionBoxParams) -> Float[ndarray, "N 4"]:
-    """Measurement noise of boxes: a share of their size and a constant, added in quadrature.
+    """Compute the measurement noise of boxes: a share of their size and a constant, in quadrature.
 
     Args:
         boxes: centre_x, centre_y, half_width, half_height, pixels.
@@ -144,22 +147,22 @@ def standing_between(
     half_height: float,
     relative_error: Float[ndarray, " N"],
 ) -> tuple[Float[ndarray, "N 3"], Float[ndarray, "N 3"]]:
-    """The nearest and the farthest place where an upright target may stand that gives each box.
+    """Compute the nearest and the farthest place of an upright target that gives each box.
 
-    The rays through the middle of the box's top and of its bottom are met by an
-    upright stick of the target's height where
+    The rays through the middle of the box's top and of its bottom meet an upright segment of the
+    target's height where
 
         s u − t v = (0, 0, 2h)
 
-    best in the least squares; the middle of the stick lies on a ray from the lens,
+    in the least squares; the middle of the segment lies on a ray from the lens,
     and an error of the box's height moves it along that ray in proportion.
 
     Args:
         camera: The calibrated camera.
         boxes: centre_x, centre_y, half_width, half_height, pixels.
         half_height: h, metres.
-        relative_error: By which share a box's height may be wrong; from 1 on a box that is
-            far too tall may stand anywhere behind.
+        relative_error: Largest relative error of a box's height; from 1 on a box that is
+            far too tall may belong to a target at any distance.
     """
     heads = camera.back_project(boxes[:, :2] - boxes[:, 3:] * [0.0, 1.0])
     feet = camera.back_project(boxes[:, :2] + boxes[:, 3:] * [0.0, 1.0])
@@ -181,16 +184,16 @@ def meets(
     """Whether each segment comes within ``margin`` metres of the room's volume, axis by axis.
 
     Args:
-        room: Its volume counts.
-        starts: World metres.
-        ends: World metres.
-        margin: Metres by which the volume is widened on all sides.
+        room: The room, whose volume is used.
+        starts: First end of each segment, world metres.
+        ends: Second end of each segment, world metres.
+        margin: Distance by which the volume is extended on all sides, metres.
     """
     low, high = room.minimum - margin, room.maximum + margin
     way = ends - starts
     with np.errstate(divide="ignore", invalid="ignore"):
         first, second = (low - starts) / way, (high - starts) / way
-    # a line along a pair of walls is between them all the way, or never
+    # a line parallel to a pair of walls is between them everywhere or nowhere
     still = np.abs(way) < 1e-12
     between = (starts >= low) & (starts <= high)
     enter = np.where(still, np.where(between, 0.0, np.inf), np.minimum(first, second))

@@ -1,4 +1,4 @@
-"""No filter in the picture: an outside detector's boxes, as they are."""
+"""No filter in the camera: the boxes of an external detector are passed on."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 
 
 class DetectionBoxes:
-    """The boxes of the sequence's ``detections``, with the noise that the parameters state.
+    """The boxes of the sequence's ``detections``, with the noise of the parameters.
 
-    Boxes that contradict the room stay among the measurements and go no further.
+    Boxes that contradict the room remain among the measurements and are not passed on.
     """
 
     def __init__(
@@ -31,7 +31,7 @@ class DetectionBoxes:
         parameters: RunParameters,
         reader: Pictures | None = None,
     ) -> None:
-        """Prepare for one camera.
+        """Prepare the boxes of one camera.
 
         Raises:
             ValueError: If the camera has no detections.
@@ -39,16 +39,16 @@ class DetectionBoxes:
         self._boxes = DetectorBoxes(sequence, camera_index, parameters.of(DetectionBoxParams))
 
     def start(self) -> None:
-        """There is no state."""
+        """The method has no state."""
 
     def step(
         self, state: None, frame: int, picture: ndarray | None, rng: np.random.Generator
     ) -> tuple[None, ViewResult]:
-        """The boxes of one step whose score is high enough and whose place is possible."""
+        """Return the boxes of one step with a sufficient score and a possible place."""
         found = self._boxes.at(frame)
         good = found.plausible
         result = ViewResult.of_boxes(found.boxes[good], found.scores[good], found.sigmas[good])
-        result = replace(result, looks=found.looks_of(good))
+        result = replace(result, embeddings=found.embeddings_of(good))
         if good.all():
             return None, result
         return None, replace(

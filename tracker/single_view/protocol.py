@@ -1,4 +1,4 @@
-"""The interface of every single-view method: a picture or boxes in, weighted boxes out.
+"""The interface of every single-view method: from an image or detections to weighted boxes.
 
 [ZW21] Zhu, Wang, "3D target position tracking based on probability hypothesis
 density filtering", 2021.
@@ -16,33 +16,34 @@ from numpy import ndarray
 from tracker.single_view.dropped import Dropped
 
 TRUST, UNCERTAINTY = "trust in the foreground", "doubt in the background"
-"""Names in a result's information: how far the foreground was believed about people with
-templates, and how little the background, 0 … 1."""
+"""Names in a result's information: the trust in the foreground at people with templates, and the
+uncertainty of the background, 0 … 1."""
 
 SHAKE = "shake, pixels"
-"""And the standard deviation of a shake of the camera that is undone."""
+"""Name in a result's information: standard deviation of the camera's shake that is compensated."""
 
 EventKind = Literal["new", "vanished", "returned", "occluded", "merged", "split"]
 
 
 @dataclass(frozen=True, slots=True)
 class ViewEvent:
-    """Something that happened to people in one camera's picture, as the method tells it."""
+    """An event of the tracks in one camera, as a method reports it."""
 
     kind: EventKind
+    """The kind of the event."""
     labels: tuple[int, ...]
-    """Whom it happened to, by their ids within this camera."""
+    """Ids of the tracks concerned, within this camera."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ViewResult:
-    """What stage 1 found in one camera at one step: what the fusion gets, and why.
+    """The result of stage 1 in one camera at one step: the boxes for the fusion, and their origin.
 
     All boxes are ``centre_x, centre_y, half_width, half_height`` in pixels.
     """
 
     boxes: Float[ndarray, "N 4"]
-    """What goes to the fusion: Y_k^i of [ZW21]."""
+    """The boxes for the fusion: Y_k^i of [ZW21]."""
     weights: Float[ndarray, " N"]
     """Weight, existence probability or detector's score of each box."""
     labels: Int[ndarray, " N"]
@@ -50,11 +51,13 @@ class ViewResult:
     sigmas: Float[ndarray, "N 4"]
     """Measurement noise: standard deviations of the same four numbers, pixels."""
     estimates: Float[ndarray, "E 4"]
-    """The method's own 2D estimates, which it may or may not pass on."""
+    """The method's own 2D estimates, which need not be the boxes for the fusion."""
     estimate_weights: Float[ndarray, " E"]
+    """Weight or existence probability of each estimate."""
     estimate_labels: Int[ndarray, " E"]
+    """Id of each estimate within this camera, -1 for none."""
     measurements: Float[ndarray, "M 4"]
-    """What the method's filter was given: peaks, foreground boxes or detections."""
+    """The measurements of the method's filter: peaks, foreground boxes or detections."""
     measurement_scores: Float[ndarray, " M"]
     """Likelihood or detector's score, 0 … 1."""
     samples: Float[ndarray, "S 4"]
@@ -62,42 +65,43 @@ class ViewResult:
     sample_weights: Float[ndarray, " S"]
     """Their weights relative to the largest, float32."""
     information: dict[str, float]
-    """Numbers worth showing of this step, by name."""
+    """Numbers about this step for display, by name."""
     dropped: Dropped = field(default_factory=Dropped.none)
-    """What was looked at and not believed."""
+    """Candidates that were rejected."""
     events: tuple[ViewEvent, ...] = ()
-    """What happened at this step, where the method tells such things."""
+    """Events of the tracks at this step, where the method reports any."""
     gates: Float[ndarray, "G 5"] = field(default_factory=lambda: np.zeros((0, 5)))
-    """Ellipses around where the method expects its targets: centre x and y in pixels, and
+    """Ellipses of the gates of the method's targets: centre x and y in pixels, and
     xx, xy, yy of the matrix C with (z − c)ᵀ C⁻¹ (z − c) = 1 on the border, pixels squared."""
     foreground: UInt8[ndarray, " bytes"] | None = None
-    """What of the picture the method took for foreground, as
-    ``tracker.single_view.pictures.foreground.pack`` makes it; None where it asked for none or there
-    was no picture."""
+    """The foreground mask, packed by ``tracker.single_view.pictures.foreground.pack``; None where
+    the method has none or there was no image."""
     likenesses: Float[ndarray, "N P"] = field(default_factory=lambda: np.zeros((0, 0)))
-    """Probability that the colours of each box are those of each of P people with templates,
-    if they are one's; (0, 0) where there was no picture, or fewer than two have templates. A
-    method leaves it: :mod:`tracker.single_view.colour.likeness` tells it of all."""
-    looks: Float16[ndarray, "N A"] = field(default_factory=lambda: np.zeros((0, 0), np.float16))
-    """What each box looks like, as a unit vector: the root of its colour histogram where the
-    method is given pictures, an outside network's where its detections have such vectors; (0, 0)
-    where there is nothing to see of it."""
+    """Probability that the colours of each box are those of each of P people with templates, given
+    that it shows one of them; (0, 0) where there was no image, or fewer than two have templates.
+    It is filled in after the method by :mod:`tracker.single_view.colour.likeness`."""
+    embeddings: Float16[ndarray, "N A"] = field(
+        default_factory=lambda: np.zeros((0, 0), np.float16)
+    )
+    """Embedding of each box's appearance, a unit vector: the root of its colour histogram where the
+    method has images, or a detection network's where the detections have such vectors; (0, 0)
+    where there is none."""
     log_ratios: Float[ndarray, " N"] = field(default_factory=lambda: np.zeros(0))
-    """Logarithm of how much likelier somebody's box is to look as this one does than a false box,
-    beside where it lies: log p(s | person) / p(s | clutter) of a score s, as a target's amplitude
-    in Lerro and Bar-Shalom, IEEE TAES 29(2), 1993. Empty where the method does not tell."""
+    """Log likelihood ratio of each box's appearance, for a person against clutter, without its
+    place: log p(s | person) / p(s | clutter) of a score s, as a target's amplitude
+    in Lerro and Bar-Shalom, IEEE TAES 29(2), 1993. Empty where the method has none."""
     blind: bool = False
-    """Whether the camera had no frame at this step, and so says nothing of who is there."""
+    """Whether the camera had no frame at this step, and so gives no evidence."""
 
     def likenesses_of(self, people: int) -> Float[ndarray, "N P"]:
-        """:attr:`likenesses` to so many people; the same to all where nothing is told of them."""
+        """:attr:`likenesses` for a number of people; equal probabilities where there are none."""
         if self.likenesses.shape[1] == people:
             return self.likenesses
         return np.full((len(self.boxes), people), 1.0 / people)
 
     @property
     def clutter_factors(self) -> Float[ndarray, " N"]:
-        """By how much the intensity of false boxes is lower or higher at each box than at any."""
+        """Factor on the clutter intensity at each box, from its appearance: 1 / Λ."""
         return np.exp(-self.log_ratios) if len(self.log_ratios) else np.ones(len(self.boxes))
 
     @staticmethod
@@ -106,7 +110,13 @@ class ViewResult:
         weights: Float[ndarray, " N"],
         sigmas: Float[ndarray, "N 4"],
     ) -> ViewResult:
-        """Boxes that are measurement, estimate and result at once, without labels."""
+        """Make a result whose boxes are measurements and estimates as well, without labels.
+
+        Args:
+            boxes: Centre and half sizes of N boxes, pixels.
+            weights: Weight or score of each box.
+            sigmas: Standard deviations of the four numbers of each box, pixels.
+        """
         labels = np.full(len(boxes), -1, dtype=np.int64)
         return ViewResult(
             boxes=boxes,
@@ -125,16 +135,16 @@ class ViewResult:
 
     @staticmethod
     def of_no_frame() -> ViewResult:
-        """The camera had no frame at this step."""
+        """The result of a step at which the camera had no frame."""
         nothing = ViewResult.of_boxes(np.zeros((0, 4)), np.zeros(0), np.zeros((0, 4)))
         return replace(nothing, blind=True)
 
 
 class SingleViewMethod(Protocol):
-    """One method, prepared for one camera of one sequence.
+    """A single-view method, prepared for one camera of one sequence.
 
-    A method is made once per camera and run (that is where templates are read and
-    the background is learnt); its steps are pure: state in, state out.
+    A method is created once per camera and run, which reads templates and learns the
+    background; a step is a pure function of its arguments.
     """
 
     def start(self) -> Any:
@@ -144,12 +154,12 @@ class SingleViewMethod(Protocol):
     def step(
         self, state: Any, frame: int, picture: ndarray | None, rng: np.random.Generator
     ) -> tuple[Any, ViewResult]:
-        """One step.
+        """Process one step.
 
         Args:
-            state: What the step before returned.
-            frame: The step, 0-based.
-            picture: (height, width, 3) uint8, BGR; None where the method needs none or
+            state: The state that the step before returned.
+            frame: Index of the step, from 0.
+            picture: (height, width, 3) uint8, BGR; None where the method needs no image or
                 the frame is missing.
             rng: The only source of randomness, made from seed, camera and step.
         """

@@ -1,4 +1,4 @@
-"""Stage 3: the filter's tracks with hindsight: places, ends, gaps, and who is who.
+"""Stage 3: smoothing of tracks over the whole recording: positions, ends, gaps, and identities.
 
 The methods are described in :mod:`tracker.parameters.groups` and chosen in
 :func:`maker`.
@@ -24,7 +24,7 @@ __all__ = [
 
 
 def maker(method: Method) -> Callable[[Sequence, RunParameters], SmoothingMethod]:
-    """The class that a method of stage 3 is made by; each is imported when it is chosen."""
+    """The class of a method of stage 3, which is imported only when it is chosen."""
     match method.name:
         case "none":
             return NoSmoothing
@@ -40,5 +40,5 @@ def maker(method: Method) -> Callable[[Sequence, RunParameters], SmoothingMethod
 
 
 def create(sequence: Sequence, parameters: RunParameters) -> SmoothingMethod:
-    """The smoothing method that the parameters name, prepared for a sequence."""
+    """Create the smoothing method that the parameters name for a sequence."""
     return maker(parameters.method("smoothing_method"))(sequence, parameters)

@@ -1,84 +1,115 @@
-"""What a recording says of its own boxes: people's sizes, each camera's offset and noise."""
+"""Self-calibration of boxes: people's sizes, each camera's offset and noise, hand-marked boxes.
+
+Stage 1's boxes of a person lie a little too high or too low, each person by other clothes, and
+alike in every camera: the filter takes that for the person's height above the floor. Only a box
+that was marked by hand shows where the centre is.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence as Many
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
 from tracker.fusion.target_model import ExpectedBoxes
+from tracker.geometry.boxes import Boxes
+from tracker.geometry.camera import Camera
 from tracker.kernels.gating import Measurements
+from tracker.sequences.sequence import Sequence
+from tracker.smoothing.paths import Paths
 
 _BOX_SIGMA = 0.1
-"""Of one box's edge about a person's, in half heights."""
+"""Standard deviation of an edge of one box, half heights."""
 
 _ALIKE = 20.0
-"""Boxes of neighbouring steps and cameras err alike: so many count as one."""
+"""Number of boxes of neighbouring steps and cameras that count as one: their errors correlate."""
 
 _SIZE_SIGMA = 0.1
-"""How far people's heights differ from the target's, as a share of it."""
+"""Standard deviation of people's heights, relative to the target's."""
 
 _OFFSET_SIGMA = 0.03
-"""How far a camera's boxes may lie off as a whole, in half heights."""
+"""Standard deviation of the offset of a camera's boxes, half heights."""
 
 SIZE_RIDGE = _ALIKE * (_BOX_SIGMA / _SIZE_SIGMA) ** 2
-"""As many boxes as the prior of a person's size is worth."""
+"""Weight of the prior of a person's size, in boxes."""
 
 OFFSET_RIDGE = _ALIKE * (_BOX_SIGMA / _OFFSET_SIGMA) ** 2
-"""As many boxes as the prior of a camera's offset is worth."""
+"""Weight of the prior of a camera's offset, in boxes."""
 
 NARROWEST, WIDEST = 0.15, 1.0
-"""Between these factors of the stated noise the learnt one lies."""
+"""Bounds of the estimated noise, as factors of the standard deviation that stage 1 gives."""
 
 ODD = 0.4
-"""Half heights: who is so far off is not standing."""
+"""Residual of a box, in half heights, from which the person is not standing upright."""
 
 FEWEST = 50
-"""Boxes of a camera below which its noise is taken as stated."""
+"""Number of boxes of a camera below which its noise is not estimated."""
+
+RIDGE = 1.0
+"""Weight of the prior of a person's shift, in marked boxes: the shifts of people and the errors of
+hand-drawn boxes both have a standard deviation of about 0.1 half heights."""
+
+_AROUND = np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False)
+_CIRCLE = np.column_stack([np.cos(_AROUND), np.sin(_AROUND), np.ones(16)])
+_OUTLINE = np.concatenate([[[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]], _CIRCLE, _CIRCLE * [1, 1, -1]])
+"""Points of an upright cylinder (34, 3): both ends of its axis, and its upper and lower edge."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Calibration:
-    """n people's sizes and the offsets and noises of C cameras, for measurements of m numbers.
+    """Sizes of n people, and offsets and noises of C cameras, for measurements of size m.
 
-    A box of person i in camera c is taken as
+    The model of a box of person i in camera c is
 
         z = h_c(x) + ½ height(h_c(x)) (b_c + s_i u + d_i w) + v,   v ~ N(0, f_c² R)
 
-    with u = (0, −1, 1) and w = (0, 1, 1) for horizontal centre, top and bottom: who is taller than
-    the target has a taller box, without being nearer, and whose boxes lie low is not lower.
+    with u = (0, −1, 1) and w = (0, 1, 1) for horizontal centre, top and bottom: a person taller
+    than the target has a taller box without being nearer, and one whose boxes are shifted down is
+    not lower.
     """
 
     sizes: Float[ndarray, " n"]
     """s: height beyond the target's, as a share of it."""
     offsets: Float[ndarray, "C m"]
-    """b, in half heights."""
+    """b: offset of each camera's boxes, half heights."""
     noises: Float[ndarray, " C"]
-    """f."""
+    """f: factor on the standard deviations of each camera's boxes."""
     shifts: Float[ndarray, " n"]
-    """d: how far below the person's middle the boxes lie, in half heights."""
+    """d: distance of the boxes below the person's centre, half heights."""
 
     @staticmethod
     def none(people: int, cameras: int, size: int) -> Calibration:
-        """As stated: nothing learnt."""
+        """The calibration that does not change the boxes.
+
+        Args:
+            people: n, the number of people.
+            cameras: C, the number of cameras.
+            size: m, the size of a measurement.
+        """
         return Calibration(
             np.zeros(people), np.zeros((cameras, size)), np.ones(cameras), np.zeros(people)
         )
 
     def of_people(self, people: ndarray) -> Calibration:
-        """Of some of the people, in that order."""
+        """Select some of the people, by index, in that order."""
         return replace(self, sizes=self.sizes[people], shifts=self.shifts[people])
 
     def measured(self, camera: int, measurements: Measurements) -> Measurements:
-        """A camera's measurements with the noise that was learnt."""
+        """Scale the noise of a camera's measurements by the estimated factor."""
         return measurements._replace(noises=self.noises[camera] ** 2 * measurements.noises)
 
     def shift(self, camera: int, people: ndarray, expected: ExpectedBoxes) -> Float[ndarray, "L m"]:
-        """What is added to the expected measurements of some boxes, pixels.
+        """The correction that is added to the expected measurements of L boxes, pixels.
 
-        A number that the picture's edge holds fast stays.
+        It is 0 for an edge of a box that the image's edge clips.
+
+        Args:
+            camera: Index of the camera.
+            people: Index of the person of each box.
+            expected: The expected boxes.
         """
         half_height = (expected.boxes[:, 3] - expected.boxes[:, 1]) / 2.0
         size = self.offsets.shape[1]
@@ -88,13 +119,13 @@ class Calibration:
 
 
 def free(expected: ExpectedBoxes) -> Bool[ndarray, "L m"]:
-    """Which numbers of some boxes move with the person: not those at the picture's edge."""
+    """Which components of L measurements depend on the state: not edges at the image's edge."""
     moves = expected.jacobians != 0.0
     return np.asarray(moves[:, :, 0] | moves[:, :, 1] | moves[:, :, 2])
 
 
 def upright(size: int) -> Float[ndarray, " m"]:
-    """u: how a taller person's box differs."""
+    """The vector u: the change of a measurement with the person's height."""
     return {
         2: np.zeros(2),
         3: np.array([0.0, -1.0, 1.0]),
@@ -103,9 +134,93 @@ def upright(size: int) -> Float[ndarray, " m"]:
 
 
 def lower(size: int) -> Float[ndarray, " m"]:
-    """w: how a box that lies lower differs."""
+    """The vector w: the change of a measurement as the box is shifted down."""
     return {
         2: np.array([0.0, 1.0]),
         3: np.array([0.0, 1.0, 1.0]),
         4: np.array([0.0, 1.0, 1.0, 0.0]),
     }[size]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Marks:
+    """M boxes of people that were marked by hand."""
+
+    steps: Int[ndarray, " M"]
+    """Step of each box."""
+    cameras: Int[ndarray, " M"]
+    """Index of the camera of each box."""
+    boxes: Float[ndarray, "M 4"]
+    """Centre and half sizes, pixels."""
+
+    @staticmethod
+    def of(sequence: Sequence) -> Marks:
+        """The templates of a recording."""
+        names = [camera.name for camera in sequence.cameras]
+        known = [one for one in sequence.templates if one.camera in names]
+        return Marks(
+            np.array([one.frame for one in known], dtype=np.int64),
+            np.array([names.index(one.camera) for one in known], dtype=np.int64),
+            Boxes.from_left_top(
+                np.array([one.box for one in known], dtype=float).reshape(-1, 4)
+            ).centred,
+        )
+
+
+def shifts(
+    marks: Marks,
+    cameras: Many[Camera],
+    half_extents: Float[ndarray, " 3"],
+    paths: Paths,
+) -> Float[ndarray, " n"]:
+    """Estimate d, the distance of stage 1's boxes below each path's centre, in half heights.
+
+    A marked box belongs to the path with the nearest centre at its step. The centre of a path
+    fitted to the boxes of stage 1 is shifted as these boxes are, so that
+
+        d = Σ (y − y_m) / h / (M + 1)
+
+    over the M marked boxes of the path, with the marked centre y_m, the centre y of the bounds of
+    a cylinder of the target's size there, and half the height h of its axis: a box drawn by hand
+    bounds the whole body, which seen from above reaches lower in the image than its axis.
+
+    Args:
+        marks: Boxes marked by hand.
+        cameras: The cameras of the recording.
+        half_extents: Half width, depth and height of the target, metres.
+        paths: n paths fitted to the boxes of stage 1 without shifts.
+    """
+    steps, owners = paths.steps, paths.owners
+    total, count = np.zeros(len(paths.labels)), np.zeros(len(paths.labels))
+    for step, index, box in zip(marks.steps, marks.cameras, marks.boxes, strict=True):
+        rows = np.flatnonzero(steps == step)
+        own, half_axes = _bounds(cameras[index], paths.states[rows, :3], half_extents)
+        off = (own.centres - box[:2]) / own.half_sizes
+        taller = np.abs(box[3] / own.half_sizes[:, 1] - 1.0)
+        # a person lying, bent or stretched out does not show the centre of an upright target
+        odd = np.abs(off).max(axis=1)
+        standing = (odd < ODD) & (taller < ODD)
+        # nor is a camera that sees people from above, or is turned on its side
+        half_heights = half_axes[:, 1]
+        standing &= (half_heights > half_axes[:, 0]) & (half_heights > own.half_sizes[:, 1] / 2.0)
+        nearest = int(odd.argmin()) if len(rows) else -1
+        if nearest >= 0 and standing[nearest]:
+            lower = own.centres[nearest, 1] - box[1]
+            total[owners[rows[nearest]]] += lower / half_heights[nearest]
+            count[owners[rows[nearest]]] += 1.0
+    return np.asarray(total / (count + RIDGE))
+
+
+def _bounds(
+    camera: Camera, places: Float[ndarray, "N 3"], half_extents: Float[ndarray, " 3"]
+) -> tuple[Boxes, Float[ndarray, "N 2"]]:
+    """The bounds of N upright cylinders, and half the extent of their axes along x and y, pixels.
+
+    They are NaN where a cylinder is not wholly in front of the lens.
+    """
+    outline = _OUTLINE * [*np.full(2, half_extents[:2].mean()), half_extents[2]]
+    pixels, _ = camera.project((places[:, None] + outline).reshape(-1, 3))
+    pixels = pixels.reshape(len(places), len(outline), 2)
+    around = pixels[:, 2:]
+    half_axes = np.abs(pixels[:, 0] - pixels[:, 1]) / 2.0
+    return Boxes.from_corners(around.min(axis=1), around.max(axis=1)), half_axes

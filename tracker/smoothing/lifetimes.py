@@ -1,14 +1,16 @@
-"""When people were there: whose track begins and ends where, and who was nobody."""
+"""Existence of tracks over time: where each begins and ends, and which are false."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
+from tracker.geometry.boxes import Boxes, paired_overlaps
 from tracker.kernels.smoothing.presence import Habits, presence
 from tracker.parameters import SmoothingParams
-from tracker.smoothing.apart import shown_apart
 from tracker.smoothing.paths import Paths
 from tracker.smoothing.smoother import Shared, Smoother
 
@@ -16,19 +18,34 @@ UNSURE = 0.3
 """Existence with which a row beyond a path's ends, or within its gaps, competes for boxes."""
 
 _MEETING = 2
-"""Cameras whose boxes of anything meet somewhere."""
+"""Number of cameras whose false boxes always have rays that meet somewhere."""
 
-_SAID = 1e4
-"""Votes for a person where somebody said that he is: more than any camera has against it."""
+_CONSTRAINT_VOTES = 1e4
+"""Log odds for existence where a correction states a position: more than any camera against it."""
+
+ONE_PERSON = 0.3
+"""Intersection over union above which two boxes of one camera may be of one person, as in the
+non-maximum suppression of detectors."""
+
+_THERE = 0.5
+"""Existence probability above which a track is present."""
+
+_HARDLY_EVER = 0.1
+"""Share of a track's boxes below which those away from other tracks are taken as stray."""
 
 
 def independence(step_time: float, memory: float) -> float:
-    """The share of a step's evidence that is new: pictures of one moment agree, right or wrong."""
+    """The share of a step's evidence that is independent of the steps before, 0 … 1.
+
+    Args:
+        step_time: Time between two steps, seconds.
+        memory: Time within which errors are correlated, seconds.
+    """
     return min(step_time / memory, 1.0)
 
 
 def misses(shared: Shared) -> Float[ndarray, " N"]:
-    """log of what the cameras that should have seen each row and did not say: at most 0."""
+    """The log likelihood of the misses at each row, Σ_c P(c missed it) log(1 − p_D), at most 0."""
     blind = np.log1p(-np.minimum(shared.chances, 1.0 - 1e-6))
     return np.asarray((shared.missed * blind).sum(axis=0))
 
@@ -36,35 +53,40 @@ def misses(shared: Shared) -> Float[ndarray, " N"]:
 def lifetimes(
     smoother: Smoother, paths: Paths, shared: Shared, parameters: SmoothingParams
 ) -> tuple[Float[ndarray, " N"], Float[ndarray, " n"]]:
-    """The probability at each row that somebody was there, and each path's odds in its whole life.
+    """Estimate the existence probability at each row, and the log odds of each path as a whole.
 
-    A camera that shows the person votes for him with as much as it would against him if it
-    showed nothing, log 1/(1 − p_D): a false box that stays is no better witness than a miss.
+    A detection by a camera counts log 1/(1 − p_D) for existence, as much as a miss counts
+    against it: a persistent false box is no better evidence than persistent misses.
 
-    Where stage 1 tells how much likelier a person looks so, log Λ is added to that; its boxes are
-    many, and most are false. One alone has a place somewhere on its ray whatever it shows, so
-    that only its looks count. Two of something else meet somewhere in the room, a third hardly
-    meets them: each beyond the second outweighs as much doubt of their looks as a vote.
+    Where stage 1 gives a likelihood ratio Λ of a box's appearance, log Λ is added; its boxes are
+    many, and most are false. One box alone is at some place on its ray whatever it is, so only
+    its appearance counts. The rays of two false boxes meet somewhere in the room, those of three
+    hardly ever do: each box beyond the second outweighs log 1/(1 − p_D) of negative log Λ.
 
-    Where stage 1 may draw several boxes around a person, all that holds of boxes that show
-    somebody apart from surer people (:func:`shown_apart`); others meet because there is one, and
-    only looks tell a second.
+    Where stage 1 may give several boxes of a person, the detections count only for boxes apart
+    from tracks of greater odds (:func:`shown_apart`), for other boxes may be of these tracks.
+
+    Args:
+        smoother: The models and the boxes.
+        paths: n paths, with N rows.
+        shared: Association and miss probabilities of the rows.
+        parameters: Time constant of correlated evidence, and cost of a change of existence.
 
     Returns:
-        (N,) probabilities; (n,) log odds of a person at some step against nobody.
+        Existence probability of the N rows; log odds of the n paths, of existing at any step.
     """
     p = smoother.parameters
     hit = -np.log1p(-min(p.detection_probability, 1.0 - 1e-6))
     links = shared.links
-    looks = np.zeros(len(links.rows))
+    log_ratios = np.zeros(len(links.rows))
     for c, camera in enumerate(smoother.cameras):
         own = links.cameras == c
-        looks[own] = -np.log(camera.clutter_factors[links.boxes[own]])
+        log_ratios[own] = -np.log(camera.clutter_factors[links.boxes[own]])
     rows = len(paths.states)
     shown = np.bincount(links.rows, links.shares, rows)
     weight = independence(smoother.model.step_time, parameters.memory)
     survival = min(p.survival_probability, 1.0 - 1e-9)
-    # within the time in which the evidence tells anew; a recording seen backwards is the same
+    # within the time of independent evidence; the same for a recording played backwards
     steps = 1.0 / weight
     come = float(np.log(min(p.birth_rate * steps * smoother.model.step_time, 1.0)))
     leave = float(np.log1p(-(survival**steps)))
@@ -72,16 +94,16 @@ def lifetimes(
     pinned, against = smoother.pinned(paths)[0], misses(shared)
 
     def by(votes: Float[ndarray, " N"]) -> tuple[Float[ndarray, " N"], Float[ndarray, " n"]]:
-        votes[pinned] += _SAID
+        votes[pinned] += _CONSTRAINT_VOTES
         found = presence(
             paths.starts, paths.firsts, weight * (votes + against), habits, smoother.frames - 1
         )
         return found.probabilities, found.odds
 
     def voted(shown: Float[ndarray, " N"]) -> Float[ndarray, " N"]:
-        return _votes(hit, shown, doubt) if looks.any() else hit * shown
+        return _votes(hit, shown, appearance) if log_ratios.any() else hit * shown
 
-    doubt = np.bincount(links.rows, links.shares * looks, rows)
+    appearance = np.bincount(links.rows, links.shares * log_ratios, rows)
     there, odds = by(voted(shown))
     if not smoother.several_boxes:
         return there, odds
@@ -92,23 +114,34 @@ def lifetimes(
 
 
 def _votes(
-    hit: float, shown: Float[ndarray, " N"], doubt: Float[ndarray, " N"]
+    hit: float, shown: Float[ndarray, " N"], appearance: Float[ndarray, " N"]
 ) -> Float[ndarray, " N"]:
-    """Of so many cameras for each row, where their boxes' looks say ``doubt``, log odds."""
-    outweighed = np.minimum(doubt + hit * np.maximum(shown - _MEETING, 0.0), 0.0)
+    """The log odds of the detections of each row.
+
+    Args:
+        hit: log 1/(1 − p_D).
+        shown: Expected number of cameras with a detection at each of N rows.
+        appearance: Sum of the log likelihood ratios of these boxes' appearance.
+    """
+    outweighed = np.minimum(appearance + hit * np.maximum(shown - _MEETING, 0.0), 0.0)
     meeting = hit * np.minimum(shown, 2.0 * np.maximum(shown - 1.0, 0.0))
-    return np.asarray(meeting + np.where(doubt < 0.0, outweighed, doubt))
+    return np.asarray(meeting + np.where(appearance < 0.0, outweighed, appearance))
 
 
 def extended(smoother: Smoother, paths: Paths, steps: int) -> tuple[Paths, Float[ndarray, " N"]]:
-    """The paths with more steps at both ends, where the motion model takes them.
+    """Extend the paths at both ends by prediction with the motion model.
+
+    Args:
+        smoother: The motion model, and the number of steps of the recording.
+        paths: The paths.
+        steps: Number of steps at each end, fewer at the ends of the recording.
 
     Returns:
-        The longer paths, and with which existence each row may ask for boxes.
+        The longer paths, and the prior existence probability of each row.
     """
     motion = smoother.model.motion
     backward = motion.transition.copy()
-    backward[:3, 3:] *= -1.0  # the same process, seen from behind
+    backward[:3, 3:] *= -1.0  # the same process in reversed time
     states, covariances, firsts, existences = [], [], [], []
     for i, (begin, end) in enumerate(zip(paths.starts, paths.starts[1:], strict=False)):
         before = min(steps, int(paths.firsts[i]))
@@ -133,7 +166,7 @@ def extended(smoother: Smoother, paths: Paths, steps: int) -> tuple[Paths, Float
 def _carried(
     state: ndarray, covariance: ndarray, transition: ndarray, noise: ndarray, steps: int
 ) -> tuple[ndarray, ndarray]:
-    """(steps, d) states and (steps, d, d) covariances of a state carried on."""
+    """Predict a state: (steps, d) states and (steps, d, d) covariances."""
     states = np.empty((steps, len(state)))
     covariances = np.empty((steps, len(state), len(state)))
     for k in range(steps):
@@ -141,3 +174,79 @@ def _carried(
         covariance = transition @ covariance @ transition.T + noise
         states[k], covariances[k] = state, covariance
     return states, covariances
+
+
+def shown_apart(
+    smoother: Smoother,
+    paths: Paths,
+    shared: Shared,
+    there: Float[ndarray, " N"],
+    odds: Float[ndarray, " n"],
+) -> Bool[ndarray, " L"]:
+    """Select the links to boxes that are apart from every track of greater odds.
+
+    A detector gives further boxes around a person: of limbs, one too high, one with a load. Those
+    of several cameras meet beside the person, or where the rays to two people cross. So a box
+    that overlaps that of a track of greater odds is no evidence, and neither is any box of a
+    track that is always within a body's width of tracks of greater odds.
+
+    Args:
+        smoother: The models and the boxes.
+        paths: n paths, with N rows.
+        shared: Association probabilities of the rows, with L links.
+        there: Existence probability of each of the N rows.
+        odds: Log odds of each of the n paths, which rank them where they are present.
+    """
+    links = shared.links
+    rows, sure = links.rows, np.where(there > _THERE, odds[paths.owners], -np.inf)
+    beside = _beside_surer(paths, sure, 2.0 * smoother.model.target.half_width)
+    away = np.bincount(paths.owners[rows], links.shares * ~beside[rows], len(paths.labels))
+    whole = np.bincount(paths.owners[rows], links.shares, len(paths.labels))
+    apart = (away > _HARDLY_EVER * whole)[paths.owners[rows]]
+    for number, camera in enumerate(smoother.cameras):
+        own = np.flatnonzero(links.cameras == number)
+        own = own[np.argsort(paths.steps[rows[own]], kind="stable")]
+        boxes = Boxes(camera.boxes[links.boxes[own]]).left_top
+        for one, other in _together(paths.steps[rows[own]]):
+            over = paired_overlaps(boxes[one], boxes[other]) > ONE_PERSON
+            lesser = _lesser(sure[rows[own]], one, other, over)
+            apart[own[lesser]] = False
+    return np.asarray(apart)
+
+
+def _beside_surer(paths: Paths, sure: Float[ndarray, " N"], width: float) -> Bool[ndarray, " N"]:
+    """The rows within ``width``, metres on the floor, of a track of greater odds at that step."""
+    order = np.argsort(paths.steps, kind="stable")
+    places = paths.states[order, :2]
+    beside = np.zeros(len(order), dtype=bool)
+    for one, other in _together(paths.steps[order]):
+        near = ((places[one] - places[other]) ** 2).sum(axis=1) < width**2
+        beside[order[_lesser(sure[order], one, other, near)]] = True
+    return beside
+
+
+def _together(steps: Int[ndarray, " N"]) -> Iterator[tuple[Int[ndarray, " P"], Int[ndarray, " P"]]]:
+    """All pairs of entries with equal steps, given in ascending order, as batches of indices."""
+    for distance in range(1, len(steps)):
+        one = np.flatnonzero(steps[distance:] == steps[:-distance])
+        if not len(one):
+            return
+        yield one, one + distance
+
+
+def _lesser(
+    sure: Float[ndarray, " N"],
+    one: Int[ndarray, " P"],
+    other: Int[ndarray, " P"],
+    chosen: Bool[ndarray, " P"],
+) -> Int[ndarray, " K"]:
+    """The entry with the lower value of each chosen pair.
+
+    Args:
+        sure: Log odds of N entries.
+        one: Index of the first entry of each of P pairs.
+        other: Index of the second entry.
+        chosen: Which of the pairs are considered.
+    """
+    less, more = chosen & (sure[one] < sure[other]), chosen & (sure[other] < sure[one])
+    return np.concatenate([one[less], other[more]])

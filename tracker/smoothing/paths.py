@@ -1,4 +1,4 @@
-"""Paths: where people were at every step of their lives, and which boxes say so."""
+"""Paths: the states of tracks at every step of their existence, and their links to boxes."""
 
 from __future__ import annotations
 
@@ -12,30 +12,32 @@ from numpy import ndarray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Paths:
-    """n paths without a gap, N rows together: one row a step, path after path."""
+    """n paths without gaps, N rows together: one row for each step, path after path."""
 
     labels: Int[ndarray, " n"]
+    """Label of each path."""
     firsts: Int[ndarray, " n"]
-    """The first step of each."""
+    """First step of each path."""
     starts: Int[ndarray, " n1"]
-    """Where each path's rows begin, and the end."""
+    """Index of each path's first row, and N at the end."""
     states: Float[ndarray, "N d"]
     """Position in metres, world frame; then velocity, where the motion model has one."""
     covariances: Float[ndarray, "N d d"]
+    """Covariance of each state, metres and seconds."""
 
     @property
     def lasts(self) -> Int[ndarray, " n"]:
-        """The last step of each."""
+        """Last step of each path."""
         return np.asarray(self.firsts + np.diff(self.starts) - 1)
 
     @property
     def owners(self) -> Int[ndarray, " N"]:
-        """The path of each row."""
+        """Index of the path of each row."""
         return np.asarray(np.repeat(np.arange(len(self.labels)), np.diff(self.starts)))
 
     @property
     def steps(self) -> Int[ndarray, " N"]:
-        """The step of each row."""
+        """Step of each row."""
         lengths = np.diff(self.starts)
         offsets = np.repeat(self.firsts - self.starts[:-1], lengths)
         return np.asarray(np.arange(self.starts[-1]) + offsets)
@@ -43,7 +45,7 @@ class Paths:
     def with_states(
         self, states: Float[ndarray, "N d"], covariances: Float[ndarray, "N d d"]
     ) -> Paths:
-        """The same paths elsewhere."""
+        """The same paths with other states and covariances."""
         return Paths(self.labels, self.firsts, self.starts, states, covariances)
 
     @staticmethod
@@ -54,7 +56,15 @@ class Paths:
         covariances: Many[Float[ndarray, "K d d"]],
         dimension: int,
     ) -> Paths:
-        """Paths of the rows of each."""
+        """Make paths from the rows of each.
+
+        Args:
+            labels: Label of each path.
+            firsts: First step of each path.
+            states: The K states of each path.
+            covariances: The K covariances of each path.
+            dimension: d, the size of the state.
+        """
         lengths = [len(one) for one in states]
         return Paths(
             np.array(labels, dtype=np.int64),
@@ -67,18 +77,20 @@ class Paths:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Links:
-    """L pairs of a row of a path and a box that is its own with some probability."""
+    """L pairs of a row of a path and a box, with their association probabilities."""
 
     cameras: Int[ndarray, " L"]
+    """Index of the camera of each box."""
     rows: Int[ndarray, " L"]
+    """Index of the row."""
     boxes: Int[ndarray, " L"]
     """Index among all boxes of the camera over the whole recording."""
     shares: Float[ndarray, " L"]
-    """Association probability."""
+    """Association probability, 0 … 1."""
 
     @staticmethod
     def joined(parts: Many[Links]) -> Links:
-        """The pairs of several cameras."""
+        """Concatenate the pairs of several cameras."""
         nothing = np.zeros(0, dtype=np.int64)
         every = [Links(nothing, nothing, nothing, np.zeros(0)), *parts]
         return Links(
@@ -89,7 +101,7 @@ class Links:
         )
 
     def take(self, chosen: ndarray) -> Links:
-        """Some of them, by mask or index."""
+        """Select some of the pairs, by mask or index."""
         return Links(
             self.cameras[chosen], self.rows[chosen], self.boxes[chosen], self.shares[chosen]
         )

@@ -1,5 +1,5 @@
-"""Places that somebody stated among the rows of paths: measured like boxes where they agree with
-these, and obeyed where they do not."""
+"""Position constraints on rows of paths: measurements where they agree with the boxes, and enforced
+where they do not."""
 
 from __future__ import annotations
 
@@ -11,43 +11,50 @@ from jaxtyping import Float, Int
 from numpy import ndarray
 
 from tracker.corrections import Correction
-from tracker.corrections.stating import doubted
+from tracker.corrections.inflation import inflation
 from tracker.smoothing.paths import Paths
 
 ASIDE = 1.5
-"""Metres a second by which somebody leaves the way that his boxes say, as fast as one walks."""
+"""Speed at which a path leaves the estimate from boxes towards an enforced place, that of walking,
+metres per second."""
 
 _LEAST = 1e-12
-"""Share of a place's variance by which it counts as told by something else too."""
+"""Share of a place's variance that is added to keep the matrix invertible."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Stated:
-    """K places of rows of paths."""
+class PlaceMeasurements:
+    """K measured places of rows of paths."""
 
     rows: Int[ndarray, " K"]
+    """Index of the row of each place."""
     points: Float[ndarray, "K 3"]
-    """z, world metres."""
+    """z: the place, world metres."""
     sigmas: Float[ndarray, " K"]
-    """σ, metres."""
+    """σ: standard deviation of the place along each axis, metres."""
     noises: Float[ndarray, "K 3 3"]
-    """R, with which each is weighed: more than σ² I where all else contradicts it, so that who is
-    off his way at one step is not taken for somebody who moves wildly, or for another."""
+    """R: noise covariance of each place, more than σ² I where the boxes contradict it, so that one
+    outlying place neither raises the process noise nor splits the track, squared metres."""
     asides: Float[ndarray, "K 3"]
-    """From where the boxes have each row to where it is said to be, metres; 0 where these agree."""
+    """Offset from the estimate of boxes to the enforced place, metres; 0 where they agree."""
 
     @staticmethod
-    def of(rows: Int[ndarray, " K"], said: Many[Correction]) -> Stated:
-        """Places as they were said."""
-        sigmas = np.array([one.accuracy or 1.0 for one in said])
-        points = np.array([one.places[0].point for one in said]).reshape(-1, 3)
+    def of(rows: Int[ndarray, " K"], corrections: Many[Correction]) -> PlaceMeasurements:
+        """The places of corrections, one for each row, with R = σ² I."""
+        sigmas = np.array([one.accuracy or 1.0 for one in corrections])
+        points = np.array([one.places[0].point for one in corrections]).reshape(-1, 3)
         noises = sigmas[:, None, None] ** 2 * np.eye(3)
-        return Stated(rows, points, sigmas, noises, np.zeros_like(points))
+        return PlaceMeasurements(rows, points, sigmas, noises, np.zeros_like(points))
 
     def information(
         self, matrices: Float[ndarray, "N 3 3"], vectors: Float[ndarray, "N 3"]
     ) -> tuple[Float[ndarray, "N 3 3"], Float[ndarray, "N 3"]]:
-        """What boxes say of the rows, with the places."""
+        """Add the information of the places to that of the boxes.
+
+        Args:
+            matrices: Information matrix on the position of each row.
+            vectors: Information vector on the position of each row.
+        """
         matrices, vectors = matrices.copy(), vectors.copy()
         precisions = np.linalg.inv(self.noises)
         matrices[self.rows] += precisions
@@ -55,42 +62,51 @@ class Stated:
         return matrices, vectors
 
     def _against(self, k: int, mean: ndarray, covariance: ndarray) -> tuple[ndarray, ndarray]:
-        """ν from where all but the place has a row to it, and the covariance P⁻ of that.
+        """The innovation ν of place k, and the covariance P⁻ of its row without that place.
 
-        With m and P of everything, R − P = R (P⁻ + R)⁻¹ R and z − m = R (P⁻ + R)⁻¹ ν.
+        With the smoothed m and P, which include the place, R − P = R (P⁻ + R)⁻¹ R and
+        z − m = R (P⁻ + R)⁻¹ ν.
         """
         noise = self.noises[k]
         lost = noise - covariance[:3, :3] + _LEAST * np.trace(noise) * np.eye(3)
         gain = noise @ np.linalg.inv(lost)
         return gain @ (self.points[k] - mean[:3]), gain @ noise - noise
 
-    def weighed(self, means: Float[ndarray, "N d"], covariances: Float[ndarray, "N d d"]) -> Stated:
-        """Weighed by how far they contradict all else, given the rows smoothed with them."""
+    def weighed(
+        self, means: Float[ndarray, "N d"], covariances: Float[ndarray, "N d d"]
+    ) -> PlaceMeasurements:
+        """Inflate the noise of the places by how far they contradict the boxes.
+
+        Args:
+            means: State of each row, smoothed with the places.
+            covariances: Covariance of each row.
+        """
         noises = self.noises.copy()
         for k, row in enumerate(self.rows.tolist()):
             offset, rest = self._against(k, means[row], covariances[row])
             sigma = float(self.sigmas[k])
-            noises[k] = sigma**2 * np.eye(3) + doubted(offset, rest, sigma)
+            noises[k] = sigma**2 * np.eye(3) + inflation(offset, rest, sigma)
         return replace(self, noises=noises)
 
     @property
     def contradicted(self) -> bool:
-        """Whether all else contradicts any of them."""
+        """Whether the boxes contradict any of the places."""
         traces = np.trace(self.noises, axis1=1, axis2=2)
         return bool((traces > 3.0 * self.sigmas**2 * (1.0 + 1e-9)).any())
 
     def obeyed(
         self, states: Float[ndarray, "N d"], covariances: Float[ndarray, "N d d"]
-    ) -> tuple[Stated, Float[ndarray, "N d"], Float[ndarray, "N d d"]]:
-        """The rows that all else contradicts at their places, to within the σ of each: what all
-        else says of somebody who is said to be elsewhere is no better than the way there is long.
+    ) -> tuple[PlaceMeasurements, Float[ndarray, "N d"], Float[ndarray, "N d d"]]:
+        """Move the rows whose places the boxes contradict to these places, to within their σ.
+
+        The covariance of such a row without its place is inflated to the distance of the place.
 
         Args:
-            states: Smoothed with the places as they are weighed.
-            covariances: Theirs.
+            states: State of each row, smoothed with the places and their inflated noise.
+            covariances: Covariance of each row.
 
         Returns:
-            The places with the way to them; states and covariances.
+            The places with their offsets, and the states and covariances.
         """
         asides = np.zeros_like(self.points)
         if not self.contradicted:
@@ -98,7 +114,7 @@ class Stated:
         states, covariances = states.copy(), covariances.copy()
         for k, row in enumerate(self.rows.tolist()):
             offset, rest = self._against(k, states[row], covariances[row])
-            widened = doubted(offset, rest, float(self.sigmas[k]))
+            widened = inflation(offset, rest, float(self.sigmas[k]))
             if not widened.any():
                 continue
             variance, spread = float(self.sigmas[k]) ** 2, rest + widened
@@ -109,20 +125,19 @@ class Stated:
         return replace(self, asides=asides), states, covariances
 
     def led_to(self, paths: Paths, step_time: float) -> Paths:
-        """The paths with the ways there and back: who is somewhere else than his boxes say left
-        them before and finds back to them after, as fast as one walks.
+        """Lead the paths to their enforced places and back, at walking speed.
 
         Args:
-            paths: Through the places.
-            step_time: Seconds.
+            paths: The paths, whose rows are at the enforced places.
+            step_time: Time between two steps, seconds.
         """
         states, covariances = paths.states.copy(), paths.covariances.copy()
-        owners, said = paths.owners, set(self.rows.tolist())
+        owners, constrained = paths.owners, set(self.rows.tolist())
         for row, aside in zip(self.rows.tolist(), self.asides, strict=True):
             far = float(np.linalg.norm(aside))
             for turn in (-1, 1):
                 near, left = row + turn, far - ASIDE * step_time
-                while left > 0.0 and near not in said:
+                while left > 0.0 and near not in constrained:
                     if not (0 <= near < len(owners) and owners[near] == owners[row]):
                         break
                     part = left / far * aside

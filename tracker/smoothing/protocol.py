@@ -1,4 +1,4 @@
-"""The interface of every smoothing method: all steps of the filter in, smoothed tracks out."""
+"""The interface of every smoothing method: from all steps of the filter to smoothed tracks."""
 
 from __future__ import annotations
 
@@ -15,33 +15,33 @@ from tracker.smoothing.result import Smoothed
 
 
 class Earlier(Protocol):
-    """What runs that differ from this one only in who is said to be whom found on their way.
+    """Intermediate results of runs that differ from this one only in corrections of identity.
 
-    What is kept is never changed, and is what would be found again: bit for bit.
+    A stored result is never changed, and equals bit for bit that of computing it again.
     """
 
     def get(self, what: str) -> Any:
-        """Something that was kept, None where it is not there."""
+        """The result stored under a name, None where there is none."""
         ...
 
     def put(self, what: str, found: object) -> None:
-        """Keep something for later runs."""
+        """Store a result under a name for later runs."""
         ...
 
 
 class Nothing:
-    """Nothing is known of earlier runs, and nothing is kept."""
+    """A store that is always empty."""
 
     def get(self, what: str) -> Any:
-        """None."""
+        """No result is ever stored: None."""
         return None
 
     def put(self, what: str, found: object) -> None:
-        """Let it go."""
+        """Discard the result."""
 
 
 class SmoothingMethod(Protocol):
-    """One method, prepared for one sequence."""
+    """A smoothing method, prepared for one sequence."""
 
     def smooth(
         self,
@@ -51,27 +51,27 @@ class SmoothingMethod(Protocol):
         corrections: Many[Correction] = (),
         earlier: Earlier | None = None,
     ) -> Smoothed | None:
-        """The tracks of some steps from step 0 on, each by the boxes of all of them.
+        """Estimate the tracks of some steps from step 0 on, each from the boxes of all steps.
 
         Args:
-            views: Stage 1 of each step.
-            fused: Stage 2 of each step.
-            check: Called now and then; raises to stop.
-            corrections: What a person said; given only where there is any.
-            earlier: Of runs with the same boxes, tracks of the filter and stated places; given only
-                where it is asked for.
+            views: The results of stage 1 for each step.
+            fused: The result of stage 2 for each step.
+            check: A function that is called now and then and raises an exception to stop.
+            corrections: The user's corrections; passed only where there are any.
+            earlier: Results of runs with the same boxes, tracks of the filter and constraints of
+                places; passed only to methods that have this argument.
 
         Returns:
-            None where the filter's tracks stay as they are.
+            The tracks; None where those of the filter do not change.
         """
         ...
 
 
 class NoSmoothing:
-    """The filter's tracks as they are: what a live system would see."""
+    """No smoothing: the filter's tracks, as a live system would have them."""
 
     def __init__(self, sequence: Sequence, parameters: RunParameters) -> None:
-        """There is nothing to prepare."""
+        """The method needs no preparation."""
 
     def smooth(
         self,
@@ -81,4 +81,4 @@ class NoSmoothing:
         corrections: Many[Correction] = (),
         earlier: Earlier | None = None,
     ) -> None:
-        """Nothing is made of them."""
+        """Return None: the filter's tracks do not change."""

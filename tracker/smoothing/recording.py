@@ -16,22 +16,28 @@ from tracker.single_view.protocol import ViewResult
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CameraBoxes:
-    """The B boxes of one camera, step after step."""
+    """The B boxes of one camera over T steps, step after step."""
 
     starts: Int[ndarray, " T1"]
-    """Where each step's boxes begin, and the end."""
+    """Index of the first box of each step, and B at the end."""
     blind: Bool[ndarray, " T"]
-    """Whether the camera had no frame."""
+    """Whether the camera had no frame at each step."""
     measurements: Measurements
-    """Of the target model, pixels and squared pixels."""
+    """The boxes as measurements of the target model, pixels and squared pixels."""
     boxes: Float[ndarray, "B 4"]
     """Centre and half sizes, pixels."""
     clutter_factors: Float[ndarray, " B"]
-    """As :attr:`tracker.single_view.protocol.ViewResult.clutter_factors`."""
+    """Factor on κ, :attr:`tracker.single_view.protocol.ViewResult.clutter_factors`."""
 
     @staticmethod
     def of(views: Many[ViewResult], model: TargetModel, factor: float) -> CameraBoxes:
-        """Those of all steps; the standard deviations times ``factor``."""
+        """Collect the boxes of all steps of one camera.
+
+        Args:
+            views: The result of stage 1 for each step.
+            model: The measurement model of a target.
+            factor: Factor on the standard deviations of the boxes.
+        """
         counts = [len(view.boxes) for view in views]
         boxes = np.concatenate([np.zeros((0, 4)), *(view.boxes for view in views)])
         sigmas = np.concatenate([np.zeros((0, 4)), *(view.sigmas for view in views)])

@@ -1,4 +1,4 @@
-"""What the smoothing says: tracks over the whole recording, and what it decided and why."""
+"""The result of smoothing: tracks over the whole recording, and the decisions about identities."""
 
 from __future__ import annotations
 
@@ -16,69 +16,83 @@ DecisionKind = Literal["cut", "joined", "removed"]
 
 @dataclass(frozen=True, slots=True)
 class Decision:
-    """One thing that the smoothing made otherwise than the filter, and with what odds."""
+    """One difference between the smoothed tracks and the filter's, with its probability."""
 
     kind: DecisionKind
+    """Whether a track was split, linked or removed."""
     step: int
-    """Where: the first step after a cut or a join; the first step of what was removed."""
+    """The first step after a split or link; the first step of a removed track."""
     label: int
-    """Of the track that it happened to; of a removed one the filter's."""
+    """Label of the track; the filter's for a removed one."""
     other: int
-    """The filter's label of what was cut off or joined; that of a removed one again."""
+    """The filter's label of the part that was split off or linked; for a removed track the same."""
     probability: float
-    """Of what was decided."""
+    """Probability of the decision, 0 … 1."""
     against: float
-    """Of the best alternative."""
+    """Probability of the best alternative, 0 … 1."""
     reason: str
-    """In a few words."""
+    """Reason in a few words."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Joined:
-    """The pieces that tracks were joined of, and the odds of joining them otherwise."""
+    """The n tracklets that tracks consist of, and the log odds of P possible links."""
 
     labels: Int[ndarray, " n"]
-    """Of the track that each piece is in, -1 for nobody's."""
+    """Label of the track that each tracklet is in, -1 for a false one."""
     firsts: Int[ndarray, " n"]
+    """First step of each tracklet."""
     lasts: Int[ndarray, " n"]
+    """Last step of each tracklet."""
     begins: Float[ndarray, "n 3"]
-    """World metres."""
+    """Position at the first step, world metres."""
     ends: Float[ndarray, "n 3"]
+    """Position at the last step, world metres."""
     worths: Float[ndarray, " n"]
-    """Log odds of each piece's boxes against clutter."""
+    """Log odds of each tracklet's boxes against clutter."""
     births: Float[ndarray, " n"]
-    """Log probability of beginning there."""
+    """Log probability of a track beginning with the tracklet."""
     deaths: Float[ndarray, " n"]
+    """Log probability of a track ending with the tracklet."""
     earlier: Int[ndarray, " P"]
-    """Of each possible pair."""
+    """Index of the first tracklet of each possible pair."""
     later: Int[ndarray, " P"]
+    """Index of the second tracklet of each pair."""
     gains: Float[ndarray, " P"]
-    """Log odds of being one person's."""
+    """Log odds of the pair being of one person."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Smoothed:
-    """Tracks of the whole recording, one row a person a step, by step and then label."""
+    """Tracks of the whole recording: N rows, one for each track at each step, by step and label."""
 
     frames: Int[ndarray, " N"]
+    """Step of each row."""
     labels: Int[ndarray, " N"]
-    """The filter's where a track goes on one of its; larger ones for people it did not part."""
+    """Label of the track: the filter's where it continues one of its tracks, else a larger one."""
     means: Float[ndarray, "N d"]
     """Position in metres, world frame; then velocity, where the motion model has one."""
     covariances: Float[ndarray, "N d d"]
+    """Covariance of each state, metres and seconds."""
     existences: Float[ndarray, " N"]
-    """Probability that the person was there, by the boxes of all steps."""
+    """Existence probability given the boxes of all steps."""
     seen: Bool[ndarray, "N C"]
-    """Whether a box of each camera is the person's with more than even odds."""
+    """Whether the association probability with a box of each camera is above 0.5."""
     decisions: tuple[Decision, ...] = ()
+    """Differences from the filter's tracks, by step."""
     learnt: Calibration = field(default_factory=lambda: Calibration.none(0, 0, 3))
-    """What the recording said of its boxes; the sizes are of the final tracks."""
+    """The self-calibration of the boxes; its sizes are those of the final tracks."""
     joined: Joined | None = None
-    """Of what tracks were joined, where that was settled."""
+    """The tracklets of the tracks, where identities were resolved."""
 
     @staticmethod
     def empty(dimension: int, cameras: int) -> Smoothed:
-        """Nobody."""
+        """The result without tracks.
+
+        Args:
+            dimension: d, the size of the state.
+            cameras: C, the number of cameras.
+        """
         return Smoothed(
             np.zeros(0, dtype=np.int64),
             np.zeros(0, dtype=np.int64),

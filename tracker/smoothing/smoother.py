@@ -1,4 +1,8 @@
-"""The fusion's own models over whole paths: best states given boxes, and boxes given states."""
+"""Batch estimation with the fusion's models: states given associations, associations given states.
+
+[SS82] Shumway, Stoffer, "An approach to time series smoothing and forecasting using the EM
+algorithm", Journal of Time Series Analysis 3(4), 1982.
+"""
 
 from __future__ import annotations
 
@@ -14,10 +18,11 @@ from jaxtyping import Float, Int
 from numpy import ndarray
 
 from tracker.corrections import Correction
-from tracker.corrections.seeking import Whereabouts
+from tracker.corrections.lookup import TrackIndex
 from tracker.fusion.model import FusionModel
 from tracker.kernels.measurement import ExpectedBoxes as SeenBoxes
 from tracker.kernels.smoothing import evidence, passes
+from tracker.kernels.smoothing.passes import SmoothedRows, drives, sums_around
 from tracker.parameters import FusionParams
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult
@@ -29,65 +34,80 @@ from tracker.smoothing.calibration import (
     SIZE_RIDGE,
     WIDEST,
     Calibration,
+    Marks,
     free,
     lower,
+    shifts,
     upright,
 )
-from tracker.smoothing.marks import Marks, shifts
 from tracker.smoothing.paths import Links, Paths
-from tracker.smoothing.place_constraints import Stated
-from tracker.smoothing.process_noise import restlessness
+from tracker.smoothing.place_constraints import PlaceMeasurements
 from tracker.smoothing.recording import CameraBoxes
 
 _T = TypeVar("_T")
 
 START_SIGMA = 10.0
-"""Metres: how little is known of a path's first place but by its boxes."""
+"""Prior standard deviation of a path's first position along each axis, metres."""
 
 _MOST_THREADS = 4
-_LEAST = 0.01  # association probability of a pair worth keeping
-_SURE = 0.9  # association probability of a box that tells of its person's size
+_LEAST = 0.01  # association probability below which a pair is left out
+_SURE = 0.9  # association probability of a box that is used for the self-calibration
 _MEDIAN = 0.4549  # of a squared standard normal
+
+_HABIT = 8.0
+"""Time constant of the process-noise scale, seconds."""
+
+_PRIOR = 0.5
+"""Weight of the prior s = 1, in seconds of a path."""
+
+_WILD = 2.0
+"""Factor on the previous scale at which the contribution of one step is clipped, so that a single
+turn or a wrong association does not raise the scale."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fitted:
-    """Paths fitted to their boxes."""
+    """Paths fitted to their boxes, with N rows."""
 
     paths: Paths
+    """The smoothed paths."""
     odds: Float[ndarray, " N"]
-    """log of what each row's boxes say, given the rows before, against all being clutter."""
+    """Log likelihood ratio of each row's boxes, given the rows before, against clutter."""
     ahead: Float[ndarray, "N d"]
-    """What the rows before say of each row."""
+    """Prediction of each row's state from the rows before, metres and seconds."""
     ahead_covariances: Float[ndarray, "N d d"]
+    """Covariance of the prediction."""
     traces: Float[ndarray, " N"]
-    """Of the position's covariance before the backward pass, square metres."""
-    restlessness: Float[ndarray, " N"]
-    """s: by which the motion's noise is multiplied on the way to each row."""
-    places: Stated = field(default_factory=lambda: Stated.of(np.zeros(0, dtype=np.int64), ()))
-    """What somebody said of where people are, as weighed against all else."""
+    """Trace of the position's filtered covariance, before the backward pass, square metres."""
+    noise_scales: Float[ndarray, " N"]
+    """s: factor on the process noise of the step to each row."""
+    places: PlaceMeasurements = field(
+        default_factory=lambda: PlaceMeasurements.of(np.zeros(0, dtype=np.int64), ())
+    )
+    """The constraints of places, with their inflated noise."""
 
     @property
     def jumps(self) -> Float[ndarray, " N"]:
-        """Squared Mahalanobis distance between what the rows before and from this one on say."""
+        """Squared Mahalanobis distance of the estimates from the rows before and from then on."""
         paths = self.paths
-        told: ndarray = passes.jumps(
+        found: ndarray = passes.jumps(
             paths.starts, paths.states, paths.covariances, self.ahead, self.ahead_covariances
         )
-        return told
+        return found
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Shared:
-    """Who made which box, at all steps and in all C cameras."""
+    """Associations of the boxes of all steps and C cameras with the N rows of paths."""
 
     links: Links
+    """Association probabilities of rows and boxes."""
     chances: Float[ndarray, "C N"]
-    """p_D of each row."""
+    """p_D of each row in each camera."""
     missed: Float[ndarray, "C N"]
-    """Probability that the camera missed it."""
+    """Probability that the camera missed the row."""
     hidden_by: Int[ndarray, "C N"]
-    """Label of who hides it, -1 for nobody."""
+    """Label of the track that occludes the row, -1 for none."""
 
 
 class Smoother:
@@ -103,15 +123,15 @@ class Smoother:
         learning: bool = True,
         several_boxes: bool = False,
     ) -> None:
-        """Prepare for the boxes of some steps from step 0 on.
+        """Prepare the boxes of some steps from step 0 on.
 
         Args:
-            sequence: Cameras and room.
-            parameters: Of the fusion.
-            views: Stage 1 of each step.
-            corrections: Of them *is here* is a measurement of the place.
-            learning: Whether people's restlessness is learnt; else they move as stated.
-            several_boxes: Whether stage 1 may draw several boxes of one camera around a person.
+            sequence: The cameras and the room.
+            parameters: The parameters of the fusion.
+            views: The results of stage 1 for each step.
+            corrections: The user's corrections, of which those of kind ``here`` measure a place.
+            learning: Whether the scale of the process noise is estimated; else it is 1.
+            several_boxes: Whether stage 1 may give several boxes of a person in one camera.
         """
         self._learning, self.several_boxes = learning, several_boxes
         self._sequence = sequence
@@ -134,66 +154,69 @@ class Smoother:
         self.log_place = float(
             1.5 * np.log(2.0 * np.pi) + 3.0 * np.log(START_SIGMA) - np.log(np.prod(size))
         )
-        """What turns the density of a first place under the prior into one over the room."""
+        """Log ratio of the uniform density over the room and the prior density of a first position.
+        """
 
     def fit(
         self, paths: Paths, links: Links, iterations: int = 1, learnt: Calibration | None = None
     ) -> Fitted:
-        """The most likely states of every path given its boxes: iterated Kalman smoothing.
+        """Estimate the states of every path given its boxes, by iterated Kalman smoothing.
 
-        Each iteration straightens the projection at the states of the one before: Gauss and
-        Newton's way to the least-squares solution over the whole path (Bell, "The iterated
-        Kalman smoother as a Gauss-Newton method", SIAM J. Optimization 4(3), 1994). A box that
-        is a path's with probability a counts with a times its information, and the motion's
-        noise with how restless the person is about that time.
+        Each iteration linearises the projection at the states of the one before: the Gauss-Newton
+        method for the least-squares solution over the whole path (Bell, "The iterated
+        Kalman smoother as a Gauss-Newton method", SIAM J. Optimization 4(3), 1994). A box with
+        association probability a contributes a times its information, and the process noise has
+        the scale that is estimated around each step.
 
         Args:
-            paths: Their states are where the projection is straightened first.
-            links: Whose box each is.
-            iterations: At least 1.
-            learnt: Of the boxes; as stated, if none.
+            paths: n paths, at whose states the projection is linearised first.
+            links: Association probabilities of rows and boxes.
+            iterations: Number of iterations, at least 1.
+            learnt: The self-calibration of the boxes; None for none.
         """
         motion, owners = self.model.motion, paths.owners
-        learnt = learnt or self.stated(paths)
+        learnt = learnt or self.uncalibrated(paths)
         rule = passes.PathMotion(motion.transition, motion.noise, self.prior)
-        restless = np.ones(len(paths.states))
+        scales = np.ones(len(paths.states))
         for _ in range(iterations):
-            told = self._each_camera(partial(self._told, paths, owners, links, learnt))
+            by_camera = self._each_camera(
+                partial(self._camera_information, paths, owners, links, learnt)
+            )
             information = evidence.BoxInformation(
-                *(np.sum(parts, axis=0) for parts in zip(*told, strict=True))
+                *(np.sum(parts, axis=0) for parts in zip(*by_camera, strict=True))
             )
             begins = paths.states[paths.starts[:-1]].copy()
             begins[:, 3:] = 0.0
-            places = Stated.of(*self.pinned(paths))
+            places = PlaceMeasurements.of(*self.pinned(paths))
             smooth = partial(_smoothed, paths, begins, information, rule)
-            found = smooth(places, restless)
+            found = smooth(places, scales)
             weighed = places.weighed(found.means, found.covariances)
             if weighed.contradicted:
                 places = weighed
-                found = smooth(places, restless)
+                found = smooth(places, scales)
             if self._learning:
-                restless = restlessness(
-                    paths.starts, found, motion.noise, restless, self.model.step_time
+                scales = process_noise_scales(
+                    paths.starts, found, motion.noise, scales, self.model.step_time
                 )
-                found = smooth(places, restless)
+                found = smooth(places, scales)
             paths = paths.with_states(found.means, found.covariances)
         places, states, covariances = places.obeyed(found.means, found.covariances)
-        # who is said to be off his way jumps no farther than his boxes do
+        # an enforced place is no jump: predictions move along with their rows
         return Fitted(
             paths.with_states(states, covariances),
             found.fits + information.constants,
             found.ahead + (states - found.means),
             found.ahead_covariances + (covariances - found.covariances),
             found.traces,
-            restless,
+            scales,
             places,
         )
 
     def _each_camera(self, work: Callable[[int], _T]) -> list[_T]:
-        """What some work gives of each camera: the kernels let go of the interpreter."""
+        """Run a function for each camera in threads: the kernels release the interpreter's lock."""
         return list(self._threads.map(work, range(len(self.cameras))))
 
-    def _told(
+    def _camera_information(
         self,
         paths: Paths,
         owners: Int[ndarray, " N"],
@@ -201,14 +224,22 @@ class Smoother:
         learnt: Calibration,
         camera: int,
     ) -> evidence.BoxInformation:
-        """What a camera's boxes say of the rows of paths."""
+        """Compute the information of one camera's boxes on the rows of paths.
+
+        Args:
+            paths: The paths, with N rows.
+            owners: Path of each row.
+            links: Association probabilities of rows and boxes.
+            learnt: The self-calibration of the boxes.
+            camera: Index of the camera.
+        """
         rows = len(paths.states)
         found = evidence.BoxInformation(np.zeros((rows, 3, 3)), np.zeros((rows, 3)), np.zeros(rows))
         own = links.take(links.cameras == camera)
         seen = self._seen(
             camera, paths.states[own.rows], paths.covariances[own.rows], owners[own.rows], learnt
         )
-        # who stands behind the lens cannot have made the box
+        # a state behind the lens has no box
         shares = np.where(seen.valid, own.shares, 0.0)
         evidence.add_information(
             evidence.BoxLinks(own.rows, own.boxes, shares),
@@ -224,20 +255,19 @@ class Smoother:
         return found
 
     def pinned(self, paths: Paths) -> tuple[Int[ndarray, " K"], list[Correction]]:
-        """The rows of paths that somebody said is there, each of one correction: of two the
-        later."""
+        """The rows of paths whose place a correction states, and the last correction of each."""
         if not self._here:
             return np.zeros(0, dtype=np.int64), []
-        whereabouts = Whereabouts(paths.steps, paths.states[:, :3])
+        whereabouts = TrackIndex(paths.steps, paths.states[:, :3])
         rows: dict[int, Correction] = {}
         for one in self._here:
-            row = whereabouts.stated(one)
+            row = whereabouts.row_of(one)
             if row is not None:
                 rows[row] = one
         return np.array(list(rows), dtype=np.int64), list(rows.values())
 
-    def stated(self, paths: Paths) -> Calibration:
-        """The boxes as stage 1 states them, for some paths."""
+    def uncalibrated(self, paths: Paths) -> Calibration:
+        """The calibration that does not change the boxes of stage 1, for some paths."""
         return Calibration.none(len(paths.labels), len(self.cameras), self.model.target.size)
 
     def share(
@@ -246,14 +276,19 @@ class Smoother:
         existences: Float[ndarray, " N"] | None = None,
         learnt: Calibration | None = None,
     ) -> Shared:
-        """Which path made which box, at every step, given where all paths lie.
+        """Associate the boxes of every step with the paths, given their states.
 
-        Association marginals by belief propagation, with the fusion's detection probabilities:
-        people behind people, the picture's edge.
+        The result has association marginals by belief propagation, with the fusion's detection
+        probabilities, which include occlusion and the edge of the image.
+
+        Args:
+            paths: n paths, with N rows.
+            existences: Prior existence probability of each row; None for 1.
+            learnt: The self-calibration of the boxes; None for none.
         """
         steps, owners = paths.steps, paths.owners
         order = np.argsort(steps, kind="stable")
-        learnt = learnt or self.stated(paths)
+        learnt = learnt or self.uncalibrated(paths)
         rows = evidence.Rows(
             paths.states,
             paths.covariances,
@@ -300,7 +335,15 @@ class Smoother:
         people: ndarray,
         learnt: Calibration,
     ) -> SeenBoxes:
-        """What a camera should give of states that are those of ``people``."""
+        """Predict the boxes of states in one camera, with the calibration of each person.
+
+        Args:
+            camera: Index of the camera.
+            states: (J, d) states.
+            covariances: (J, d, d) covariances.
+            people: Index of the path of each state.
+            learnt: The self-calibration of the boxes.
+        """
         found = self.model.target.expected(self.model.cameras[camera], states, covariances)
         values = found.expected.values + learnt.shift(camera, people, found)
         return SeenBoxes(
@@ -308,17 +351,22 @@ class Smoother:
         )
 
     def learn(self, paths: Paths, links: Links, learnt: Calibration) -> Calibration:
-        """What the boxes say of themselves, given where the paths lie: a step of EM.
+        """Estimate the self-calibration of the boxes given the paths: an M-step of EM.
 
-        Sizes and offsets are means of the residuals of boxes that are somebody's, drawn
-        towards 0 by their priors; the noise is the median of r² + H P Hᵀ over its stated value.
+        Sizes and offsets are means of the residuals of boxes with a clear association, shrunk
+        towards 0 by their priors; the squared noise factor is the median of r² + H P Hᵀ over R.
+
+        Args:
+            paths: n paths, fitted to their boxes.
+            links: Association probabilities of rows and boxes.
+            learnt: The calibration before.
         """
         size, owners = self.model.target.size, paths.owners
         u, w = upright(size), lower(size)
         people = len(paths.labels)
         witness = np.ones(len(paths.states), dtype=bool)
-        witness[self.pinned(paths)[0]] = False  # somebody knows better than the boxes there
-        told, count = np.zeros(people), np.zeros(people)
+        witness[self.pinned(paths)[0]] = False  # a correction replaces the boxes there
+        size_sums, count = np.zeros(people), np.zeros(people)
         offsets, noises = np.zeros_like(learnt.offsets), learnt.noises.copy()
         for c, camera in enumerate(self.cameras):
             own = links.take((links.cameras == c) & (links.shares > _SURE) & witness[links.rows])
@@ -329,7 +377,7 @@ class Smoother:
             plain = camera.measurements.values[own.boxes] - expected.expected.values
             whole = expected.valid & free(expected).all(axis=1)
             left = (plain - learnt.shift(c, owners[own.rows], expected)) / half[:, None]
-            # a box of another posture is no witness of a person's height
+            # a box of another posture does not show the person's height
             whole &= (np.abs(left) < ODD).all(axis=1)
             if not whole.any():
                 continue
@@ -340,7 +388,7 @@ class Smoother:
             offsets[c] = rest.sum(axis=0) / (len(rest) + OFFSET_RIDGE)
             if size >= 3:
                 taller = shares - offsets[c]
-                told += np.bincount(rows, (taller @ u) / (u @ u), people)
+                size_sums += np.bincount(rows, (taller @ u) / (u @ u), people)
                 count += np.bincount(rows, minlength=people)
             if len(rest) >= FEWEST:
                 h = expected.jacobians[whole][:, :, :3]
@@ -355,10 +403,10 @@ class Smoother:
                 noises[c] = np.clip(
                     np.sqrt(ratio * (1.0 + alike) / (1.0 - alike)), NARROWEST, WIDEST
                 )
-        return Calibration(told / (count + SIZE_RIDGE), offsets, noises, learnt.shifts)
+        return Calibration(size_sums / (count + SIZE_RIDGE), offsets, noises, learnt.shifts)
 
     def placed(self, paths: Paths, learnt: Calibration) -> Calibration:
-        """What marked boxes say of paths that were fitted with it: how low each one's boxes lie."""
+        """Add the shifts that hand-marked boxes show of paths fitted with ``learnt``."""
         half_extents = self._sequence.target_half_extents
         found = shifts(self._marks, self.model.cameras, half_extents, paths)
         return replace(learnt, shifts=learnt.shifts + found)
@@ -369,13 +417,13 @@ def _smoothed(
     begins: Float[ndarray, "n d"],
     information: evidence.BoxInformation,
     rule: passes.PathMotion,
-    places: Stated,
-    restless: Float[ndarray, " N"],
+    places: PlaceMeasurements,
+    scales: Float[ndarray, " N"],
 ) -> passes.SmoothedRows:
-    """The rows of paths by their boxes and by what somebody said of their places."""
+    """Smooth paths given the information of their boxes and the constraints of places."""
     matrices, vectors = places.information(information.matrices, information.vectors)
     found: passes.SmoothedRows = passes.smooth_paths(
-        paths.starts, begins, matrices, vectors, rule, restless
+        paths.starts, begins, matrices, vectors, rule, scales
     )
     return found
 
@@ -383,11 +431,16 @@ def _smoothed(
 def _alike(
     rows: Int[ndarray, " L"], owners: Int[ndarray, " N"], residuals: Float[ndarray, "L m"]
 ) -> float:
-    """ρ, the correlation of the errors of a path's boxes in consecutive steps, 0 … 0.95.
+    """The correlation ρ of the errors of a path's boxes in consecutive steps, 0 … 0.95.
 
-    A mean of errors that follow e' = ρ e + v varies (1 + ρ)/(1 − ρ) times as much as one of
-    independent errors of the same size: that factor on R lets a filter that takes them as
-    independent trust the boxes as far as they deserve.
+    The variance of a mean of errors that follow e' = ρ e + v is (1 + ρ)/(1 − ρ) times that of
+    independent errors of the same size: with this factor on R a filter that takes errors as
+    independent has the right covariance.
+
+    Args:
+        rows: Row of each of L boxes.
+        owners: Path of each of N rows.
+        residuals: Residual of each box, half heights.
     """
     order = np.argsort(rows, kind="stable")
     rows, residuals = rows[order], residuals[order]
@@ -397,3 +450,43 @@ def _alike(
     here, after = residuals[:-1][next_step], residuals[1:][next_step]
     correlation = (here * after).sum() / np.sqrt((here**2).sum() * (after**2).sum() + 1e-300)
     return float(np.clip(correlation, 0.0, 0.95))
+
+
+def process_noise_scales(
+    starts: Int[ndarray, " n1"],
+    found: SmoothedRows,
+    noise: Float[ndarray, "d d"],
+    before: Float[ndarray, " N"],
+    step_time: float,
+) -> Float[ndarray, " N"]:
+    """Estimate the scale s of the process noise Q at every row: an M-step of EM [SS82].
+
+    The process noise of the step to row k is w_k ~ N(0, s Q). Given all boxes its mean and
+    covariance are
+
+        ŵ = s Q P⁻⁻¹ (m − m⁻),   W = s Q − s Q (P⁻⁻¹ − P⁻⁻¹ P P⁻⁻¹) s Q
+
+    and s is the mean of tr Q⁻¹ (ŵ ŵᵀ + W) / d over the rows of the path, with weights that decay
+    exponentially with time, each row's value clipped at twice the previous scale, and with a prior
+    of 1. Only the components along x and y are used.
+
+    Args:
+        starts: Index of each path's first row, and N at the end.
+        found: The rows, smoothed with the scales ``before``.
+        noise: Q, the process noise of one step.
+        before: s of each row so far.
+        step_time: Time between two steps, seconds.
+    """
+    dimension = found.means.shape[1]
+    ground = np.flatnonzero(np.arange(dimension) % 3 < 2)
+    on_ground = noise[np.ix_(ground, ground)]
+    size = float(len(ground))
+    squares = before * size + before**2 * drives(found, on_ground, ground)
+    squares = np.minimum(squares, _WILD * size * before)
+    counts = np.full(len(squares), size)
+    begins = starts[:-1]
+    squares[begins], counts[begins] = 0.0, 0.0  # no step leads to a first row
+    kept = float(np.exp(-step_time / _HABIT))
+    prior = _PRIOR * size / step_time
+    total, count = sums_around(starts, squares, kept), sums_around(starts, counts, kept)
+    return np.asarray((prior + total) / (prior + count))

@@ -1,4 +1,4 @@
-"""Stage 3: the filter's tracks with hindsight, over all steps of a recording."""
+"""Stage 3: the methods that smooth the filter's tracks over all steps of a recording."""
 
 from __future__ import annotations
 
@@ -15,67 +15,81 @@ from tracker.corrections import Correction
 from tracker.fusion import trajectories
 from tracker.fusion.model import CONFIRMED
 from tracker.fusion.protocol import FusionResult
+from tracker.fusion.trajectories import Trajectories
 from tracker.parameters import RunParameters, SmoothingParams
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult
-from tracker.smoothing import lifetimes, reading
+from tracker.smoothing import lifetimes
 from tracker.smoothing.calibration import Calibration
-from tracker.smoothing.identity import identities, pieces
-from tracker.smoothing.identity.cutting import Tracked
+from tracker.smoothing.identity import identities, tracklets
 from tracker.smoothing.identity.people import Seen
+from tracker.smoothing.identity.splitting import Tracked
 from tracker.smoothing.paths import Links, Paths
 from tracker.smoothing.protocol import Earlier, Nothing
+from tracker.smoothing.recording import CameraBoxes
 from tracker.smoothing.result import Decision, Joined, Smoothed
 from tracker.smoothing.smoother import Fitted, Shared, Smoother
 
 _SEEN = 0.5
-"""Association probability from which a camera counts as seeing a person."""
+"""Association probability above which a camera counts as detecting a track."""
+
+_WIDE = 1.0
+"""Initial variance of a state within a gap, m² and (m/s)²."""
 
 
 class _Decided(NamedTuple):
-    """What was decided of who is who, and between what."""
+    """The resolution of identities."""
 
     decisions: list[Decision]
+    """Differences from the filter's tracks."""
     joined: Joined | None = None
+    """The tracklets of the tracks."""
     limits: Mapping[int, tuple[int, int]] = MappingProxyType({})
-    """Of some labels the first and the last step at which corrections let them be."""
+    """First and last step at which corrections let a track exist, by its label."""
     key: str = ""
-    """Of what corrections had to be made to hold; empty where that was not asked."""
+    """Hash of the corrections that were enforced; empty where identities are not resolved."""
 
 
 class _First(NamedTuple):
-    """The filter's own tracks, and whose box each was by them."""
+    """The filter's tracks, and the association probabilities of their rows."""
 
     paths: Paths
     shared: Shared
 
 
 class _Start(NamedTuple):
-    """Where the last settling of who is who begins: what nobody's word on that has touched."""
+    """The input of the last resolution of identities, which no correction of identity affects."""
 
     fitted: Fitted
+    """The tracks of the round before, fitted to their boxes."""
     shared: Shared
+    """Association probabilities of their rows."""
     learnt: Calibration
+    """The self-calibration of the boxes."""
     contested: Float[ndarray, " N"]
+    """Share of each row's boxes that may belong to another track as well, 0 … 1."""
     had: Bool[ndarray, " N"]
+    """Whether a row had a track before; the other rows fill gaps."""
     names: Int[ndarray, " N"]
+    """The filter's label of each row, -1 where it had no track."""
     first: _First
+    """The filter's own tracks."""
 
 
 class Positions:
-    """Each track of the filter, smoothed over its whole life.
+    """Each track of the filter, smoothed over its whole duration.
 
-    It is fitted to its boxes, and the boxes are shared out anew by where the tracks lie; gaps
-    are filled from both sides, ends cut where the evidence ends, and beginnings drawn back to
-    the first box.
+    A track is fitted to its boxes, and the boxes are associated again with the fitted tracks;
+    gaps are filled from both sides, the end is moved to that of the evidence, and the beginning
+    to the first box.
     """
 
     def __init__(self, sequence: Sequence, parameters: RunParameters) -> None:
-        """Prepare for one sequence.
+        """Prepare the method for one sequence.
 
         Args:
-            sequence: Cameras and room.
-            parameters: Of the fusion, whose models are used, and of the smoothing.
+            sequence: The cameras and the room.
+            parameters: The parameters of the fusion, whose models are used, and of the smoothing.
         """
         self._sequence = sequence
         self._parameters = parameters
@@ -88,7 +102,7 @@ class Positions:
         corrections: Many[Correction] = (),
         earlier: Earlier | None = None,
     ) -> Smoothed:
-        """The tracks of some steps from step 0 on, each by the boxes of all of them."""
+        """Estimate the tracks of some steps from step 0 on, each from the boxes of all steps."""
         p, earlier = self._parameters.smoothing, earlier or Nothing()
         used = self._parameters.method("single_view").used(self._parameters)
         smoother = Smoother(
@@ -103,9 +117,9 @@ class Positions:
         tracks = trajectories.extract(fused, cameras=cameras, extraction_threshold=CONFIRMED)
         if not len(tracks):
             return Smoothed.empty(dimension, cameras)
-        paths, had = reading.read_paths(fused, tracks, dimension)
+        paths, had = read_paths(fused, tracks, dimension)
         existences = np.where(had, 1.0, lifetimes.UNSURE)
-        links = reading.read_links(fused, paths, smoother.cameras)
+        links = read_links(fused, paths, smoother.cameras)
         check()
         paths, existences, links, learnt, decided = self._named(
             smoother, paths, existences, links, views, check, corrections, earlier
@@ -113,8 +127,8 @@ class Positions:
         known: Smoothed | None = earlier.get(f"smoothed-{decided.key}") if decided.key else None
         if known is not None:
             return known
-        turns = p.iterations if learnt is None else 1  # what was settled lies near its boxes
-        fitted, shared, learnt = _settled(
+        turns = p.iterations if learnt is None else 1  # resolved tracks are near their boxes
+        fitted, shared, learnt = _fit_and_share(
             smoother, paths, existences, links, p, learnt, check, turns=turns
         )
         found = _finished(smoother, fitted, shared, learnt, p, decided)
@@ -133,13 +147,17 @@ class Positions:
         corrections: Many[Correction],
         earlier: Earlier,
     ) -> tuple[Paths, Float[ndarray, " N"], Links, Calibration | None, _Decided]:
-        """The tracks of people, with which existence each row asks for boxes, and what was learnt
-        on the way: here the filter's own."""
+        """Resolve the identities; here the filter's own tracks remain.
+
+        Returns:
+            The tracks with N rows, the prior existence probability of each row, their links to
+            boxes, the self-calibration, if there is one yet, and the decisions.
+        """
         return paths, existences, links, None, _Decided([])
 
 
 class Identities(Positions):
-    """Smoothed, and who is who settled: tracks cut where it was a draw, and joined at once."""
+    """Tracks smoothed with their identities resolved: split where ambiguous, and linked at once."""
 
     def _named(
         self,
@@ -161,7 +179,7 @@ class Identities(Positions):
         tracked = Tracked(
             smoother, start.fitted, start.shared, start.contested, start.had, start.names
         )
-        found, key = identities.settle(tracked, p, seen, corrections, earlier)
+        found, key = identities.link_tracklets(tracked, p, seen, corrections, earlier)
         check()
         existences = np.where(found.had, 1.0, lifetimes.UNSURE)
         first = start.first
@@ -182,29 +200,29 @@ class Identities(Positions):
         seen: Seen,
         check: Callable[[], None],
     ) -> _Start:
-        """All rounds but the last settling, which alone obeys what was said of who is who."""
+        """Run all rounds but the last resolution, the only one with corrections of identity."""
         p = self._parameters.smoothing
-        contested = pieces.contested(paths, links)
-        fitted, shared, learnt = _settled(
+        contested = tracklets.contested(paths, links)
+        fitted, shared, learnt = _fit_and_share(
             smoother, paths, existences, links, p, None, check, turns=p.iterations
         )
         first = _First(fitted.paths, shared)
         names = np.where(existences == 1.0, paths.labels[paths.owners], -1)
         for _ in range(p.rounds - 1):
             tracked = Tracked(smoother, fitted, shared, contested, existences == 1.0, names)
-            found, _key = identities.settle(tracked, p, seen)
+            found, _key = identities.link_tracklets(tracked, p, seen)
             check()
             existences, names = np.where(found.had, 1.0, lifetimes.UNSURE), found.names
             learnt = learnt.of_people(found.origins)
-            # who is who tells whose boxes are whose, and those again who is who
-            fitted, shared, learnt = _settled(
+            # identities improve the association of boxes, and that again the identities
+            fitted, shared, learnt = _fit_and_share(
                 smoother, found.paths, existences, found.links, p, learnt, check, turns=1
             )
-            contested = pieces.contested(fitted.paths, shared.links)
+            contested = tracklets.contested(fitted.paths, shared.links)
         return _Start(fitted, shared, learnt, contested, existences == 1.0, names, first)
 
 
-def _settled(
+def _fit_and_share(
     smoother: Smoother,
     paths: Paths,
     existences: Float[ndarray, " N"],
@@ -214,8 +232,19 @@ def _settled(
     check: Callable[[], None],
     turns: int,
 ) -> tuple[Fitted, Shared, Calibration]:
-    """Tracks fitted to their boxes, boxes shared out by the tracks that are there, in turns."""
-    learnt = learnt or smoother.stated(paths)
+    """Alternate fitting tracks to their boxes and associating boxes with the tracks.
+
+    Args:
+        smoother: The models and the boxes.
+        paths: The tracks, with N rows.
+        existences: Prior existence probability of each row.
+        links: Association probabilities of rows and boxes at the start.
+        p: The parameters of the smoothing.
+        learnt: The self-calibration so far, None for none.
+        check: A function that is called in every turn and raises an exception to stop.
+        turns: Number of turns.
+    """
+    learnt = learnt or smoother.uncalibrated(paths)
     fitted = smoother.fit(paths, links, 2, learnt)
     shared = smoother.share(fitted.paths, existences, learnt)
     for _ in range(turns):
@@ -236,7 +265,7 @@ def _finished(
     p: SmoothingParams,
     decided: _Decided,
 ) -> Smoothed:
-    """The tracks with their ends settled, and what is nobody left out."""
+    """Estimate the ends of the tracks, and remove false tracks."""
     longer, existences = lifetimes.extended(
         smoother, fitted.paths, round(p.reach / smoother.model.step_time)
     )
@@ -253,13 +282,13 @@ def _finished(
     there[away] = 0.0
     paths = fitted.places.led_to(fitted.paths, smoother.model.step_time)
     owners = paths.owners
-    somebody = odds > 0.0
-    removed = [_removed(paths, path, odds[path]) for path in np.flatnonzero(~somebody).tolist()]
+    present = odds > 0.0
+    removed = [_removed(paths, path, odds[path]) for path in np.flatnonzero(~present).tolist()]
     links = shared.links
     seen = np.zeros((len(there), len(smoother.cameras)), dtype=bool)
     sure = links.shares > _SEEN
     seen[links.rows[sure], links.cameras[sure]] = True
-    rows = np.flatnonzero(somebody[owners])
+    rows = np.flatnonzero(present[owners])
     rows = rows[np.lexsort((paths.labels[owners[rows]], paths.steps[rows]))]
     return Smoothed(
         paths.steps[rows],
@@ -275,19 +304,21 @@ def _finished(
 
 
 def _removed(paths: Paths, path: int, odds: float) -> Decision:
-    """That a track is nobody's: by its odds in its whole life, or as no piece of it is left."""
-    nobody = float(1.0 / (1.0 + np.exp(np.clip(odds, -600.0, 600.0))))
+    """The decision to remove a track, for its log odds or because none of its tracklets is left."""
+    absence = float(1.0 / (1.0 + np.exp(np.clip(odds, -600.0, 600.0))))
     reason = (
         "over its whole life it is likelier nobody"
         if odds <= 0.0
         else "no piece of it stands by boxes of its own"
     )
     label = int(paths.labels[path])
-    return Decision("removed", int(paths.firsts[path]), label, label, nobody, 1.0 - nobody, reason)
+    return Decision(
+        "removed", int(paths.firsts[path]), label, label, absence, 1.0 - absence, reason
+    )
 
 
 def _outside(paths: Paths, limits: Mapping[int, tuple[int, int]]) -> Bool[ndarray, " N"]:
-    """The rows at which corrections do not let a person be."""
+    """The rows at which corrections do not let a track exist."""
     away = np.zeros(len(paths.states), dtype=bool)
     for path, label in enumerate(paths.labels.tolist()):
         if label in limits:
@@ -296,3 +327,93 @@ def _outside(paths: Paths, limits: Mapping[int, tuple[int, int]]) -> Bool[ndarra
             steps = int(paths.firsts[path]) + np.arange(own.stop - own.start)
             away[own] = (steps < first) | (steps > last)
     return away
+
+
+def read_paths(
+    fused: Many[FusionResult], tracks: Trajectories, dimension: int
+) -> tuple[Paths, Bool[ndarray, " N"]]:
+    """Convert the fusion's tracks to paths, one a label, from its first box to its last report.
+
+    Where a label was missing for a while, the states are interpolated linearly in the gap.
+
+    Args:
+        fused: The result of stage 2 for each step.
+        tracks: The tracks extracted from these.
+        dimension: d, the size of the state.
+
+    Returns:
+        The paths, and whether the fusion had each of their rows.
+    """
+    order = np.lexsort((tracks.frames, tracks.labels))
+    of_label, frames = tracks.labels[order], tracks.frames[order]
+    labels, begins = np.unique(of_label, return_index=True)
+    ends = np.append(begins[1:], len(order))
+    earlier = _before_their_report(fused, dict(zip(labels.tolist(), frames[begins], strict=True)))
+    firsts, states, covariances, had = [], [], [], []
+    for label, begin, end in zip(labels.tolist(), begins, ends, strict=True):
+        known = [*earlier.get(label, ()), *zip(
+            frames[begin:end].tolist(), tracks.components[order[begin:end]].tolist(), strict=True
+        )]  # fmt: skip
+        steps = np.array([step for step, _ in known])
+        means = np.array([fused[step].posterior.means[component] for step, component in known])
+        spread = np.array(
+            [fused[step].posterior.covariances[component] for step, component in known]
+        )
+        first, last = steps[0], steps[-1]
+        every = np.arange(first, last + 1)
+        filled = np.stack(
+            [np.interp(every, steps, means[:, axis]) for axis in range(dimension)], axis=1
+        )
+        wide = np.tile(_WIDE * np.eye(dimension), (len(every), 1, 1))
+        wide[steps - first] = spread
+        own = np.zeros(len(every), dtype=bool)
+        own[steps - first] = True
+        had.append(own)
+        firsts.append(int(first))
+        states.append(filled)
+        covariances.append(wide)
+    paths = Paths.of(labels.tolist(), firsts, states, covariances, dimension)
+    return paths, np.concatenate([np.zeros(0, dtype=bool), *had])
+
+
+def _before_their_report(
+    fused: Many[FusionResult], reported: dict[int, int]
+) -> dict[int, list[tuple[int, int]]]:
+    """The steps before each label's first report at which a box updated it, and its component."""
+    found: dict[int, list[tuple[int, int]]] = {}
+    for step, result in enumerate(fused):
+        fed = np.flatnonzero((result.sources >= 0).any(axis=0))
+        there: set[int] = set()
+        labels = result.posterior.labels[fed].tolist()
+        for component, label in zip(fed.tolist(), labels, strict=True):
+            if label not in there and step < reported.get(label, -1):
+                there.add(label)
+                found.setdefault(label, []).append((step, component))
+    return found
+
+
+def read_links(fused: Many[FusionResult], paths: Paths, cameras: Many[CameraBoxes]) -> Links:
+    """Convert the association probabilities of the fusion to links of the rows of the paths."""
+    row_of = {label: i for i, label in enumerate(paths.labels.tolist())}
+    lasts = paths.lasts
+    found: list[tuple[ndarray, ...]] = []
+    for step, result in enumerate(fused):
+        associations = result.associations
+        if not len(associations.cameras):
+            continue
+        of_component = np.array(
+            [row_of.get(label, -1) for label in result.posterior.labels.tolist()], dtype=np.int64
+        )
+        path = of_component[associations.components]
+        alive = (path >= 0) & (paths.firsts[path] <= step) & (step <= lasts[path])
+        path, which = path[alive], associations.cameras[alive].astype(np.int64)
+        begins = np.array([camera.starts[step] for camera in cameras])
+        found.append(
+            (
+                which,
+                paths.starts[path] + step - paths.firsts[path],
+                begins[which] + associations.boxes[alive],
+                associations.probabilities[alive].astype(float),
+            )
+        )
+    return Links.joined([Links(*part) for part in found])

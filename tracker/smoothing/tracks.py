@@ -1,4 +1,4 @@
-"""The smoothed tracks as the run reports them."""
+"""Conversion of the smoothed tracks to the reported trajectories of a run."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ def tracks_of(
     bounds: Bounds,
     near: float,
 ) -> Trajectories:
-    """The people of each step whose existence is above the threshold, inside the room.
+    """Extract the tracks whose existence is above the threshold, inside the room.
 
     Args:
-        smoothed: All steps.
-        fused: Stage 2 of each step, for the component that stands for each person.
-        ids: Label → id as the filter reported them; labels that it never reported get the
-            next numbers.
-        extraction_threshold: As ``bounds``, of :func:`tracker.fusion.trajectories.extract`.
-        near: Metres within which a component of the filter's posterior is the person's.
+        smoothed: The smoothed tracks of all steps.
+        fused: The result of stage 2 for each step, for the component of each track.
+        ids: The id of each label that the filter reported; other labels get the next numbers.
+        extraction_threshold: Existence probability above which a row is reported.
+        bounds: The volume in which tracks are reported.
+        near: Distance within which a component of the filter's posterior is the track's, metres.
     """
     chosen = smoothed.existences > extraction_threshold
     chosen &= bounds.contain(smoothed.means[:, :3])
@@ -57,11 +57,11 @@ def tracks_of(
 
 
 def names_of(smoothed: Smoothed, tracks: Trajectories) -> dict[int, int]:
-    """The id of each label that is reported; of a track that was not made of this, none.
+    """The id of each label that is reported, for the tracks that were made from ``smoothed``.
 
     Args:
-        smoothed: Stage 3 of a run.
-        tracks: By :func:`tracks_of`; as long as the run goes on they may be others.
+        smoothed: The result of stage 3 of a run.
+        tracks: The result of :func:`tracks_of`; while the run continues they may be others.
     """
     place = {
         (frame, *mean): label
@@ -94,7 +94,7 @@ def _components(
         distances = (gaps**2).sum(axis=2)
         best = distances.argmin(axis=1)
         good = distances[np.arange(len(best)), best] <= near * near
-        # one component stands for one person: for the nearest of those who are near it
+        # a component belongs to one track: the nearest of those near it
         closest = distances.argmin(axis=0)[best] == np.arange(len(best))
         components[own] = np.where(good & closest, sure[best], -1)
         labels[own] = np.where(good & closest, result.posterior.labels[sure[best]], -1)
@@ -102,4 +102,4 @@ def _components(
 
 
 _FAINT = 0.05
-"""Weight below which a component stands for nobody."""
+"""Weight below which a component belongs to no track."""

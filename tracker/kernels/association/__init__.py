@@ -1,1 +1,1 @@
-"""Kernels of the association: matchings, sums over subsets, belief propagation."""
+"""Kernels of data association: matchings, sums over subsets, belief propagation."""

@@ -11,37 +11,37 @@ from tracker.kernels.compilation import kernel
 
 
 class Settling(NamedTuple):
-    """When messages have settled."""
+    """The convergence criterion of the messages."""
 
     tolerance: float
-    """Largest change of a message, relative to the intensity it meets."""
+    """Largest change of a message at convergence, relative to the intensity that it meets."""
     iterations: int
-    """At most this many, should they not settle."""
+    """Largest number of iterations."""
 
 
 class Marginals(NamedTuple):
     """Marginal association probabilities of n targets and M measurements."""
 
     rows: ndarray
-    """(n, 1 + M), of a miss and of each measurement for every target."""
+    """(n, 1 + M), probabilities of a miss and of each measurement for every target."""
     unexplained: ndarray
-    """(M,), that no target made the measurement."""
+    """(M,), probability that no target made the measurement."""
 
 
 @kernel
 def belief_propagation(
     missed: ndarray, detected: ndarray, unexplained: ndarray, settling: Settling
 ) -> Marginals:
-    """Messages between targets and measurements until they settle.
+    """Compute association marginals by messages between targets and measurements.
 
     Args:
         missed: (n,) weight of each target's miss.
         detected: (n, M) weight of each pair, 0 outside the gate.
-        unexplained: (M,) weight of each measurement being nobody's.
-        settling: When to stop.
+        unexplained: (M,) weight of each measurement having no target.
+        settling: The convergence criterion.
     """
     targets, count = detected.shape
-    # only pairs inside a gate exchange messages: row by row, whose measurement and weight
+    # only pairs inside a gate exchange messages: listed row by row, with measurement and weight
     rows = np.zeros((targets, 1 + count))
     starts = np.zeros(targets + 1, dtype=np.int64)
     for i in range(targets):

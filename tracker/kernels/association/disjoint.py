@@ -1,9 +1,9 @@
-"""Heaviest matchings that share no pair, one after the other, compiled.
+"""Heaviest matchings that share no pair, one after another, compiled.
 
-A matching of n rows starts from the columns' duals of the one before, which stay feasible
-when pairs grow dearer. Of each row only the few nearest columns are looked at until a
-search has come so far that another could be nearer: duals of columns only fall, so what
-a row's other columns cost at the start bounds what they cost later. A matching takes
+A matching of n rows starts from the column duals of the one before, which stay feasible
+when costs of pairs increase. Only the few nearest columns of each row are considered until a
+search has come so far that another could be nearer: duals of columns only decrease, so the
+cost of a row's other columns at the start bounds their cost later. A matching takes
 O(n²) to find the nearest columns, and searches of about √n rows each for the quarter of
 the rows that the nearest columns do not serve ([V96] calls the nearest ones the core).
 
@@ -21,16 +21,16 @@ from numpy import ndarray
 from tracker.kernels.compilation import kernel
 
 CORE = 6
-"""Of each row so many of the nearest columns are kept."""
+"""Number of nearest columns of each row in the core."""
 
 
 class _Matching(NamedTuple):
-    """A matching on its way, with the duals that prove it the heaviest."""
+    """An incomplete matching, with the duals that prove it the heaviest."""
 
     row_duals: ndarray
-    """(N,), feasible with the columns'."""
+    """(N,), feasible with the duals of the columns."""
     column_duals: ndarray
-    """(N,)."""
+    """(N,), duals of the columns."""
     column_of: ndarray
     """(N,) the column of each row, -1 for none."""
     row_of: ndarray
@@ -38,32 +38,32 @@ class _Matching(NamedTuple):
 
 
 class _Room(NamedTuple):
-    """What a search writes in."""
+    """Working memory of a search."""
 
     shortest: ndarray
-    """(N,) all infinite, before a search and after it."""
+    """(N,) lengths of the shortest paths, all infinite before and after a search."""
     before: ndarray
-    """(N,) for the row that each column is reached from."""
-    settled: ndarray
-    """(N,) all false, before a search and after it."""
+    """(N,) row from which each column is reached."""
+    finished: ndarray
+    """(N,) whether the path to a column is final, all false before and after a search."""
     touched: ndarray
-    """(N,) for the columns that were reached."""
+    """(N,) the columns that were reached."""
     keys: ndarray
-    """(N (N + 2),) for the heap, as the next."""
+    """(N (N + 2),) keys of the heap, and its nodes in the next array."""
     nodes: ndarray
 
 
 @kernel
 def disjoint_matchings(weights: ndarray, count: int) -> ndarray:
-    """Matchings one after the other, each the heaviest without the pairs of those before.
+    """Find matchings one after another, each the heaviest without the pairs of those before.
 
     Args:
-        weights: (N, N), 0 where there is no pair.
-        count: At most so many.
+        weights: (N, N) weights, 0 where there is no pair.
+        count: Largest number of matchings.
 
     Returns:
-        (K, N) the column of each row, -1 where its pair has no weight; the last is the
-        only one that may be without pairs.
+        (K, N) the column of each row, -1 where its pair has no weight; only the last may be
+        without pairs.
     """
     size = weights.shape[0]
     kept = min(CORE, size)
@@ -115,7 +115,7 @@ def disjoint_matchings(weights: ndarray, count: int) -> ndarray:
 
 @kernel
 def _nearest(cost: ndarray, duals: ndarray, columns: ndarray, reduced: ndarray) -> None:
-    """The columns of the least reduced cost of one row, nearest first, in place."""
+    """Select the columns of the least reduced cost of one row, nearest first, in place."""
     kept = len(columns)
     filled = 0
     for j in range(len(cost)):
@@ -141,35 +141,35 @@ def _augment(
     bounds: ndarray,
     room: _Room,
 ) -> None:
-    """Give one more row its column by the shortest augmenting path, in place.
+    """Assign a column to one more row by the shortest augmenting path, in place.
 
-    Dijkstra's search over rows, from a heap of columns (0 … N - 1) and of rows whose other
-    columns have not been looked at (N … 2N - 1), by the least that these can be away.
+    This is Dijkstra's search over rows, from a heap of columns (0 … N - 1) and of rows whose other
+    columns are not considered yet (N … 2N - 1), by the least that these can cost.
 
     Args:
-        cost: (N, N), finite.
+        cost: (N, N) costs, finite.
         start: The row without a column.
-        matching: Of the other rows.
+        matching: Matching of the other rows.
         core: (N, C) the nearest columns of each row.
         bounds: (N,) the least reduced cost of each row's other columns.
-        room: To write in.
+        room: Working memory.
     """
     row_duals, column_duals = matching.row_duals, matching.column_duals
     column_of, row_of = matching.column_of, matching.row_of
-    shortest, before, settled = room.shortest, room.before, room.settled
+    shortest, before, finished = room.shortest, room.before, room.finished
     touched, keys, nodes = room.touched, room.keys, room.nodes
     size = len(cost)
     partial = core.shape[1] < size
     heap, reached = 0, 0
     row, distance = start, 0.0
     sink, best = -1, np.inf
-    whole = False  # whether all columns of the row are looked at, or its core
+    whole = False  # whether all columns of the row are considered, or its core
     while True:
         offset = distance - row_duals[row]
         for m in range(size if whole else core.shape[1]):
             j = m if whole else core[row, m]
             length = offset + cost[row, j] - column_duals[j]
-            if not length < best or not length < shortest[j] or settled[j]:
+            if not length < best or not length < shortest[j] or finished[j]:
                 continue
             if shortest[j] == np.inf:
                 touched[reached] = j
@@ -190,18 +190,18 @@ def _augment(
             if whole:
                 row = node - size
                 distance = 0.0 if row == start else shortest[column_of[row]]
-            elif not settled[node]:
-                settled[node] = True
+            elif not finished[node]:
+                finished[node] = True
                 row = row_of[node]
         if row < 0:
             break
     row_duals[start] += best
     for m in range(reached):
         j = touched[m]
-        if settled[j]:
+        if finished[j]:
             row_duals[row_of[j]] += best - shortest[j]
             column_duals[j] -= best - shortest[j]
-        settled[j] = False
+        finished[j] = False
         shortest[j] = np.inf
     j = sink
     while True:
@@ -214,7 +214,7 @@ def _augment(
 
 @kernel
 def _push(keys: ndarray, nodes: ndarray, count: int, key: float, node: int) -> int:
-    """One more node of a binary heap, least key first, in place; how many there are now."""
+    """Insert a node into a binary heap, least key first, in place; the new number of nodes."""
     place = count
     while place > 0:
         parent = (place - 1) >> 1
@@ -228,7 +228,7 @@ def _push(keys: ndarray, nodes: ndarray, count: int, key: float, node: int) -> i
 
 @kernel
 def _pop(keys: ndarray, nodes: ndarray, count: int) -> int:
-    """The heap without its first node, in place; how many there are now."""
+    """Remove the first node of the heap, in place; the new number of nodes."""
     count -= 1
     key, node = keys[count], nodes[count]
     place = 0

@@ -1,6 +1,6 @@
-"""The cheapest matchings one after the other, compiled.
+"""The cheapest matchings one after another, compiled.
 
-Every kernel has a counterpart by enumeration in the tests that it must agree with.
+Every kernel must agree with a counterpart by enumeration in the tests.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ def augment(
     row_of: ndarray,
     closed: ndarray,
 ) -> bool:
-    """Give one more row its column, by the shortest augmenting path ([C16]), in place.
+    """Assign a column to one more row, by the shortest augmenting path ([C16]), in place.
 
     The columns' duals and those of the rows that have a column must be feasible. In a
     matching of all rows to all columns they then prove it the cheapest.
@@ -32,8 +32,8 @@ def augment(
     Args:
         cost: (N, N), infinite where a pair is forbidden.
         start: The row without a column.
-        row_duals: (N,).
-        column_duals: (N,).
+        row_duals: (N,) duals of the rows.
+        column_duals: (N,) duals of the columns.
         column_of: (N,) the column of each row, -1 for none.
         row_of: (N,) the row of each column, -1 for none.
         closed: (N,) columns that may not be touched.
@@ -96,7 +96,7 @@ def assign(
     column_of: ndarray,
     row_of: ndarray,
 ) -> bool:
-    """The cheapest matching of all rows to all columns, from any column duals, in place.
+    """Find the cheapest matching of all rows to all columns, from any column duals, in place.
 
     Returns:
         Whether there is a matching of finite cost.
@@ -130,9 +130,9 @@ def assign(
 
 @kernel
 def best_matchings(cost: ndarray, branching: int, count: int) -> ndarray:
-    """The cheapest matchings of all rows to all columns that differ in the first rows ([M68]).
+    """Find the cheapest matchings of all rows to all columns that differ in the first rows ([M68]).
 
-    The best of what is left is split: for each of the rows that are not fixed, one
+    The best of the remaining parts is split: for each of the rows that are not fixed, one
     part in which the rows before are fixed and this row may not have its column. Each
     part is solved from its parent's duals by one augmenting path ([MSC97]).
 
@@ -143,8 +143,8 @@ def best_matchings(cost: ndarray, branching: int, count: int) -> ndarray:
 
     Args:
         cost: (N, N), infinite where a pair is forbidden.
-        branching: Only the first so many rows tell one matching from another.
-        count: At most so many.
+        branching: Number of first rows by which matchings are distinguished.
+        count: Largest number of matchings.
 
     Returns:
         (K, N) the column of each row, cheapest first, K ≤ count.

@@ -1,6 +1,6 @@
 """Sums over all one-to-one choices, subset by subset, compiled.
 
-The kernel has a counterpart by enumeration in the tests that it must agree with.
+The kernel must agree with a counterpart by enumeration in the tests.
 """
 
 from __future__ import annotations
@@ -14,26 +14,26 @@ from tracker.kernels.compilation import kernel
 
 
 class SubsetMarginals(NamedTuple):
-    """Sums over the choices of s steps among k items."""
+    """Sums of the weights of choices of s steps among k items."""
 
     none: ndarray
-    """(s,) in which each step takes none."""
+    """(s,), over choices in which each step takes none."""
     chosen: ndarray
-    """(s, k) in which each step takes each item."""
+    """(s, k), over choices in which each step takes each item."""
     left: ndarray
-    """(k,) in which nobody takes each item."""
+    """(k,), over choices in which no step takes each item."""
     total: float
-    """Of all choices."""
+    """Sum over all choices."""
 
 
 @kernel
 def subset_marginals(
     skips: ndarray, pairs: ndarray, rests: ndarray, factors: ndarray
 ) -> SubsetMarginals:
-    """Sums over all one-to-one choices of items by a row of steps, by subsets of the items.
+    """Sum the weights of all one-to-one choices of items by a row of steps, over subsets of items.
 
     Each step takes one item that no other takes, or none. The weight of a choice is
-    Π skips of steps that take none · Π pairs · Π rests of items that nobody takes ·
+    Π skips of steps that take none · Π pairs · Π rests of items that no step takes ·
     factors[number of items taken]. With F_s(S) the sum over the first s steps that take
     just the items S, and B_s(S) over the others given S,
 
@@ -42,23 +42,23 @@ def subset_marginals(
         Σ choices with s ← i = Σ_{S ∌ i} F_s(S) pairs_si B_{s+1}(S ∪ i)
 
     Args:
-        skips: (s,).
-        pairs: (s, k); 0 where a step cannot take an item.
-        rests: (k,).
-        factors: (k + 1,).
+        skips: (s,) weight of each step taking none.
+        pairs: (s, k) weight of each step and item; 0 where a step cannot take an item.
+        rests: (k,) weight of each item that no step takes.
+        factors: (k + 1,) factor by the number of items taken.
     """
     steps, items = pairs.shape
     subsets = 1 << items
     backward = np.zeros((steps + 1, subsets))
     for subset in range(subsets):
         weight = 1.0
-        taken = 0
+        assigned = 0
         for i in range(items):
             if subset >> i & 1:
-                taken += 1
+                assigned += 1
             else:
                 weight *= rests[i]
-        backward[steps, subset] = weight * factors[taken]
+        backward[steps, subset] = weight * factors[assigned]
     for s in range(steps - 1, -1, -1):
         for subset in range(subsets):
             backward[s, subset] = backward[s + 1, subset] * skips[s]

@@ -1,4 +1,4 @@
-"""Which measurements are reported as targets, compiled."""
+"""Extraction of targets by measurement from a PHD update, compiled."""
 
 from __future__ import annotations
 
@@ -14,27 +14,27 @@ from tracker.kernels.linear_algebra import merge_moments
 
 
 class Payments(NamedTuple):
-    """What P pairs of a component and a measurement spend on it."""
+    """The weight that P pairs of a component and a measurement contribute to extracted targets."""
 
     spent: ndarray
-    """(P,)."""
+    """(P,), weight of each pair that is used."""
     places: ndarray
-    """(P,), the place of the pair's measurement among the reported ones, -1 for none."""
+    """(P,), index of the pair's measurement among the reported ones, -1 for none."""
     reported: int
-    """How many measurements."""
+    """Number of reported measurements."""
 
 
 class Reported(NamedTuple):
-    """The T targets that an update reports."""
+    """The T targets extracted from an update."""
 
     weights: ndarray
-    """(T,)."""
+    """(T,), expected number of targets."""
     means: ndarray
-    """(T, d)."""
+    """(T, d), states."""
     covariances: ndarray
-    """(T, d, d)."""
+    """(T, d, d), covariances."""
     heaviest: ndarray
-    """(T,), the heaviest of the components that each was made of."""
+    """(T,), index of the heaviest component of each."""
 
 
 @kernel
@@ -47,16 +47,16 @@ def pay_for_measurements(
     sums: ndarray,
     threshold: float,
 ) -> Payments:
-    """Which measurements the components can pay for, the surest first.
+    """Determine the measurements that components can explain, by decreasing weight.
 
     Args:
-        left: (J,), what each component has to spend; it is used up.
-        weights: (P,), of each pair of a component and a measurement.
-        parents: (P,), the component.
-        measured: (P,), the measurement, ascending.
-        log_odds: (P,), against clutter.
-        sums: (M,), of the weights of each measurement.
-        threshold: What a measurement costs at least.
+        left: (J,), expected number of targets that each component may still explain; changed.
+        weights: (P,), weight of each pair of a component and a measurement.
+        parents: (P,), the component of each pair.
+        measured: (P,), the measurement of each pair, ascending.
+        log_odds: (P,), log odds of each pair against clutter.
+        sums: (M,), sum of the weights of each measurement.
+        threshold: Expected number of targets from which a measurement is reported.
     """
     count = len(sums)
     spent = np.zeros(len(weights))
@@ -88,13 +88,13 @@ def pay_for_measurements(
 def report(
     predicted: ndarray, updated: UpdatedIntensity, threshold: float, spare: float
 ) -> Reported:
-    """The targets that an update reports: :func:`tracker.filters.phd.extract_measured`.
+    """Extract the targets of an update, as :func:`tracker.filters.phd.extract_measured`.
 
     Args:
-        predicted: (J,) weights.
-        updated: By one measurement set, not reduced yet.
-        threshold: Expected number of targets.
-        spare: What a component may spend beyond its weight, or beyond one target.
+        predicted: (J,) weights of the predicted components.
+        updated: The update by one measurement set, before any reduction.
+        threshold: Expected number of targets from which one is reported.
+        spare: Expected number of targets by which a component may exceed its weight, or 1.
     """
     size = len(predicted)
     weights, means, covariances = updated.weights, updated.means, updated.covariances

@@ -1,10 +1,10 @@
 """The hot loops of reducing a Gaussian mixture: prune, merge, cap.
 
-Merging does not look at every pair. Whatever lies within a squared Mahalanobis distance U
+Merging does not compare every pair. Every point within a squared Mahalanobis distance U
 of a component with the covariance P lies within √(U P_aa) of it along every axis a: only
-the cells of a grid over two axes that this box touches are searched, and what is too far
-along another axis is left after one subtraction. The bounds are exact: the result is that
-of comparing all.
+the cells of a grid over two axes that this box touches are searched, and a component that is
+too far along another axis is rejected after one subtraction. The bounds are exact: the result
+is that of comparing all.
 
 [VM06] B.-N. Vo, W.-K. Ma, "The Gaussian mixture probability hypothesis density
 filter", IEEE Transactions on Signal Processing 54(11), 2006.
@@ -24,15 +24,15 @@ from tracker.kernels.intensity.mixture import heaviest_first
 from tracker.kernels.linear_algebra import merge_moments
 
 _CLASSES = 16
-"""Components whose reach agrees within a factor of two share a grid: a few very wide ones do
-not make the search wide for all."""
+"""Number of grids. Components whose reach agrees within a factor of two share a grid, so that a few
+very wide ones do not make the search wide for all."""
 
 
 class Groups(NamedTuple):
-    """J components around K leaders."""
+    """J components grouped around K leaders."""
 
     places: ndarray
-    """(J,), the group of each, -1 for none."""
+    """(J,), index of the group of each, -1 for none."""
     leaders: ndarray
     """(K,), the leader of each group."""
 
@@ -41,13 +41,13 @@ class Reduced(NamedTuple):
     """A mixture after pruning, merging and capping."""
 
     weights: ndarray
-    """(K,), heaviest first."""
+    """(K,), expected numbers of targets, heaviest first."""
     means: ndarray
-    """(K, d)."""
+    """(K, d), states."""
     covariances: ndarray
-    """(K, d, d)."""
+    """(K, d, d), covariances."""
     leaders: ndarray
-    """(K,), the component that led each."""
+    """(K,), index of the leader of each."""
 
 
 class _Axes(NamedTuple):
@@ -58,7 +58,7 @@ class _Axes(NamedTuple):
 
 
 class _Span(NamedTuple):
-    """Cells in a row, both ends included."""
+    """A range of cells, both ends included."""
 
     first: int
     last: int
@@ -68,24 +68,24 @@ class _Grids(NamedTuple):
     """A grid over two axes for each class of reach."""
 
     by_cell: ndarray
-    """(N,) the components, cell by cell."""
+    """(N,), the components, cell by cell."""
     begins: ndarray
-    """Where each cell of all grids begins among them."""
+    """Index of the first component of each cell of all grids."""
     first_cell: ndarray
-    """For each class that has components its first cell, and one more."""
+    """Index of the first cell of each class that has components, and one more."""
     counts: ndarray
-    """Of each such class, rows and columns."""
+    """Number of rows and columns of the grid of each such class."""
     sides: ndarray
-    """Of each such class (6,): the lowest coordinate, the number of cells a metre and the
+    """(6,) for each such class: the lowest coordinate, the number of cells per metre and the
     greatest reach along either axis."""
 
 
 @kernel
 def _factor(covariances: ndarray, which: ndarray, lower: ndarray, axes: Sequence[int]) -> None:
-    """Cholesky factors of the covariances at ``which`` into ``lower``, with 1 / L_aa for L_aa.
+    """Compute Cholesky factors of the covariances at ``which``, with 1 / L_aa for L_aa, in place.
 
     Args:
-        axes: Of the state: a range, or, so that loops are unrolled, a tuple of as many.
+        axes: Axes of the state: a range, or a tuple of as many for unrolled loops.
     """
     for i in which:
         for a in range(len(axes)):
@@ -97,7 +97,7 @@ def _factor(covariances: ndarray, which: ndarray, lower: ndarray, axes: Sequence
             total = covariances[i, a, a]
             for c in range(a):
                 total -= lower[i, a, c] * lower[i, a, c]
-            # what rounding leaves of a singular matrix is no variance
+            # rounding errors of a singular matrix are no variance
             if not total > 1e-14 * covariances[i, a, a]:
                 raise np.linalg.LinAlgError("a covariance is not positive definite")
             lower[i, a, a] = 1.0 / math.sqrt(total)
@@ -105,7 +105,7 @@ def _factor(covariances: ndarray, which: ndarray, lower: ndarray, axes: Sequence
 
 @kernel
 def _factors(covariances: ndarray, which: ndarray) -> ndarray:
-    """Cholesky factors (J, d, d) of the covariances at ``which``, with 1 / L_aa for L_aa.
+    """Compute Cholesky factors (J, d, d) of covariances at ``which``, with 1 / L_aa for L_aa.
 
     Raises:
         numpy.linalg.LinAlgError: If one is not positive definite.
@@ -121,7 +121,7 @@ def _factors(covariances: ndarray, which: ndarray) -> ndarray:
 
 @kernel
 def _widest_axes(means: ndarray, covariances: ndarray, which: ndarray) -> _Axes:
-    """The two axes along which components lie furthest apart, measured by their variances."""
+    """The two axes along which components are spread most, in units of their variances."""
     first = second = 0
     most = more = -1.0
     for a in range(means.shape[1]):
@@ -142,13 +142,13 @@ def _widest_axes(means: ndarray, covariances: ndarray, which: ndarray) -> _Axes:
 
 @kernel
 def _grids(places: ndarray) -> _Grids:
-    """A grid over two axes for each class of reach, its cells about half as wide as the reach.
+    """Make a grid over two axes for each class of reach, with cells of about half the reach.
 
     Args:
-        places: (N, 4), the coordinates along the two axes and the reach along them.
+        places: (N, 4), the coordinates along the two axes and the reach along them, metres.
     """
     size = len(places)
-    # the exponent of a floating-point number is the whole part of its logarithm
+    # the exponent of a floating-point number is the integer part of its logarithm
     classes = (places[:, 2] / places[:, 2].min()).view(np.int64) >> 52
     classes -= classes.min()
     members = np.zeros(_CLASSES, dtype=np.int64)
@@ -172,7 +172,7 @@ def _grids(places: ndarray) -> _Grids:
             continue
         for k in range(2):
             fit[k] = max(1.0, 2.0 * (high[c, k] - low[c, k]) / sides[c, 4 + k])
-        # no more cells than a few a component, whatever the extent
+        # the number of cells is limited to a few per component, whatever the extent
         shrink = max(1.0, math.sqrt(fit[0] * fit[1] / (4.0 * members[c])))
         for k in range(2):
             counts[used, k] = max(1, min(int(fit[k] / shrink), 4 * members[c]))
@@ -203,29 +203,30 @@ def _grids(places: ndarray) -> _Grids:
 
 @kernel
 def _search(here: float, there: float, beside: ndarray, grids: _Grids, hits: ndarray) -> int:
-    """Find who reaches a place along both axes of the grids.
+    """Find the components that reach a place along both axes of the grids.
 
     Args:
-        here: Along the first axis, as ``there`` along the second.
-        beside: (N, 4), as the places of :func:`_grids`, cell by cell. Who has a negative
-            reach is not found.
-        grids: Of these places.
-        hits: (N + 1,), takes the rows of ``beside`` that were found.
+        here: Coordinate along the first axis.
+        there: Coordinate along the second axis.
+        beside: (N, 4), as the places of :func:`_grids`, cell by cell. A component with a
+            negative reach is not found.
+        grids: The grids of these places.
+        hits: (N + 1,), receives the rows of ``beside`` that are found.
 
     Returns:
-        How many were found.
+        The number of rows found.
     """
     begins, first_cell = grids.begins, grids.first_cell
     counts, sides = grids.counts, grids.sides
     found = 0
     for c in range(len(first_cell) - 1):
-        # whoever reaches the place lies in one of these cells; the last holds its far edge
+        # a component that reaches the place lies in one of these cells; the last has its far edge
         rows = _reached(here - sides[c, 0], sides[c, 4], sides[c, 2], counts[c, 0])
         columns = _reached(there - sides[c, 1], sides[c, 5], sides[c, 3], counts[c, 1])
         for row in range(rows.first, rows.last + 1):
             cell = first_cell[c] + row * counts[c, 1]
             for k in range(begins[cell + columns.first], begins[cell + columns.last + 1]):
-                # without a branch, which nobody could foresee
+                # without a branch, which would be unpredictable
                 hits[found] = k
                 found += int(
                     (abs(beside[k, 0] - here) <= beside[k, 2])
@@ -246,7 +247,7 @@ def _reached(offset: float, reach: float, cells_a_metre: float, count: int) -> _
 def _squared_distance(
     means: ndarray, lower: ndarray, i: int, leader: int, solved: ndarray, axes: Sequence[int]
 ) -> float:
-    """(m_i − m_l)ᵀ P_i⁻¹ (m_i − m_l), by a factor and for axes as of :func:`_factor`."""
+    """(m_i − m_l)ᵀ P_i⁻¹ (m_i − m_l), for a factor and axes of :func:`_factor`."""
     distance = 0.0
     for a in range(len(axes)):
         total = means[i, a] - means[leader, a]
@@ -261,20 +262,20 @@ def _squared_distance(
 def merge_groups(
     means: ndarray, covariances: ndarray, order: ndarray, owners: ndarray, threshold: float
 ) -> Groups:
-    """Group components around the heaviest ones left (Table II of [VM06]).
+    """Group components around the heaviest remaining ones (Table II of [VM06]).
 
     A component i joins the leader l where (m_i − m_l)ᵀ P_i⁻¹ (m_i − m_l) <= threshold.
 
     Args:
-        means: (J, d).
+        means: (J, d), states.
         covariances: (J, d, d), positive definite.
-        order: (N,) indices of those to be grouped, heaviest first.
-        owners: (J,); a component with an owner (0 or more) joins its owner's only. (0,) where
-            nobody has one.
-        threshold: Squared Mahalanobis distance.
+        order: (N,), indices of the components to be grouped, heaviest first.
+        owners: (J,), owner of each component, -1 for none; one with an owner (0 or more) joins
+            components of the same owner only. (0,) where no component has one.
+        threshold: Squared Mahalanobis distance U.
 
     Returns:
-        Groups of those in ``order``.
+        The groups of the components in ``order``.
 
     Raises:
         numpy.linalg.LinAlgError: If a covariance is not positive definite.
@@ -290,7 +291,7 @@ def merge_groups(
     widest = _widest_axes(means, covariances, which)
     first, second = widest.first, widest.second
     places = np.empty((len(which), 4))
-    # a little more than the bound, so that rounding excludes nobody
+    # a little more than the bound, so that rounding excludes no component
     bound = threshold * (1.0 + 1e-9)
     for k in range(len(which)):
         i = which[k]
@@ -299,7 +300,7 @@ def merge_groups(
         places[k, 3] = math.sqrt(bound * covariances[i, second, second]) + 1e-300
     grids = _grids(places)
     by_cell = grids.by_cell
-    # place and reach in the order of the cells; nobody reaches out of -1
+    # place and reach in the order of the cells; a reach of -1 reaches nothing
     beside = np.empty(places.shape)
     slot = np.empty(len(means), dtype=np.int64)
     for k in range(len(by_cell)):
@@ -344,16 +345,16 @@ def reduce_mixture(
 ) -> Reduced:
     """Prune, merge and cap: :func:`tracker.filters.gaussian_mixture.reduce`.
 
-    Only the moments of what stays are computed, and nothing is moved in between.
+    Only the moments of the remaining components are computed, and no array is moved in between.
 
     Args:
-        weights: (J,).
-        means: (J, d).
-        covariances: (J, d, d).
-        owners: (J,), or (0,), of :func:`merge_groups`.
-        pruning_threshold: The least weight.
-        merging_threshold: Squared Mahalanobis distance.
-        max_components: How many may stay.
+        weights: (J,), expected numbers of targets.
+        means: (J, d), states.
+        covariances: (J, d, d), covariances.
+        owners: (J,), or (0,), as in :func:`merge_groups`.
+        pruning_threshold: The least weight of a component.
+        merging_threshold: Squared Mahalanobis distance U.
+        max_components: Largest number of components.
     """
     kept = np.flatnonzero(weights >= pruning_threshold)
     order = kept[heaviest_first(weights[kept])]

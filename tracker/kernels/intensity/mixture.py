@@ -11,30 +11,30 @@ from numpy import ndarray
 from tracker.kernels.compilation import kernel
 
 _FEW = 48
-"""Up to so many weights are sorted by insertion."""
+"""Number of weights up to which they are sorted by insertion."""
 
 _DIGIT = 10
-"""Bits that one pass of sorting looks at."""
+"""Number of bits of a digit in one pass of the radix sort."""
 
 
 class Moments(NamedTuple):
-    """Where J components are."""
+    """Means and covariances of J components."""
 
     means: ndarray
-    """(J, d)."""
+    """(J, d), states."""
     covariances: ndarray
-    """(J, d, d)."""
+    """(J, d, d), covariances."""
 
 
 @kernel
 def predict(means: ndarray, covariances: ndarray, transition: ndarray, noises: ndarray) -> Moments:
-    """F m and F P Fᵀ + Q of every component, symmetric to the last bit.
+    """Compute F m and F P Fᵀ + Q of every component, symmetric to the last bit.
 
     Args:
-        means: (J, d).
-        covariances: (J, d, d).
-        transition: F (d, d).
-        noises: Q, (1, d, d) for all, or (J, d, d).
+        means: (J, d), states.
+        covariances: (J, d, d), covariances.
+        transition: F (d, d), of one step.
+        noises: Q, (1, d, d) for all, or (J, d, d), the process noise of one step.
     """
     dimension = means.shape[1]
     if dimension == 4:
@@ -46,7 +46,7 @@ def predict(means: ndarray, covariances: ndarray, transition: ndarray, noises: n
 def _predicted(
     means: ndarray, covariances: ndarray, transition: ndarray, noises: ndarray, axes: Sequence[int]
 ) -> Moments:
-    """:func:`predict` for axes that are a range, or, to have loops unrolled, a tuple of as many."""
+    """:func:`predict` for axes that are a range, or a tuple of as many for unrolled loops."""
     moved = np.empty(means.shape)
     spread = np.empty(covariances.shape)
     half = np.empty(transition.shape)
@@ -90,18 +90,18 @@ def _insert(weights: ndarray, order: ndarray, most: int) -> bool:
 
 @kernel
 def heaviest_first(weights: ndarray) -> ndarray:
-    """Indices of weights (J,), none negative, heaviest first; of equal ones the first comes first.
+    """The indices of weights (J,), none negative, heaviest first; equal ones in ascending order.
 
-    Few are sorted by insertion. Of many the bits are: those of a positive number are in the
-    order of the numbers. The upper ones, a pass for each digit of them, nearly do it, and
-    insertion does the rest; if that takes long, all bits are looked at.
+    Few are sorted by insertion. Many are sorted by radix, since the bits of a positive number are
+    in the order of the numbers: a pass for each digit of the upper bits nearly sorts them, and
+    insertion completes it; where that takes long, all bits are sorted.
     """
     size = len(weights)
     order = np.arange(size)
     if size <= _FEW:
         _insert(weights, order, size * size)
         return order
-    # a negative zero becomes a positive one; what is heavier becomes what is smaller
+    # a negative zero becomes a positive one; heavier weights become smaller keys
     keys = ~((weights + 0.0).view(np.uint64))
     keys -= keys.min()
     highest = keys.max()
@@ -118,7 +118,7 @@ def heaviest_first(weights: ndarray) -> ndarray:
 
 @kernel
 def _sort_bits(keys: ndarray, order: ndarray, first: int, last: int) -> None:
-    """Sort ``order`` by some bits of the keys, smallest first, keeping the order of equal ones."""
+    """Sort ``order`` stably by some bits of the keys, smallest first."""
     other = np.empty_like(order)
     mask = np.uint64((1 << _DIGIT) - 1)
     begins = np.empty((1 << _DIGIT) + 1, dtype=np.int64)
@@ -138,9 +138,9 @@ def _sort_bits(keys: ndarray, order: ndarray, first: int, last: int) -> None:
 
 @kernel
 def heaviest_of_groups(weights: ndarray, group: ndarray, count: int) -> ndarray:
-    """The heaviest of each group 0 … count - 1, of equal ones the last; -1 where it is empty.
+    """The heaviest component of each group 0 … count - 1, the last of equal ones; -1 for none.
 
-    Who is in the group -1 is left out.
+    Components of the group -1 are left out.
     """
     heaviest = np.full(count, -1, dtype=np.int64)
     for i in range(len(weights)):

@@ -15,42 +15,42 @@ from tracker.kernels.linear_algebra import Gaussians
 
 
 class PairWeights(NamedTuple):
-    """Weights of P pairs of a component and one of M measurements."""
+    """Weights of P pairs of a component and a measurement, for M measurements."""
 
     weights: ndarray
-    """(P,)."""
+    """(P,), expected number of targets of each pair."""
     log_odds: ndarray
-    """(P,), against clutter."""
+    """(P,), log odds of each pair against clutter."""
     sums: ndarray
-    """(M,), of the weights."""
+    """(M,), sum of the weights of each measurement's pairs."""
 
 
 class UpdatedIntensity(NamedTuple):
-    """An intensity after one measurement set: J components as missed, then P pairs."""
+    """An intensity after one measurement set: J components as missed, followed by P pairs."""
 
     weights: ndarray
-    """(K,), K = J + P."""
+    """(K,), expected numbers of targets, K = J + P."""
     means: ndarray
-    """(K, d)."""
+    """(K, d), states."""
     covariances: ndarray
-    """(K, d, d)."""
+    """(K, d, d), covariances."""
     parents: ndarray
-    """(K,), the component that each comes from."""
+    """(K,), the predicted component that each comes from."""
     measured: ndarray
     """(K,), the measurement that updated it, -1 for a miss."""
     log_odds: ndarray
-    """(P,), of the pairs against clutter."""
+    """(P,), log odds of the pairs against clutter."""
     sums: ndarray
-    """(M,), of the weights of each measurement's pairs."""
+    """(M,), sum of the weights of each measurement's pairs."""
 
 
 @kernel
 def phd_weights(log_terms: ndarray, measured: ndarray, log_clutter: ndarray) -> PairWeights:
-    """Weights of a PHD update, in logarithms: a far measurement still goes to its nearest.
+    """Compute the weights of a PHD update in logarithms, so that far measurements do not underflow.
 
     Args:
         log_terms: (P,), log(p_D w q(z)) of each pair.
-        measured: (P,), its measurement.
+        measured: (P,), the measurement of each pair.
         log_clutter: (M,), log κ(z); minus infinity without clutter.
     """
     count = len(log_clutter)
@@ -80,28 +80,28 @@ def phd_weights(log_terms: ndarray, measured: ndarray, log_clutter: ndarray) -> 
 
 @kernel
 def _vectors(values: ndarray, which: ndarray) -> ndarray:
-    """The rows ``which`` of (J, d): by brackets it takes several times as long, as to compile."""
-    taken = np.empty((len(which), values.shape[1]))
+    """The rows ``which`` of (J, d): indexing with brackets takes longer, also to compile."""
+    picked = np.empty((len(which), values.shape[1]))
     for k in range(len(which)):
         for a in range(values.shape[1]):
-            taken[k, a] = values[which[k], a]
-    return taken
+            picked[k, a] = values[which[k], a]
+    return picked
 
 
 @kernel
 def _matrices(values: ndarray, which: ndarray) -> ndarray:
-    """The matrices ``which`` of (J, n, d), likewise."""
-    taken = np.empty((len(which), values.shape[1], values.shape[2]))
+    """The matrices ``which`` of (J, n, d), for the same reason."""
+    picked = np.empty((len(which), values.shape[1], values.shape[2]))
     for k in range(len(which)):
         for a in range(values.shape[1]):
             for b in range(values.shape[2]):
-                taken[k, a, b] = values[which[k], a, b]
-    return taken
+                picked[k, a, b] = values[which[k], a, b]
+    return picked
 
 
 @kernel
 def _picked(expected: Expected, which: ndarray, size: int) -> Expected:
-    """What the components ``which`` of ``size`` predict."""
+    """Select the predictions of the components ``which`` of ``size``."""
     nothing, of_all = which[:0], np.zeros(1, dtype=np.int64)
     there = which if len(expected.posture_values) else nothing
     return Expected(
@@ -125,15 +125,15 @@ def phd_update(
     clutter: ndarray,
     gate: float,
 ) -> UpdatedIntensity:
-    """The GM-PHD update: every component as missed, then one for every gated pair.
+    """Compute the GM-PHD update: every component as missed, then one for every gated pair.
 
     Args:
-        predicted: J components.
-        expected: The measurement that each predicts.
-        measurements: M of them.
-        detection_probabilities: (J,).
-        clutter: (M,), κ(z).
-        gate: Squared Mahalanobis distance.
+        predicted: J predicted components.
+        expected: The measurement that each component predicts.
+        measurements: M measurements with their noise.
+        detection_probabilities: (J,), p_D of each component.
+        clutter: (M,), κ(z) per unit of the measurement space.
+        gate: Squared Mahalanobis distance of the gate.
     """
     weights, means, covariances = predicted.weights, predicted.means, predicted.covariances
     size, dimension = means.shape
@@ -166,7 +166,7 @@ def phd_update(
     all_covariances = np.empty((size + pairs, dimension, dimension))
     parents = np.empty(size + pairs, dtype=np.int64)
     sources = np.empty(size + pairs, dtype=np.int64)
-    # row by row: by slices it takes longer, as to compile
+    # row by row: slices take longer, also to compile
     for k in range(size + pairs):
         pair = k - size
         if k < size:

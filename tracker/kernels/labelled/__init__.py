@@ -1,1 +1,1 @@
-"""Kernels of the labelled fusion: a step, a camera, its association marginals."""
+"""Kernels of the labelled fusion: a step, the update by a camera, its association marginals."""

@@ -1,6 +1,6 @@
-"""What one camera's boxes say of everybody in a room, compiled: a labelled filter's inner step.
+"""Update of a labelled filter by the boxes of one camera, compiled.
 
-One call a camera and step: the calls between its parts would take longer than the parts.
+One call for each camera and step: calls between its parts would take longer than the parts.
 """
 
 from __future__ import annotations
@@ -22,96 +22,96 @@ from tracker.kernels.measurement import ExpectedBoxes
 
 
 class Tracks(NamedTuple):
-    """n Bernoulli tracks: one existence, one Gaussian and one label a person."""
+    """n Bernoulli tracks: an existence probability, a Gaussian and a label each."""
 
     existences: ndarray
-    """(n,)."""
+    """(n,), existence probabilities."""
     means: ndarray
-    """(n, d)."""
+    """(n, d), states: position in metres, world frame, then velocity."""
     covariances: ndarray
-    """(n, d, d)."""
+    """(n, d, d), covariances."""
     labels: ndarray
-    """(n,)."""
+    """(n,), labels."""
 
 
 class CameraRule(NamedTuple):
-    """How every camera's boxes are taken."""
+    """Parameters of the update by any camera."""
 
     gate: float
-    """Squared Mahalanobis distance."""
+    """Squared Mahalanobis distance of the gate."""
     soft: bool
-    """Of :func:`tracker.kernels.boxes.inside_probability`."""
+    """Whether the edge of the image is soft: :func:`tracker.kernels.boxes.inside_probability`."""
     detection_probability: float
-    """Of somebody in full view."""
+    """p_D of a target in full view."""
     confirmed: float
-    """Whoever occludes with more weight than this hides others."""
+    """Weight above which a track occludes others."""
     near: float
-    """As the next two, of :class:`tracker.kernels.boxes.Occlusion`."""
+    """As the next two fields, of :class:`tracker.kernels.boxes.Occlusion`."""
     strength: float
-    worth_telling: float
+    reporting_share: float
     tolerance: float
-    """As the next, of :class:`tracker.kernels.association.belief_propagation.Settling`."""
+    """As the next field, of :class:`tracker.kernels.association.belief_propagation.Settling`."""
     iterations: int
-    least_told: float
-    """Association probability from which a pair is told."""
+    reporting_threshold: float
+    """Association probability from which a pair is reported."""
 
 
 class CameraRecord(NamedTuple):
-    """What a camera says of n tracks."""
+    """The evidence of a camera for n tracks."""
 
     detection_probabilities: ndarray
-    """(n,)."""
+    """(n,), p_D of each track."""
     hidden_by: ndarray
-    """(n,), the label of who hides each, -1 for nobody."""
+    """(n,), label of the occluder of each track, -1 for none."""
     sources: ndarray
-    """(n,), the box that is more likely its own than any other and than none, -1 for none."""
+    """(n,), index of the box that is likelier than any other and than a miss, -1 for none."""
     shares: ndarray
-    """(n,), the probability of that."""
+    """(n,), association probability of that box."""
 
 
 class Newcomers(NamedTuple):
-    """What M boxes make of people never yet detected."""
+    """The components that M boxes make of targets never detected before."""
 
     shares: ndarray
-    """(M,), e / (κ + e): a newcomer's share in what no track explains."""
+    """(M,), e / (κ + e): share of new targets in the unexplained probability of the box."""
     means: ndarray
-    """(M, d)."""
+    """(M, d), states."""
     covariances: ndarray
-    """(M, d, d)."""
+    """(M, d, d), covariances."""
 
 
 class TrackPairs(NamedTuple):
-    """A pairs of a track and a box that are worth telling."""
+    """A pairs of a track and a box that are reported."""
 
     tracks: ndarray
-    """(A,), the index."""
+    """(A,), index of the track."""
     boxes: ndarray
-    """(A,)."""
+    """(A,), index of the box."""
     probabilities: ndarray
-    """(A,)."""
+    """(A,), association probabilities."""
 
 
 class CameraUpdate(NamedTuple):
-    """Everybody in a room after one camera's boxes."""
+    """Tracks and undetected targets after the update by one camera's boxes."""
 
     existences: ndarray
-    """(n,)."""
+    """(n,), existence probabilities."""
     means: ndarray
-    """(n, d)."""
+    """(n, d), states."""
     covariances: ndarray
-    """(n, d, d)."""
+    """(n, d, d), covariances."""
     record: CameraRecord
     undetected: ndarray
-    """(U,), weights of those never yet detected."""
+    """(U,), weights of the undetected components."""
     newcomers: Newcomers
     unexplained: ndarray
-    """(M,), the probability that no track made the box."""
+    """(M,), the probability that no track made each box."""
     pairs: TrackPairs
 
 
 @kernel
 def _part(expected: Expected, first: int, last: int) -> Expected:
-    """What the components from ``first`` to ``last``, exclusive, predict."""
+    """Select the predictions of the components from ``first`` to ``last``, exclusive."""
     spreads, others = expected.spreads, len(expected.posture_values) > 0
     begin, end = (first, last) if others else (0, 0)
     return Expected(
@@ -138,22 +138,22 @@ def update_by_camera(
     resemblance: ndarray,
     rule: CameraRule,
 ) -> CameraUpdate:
-    """The update of n tracks, and of the U people never yet detected, by one camera's M boxes.
+    """Update n tracks and the U components of undetected targets by one camera's M boxes.
 
-    The undetected are updated as a PHD intensity; what a box makes of them, e, stands beside
-    the clutter κ as what else may have made the box, and the tracks share the boxes by belief
-    propagation. In what the camera expects, the undetected come first and then the tracks.
+    The undetected targets are updated as a PHD intensity; its expected number of targets e at a
+    box is added to the clutter κ, and the boxes are associated with the tracks by belief
+    propagation. The predictions have the undetected components first and then the tracks.
 
     Args:
         undetected: U components.
-        tracks: n of them.
-        occluding: (n,), the weight with which each track may hide others.
-        measurements: M of them, each with its noise or all with one.
-        seen: What the camera should see of U + n.
+        tracks: n tracks.
+        occluding: (n,), the weight with which each track may occlude others.
+        measurements: M boxes as measurements, each with its noise or all with one.
+        seen: The predicted boxes of U + n components.
         image_size: (2,) width and height, pixels.
-        clutter: κ (M,).
-        resemblance: As :func:`tracker.kernels.labelled.marginals.bernoulli_update`.
-        rule: How the boxes are taken.
+        clutter: κ (M,), per unit of the measurement space.
+        resemblance: As in :func:`tracker.kernels.labelled.marginals.bernoulli_update`.
+        rule: The parameters of the update.
     """
     size, count = len(undetected.weights), len(measurements.values)
     everybody = size + len(tracks.existences)
@@ -199,7 +199,7 @@ def update_by_camera(
         tracks.labels,
         hiding,
         occluding[hiding],
-        Occlusion(rule.near, rule.strength, rule.worth_telling),
+        Occlusion(rule.near, rule.strength, rule.reporting_share),
     )
     updated = bernoulli_update(
         Gaussians(tracks.existences, tracks.means, tracks.covariances),
@@ -222,22 +222,22 @@ def update_by_camera(
         new.weights[:size].copy(),
         Newcomers(newcomer, born.means, born.covariances),
         updated.unexplained,
-        _told(updated.rows, rule.least_told),
+        _reported_pairs(updated.rows, rule.reporting_threshold),
     )
 
 
 class _Likeliest(NamedTuple):
-    """The box that is more likely a track's own than any other and than none."""
+    """The likeliest box of each of n tracks, where it is likelier than a miss."""
 
     boxes: ndarray
-    """(n,), -1 for none."""
+    """(n,), index of the box, -1 for none."""
     shares: ndarray
-    """(n,), its probability."""
+    """(n,), its association probability."""
 
 
 @kernel
 def _likeliest(rows: ndarray) -> _Likeliest:
-    """Of the association probabilities (n, 1 + M), of which the first is of a miss."""
+    """Find the likeliest box of each row of (n, 1 + M) probabilities, the first being a miss."""
     tracks, count = rows.shape
     best = np.full(tracks, -1, dtype=np.int64)
     shares = np.zeros(tracks)
@@ -249,17 +249,17 @@ def _likeliest(rows: ndarray) -> _Likeliest:
 
 
 @kernel
-def _told(rows: ndarray, least: float) -> TrackPairs:
-    """The pairs of (n, 1 + M) association probabilities that are not less than ``least``."""
-    tracks, count = rows.shape
-    who = np.empty(tracks * (count - 1), dtype=np.int64)
-    what = np.empty(tracks * (count - 1), dtype=np.int64)
-    probabilities = np.empty(tracks * (count - 1))
-    told = 0
-    for i in range(tracks):
-        for z in range(count - 1):
+def _reported_pairs(rows: ndarray, least: float) -> TrackPairs:
+    """List the pairs of (n, 1 + M) association probabilities that are at least ``least``."""
+    size, columns = rows.shape
+    tracks = np.empty(size * (columns - 1), dtype=np.int64)
+    boxes = np.empty(size * (columns - 1), dtype=np.int64)
+    probabilities = np.empty(size * (columns - 1))
+    count = 0
+    for i in range(size):
+        for z in range(columns - 1):
             share = rows[i, 1 + z]
             if share > 0.0 and share >= least:
-                who[told], what[told], probabilities[told] = i, z, share
-                told += 1
-    return TrackPairs(who[:told].copy(), what[:told].copy(), probabilities[:told].copy())
+                tracks[count], boxes[count], probabilities[count] = i, z, share
+                count += 1
+    return TrackPairs(tracks[:count].copy(), boxes[:count].copy(), probabilities[:count].copy())

@@ -1,4 +1,4 @@
-"""Updates by boxes of which each target gets its share, compiled."""
+"""Updates with association marginals: each target makes at most one box, compiled."""
 
 from __future__ import annotations
 
@@ -19,50 +19,50 @@ class UpdatedBernoullis(NamedTuple):
     """n Bernoulli tracks after one measurement set."""
 
     existences: ndarray
-    """(n,)."""
+    """(n,), existence probabilities."""
     means: ndarray
-    """(n, d)."""
+    """(n, d), states."""
     covariances: ndarray
-    """(n, d, d)."""
+    """(n, d, d), covariances."""
     rows: ndarray
-    """(n, 1 + M), of a miss and of each measurement."""
+    """(n, 1 + M), probabilities of a miss and of each measurement."""
     unexplained: ndarray
-    """(M,), that no track made the measurement."""
+    """(M,), probability that no track made the measurement."""
 
 
 class LabelledWeights(NamedTuple):
-    """J components of people before a camera."""
+    """J components of tracks before the update by a camera."""
 
     weights: ndarray
-    """(J,)."""
+    """(J,), expected numbers of targets."""
     labels: ndarray
-    """(J,)."""
+    """(J,), labels of the tracks."""
     detection_probabilities: ndarray
-    """(J,)."""
+    """(J,), p_D of each component."""
 
 
 class PairOdds(NamedTuple):
     """P pairs of a component and a box."""
 
     parents: ndarray
-    """(P,), the component."""
+    """(P,), index of the component."""
     measured: ndarray
-    """(P,), the box."""
+    """(P,), index of the box."""
     log_odds: ndarray
     """(P,), log(p_D w q(z) / κ)."""
     boxes: int
-    """M, of all boxes."""
+    """M, the number of boxes."""
 
 
 class SharedBoxes(NamedTuple):
-    """Weights of a PHD update whose labels stand for one person each."""
+    """Weights of a PHD update in which a label stands for one target."""
 
     factors: ndarray
-    """(J,), on the weights of the missed."""
+    """(J,), factors on the weights of the missed components."""
     shares: ndarray
-    """(P,), the weights of the pairs."""
+    """(P,), weights of the pairs."""
     of_people: ndarray
-    """(P,), whether a pair is a person's, not a birth's."""
+    """(P,), whether a pair is of a track, not of a birth."""
 
 
 @kernel
@@ -76,18 +76,18 @@ def bernoulli_update(
     gate: float,
     settling: Settling,
 ) -> UpdatedBernoullis:
-    """The update of Bernoulli tracks by one measurement set, of which each gets its share.
+    """Update Bernoulli tracks by one measurement set, with association marginals.
 
     Args:
-        tracks: n of them; weights are existence probabilities.
-        expected: The measurement that each predicts.
-        measurements: M of them.
-        detection_probabilities: (n,).
-        unexplained: (M,), intensity of clutter and newcomers at each measurement, > 0.
-        resemblance: (k, M) with k up to n, by how much likelier each of the first k tracks is to
-            look as each measurement does than anybody; others are not known by their looks.
-        gate: Squared Mahalanobis distance.
-        settling: Of :func:`tracker.kernels.association.belief_propagation.belief_propagation`.
+        tracks: n tracks; weights are existence probabilities.
+        expected: The measurement that each track predicts.
+        measurements: M measurements with their noise.
+        detection_probabilities: (n,), p_D of each track.
+        unexplained: (M,), intensity of clutter and new targets at each measurement, > 0.
+        resemblance: (k, M) with k up to n, likelihood ratio of each measurement's appearance for
+            the first k tracks, of the track against any target; 1 for the other tracks.
+        gate: Squared Mahalanobis distance of the gate.
+        settling: Convergence criterion of the belief propagation.
     """
     existences, means, covariances = tracks.weights, tracks.means, tracks.covariances
     size, dimension = means.shape
@@ -118,7 +118,7 @@ def bernoulli_update(
     spread = np.empty((size + pairs, dimension, dimension))
     group = np.empty(size + pairs, dtype=np.int64)
     for i in range(size):
-        # a faint share of the missed hypothesis stays, so that no track is without any
+        # the missed hypothesis retains a tiny share, so that every track has a hypothesis
         weights[i] = max(rows[i, 0] * survived[i] / max(missed[i], 1e-300), 1e-12)
         group[i] = i
     parts[:size], spread[:size] = means, covariances
@@ -144,15 +144,15 @@ def share_boxes(
     largest_odds: float,
     settling: Settling,
 ) -> SharedBoxes:
-    """New weights of a PHD update whose labels stand for one person each.
+    """Compute weights of a PHD update in which a label stands for one target.
 
     Args:
         people: J components.
-        first_birth: Labels from here up to ``last_birth``, exclusive, stay Poisson.
-        last_birth: Likewise.
-        odds_of_pairs: Of each against clutter.
-        largest_odds: Logarithm of what counts as certain.
-        settling: Of :func:`tracker.kernels.association.belief_propagation.belief_propagation`.
+        first_birth: First label of this step's births, which stay Poisson.
+        last_birth: Label after the last of the births.
+        odds_of_pairs: Log odds of each pair against clutter.
+        largest_odds: Log odds at which they are clipped.
+        settling: Convergence criterion of the belief propagation.
     """
     weights, labels = people.weights, people.labels
     parents, measured = odds_of_pairs.parents, odds_of_pairs.measured
@@ -165,22 +165,22 @@ def share_boxes(
     for j in range(len(labels)):
         held[place[j]] += weights[j]
         there[place[j]] += weights[j] * people.detection_probabilities[j]
-    # merging may have left a little more than one person
+    # merging may result in a weight a little above 1
     scale = 1.0 / np.maximum(held, 1.0)
     missed = np.maximum(1.0 - there * scale, 1e-9)
     pairs = len(parents)
     odds, owner = np.empty(pairs), np.empty(pairs, dtype=np.int64)
     table = np.zeros((count, boxes))
-    nobody = np.ones(boxes)  # clutter or a newcomer, in units of κ
+    unassigned = np.ones(boxes)  # clutter or a newcomer, in units of κ
     for pair in range(pairs):
         owner[pair] = place[parents[pair]]
         odds[pair] = math.exp(min(odds_of_pairs.log_odds[pair], largest_odds)) * scale[owner[pair]]
         if person[owner[pair]]:
             table[owner[pair], measured[pair]] += odds[pair]
         else:
-            nobody[measured[pair]] += odds[pair]
+            unassigned[measured[pair]] += odds[pair]
     persons = np.flatnonzero(person)
-    marginals = belief_propagation(missed[persons], table[persons], nobody, settling)
+    marginals = belief_propagation(missed[persons], table[persons], unassigned, settling)
     rows, columns = marginals.rows, marginals.unexplained
     row = np.full(count, -1, dtype=np.int64)
     factors = scale.copy()
@@ -190,9 +190,9 @@ def share_boxes(
     shares = np.empty(pairs)
     for pair in range(pairs):
         who, z = owner[pair], measured[pair]
-        # the share of this pair in what its label, or the newcomers, got of the box
+        # the share of this pair in the marginal of its label, or of the births, for the box
         if person[who]:
             shares[pair] = odds[pair] * rows[row[who], 1 + z] / max(table[who, z], 1e-300)
         else:
-            shares[pair] = odds[pair] * columns[z] / nobody[z]
+            shares[pair] = odds[pair] * columns[z] / unassigned[z]
     return SharedBoxes(factors[place], shares, person[owner])

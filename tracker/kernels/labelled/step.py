@@ -1,6 +1,6 @@
 """One step of the labelled filter over all cameras, compiled.
 
-One call a step: the calls between its parts would take longer than the parts.
+One call for each step: calls between its parts would take longer than the parts.
 """
 
 from __future__ import annotations
@@ -20,66 +20,66 @@ from tracker.kernels.measurement import Target, expected_measurements, measured_
 
 
 class CameraBoxes(NamedTuple):
-    """B boxes of C cameras, one camera after another."""
+    """B boxes of C cameras, camera after camera."""
 
     boxes: ndarray
     """(B, 4) centre and half sizes, pixels."""
     sigmas: ndarray
-    """(B, 4), standard deviations of the same, pixels."""
+    """(B, 4), standard deviations of the same four numbers, pixels."""
     starts: ndarray
-    """(C + 1,), where each camera's boxes begin, and the end."""
+    """(C + 1,), index of each camera's first box, and B."""
     clutter_factors: ndarray
-    """(B,), on κ: by what each looks like, it is the likelier false the larger this is."""
+    """(B,), factor on κ from each box's appearance: the larger, the likelier the box is false."""
     resemblance: ndarray
-    """(n, B), by how much likelier each track of the step before is to look as each box does than
-    anybody; (0, B) where nothing is known of looks."""
+    """(n, B), likelihood ratio of each box's appearance for each track of the step before, of the
+    track against any target; (0, B) where no track has an appearance."""
 
 
 class StepModel(NamedTuple):
-    """What stays from step to step, beside target, cameras and how their boxes are taken."""
+    """The model that is constant over the steps, beside target, cameras and update parameters."""
 
     transition: ndarray
-    """F (d, d)."""
+    """F (d, d), transition matrix."""
     motion_noise: ndarray
-    """Q (1, d, d)."""
+    """Q (1, d, d), process noise of one step."""
     survival_probability: float
     birth_weights: ndarray
-    """(G,), as the next two (G, d) and (G, d, d): births join the undetected."""
+    """(G,), as the next two (G, d) and (G, d, d): births, added to the undetected targets."""
     birth_means: ndarray
     birth_covariances: ndarray
     transform: ndarray
-    """As ``products``, of :func:`tracker.kernels.measurement.measured_boxes`."""
+    """As ``products``, an argument of :func:`tracker.kernels.measurement.measured_boxes`."""
     products: ndarray
     sigma_factor: float
-    """On the boxes' standard deviations."""
+    """Factor on the boxes' standard deviations."""
     clutter: ndarray
-    """κ (C,)."""
+    """κ (C,), per unit of the measurement space."""
     least_existence: float
-    """Of a track that begins."""
+    """Least existence probability of a track that begins."""
 
 
 class StepResult(NamedTuple):
-    """n tracks, U undetected people, B boxes and A pairs worth telling after one step."""
+    """n tracks, U undetected components, B boxes and A reported pairs after one step."""
 
     existences: ndarray
-    """(n,), as the next (n, d), (n, d, d) and (n,) of the tracks."""
+    """(n,), as the next (n, d), (n, d, d) and (n,): the tracks."""
     means: ndarray
     covariances: ndarray
     labels: ndarray
     next_label: int
-    """The first that is free."""
+    """The first label that is free."""
     undetected_weights: ndarray
-    """(U,), as the next two (U, d) and (U, d, d)."""
+    """(U,), as the next two (U, d) and (U, d, d): the undetected targets."""
     undetected_means: ndarray
     undetected_covariances: ndarray
     detection_probabilities: ndarray
-    """(C, n), as the next three: of each camera the fields of
+    """(C, n), as the next three: for each camera the fields of
     :class:`tracker.kernels.labelled.camera_update.CameraRecord`."""
     hidden_by: ndarray
     sources: ndarray
     shares: ndarray
     pair_cameras: ndarray
-    """(A,), as the next three: of the pairs camera, label, box and probability."""
+    """(A,), as the next three: camera, label, box and probability of each reported pair."""
     pair_labels: ndarray
     pair_boxes: ndarray
     pair_probabilities: ndarray
@@ -87,21 +87,22 @@ class StepResult(NamedTuple):
     """(B, m), the boxes as measurements, and (B, m, m) their noises."""
     noises: ndarray
     unexplained: ndarray
-    """(B,), the probability that no track made each."""
+    """(B,), the probability that no track made each box."""
 
 
 class KeepingRule(NamedTuple):
-    """Which tracks live on."""
+    """Parameters by which tracks are retained at the end of a step."""
 
     least_existence: float
-    """Who has less is dropped."""
+    """Existence probability below which a track is dropped."""
     low: ndarray
-    """(3,), as ``high``, the corners that a track stays between, world metres."""
+    """(3,), as ``high``, corners of the volume in which tracks are retained, world metres."""
     high: ndarray
     most: int
-    """No more than this are kept."""
+    """Largest number of tracks."""
     near: float
-    """As ``height`` and ``confirmed``, of :func:`tracker.kernels.linear_algebra.duplicates`."""
+    """As ``height`` and ``confirmed``, an argument of
+    :func:`tracker.kernels.linear_algebra.duplicates`."""
     height: float
     confirmed: float
 
@@ -117,20 +118,20 @@ def predict_and_update(
     cameras: Calibrations,
     rule: CameraRule,
 ) -> StepResult:
-    """Predict n tracks and the U people never yet detected, update them by C cameras' boxes.
+    """Predict n tracks and U undetected components, and update them by the boxes of C cameras.
 
-    Camera after camera, in their order, each with :func:`update_by_camera`; what a box makes of
-    the undetected begins a track, which the cameras after it update.
+    The cameras update in their order, each with :func:`update_by_camera`; a box of the
+    undetected targets begins a track, which the cameras after it update.
 
     Args:
-        tracks: Of the step before.
-        next_label: The first that is free.
-        undetected: Of the step before.
-        seen: What the cameras show.
-        model: Of the room and how people move in it.
-        target: Of their size and postures.
-        cameras: C of them.
-        rule: How their boxes are taken.
+        tracks: The tracks of the step before.
+        next_label: The first label that is free.
+        undetected: The undetected components of the step before.
+        seen: The boxes of the cameras.
+        model: Motion, births and clutter.
+        target: Sizes and postures of a target.
+        cameras: The C cameras.
+        rule: The parameters of the update.
     """
     starts, labels = seen.starts, tracks.labels
     count = len(seen.boxes)
@@ -159,8 +160,8 @@ def predict_and_update(
     sources = np.full((views, most), -1, dtype=np.int64)
     unexplained = np.empty(count)
     capacity = 4 * most
-    told = np.empty((capacity, 3), dtype=np.int64)
-    told_probabilities = np.empty(capacity)
+    pair_rows = np.empty((capacity, 3), dtype=np.int64)
+    probabilities = np.empty(capacity)
     pairs = 0
     for c in range(views):
         own = slice(starts[c], starts[c + 1])
@@ -195,14 +196,14 @@ def predict_and_update(
         needed = pairs + len(known.tracks) + len(born)
         if needed > capacity:
             capacity = 2 * needed
-            told = np.concatenate((told, np.empty((capacity - len(told), 3), dtype=np.int64)))
-            told_probabilities = np.concatenate(
-                (told_probabilities, np.empty(capacity - len(told_probabilities)))
+            pair_rows = np.concatenate(
+                (pair_rows, np.empty((capacity - len(pair_rows), 3), dtype=np.int64))
             )
+            probabilities = np.concatenate((probabilities, np.empty(capacity - len(probabilities))))
         for pair in range(len(known.tracks)):
-            told[pairs, 0], told[pairs, 1] = c, labels[known.tracks[pair]]
-            told[pairs, 2] = known.boxes[pair]
-            told_probabilities[pairs] = known.probabilities[pair]
+            pair_rows[pairs, 0], pair_rows[pairs, 1] = c, labels[known.tracks[pair]]
+            pair_rows[pairs, 2] = known.boxes[pair]
+            probabilities[pairs] = known.probabilities[pair]
             pairs += 1
         if len(born) == 0:
             continue
@@ -210,9 +211,9 @@ def predict_and_update(
             z = born[k]
             detection_probabilities[c, size + k] = rule.detection_probability
             sources[c, size + k], shares[c, size + k] = z, 1.0
-            if born_existences[z] >= rule.least_told:
-                told[pairs, 0], told[pairs, 1], told[pairs, 2] = c, next_label + k, z
-                told_probabilities[pairs] = born_existences[z]
+            if born_existences[z] >= rule.reporting_threshold:
+                pair_rows[pairs, 0], pair_rows[pairs, 1], pair_rows[pairs, 2] = c, next_label + k, z
+                probabilities[pairs] = born_existences[z]
                 pairs += 1
         existences = np.concatenate((existences, born_existences[born]))
         means = np.concatenate((means, found.newcomers.means[born]))
@@ -233,10 +234,10 @@ def predict_and_update(
         hidden_by[:, :everybody].copy(),
         sources[:, :everybody].copy(),
         shares[:, :everybody].copy(),
-        told[:pairs, 0].copy(),
-        told[:pairs, 1].copy(),
-        told[:pairs, 2].copy(),
-        told_probabilities[:pairs].copy(),
+        pair_rows[:pairs, 0].copy(),
+        pair_rows[:pairs, 1].copy(),
+        pair_rows[:pairs, 2].copy(),
+        probabilities[:pairs].copy(),
         measured.values,
         measured.noises,
         unexplained,
@@ -247,16 +248,16 @@ def predict_and_update(
 def kept_tracks(
     existences: ndarray, means: ndarray, labels: ndarray, sources: ndarray, rule: KeepingRule
 ) -> ndarray:
-    """Indices of the tracks that live on, the surest first.
+    """The indices of the tracks that are retained, by decreasing existence.
 
-    Left out are the faint, those who strayed, who are too many, and duplicates of others.
+    Weak tracks, those outside the volume, duplicates, and those beyond the number are left out.
 
     Args:
-        existences: (n,).
-        means: (n, d), position first, world metres.
-        labels: (n,).
-        sources: (C, n), the box that each camera gave each, -1 for none.
-        rule: Which of them.
+        existences: (n,), existence probabilities.
+        means: (n, d), states, position first, world metres.
+        labels: (n,), labels of the tracks.
+        sources: (C, n), box of each track in each camera, -1 for none.
+        rule: The parameters.
     """
     alive = inside_bounds(means, rule.low, rule.high)
     alive = alive[existences[alive] >= rule.least_existence]

@@ -1,1 +1,1 @@
-"""Kernels over pixels and boxes of one picture."""
+"""Kernels over pixels and boxes of one image."""

@@ -1,4 +1,4 @@
-"""Sums over rectangles of a picture's channels, and boosted trees that ask for them.
+"""Sums over rectangles of an image's channels, and boosted trees over them, compiled.
 
 [DTPB09] Dollár, Tu, Perona, Belongie, "Integral channel features", BMVC 2009.
 """
@@ -14,24 +14,24 @@ from numpy import ndarray
 from tracker.kernels.compilation import pixel_kernel
 
 ORIENTATIONS = 6
-"""Directions of edges that are told apart, over half a turn."""
+"""Number of bins for the direction of edges, over half a turn."""
 
 COLUMNS, ROWS = 8, 10
-"""Cells of a window."""
+"""Number of cells of a window across and down."""
 
 
 class Gradients(NamedTuple):
-    """The edges of a picture."""
+    """The gradients of an image."""
 
     bins: ndarray
-    """(h, w) uint8, the direction of each pixel's, 0 … ORIENTATIONS - 1."""
+    """(h, w) uint8, bin of each pixel's direction, 0 … ORIENTATIONS - 1."""
     magnitudes: ndarray
-    """(h, w) float32, levels a pixel, of the channel that changes most."""
+    """(h, w) float32, levels per pixel, of the channel with the largest gradient."""
 
 
 @pixel_kernel
 def gradients(picture: ndarray) -> Gradients:
-    """Central differences of the channel that changes most, by size and direction.
+    """Compute central differences of the channel with the largest gradient, as size and direction.
 
     Args:
         picture: (h, w, 3) uint8.
@@ -43,7 +43,7 @@ def gradients(picture: ndarray) -> Gradients:
         for x in range(1, width - 1):
             best, across, down = -1, 0, 0
             for c in range(3):
-                # bytes are subtracted with a sign
+                # bytes are subtracted as signed integers
                 right = int(np.int64(picture[y, x + 1, c]) - np.int64(picture[y, x - 1, c]))
                 below = int(np.int64(picture[y + 1, x, c]) - np.int64(picture[y - 1, x, c]))
                 size = right * right + below * below
@@ -58,10 +58,10 @@ def gradients(picture: ndarray) -> Gradients:
 
 @pixel_kernel
 def channel_sums(bins: ndarray, magnitudes: ndarray, planes: ndarray) -> ndarray:
-    """The integral image of all channels: sums above and to the left of each pixel corner.
+    """Compute the integral image of all channels: sums above and to the left of each pixel corner.
 
-    The first channels are the magnitudes by direction, the next one those of all, then the
-    planes.
+    The first channels are the magnitudes by direction, the next one that of all directions, and
+    the last ones the planes.
 
     Args:
         bins: (h, w) uint8, as in :class:`Gradients`.
@@ -90,7 +90,7 @@ def channel_sums(bins: ndarray, magnitudes: ndarray, planes: ndarray) -> ndarray
 
 @pixel_kernel
 def _edges(low: float, high: float, limit: int, edges: ndarray) -> None:
-    """The borders of equal cells between two places, as whole pixels inside a picture."""
+    """Divide a range into equal cells, with borders at whole pixels inside an image."""
     cells = len(edges) - 1
     for k in range(cells + 1):
         place = low + (high - low) * k / cells
@@ -99,7 +99,7 @@ def _edges(low: float, high: float, limit: int, edges: ndarray) -> None:
 
 @pixel_kernel
 def _mean(sums: ndarray, xs: ndarray, ys: ndarray, feature: int) -> int:
-    """The mean of one channel over one cell, rounded; 0 where no pixel is in it."""
+    """The mean of one channel over one cell, rounded; 0 for a cell without pixels."""
     channels = sums.shape[2]
     cell, channel = feature // channels, feature % channels
     row, column = cell // COLUMNS, cell % COLUMNS
@@ -118,14 +118,14 @@ def _mean(sums: ndarray, xs: ndarray, ys: ndarray, feature: int) -> int:
 
 @pixel_kernel
 def cell_means(sums: ndarray, windows: ndarray) -> ndarray:
-    """The mean of every channel over every cell of windows.
+    """Compute the mean of every channel over every cell of windows.
 
     Args:
-        sums: As :func:`channel_sums` makes them.
+        sums: Integral image of :func:`channel_sums`.
         windows: (N, 4), left, top, right and bottom edge, pixels.
 
     Returns:
-        (N, ROWS * COLUMNS * channels) uint8, the channels of a cell beside each other.
+        (N, ROWS * COLUMNS * channels) uint8, the channels of a cell next to each other.
     """
     height, width, channels = sums.shape
     count = ROWS * COLUMNS * channels
@@ -148,23 +148,23 @@ def tree_scores(
     leaves: ndarray,
     least: ndarray,
 ) -> ndarray:
-    """The sum of boosted trees of depth 3 over windows, given up where it falls too low.
+    """Sum boosted trees of depth 3 over windows; a window is rejected where the sum is too low.
 
     Args:
-        sums: As :func:`channel_sums` makes them.
+        sums: Integral image of :func:`channel_sums`.
         windows: (N, 4), left, top, right and bottom edge, pixels.
-        features: (T, 7) of :func:`cell_means` that the nodes ask for, breadth first.
-        thresholds: (T, 7); up to it the way goes left.
-        leaves: (T, 8), what each tree adds.
-        least: (T,), a sum below it after a tree ends the window.
+        features: (T, 7), feature of :func:`cell_means` of each node, breadth first.
+        thresholds: (T, 7); features up to the threshold go left.
+        leaves: (T, 8), the score that each tree adds.
+        least: (T,), score after each tree below which a window is rejected.
 
     Returns:
-        (N,) float32, minus infinity where a window was given up.
+        (N,) float32 scores, minus infinity where a window was rejected.
     """
     height, width, channels = sums.shape
     scores = np.full(len(windows), -np.inf, dtype=np.float32)
     xs, ys = np.empty(COLUMNS + 1, dtype=np.int64), np.empty(ROWS + 1, dtype=np.int64)
-    # a division takes longer than all else of a node: none is left to be made in a window
+    # divisions are the slowest operation of a node, so none is left in the loop over windows
     rows, columns = np.empty(features.shape, np.int64), np.empty(features.shape, np.int64)
     planes = np.empty(features.shape, np.int64)
     for t in range(len(features)):
@@ -194,7 +194,7 @@ def tree_scores(
                         - sums[bottom, left, channel]
                         + sums[top, left, channel]
                     )
-                    # the rounded mean of `_mean` is up to the threshold
+                    # whether the rounded mean of `_mean` is at most the threshold
                     low = inside + (area >> 1) < (limit + 1) * area
                 node = 2 * node + (1 if low else 2)
             total += leaves[t, node - 7]

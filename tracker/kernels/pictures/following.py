@@ -1,4 +1,4 @@
-"""Mean shift over the moving pixels towards a target's colours, compiled.
+"""Mean shift over moving pixels towards a target's colour histogram, compiled.
 
 [CRM03] Comaniciu, Ramesh, Meer, "Kernel-based object tracking", IEEE TPAMI 25(5), 2003.
 """
@@ -22,20 +22,20 @@ def follow_colours(
     iterations: int,
     tolerance: float,
 ) -> ndarray:
-    """The centre where the climb from a box ends ([CRM03]_), or where it was.
+    """The centre at which the climb from a box ends ([CRM03]_), or that of the box.
 
     The equation is in :func:`tracker.single_view.association_matrix.following.follow`.
 
     Args:
         bins: (h, w), the histogram bin of each pixel.
-        moving: (h, w), the pixels that count.
-        box: (4,), where the target was, centre and half sizes, pixels.
-        histogram: (bins,), q.
-        iterations: At most so many shifts.
-        tolerance: Pixels; a shift shorter than this is the last one.
+        moving: (h, w), whether a pixel is in the foreground.
+        box: (4,), box of the target before, centre and half sizes, pixels.
+        histogram: (bins,), q, the target's histogram.
+        iterations: Largest number of shifts.
+        tolerance: Length of a shift below which the climb ends, pixels.
 
     Returns:
-        (2,), pixels.
+        (2,), x and y, pixels.
     """
     height, width = bins.shape
     x, y = box[0], box[1]

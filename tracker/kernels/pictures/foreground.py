@@ -1,6 +1,6 @@
-"""The loops over pixels of the adaptive segmentation, compiled by numba.
+"""Kernels over pixels for the adaptive segmentation, compiled.
 
-Each has a NumPy counterpart in the tests that it must agree with.
+Every kernel must agree with a NumPy counterpart in the tests.
 """
 
 from __future__ import annotations
@@ -17,29 +17,29 @@ class ClassThresholds(NamedTuple):
     """The K iterations of a c-means on differences."""
 
     thresholds: ndarray
-    """(K, 3), a channel each."""
+    """(K, 3), one for each channel, grey levels."""
     counts: ndarray
-    """(K,) the foreground pixels n(k)."""
+    """(K,) numbers of foreground pixels n(k)."""
 
 
 class Background(NamedTuple):
-    """A background that follows the light."""
+    """A background that adapts to the illumination."""
 
     levels: ndarray
     """(h, w, 3) uint16, 256 times the level."""
     still: ndarray
-    """(h, w) uint8, for how many pictures each pixel has been away from the foreground."""
+    """(h, w) uint8, number of images for which each pixel has been away from the foreground."""
 
 
 class LevelMedians(NamedTuple):
-    """What a target shows at groups of a source's levels: (3, groups) each, channel by channel."""
+    """Medians of a target image at groups of a source's levels: (3, groups) each, by channel."""
 
     totals: ndarray
-    """Pixels of the group."""
+    """Number of pixels of the group."""
     sums: ndarray
-    """Of their levels in the source."""
+    """Sum of their levels in the source."""
     medians: ndarray
-    """The lower median of their levels in the target, 0 where there is none."""
+    """Lower median of their levels in the target, 0 for an empty group."""
 
 
 @pixel_kernel
@@ -54,22 +54,22 @@ def two_classes(
 ) -> ClassThresholds:
     """Split differences into background and foreground by the modified c-means.
 
-    Each class has one centre a channel. A difference d belongs to the background
+    Each class has one centre for each channel. A difference d belongs to the background
     where (d - m_b) / r <= m_f - d, that is up to the threshold
 
         t = (m_b + r m_f) / (1 + r)
 
     and a pixel where all its channels do. The means of both classes are the next
-    centres; a class too small to have a mean keeps its centres.
+    centres; a class too small for a mean retains its centres.
 
     Args:
         difference: (h, w, 3) uint8.
-        background_centre: Start of m_b in every channel.
-        foreground_centre: Start of m_f in every channel.
+        background_centre: Initial m_b of every channel, grey levels.
+        foreground_centre: Initial m_f of every channel, grey levels.
         ratio: r, the background's deviation over the foreground's.
-        least: No threshold is lower.
-        enough: A class of fewer pixels keeps its centres.
-        iterations: At most so many; fewer where the thresholds come to rest.
+        least: Lower bound of the thresholds, grey levels.
+        enough: Number of pixels of a class below which it retains its centres.
+        iterations: Largest number of iterations; fewer where the thresholds converge.
     """
     height, width, _ = difference.shape
     total = np.zeros(3)
@@ -88,12 +88,12 @@ def two_classes(
     for k in range(iterations):
         for c in range(3):
             thresholds[k, c] = max((m_b[c] + ratio * m_f[c]) / (1.0 + ratio), least)
-        # differences are whole numbers: above t is above its floor
+        # differences are integers: above t is above its floor
         t0, t1, t2 = int(thresholds[k, 0]), int(thresholds[k, 1]), int(thresholds[k, 2])
         count, s0, s1, s2 = 0, np.int64(0), np.int64(0), np.int64(0)
         for y in range(height):
             for x in range(width):
-                # bytes are added up with more bits
+                # bytes are summed with more bits
                 d0 = np.int64(difference[y, x, 0])
                 d1 = np.int64(difference[y, x, 1])
                 d2 = np.int64(difference[y, x, 2])
@@ -118,14 +118,14 @@ def two_classes(
 
 @pixel_kernel
 def above(difference: ndarray, thresholds: ndarray) -> ndarray:
-    """1 where any channel differs by more than its threshold.
+    """Mark the pixels where any channel differs by more than its threshold.
 
     Args:
         difference: (h, w, 3) uint8.
-        thresholds: (3,).
+        thresholds: (3,), grey levels.
 
     Returns:
-        (h, w) uint8.
+        (h, w) uint8, 1 where a pixel is marked.
     """
     height, width, _ = difference.shape
     mask = np.empty((height, width), dtype=np.uint8)
@@ -147,15 +147,15 @@ def clear_shadows(
     tint: float,
     least: float,
 ) -> None:
-    """Set the difference to 0 where all channels fell by nearly the same share.
+    """Set the difference to 0 where all channels decreased by nearly the same share.
 
     Args:
         difference: (h, w, 3) uint8; changed in place.
         picture: (h, w, 3) uint8.
-        background: (h, w, 3) uint8, at the picture's exposure.
-        darkest: A shadow leaves at least this share of the light.
-        tint: The channels' shares differ by at most this in a shadow.
-        least: Differences up to this are left as they are.
+        background: (h, w, 3) uint8, at the image's exposure.
+        darkest: Least share of the light that a shadow leaves, 0 … 1.
+        tint: Largest difference of the channels' shares in a shadow.
+        least: Differences up to this are left unchanged, grey levels.
     """
     height, width, _ = difference.shape
     for y in range(height):
@@ -182,26 +182,26 @@ def update_background(
     frames: int,
     rate: float,
 ) -> Background:
-    """Let the background follow where a pixel has been background for long enough.
+    """Adapt the background where a pixel has been background for long enough.
 
         M ← M + α (I - M)
 
-    where a pixel has not been near the foreground for ``frames`` pictures, and no
+    where a pixel has not been near the foreground for ``frames`` images, and no
     channel differs by ``limit`` or more.
 
     Args:
         background: (h, w, 3) uint16, 256 times the level.
-        still: (h, w) uint8, for how many pictures each pixel has been
+        still: (h, w) uint8, number of images for which each pixel has been
             away from the foreground, 255 at most.
         picture: (h, w, 3) uint8, I.
-        shown: (h, w, 3) uint8, the background as it was compared with the picture.
+        shown: (h, w, 3) uint8, the background as it was compared with the image.
         near: (h, w) uint8, 1 on and near the foreground.
-        limit: Th, grey levels.
-        frames: w.
-        rate: α.
+        limit: Largest difference, grey levels.
+        frames: Number of images.
+        rate: α, 0 … 1.
 
     Returns:
-        The background and the counts after this picture.
+        The background and the counts after this image.
     """
     height, width, _ = background.shape
     after = background.copy()
@@ -228,12 +228,12 @@ def update_background(
 
 @pixel_kernel
 def level_medians(source: ndarray, target: ndarray, groups: int) -> LevelMedians:
-    """What a target shows at each of some levels of a source, channel by channel.
+    """Compute the medians of a target image at groups of a source's levels, channel by channel.
 
     Args:
-        source: (N, 3) uint8.
-        target: (N, 3) uint8.
-        groups: The source's 256 levels are taken together into so many.
+        source: (N, 3) uint8, pixels of the source.
+        target: (N, 3) uint8, the same pixels of the target.
+        groups: Number of groups that the source's 256 levels are divided into.
     """
     totals = np.zeros((3, groups), dtype=np.int64)
     sums = np.zeros((3, groups))
@@ -260,10 +260,10 @@ def level_medians(source: ndarray, target: ndarray, groups: int) -> LevelMedians
 
 @pixel_kernel
 def upper_medians(values: ndarray) -> ndarray:
-    """The median of each column of (N, P) uint8, of an even number the upper one.
+    """Compute the median of each column of (N, P) uint8, the upper one for an even number.
 
-    Two counts by four bits each find it: first of the upper half of a value, then, among those
-    that share it, of the lower one.
+    It is found by two counts over four bits each: of the upper half of a value, and then, among
+    those with the same upper half, of the lower half.
     """
     count, size = values.shape
     rank = count // 2

@@ -1,7 +1,7 @@
-"""The hot loops over pixels and boxes, compiled by numba: plain functions of arrays.
+"""Kernels over pixels and boxes, compiled.
 
 Boxes are rows of ``centre_x, centre_y, half_width, half_height`` in pixels. Every
-kernel has a NumPy counterpart in the tests that it must agree with.
+kernel must agree with a NumPy counterpart in the tests.
 """
 
 from __future__ import annotations
@@ -16,21 +16,21 @@ from tracker.kernels.compilation import pixel_kernel
 
 
 class Modes(NamedTuple):
-    """Where K climbs ended."""
+    """The ends of K climbs."""
 
     boxes: ndarray
-    """(K, 4)."""
+    """(K, 4), the boxes."""
     densities: ndarray
-    """(K,), Σ_i w_i k_i there."""
+    """(K,), density Σ_i w_i k_i at each end."""
 
 
 class Filled(NamedTuple):
-    """What the pixels of one box made of a histogram."""
+    """The contribution of one box's pixels to a histogram."""
 
     bins: int
-    """How many bins hold something."""
+    """Number of bins that are not empty."""
     weight: float
-    """Of all pixels together."""
+    """Weight of all pixels together."""
 
 
 @pixel_kernel
@@ -45,14 +45,14 @@ def _fill(
     """Add the weights of a box's pixels to a histogram of zeros.
 
     Args:
-        bin_map: As the next two, of :func:`box_histograms`.
+        bin_map: As the next two arguments, of :func:`box_histograms`.
         box: (4,), centre x, centre y, half width, half height, pixels.
-        histogram: (bins,), zeros; the weights are put in.
-        touched: (bins,), to be filled with the bins that hold something.
+        histogram: (bins,), zeros; receives the weights.
+        touched: (bins,), receives the bins that are not empty.
     """
     height, width = bin_map.shape
     centre_x, centre_y = box[0], box[1]
-    # half a pixel at least: the box always holds the pixel that its centre is in
+    # at least half a pixel: the box always contains the pixel of its centre
     half_x, half_y = max(box[2], 0.5), max(box[3], 0.5)
     stride_x = math.ceil(2.0 * half_x / longest_side)
     stride_y = math.ceil(2.0 * half_y / longest_side)
@@ -84,14 +84,14 @@ def _fill(
 def box_histograms(
     bin_map: ndarray, boxes: ndarray, bins: int, epanechnikov: bool, longest_side: int
 ) -> ndarray:
-    """The colour histogram of every box, each summing to 1, or all 0 where no pixel lies in it.
+    """Compute the colour histogram of every box, with sum 1, or 0 for a box without pixels.
 
     Args:
         bin_map: (h, w), the bin of each pixel.
         boxes: (N, 4), centre x, centre y, half width, half height, pixels.
         bins: The number of bins.
-        epanechnikov: Whether pixels weigh 1 - r² on the ellipse in the box, or all the same.
-        longest_side: Boxes wider or taller than this many pixels are read with a stride.
+        epanechnikov: Whether pixels have the weight 1 - r² on the ellipse in the box, or all equal.
+        longest_side: Side in pixels above which a box is sampled with a stride.
 
     Returns:
         (N, bins).
@@ -115,10 +115,10 @@ def template_distances(
     epanechnikov: bool,
     longest_side: int,
 ) -> ndarray:
-    """Bhattacharyya distance of every box to the nearest template of each group.
+    """Compute the Bhattacharyya distance of every box to the nearest template of each group.
 
-    The same as :func:`box_histograms` and the distances to all rows, without the
-    histograms being stored: only the bins that a box touches are visited.
+    The result equals :func:`box_histograms` and the distances to all rows, without
+    storing the histograms: only the bins that a box touches are visited.
 
     Args:
         bin_map: (h, w), the bin of each pixel.
@@ -129,7 +129,7 @@ def template_distances(
         longest_side: As in :func:`box_histograms`.
 
     Returns:
-        (N, G) distances, 1 where a box holds no pixel.
+        (N, G) distances, 1 for a box without pixels.
     """
     count = boxes.shape[0]
     templates, bins = template_roots.shape
@@ -155,12 +155,12 @@ def template_distances(
 
 @pixel_kernel
 def hue_saturation_bins(hsv: ndarray, least_saturation: int, least_value: int) -> ndarray:
-    """The bin of each pixel: 16 hues × 16 saturations where it is coloured, else 16 values.
+    """Compute the bin of each pixel: 16 hues × 16 saturations if coloured, else 16 values.
 
     Args:
         hsv: (h, w, 3) uint8, OpenCV's range (hue 0 … 179).
-        least_saturation: A coloured pixel has at least this, 0 … 255 …
-        least_value: … and at least this value.
+        least_saturation: Least saturation of a coloured pixel, 0 … 255.
+        least_value: Least value of a coloured pixel, 0 … 255.
 
     Returns:
         (h, w) uint16, 0 … 271.
@@ -179,14 +179,14 @@ def hue_saturation_bins(hsv: ndarray, least_saturation: int, least_value: int) -
 
 @pixel_kernel
 def box_means(integral: ndarray, edges: ndarray) -> ndarray:
-    """The mean of a picture over rectangles, from its integral image.
+    """Compute the mean of an image over rectangles, from its integral image.
 
     Args:
         integral: (h + 1, w + 1), sums above and to the left.
         edges: (N, 4), left, top, right, bottom in pixels, not rounded.
 
     Returns:
-        (N,) means over the pixels whose centres lie inside; 0 where there are none.
+        (N,) means over the pixels whose centres lie inside; 0 for no pixel.
     """
     height, width = integral.shape[0] - 1, integral.shape[1] - 1
     count = edges.shape[0]
@@ -209,18 +209,18 @@ def box_means(integral: ndarray, edges: ndarray) -> ndarray:
 
 @pixel_kernel
 def spread_starts(samples: ndarray, weights: ndarray, order: ndarray, most: int) -> ndarray:
-    """Heaviest samples that keep a box's distance from each other.
+    """Select the heaviest samples that are a box's size apart from each other.
 
     Args:
         samples: (S, 4), centre x, centre y, half width, half height.
-        weights: (S,); samples of weight 0 are never taken.
+        weights: (S,), weights; samples of weight 0 are never selected.
         order: (S,) indices, heaviest first.
-        most: At most so many.
+        most: Largest number of samples.
 
     Returns:
-        Indices of the samples taken.
+        Indices of the selected samples.
     """
-    taken = np.empty(most, dtype=np.int64)
+    chosen = np.empty(most, dtype=np.int64)
     count = 0
     for rank in range(len(order)):
         if count == most:
@@ -230,16 +230,16 @@ def spread_starts(samples: ndarray, weights: ndarray, order: ndarray, most: int)
             break
         apart = True
         for k in range(count):
-            j = taken[k]
+            j = chosen[k]
             u = (samples[i, 0] - samples[j, 0]) / samples[j, 2]
             v = (samples[i, 1] - samples[j, 1]) / samples[j, 3]
             if u * u + v * v < 1.0:
                 apart = False
                 break
         if apart:
-            taken[count] = i
+            chosen[count] = i
             count += 1
-    return taken[:count].copy()
+    return chosen[:count].copy()
 
 
 @pixel_kernel
@@ -258,11 +258,11 @@ def mean_shift(
 
     Args:
         samples: (S, 4), centre x, centre y, half width, half height.
-        weights: (S,).
-        starts: (K, 4).
-        bandwidth: In half sizes, for the centre and for the sizes alike.
-        iterations: At most so many.
-        tolerance: Stop when a step is shorter than this many half sizes.
+        weights: (S,), weights of the samples.
+        starts: (K, 4), boxes at which the climbs start.
+        bandwidth: Bandwidth in half sizes, for the centre and for the sizes alike.
+        iterations: Largest number of steps.
+        tolerance: Length of a step, in half sizes, below which a climb stops.
     """
     count = len(starts)
     modes = starts.copy()
@@ -314,23 +314,23 @@ def foreground_mask(
     darkest_shadow: float,
     shadow_tint: float,
 ) -> ndarray:
-    """1 where a pixel is neither the background nor a shadow on it.
+    """Mark the pixels that are neither the background nor a shadow on it.
 
     A pixel differs where its square-rooted grey levels (whose noise is the same in
     dark and light) are further apart than threshold + spread. It is a shadow where
-    all channels fell by nearly the same share.
+    all channels decreased by nearly the same share.
 
     Args:
         picture: (h, w, 3) uint8.
         background: (h, w, 3) uint8.
-        curve: (1, 256, 3) uint8, each of its levels at the picture's exposure.
-        spread: (h, w), what a pixel varies by itself, in the same units as the threshold.
-        threshold: On the scale 16 √level, which runs from 0 to 255.
-        darkest_shadow: A shadow leaves at least this share of the light; 1 knows no shadow.
-        shadow_tint: The channels' shares differ by at most this in a shadow.
+        curve: (1, 256, 3) uint8, each level of the background at the image's exposure.
+        spread: (h, w), variation of each pixel, in the units of the threshold.
+        threshold: Threshold on the scale 16 √level, which runs from 0 to 255.
+        darkest_shadow: Least share of the light that a shadow leaves; 1 for no shadows.
+        shadow_tint: Largest difference of the channels' shares in a shadow.
 
     Returns:
-        (h, w) uint8.
+        (h, w) uint8, 1 where a pixel is foreground.
     """
     height, width, _ = picture.shape
     roots = np.empty(256)
@@ -360,16 +360,16 @@ def foreground_mask(
 
 @pixel_kernel
 def keep_apart(boxes: ndarray, densities: ndarray, order: ndarray, distance: float) -> ndarray:
-    """Which boxes stay, in the given order: none whose centre is near one that stays already.
+    """Select boxes in the given order, none with a centre near one that is selected already.
 
     Args:
-        boxes: (N, 4).
-        densities: (N,); from the first that is not positive on, none stays.
+        boxes: (N, 4), centre x, centre y, half width, half height, pixels.
+        densities: (N,) densities; the first that is not positive ends the selection.
         order: (N,) indices.
-        distance: In half sizes of the box that stays.
+        distance: Least distance, in half sizes of the box that is selected already.
 
     Returns:
-        Indices of those that stay.
+        Indices of the selected boxes.
     """
     kept = np.empty(len(order), dtype=np.int64)
     count = 0

@@ -1,4 +1,4 @@
-"""Target boxes that hang from the outlines of pieces of foreground, compiled.
+"""Candidate boxes of targets from the outlines of foreground components, compiled.
 
 Boxes are rows of ``centre_x, centre_y, half_width, half_height`` in pixels.
 """
@@ -14,49 +14,49 @@ from tracker.kernels.compilation import pixel_kernel
 
 
 class SizeTable(NamedTuple):
-    """How large a target can be at each place of a picture, cell by cell."""
+    """Possible sizes of a target at each place of an image, by the cells of a grid."""
 
     table: ndarray
-    """(cells, Q, 2), half widths and half heights, pixels."""
+    """(cells, Q, 2), half widths and half heights of Q sizes, pixels."""
     possible: ndarray
     """(cells,), whether a target's centre can be there."""
     cell: float
     """Side of a cell, pixels."""
     columns: int
-    """Cells across."""
+    """Number of cells across."""
     rows: int
-    """Cells down."""
+    """Number of cells down."""
 
 
 class Candidates(NamedTuple):
-    """N boxes that may be targets'."""
+    """N candidate boxes of targets."""
 
     boxes: ndarray
-    """(N, 4)."""
+    """(N, 4), pixels."""
     owners: ndarray
-    """(N,), the piece of foreground that each is in, ascending."""
+    """(N,), the foreground component of each box, ascending."""
 
 
 class Acceptance(NamedTuple):
-    """Least scores of a piece's boxes."""
+    """Least scores of the boxes of a foreground component."""
 
     first: float
-    """Of its best."""
+    """Least score of the best box."""
     further: float
-    """Of the others, up to the number that is believed."""
+    """Least score of further boxes, up to the estimated number of targets."""
     spare: float
-    """Beyond that number."""
+    """Least score of boxes beyond that number."""
 
 
 class Chosen(NamedTuple):
-    """The boxes that are taken for targets', piece by piece, the best of a piece first."""
+    """The accepted boxes, component by component, the best of each first."""
 
     boxes: ndarray
-    """(N, 4)."""
+    """(N, 4), pixels."""
     scores: ndarray
-    """(N,)."""
+    """(N,), scores."""
     owners: ndarray
-    """(N,), the piece of each."""
+    """(N,), the foreground component of each box."""
 
 
 @pixel_kernel
@@ -67,17 +67,17 @@ def candidates(
     usual: float,
     stride: int,
 ) -> Candidates:
-    """Boxes of every size that hang from the highest pixels of each piece.
+    """Make boxes of every size at the topmost pixels of each foreground component.
 
-    A box's size depends on the place of its centre, and that on its size: three
-    rounds settle it.
+    The size of a box depends on the place of its centre, and that on its size: three
+    iterations determine both.
 
     Args:
-        owners: (h, w), the piece of each pixel.
-        pieces: (J, 4), their boxes.
-        sizes: At each place.
-        usual: Half height that is tried first.
-        stride: Pixels between columns.
+        owners: (h, w), the foreground component of each pixel.
+        pieces: (J, 4), boxes of the components, pixels.
+        sizes: The possible sizes at each place.
+        usual: Half height of the first iteration, pixels.
+        stride: Distance between columns, pixels.
     """
     table, possible, cell = sizes.table, sizes.possible, sizes.cell
     tried = table.shape[1]
@@ -125,15 +125,15 @@ def choose(
     width: float,
     apart: float,
 ) -> Chosen:
-    """The best boxes of each piece, averaged with their neighbours, that keep apart.
+    """Select the best boxes of each component, averaged with their neighbours, that keep apart.
 
     Args:
-        candidates: Piece by piece.
-        scores: (N,), theirs.
-        wanted: (J,), boxes of each piece.
+        candidates: The candidate boxes, component by component.
+        scores: (N,), their scores.
+        wanted: (J,), estimated number of targets of each component.
         acceptance: The least scores.
-        width: Of the Gaussian that averages, in half sizes.
-        apart: Distance that two boxes keep, in half sizes.
+        width: Standard deviation of the Gaussian weights of the average, in half sizes.
+        apart: Least distance of two boxes, in half sizes.
     """
     boxes, owners = candidates.boxes, candidates.owners
     chosen = np.empty_like(boxes)
@@ -145,14 +145,14 @@ def choose(
         end = begin
         while end < len(boxes) and owners[end] == j:
             end += 1
-        taken = 0
+        accepted = 0
         while True:
             best = -1
             for i in range(begin, end):
                 if free[i] and (best < 0 or scores[i] > scores[best]):
                     best = i
-            least = acceptance.first if taken == 0 else acceptance.further
-            if taken >= wanted[j]:
+            least = acceptance.first if accepted == 0 else acceptance.further
+            if accepted >= wanted[j]:
                 least = acceptance.spare
             if best < 0 or scores[best] < least:
                 break
@@ -170,7 +170,7 @@ def choose(
             for a in range(4):
                 mean[a] /= total
             clear = True
-            for k in range(count - taken, count):
+            for k in range(count - accepted, count):
                 u = (mean[0] - chosen[k, 0]) / chosen[k, 2]
                 v = (mean[1] - chosen[k, 1]) / chosen[k, 3]
                 clear = clear and u * u + v * v >= apart * apart
@@ -179,7 +179,7 @@ def choose(
                 continue
             chosen[count], values[count], whose[count] = mean, scores[best], j
             count += 1
-            taken += 1
+            accepted += 1
             for i in range(begin, end):
                 u = (boxes[i, 0] - mean[0]) / mean[2]
                 v = (boxes[i, 1] - mean[1]) / mean[3]

@@ -1,1 +1,1 @@
-"""Kernels of the smoothing: what boxes say of paths, their best states, and who made which box."""
+"""Kernels of the smoothing: information of boxes on paths, smoothing passes, and association."""

@@ -1,4 +1,4 @@
-"""What the boxes of one camera say of paths, and which box belongs to which path: compiled."""
+"""Information of one camera's boxes on paths, and their association with paths, compiled."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from tracker.kernels.linear_algebra import factorise
 from tracker.kernels.measurement import ExpectedBoxes
 
 _NO_SHARE = 1e-6
-"""Probability below which a box tells nothing of a path."""
+"""Probability below which a box has no effect on a path."""
 
 
 class _Room(NamedTuple):
-    """To write in while one pair is worked out."""
+    """Working memory for one pair."""
 
     spread: ndarray
     """(m, m)."""
@@ -41,7 +41,7 @@ def _room(size: int) -> _Room:
 
 @kernel
 def _add_spread(jacobian: ndarray, covariance: ndarray, spread: ndarray) -> None:
-    """Add H P Hᵀ of the position."""
+    """Add H P Hᵀ of the position to ``spread``."""
     size = len(spread)
     for p in range(size):
         for b in range(3):
@@ -54,7 +54,7 @@ def _add_spread(jacobian: ndarray, covariance: ndarray, spread: ndarray) -> None
 
 @kernel
 def _whiten(lower: ndarray, right: ndarray, whitened: ndarray) -> float:
-    """L⁻¹ b for a Cholesky factor L, and its squared length."""
+    """Compute L⁻¹ b for a Cholesky factor L; returns its squared length."""
     length = 0.0
     for p in range(len(right)):
         value = right[p]
@@ -68,7 +68,7 @@ def _whiten(lower: ndarray, right: ndarray, whitened: ndarray) -> float:
 
 @kernel
 def _log_density(room: _Room) -> float:
-    """log N(column; 0, spread), and the whitened column."""
+    """log N(column; 0, spread); the whitened column is stored as well."""
     size = len(room.column)
     log_determinant = factorise(room.spread, room.lower)
     length = _whiten(room.lower, room.column, room.whitened)
@@ -76,7 +76,7 @@ def _log_density(room: _Room) -> float:
 
 
 class BoxInformation(NamedTuple):
-    """What boxes say of the positions of N rows of paths: log L(p) = yᵀp − ½ pᵀ Y p + c."""
+    """The information of boxes on the positions of N rows: log L(p) = yᵀp − ½ pᵀ Y p + c."""
 
     matrices: ndarray
     """Y (N, 3, 3)."""
@@ -87,55 +87,55 @@ class BoxInformation(NamedTuple):
 
 
 class BoxLinks(NamedTuple):
-    """L pairs of a row of a path and a box of a camera."""
+    """L pairs of a row of a path and a box of one camera."""
 
     rows: ndarray
-    """(L,)."""
+    """(L,), index of the row."""
     boxes: ndarray
     """(L,), index among the camera's boxes of all steps."""
     shares: ndarray
-    """a (L,), association probability."""
+    """a (L,), association probability, 0 … 1."""
 
 
 class Rows(NamedTuple):
-    """N rows of paths, and where each step's are."""
+    """N rows of paths, indexed by step."""
 
     states: ndarray
-    """(N, d), position first."""
+    """(N, d), states, position first, world metres."""
     covariances: ndarray
-    """(N, d, d)."""
+    """(N, d, d), covariances."""
     existences: ndarray
-    """(N,), that somebody is there."""
+    """(N,), existence probabilities."""
     labels: ndarray
-    """(N,), of their paths."""
+    """(N,), labels of their paths."""
     order: ndarray
     """(N,), the rows, step after step."""
     step_starts: ndarray
-    """(T + 1,), where each step's rows begin in ``order``, and the end."""
+    """(T + 1,), index of each step's first row in ``order``, and N."""
 
 
 class CameraSteps(NamedTuple):
-    """What one camera gave at T steps."""
+    """The boxes of one camera at T steps."""
 
     starts: ndarray
-    """(T + 1,), where each step's boxes begin, and the end."""
+    """(T + 1,), index of each step's first box, and B."""
     blind: ndarray
-    """(T,), whether it had no frame."""
+    """(T,), whether the camera had no frame."""
     measurements: Measurements
     clutter: ndarray
-    """κ (B,) of each of its boxes."""
+    """κ (B,) at each of its boxes, per unit of the measurement space."""
 
 
 class SharedCamera(NamedTuple):
-    """Who made which of a camera's boxes."""
+    """The association of one camera's boxes with N rows."""
 
     links: BoxLinks
     detection_probabilities: ndarray
-    """(N,)."""
+    """(N,), p_D of each row."""
     missed: ndarray
     """(N,), probability of a miss."""
     hidden_by: ndarray
-    """(N,), label of who hides each, -1 for nobody."""
+    """(N,), label of the occluder of each row, -1 for none."""
 
 
 @kernel
@@ -147,20 +147,20 @@ def add_information(
     measurements: Measurements,
     information: BoxInformation,
 ) -> None:
-    """Add what L boxes of a camera say of the rows of paths, straightened at the states.
+    """Add the information of L boxes of a camera on the rows of paths, linearised at the states.
 
         Y += a Hᵀ R⁻¹ H,   y += a Hᵀ R⁻¹ (z − h(x) + H x),   c += a log N(z − h + H x; 0, R)
 
-    with the share a of a box. Of a box that may show another posture, each counts with its
-    probability at the states.
+    with the association probability a of a box. Where a box may be of another posture, each posture
+    counts with its probability at the states.
 
     Args:
-        links: Whose box each is.
-        states: (N, d).
-        covariances: (N, d, d).
-        expected: Of each of the L pairs.
-        measurements: The camera's.
-        information: Added to.
+        links: The L pairs of rows and boxes.
+        states: (N, d) states.
+        covariances: (N, d, d) covariances.
+        expected: Predicted measurement of each of the L pairs.
+        measurements: All boxes of the camera as measurements.
+        information: The information that is added to.
     """
     rows, boxes, shares = links.rows, links.boxes, links.shares
     jacobians, spreads = expected.jacobians, expected.spreads
@@ -215,17 +215,17 @@ def add_information(
                 for p in range(size):
                     room.column[p] = h[p, a]
                 _whiten(room.lower, room.column, halves[a])
-                told = 0.0
+                total = 0.0
                 for p in range(size):
-                    told += halves[a, p] * room.whitened[p]
-                information.vectors[k, a] += a_share * told
+                    total += halves[a, p] * room.whitened[p]
+                information.vectors[k, a] += a_share * total
                 for b in range(a + 1):
-                    told = 0.0
+                    total = 0.0
                     for p in range(size):
-                        told += halves[a, p] * halves[b, p]
-                    information.matrices[k, a, b] += a_share * told
+                        total += halves[a, p] * halves[b, p]
+                    information.matrices[k, a, b] += a_share * total
                     if b < a:
-                        information.matrices[k, b, a] += a_share * told
+                        information.matrices[k, b, a] += a_share * total
 
 
 @kernel
@@ -236,14 +236,14 @@ def share_camera(
     image_size: ndarray,
     rule: CameraRule,
 ) -> SharedCamera:
-    """Who made which of a camera's boxes, at every step, given where all paths lie.
+    """Associate a camera's boxes with paths at every step, given the states of all paths.
 
     Args:
-        rows: Of the paths.
-        camera: Its boxes.
-        seen: What it should give of each row.
+        rows: The rows of the paths.
+        camera: The boxes of the camera.
+        seen: Predicted box of each row in the camera.
         image_size: (2,) width and height, pixels.
-        rule: Of the fusion; pairs from its ``least_told`` on are returned.
+        rule: The update of the fusion; pairs from its ``reporting_threshold`` on are returned.
     """
     order, step_starts, existences = rows.order, rows.step_starts, rows.existences
     states, covariances, labels = rows.states, rows.covariances, rows.labels
@@ -277,7 +277,7 @@ def share_camera(
             labels[own],
             hiding,
             weights[hiding],
-            Occlusion(rule.near, rule.strength, rule.worth_telling),
+            Occlusion(rule.near, rule.strength, rule.reporting_share),
         )
         chances_here, hidden_by = hidden_here.detection_probabilities, hidden_here.hidden_by
         first, count = box_starts[step], box_starts[step + 1] - box_starts[step]
@@ -321,19 +321,19 @@ def share_camera(
                     if length > gate:
                         continue
                     detected[i, j] += weights[i] * chances_here[i] * share * math.exp(log_density)
-        told = belief_propagation(
+        marginals = belief_propagation(
             1.0 - weights * chances_here,
             detected,
             camera.clutter[first : first + count],
             Settling(rule.tolerance, rule.iterations),
         ).rows
         for i in range(len(own)):
-            missed[own[i]] = told[i, 0]
+            missed[own[i]] = marginals[i, 0]
             for j in range(count):
-                if told[i, 1 + j] >= rule.least_told:
+                if marginals[i, 1 + j] >= rule.reporting_threshold:
                     found_rows.append(own[i])
                     found_boxes.append(first + j)
-                    found_shares.append(told[i, 1 + j])
+                    found_shares.append(marginals[i, 1 + j])
     return SharedCamera(
         BoxLinks(np.array(found_rows), np.array(found_boxes), np.array(found_shares)),
         chances,
@@ -351,21 +351,21 @@ def seen_empty(
     box_starts: ndarray,
     boxes: ndarray,
 ) -> ndarray:
-    """By how much a camera's look at some places speaks against anybody being there.
+    """Compute the log likelihood of the misses of one camera at some places.
 
-        log(1 − p_D) where no box of the step touches the one that he should give, else 0:
-        whoever hides him has a box there
+        log(1 − p_D) where no box of the step overlaps the predicted one, else 0:
+        an occluder would have a box there
 
     Args:
         expected: (N, 4) left, top, right, bottom, pixels.
-        valid: (N,), whether there is anything to see.
-        chances: (N,) p_D, 0 outside the picture.
-        steps: (N,).
-        box_starts: (T + 1,), where each step's boxes begin.
+        valid: (N,), whether the place is in front of the lens.
+        chances: (N,) p_D, 0 outside the image.
+        steps: (N,), step of each place.
+        box_starts: (T + 1,), index of each step's first box, and B.
         boxes: (B, 4) centre and half sizes, pixels.
 
     Returns:
-        (N,), at most 0.
+        (N,), log likelihoods, at most 0.
     """
     result = np.zeros(len(steps))
     for k in range(len(steps)):

@@ -17,39 +17,39 @@ from tracker.kernels.linear_algebra import factorise, solve
 
 
 class PathMotion(NamedTuple):
-    """How a person moves, and what is known of him at first."""
+    """The motion model of a path, and the prior of its first state."""
 
     transition: ndarray
-    """F (d, d)."""
+    """F (d, d), transition matrix of one step."""
     noise: ndarray
-    """Q (d, d)."""
+    """Q (d, d), process noise of one step."""
     prior: ndarray
-    """(d, d), covariance of a first state."""
+    """(d, d), prior covariance of a first state."""
 
 
 class SmoothedRows(NamedTuple):
     """N rows of paths after both passes."""
 
     means: ndarray
-    """(N, d)."""
+    """(N, d), smoothed states."""
     covariances: ndarray
-    """(N, d, d)."""
+    """(N, d, d), smoothed covariances."""
     fits: ndarray
-    """(N,), log ∫ N(p; m, P) L(p) dp of each row, by the boxes of the rows before."""
+    """(N,), log ∫ N(p; m, P) L(p) dp of each row, with the prediction from the rows before."""
     traces: ndarray
-    """(N,), of the position's covariance by the rows before and this one."""
+    """(N,), trace of the position's filtered covariance, square metres."""
     ahead: ndarray
-    """m⁻ (N, d), what the rows before say of each row."""
+    """m⁻ (N, d), prediction of each row from the rows before."""
     ahead_covariances: ndarray
     """P⁻ (N, d, d)."""
 
 
 class _Room(NamedTuple):
-    """To write in while one row is worked out."""
+    """Working memory for one row."""
 
     inverse: ndarray
     """(3, 3)."""
-    told: ndarray
+    system: ndarray
     """(3, 3), S."""
     side: ndarray
     """(d, 3), W."""
@@ -64,25 +64,25 @@ def _carry(
     mean: ndarray,
     covariance: ndarray,
     motion: PathMotion,
-    restlessness: float,
+    noise_scales: float,
     half: ndarray,
     ahead: ndarray,
     ahead_covariance: ndarray,
 ) -> None:
-    """m⁻ = F m and P⁻ = F P Fᵀ + s Q, into the last two; F P stays in ``half``."""
+    """Compute m⁻ = F m and P⁻ = F P Fᵀ + s Q, into the last two; F P remains in ``half``."""
     transition, d = motion.transition, len(mean)
     for a in range(d):
         ahead[a] = 0.0
         for b in range(d):
             half[a, b] = 0.0
         for r in range(d):
-            if transition[a, r] != 0.0:  # most are
+            if transition[a, r] != 0.0:  # most entries are 0
                 ahead[a] += transition[a, r] * mean[r]
                 for b in range(d):
                     half[a, b] += transition[a, r] * covariance[r, b]
     for a in range(d):
         for b in range(a + 1):
-            total = restlessness * motion.noise[a, b]
+            total = noise_scales * motion.noise[a, b]
             for r in range(d):
                 total += half[a, r] * transition[b, r]
             ahead_covariance[a, b] = total
@@ -91,7 +91,7 @@ def _carry(
 
 @kernel
 def _inverse(matrix: ndarray, inverse: ndarray) -> float:
-    """The inverse of a 3 × 3 matrix, by its cofactors, and its determinant."""
+    """Invert a 3 × 3 matrix by its cofactors, in place; returns its determinant."""
     for a in range(3):
         b, c = (a + 1) % 3, (a + 2) % 3
         for p in range(3):
@@ -108,15 +108,15 @@ def _inverse(matrix: ndarray, inverse: ndarray) -> float:
 
 @kernel
 def _update(y: ndarray, v: ndarray, mean: ndarray, covariance: ndarray, room: _Room) -> float:
-    """Mean and covariance by what a row's boxes say, in place.
+    """Update mean and covariance by the information of a row's boxes, in place.
 
     With P_pp = L Lᵀ, W = P_p L⁻ᵀ and S = I + Lᵀ Y L it is P⁺ = P − W (I − S⁻¹) Wᵀ: S is symmetric
-    and at least I, however large Y and P are, and so nothing of P⁺ is lost in rounding.
+    and at least I, however large Y and P are, so that P⁺ has no cancellation.
 
     Returns:
         log ∫ N(x; m, P) exp(vᵀx − ½ xᵀYx) dx, by the matrix determinant lemma.
     """
-    inverse, told, side, half, lower = room
+    inverse, system, side, half, lower = room
     d = len(mean)
     factorise(covariance[:3, :3], lower[:3, :3])
     for a in range(d):
@@ -135,9 +135,9 @@ def _update(y: ndarray, v: ndarray, mean: ndarray, covariance: ndarray, room: _R
             total = 1.0 if a == b else 0.0
             for r in range(a, 3):
                 total += lower[r, a] * half[r, b]
-            told[a, b] = total
-            told[b, a] = total
-    determinant = _inverse(told, inverse)
+            system[a, b] = total
+            system[b, a] = total
+    determinant = _inverse(system, inverse)
     for a in range(d):
         for b in range(3):
             half[a, b] = side[a, b]
@@ -152,17 +152,17 @@ def _update(y: ndarray, v: ndarray, mean: ndarray, covariance: ndarray, room: _R
             covariance[b, a] = total
     fixed, found = 0.0, 0.0
     for a in range(3):
-        told[0, a] = v[a]
+        system[0, a] = v[a]
         fixed += mean[a] * v[a]
         for b in range(3):
-            told[0, a] -= y[a, b] * mean[b]
+            system[0, a] -= y[a, b] * mean[b]
             fixed -= 0.5 * mean[a] * y[a, b] * mean[b]
     for a in range(3):
         for b in range(3):
-            found += 0.5 * told[0, a] * covariance[a, b] * told[0, b]
+            found += 0.5 * system[0, a] * covariance[a, b] * system[0, b]
     for a in range(d):
         for b in range(3):
-            mean[a] += covariance[a, b] * told[0, b]
+            mean[a] += covariance[a, b] * system[0, b]
     return fixed + found - 0.5 * math.log(max(determinant, 1e-300))
 
 
@@ -177,7 +177,7 @@ def _look_back(
     transition: ndarray,
     room: _Room,
 ) -> None:
-    """Mean and covariance by what the row after says of the rows behind it ([RTS65]), in place.
+    """Smooth mean and covariance of a row by those of the row after it ([RTS65]), in place.
 
     G = P Fᵀ (P⁻)⁻¹,   m += G (m_after − m⁻),   P += G (P_after − P⁻) Gᵀ
     """
@@ -214,24 +214,24 @@ def smooth_paths(
     information: ndarray,
     vectors: ndarray,
     motion: PathMotion,
-    restlessness: ndarray,
+    noise_scales: ndarray,
 ) -> SmoothedRows:
-    """The states of paths given all their boxes ([RTS65]), and how well these fit.
+    """Estimate the states of paths given all their boxes ([RTS65]), and the likelihood of these.
 
-    A row's boxes say of its position p what log L(p) = yᵀp − ½ pᵀ Y p says, whatever their
-    number: with the predicted N(m, P) the filter takes them as
+    The boxes of a row have the log likelihood log L(p) = yᵀp − ½ pᵀ Y p of its position p, whatever
+    their number: with the prediction N(m, P) the filter updates by
 
         P⁺ = P − P_p (I + Y P_pp)⁻¹ Y P_pᵀ,   m⁺ = m + P⁺_p (y − Y m_p)
 
-    which needs no inverse of Y: one camera alone may say nothing of depth.
+    which needs no inverse of Y: one camera alone may have no information about depth.
 
     Args:
-        starts: (n + 1,), where each path's rows begin, and the end.
-        begins: (n, d), mean of each path's first state.
-        information: Y (N, 3, 3), one a row.
-        vectors: y (N, 3).
-        motion: Of all.
-        restlessness: s (N,), by which Q is multiplied on the way to each row.
+        starts: (n + 1,), index of each path's first row, and N.
+        begins: (n, d), prior mean of each path's first state.
+        information: Y (N, 3, 3), information matrix of each row.
+        vectors: y (N, 3), information vector of each row.
+        motion: The motion model of all paths.
+        noise_scales: s (N,), factor on Q for the step to each row.
     """
     rows, d = len(information), len(motion.transition)
     means, covariances = np.empty((rows, d)), np.empty((rows, d, d))
@@ -247,7 +247,7 @@ def smooth_paths(
                 ahead[k], ahead_covariances[k] = begins[path], motion.prior
             else:
                 _carry(
-                    means[k - 1], covariances[k - 1], motion, restlessness[k], room.half,
+                    means[k - 1], covariances[k - 1], motion, noise_scales[k], room.half,
                     ahead[k], ahead_covariances[k],
                 )  # fmt: skip
             means[k], covariances[k] = ahead[k], ahead_covariances[k]
@@ -271,13 +271,13 @@ def jumps(
     ahead: ndarray,
     ahead_covariances: ndarray,
 ) -> ndarray:
-    """Squared Mahalanobis distance between what the rows before and those from this one on say.
+    """Compute squared Mahalanobis distances of estimates from the rows before and from then on.
 
-    What is learnt from behind is P⁻ (P⁻ − P)⁻¹ P⁻, where anything is.
+    The covariances of the two estimates sum up to P⁻ (P⁻ − P)⁻¹ P⁻.
 
     Args:
-        starts: (n + 1,), where each path's rows begin, and the end.
-        means: m (N, d), as the next three of :class:`SmoothedRows`.
+        starts: (n + 1,), index of each path's first row, and N.
+        means: m (N, d), as the next three fields of :class:`SmoothedRows`.
         covariances: P (N, d, d).
         ahead: m⁻ (N, d).
         ahead_covariances: P⁻ (N, d, d).
@@ -298,12 +298,12 @@ def jumps(
 
 @kernel
 def drives(found: SmoothedRows, noise: ndarray, axes: ndarray) -> ndarray:
-    """tr Q (λ λᵀ + P⁻⁻¹ P P⁻⁻¹ − P⁻⁻¹) of each row, with λ = P⁻⁻¹ (m − m⁻).
+    """Compute tr Q (λ λᵀ + P⁻⁻¹ P P⁻⁻¹ − P⁻⁻¹) of each row, with λ = P⁻⁻¹ (m − m⁻).
 
     Args:
-        found: The rows.
-        noise: Q (g, g), of some axes of the state.
-        axes: (g,), which ones.
+        found: The N smoothed rows.
+        noise: Q (g, g), process noise of some components of the state.
+        axes: (g,), indices of these components.
     """
     d, size = found.means.shape[1], len(axes)
     lower, columns = np.zeros((d, d)), np.empty((size, d))
@@ -324,21 +324,21 @@ def drives(found: SmoothedRows, noise: ndarray, axes: ndarray) -> ndarray:
                 for b in range(d):
                     pulled[a] += found.covariances[k, a, b] * columns[g, b]
             for h in range(size):
-                told = pulls[g] * pulls[h] - columns[g, axes[h]]
+                term = pulls[g] * pulls[h] - columns[g, axes[h]]
                 for a in range(d):
-                    told += pulled[a] * columns[h, a]
-                drive[k] += noise[g, h] * told
+                    term += pulled[a] * columns[h, a]
+                drive[k] += noise[g, h] * term
     return drive
 
 
 @kernel
 def sums_around(starts: ndarray, values: ndarray, kept: float) -> ndarray:
-    """Σ_j κ^{|j − k|} v_j of each row k over the rows j of its path.
+    """Compute Σ_j κ^{|j − k|} v_j of each row k over the rows j of its path.
 
     Args:
-        starts: (n + 1,), where each path's rows begin, and the end.
-        values: v (N,).
-        kept: κ, 0 … 1.
+        starts: (n + 1,), index of each path's first row, and N.
+        values: v (N,), one value for each row.
+        kept: κ, 0 … 1, the factor per step.
     """
     before, after = values.copy(), values.copy()
     for path in range(len(starts) - 1):

@@ -1,4 +1,4 @@
-"""When somebody was there: two states and what the cameras say at every step, compiled."""
+"""Existence of tracks over time: two states and the evidence of every step, compiled."""
 
 from __future__ import annotations
 
@@ -12,43 +12,43 @@ from tracker.kernels.compilation import kernel
 
 
 class Habits(NamedTuple):
-    """How people come and go: log probabilities."""
+    """The transition model of existence, as log probabilities."""
 
     stay: float
-    """From one step to the next."""
+    """Log probability of existing at the next step."""
     enter: float
-    """Of coming, and of leaving for good."""
+    """Log probability of a birth, and of a death."""
     change: float
-    """Of going away for a while, and of returning."""
+    """Log probability of becoming absent for a while, and of returning."""
 
 
 class Presence(NamedTuple):
-    """When the people of n paths were there."""
+    """The existence of n tracks over N rows."""
 
     probabilities: ndarray
-    """(N,), at each row."""
+    """(N,), existence probability at each row."""
     odds: ndarray
-    """(n,), log odds of the best sequence with somebody at some step against nobody at any."""
+    """(n,), log odds of the best sequence that exists at some step against never existing."""
 
 
 @kernel
 def presence(
     starts: ndarray, firsts: ndarray, votes: ndarray, habits: Habits, end: int
 ) -> Presence:
-    """How surely a path's person was there at each step, exactly, by Viterbi's recursion both ways.
+    """Compute the existence of each path at each step, exactly, by Viterbi's recursion both ways.
 
-    A person comes once and leaves once, with the probability e^enter each, and may be away in
-    between, with e^change for each going and returning; staying has e^stay, being away costs
-    nothing. At each step the best sequence in which he is there is set against the best in
-    which he is not.
+    A track is born once and dies once, with the probability e^enter each, and may be absent in
+    between, with e^change for each change; staying present has e^stay, being absent has 1. At
+    each step the best sequence in which the track exists is compared with the best in which it
+    does not.
 
     Args:
-        starts: (n + 1,), where each path's rows begin, and the end.
-        firsts: (n,), the first step of each path.
-        votes: (N,), log of what each row's evidence says for somebody against nobody.
-        habits: Of all.
-        end: The recording's last step: who is there at it has not left, and who is there at its
-            first one has not come.
+        starts: (n + 1,), index of each path's first row, and N.
+        firsts: (n,), first step of each path.
+        votes: (N,), log likelihood ratio of each row's evidence, of existing against not.
+        habits: The transition model of all paths.
+        end: Last step of the recording: a track that exists at it has not died, and one that
+            exists at step 0 was not born.
     """
     stay, enter, change = habits
     chances = np.zeros(len(votes))
@@ -68,7 +68,7 @@ def presence(
             coming = enter
         leaving = 0.0 if firsts[path] + count - 1 >= end else enter
         odds[path] = max(present + leaving, left)
-        # what can still come, from each state
+        # the best continuation from each state
         if_present, if_never, if_away = leaving, 0.0, -np.inf
         for k in range(count - 1, -1, -1):
             absent = max(if_never, max(between[k] + if_away, gone[k]))

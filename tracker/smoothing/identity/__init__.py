@@ -1,1 +1,1 @@
-"""Who is who over the whole recording: tracks cut, pieces joined, and why."""
+"""Resolution of identities: tracks are split into tracklets, and these are linked."""

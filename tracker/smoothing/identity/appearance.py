@@ -1,4 +1,4 @@
-"""What people look like, gathered from the recording itself, and whether two pieces look alike."""
+"""Appearance models of tracklets, learnt from the recording, and their likelihood ratio."""
 
 from __future__ import annotations
 
@@ -14,45 +14,47 @@ from tracker.smoothing.paths import Links, Paths
 from tracker.smoothing.recording import CameraBoxes
 
 _OWN = 0.7
-"""Association probability of a box that tells what its person looks like."""
+"""Least association probability of a box that contributes to an appearance model."""
 
 _ENOUGH = 0.2
-"""Seconds of boxes in one camera that make a model; at least :data:`_FEWEST` boxes."""
+"""Seconds of boxes in one camera that a model needs, at least :data:`_FEWEST` boxes."""
 
 _FEWEST = 3
+"""Least number of boxes of a model."""
 
 _APART = 0.25
-"""Seconds from the middle of a piece at which its halves begin that are compared."""
+"""Seconds between the middle of a tracklet and each of its halves that are compared."""
 
-_DOUBT = 0.02
-"""Probability that looks tell nothing of who it is."""
+_OUTLIERS = 0.02
+"""Probability that the appearance is uninformative."""
 
 _LATER = 0.1
-"""How much further apart the same person's looks are later than within one piece."""
+"""Additional distance of one person's embeddings between tracklets, against within one."""
 
 _NARROWEST = 0.1
-"""Of the spread of distances, whatever few of them say."""
+"""Least standard deviation of the distances."""
 
 _SAME, _OTHER = (0.15, 0.15), (0.8, 0.15)
-"""Median and spread of the distances where a recording has too few of its own."""
+"""Median and standard deviation of the distances where a recording has too few."""
 
 _COMPARED = 5
-"""Distances of each kind from which the recording's own are taken."""
+"""Least number of distances of each kind for using those of the recording."""
 
 _AT_ONCE = 2048
-"""Pairs whose looks are in memory together: of a long recording there are millions."""
+"""Number of pairs that are compared at once, which bounds the memory for long recordings."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Models:
-    """The looks of n pieces in each of C cameras."""
+    """The mean embeddings of n tracklets in each of C cameras."""
 
     vectors: Float[ndarray, "n C A"]
-    """Of unit length, less what all have in common; 0 where there is none."""
+    """Unit vectors, after the mean over all tracklets is subtracted; 0 where there is none."""
     known: Bool[ndarray, "n C"]
+    """Whether a tracklet has an embedding in a camera."""
 
     def distances(self, one: ndarray, other: ndarray) -> Float[ndarray, "P C"]:
-        """(1 − cos) / 2 of pairs in each camera: 0 for the same looks, 1 for opposite ones."""
+        """The distance (1 − cos) / 2 of pairs in each camera: 0 if equal, 1 if opposite."""
         cosines = np.empty((len(one), self.vectors.shape[1]))
         for first in range(0, len(one), _AT_ONCE):
             some = slice(first, first + _AT_ONCE)
@@ -63,45 +65,46 @@ class Models:
 
 
 class Appearance:
-    """Whether two pieces look like one person: a likelihood ratio calibrated on the recording.
+    """A likelihood ratio of two tracklets having the same person, calibrated on the recording.
 
-    Every piece gathers in each camera the mean of the unit vectors of boxes that nobody else
-    overlaps. What all have in common in a camera is taken off, and two pieces are compared
-    in the cameras that know both, by the angle between what is left. How far apart one
-    person's looks are is read off the halves of pieces, how far two persons' off pieces that
-    live at the same time; both as Gaussians of median and spread. The log likelihood ratio of
-    each camera counts with a doubt, so that none decides alone against all others.
+    The embedding of a tracklet in a camera is the mean of the unit vectors of its boxes that no
+    other box overlaps, less the mean over all tracklets. Two tracklets are compared by the angle
+    between their embeddings, in the cameras that have both. The distribution of one person's
+    distances is estimated from the two halves of tracklets, that of two persons' from tracklets
+    that exist at the same time; both are Gaussians of median and robust spread. Each camera's
+    likelihood ratio includes a probability of being uninformative, so that no camera outweighs
+    all others.
     """
 
     def __init__(
         self,
-        pieces: Paths,
+        tracklets: Paths,
         links: Links,
         cameras: Many[CameraBoxes],
-        looks: Many[Float[ndarray, "B A"]],
+        embeddings: Many[Float[ndarray, "B A"]],
         step_time: float,
     ) -> None:
-        """Gather.
+        """Compute the embeddings of all tracklets, and the distributions of their distances.
 
         Args:
-            pieces: Whose looks.
-            links: Whose box each is.
-            cameras: The boxes.
-            looks: A unit vector for each box of each camera, 0 where there is none.
-            step_time: Seconds.
+            tracklets: The n tracklets.
+            links: Association probabilities of their rows and boxes.
+            cameras: The boxes of each camera.
+            embeddings: A unit vector for each box of each camera, 0 where there is none.
+            step_time: Time between two steps, seconds.
         """
         fewest = max(_FEWEST, round(_ENOUGH / step_time))
-        seen = [np.asarray(vectors.any(axis=1)) for vectors in looks]
+        seen = [np.asarray(vectors.any(axis=1)) for vectors in embeddings]
         own = links.take(clean(links, cameras, seen))
-        steps, owners = pieces.steps[own.rows], pieces.owners[own.rows]
-        middle = ((pieces.firsts + pieces.lasts) / 2.0)[owners]
+        steps, owners = tracklets.steps[own.rows], tracklets.owners[own.rows]
+        middle = ((tracklets.firsts + tracklets.lasts) / 2.0)[owners]
         apart = _APART / step_time
-        size = (len(pieces.labels), len(cameras))
-        whole = _gather(own, owners, looks, size, fewest)
+        size = (len(tracklets.labels), len(cameras))
+        whole = _gather(own, owners, embeddings, size, fewest)
         early = steps < middle - apart
         late = steps > middle + apart
-        first = _gather(own.take(early), owners[early], looks, size, fewest)
-        second = _gather(own.take(late), owners[late], looks, size, fewest)
+        first = _gather(own.take(early), owners[early], embeddings, size, fewest)
+        second = _gather(own.take(late), owners[late], embeddings, size, fewest)
         common = whole.vectors.sum(axis=0) / np.maximum(whole.known.sum(axis=0), 1)[:, None]
         self._models = _less(whole, common)
         halves = Models(
@@ -111,7 +114,7 @@ class Appearance:
         one = np.arange(size[0])
         both = first.known & second.known
         same = halves.distances(one, one + size[0])[both]
-        i, j = _together(pieces)
+        i, j = _together(tracklets)
         other = self._models.distances(i, j)[whole.known[i] & whole.known[j]]
         middle_same, spread_same = _median(same, _SAME)
         self._same = middle_same + _LATER / 2.0, float(np.hypot(spread_same, _LATER))
@@ -120,21 +123,26 @@ class Appearance:
     def log_ratio(
         self, earlier: Int[ndarray, " P"], later: Int[ndarray, " P"]
     ) -> tuple[Float[ndarray, " P"], Bool[ndarray, " P"]]:
-        """log of how much likelier the looks of two pieces are one person's than two persons'.
+        """The log likelihood ratio of pairs of tracklets being of one person against two.
+
+        Args:
+            earlier: Index of the first tracklet of each pair.
+            later: Index of the second.
 
         Returns:
-            The log ratio, 0 where no camera knows both, and whether any does.
+            The log ratio, 0 where no camera has both, and whether any camera has both.
         """
         known = self._models.known[earlier] & self._models.known[later]
         (low, narrow), (high, wide) = self._same, self._other
-        if not high > low:  # here all look alike
+        if not high > low:  # appearance does not distinguish people here
             return np.zeros(len(earlier)), np.zeros(len(earlier), dtype=bool)
-        # beyond the two medians a distance says no more than at them
+        # beyond the two medians a distance has the likelihood ratio of the median
         distances = np.clip(self._models.distances(earlier, later), low, high)
         one = np.exp(-0.5 * ((distances - low) / narrow) ** 2) / narrow
         two = np.exp(-0.5 * ((distances - high) / wide) ** 2) / wide
         ratio = np.log(
-            ((1.0 - _DOUBT) * one + _DOUBT * two) / (_DOUBT * one + (1.0 - _DOUBT) * two)
+            ((1.0 - _OUTLIERS) * one + _OUTLIERS * two)
+            / (_OUTLIERS * one + (1.0 - _OUTLIERS) * two)
         )
         return np.asarray((ratio * known).sum(axis=1)), known.any(axis=1)
 
@@ -142,8 +150,13 @@ class Appearance:
 def clean(
     links: Links, cameras: Many[CameraBoxes], seen: Many[Bool[ndarray, " B"]] | None = None
 ) -> Bool[ndarray, " L"]:
-    """Links of boxes that are surely somebody's and touch no other box; of each camera only those
-    of which there is something to see, where that is told."""
+    """Select the links of boxes with a clear association that overlap no other box.
+
+    Args:
+        links: L associations of rows and boxes.
+        cameras: The boxes of each camera.
+        seen: Whether each box of each camera has an embedding; None for all.
+    """
     found = links.shares > _OWN
     for c, camera in enumerate(cameras):
         good = box_kernels.alone(camera.boxes, camera.starts)
@@ -157,12 +170,20 @@ def clean(
 def _gather(
     links: Links,
     owners: Int[ndarray, " L"],
-    looks: Many[Float[ndarray, "B A"]],
+    embeddings: Many[Float[ndarray, "B A"]],
     size: tuple[int, int],
     fewest: int,
 ) -> Models:
-    """The mean looks of each piece and camera, of unit length."""
-    vectors = np.zeros((*size, looks[0].shape[1]))
+    """Compute the mean embedding of each tracklet and camera, of unit length.
+
+    Args:
+        links: L associations of rows and boxes.
+        owners: Tracklet of each association.
+        embeddings: A unit vector for each box of each camera.
+        size: Number of tracklets and of cameras.
+        fewest: Least number of boxes of an embedding.
+    """
+    vectors = np.zeros((*size, embeddings[0].shape[1]))
     counts = np.zeros(size, dtype=np.int64)
     for c in range(size[1]):
         own = links.cameras == c
@@ -172,7 +193,7 @@ def _gather(
         begins = np.flatnonzero(np.diff(sorted_rows, prepend=-1))
         if len(begins):
             vectors[sorted_rows[begins], c] = np.add.reduceat(
-                looks[c][links.boxes[own][order]].astype(float), begins
+                embeddings[c][links.boxes[own][order]].astype(float), begins
             )
         counts[:, c] = np.bincount(rows, minlength=size[0])
     known = counts >= fewest
@@ -180,7 +201,7 @@ def _gather(
 
 
 def _less(models: Models, common: Float[ndarray, "C A"]) -> Models:
-    """Without what all have in common."""
+    """Subtract the mean over all tracklets from each embedding, and normalise."""
     return Models(_unit(models.vectors - common) * models.known[..., None], models.known)
 
 
@@ -189,16 +210,16 @@ def _unit(vectors: ndarray) -> ndarray:
     return np.asarray(vectors / np.maximum(lengths, 1e-9))
 
 
-def _together(pieces: Paths) -> tuple[Int[ndarray, " P"], Int[ndarray, " P"]]:
-    """The pairs of pieces that live at the same time: two people."""
-    i, j = np.triu_indices(len(pieces.labels), 1)
-    lasts = pieces.lasts
-    overlap = np.minimum(lasts[i], lasts[j]) > np.maximum(pieces.firsts[i], pieces.firsts[j])
+def _together(tracklets: Paths) -> tuple[Int[ndarray, " P"], Int[ndarray, " P"]]:
+    """The pairs of tracklets that overlap in time, and so are of two people."""
+    i, j = np.triu_indices(len(tracklets.labels), 1)
+    lasts = tracklets.lasts
+    overlap = np.minimum(lasts[i], lasts[j]) > np.maximum(tracklets.firsts[i], tracklets.firsts[j])
     return i[overlap], j[overlap]
 
 
 def _median(values: ndarray, otherwise: tuple[float, float]) -> tuple[float, float]:
-    """Median and robust spread."""
+    """The median and the standard deviation estimated from absolute deviations."""
     if len(values) < _COMPARED:
         return otherwise
     middle = float(np.median(values))

@@ -1,4 +1,4 @@
-"""What corrections say of pieces: which are one person's, which are not, which are nobody's."""
+"""Constraints on the linking of tracklets from a user's corrections, and their resolution."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from jaxtyping import Bool, Int
 from numpy import ndarray
 
 from tracker.corrections import Correction, Place
-from tracker.corrections.seeking import Whereabouts, mostly_inside
+from tracker.corrections.lookup import TrackIndex, mostly_inside
 from tracker.smoothing.identity.exchanges import turn
 from tracker.smoothing.paths import Paths
 from tracker.smoothing.smoother import Fitted
@@ -23,110 +23,131 @@ _EVER = int(np.iinfo(np.int64).max)
 
 
 @dataclass(frozen=True, slots=True)
-class Ties:
-    """What the joining of n pieces must obey; all of it can be obeyed at once."""
+class LinkConstraints:
+    """Consistent constraints on the linking of n tracklets, which are given by their indices."""
 
-    together: tuple[tuple[int, int], ...] = ()
-    """Consecutive pieces of one person, the earlier first; others may lie between."""
-    apart: tuple[tuple[int, int], ...] = ()
-    """Pieces of two people."""
-    somebody: frozenset[int] = frozenset()
-    """Pieces that are somebody's for sure."""
-    nobody: frozenset[int] = frozenset()
+    must_link: tuple[tuple[int, int], ...] = ()
+    """Pairs of one person's tracklets, the earlier first; further ones may lie between."""
+    cannot_link: tuple[tuple[int, int], ...] = ()
+    """Pairs of tracklets of two people."""
+    targets: frozenset[int] = frozenset()
+    """Tracklets that are targets for certain."""
+    clutter: frozenset[int] = frozenset()
+    """Tracklets that are false for certain."""
     firsts: frozenset[int] = frozenset()
-    """Pieces before which their person was not there."""
+    """Tracklets that are the first of their track."""
     lasts: frozenset[int] = frozenset()
-    """Pieces after which their person was not there."""
+    """Tracklets that are the last of their track."""
 
     def __bool__(self) -> bool:
-        return bool(self.together or self.apart or self.somebody or self.nobody
+        return bool(self.must_link or self.cannot_link or self.targets or self.clutter
                     or self.firsts or self.lasts)  # fmt: skip
 
-    def parted(self, cut: Paths, longest: int) -> tuple[Ties, Ties]:
-        """What holds for joins over short gaps, and what is left for those who were away longer.
+    def parted(self, cut: Paths, longest: int) -> tuple[LinkConstraints, LinkConstraints]:
+        """Split the constraints into those for links over short gaps and those over long ones.
 
         Args:
-            cut: The pieces.
-            longest: Steps of the longest gap that motion alone bridges.
+            cut: The tracklets.
+            longest: Longest gap, in steps, over which tracklets are linked by motion alone.
         """
-        near = tuple((i, j) for i, j in self.together if cut.firsts[j] - cut.lasts[i] <= longest)
-        far = tuple(pair for pair in self.together if pair not in near)
-        return replace(self, together=near), replace(self, together=far)
+        near = tuple((i, j) for i, j in self.must_link if cut.firsts[j] - cut.lasts[i] <= longest)
+        far = tuple(pair for pair in self.must_link if pair not in near)
+        return replace(self, must_link=near), replace(self, must_link=far)
 
     def limits(self, chains: Many[Many[int]], cut: Paths) -> dict[int, tuple[int, int]]:
-        """The first and the last step at which the people of some chains may be: who is not
-        somebody else does not go on where that one begins.
+        """The first and the last step at which the tracks of some chains may exist.
+
+        A track ends before the tracklet that it must not be linked to begins.
 
         Args:
-            chains: The pieces of each person.
-            cut: The pieces.
+            chains: The tracklets of each track, in the order of time.
+            cut: The tracklets.
+
+        Returns:
+            First and last step by the index of the chain, for the chains that are limited.
         """
-        number = {piece: k for k, chain in enumerate(chains) for piece in chain}
+        number = {tracklet: k for k, chain in enumerate(chains) for tracklet in chain}
         found: dict[int, tuple[int, int]] = {}
 
-        def limit(piece: int, first: int, last: int) -> None:
-            k = number.get(piece, -1)
+        def limit(tracklet: int, first: int, last: int) -> None:
+            k = number.get(tracklet, -1)
             if k >= 0:
                 low, high = found.get(k, (0, _EVER))
-                begins, ends = piece == chains[k][0], piece == chains[k][-1]
+                begins, ends = tracklet == chains[k][0], tracklet == chains[k][-1]
                 found[k] = max(low, first if begins else 0), min(high, last if ends else high)
 
-        for one, other in self.apart:
+        for one, other in self.cannot_link:
             i, j = (one, other) if cut.firsts[one] <= cut.firsts[other] else (other, one)
             if cut.lasts[i] < cut.firsts[j]:
                 limit(i, 0, int(cut.firsts[j]) - 1)
                 limit(j, int(cut.lasts[i]) + 1, _EVER)
-        for piece in self.firsts:
-            limit(piece, int(cut.firsts[piece]), _EVER)
-        for piece in self.lasts:
-            limit(piece, 0, int(cut.lasts[piece]))
+        for tracklet in self.firsts:
+            limit(tracklet, int(cut.firsts[tracklet]), _EVER)
+        for tracklet in self.lasts:
+            limit(tracklet, 0, int(cut.lasts[tracklet]))
         return found
 
-    def of_chains(self, chains: Many[Many[int]], cut: Paths) -> Ties | None:
-        """The same of the chains of pieces; None where two of one person's overlap in time."""
-        number = {piece: k for k, chain in enumerate(chains) for piece in chain}
-        told = Said(
-            [(number[i], number[j]) for i, j in self.together],
-            [(number[i], number[j]) for i, j in self.apart if i in number and j in number],
+    def of_chains(self, chains: Many[Many[int]], cut: Paths) -> LinkConstraints | None:
+        """The same constraints on chains of tracklets, by their indices.
+
+        Returns:
+            The constraints; None where two chains that must be linked overlap in time.
+        """
+        number = {tracklet: k for k, chain in enumerate(chains) for tracklet in chain}
+        pairs = Constraint(
+            [(number[i], number[j]) for i, j in self.must_link],
+            [(number[i], number[j]) for i, j in self.cannot_link if i in number and j in number],
         )
-        ends = [Said(first=number[piece]) for piece in sorted(self.firsts) if piece in number]
-        ends += [Said(last=number[piece]) for piece in sorted(self.lasts) if piece in number]
+        ends = [
+            Constraint(first=number[tracklet])
+            for tracklet in sorted(self.firsts)
+            if tracklet in number
+        ]
+        ends += [
+            Constraint(last=number[tracklet])
+            for tracklet in sorted(self.lasts)
+            if tracklet in number
+        ]
         firsts = np.array([cut.firsts[chain[0]] for chain in chains], dtype=np.int64)
         lasts = np.array([cut.lasts[chain[-1]] for chain in chains], dtype=np.int64)
-        return possible(firsts, lasts, [told, *ends], strict=True)
+        return possible(firsts, lasts, [pairs, *ends], strict=True)
 
 
-class Said(NamedTuple):
-    """What one correction says of pieces."""
+class Constraint(NamedTuple):
+    """The constraint of one correction on tracklets, which are given by their indices."""
 
-    together: Many[tuple[int, int]] = ()
-    apart: Many[tuple[int, int]] = ()
-    nobody: AbstractSet[int] = frozenset()
+    must_link: Many[tuple[int, int]] = ()
+    """Pairs of one person's tracklets, the earlier first."""
+    cannot_link: Many[tuple[int, int]] = ()
+    """Pairs of tracklets of two people."""
+    clutter: AbstractSet[int] = frozenset()
+    """Tracklets that are false."""
     first: int = -1
-    """Before which its person was not there; -1 for none."""
+    """The tracklet with which its track begins, -1 for none."""
     last: int = -1
+    """The tracklet with which its track ends, -1 for none."""
     meant: AbstractSet[int] = frozenset()
-    """All pieces that it speaks of."""
-    somebody: AbstractSet[int] = frozenset()
-    """Those of them that are somebody's for sure."""
+    """All tracklets that the correction refers to."""
+    targets: AbstractSet[int] = frozenset()
+    """Tracklets that are targets for certain."""
 
 
-class Seeker:
-    """Finds whom corrections mean, among uncut paths and then among their pieces."""
+class ConstraintResolver:
+    """Finds the tracks that corrections refer to, among paths and among their tracklets."""
 
     def __init__(self, fitted: Fitted, corrections: Many[Correction], leeway: int) -> None:
-        """Look where everybody is.
+        """Find the row of the paths that each place of the corrections refers to.
 
         Args:
-            fitted: The paths before they are cut.
-            corrections: In their order.
-            leeway: Steps within which somebody counts who is not there at the very step.
+            fitted: The paths before they are split, with N rows.
+            corrections: The corrections in the order in which they were made.
+            leeway: Number of steps by which a track may miss the step of a place.
         """
         paths = fitted.paths
         self._fitted, self._corrections, self._leeway = fitted, corrections, leeway
         self._jumps = fitted.jumps if any(one.kind == "different" for one in corrections) else None
         self._steps, self._owners = paths.steps, paths.owners
-        self._whereabouts = Whereabouts(self._steps, paths.states[:, :3], self._owners)
+        self._whereabouts = TrackIndex(self._steps, paths.states[:, :3], self._owners)
         self._rows = {
             place: self._whereabouts.nearest(place, leeway=leeway)
             for one in corrections
@@ -134,7 +155,7 @@ class Seeker:
             for place in one.places
         }
         self._rows |= {
-            one.places[0]: self._whereabouts.stated(one)
+            one.places[0]: self._whereabouts.row_of(one)
             for one in corrections
             if one.kind == "here"
         }
@@ -143,10 +164,10 @@ class Seeker:
         }
 
     def breaks(self) -> Bool[ndarray, " N"]:
-        """The rows before which a correction cuts its path.
+        """The rows before which a correction splits its path.
 
-        What a person says of two moments says nothing of when between them it happened: that is
-        where it fits the lives before and after best.
+        A correction about two steps does not determine the step between them at which to split:
+        it is the one at which the parts before and after fit best.
         """
         found = np.zeros(len(self._steps), dtype=bool)
         for one in self._corrections:
@@ -167,8 +188,11 @@ class Seeker:
         return found
 
     def _turns(self, one: Correction) -> list[int]:
-        """Where somebody goes on as somebody else who is not the same for the paths, and where
-        somebody does not go on who is."""
+        """The rows before which the paths are split for one correction of identity.
+
+        Where two places of one person lie on two paths, both are split where one continues as the
+        other; where two places of two people lie on one path, it is split between them.
+        """
         found: list[int] = []
         for a, b in one.pairs:
             earlier, later = self._rows[a], self._rows[b]
@@ -194,43 +218,49 @@ class Seeker:
         return found
 
     def meant(self, cut: Paths, kept: Int[ndarray, " M"]) -> set[int]:
-        """The pieces that a correction speaks of."""
-        return {piece for said in self._told(cut, kept) for piece in said.meant}
-
-    def ties(self, cut: Paths, kept: Int[ndarray, " M"]) -> Ties:
-        """What the corrections say of the pieces.
+        """The tracklets that a correction refers to.
 
         Args:
-            cut: The pieces.
-            kept: The row of the uncut paths that each of their rows was.
+            cut: The tracklets, with M rows.
+            kept: The row of the unsplit paths that each of the M rows was.
         """
-        found = possible(cut.firsts, cut.lasts, self._told(cut, kept))
+        return {tracklet for one in self._constraints(cut, kept) for tracklet in one.meant}
+
+    def constraints(self, cut: Paths, kept: Int[ndarray, " M"]) -> LinkConstraints:
+        """The constraints of all corrections on the tracklets, as far as they are consistent.
+
+        Args:
+            cut: The tracklets, with M rows.
+            kept: The row of the unsplit paths that each of the M rows was.
+        """
+        found = possible(cut.firsts, cut.lasts, self._constraints(cut, kept))
         assert found is not None
         return found
 
-    def _told(self, cut: Paths, kept: Int[ndarray, " M"]) -> Iterator[Said]:
+    def _constraints(self, cut: Paths, kept: Int[ndarray, " M"]) -> Iterator[Constraint]:
+        """The constraint of each correction, in their order."""
         for one in self._corrections:
             if one.kind == "nobody":
                 inside = self._inside[one.id][kept]
                 gone = mostly_inside(cut.owners, cut.steps, inside, one)
-                yield Said(nobody=gone, meant=gone)
+                yield Constraint(clutter=gone, meant=gone)
             elif one.kind == "here":
-                piece = self._piece(one.places[0], cut, kept, before=True)
-                yield Said(meant={piece} - {-1}, somebody={piece} - {-1})
+                tracklet = self._tracklet(one.places[0], cut, kept, before=True)
+                yield Constraint(meant={tracklet} - {-1}, targets={tracklet} - {-1})
             elif one.kind != "checked":
                 yield self._of_people(one, cut, kept)
 
-    def _of_people(self, one: Correction, cut: Paths, kept: Int[ndarray, " M"]) -> Said:
+    def _of_people(self, one: Correction, cut: Paths, kept: Int[ndarray, " M"]) -> Constraint:
         later = {"same": 1, "different": 1, "exchanged": 2}.get(one.kind, 0)
         own = {
-            place: self._piece(place, cut, kept, before=number < later or one.kind == "left")
+            place: self._tracklet(place, cut, kept, before=number < later or one.kind == "left")
             for number, place in enumerate(one.places)
         }
-        meant = {piece for piece in own.values() if piece >= 0}
+        meant = {tracklet for tracklet in own.values() if tracklet >= 0}
         if len(meant) < len(set(own.values())):
-            return Said(meant=meant)  # somebody is not found
+            return Constraint(meant=meant)  # a place has no tracklet
         first = own[one.places[0]]
-        return Said(
+        return Constraint(
             [(own[a], own[b]) for a, b in one.pairs],
             [(own[a], own[b]) for a, b in one.apart],
             first=first if one.kind == "came" else -1,
@@ -238,16 +268,19 @@ class Seeker:
             meant=meant,
         )
 
-    def _piece(
+    def _tracklet(
         self, place: Place, cut: Paths, kept: Int[ndarray, " M"], *, before: bool = False
     ) -> int:
-        """The piece that is meant: of the path that is there, the one at or next to the place.
+        """The tracklet that a place refers to: of the path there, the one at or next to the place.
 
         Args:
-            place: Of a correction.
-            cut: The pieces.
-            kept: The row of the uncut paths that each of their rows was.
-            before: Whether what lies before the place is nearer than what lies after it.
+            place: A place of a correction.
+            cut: The tracklets, with M rows.
+            kept: The row of the unsplit paths that each of the M rows was.
+            before: Whether the tracklet before the place is preferred to the one after it.
+
+        Returns:
+            The index of the tracklet, -1 for none.
         """
         row = self._rows[place]
         if row is None or not len(kept):
@@ -265,68 +298,69 @@ class Seeker:
 def possible(
     firsts: Int[ndarray, " n"],
     lasts: Int[ndarray, " n"],
-    told: Iterable[Said],
+    wanted: Iterable[Constraint],
     *,
     strict: bool = False,
-) -> Ties | None:
-    """Of what corrections say of pieces, in their order, all that can be obeyed together.
+) -> LinkConstraints | None:
+    """Combine the constraints of corrections, in their order, as far as they are consistent.
 
-    The pieces of one person must follow one another in time; of two that cannot both be, the
-    earlier counts, and the later correction will be told as unmet.
+    The tracklets of one person must follow one another in time. Of two constraints that
+    contradict each other the earlier holds, and the later correction is reported as unmet.
 
     Args:
-        firsts: The first step of each piece.
-        lasts: The last.
-        told: By each correction.
-        strict: Whether None is returned where not all can be obeyed.
+        firsts: The first step of each of n tracklets.
+        lasts: The last step of each tracklet.
+        wanted: The constraint of each correction.
+        strict: Whether None is returned where not all of them are consistent.
     """
     groups: dict[int, list[int]] = {}
-    apart: list[tuple[int, int]] = []
-    nobody: set[int] = set()
+    cannot_link: list[tuple[int, int]] = []
+    clutter: set[int] = set()
     came: set[int] = set()
     left: set[int] = set()
-    somebody: set[int] = set()
+    targets: set[int] = set()
 
     def joined(pairs: list[tuple[int, int]]) -> dict[int, list[int]] | None:
-        """The groups with more pairs, None where somebody would be in two places at once."""
+        """The groups with more pairs, None where a person would be in two places at once."""
         found = dict(groups)
         for i, j in pairs:
             one, other = found.get(i, [i]), found.get(j, [j])
             if one is other or i == j:
                 continue
-            both = sorted({*one, *other}, key=lambda piece: int(firsts[piece]))
+            both = sorted({*one, *other}, key=lambda tracklet: int(firsts[tracklet]))
             if any(lasts[a] >= firsts[b] for a, b in itertools.pairwise(both)):
                 return None
-            for piece in both:
-                found[piece] = both
+            for tracklet in both:
+                found[tracklet] = both
         return found
 
-    for one in told:
-        grown = joined([pair for pair in one.together if pair[0] != pair[1]])
-        if grown is None or any(piece in nobody for pair in one.together for piece in pair):
+    for one in wanted:
+        grown = joined([pair for pair in one.must_link if pair[0] != pair[1]])
+        if grown is None or any(tracklet in clutter for pair in one.must_link for tracklet in pair):
             if strict:
                 return None
             continue
-        more = [pair for pair in one.apart if pair[0] != pair[1]]
+        more = [pair for pair in one.cannot_link if pair[0] != pair[1]]
         if any(
-            grown.get(i) is not None and grown.get(i) is grown.get(j) for i, j in [*apart, *more]
+            grown.get(i) is not None and grown.get(i) is grown.get(j)
+            for i, j in [*cannot_link, *more]
         ):
             if strict:
                 return None
             continue
-        groups, apart = grown, [*apart, *more]
-        nobody |= {piece for piece in one.nobody if piece not in groups}
+        groups, cannot_link = grown, [*cannot_link, *more]
+        clutter |= {tracklet for tracklet in one.clutter if tracklet not in groups}
         came |= {one.first} - {-1}
         left |= {one.last} - {-1}
-        somebody |= one.somebody
+        targets |= one.targets
     members = {tuple(group) for group in groups.values()}
-    together = [pair for group in sorted(members) for pair in itertools.pairwise(group)]
-    sure = {piece for group in members for piece in group} | came | left | somebody
-    return Ties(
-        tuple(together),
-        tuple(apart),
-        frozenset(sure - nobody),
-        frozenset(nobody),
+    must_link = [pair for group in sorted(members) for pair in itertools.pairwise(group)]
+    sure = {tracklet for group in members for tracklet in group} | came | left | targets
+    return LinkConstraints(
+        tuple(must_link),
+        tuple(cannot_link),
+        frozenset(sure - clutter),
+        frozenset(clutter),
         frozenset(came),
         frozenset(left),
     )

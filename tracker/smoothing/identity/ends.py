@@ -1,4 +1,4 @@
-"""What is known of pieces of tracks at their two ends: alone, or with the rest of their chains."""
+"""State estimates at the two ends of tracklets, each alone or with the rest of its chain."""
 
 from __future__ import annotations
 
@@ -13,47 +13,51 @@ from tracker.smoothing.paths import Paths
 from tracker.smoothing.smoother import Fitted
 
 _BEYOND = 1e-9
-"""Of the covariance before: what keeps information at 0 where a piece's boxes say nothing."""
+"""Share of the prior information that is left, so that a tracklet without boxes has about 0."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ends:
-    """n pieces of tracks."""
+    """The ends of n tracklets, in the units of the state: metres and seconds."""
 
     ends: Float[ndarray, "n d"]
-    """The last state of each, by what is up to it."""
+    """The last state of each tracklet, filtered from the boxes up to it."""
     covariances: Float[ndarray, "n d d"]
+    """The covariance of each last state."""
     information: Float[ndarray, "n d d"]
-    """Λ of what is from its beginning on, of the first state of each."""
+    """Information matrix Λ on the first state of each tracklet, of the boxes from it on."""
     vectors: Float[ndarray, "n d"]
-    """η."""
-    restlessness: Float[ndarray, "n 2"]
-    """s at the beginning and at the end."""
+    """Information vector η of the same."""
+    noise_scales: Float[ndarray, "n 2"]
+    """Factor s on the process noise at the first and at the last state."""
 
     @staticmethod
     def alone(fitted: Fitted, prior: Float[ndarray, "d d"]) -> Ends:
-        """By the boxes of each piece alone.
+        """Estimate the ends from the boxes of each tracklet alone.
 
         Args:
-            fitted: The pieces, each fitted to its own boxes.
-            prior: Covariance of a first state in the fit.
+            fitted: The tracklets, each fitted to its own boxes.
+            prior: Prior covariance of a first state in the fit.
         """
-        pieces = fitted.paths
-        ends, begins = pieces.starts[1:] - 1, pieces.starts[:-1]
-        inverse, origin = np.linalg.inv(pieces.covariances[begins]), np.linalg.inv(prior)
-        centre = pieces.states[begins].copy()
+        tracklets = fitted.paths
+        ends, begins = tracklets.starts[1:] - 1, tracklets.starts[:-1]
+        inverse, origin = np.linalg.inv(tracklets.covariances[begins]), np.linalg.inv(prior)
+        centre = tracklets.states[begins].copy()
         centre[:, 3:] = 0.0
         return Ends(
-            pieces.states[ends],
-            pieces.covariances[ends],
+            tracklets.states[ends],
+            tracklets.covariances[ends],
             inverse - origin,
-            np.einsum("pij,pj->pi", inverse, pieces.states[begins]) - centre @ origin,
-            np.stack([fitted.restlessness[begins], fitted.restlessness[ends]], axis=1),
+            np.einsum("pij,pj->pi", inverse, tracklets.states[begins]) - centre @ origin,
+            np.stack([fitted.noise_scales[begins], fitted.noise_scales[ends]], axis=1),
         )
 
-    def told_by(self, share: float) -> Ends:
-        """Where boxes err alike for a while, only a share of what they say is new: it is as little
-        known where a piece ends, and where and how fast the next one begins."""
+    def discounted(self, share: float) -> Ends:
+        """Discount the information of the boxes to a share, since errors of boxes are correlated.
+
+        Args:
+            share: Share of the information that is independent, 0 … 1.
+        """
         return replace(
             self,
             covariances=self.covariances / share,
@@ -62,30 +66,31 @@ class Ends:
         )
 
     def in_chains(
-        self, pieces: Paths, chains: Fitted, rows: Int[ndarray, " M"], motion: Motion
+        self, tracklets: Paths, chains: Fitted, rows: Int[ndarray, " M"], motion: Motion
     ) -> Ends:
-        """By all boxes of the chains of several pieces.
+        """Estimate the ends from all boxes of the chains that the tracklets are in.
 
-        A piece of one step says nothing of where its person goes; the pieces before and after
-        it do. What is known before the next row is undone by one step of the motion,
+        A tracklet of one step has no information about velocity; the tracklets before and after
+        it have. The filtered state of a row is obtained from the prediction of the next row by
+        inverting one step of the motion,
 
             m = F⁻¹ m⁻,   P = F⁻¹ (P⁻ − s Q) F⁻ᵀ
 
         Args:
-            pieces: The pieces.
-            chains: Fitted to their boxes.
-            rows: Of the chains, for each row of the pieces; -1 for pieces in no such chain,
-                which stay as they are.
-            motion: Of both.
+            tracklets: The tracklets, with M rows.
+            chains: The chains, fitted to their boxes.
+            rows: The row of the chains for each of the M rows; -1 for tracklets in no chain, whose
+                ends do not change.
+            motion: The motion model of both.
         """
-        firsts, lasts = rows[pieces.starts[:-1]], rows[pieces.starts[1:] - 1]
+        firsts, lasts = rows[tracklets.starts[:-1]], rows[tracklets.starts[1:] - 1]
         joined = np.flatnonzero(firsts >= 0)
         first, last, paths = firsts[joined], lasts[joined], chains.paths
         ends, covariances = self.ends.copy(), self.covariances.copy()
         ends[joined], covariances[joined] = paths.states[last], paths.covariances[last]
         goes_on = ~np.isin(last, paths.starts[1:] - 1)
         after, back = last[goes_on] + 1, np.linalg.inv(motion.transition)
-        added = chains.restlessness[after, None, None] * motion.noise
+        added = chains.noise_scales[after, None, None] * motion.noise
         ends[joined[goes_on]] = chains.ahead[after] @ back.T
         covariances[joined[goes_on]] = back @ (chains.ahead_covariances[after] - added) @ back.T
         inverse = np.linalg.inv(paths.covariances[first])
@@ -94,7 +99,7 @@ class Ends:
         information[joined] = inverse - before
         vectors[joined] = np.einsum("pij,pj->pi", inverse, paths.states[first])
         vectors[joined] -= np.einsum("pij,pj->pi", before, chains.ahead[first])
-        restlessness = self.restlessness.copy()
-        restlessness[joined, 0] = chains.restlessness[first]
-        restlessness[joined, 1] = chains.restlessness[last]
-        return Ends(ends, covariances, information, vectors, restlessness)
+        noise_scales = self.noise_scales.copy()
+        noise_scales[joined, 0] = chains.noise_scales[first]
+        noise_scales[joined, 1] = chains.noise_scales[last]
+        return Ends(ends, covariances, information, vectors, noise_scales)

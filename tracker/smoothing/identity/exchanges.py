@@ -1,4 +1,4 @@
-"""Where two paths fit their motion better with what follows exchanged."""
+"""Identity swaps: steps at which two paths fit the motion better with their tails exchanged."""
 
 from __future__ import annotations
 
@@ -6,26 +6,27 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
-from tracker.smoothing.identity.pieces import log_integral
+from tracker.smoothing.identity.tracklets import log_integral
 from tracker.smoothing.smoother import Fitted
 
 _BEYOND = 1e-9
-"""Of the covariance before: what keeps information at 0 where a row's boxes say nothing."""
+"""Share of the prior information that is left, so that a row without boxes has about 0."""
 
 
 def exchange_breaks(
     fitted: Fitted, *, reach: float, least: float, apart: int
 ) -> Bool[ndarray, " N"]:
-    """The rows before which two paths are cut, so that each may go on as the other.
+    """Find the rows before which two paths are split, so that each may continue as the other.
 
-    A filter that took the wrong turn where two passed has no row that was near a draw: only
-    both lives as a whole tell.
+    Where a filter swapped two tracks as they passed, its association was not ambiguous at any
+    row: only both paths as a whole show it.
 
     Args:
-        fitted: Of the paths.
-        reach: Metres on the ground within which two are compared.
-        least: Log odds from which both are cut: whether they are exchanged is for the joining.
-        apart: Steps within which the same two are cut once, where they gain most.
+        fitted: The paths, fitted to their boxes.
+        reach: Distance on the ground within which two paths are compared, metres.
+        least: Log odds of the swap above which both are split; the linking decides about it.
+        apart: Number of steps within which the same two paths are split once, where the odds are
+            largest.
     """
     paths = fitted.paths
     breaks = np.zeros(len(paths.states), dtype=bool)
@@ -42,10 +43,10 @@ def exchange_breaks(
 def gains_of(
     fitted: Fitted, one: Int[ndarray, " P"], other: Int[ndarray, " P"]
 ) -> Float[ndarray, " P"]:
-    """The log odds of pairs of rows of one step, each path going on as the other from there on.
+    """Compute the log odds of a swap at pairs of rows of one step.
 
-    With a_i, A_i what the rows of path i before step k say of it, and Λ_i, η_i the information of
-    its rows from k on, the paths i and j exchanged at k gain
+    With N(a_i, A_i) the prediction of path i to step k from the rows before, and Λ_i, η_i the
+    information of its rows from k on, the swap of the paths i and j at k gains
 
         g = ℓ(a_i, A_i; η_j, Λ_j) + ℓ(a_j, A_j; η_i, Λ_i) − ℓ(a_i, A_i; η_i, Λ_i)
             − ℓ(a_j, A_j; η_j, Λ_j),    ℓ = log ∫ N(x; a, A) e^{ηᵀx − ½ xᵀΛx} dx
@@ -65,30 +66,34 @@ def gains_of(
 
 
 def turn(fitted: Fitted, one: int, other: int, after: int, until: int) -> list[int]:
-    """The rows before which two paths are cut so that the one goes on as the other: at the step
-    at which that fits both lives best.
+    """Find the rows before which two paths are split so that the one continues as the other.
+
+    They are those of the step at which the swap has the largest log odds.
 
     Args:
-        fitted: Of the paths.
-        one: The path.
-        other: The path that it goes on as.
-        after: The step at which it is still the one.
-        until: The step at which it is the other.
+        fitted: The paths, fitted to their boxes.
+        one: Index of the first path.
+        other: Index of the path that it continues as.
+        after: A step at which the person is still on the first path.
+        until: A step at which the person is on the other.
+
+    Returns:
+        A row of each path; none where the first path ends before the other begins.
     """
     paths = fitted.paths
     first = max(after + 1, int(paths.firsts[one]) + 1, int(paths.firsts[other]))
     last = min(until, int(paths.lasts[one]), int(paths.lasts[other]))
     if last < first:
-        return []  # the one is gone when the other comes
+        return []  # the paths do not overlap in time
     steps = np.arange(first, last + 1)
     own = int(paths.starts[one]) + steps - int(paths.firsts[one])
-    theirs = int(paths.starts[other]) + steps - int(paths.firsts[other])
-    best = int(np.argmax(gains_of(fitted, own, theirs)))
-    return [int(own[best]), int(theirs[best])]
+    others = int(paths.starts[other]) + steps - int(paths.firsts[other])
+    best = int(np.argmax(gains_of(fitted, own, others)))
+    return [int(own[best]), int(others[best])]
 
 
 def _pairs(fitted: Fitted, reach: float) -> tuple[Int[ndarray, " P"], Int[ndarray, " P"]]:
-    """The rows of two paths at one step that are near each other, neither of them its first."""
+    """The pairs of rows of two paths at one step that are near each other, without first rows."""
     paths = fitted.paths
     inner = np.ones(len(paths.states), dtype=bool)
     inner[paths.starts[:-1][np.diff(paths.starts) > 0]] = False
@@ -112,7 +117,15 @@ def _best(
     gains: Float[ndarray, " P"],
     apart: int,
 ) -> list[int]:
-    """Of each two the pair of most gain, and of those further off than ``apart`` steps again."""
+    """The pair of rows of the largest gain for each encounter of two paths.
+
+    Args:
+        one: Path of the first row of each pair.
+        other: Path of the second row.
+        steps: Step of each pair.
+        gains: Log odds of a swap at each pair.
+        apart: Number of steps without a pair after which two paths meet anew.
+    """
     order = np.lexsort((steps, np.maximum(one, other), np.minimum(one, other)))
     low, high = np.minimum(one, other)[order], np.maximum(one, other)[order]
     fresh = np.ones(len(order), dtype=bool)

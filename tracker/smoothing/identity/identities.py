@@ -1,17 +1,18 @@
-"""Who is who over the whole recording: tracks cut where it was a draw, and joined again.
+"""Resolution of identities over the whole recording: tracks are split into tracklets and linked.
 
-The tracks of the filter are cut where its association marginals were near a draw, where past
-and future contradict each other, and where nobody saw them for long. What is left are pieces
-that are surely one person's; all of them together are joined at the least cost.
+The tracks of the filter are split where its association marginals were ambiguous, where past
+and future contradict each other, and where no camera detected them for long. Each of the
+tracklets that remain is of one person; all of them together are linked at the least cost.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence as Many
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
-from jaxtyping import Bool, Int
+from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
 from tracker.corrections import Correction
@@ -20,92 +21,106 @@ from tracker.corrections.kinds import leeway as corrections_leeway
 from tracker.corrections.outcomes import outcomes
 from tracker.geometry.assignment import names_by_majority
 from tracker.parameters import SmoothingParams
-from tracker.smoothing.identity import cutting, joining, odds, pieces
-from tracker.smoothing.identity import decisions as decided
-from tracker.smoothing.identity.constraints import Seeker, Ties
-from tracker.smoothing.identity.cutting import Tracked
+from tracker.smoothing.identity import association, odds, splitting, tracklets
+from tracker.smoothing.identity.constraints import ConstraintResolver, LinkConstraints
 from tracker.smoothing.identity.ends import Ends
-from tracker.smoothing.identity.people import Seen, told_of_people
+from tracker.smoothing.identity.integer_program import Cut
+from tracker.smoothing.identity.people import Seen, template_log_odds
 from tracker.smoothing.identity.people import of_chains as people_of_chains
-from tracker.smoothing.identity.program import Cut
-from tracker.smoothing.identity.staying import Staying
+from tracker.smoothing.identity.splitting import Tracked
+from tracker.smoothing.identity.tracklets import Pairs, same_label
 from tracker.smoothing.paths import Links, Paths
 from tracker.smoothing.protocol import Earlier, Nothing
 from tracker.smoothing.result import Decision, Joined
 from tracker.smoothing.smoother import Shared
 
 _SURE = 1e6
-"""Log odds of chains that were found somebody's already."""
+"""Log odds of chains that were accepted in the first linking."""
 
 _CAREFUL = 3
-"""How often only those corrections are made to hold of which no earlier one speaks of the same
-people; then all that do not hold: dozens that hang together would take as many turns."""
+"""Number of rounds that enforce unmet corrections only where no earlier one refers to the same
+people. Later rounds enforce all: dozens that depend on each other would take as many rounds."""
 
 _TURNS = 2
-"""How often pieces are joined anew by what their chains say of them."""
+"""Largest number of repetitions of the linking with ends estimated from whole chains."""
+
+_REASONS = {
+    0: "past and future do not fit",
+    1: "whose boxes these are was near a draw",
+    2: "past and future do not fit",
+    3: "nobody saw it, or it was not there",
+}
+
+_STAYS = 8.0
+"""Log odds added to a link that is made without any correction: a correction of one link is no
+evidence against others."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Settled:
-    """Pieces joined into the tracks of people."""
+class LinkedTracks:
+    """Tracklets linked into n tracks, with N rows."""
 
     paths: Paths
+    """The tracks, interpolated in the gaps."""
     links: Links
+    """Association probabilities of their rows and boxes."""
     origins: Int[ndarray, " n"]
-    """The path before the cuts of which each has most."""
+    """Index of the path before the splits of which each track has most rows."""
     had: Bool[ndarray, " N"]
-    """The rows of pieces: the others are of the gaps between them."""
+    """The rows of tracklets: the others fill the gaps between them."""
     names: Int[ndarray, " N"]
-    """The filter's label of each row, -1 where it had nobody."""
+    """The filter's label of each row, -1 where it had no track."""
     decisions: list[Decision]
+    """Splits and links by which the tracks differ from the filter's."""
     joined: Joined
+    """The tracklets and the odds of linking them otherwise."""
     limits: dict[int, tuple[int, int]]
-    """Of some labels the first and the last step at which corrections let them be."""
+    """First and last step at which corrections let a track exist, by its label."""
     people: Int[ndarray, " R"]
-    """The label of each row before the cuts, -1 where nobody has it."""
+    """The label of each row before the splits, -1 where no track has it."""
 
 
-def settle(
+def link_tracklets(
     tracked: Tracked,
     parameters: SmoothingParams,
     seen: Seen,
     corrections: Many[Correction] = (),
     earlier: Earlier | None = None,
-) -> tuple[Settled, str]:
-    """Cut and join.
+) -> tuple[LinkedTracks, str]:
+    """Split tracks into tracklets and link these, so that all corrections of identity are met.
 
-    Of what a person said of who is who only what does not hold by itself is made to hold, one
-    after another: who says that it is as it is changes nothing. What nobody speaks of stays, as
-    far as it can, as it is settled without them.
+    Only corrections that the result without them does not meet are enforced, one after another:
+    a correction that confirms the result has no effect. Links that no correction refers to
+    remain, as far as possible, those of the result without corrections.
 
     Args:
-        tracked: By the filter, or as settled before.
-        parameters: When to cut, and what holds together.
-        seen: What the boxes look like.
-        corrections: What a person said of who is who.
-        earlier: What was found for these tracks while other corrections were obeyed: most of what
-            is obeyed on the way to all of them is what was on the way to all but the newest.
+        tracked: Tracks of the filter, or of the previous round.
+        parameters: Thresholds of the splits, and weights of the links.
+        seen: Appearance of the boxes.
+        corrections: The user's corrections, in the order in which they were made.
+        earlier: Results for these tracks under other sets of corrections: with one more
+            correction most of the sets that are enforced on the way are the same.
 
     Returns:
-        The people, and a hash of what had to be made to hold for them.
+        The tracks, and a hash of the corrections that were enforced.
     """
     earlier = earlier or Nothing()
     leeway = corrections_leeway(tracked.smoother.model.step_time)
     waiting = [one for one in corrections if one.pairs or one.apart]
-    plain: cutting.Cuts | None = None
-    staying = Staying()
+    plain: splitting.Cuts | None = None
+    prior_links = PriorLinks()
     turn = 0
     while True:
         obeyed = [one for one in corrections if one not in waiting]
         key = f"settled-{digest(obeyed, OF_PEOPLE)}"
-        found: Settled | None = earlier.get(key)
+        found: LinkedTracks | None = earlier.get(key)
         if found is None:
-            plain = plain or earlier.get("cuts") or cutting.cuts(tracked, parameters)
+            plain = plain or earlier.get("cuts") or splitting.cuts(tracked, parameters)
             earlier.put("cuts", plain)
-            found = _settled(tracked, parameters, seen, obeyed, leeway, plain, staying)
+            found = _linked(tracked, parameters, seen, obeyed, leeway, plain, prior_links)
             earlier.put(key, found)
-        if staying.people is None:
-            staying = Staying(found.people)
+        if prior_links.people is None:
+            prior_links = PriorLinks(found.people)
         unmet = _unmet(found.paths, waiting, leeway, careful=turn < _CAREFUL)
         if not unmet:
             return found, key
@@ -115,19 +130,26 @@ def settle(
 def _unmet(
     paths: Paths, waiting: Many[Correction], leeway: int, *, careful: bool
 ) -> list[Correction]:
-    """Those that do not hold; where one is careful, but for what may hold once an earlier one does
-    that speaks of the same people: whom somebody meets later depends on who he was before."""
+    """The corrections that paths do not meet.
+
+    Args:
+        paths: The linked tracks.
+        waiting: The corrections that are not enforced yet.
+        leeway: Number of steps by which a track may miss the step of a correction.
+        careful: Whether a correction is left out where an unmet earlier one refers to the same
+            tracks, since it may be met once that one is enforced.
+    """
     if not waiting:
         return []
-    told = outcomes(
+    results = outcomes(
         paths.steps, paths.labels[paths.owners], paths.states[:, :3], waiting, leeway=leeway
     )
     found: list[Correction] = []
     touched: set[int] = set()
-    for one, outcome in zip(waiting, told, strict=True):
+    for one, outcome in zip(waiting, results, strict=True):
         if outcome.met:
             continue
-        if careful and not outcome.tracks:  # of whom nobody was found that may be anybody
+        if careful and not outcome.tracks:  # without a track it may refer to any
             return found or [one]
         if not careful or touched.isdisjoint(outcome.tracks):
             found.append(one)
@@ -135,106 +157,120 @@ def _unmet(
     return found
 
 
-def _settled(
+def _linked(
     tracked: Tracked,
     parameters: SmoothingParams,
     seen: Seen,
     corrections: Many[Correction],
     leeway: int,
-    plain: cutting.Cuts,
-    staying: Staying,
-) -> Settled:
-    """Cut and join with all of some corrections."""
+    plain: splitting.Cuts,
+    prior_links: PriorLinks,
+) -> LinkedTracks:
+    """Split and link under all of some corrections.
+
+    Args:
+        tracked: Tracks of the filter, or of the previous round.
+        parameters: Thresholds of the splits, and weights of the links.
+        seen: Appearance of the boxes.
+        corrections: The corrections that are enforced.
+        leeway: Number of steps by which a track may miss the step of a correction.
+        plain: The splits without corrections.
+        prior_links: The links without corrections, which are preferred.
+    """
     smoother, fitted, shared = tracked.smoother, tracked.fitted, tracked.shared
-    seeker = Seeker(fitted, corrections, leeway)
-    cut, kept = cutting.cut(tracked, plain, seeker)
-    ties = seeker.ties(cut, kept)
-    links = pieces.moved(shared.links, kept, len(fitted.paths.states))
+    resolver = ConstraintResolver(fitted, corrections, leeway)
+    cut, kept = splitting.cut(tracked, plain, resolver)
+    constraints = resolver.constraints(cut, kept)
+    links = tracklets.moved(shared.links, kept, len(fitted.paths.states))
     refitted = smoother.fit(cut, links)
     own = Shared(links, shared.chances[:, kept], shared.missed[:, kept], shared.hidden_by[:, kept])
-    worths, births, deaths = odds.of_pieces(smoother, refitted, own, parameters)
+    worths, births, deaths = odds.of_tracklets(smoother, refitted, own, parameters)
     alone = Ends.alone(refitted, smoother.prior)
-    goes_on = odds.GoesOn(smoother, refitted.paths, links, parameters, seen.looks)
+    goes_on = odds.GoesOn(smoother, refitted.paths, links, parameters, seen.embeddings)
     pairs = goes_on.by(alone)
-    people = told_of_people(refitted.paths, links, smoother, seen, parameters.appearance)
+    people = template_log_odds(refitted.paths, links, smoother, seen, parameters.appearance)
     longest = max(round(parameters.longest / smoother.model.step_time), 1)
-    now, later = ties.parted(cut, longest)
+    now, later = constraints.parted(cut, longest)
     cuts: list[Cut] = []
 
-    def chained(pairs: pieces.Pairs, ties: Ties) -> list[list[int]]:
-        """The chains of pieces that are worth most together, as far as the ties let them."""
-        gains = staying.gains(pairs, cut, kept)
-        following, used = joining.join(
-            worths, births, deaths, pairs.earlier, pairs.later, gains, ties, people, cuts
+    def chained(pairs: tracklets.Pairs, constraints: LinkConstraints) -> list[list[int]]:
+        """The best chains of tracklets under some constraints."""
+        gains = prior_links.gains(pairs, cut, kept)
+        following, used = association.join(
+            worths, births, deaths, pairs.earlier, pairs.later, gains, constraints, people, cuts
         )
-        return joining.chains(following, used)
+        return association.chains(following, used)
 
     first = chained(pairs, now)
-    for _ in range(_TURNS):  # who is joined to whom tells of the ends of the pieces in between
+    for _ in range(_TURNS):  # the links improve the estimates at the ends of the tracklets
         several = [chain for chain in first if len(chain) > 1]
         if not several:
             break
-        whole, rows = pieces.chained(refitted.paths, several, list(range(len(several))))
-        told = alone.in_chains(
-            cut, smoother.fit(whole, pieces.moved_to(links, rows)), rows, smoother.model.motion
+        whole, rows = tracklets.chained(refitted.paths, several, list(range(len(several))))
+        ends = alone.in_chains(
+            cut, smoother.fit(whole, tracklets.moved_to(links, rows)), rows, smoother.model.motion
         )
-        pairs = goes_on.by(told)
+        pairs = goes_on.by(ends)
         again = chained(pairs, now)
         if again == first:
             break
         first = again
     of_chains = later.of_chains(first, cut)
-    if of_chains is None:  # who is tied to somebody far away may not be joined to another meanwhile
-        first = chained(pairs, ties)
-        of_chains = replace(ties, together=()).of_chains(first, cut) or Ties()
-    # what goes on by its motion tells more of its looks than each piece alone
-    back = odds.comes_back(smoother, refitted.paths, links, first, parameters, seen.looks)
-    following, _ = joining.join(
+    if of_chains is None:  # a far partner excludes links to others in between
+        first = chained(pairs, constraints)
+        of_chains = replace(constraints, must_link=()).of_chains(first, cut) or LinkConstraints()
+    # chains linked by motion have better embeddings than single tracklets
+    back = odds.comes_back(smoother, refitted.paths, links, first, parameters, seen.embeddings)
+    following, _ = association.join(
         np.full(len(first), _SURE), births[[c[0] for c in first]], deaths[[c[-1] for c in first]],
         back.earlier, back.later, back.gains, of_chains,
         people_of_chains(people, first),
     )  # fmt: skip
     chains = [
-        [piece for number in numbers for piece in first[number]]
-        for numbers in joining.chains(following, np.ones(len(first), dtype=bool))
+        [tracklet for number in numbers for tracklet in first[number]]
+        for numbers in association.chains(following, np.ones(len(first), dtype=bool))
     ]
     pairs = pairs.with_more(back.of_ends(first))
     labels = _labels(cut, chains)
-    decisions = decided.cuts(cut, fitted.paths, kept, plain.reasons, chains, labels)
-    decisions += decided.joins(cut, pairs, chains, labels, odds.anew(smoother), set(ties.together))
-    paths, rows = pieces.chained(refitted.paths, chains, labels)
+    decisions = split_decisions(cut, fitted.paths, kept, plain.reasons, chains, labels)
+    decisions += join_decisions(
+        cut, pairs, chains, labels, odds.anew(smoother), set(constraints.must_link)
+    )
+    paths, rows = tracklets.chained(refitted.paths, chains, labels)
     lengths = np.diff(cut.starts)
     origins = [
         _most(fitted.paths.owners[kept[cut.starts[chain]]], lengths[chain]) for chain in chains
     ]
-    links = pieces.moved_to(links, rows)
-    of_piece = np.zeros(len(paths.states), dtype=bool)
-    of_piece[rows[rows >= 0]] = True
+    links = tracklets.moved_to(links, rows)
+    of_tracklet = np.zeros(len(paths.states), dtype=bool)
+    of_tracklet[rows[rows >= 0]] = True
     names_of = np.full(len(paths.states), -1, dtype=np.int64)
     names_of[rows[rows >= 0]] = tracked.names[kept[rows >= 0]]
-    of_pieces = np.full(len(cut.labels), -1, dtype=np.int64)
+    of_tracklets = np.full(len(cut.labels), -1, dtype=np.int64)
     for chain, label in zip(chains, labels, strict=True):
-        of_pieces[chain] = label
+        of_tracklets[chain] = label
     places = refitted.paths.states[:, :3]
     joined = Joined(
-        of_pieces, cut.firsts, cut.lasts, places[cut.starts[:-1]], places[cut.starts[1:] - 1],
+        of_tracklets, cut.firsts, cut.lasts, places[cut.starts[:-1]], places[cut.starts[1:] - 1],
         worths, births, deaths, pairs.earlier, pairs.later, pairs.gains,
     )  # fmt: skip
-    limits = {labels[k]: span for k, span in ties.limits(chains, cut).items()}
+    limits = {labels[k]: span for k, span in constraints.limits(chains, cut).items()}
     origins_of = np.array(origins, dtype=np.int64)
     whose = np.full(len(fitted.paths.states), -1, dtype=np.int64)
-    whose[kept] = of_pieces[cut.owners]
-    return Settled(paths, links, origins_of, of_piece, names_of, decisions, joined, limits, whose)
+    whose[kept] = of_tracklets[cut.owners]
+    return LinkedTracks(
+        paths, links, origins_of, of_tracklet, names_of, decisions, joined, limits, whose
+    )
 
 
 def _most(names: ndarray, weights: ndarray) -> int:
-    """The name with most weight, of equal ones the smallest."""
+    """The value with the largest total weight, the smallest of equal ones."""
     values, which = np.unique(names, return_inverse=True)
     return int(values[np.argmax(np.bincount(which, weights))])
 
 
 def _labels(cut: Paths, chains: list[list[int]]) -> list[int]:
-    """A label for each chain: that of most of its rows, where no other chain has more of it."""
+    """The label of each chain: that of most of its rows, unless another chain has more of it."""
     lengths = np.diff(cut.starts)
     counts = []
     for chain in chains:
@@ -242,3 +278,128 @@ def _labels(cut: Paths, chains: list[list[int]]) -> list[int]:
         rows = np.bincount(which, lengths[chain]).astype(np.int64)
         counts.append(dict(zip(names.tolist(), rows.tolist(), strict=True)))
     return names_by_majority(counts, int(cut.labels.max(initial=0)))
+
+
+def split_decisions(
+    cut: Paths,
+    before: Paths,
+    kept: Int[ndarray, " M"],
+    reasons: Int[ndarray, " N"],
+    chains: list[list[int]],
+    labels: list[int],
+) -> list[Decision]:
+    """List the splits after which a track does not continue as the filter's.
+
+    Args:
+        cut: The tracklets, with M rows.
+        before: The paths before the splits, with N rows.
+        kept: The row of ``before`` that each of the M rows was.
+        reasons: Why each of the N rows was left out, as in :class:`Cuts`.
+        chains: The tracklets of each track.
+        labels: Label of each track.
+    """
+    chain_of = {tracklet: number for number, chain in enumerate(chains) for tracklet in chain}
+    found = []
+    for tracklet, after in same_label(cut):
+        one, other = chain_of.get(tracklet), chain_of.get(after)
+        if one is None or one == other:
+            continue
+        last, first = kept[cut.starts[tracklet + 1] - 1], kept[cut.starts[after]]
+        why = int(np.max(reasons[last + 1 : first], initial=0))
+        if (reasons[last + 1 : first] == 1).any():
+            why = 1
+        step = int(before.steps[first])
+        found.append(
+            Decision("cut", step, labels[one], int(cut.labels[tracklet]), 1.0, 0.0, _REASONS[why])
+        )
+    return found
+
+
+def join_decisions(
+    cut: Paths,
+    pairs: Pairs,
+    chains: list[list[int]],
+    labels: list[int],
+    anew: float,
+    required: set[tuple[int, int]],
+) -> list[Decision]:
+    """List the links between tracks of the filter, with the odds against the best alternative.
+
+    Args:
+        cut: The tracklets.
+        pairs: The possible pairs with their log odds.
+        chains: The tracklets of each track.
+        labels: Label of each track.
+        anew: Log probability of a death and a birth instead of a link.
+        required: Pairs of tracklets that a correction links.
+    """
+    gain = {
+        (i, j): g
+        for i, j, g in zip(
+            pairs.earlier.tolist(), pairs.later.tolist(), pairs.gains.tolist(), strict=True
+        )
+    }
+    by_later: dict[int, list[float]] = {}
+    for (_, j), g in gain.items():
+        by_later.setdefault(j, []).append(g)
+    found = []
+    for chain, label in zip(chains, labels, strict=True):
+        for i, j in pairwise(chain):
+            if cut.labels[i] == cut.labels[j]:
+                continue
+            if (i, j) in required or (i, j) not in gain:
+                name = int(cut.labels[j] if cut.labels[j] != label else cut.labels[i])
+                step = int(cut.firsts[j])
+                found.append(Decision("joined", step, label, name, 1.0, 0.0, "a person said so"))
+                continue
+            every = np.array([*by_later[j], anew])
+            weights = np.exp(every - every.max())
+            chances = weights / weights.sum()
+            which = int(np.argmin(np.abs(every - gain[i, j])))
+            own, rest = float(chances[which]), np.delete(chances, which)
+            found.append(
+                Decision(
+                    "joined",
+                    int(cut.firsts[j]),
+                    label,
+                    int(cut.labels[j] if cut.labels[j] != label else cut.labels[i]),
+                    own,
+                    float(rest.max(initial=0.0)),
+                    "one person goes on" if cut.firsts[j] - cut.lasts[i] < 2 else "one person",
+                )
+            )
+    return found
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PriorLinks:
+    """The tracks of N rows without any correction, whose links are preferred.
+
+    The optimum under a correction may change links that the correction does not refer to; these
+    were the optimum before, and the odds of many are near even. So every link i → j of the
+    result without corrections gains s more,
+
+        gain'_ij = gain_ij + s where one track had the end of i and the beginning of j
+
+    and tracklets that a correction separates are linked by their own odds. The preference is the
+    same for every set of corrections: after one is undone the others have the result that they
+    would have alone.
+    """
+
+    people: Int[ndarray, " N"] | None = None
+    """The label of each row, -1 where no track has it; None before the first linking."""
+
+    def gains(self, pairs: Pairs, cut: Paths, kept: Int[ndarray, " M"]) -> Float[ndarray, " P"]:
+        """The gains of pairs of tracklets, raised for those that were linked.
+
+        Args:
+            pairs: P pairs of tracklets with their log odds.
+            cut: The tracklets, with M rows.
+            kept: The row of the N rows that each of the M rows was.
+        """
+        if self.people is None or not len(pairs.gains):
+            return pairs.gains
+        first = self.people[kept[cut.starts[:-1]]]
+        last = self.people[kept[cut.starts[1:] - 1]]
+        stays = (last[pairs.earlier] == first[pairs.later]) & (last[pairs.earlier] >= 0)
+        return np.asarray(pairs.gains + _STAYS * stays)

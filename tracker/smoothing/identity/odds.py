@@ -1,4 +1,4 @@
-"""What speaks for one person: whether a piece is somebody, and whether two are one."""
+"""Costs of the tracklet association, as log odds: of each tracklet, and of each possible link."""
 
 from __future__ import annotations
 
@@ -11,22 +11,33 @@ from numpy import ndarray
 from tracker.fusion import visibility
 from tracker.kernels.smoothing import evidence
 from tracker.parameters import SmoothingParams
-from tracker.smoothing.identity import pieces
+from tracker.smoothing.identity import tracklets
 from tracker.smoothing.identity.appearance import Appearance
 from tracker.smoothing.identity.ends import Ends
-from tracker.smoothing.identity.pieces import Pairs, chained, same_label
+from tracker.smoothing.identity.tracklets import Pairs, chained, same_label
 from tracker.smoothing.lifetimes import independence, misses
 from tracker.smoothing.paths import Links, Paths
 from tracker.smoothing.smoother import Fitted, Shared, Smoother
 
 FASTEST = 3.0
-"""Metres a second that nobody in a room exceeds for long."""
+"""Largest speed of a person in a room over several steps, metres per second."""
 
 
-def of_pieces(
+def of_tracklets(
     smoother: Smoother, fitted: Fitted, shared: Shared, parameters: SmoothingParams
 ) -> tuple[Float[ndarray, " n"], Float[ndarray, " n"], Float[ndarray, " n"]]:
-    """Of each piece: the log odds of its boxes against clutter, of its birth and of its death."""
+    """The log odds of each tracklet's boxes against clutter, and of its birth and death.
+
+    Args:
+        smoother: The models and the boxes.
+        fitted: The n tracklets, fitted to their boxes.
+        shared: Association and miss probabilities of their rows.
+        parameters: Time constant of correlated evidence.
+
+    Returns:
+        Log odds of being a target, log probability of a birth at the first step, and of a death
+        after the last; the last two are 0 at the ends of the recording.
+    """
     step_time, paths = smoother.model.step_time, fitted.paths
     count = len(paths.labels)
     survival, death = _survival(smoother)
@@ -38,23 +49,22 @@ def of_pieces(
 
 
 def _survival(smoother: Smoother) -> tuple[float, float]:
-    """log p_S and log(1 − p_S)."""
+    """The values of log p_S and log(1 − p_S)."""
     survival = min(smoother.parameters.survival_probability, 1.0 - 1e-6)
     return float(np.log(survival)), float(np.log1p(-survival))
 
 
 def anew(smoother: Smoother) -> float:
-    """log of the probability that somebody comes at a step, and of that somebody leaves at it."""
+    """The log probability of a death and a birth at one step."""
     rate = smoother.parameters.birth_rate * smoother.model.step_time
     return float(np.log(rate)) + _survival(smoother)[1]
 
 
 class GoesOn:
-    """Every pair of pieces of which the second may continue the first, with its gain: by their
-    motion over a short gap, and their looks. The label that the filter gave both says nothing
-    more: it came of the same boxes.
+    """Log odds of links over short gaps, from motion, appearance and misses in the gap.
 
-    Only the motion depends on what is known of the pieces' ends: the rest is looked into once.
+    The filter's labels are not used: they came from the same boxes. Only the odds of the motion
+    depend on the estimates at the tracklets' ends; the rest is computed once.
     """
 
     def __init__(
@@ -63,29 +73,37 @@ class GoesOn:
         paths: Paths,
         links: Links,
         p: SmoothingParams,
-        looks: Many[Float[ndarray, "B A"]] | None,
+        embeddings: Many[Float[ndarray, "B A"]] | None,
     ) -> None:
-        """Look into all that does not depend on the ends."""
+        """Compute the odds that do not depend on the estimates at the ends.
+
+        Args:
+            smoother: The models and the boxes.
+            paths: The n tracklets.
+            links: Association probabilities of their rows and boxes.
+            p: The longest gap, and the weight of the appearance.
+            embeddings: A unit vector for each box of each camera; None without appearance.
+        """
         self._smoother, self._paths = smoother, paths
         self._share = independence(smoother.model.step_time, p.memory)
-        self._near = near = pieces.near_pairs(
+        self._near = near = tracklets.near_pairs(
             paths,
             longest=max(round(p.longest / smoother.model.step_time), 1),
             fastest=FASTEST * smoother.model.step_time,
         )
         self._empty = _seen_empty(smoother, paths, near, p.memory)
         self._alike = np.zeros(len(near.earlier))
-        if looks is not None:
-            alike = Appearance(paths, links, smoother.cameras, looks, smoother.model.step_time)
+        if embeddings is not None:
+            alike = Appearance(paths, links, smoother.cameras, embeddings, smoother.model.step_time)
             self._alike = p.appearance * alike.log_ratio(near.earlier, near.later)[0]
 
     def by(self, known: Ends) -> Pairs:
-        """The pairs, by what is known of the pieces' ends."""
+        """The possible pairs with their log odds, given the estimates at the tracklets' ends."""
         smoother, near = self._smoother, self._near
-        motion = pieces.motion_gains(
+        motion = tracklets.motion_gains(
             self._paths,
             near,
-            known.told_by(self._share),
+            known.discounted(self._share),
             smoother.model.motion,
             smoother.prior,
             smoother.log_place,
@@ -102,23 +120,36 @@ def comes_back(
     links: Links,
     chains: list[list[int]],
     p: SmoothingParams,
-    looks: Many[Float[ndarray, "B A"]] | None,
+    embeddings: Many[Float[ndarray, "B A"]] | None,
 ) -> Pairs:
-    """Every pair of chains of which the second may be the first, gone for a while and back: one of
-    those who left, by the looks, and by the label that the filter gave pieces of both."""
+    """Compute the log odds of links over long gaps, from appearance and from the filter's labels.
+
+    The person of the later chain is as likely any of those that ended before as a new one.
+
+    Args:
+        smoother: The models and the boxes.
+        paths: The n tracklets.
+        links: Association probabilities of their rows and boxes.
+        chains: The tracklets of each chain.
+        p: Weights of the appearance and of the filter's labels.
+        embeddings: A unit vector for each box of each camera; None without appearance.
+
+    Returns:
+        Pairs of chains with their log odds.
+    """
     whole, rows = chained(paths, chains, list(range(len(chains))))
     newcomer = anew(smoother)
     before = whole.lasts[:, None] < whole.firsts[None, :]
     gains = np.full(before.shape, -np.inf)
-    if looks is not None:
-        own = pieces.moved_to(links, rows)
-        alike = Appearance(whole, own, smoother.cameras, looks, smoother.model.step_time)
+    if embeddings is not None:
+        own = tracklets.moved_to(links, rows)
+        alike = Appearance(whole, own, smoother.cameras, embeddings, smoother.model.step_time)
         gone = np.maximum(before.sum(axis=0), 1)
         earlier, later = np.nonzero(before)
         ratio, known = alike.log_ratio(earlier, later)
         earlier, later, ratio = earlier[known], later[known], ratio[known]
         gains[earlier, later] = newcomer - np.log(gone[later]) + p.appearance * ratio
-    chain_of = {piece: number for number, chain in enumerate(chains) for piece in chain}
+    chain_of = {tracklet: number for number, chain in enumerate(chains) for tracklet in chain}
     for one, other in same_label(paths):
         i, j = chain_of.get(one, -1), chain_of.get(other, -1)
         if min(i, j) >= 0 and before[i, j]:
@@ -127,7 +158,7 @@ def comes_back(
 
 
 def _of_table(gains: Float[ndarray, "n n"], paths: Paths) -> Pairs:
-    """The pairs that are possible."""
+    """List the pairs with finite gains."""
     earlier, later = np.nonzero(np.isfinite(gains))
     gaps = paths.firsts[later] - paths.lasts[earlier]
     return Pairs(earlier, later, gaps, gains[earlier, later])
@@ -136,13 +167,13 @@ def _of_table(gains: Float[ndarray, "n n"], paths: Paths) -> Pairs:
 def _seen_empty(
     smoother: Smoother, paths: Paths, pairs: Pairs, memory: float
 ) -> Float[ndarray, " P"]:
-    """What the cameras say of the ways between the pieces of each pair: at most 0.
+    """Log likelihood of the cameras' misses on the straight line between each pair, at most 0.
 
-    A camera that looks at the straight way in between and has no box there speaks against
-    somebody; one that has a box, his or of who hides him, says nothing.
+    A camera that views a point of the line and has no box there counts as a miss; one that has a
+    box there, of this person or of an occluder, has no effect.
     """
     inner = pairs.gaps - 1
-    told = np.zeros(len(inner))
+    total = np.zeros(len(inner))
     pair = np.repeat(np.arange(len(inner)), inner)
     step = np.arange(len(pair)) - np.repeat(np.cumsum(inner) - inner, inner) + 1
     begin = paths.states[paths.starts[1:][pairs.earlier] - 1][pair]
@@ -161,5 +192,5 @@ def _seen_empty(
         against = evidence.seen_empty(
             expected.boxes, expected.valid, chances, steps, camera.starts, camera.boxes
         )
-        told += np.bincount(pair, against, len(inner))
-    return told * independence(model.step_time, memory)
+        total += np.bincount(pair, against, len(inner))
+    return total * independence(model.step_time, memory)

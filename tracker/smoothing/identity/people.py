@@ -1,4 +1,4 @@
-"""What boxes look like, and which of the people with templates each piece of a track is by it."""
+"""Embeddings of boxes, and log odds of the people with templates for each tracklet."""
 
 from __future__ import annotations
 
@@ -16,33 +16,37 @@ from tracker.smoothing.paths import Links, Paths
 from tracker.smoothing.smoother import Smoother
 
 _AS_THE_FILTER = FusionParams()
-"""What colours tell is weighed as the filter does by itself, whatever it is set to."""
+"""The filter's default parameters, by which colours are weighted whatever the filter is set to."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Seen:
-    """What the boxes of all steps look like, camera by camera; None where nothing is told."""
+    """The appearance of the boxes of all steps, camera by camera; None where none is known."""
 
-    looks: Many[Float[ndarray, "B A"]] | None = None
+    embeddings: Many[Float[ndarray, "B A"]] | None = None
     """A unit vector for each box, 0 where it has none."""
     likenesses: Many[Float[ndarray, "B G"]] | None = None
     """Probability of each of G people with templates for each box, 1/G each where it is unknown."""
 
     @staticmethod
     def of(views: Many[tuple[ViewResult, ...]]) -> Seen:
-        """By stage 1 of each step."""
-        return Seen(_looks(views), _likenesses(views))
+        """Collect the appearance of boxes from the results of stage 1 for each step."""
+        return Seen(_embeddings(views), _likenesses(views))
 
 
-def _looks(views: Many[tuple[ViewResult, ...]]) -> list[Float[ndarray, "B A"]] | None:
-    sizes = {view.looks.shape[1] for step in views for view in step if view.looks.shape[1]}
+def _embeddings(views: Many[tuple[ViewResult, ...]]) -> list[Float[ndarray, "B A"]] | None:
+    sizes = {
+        view.embeddings.shape[1] for step in views for view in step if view.embeddings.shape[1]
+    }
     if len(sizes) != 1:
         return None
     size = sizes.pop()
     return [
         np.concatenate(
             [
-                step[c].looks if step[c].looks.shape[1] else np.zeros((len(step[c].boxes), size))
+                step[c].embeddings
+                if step[c].embeddings.shape[1]
+                else np.zeros((len(step[c].boxes), size))
                 for step in views
             ]
         )
@@ -52,7 +56,7 @@ def _looks(views: Many[tuple[ViewResult, ...]]) -> list[Float[ndarray, "B A"]] |
 
 def _likenesses(views: Many[tuple[ViewResult, ...]]) -> list[Float[ndarray, "B G"]] | None:
     people = max((view.likenesses.shape[1] for step in views for view in step), default=0)
-    if people < 2:  # of one alone colours say nothing
+    if people < 2:  # colours do not discriminate one person alone
         return None
     return [
         np.concatenate([step[c].likenesses_of(people) for step in views])
@@ -60,44 +64,53 @@ def _likenesses(views: Many[tuple[ViewResult, ...]]) -> list[Float[ndarray, "B G
     ]
 
 
-def told_of_people(
-    pieces: Paths, links: Links, smoother: Smoother, seen: Seen, weight: float
+def template_log_odds(
+    tracklets: Paths, links: Links, smoother: Smoother, seen: Seen, weight: float
 ) -> Float[ndarray, "n G"]:
-    """How much less likely the colours of each piece are those of each person with templates than
-    those of the likeliest: log, at most 0; of one (n, 1) where nothing is told.
+    """Compute the log likelihood of each tracklet's colours under each of G people with templates.
 
         u_g = α Δt/τ Σ_z a(z) log (ε + (1 − ε) G p_g(z)),   less the largest
 
-    over the boxes z of the piece that no other box touches, with association probability a. The
-    filter's re-identification weighs the same step by step, when two have just been one blob;
-    here whole pieces are weighed. p_g tells which of the templates a box is nearest to and not
-    how near: who has none looks like one of them, too, and nobody looks like this one here and
-    that one there.
+    over the boxes z of the tracklet that no other box touches, with association probability a. The
+    filter's re-identification has the same evidence step by step, also when two people have just
+    been one blob; here it is summed over whole tracklets. p_g is the relative likelihood among the
+    templates: a person without a template resembles one of them too, but consistently the same.
 
     Args:
-        pieces: Of tracks.
-        links: Whose box each is.
+        tracklets: The n tracklets.
+        links: Association probabilities of their rows and boxes.
         smoother: The boxes and the time of a step, Δt.
         seen: p_g of each box.
-        weight: α.
+        weight: α, the weight of the appearance.
+
+    Returns:
+        Log likelihoods less the largest of each tracklet, at most 0; of shape (n, 1) where no
+        box has likelihoods.
     """
     if seen.likenesses is None:
-        return np.zeros((len(pieces.labels), 1))
+        return np.zeros((len(tracklets.labels), 1))
     own = links.take(appearance.clean(links, smoother.cameras))
-    owners = pieces.owners[own.rows]
+    owners = tracklets.owners[own.rows]
     people = seen.likenesses[0].shape[1]
-    told = np.zeros((len(pieces.labels), people))
-    doubt = _AS_THE_FILTER.recognition_doubt
+    scores = np.zeros((len(tracklets.labels), people))
+    outliers = _AS_THE_FILTER.recognition_doubt
     fresh = weight * min(smoother.model.step_time / _AS_THE_FILTER.recognition_interval, 1.0)
     for c, likeness in enumerate(seen.likenesses):
         of_camera = own.cameras == c
-        odds = np.log(doubt + (1.0 - doubt) * people * likeness[own.boxes[of_camera]])
+        odds = np.log(outliers + (1.0 - outliers) * people * likeness[own.boxes[of_camera]])
         share = fresh * own.shares[of_camera]
-        np.add.at(told, owners[of_camera], share[:, None] * odds)
-    return np.asarray(told - told.max(axis=1, keepdims=True))
+        np.add.at(scores, owners[of_camera], share[:, None] * odds)
+    return np.asarray(scores - scores.max(axis=1, keepdims=True))
 
 
-def of_chains(told: Float[ndarray, "n G"], chains: Many[Many[int]]) -> Float[ndarray, "m G"]:
-    """The same of chains of pieces."""
-    whole = np.array([told[list(chain)].sum(axis=0) for chain in chains]).reshape(-1, told.shape[1])
+def of_chains(scores: Float[ndarray, "n G"], chains: Many[Many[int]]) -> Float[ndarray, "m G"]:
+    """Sum the log likelihoods over the tracklets of each chain, less the largest of each chain.
+
+    Args:
+        scores: Log likelihood of each of n tracklets under each of G people.
+        chains: The tracklets of each of m chains.
+    """
+    whole = np.array([scores[list(chain)].sum(axis=0) for chain in chains]).reshape(
+        -1, scores.shape[1]
+    )
     return np.asarray(whole - whole.max(axis=1, keepdims=True))

@@ -1,4 +1,4 @@
-"""People lost a short while ago: who reappears near the predicted place gets the old label back."""
+"""Label recovery: a track that begins near the prediction of a lost one takes over its label."""
 
 from __future__ import annotations
 
@@ -16,49 +16,53 @@ from tracker.geometry.assignment import linear_sum_assignment
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Memory:
-    """Who is known, and who of them was lost a short while ago.
+    """The confirmed tracks of a step, and the predictions of those lost a short while ago.
 
-    A filter drops a person whom no camera sees within a step or two, which is right for the
-    estimate and wrong for the label. So the last state of a confirmed person who vanished
-    inside the room is predicted on for a while, and the first new track that is confirmed
-    within its gate is taken for the same person. Nothing else of the filter changes.
+    A filter drops a target that no camera detects within a step or two, which is right for the
+    estimate and wrong for the label. So the last state of a confirmed track that ended
+    inside the room is predicted further for a while, and the first new track that is confirmed
+    within its gate takes over its label. The estimates of the filter do not change.
     """
 
     known: GaussianMixture
-    """The sure people of the last step, the heaviest component of each."""
+    """The confirmed tracks of the last step, the heaviest component of each label."""
     lost: GaussianMixture
-    """Where each lost one may be by now."""
+    """The predicted states of L lost tracks."""
     ages: Float[ndarray, " L"]
-    """Seconds since each was lost."""
+    """Seconds since each track was lost."""
     newer: Int[ndarray, " L"]
-    """The first label that was given only after each was lost."""
+    """The first label that was given only after each track was lost."""
 
     @staticmethod
     def start(dimension: int) -> Memory:
-        """Nobody is known."""
-        nobody = GaussianMixture.empty(dimension)
-        return Memory(nobody, nobody, np.zeros(0), np.zeros(0, dtype=np.int64))
+        """The memory without tracks, for states of the given dimension."""
+        empty = GaussianMixture.empty(dimension)
+        return Memory(empty, empty, np.zeros(0), np.zeros(0, dtype=np.int64))
 
     def relabelled(self, changed: dict[int, int]) -> Memory:
-        """The known under other labels; who is lost under one of them is found."""
+        """Rename the known tracks; a lost track whose label is given away is removed.
+
+        Args:
+            changed: New label by old one.
+        """
         back = np.isin(self.lost.labels, list(changed.values()))
-        kept = self.take(~back)
-        return Memory(self.known.relabelled(changed), kept.lost, kept.ages, kept.newer)
+        still = self.take(~back)
+        return Memory(self.known.relabelled(changed), still.lost, still.ages, still.newer)
 
     def take(self, indices: ndarray) -> Memory:
-        """Some of the lost."""
+        """Select some of the lost tracks, by index or mask."""
         return Memory(self.known, self.lost.take(indices), self.ages[indices], self.newer[indices])
 
 
 def recall(
     memory: Memory, mixture: GaussianMixture, model: FusionModel, first_label: int
 ) -> tuple[Int[ndarray, " J"], Memory]:
-    """Give their labels back to people who return, and remember who is lost now.
+    """Give lost labels back to new tracks at the predicted places, and update the memory.
 
     Args:
-        memory: Of the step before.
-        mixture: The posterior of this step, the heaviest component of a label first.
-        model: Its motion predicts the lost, and its room ends the wait for who left it.
+        memory: The memory after the step before.
+        mixture: The posterior of this step, J components, the heaviest of a label first.
+        model: The motion that predicts lost tracks, and the room outside which they are dropped.
         first_label: The first label that was given in this step.
 
     Returns:
@@ -82,7 +86,7 @@ def recall(
 
 
 def _first_of_each(labels: Int[ndarray, " J"], among: Int[ndarray, " K"]) -> Int[ndarray, " L"]:
-    """The first of some components of each label."""
+    """The first component of each label among some, by ascending label."""
     first: dict[int, int] = {}
     for index, label in zip(among.tolist(), labels.take(among).tolist(), strict=True):
         first.setdefault(label, index)
@@ -92,7 +96,7 @@ def _first_of_each(labels: Int[ndarray, " J"], among: Int[ndarray, " K"]) -> Int
 def _missing(
     memory: Memory, present: Int[ndarray, " L"], model: FusionModel, first_label: int
 ) -> Memory:
-    """Who of the lost and of the known is not present, where he may be now: the new lost."""
+    """Predict the lost and known tracks whose labels are not present: those lost at this step."""
     there = set(present.tolist())
     known = memory.known
     away = [i for i, label in enumerate(known.labels.tolist()) if label not in there]
@@ -119,7 +123,17 @@ def _missing(
 def _returned(
     memory: Memory, people: GaussianMixture, labels: Int[ndarray, " J"], reach: float
 ) -> tuple[Int[ndarray, " J"], Bool[ndarray, " L"]]:
-    """The labels with the old names of those who are back, and which of the lost these are."""
+    """Assign new tracks to lost ones by squared Mahalanobis distance, and swap their labels.
+
+    Args:
+        memory: L lost tracks, predicted to this step.
+        people: The confirmed tracks of this step, one component each.
+        labels: Labels of all J components of the posterior.
+        reach: Largest squared Mahalanobis distance.
+
+    Returns:
+        The labels of the J components afterwards, and which lost tracks are back.
+    """
     lost, back = memory.lost, np.zeros(memory.lost.size, dtype=bool)
     offsets = people.means[None, :, :3] - lost.means[:, None, :3]
     spread = lost.covariances[:, None, :3, :3] + people.covariances[None, :, :3, :3]
@@ -131,7 +145,7 @@ def _returned(
     labels = labels.copy()
     for old, newcomer in zip(*linear_sum_assignment(np.where(may, distances, 1e6)), strict=True):
         if may[old, newcomer]:
-            # what is left of the old label goes on as the newcomer's
+            # components that still bear the old label get the new track's
             name, other = lost.labels[old], people.labels[newcomer]
             was_old, was_new = labels == name, labels == other
             labels[was_old], labels[was_new] = other, name

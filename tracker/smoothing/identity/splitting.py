@@ -1,4 +1,4 @@
-"""Where the filter's tracks are cut: at a draw, a contradiction, where nobody saw them for long."""
+"""Splitting of the filter's tracks: at ambiguous boxes, at jumps, and in long gaps."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
 from tracker.parameters import SmoothingParams
-from tracker.smoothing.identity import pieces
-from tracker.smoothing.identity.constraints import Seeker
+from tracker.smoothing.identity import tracklets
+from tracker.smoothing.identity.constraints import ConstraintResolver
 from tracker.smoothing.identity.exchanges import exchange_breaks
 from tracker.smoothing.identity.odds import FASTEST
 from tracker.smoothing.lifetimes import independence, lifetimes
@@ -18,47 +18,47 @@ from tracker.smoothing.paths import Paths
 from tracker.smoothing.smoother import Fitted, Shared, Smoother
 
 _FED = 0.3
-"""Boxes, of all cameras together, from which a row counts as seen."""
+"""Sum of association probabilities over all cameras above which a row counts as detected."""
 
 _AROUND = 0.2
-"""Seconds around a jump that belong to neither side."""
+"""Seconds before and after a jump that are left out of both tracklets."""
 
 _SHORTEST = 0.4
-"""Seconds of a piece that stands for itself; a shorter one, beside longer ones, is left out."""
+"""Shortest tracklet, seconds; shorter ones are left out where their path has longer ones."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tracked:
-    """Tracks whose people are to be settled, and what is known of their N rows."""
+    """Tracks whose identities are to be resolved, with data about their N rows."""
 
     smoother: Smoother
-    """The models."""
+    """The models and the boxes."""
     fitted: Fitted
-    """The filter's tracks, or what was made of them before, fitted to their boxes."""
+    """The filter's tracks, or those of the previous round, fitted to their boxes."""
     shared: Shared
-    """Whose box each is."""
+    """Association probabilities of the rows and boxes."""
     contested: Float[ndarray, " N"]
-    """By which share each row's boxes were as well another's."""
+    """Share of each row's boxes that may belong to another track as well, 0 … 1."""
     had: Bool[ndarray, " N"]
-    """At which rows there was a track before."""
+    """Whether a row had a track before; the other rows fill gaps."""
     names: Int[ndarray, " N"]
-    """The filter's label of each row, -1 where it had nobody."""
+    """The filter's label of each row, -1 where it had no track."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Cuts:
-    """Where N rows are cut by themselves, whatever a person says of them."""
+    """The splits of paths of N rows without any correction."""
 
     reasons: Int[ndarray, " N"]
-    """Why each row is left out: 0 for not, 1 contested, 2 jump, 3 away or not seen."""
+    """Why each row is left out: 0 for not, 1 ambiguous boxes, 2 jump, 3 absent or not detected."""
     clear: Bool[ndarray, " N"]
-    """The rows that are kept."""
+    """The rows that remain in tracklets."""
     breaks: Bool[ndarray, " N"]
-    """Rows before which a path is cut even where both sides are clear."""
+    """The rows before which a path is split even where both sides remain."""
 
 
 def cuts(tracked: Tracked, p: SmoothingParams) -> Cuts:
-    """Where tracks are cut by themselves."""
+    """Compute the splits of tracks without any correction."""
     smoother, fitted, shared = tracked.smoother, tracked.fitted, tracked.shared
     step_time, paths = smoother.model.step_time, fitted.paths
     rows = len(paths.states)
@@ -70,7 +70,7 @@ def cuts(tracked: Tracked, p: SmoothingParams) -> Cuts:
     away = _long_gaps(paths, fed, too_long) | (there < 0.5)
     reasons[away | _not_bridged(paths, tracked.had, away, too_long)] = 3
     around = round(_AROUND / step_time)
-    # where boxes err alike for a while, past and future contradict each other by less than it seems
+    # errors of boxes are correlated, so past and future contradict each other less than it seems
     jumps = np.flatnonzero(fitted.jumps * independence(step_time, p.memory) > p.jump)
     owners = paths.owners
     for offset in range(-around, around):
@@ -88,35 +88,40 @@ def cuts(tracked: Tracked, p: SmoothingParams) -> Cuts:
     return Cuts(reasons, clear & ~between, breaks | begins)
 
 
-def cut(tracked: Tracked, plain: Cuts, seeker: Seeker) -> tuple[Paths, Int[ndarray, " M"]]:
-    """The pieces under the filter's labels, and the row that each of their rows was.
+def cut(
+    tracked: Tracked, plain: Cuts, resolver: ConstraintResolver
+) -> tuple[Paths, Int[ndarray, " M"]]:
+    """Split tracks into tracklets with the filter's labels.
 
     Args:
-        tracked: What is cut.
-        plain: Where it is by itself.
-        seeker: Where corrections cut it.
+        tracked: The tracks.
+        plain: The splits without any correction.
+        resolver: The splits of the corrections.
+
+    Returns:
+        The tracklets with M rows, and the row of the tracks that each of these was.
     """
     paths, owners = tracked.fitted.paths, tracked.fitted.paths.owners
-    clear, breaks = plain.clear.copy(), plain.breaks | seeker.breaks()
-    cut, kept = pieces.cut(paths, clear, breaks)
-    # a short piece says little of who it is; where it is all there is it stays
+    clear, breaks = plain.clear.copy(), plain.breaks | resolver.breaks()
+    cut, kept = tracklets.cut(paths, clear, breaks)
+    # a short tracklet has little information about identity; where it is the only one it remains
     lengths = np.diff(cut.starts)
     of = owners[kept[cut.starts[:-1]]]
     longest = np.zeros(len(paths.labels), dtype=np.int64)
     np.maximum.at(longest, of, lengths)
     shortest = round(_SHORTEST / tracked.smoother.model.step_time)
     short = (lengths < shortest) & (longest[of] >= shortest)
-    short[list(seeker.meant(cut, kept))] = False
+    short[list(resolver.meant(cut, kept))] = False
     clear[kept[np.repeat(short, lengths)]] = False
-    cut, kept = pieces.cut(paths, clear, breaks)
+    cut, kept = tracklets.cut(paths, clear, breaks)
     return replace(cut, labels=_named(cut, tracked.names[kept])), kept
 
 
 def _of_two(
     paths: Paths, names: Int[ndarray, " N"]
 ) -> tuple[Bool[ndarray, " N"], Bool[ndarray, " N"]]:
-    """The rows at which a path goes on under another label of the filter's, and those in between
-    that have none."""
+    """The rows at which a path continues under another label of the filter, and the rows without a
+    label in between."""
     begins = np.zeros(len(names), dtype=bool)
     between = begins.copy()
     rows = np.flatnonzero(names >= 0)
@@ -130,7 +135,7 @@ def _of_two(
 
 
 def _named(cut: Paths, names: Int[ndarray, " M"]) -> Int[ndarray, " n"]:
-    """The filter's label of each piece; one that it never had keeps its own."""
+    """The filter's label of each tracklet; one without such a label retains its own."""
     labels = cut.labels.copy()
     known = np.flatnonzero(names >= 0)
     owners, first = np.unique(cut.owners[known], return_index=True)
@@ -139,14 +144,14 @@ def _named(cut: Paths, names: Int[ndarray, " M"]) -> Int[ndarray, " n"]:
 
 
 def _runs(paths: Paths, flags: Bool[ndarray, " N"]) -> Int[ndarray, " N"]:
-    """The number of the run of equal flags of one path that each row is in."""
+    """The index of the run of equal flags of one path that each row is in."""
     change = np.ones(len(flags), dtype=bool)
     change[1:] = (flags[1:] != flags[:-1]) | (np.diff(paths.owners) != 0)
     return np.asarray(np.cumsum(change) - 1)
 
 
 def _long_gaps(paths: Paths, fed: Bool[ndarray, " N"], longest: int) -> Bool[ndarray, " N"]:
-    """The rows of those runs without a box that are longer than ``longest`` steps."""
+    """The rows in runs without a box that are longer than ``longest`` steps."""
     run = _runs(paths, fed)
     return np.asarray(~fed & (np.bincount(run)[run] > longest)) if len(fed) else fed
 
@@ -154,15 +159,15 @@ def _long_gaps(paths: Paths, fed: Bool[ndarray, " N"], longest: int) -> Bool[nda
 def _not_bridged(
     paths: Paths, had: Bool[ndarray, " N"], away: Bool[ndarray, " N"], longest: int
 ) -> Bool[ndarray, " N"]:
-    """The rows of the filter's long gaps that the boxes do not lead through from end to end: what
-    it lost and went on only for a while may have gone on as another track."""
+    """The rows of the filter's long gaps that boxes do not bridge from end to end: the person may
+    have continued as another track meanwhile."""
     gaps = _long_gaps(paths, had, longest)
     run = _runs(paths, had)
     return np.asarray(gaps & (np.bincount(run, away & gaps)[run] > 0.0)) if len(had) else gaps
 
 
 def _between(paths: Paths, seen: Bool[ndarray, " N"]) -> Bool[ndarray, " N"]:
-    """The rows from the first to the last seen one of each path."""
+    """The rows from the first to the last detected one of each path."""
     rows, owners = np.arange(len(seen)), paths.owners
     first = np.full(len(paths.labels), len(seen))
     last = np.full(len(paths.labels), -1)

@@ -1,4 +1,4 @@
-"""Who is meant: the rows of a run's tracks at the places of a correction."""
+"""Lookup of the rows of tracks that the places of corrections refer to."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from tracker.corrections.contradictions import NEAR, along
 from tracker.corrections.kinds import REACH, Correction, Place
 
 
-class Whereabouts:
-    """Where tracks are, to be asked who was at a place."""
+class TrackIndex:
+    """An index of the rows of tracks by step, for finding the track at a place."""
 
     def __init__(
         self,
@@ -19,13 +19,13 @@ class Whereabouts:
         positions: Float[ndarray, "N 3"],
         owners: Int[ndarray, " N"] | None = None,
     ) -> None:
-        """Prepare for N rows of tracks, in any order.
+        """Index N rows of tracks, in any order.
 
         Args:
-            steps: Of each row.
-            positions: World metres.
-            owners: Whose each row is, by which who is not there at a step is taken to have gone
-                straight on; without it, to have stood.
+            steps: Step of each row.
+            positions: Position of each row, world metres.
+            owners: Track of each row, by which positions are extrapolated linearly to steps
+                without a row; with None they are constant.
         """
         self._order = np.argsort(steps, kind="stable")
         self._steps = steps[self._order]
@@ -35,18 +35,18 @@ class Whereabouts:
             self._before, self._after = _ways(self._steps, self._ground, owners[self._order])
 
     def at(self, step: int) -> slice:
-        """The rows of a step, as places in the order of steps."""
+        """The slice of one step, in the order of steps."""
         low, high = np.searchsorted(self._steps, [step, step + 1])
         return slice(int(low), int(high))
 
     def nearest(self, place: Place, *, leeway: int = 0, reach: float = REACH) -> int | None:
-        """The row that a place means: the nearest on the ground within reach, None for nobody.
+        """The row that a place refers to: the nearest on the ground within reach, None for none.
 
         Args:
             place: Step and position.
-            leeway: Steps before and after within which somebody counts who is not there at the
-                very step, where he would be then; all of them count half as much as ``reach``.
-            reach: Metres.
+            leeway: Number of steps before and after from which rows are extrapolated to the step
+                of the place; ``leeway`` steps cost as much as half of ``reach``.
+            reach: Largest distance on the ground, metres.
         """
         low = int(np.searchsorted(self._steps, place.step - leeway))
         high = int(np.searchsorted(self._steps, place.step + leeway, side="right"))
@@ -60,10 +60,11 @@ class Whereabouts:
         best = int(np.argmin(cost))
         return int(self._order[low + best]) if cost[best] <= reach else None
 
-    def stated(self, here: Correction) -> int | None:
-        """The row of who *is here* says is there: at the place, or where a run had whom it means.
+    def row_of(self, here: Correction) -> int | None:
+        """The row that an *is here* correction refers to, None for none.
 
-        As long as nobody is at the place itself, it is who is at the second place that goes there.
+        It is that at the place itself; where no track is there, that at the second place, at
+        which a run had the track.
         """
         place, *meant = here.places
         if not meant:
@@ -71,14 +72,14 @@ class Whereabouts:
         there = self.nearest(place, reach=NEAR)
         return self.nearest(meant[0]) if there is None else there
 
-    def inside(self, nobody: Correction) -> Bool[ndarray, " N"]:
-        """The rows within reach of the way along the places of *nobody*, at its steps."""
+    def inside(self, correction: Correction) -> Bool[ndarray, " N"]:
+        """The rows within the accuracy of the interpolated places of a *nobody* correction."""
         found = np.zeros(len(self._steps), dtype=bool)
-        around = nobody.accuracy or 0.0
-        first, last = nobody.steps
+        around = correction.accuracy or 0.0
+        first, last = correction.steps
         for step in range(first, last + 1):
             own = self.at(step)
-            where = along(nobody.places, step)
+            where = along(correction.places, step)
             if own.start < own.stop and where is not None:
                 near = np.hypot(*(self._ground[own] - where).T) <= around
                 found[self._order[own]] = near
@@ -88,7 +89,7 @@ class Whereabouts:
 def _ways(
     steps: Int[ndarray, " N"], ground: Float[ndarray, "N 2"], owners: Int[ndarray, " N"]
 ) -> tuple[Float[ndarray, "N 2"], Float[ndarray, "N 2"]]:
-    """Metres a step by which each row's owner came to it, and went on from it; 0 at an end."""
+    """The velocity of each row's track before and after it, metres per step; 0 at an end."""
     before, after = np.zeros_like(ground), np.zeros_like(ground)
     order = np.lexsort((steps, owners))
     one, other = order[:-1], order[1:]
@@ -105,10 +106,16 @@ def mostly_inside(
     inside: Bool[ndarray, " N"],
     one: Correction,
 ) -> set[int]:
-    """The owners who are nobody: whose rows at the steps of the correction are mostly along it.
+    """The tracks that a *nobody* correction refers to, with most of their rows inside it.
 
-    Somebody who only passes by is not meant, nor who is there for one step of many alone: where the
-    births that were forbidden are allowed again, somebody may begin at the very last of them.
+    A track that only passes is not among them, nor a longer one with a single row inside: it may
+    be born at the last step of the correction, after which births are allowed again.
+
+    Args:
+        owners: Track of each of N rows.
+        steps: Step of each row.
+        inside: Whether each row is within the accuracy of the correction's places.
+        one: The correction.
     """
     first, last = one.steps
     during = (steps >= first) & (steps <= last)

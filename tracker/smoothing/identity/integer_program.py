@@ -1,4 +1,4 @@
-"""The joining of pieces as an integer program: what a person said, and who has whose colours.
+"""Tracklet association as an integer program, with constraints and with people's colours.
 
 [DFJ54] Dantzig, Fulkerson, Johnson, "Solution of a large-scale traveling-salesman problem",
 Operations Research 2(4), 1954.
@@ -15,94 +15,98 @@ from numpy import ndarray
 from scipy.optimize import Bounds, LinearConstraint, milp
 from scipy.sparse import coo_array, csr_array
 
-from tracker.smoothing.identity.constraints import Ties
+from tracker.smoothing.identity.constraints import LinkConstraints
 
 _REACH = 40.0
-"""What the ways cost at most that are looked at first: few corrections cost more."""
+"""Bound on the reduced cost of the edges that are considered first: few corrections cost more."""
 
 _ROUNDING = 1e-9
 
 Cut = tuple[str, list[int]]
-"""What a solution broke, and the pieces that say so, as :func:`broken`."""
+"""The kind of a violated constraint, and the tracklets concerned, as :func:`broken` returns it."""
 
 
 class _Edges(NamedTuple):
-    """E ways of a piece to go on or to come about, once for each of the people it may be."""
+    """E edges, one for each entry of the table and each of the people that it may be."""
 
     rows: Int[ndarray, " E"]
-    """As of the table: of a piece, how it goes on; beyond them, how one begins."""
+    """Row of the table: a tracklet that is left, or beyond these the beginning of one."""
     columns: Int[ndarray, " E"]
+    """Column of the table: a tracklet that is entered, or beyond these the end of one."""
     people: Int[ndarray, " E"]
-    """Whose looks it has."""
+    """Index of the person with a template whose colours the edge has."""
 
 
 def solved(
     table: Float[ndarray, "2k 2k"],
     possible: Bool[ndarray, "2k 2k"],
-    ties: Ties,
+    constraints: LinkConstraints,
     people: Float[ndarray, "k G"],
     best: Int[ndarray, " 2k"],
     cuts: list[Cut],
 ) -> list[int]:
-    """The column of each of the k pieces' rows in the best chains that obey the ties, where each
-    chain looks like one of G people throughout.
+    """Solve the association of k tracklets under the constraints, each chain being one of G people.
 
-    With x_e^g for a way e that is taken as person g the program is that of the assignment, and
+    With x_e^g = 1 for an edge e that is selected as person g the program is the assignment, and
 
         Σ_g Σ_{e out of i} x_e^g = Σ_g Σ_{e into i} x_e^g = 1
         Σ_{e out of i} x_e^g = Σ_{e into i} x_e^g
 
-    where a piece as g's is worth u_g more.
+    where a tracklet as person g is worth u_g more.
 
-    Ties are linear inequalities. Who is tied together is in one chain: of what i's chain has
-    without j, S, something goes on out of S, Σ_{u∈S, v∉S} x_uv ≥ 1. Who is apart is not: of the
-    joins on the way from i to j one is not made, Σ x_uv ≤ L − 1. They are added where a solution
-    breaks them, until none does, as the subtours of a travelling salesman are [DFJ54].
+    The constraints are linear inequalities. Two tracklets i and j that must be linked are in one
+    chain: where the chain of i is a set S without j, an edge leaves S, Σ_{u∈S, v∉S} x_uv ≥ 1. Of
+    the L links on a path from i to j that cannot be linked one is not made, Σ x_uv ≤ L − 1. They
+    are added where a solution violates them, until none does, like the subtour eliminations of
+    the travelling salesman problem [DFJ54].
 
-    Only ways that cost little are looked at first. What is found with these is the best of all if
-    it is worth no less than the assignment by more than the least that any other way costs.
+    Only edges of small reduced cost are considered first. Their solution is the optimum if it is
+    worth less than the assignment by no more than the least reduced cost of the other edges.
 
     Args:
-        table: Of the assignment: log odds of each way.
-        possible: Which ways there are.
-        ties: What must hold.
-        people: u, as :func:`tracker.smoothing.identity.joining.join`.
-        best: The assignment without what is added here: each row's column.
-        cuts: What solutions broke so far; more are added.
+        table: Log odds of each edge of the assignment.
+        possible: Which edges are admissible.
+        constraints: Constraints on the k tracklets.
+        people: u, the log likelihood of the colours of each tracklet under each person, as in
+            :func:`tracker.smoothing.identity.association.join`.
+        best: The column of each row in the best assignment without constraints and people.
+        cuts: Constraints that solutions violated so far; new ones are added.
+
+    Returns:
+        The column of each of the first k rows.
     """
     size = len(people)
     possible = possible.copy()
     slack = _slack(table, best)
     possible[size:, size:] = False
-    if not ties:
+    if not constraints:
         _leave_out_what_is_worse_than_two(table, possible, size)
     worth = float(table[np.arange(2 * size), best].sum())
     reach = _REACH
     while True:
-        found = _within_reach(table, possible & (slack <= reach), ties, people, best, cuts)
+        found = _within_reach(table, possible & (slack <= reach), constraints, people, best, cuts)
         if found is not None:
             goes_on, value = found
             if worth - value <= reach:
                 return goes_on
-            reach = worth - value + _ROUNDING  # whatever is better is made of these
+            reach = worth - value + _ROUNDING  # every better solution consists of these edges
         elif np.isinf(reach):
-            raise RuntimeError("ties that can all hold were found impossible")
+            raise RuntimeError("consistent constraints have no solution")
         else:
             reach = np.inf
 
 
 def _slack(table: Float[ndarray, "m m"], best: Int[ndarray, " m"]) -> Float[ndarray, "m m"]:
-    """What each way costs at least: no assignment that has it is worth more than the best without
-    so much.
+    """Compute the reduced cost of each edge, by which an assignment with it is worth less at least.
 
     It is u_r + v_c − w_rc with the prices u and v of rows and columns of the dual program,
 
         v_c = max(0, max_r v_{c(r)} + w_rc − w_{r c(r)}),   u_r = w_{r c(r)} − v_{c(r)}
 
-    where c(r) is the best assignment: longest ways, which have no cycle that gains.
+    where c(r) is the best assignment: longest paths, in a graph without positive cycles.
     """
     chosen = table[np.arange(len(table)), best]
-    if not np.isfinite(chosen).all():  # it is none: whatever it is worth tells nothing
+    if not np.isfinite(chosen).all():  # the assignment is inadmissible and gives no bound
         return np.zeros_like(table)
     gains = table - chosen[:, None]
     prices = np.zeros(len(table))
@@ -117,32 +121,35 @@ def _slack(table: Float[ndarray, "m m"], best: Int[ndarray, " m"]) -> Float[ndar
 def _within_reach(
     table: Float[ndarray, "2k 2k"],
     possible: Bool[ndarray, "2k 2k"],
-    ties: Ties,
+    constraints: LinkConstraints,
     people: Float[ndarray, "k G"],
     best: Int[ndarray, " 2k"],
     cuts: list[Cut],
 ) -> tuple[list[int], float] | None:
-    """The best chains of some ways, as :func:`solved`, and what they are worth; None if there are
-    none.
+    """Solve the program over some edges, as :func:`solved`.
 
     Args:
-        table: As the next four.
-        possible: Which ways are looked at.
-        ties: What must hold.
-        people: u.
-        best: The assignment.
-        cuts: What solutions broke so far.
+        table: Log odds of each edge.
+        possible: Which edges are considered.
+        constraints: Constraints on the k tracklets.
+        people: u, the log likelihood of the colours of each tracklet under each person.
+        best: The column of each row in the best assignment without constraints and people.
+        cuts: Constraints that solutions violated so far; new ones are added.
+
+    Returns:
+        The column of each of the first k rows, and the value of the solution; None if there is
+        none.
     """
     size, kinds = people.shape
     edges = _edges(possible, kinds)
     rows, columns = edges.rows, edges.columns
     values = table[rows, columns]
-    somebody = (rows < size) & (rows != columns)
-    values[somebody] += people[rows[somebody], edges.people[somebody]]
+    assigned = (rows < size) & (rows != columns)
+    values[assigned] += people[rows[assigned], edges.people[assigned]]
     inner = (rows < size) & (columns < size) & (rows != columns)
-    constraints = [LinearConstraint(_once(edges, size), 1.0, 1.0)]
+    linear = [LinearConstraint(_once(edges, size), 1.0, 1.0)]
     if kinds > 1:
-        constraints.append(LinearConstraint(_one_person(edges, size, kinds), 0.0, 0.0))
+        linear.append(LinearConstraint(_one_person(edges, size, kinds), 0.0, 0.0))
 
     def cut(kind: str, some: list[int]) -> LinearConstraint:
         if kind == "together":
@@ -152,35 +159,34 @@ def _within_reach(
         on_it = np.isin(rows * (2 * size) + columns, way) & inner
         return LinearConstraint(on_it.astype(float)[None], -np.inf, len(way) - 1.0)
 
-    cuts += [] if cuts else broken(best[:size].tolist(), ties, size)
-    constraints += [cut(*one) for one in cuts]
+    cuts += [] if cuts else broken(best[:size].tolist(), constraints, size)
+    linear += [cut(*one) for one in cuts]
     while True:
         found = milp(
             -values,
             integrality=np.ones(len(rows), dtype=np.int64),
             bounds=Bounds(0.0, 1.0),
-            constraints=constraints,
+            constraints=linear,
             options={"mip_rel_gap": 0.0},
         )
         if found.x is None:
             return None
-        taken = found.x > 0.5
-        chosen = taken & (rows < size)
+        selected = found.x > 0.5
+        chosen = selected & (rows < size)
         goes_on = [-1] * size
         for row, column in zip(rows[chosen].tolist(), columns[chosen].tolist(), strict=True):
             goes_on[row] = column
-        unmet = broken(goes_on, ties, size)
+        unmet = broken(goes_on, constraints, size)
         if not unmet:
-            return goes_on, float(values[taken].sum())
+            return goes_on, float(values[selected].sum())
         cuts += unmet
-        constraints += [cut(*one) for one in unmet]
+        linear += [cut(*one) for one in unmet]
 
 
 def _leave_out_what_is_worse_than_two(
     table: Float[ndarray, "2k 2k"], possible: Bool[ndarray, "2k 2k"], size: int
 ) -> None:
-    """Leave out joins that lose against one who leaves and another who comes: in no best set of
-    chains is such a join, whoever the two are."""
+    """Remove links that are worth less than an end and a beginning: no optimum contains them."""
     inner = np.arange(size)
     ends, begins = table[inner, size + inner], table[size + inner, inner]
     worse = table[:size, :size] < ends[:, None] + begins[None, :]
@@ -189,7 +195,7 @@ def _leave_out_what_is_worse_than_two(
 
 
 def _edges(possible: Bool[ndarray, "m m"], kinds: int) -> _Edges:
-    """Each way as each person; who is nobody is so once."""
+    """List each admissible edge once for each person; that of a false tracklet is listed once."""
     rows, columns = np.nonzero(possible)
     people = np.repeat(np.arange(kinds), len(rows))
     rows, columns = np.tile(rows, kinds), np.tile(columns, kinds)
@@ -198,7 +204,7 @@ def _edges(possible: Bool[ndarray, "m m"], kinds: int) -> _Edges:
 
 
 def _once(edges: _Edges, size: int) -> csr_array:
-    """Each piece goes on once and comes about once."""
+    """Rows of the program by which each tracklet is left once and entered once."""
     out, into = np.flatnonzero(edges.rows < size), np.flatnonzero(edges.columns < size)
     return coo_array(
         (
@@ -213,8 +219,8 @@ def _once(edges: _Edges, size: int) -> csr_array:
 
 
 def _one_person(edges: _Edges, size: int, kinds: int) -> csr_array:
-    """A piece goes on as the one who it was: of all but the first, for whom it follows from
-    the rest."""
+    """Rows by which a tracklet is left as the person that it is entered as, for all but the first
+    person, for whom this follows from the rest."""
     named = (edges.people > 0) & (edges.rows != edges.columns)
     out = np.flatnonzero(named & (edges.rows < size))
     into = np.flatnonzero(named & (edges.columns < size))
@@ -235,21 +241,25 @@ def _one_person(edges: _Edges, size: int, kinds: int) -> csr_array:
     ).tocsr()
 
 
-def broken(goes_on: list[int], ties: Ties, size: int) -> list[Cut]:
-    """The ties that a solution breaks: of those together the chain that lacks the other from the
-    first on, of those apart the way between them."""
+def broken(goes_on: list[int], constraints: LinkConstraints, size: int) -> list[Cut]:
+    """The constraints that a solution violates.
 
-    def chain(piece: int) -> list[int]:
-        found = [piece]
+    Returns:
+        For a pair that must be linked, the chain of the first tracklet, which lacks the second;
+        for a pair that cannot be linked, the path between the two.
+    """
+
+    def chain(tracklet: int) -> list[int]:
+        found = [tracklet]
         while goes_on[found[-1]] < size and goes_on[found[-1]] != found[-1]:
             found.append(goes_on[found[-1]])
         return found
 
     broken: list[Cut] = []
-    for i, j in ties.together:
+    for i, j in constraints.must_link:
         if j not in (own := chain(i)):
             broken.append(("together", own))
-    for i, j in ties.apart:
+    for i, j in constraints.cannot_link:
         for one, other in ((i, j), (j, i)):
             own = chain(one)
             if other in own[1:]:

@@ -13,8 +13,7 @@ from tracker.filters.models import Motion
 from tracker.kernels.smoothing import passes
 from tracker.smoothing.identity.ends import Ends
 from tracker.smoothing.paths import Paths
-from tracker.smoothing.process_noise import restlessness
-from tracker.smoothing.smoother import Fitted
+from tracker.smoothing.smoother import Fitted, process_noise_scales
 
 SIGMA = 0.03
 
@@ -26,7 +25,7 @@ def learnt(places: list[ndarray], turns: int = 20) -> Fitted:
     found, told = None, np.ones(len(paths.states))
     for _ in range(turns):
         found = smooth(told)
-        told = restlessness(paths.starts, found, noise, told, STEP)
+        told = process_noise_scales(paths.starts, found, noise, told, STEP)
     assert found is not None
     return fitted_to(paths, found, told)
 
@@ -47,14 +46,14 @@ def moving(steps: int, seed: int, scale: float = 1.0) -> ndarray:
 
 
 def test_who_stands_is_not_restless_and_who_moves_as_stated_is() -> None:
-    found = learnt([standing(200, 0.0, 1), moving(200, 2)]).restlessness
+    found = learnt([standing(200, 0.0, 1), moving(200, 2)]).noise_scales
     assert found[:200].max() < 0.2
     # each step counts in full up to twice the mean: a little less than 1
     assert 0.5 < np.median(found[200:]) < 1.2
 
 
 def test_more_of_the_same_noise_is_found_in_its_order() -> None:
-    told = [np.median(learnt([moving(300, 3, scale)]).restlessness) for scale in (0.1, 0.3, 1.0)]
+    told = [np.median(learnt([moving(300, 3, scale)]).noise_scales) for scale in (0.1, 0.3, 1.0)]
     assert told[0] < 0.6 * told[1] < 0.6 * told[2]
 
 
@@ -63,7 +62,7 @@ def test_one_jump_to_anothers_place_makes_nobody_restless() -> None:
     jumped = still.copy()
     jumped[30:, 0] += 0.5
     found = learnt([jumped])
-    assert found.restlessness.max() < 0.25
+    assert found.noise_scales.max() < 0.25
     jump = found.jumps
     assert np.argmax(jump) in (29, 30, 31)
     assert jump.max() > 2.0 * learnt([jumped], turns=1).jumps.max()
@@ -76,7 +75,9 @@ def test_without_boxes_nothing_is_learnt() -> None:
     found = passes.smooth_paths(
         starts, np.zeros((2, 6)), np.zeros((6, 3, 3)), np.zeros((6, 3)), rule, np.ones(6)
     )
-    assert_allclose(restlessness(starts, found, motion.noise, np.ones(6), STEP), 1.0, atol=1e-6)
+    assert_allclose(
+        process_noise_scales(starts, found, motion.noise, np.ones(6), STEP), 1.0, atol=1e-6
+    )
 
 
 def test_restlessness_is_the_mean_of_what_drove_the_person() -> None:
@@ -101,7 +102,7 @@ def test_restlessness_is_the_mean_of_what_drove_the_person() -> None:
         own = inner & ((np.arange(12) < 5) == (row < 5))
         kept = np.exp(-STEP / 8.0 * np.abs(np.arange(12) - row))[own]
         told.append((prior + kept @ squares[own]) / (prior + 4.0 * kept.sum()))
-    assert_allclose(restlessness(paths.starts, found, noise, before, STEP), told, rtol=1e-6)
+    assert_allclose(process_noise_scales(paths.starts, found, noise, before, STEP), told, rtol=1e-6)
 
 
 def test_drives_are_what_they_say() -> None:
@@ -138,13 +139,13 @@ def test_the_ends_of_a_piece_in_a_chain_are_what_the_rest_of_the_chain_says() ->
         6,
     )  # fmt: skip
     own = Fitted(
-        cut, np.zeros(12), paths.states, paths.covariances, np.zeros(12), whole.restlessness
+        cut, np.zeros(12), paths.states, paths.covariances, np.zeros(12), whole.noise_scales
     )
     told = Ends.alone(own, PRIOR).in_chains(cut, whole, np.arange(12), motion)
     for piece, row in ((0, 5), (1, 6)):
         ahead = motion.transition @ told.ends[piece]
         spread = motion.transition @ told.covariances[piece] @ motion.transition.T
-        spread += whole.restlessness[row] * motion.noise
+        spread += whole.noise_scales[row] * motion.noise
         assert_allclose(ahead, whole.ahead[row], atol=1e-8)
         information = np.linalg.inv(spread) + told.information[piece + 1]
         vector = np.linalg.solve(spread, ahead) + told.vectors[piece + 1]

@@ -1,4 +1,4 @@
-"""Tracks cut into pieces where it is a draw whose boxes are whose, and what joins them again."""
+"""Tracklets: parts of tracks without ambiguous association, and the motion odds of linking them."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from tracker.smoothing.identity.ends import Ends
 from tracker.smoothing.paths import Links, Paths
 
 _CHANGES = 0.1
-"""Probability that somebody begins to move as the motion model says while nobody sees him."""
+"""Probability that a person's process noise returns to the model's within a gap."""
 
 
 def contested(paths: Paths, links: Links) -> Float[ndarray, " N"]:
-    """By which share the boxes of each row may as well be another path's.
+    """Compute the share of each row's boxes that may belong to another path as well.
 
         Σ_z min(a_i(z), max_{j≠i} a_j(z)) / Σ_z a_i(z)
 
-    over the boxes z of all cameras with association probabilities a: 0 where they are nobody
-    else's, 1 where they are somebody else's just as well.
+    over the boxes z of all cameras with association probabilities a: 0 where they belong to no
+    other path, 1 where another path is at least as likely.
     """
     rows = len(paths.states)
     own = np.bincount(links.rows, links.shares, rows)
@@ -45,12 +45,15 @@ def contested(paths: Paths, links: Links) -> Float[ndarray, " N"]:
 def cut(
     paths: Paths, clear: Bool[ndarray, " N"], breaks: Bool[ndarray, " N"]
 ) -> tuple[Paths, Int[ndarray, " M"]]:
-    """The runs of clear rows as paths of their own, and which row each of their rows was.
+    """Split paths into the runs of clear rows.
 
     Args:
-        paths: What is cut.
-        clear: Rows that are kept.
-        breaks: Rows before which a path is cut even where both sides are clear.
+        paths: The paths, with N rows.
+        clear: The rows that remain.
+        breaks: The rows before which a path is split even where both sides are clear.
+
+    Returns:
+        The runs as paths with M rows, and the row of ``paths`` that each of these was.
     """
     kept = np.flatnonzero(clear)
     owners = paths.owners[kept]
@@ -71,14 +74,14 @@ def cut(
 
 
 def moved(links: Links, kept: Int[ndarray, " M"], rows: int) -> Links:
-    """The links of rows that were kept, by their new rows."""
+    """Renumber the links after M of N rows were selected; links of other rows are removed."""
     place = np.full(rows, -1, dtype=np.int64)
     place[kept] = np.arange(len(kept))
     return moved_to(links, place)
 
 
 def moved_to(links: Links, place: Int[ndarray, " N"]) -> Links:
-    """The links of rows that have a new place, -1 for none, by that place."""
+    """Renumber the links by the new index of each row, -1 for rows whose links are removed."""
     new = place[links.rows]
     chosen = links.take(new >= 0)
     return Links(chosen.cameras, new[new >= 0], chosen.boxes, chosen.shares)
@@ -86,23 +89,25 @@ def moved_to(links: Links, place: Int[ndarray, " N"]) -> Links:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pairs:
-    """P pairs of pieces that may be one person's, the first before the second."""
+    """P pairs of tracklets that may be linked, the first before the second."""
 
     earlier: Int[ndarray, " P"]
+    """Index of the first tracklet."""
     later: Int[ndarray, " P"]
+    """Index of the second tracklet."""
     gaps: Int[ndarray, " P"]
-    """Steps from the end of the one to the beginning of the other, at least 1."""
+    """Number of steps from the end of the first to the beginning of the second, at least 1."""
     gains: Float[ndarray, " P"]
-    """log of how much better the second fits as the first's continuation than anywhere."""
+    """Log odds of the second continuing the first against being a new target."""
 
     def of_ends(self, chains: Many[Many[int]]) -> Pairs:
-        """Pairs of chains as pairs of the last piece of the one and the first of the other."""
+        """Convert pairs of chains to pairs of one's last tracklet and the other's first."""
         first = np.array([chain[0] for chain in chains], dtype=np.int64)
         last = np.array([chain[-1] for chain in chains], dtype=np.int64)
         return Pairs(last[self.earlier], first[self.later], self.gaps, self.gains)
 
     def with_more(self, more: Pairs) -> Pairs:
-        """These and others."""
+        """Append other pairs."""
         return Pairs(
             np.concatenate([self.earlier, more.earlier]),
             np.concatenate([self.later, more.later]),
@@ -111,16 +116,16 @@ class Pairs:
         )
 
 
-def near_pairs(pieces: Paths, *, longest: int, fastest: float) -> Pairs:
-    """The pairs that may be one person's by when and where they are, with gains of 0.
+def near_pairs(tracklets: Paths, *, longest: int, fastest: float) -> Pairs:
+    """List the pairs that are possible by time and distance, with gains of 0.
 
     Args:
-        pieces: Of tracks.
-        longest: Steps of the longest gap.
-        fastest: Metres a step that nobody exceeds.
+        tracklets: The n tracklets.
+        longest: Longest gap, steps.
+        fastest: Largest speed, metres per step.
     """
-    ends, begins = pieces.starts[1:] - 1, pieces.starts[:-1]
-    lasts, firsts = pieces.lasts, pieces.firsts
+    ends, begins = tracklets.starts[1:] - 1, tracklets.starts[:-1]
+    lasts, firsts = tracklets.lasts, tracklets.firsts
     order = np.argsort(firsts, kind="stable")
     low = np.searchsorted(firsts[order], lasts, side="right")
     high = np.searchsorted(firsts[order], lasts + longest, side="right")
@@ -128,44 +133,45 @@ def near_pairs(pieces: Paths, *, longest: int, fastest: float) -> Pairs:
     offset = np.arange(len(earlier)) - np.repeat(np.cumsum(high - low) - (high - low), high - low)
     later = order[np.repeat(low, high - low) + offset] if len(earlier) else earlier
     gaps = firsts[later] - lasts[earlier]
-    way = pieces.states[begins[later], :3] - pieces.states[ends[earlier], :3]
+    way = tracklets.states[begins[later], :3] - tracklets.states[ends[earlier], :3]
     near = np.linalg.norm(way, axis=1) <= 1.0 + fastest * gaps
-    # as the filter had it is always possible: it may have followed another before
+    # a pair with one label of the filter is always possible
     goes_on = np.full(len(lasts), -1)
-    for one, other in same_label(pieces):
+    for one, other in same_label(tracklets):
         goes_on[one] = other
     near |= goes_on[earlier] == later
     return Pairs(earlier[near], later[near], gaps[near], np.zeros(int(near.sum())))
 
 
 def motion_gains(
-    pieces: Paths,
+    tracklets: Paths,
     pairs: Pairs,
     known: Ends,
     motion: Motion,
     prior: Float[ndarray, "d d"],
     log_place: float,
 ) -> Float[ndarray, " P"]:
-    """The motion's log odds of pairs of pieces.
+    """Compute the log odds of pairs of tracklets by motion.
 
-    With Λ, η the information of what is from the later piece's beginning on, and N(a, A_s) the
-    earlier one's last state predicted over the gap by a motion with noise s Q,
+    With Λ, η the information on the first state of the later tracklet, and N(a, A_s) the last
+    state of the earlier one predicted over the gap with process noise s Q,
 
         gain = log Σ_s w_s ∫ N(x; a, A_s) e^{ηᵀx − ½ xᵀΛx} dx − log ∫ p_0(x) e^{ηᵀx − ½ xᵀΛx} dx
 
-    with the density p_0 of a newcomer: anywhere in the room, at a newcomer's speed. The person is
-    mostly as restless as before and after, s = √(s_i s_j), and else no less than the motion says.
+    with the density p_0 of a new target: uniform in the room, with the velocity of a birth. The
+    scale s of the process noise is with probability 0.9 that before and after, s = √(s_i s_j),
+    and else at least 1.
 
     Args:
-        pieces: Each fitted to its own boxes alone.
-        pairs: Of them.
-        known: Of their ends.
-        motion: Of the fusion.
-        prior: Covariance of a first state in the fit.
-        log_place: What turns its density into that of the room.
+        tracklets: The n tracklets, each fitted to its own boxes alone.
+        pairs: P pairs of these.
+        known: Estimates at the ends of the tracklets.
+        motion: The motion model of the fusion.
+        prior: Prior covariance of a first state in the fit.
+        log_place: Log ratio of the uniform density over the room and the density of the prior.
     """
     earlier, later, gaps = pairs.earlier, pairs.later, pairs.gaps
-    begins = pieces.starts[:-1]
+    begins = tracklets.starts[:-1]
     # F^k, and the noise that k steps add
     d = motion.dimension
     most = int(gaps.max(initial=1))
@@ -177,9 +183,9 @@ def motion_gains(
     f = transitions[gaps]
     a = np.einsum("pij,pj->pi", f, known.ends[earlier])
     spread = f @ known.covariances[earlier] @ f.transpose(0, 2, 1)
-    own = np.sqrt(known.restlessness[earlier, 1] * known.restlessness[later, 0])
-    told = known.information[later], known.vectors[later]
-    centre = pieces.states[begins].copy()
+    own = np.sqrt(known.noise_scales[earlier, 1] * known.noise_scales[later, 0])
+    later_ends = known.information[later], known.vectors[later]
+    centre = tracklets.states[begins].copy()
     centre[:, 3:] = 0.0
     newcomer = log_integral(
         centre,
@@ -189,7 +195,7 @@ def motion_gains(
     )
     gains = np.logaddexp(
         *(
-            np.log(weight) + log_integral(a, spread + s[:, None, None] * noises[gaps], *told)
+            np.log(weight) + log_integral(a, spread + s[:, None, None] * noises[gaps], *later_ends)
             for weight, s in ((1.0 - _CHANGES, own), (_CHANGES, np.maximum(own, 1.0)))
         )
     )
@@ -202,20 +208,22 @@ def log_integral(
     information: Float[ndarray, "P d d"],
     vectors: Float[ndarray, "P d"],
 ) -> Float[ndarray, " P"]:
-    """log ∫ N(x; m, P) e^{ηᵀx − ½ xᵀΛx} dx."""
+    """Compute log ∫ N(x; m, P) e^{ηᵀx − ½ xᵀΛx} dx for P Gaussians and information pairs."""
     if not len(means):
         return np.zeros(0)
     bracket = np.eye(means.shape[1]) + information @ covariances
-    told = vectors - np.einsum("pij,pj->pi", information, means)
-    shift = np.einsum("pij,pj->pi", covariances, np.linalg.solve(bracket, told[..., None])[..., 0])
+    residual = vectors - np.einsum("pij,pj->pi", information, means)
+    shift = np.einsum(
+        "pij,pj->pi", covariances, np.linalg.solve(bracket, residual[..., None])[..., 0]
+    )
     _, log_determinant = np.linalg.slogdet(bracket)
     fixed = np.einsum("pi,pi->p", means, vectors)
     fixed -= 0.5 * np.einsum("pi,pij,pj->p", means, information, means)
-    return np.asarray(fixed + 0.5 * np.einsum("pi,pi->p", told, shift) - 0.5 * log_determinant)
+    return np.asarray(fixed + 0.5 * np.einsum("pi,pi->p", residual, shift) - 0.5 * log_determinant)
 
 
 def same_label(paths: Paths) -> list[tuple[int, int]]:
-    """Each piece and the next one that has the same label of the filter's."""
+    """The pairs of each tracklet and the next one with the same label of the filter."""
     order = np.lexsort((paths.firsts, paths.labels))
     one, other = order[:-1], order[1:]
     same = (paths.labels[one] == paths.labels[other]) & (paths.lasts[one] < paths.firsts[other])
@@ -225,7 +233,16 @@ def same_label(paths: Paths) -> list[tuple[int, int]]:
 def chained(
     cut: Paths, chains: list[list[int]], labels: list[int]
 ) -> tuple[Paths, Int[ndarray, " M"]]:
-    """The chains as paths, drawn straight through their gaps, and each row's place in them."""
+    """Join the tracklets of each chain to one path, by linear interpolation in the gaps.
+
+    Args:
+        cut: The tracklets, with M rows.
+        chains: The tracklets of each chain, in the order of time.
+        labels: Label of each chain.
+
+    Returns:
+        The paths, and the row of these for each of the M rows, -1 for tracklets in no chain.
+    """
     dimension = cut.states.shape[1]
     steps, place = cut.steps, np.full(len(cut.states), -1, dtype=np.int64)
     firsts, states, covariances, begin = [], [], [], 0
