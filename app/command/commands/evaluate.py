@@ -207,7 +207,7 @@ def print_evaluation(evaluation: Evaluation) -> None:
     """The figures with what each was measured with, then the people."""
     print_table(
         ("figure", ">value", "unit", "measured with"),
-        [(f.definition.name, f.text, f.unit, f.stated) for f in evaluation.figures],
+        [(f.definition.name, f.text, f.unit, f.measured_with) for f in evaluation.figures],
     )
     if not evaluation.people:
         return
