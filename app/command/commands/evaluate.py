@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from contextlib import closing
-from dataclasses import asdict, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
@@ -128,7 +128,10 @@ def estimate_without_truth(command: Evaluate) -> None:
             "backwards": found.backwards,
             "without": dict(zip(names, found.without, strict=False)),
             "overlap": dict(zip(names, found.overlaps, strict=False)),
-            "doubts": [asdict(doubt) for doubt in found.doubts],
+            "doubts": [
+                {"step": one.step, "ids": one.ids, "looks": one.variants, "why": one.why}
+                for one in found.disagreements
+            ],
         }
         print_json(document)
     else:
@@ -149,11 +152,11 @@ def _print_estimate(found: Estimate, names: list[str]) -> None:
         words = f"its boxes overlap the others' people by {number(overlap, 2)}"
         rows.append((f"without {name}", number(agreed, 3), words))
     print_table(("figure", ">value", "measured with"), rows)
-    if found.doubts:
+    if found.disagreements:
         sys.stdout.write("\n")
         print_table(
             (">step", "doubtful"),
-            [(str(doubt.step), doubt.why) for doubt in found.doubts[:_SHOWN_DOUBTS]],
+            [(str(doubt.step), doubt.why) for doubt in found.disagreements[:_SHOWN_DOUBTS]],
         )
 
 
