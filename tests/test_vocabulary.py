@@ -25,7 +25,7 @@ OF_MODULES = ("checked", "visible")
 """Words that say nothing as the name of a module."""
 
 NOT_DONE = {
-    "corrections", "fusion", "geometry", "io", "kernels", "library",
+    "corrections", "fusion", "geometry", "io", "kernels",
     "parameters", "sequences", "single_view", "smoothing", "studies", "app",
 }  # fmt: skip
 """Packages whose inner names are not the field's yet."""

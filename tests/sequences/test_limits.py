@@ -326,13 +326,13 @@ def test_a_box_has_a_size_and_a_score(cell: int) -> None:
 
 def test_boxes_belong_to_the_step_of_their_frame() -> None:
     looks = np.arange(6.0).reshape(3, 2)
-    made = box_table([box(6), box(4), box(5, score=1.0)], first=4, looks=looks)
+    made = box_table([box(6), box(4), box(5, score=1.0)], first=4, embeddings=looks)
     assert made.steps == 3
     found, looked_at = made.detections(3, None)
     assert looked_at is None
     assert_array_equal(found.frames, [0, 1, 2])
     assert_array_equal(found.scores, [0.5, 1.0, 0.5])
-    assert_array_equal(found.looks, looks[[1, 2, 0]])
+    assert_array_equal(found.embeddings, looks[[1, 2, 0]])
     assert refused(lambda: made.detections(2, None))
     assert box_table([]).steps == 0
     # counted from 4, while the camera's file begins at frame 1: its frames 3, 1 and 2

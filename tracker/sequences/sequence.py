@@ -70,9 +70,11 @@ class Detections:
     """left, top, width, height, pixels."""
     scores: Float[ndarray, " D"]
     """0 … 1; 1 where the file has none."""
-    looks: Float16[ndarray, "D A"] = field(default_factory=lambda: np.zeros((0, 0), np.float16))
-    """What each box looks like to an outside network, as a unit vector, 0 where it does not say;
-    (0, 0) where there is no file of it."""
+    embeddings: Float16[ndarray, "D A"] = field(
+        default_factory=lambda: np.zeros((0, 0), np.float16)
+    )
+    """Unit vectors of each box's appearance from an outside network, or zeros for a box without
+    one; of shape (0, 0) if there is no such file."""
 
     def at(self, frame: int) -> slice:
         """The rows of one step."""

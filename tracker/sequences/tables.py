@@ -63,8 +63,8 @@ class BoxTable:
     """Whether only frames that have a row were looked at."""
     file_starts: int
     """Which frame of the camera's file the first picture is."""
-    looks: Float16[ndarray, "N A"]
-    """What each row's box looks like; (0, 0) where no file tells."""
+    embeddings: Float16[ndarray, "N A"]
+    """The appearance vector of each row's box; of shape (0, 0) if there is no such file."""
 
     @property
     def steps(self) -> int:
@@ -124,8 +124,8 @@ class BoxTable:
                 f"step {step}; leave out those with low scores",
             )
         boxes: Float[ndarray, "D 4"] = columns.stacked(*BOX)[kept]
-        looks = self.looks[kept] if self.looks.shape[1] else self.looks
-        return Detections(of_row[kept], boxes, scores[kept], looks), looked_at
+        embeddings = self.embeddings[kept] if self.embeddings.shape[1] else self.embeddings
+        return Detections(of_row[kept], boxes, scores[kept], embeddings), looked_at
 
     def _looked_at(
         self, steps: int, clock: Clock | None, of_row: Int[ndarray, " N"]
@@ -172,12 +172,12 @@ def read_box_table(fields: Fields, reading: Reading, file_starts: int) -> BoxTab
     if steps not in ("all", "listed"):
         raise fields.error("detected_steps", f'expected "all" or "listed", found "{steps}"')
     first = fields.integer("detections_first_frame", 0)
-    looks = np.zeros((0, 0), dtype=np.float16)
+    embeddings = np.zeros((0, 0), dtype=np.float16)
     if "appearance" in fields:
         file = locate(reading.folder, fields, "appearance")
         reading.files.append(file)
-        looks = read_appearance(file, fields, path.name, len(columns))
-    return BoxTable(columns, first, steps == "listed", file_starts, looks)
+        embeddings = read_appearance(file, fields, path.name, len(columns))
+    return BoxTable(columns, first, steps == "listed", file_starts, embeddings)
 
 
 def read_ground_truth(fields: Fields, reading: Reading, frames: int) -> GroundTruth | None:

@@ -85,11 +85,11 @@ def read_sources(tables: Many[Fields], reading: Reading) -> tuple[Source, ...]:
 
 def _check_lengths(sources: Many[Source]) -> None:
     """One network looked into all cameras."""
-    known = [one for one in sources if one.table is not None and one.table.looks.shape[1]]
+    known = [one for one in sources if one.table is not None and one.table.embeddings.shape[1]]
     for one in known[1:]:
         assert one.table is not None
         assert known[0].table is not None
-        own, first = one.table.looks.shape[1], known[0].table.looks.shape[1]
+        own, first = one.table.embeddings.shape[1], known[0].table.embeddings.shape[1]
         if own != first:
             raise one.fields.error(
                 "appearance",

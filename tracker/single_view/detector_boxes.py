@@ -63,7 +63,9 @@ class DetectorBoxes:
         above = all_boxes.scores >= p.score_threshold
         self._frames = all_boxes.frames[above]
         found = judged(sequence, view.camera, all_boxes.boxes[above], all_boxes.scores[above], p)
-        looks = all_boxes.looks[above] if all_boxes.looks.shape[1] else all_boxes.looks
+        looks = (
+            all_boxes.embeddings[above] if all_boxes.embeddings.shape[1] else all_boxes.embeddings
+        )
         self._found = replace(found, looks=looks)
         """Of all steps: the judgement of a box asks for no other."""
 
