@@ -26,7 +26,7 @@ OF_MODULES = ("checked", "visible")
 
 NOT_DONE = {
     "corrections", "fusion", "geometry", "io", "kernels",
-    "parameters", "sequences", "single_view", "smoothing", "app",
+    "parameters", "single_view", "smoothing", "app",
 }  # fmt: skip
 """Packages whose inner names are not the field's yet."""
 
