@@ -128,7 +128,7 @@ def _ways(half: str) -> Iterable[RunParameters]:
         for single_view in FOLLOWING
         for smoothing_method in _own("smoothing_method")
     )
-    # the orders are opposite, so that the processes seldom wait for a kernel that the other compiles
+    # the orders are opposite, so that neither process waits for what the other compiles
     if half == HALVES[0]:
         return of_views
     boxes = RunParameters(single_view="none")
