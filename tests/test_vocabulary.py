@@ -34,8 +34,7 @@ PARAMETERS = {
 """Names of parameters: files have them, and only the package of parameters can change them."""
 
 NOT_DONE = {
-    "evaluation", "export", "io", "library", "parameters", "review", "runs", "sequences",
-    "single_view", "studies", "app",
+    "io", "parameters", "single_view", "app",
 }  # fmt: skip
 """Packages whose inner names are not the field's yet."""
 

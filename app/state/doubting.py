@@ -41,7 +41,7 @@ class Doubting:
     def _remember(self, sequence: str, made: Queue) -> None:
         if sequence != self._of:
             self._of, self._told = sequence, {}
-        for one in made.doubts:
+        for one in made.items:
             self._told.pop(one.id, None)
             self._told[one.id] = one
         for old in list(self._told)[:-_MOST]:
@@ -49,7 +49,7 @@ class Doubting:
 
     def find(self, snapshot: Snapshot, identity: str) -> ReviewItem | None:
         """One of them; None where it is not there any more."""
-        return next((one for one in self.of(snapshot).doubts if one.id == identity), None)
+        return next((one for one in self.of(snapshot).items if one.id == identity), None)
 
     def told(self, snapshot: Snapshot, identity: str) -> ReviewItem | None:
         """One of them, or of a run before: what somebody says of steps and places who still has

@@ -15,7 +15,7 @@ from tracker import parameters as table
 from tracker.corrections import Correction
 from tracker.fusion.trajectories import Trajectories
 from tracker.parameters import MethodKey, RunParameters
-from tracker.review.template_suggestions import Offer
+from tracker.review.template_suggestions import Suggestion
 from tracker.runs.fitting import unfit_methods
 from tracker.runs.pipeline import Run
 from tracker.sequences.pictures.frames import FrameReader
@@ -163,7 +163,7 @@ class Snapshot:
     scores: Scores = field(default_factory=Scores)
     """Runs against the truth, where there is one."""
     ghosts: Ghosts | None = None
-    offers: tuple[Offer, ...] | None = None
+    offers: tuple[Suggestion, ...] | None = None
     """Templates cut from a run's tracks, once somebody asked for them."""
     layers: Mapping[str, bool] = field(
         # the truth is in the pictures at first: in 3D twice as many boxes hide the people

@@ -30,7 +30,7 @@ from app.state.snapshot import (
 from tracker import parameters as table
 from tracker.corrections import Correction
 from tracker.parameters import ParameterError, RunParameters
-from tracker.review.template_suggestions import Offer
+from tracker.review.template_suggestions import Suggestion
 from tracker.runs.pipeline import Run
 from tracker.sequences.sequence import Sequence
 
@@ -258,7 +258,7 @@ class Workbench(ShownRun):
             if ghosts is not None or now.ghosts is not None:
                 self._put("ghosts", ghosts=ghosts)
 
-    def show_offers(self, sequence: Sequence, offers: tuple[Offer, ...] | None) -> None:
+    def show_offers(self, sequence: Sequence, offers: tuple[Suggestion, ...] | None) -> None:
         """Have Teach list templates that may be taken, or no more.
 
         Args:

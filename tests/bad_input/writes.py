@@ -36,10 +36,10 @@ from tracker.sequences.sequence import Sequence
 from tracker.sequences.writing import saving
 from tracker.sequences.writing.teaching import Values, taught_values, with_taught
 from tracker.single_view.protocol import ViewResult
-from tracker.studies.kept.journal import Journal
 from tracker.studies.kept.records import Status, Trial
 from tracker.studies.kept.store import Store, create
 from tracker.studies.kept.writer import Writer
+from tracker.studies.sampling import Journal
 from tracker.studies.work.jobs import Outcome
 
 STEP = 2.0**-12
@@ -189,7 +189,7 @@ def end_trial(folder: Path, number: int) -> None:
     with Writer(folder / "studies" / "small") as writer:
         writer.keep(Outcome(f"key-{number}", "done", figures={"score": 0.5}))
         writer.end(Trial(number, "complete", {}, (0.5,), (0.0,), {}, False, "", 1.0, ()))
-        writer.say(Status("running", done=number))
+        writer.write_status(Status("running", done=number))
 
 
 def ended_trials(folder: Path) -> int:

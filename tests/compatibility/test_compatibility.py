@@ -599,7 +599,7 @@ def test_every_field_of_a_camera_is_read() -> None:
         ([0, 4], [[7, 9.5, 11, 25], [20, 9.5, 11, 25]], [1.0, 1.0]),
         ([0, 7], [[20, 20, 8, 8], [30, 22, 8, 8]], [0.25, 0.125]),
     ]
-    looks = [detections.looks for detections in boxes if detections]
+    looks = [detections.embeddings for detections in boxes if detections]
     np.testing.assert_allclose(looks[0], [[0, 1, 0], [0.6, 0.8, 0]], atol=1e-3)
     np.testing.assert_allclose(looks[1], [[0, 0, 1], [0, 1, 0]], atol=1e-3)
     looked_at = [door.was_looked_at(step) for step in range(8)]

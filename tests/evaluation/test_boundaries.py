@@ -301,11 +301,11 @@ def test_an_uncertain_position_beyond_the_gate_takes_nothing() -> None:
 def test_what_is_stated_beside_a_figure_has_its_unit() -> None:
     names = ("distance", "gate", "cutoff", "order", "window", "near", "overlap")
     settings = EvaluationSettings(gate=0.75, cutoff=2.0, order=2.0, window=2, near=0.2, overlap=0.4)
-    assert settings.stated(names) == (
+    assert settings.in_words(names) == (
         "3D distance, gate 0.75 m, cut-off 2 m, order 2, window 2 steps, within 0.2 m, IoU ≥ 0.4"
     )
     boxes = EvaluationSettings(distance="box", box_gate=0.4, gate=0.75, cutoff=0.8, window=1)
-    assert boxes.stated(("gate", "cutoff", "window")) == "gate 0.4, cut-off 0.8, window 1 step"
+    assert boxes.in_words(("gate", "cutoff", "window")) == "gate 0.4, cut-off 0.8, window 1 step"
     assert (boxes.unit, settings.unit) == ("", "m")
     assert (boxes.effective_gate, settings.effective_gate) == (0.4, 0.75)
 

@@ -37,7 +37,8 @@ def test_settings_stand_beside_the_figures():
     truth, tracks = by_hand()
     settings = EvaluationSettings(gate=0.75, cutoff=2.0, order=2.0, window=1, near=0.2)
     stated = {
-        f.definition.key: (f.unit, f.stated) for f in evaluate(truth, tracks, settings).figures
+        f.definition.key: (f.unit, f.measured_with)
+        for f in evaluate(truth, tracks, settings).figures
     }
     assert stated["mota"] == ("", "3D distance, gate 0.75 m")
     assert stated["ospa"] == ("m", "3D distance, cut-off 2 m, order 2")
@@ -45,7 +46,7 @@ def test_settings_stand_beside_the_figures():
     assert stated["gospa_missed"][0] == "m^2"
     assert stated["found_share"][1] == "within 0.2 m"
     boxes = evaluate(truth, tracks, EvaluationSettings(distance="box"), half_extents=HALF_EXTENTS)
-    by_key = {f.definition.key: (f.unit, f.stated) for f in boxes.figures}
+    by_key = {f.definition.key: (f.unit, f.measured_with) for f in boxes.figures}
     assert by_key["motp"] == ("", "3D-box (1 − GIoU)/2, gate 0.5")
     assert by_key["gospa_false"][0] == ""
     assert by_key["position_error"][0] == "m"

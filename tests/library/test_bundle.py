@@ -90,7 +90,7 @@ def test_a_camera_without_a_picture_is_blind_elsewhere_too(tmp_path: Path) -> No
     np.testing.assert_array_equal(there[0].looked_at, looked_at)
     assert there[0].detections is not None
     np.testing.assert_array_equal(there[0].detections.frames, boxes.frames)
-    np.testing.assert_array_equal(there[0].detections.looks, looks)
+    np.testing.assert_array_equal(there[0].detections.embeddings, looks)
     assert there[1].looked_at is None
 
 

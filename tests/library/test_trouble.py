@@ -13,7 +13,7 @@ import pytest
 
 from tests.library.runs import RECORDING, filled, made_by_the_version_before, run
 from tracker.library import repair
-from tracker.library.errors import LibraryError, told
+from tracker.library.errors import LibraryError, explained
 from tracker.library.store import Library, open_library
 
 
@@ -62,7 +62,7 @@ def test_one_that_may_only_be_read(path: Path, monkeypatch: pytest.MonkeyPatch) 
         assert len(library.runs()) == 4
         with pytest.raises(LibraryError, match="open for reading alone"):
             library.keep(RECORDING, run(9))
-        with pytest.raises(LibraryError, match="can be read but not written"), told(path):
+        with pytest.raises(LibraryError, match="can be read but not written"), explained(path):
             library._connection.execute("UPDATE runs SET star = 1")
 
 

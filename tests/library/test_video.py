@@ -15,7 +15,7 @@ from tests.library.written import written
 from tests.synthetic import number_in, write_sequence
 from tracker.export.palette import rgb
 from tracker.export.registry import FORMATS, save
-from tracker.export.video.drawing import Mosaic
+from tracker.export.video import Mosaic
 from tracker.export.written import Options, Stopped, Written
 from tracker.fusion.trajectories import Trajectories
 from tracker.parameters import RunParameters

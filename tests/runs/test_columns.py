@@ -13,7 +13,7 @@ from jaxtyping import Float, Int
 from numpy import ndarray
 
 from tests.engine.synthetic import crossing, sequence, views_at
-from tracker.runs.columns import pack, unpack
+from tracker.runs.stage_files import pack, unpack
 from tracker.single_view.protocol import ViewEvent, ViewResult
 
 

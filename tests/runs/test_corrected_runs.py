@@ -16,7 +16,7 @@ from tracker.corrections.kinds import make
 from tracker.corrections.log import dump, parse
 from tracker.fusion.multi_bernoulli import MultiBernoulli
 from tracker.parameters import RunParameters, with_values
-from tracker.review.queue.item import Lanes
+from tracker.review.queue.item import TrackRows
 from tracker.runs import pipeline
 from tracker.runs.pipeline import Run
 from tracker.runs.stage_cache import StageCache
@@ -191,7 +191,7 @@ def test_who_turns_often_is_left_out_along_his_whole_course() -> None:
     other = walk((1.1, -0.9, 1.0), (-1.0, -0.8, 1.0), steps)
     whole = sequence([(0, path), (0, other)], steps)
     before = run_of(whole)
-    lanes = Lanes(before.tracks)
+    lanes = TrackRows(before.tracks)
     track = max(
         lanes.ids.tolist(), key=lambda one: before.tracks.positions[lanes.rows[one], 1].mean()
     )

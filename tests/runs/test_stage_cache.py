@@ -297,8 +297,21 @@ def test_other_code_has_other_keys(tmp_path: Path, monkeypatch: pytest.MonkeyPat
         assert {stage for stage in stages if now[stage] != start[stage]} == later, name
         path.write_text(text, encoding="utf-8")
     assert versions() == start
+    for package in ("evaluation", "export", "library", "review", "studies"):
+        for path in (copy / package).rglob("*.py"):
+            path.write_text(path.read_text(encoding="utf-8") + "CHANGED = 1\n", encoding="utf-8")
+    assert versions() == start
     monkeypatch.setattr(np, "__version__", "0")
     assert all(versions()[stage] != start[stage] for stage in stages)
+
+
+def test_every_path_that_is_left_out_of_a_key_is_there() -> None:
+    root = Path(numbers_version.__file__).parents[1]
+    later = [path for paths in numbers_version.LATER.values() for path in paths]
+    for path in (*numbers_version.WITHOUT_EFFECT, *later):
+        assert (root / path).is_file() if path.endswith(".py") else (root / path).is_dir(), path
+        others = [one.name for one in (root / path).parent.glob(f"{Path(path).name}*")]
+        assert others == [Path(path).name], "another name begins with the same letters"
 
 
 def test_the_keys_hold_the_version(monkeypatch: pytest.MonkeyPatch) -> None:

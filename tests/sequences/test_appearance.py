@@ -37,9 +37,9 @@ def test_vectors_have_the_order_of_the_table_and_the_length_one(tmp_path: Path) 
     for view in read_sequence(folder).views:
         own = view.detections
         assert own is not None
-        assert own.looks.shape == (FRAMES, 6)
+        assert own.embeddings.shape == (FRAMES, 6)
         expected = values / np.maximum(np.linalg.norm(values, axis=1, keepdims=True), 1e-9)
-        np.testing.assert_allclose(own.looks, expected, atol=1e-3)
+        np.testing.assert_allclose(own.embeddings, expected, atol=1e-3)
     key = read_sequence(folder).digest
     np.save(folder / "cam1.npy", np.concatenate([values, values[:1], values[:0]])[:, :5])
     np.save(folder / "cam2.npy", values[:, :5])

@@ -71,9 +71,9 @@ def test_rate_and_steps_follow_from_the_longest_and_the_fastest(
 ) -> None:
     time = find_time(sources, fps, None, fields())
     assert (time.fps, time.steps, time.own_rates) == (found, steps, own)
-    reported = [one.partition(" is")[0] for one in time.told]
+    reported = [one.partition(" is")[0] for one in time.remarks]
     assert reported == (["fps", "frames"] if fps is None else ["frames"])
-    assert ("fastest" in time.told[0]) == own
+    assert ("fastest" in time.remarks[0]) == own
     assert find_time(sources, fps, 7, fields()).steps == 7
     assert time.beginning == (6.5 if sources[0].timing.stamps else 0.0)
 

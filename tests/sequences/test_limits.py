@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from tracker.files.text import shown
 from tracker.sequences import csv_columns
-from tracker.sequences.calibration import POSE, check_sight, read_camera
+from tracker.sequences.calibration import POSE, check_view_of_room, read_camera
 from tracker.sequences.clock import Clock, read_timing
 from tracker.sequences.csv_columns import Columns, guarded, read_columns, unguarded
 from tracker.sequences.errors import SequenceError
@@ -203,7 +203,7 @@ def test_a_projection_may_lie_so_far_away_and_no_further() -> None:
 
 def test_a_camera_is_warned_of_where_nothing_of_the_room_is_in_sight() -> None:
     def warned(low: list[float], high: list[float]) -> bool:
-        return bool(list(check_sight(camera(), Room(np.array(low), np.array(high)))))
+        return bool(list(check_view_of_room(camera(), Room(np.array(low), np.array(high)))))
 
     # it stands at z = -4, looks along z and sees a fifth of the depth to either side
     assert not warned([-1.0, -1.0, 0.0], [1.0, 1.0, 2.0])
@@ -326,13 +326,13 @@ def test_a_box_has_a_size_and_a_score(cell: int) -> None:
 
 def test_boxes_belong_to_the_step_of_their_frame() -> None:
     looks = np.arange(6.0).reshape(3, 2)
-    made = box_table([box(6), box(4), box(5, score=1.0)], first=4, looks=looks)
+    made = box_table([box(6), box(4), box(5, score=1.0)], first=4, embeddings=looks)
     assert made.steps == 3
     found, looked_at = made.detections(3, None)
     assert looked_at is None
     assert_array_equal(found.frames, [0, 1, 2])
     assert_array_equal(found.scores, [0.5, 1.0, 0.5])
-    assert_array_equal(found.looks, looks[[1, 2, 0]])
+    assert_array_equal(found.embeddings, looks[[1, 2, 0]])
     assert refused(lambda: made.detections(2, None))
     assert box_table([]).steps == 0
     # counted from 4, while the camera's file begins at frame 1: its frames 3, 1 and 2

@@ -10,7 +10,7 @@ from typing import Any
 import optuna
 import pytest
 
-from tracker.studies.kept.journal import Journal, storage
+from tracker.studies.sampling import Journal, storage
 
 
 @contextmanager

@@ -14,7 +14,7 @@ from tests.studies.small import Serial, definition, made_up, recording, run
 from tracker.parameters import with_values
 from tracker.runs.run import stage_keys
 from tracker.studies.errors import StudyError
-from tracker.studies.found.weighing import Weighing
+from tracker.studies.found.importance import Weighing
 from tracker.studies.kept.records import Trial
 from tracker.studies.kept.store import JOURNAL, Store, create
 from tracker.studies.kept.writer import RESULTS

@@ -222,7 +222,7 @@ def test_nobody_waits_for_the_disk_to_tell_how_far_it_is(
     store, synced = study(tmp_path), list[int]()
     monkeypatch.setattr(os, "fsync", synced.append)
     with store.running() as writer:
-        writer.say(Status("running", done=2))
+        writer.write_status(Status("running", done=2))
     assert store.folder.joinpath(STATUS).stat().st_size > 0
     assert not synced
     write_whole(tmp_path / "kept", b"kept")

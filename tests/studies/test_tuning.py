@@ -40,7 +40,7 @@ def test_what_was_luck_is_not_proposed(tmp_path: Path) -> None:
 
     store = study(tmp_path)
     run(store, Serial(do))
-    found = store.told("tuned")
+    found = store.fact("tuned")
     assert not found["better"]
     assert found["words"] == "nothing better was found"
     assert found["seeds"] == [1, 2, 3]
@@ -52,7 +52,7 @@ def test_what_brings_something_is_proposed_without_what_does_not(tmp_path: Path)
 
     store = study(tmp_path)
     run(store, Serial(do))
-    found = store.told("tuned")
+    found = store.fact("tuned")
     assert found["better"]
     (row,) = found["rows"]
     assert row["key"] == "fusion.detection_probability"
@@ -75,7 +75,7 @@ def test_from_a_bad_start_it_comes_back_to_the_defaults(tmp_path: Path) -> None:
     run(store, Serial(do))
     assert store.trial(1).values["fusion.clutter_rate"] == 10.0
     assert store.trial(1).words == "where you were"
-    found = store.told("tuned")
+    found = store.fact("tuned")
     assert found["better"]
     assert found["values"]["fusion.clutter_rate"] == 3.0
     (row,) = found["rows"]
@@ -86,7 +86,7 @@ def test_from_a_bad_start_it_comes_back_to_the_defaults(tmp_path: Path) -> None:
 def test_a_method_that_draws_nothing_is_told(tmp_path: Path) -> None:
     store = study(tmp_path)
     run(store, Serial())  # boxes: the tracks are the same for every seed
-    found = store.told("tuned")
+    found = store.fact("tuned")
     assert "nothing is drawn at random here" in found["words"]
     assert found["seeds"] == [0]
 
@@ -100,10 +100,10 @@ def test_ended_while_it_measures_again_it_goes_on(tmp_path: Path) -> None:
     with pytest.raises(KeyboardInterrupt):
         run(store, first)
     assert len(store.trials()) == 40
-    assert store.told("tuned") is None
+    assert store.fact("tuned") is None
     second = Serial(do)
     run(store, second)
-    assert store.told("tuned")["better"]
+    assert store.fact("tuned")["better"]
     assert not set(first.done) & set(second.done)
 
 
@@ -118,7 +118,7 @@ def test_the_dozen_are_varied_around_where_somebody_is(tmp_path: Path) -> None:
     for one in made.varied:
         now = made.start.get(one.key, table.PARAMETERS[one.key].default)
         assert one.contains(now)
-    blind = tuning("t", [str(place)], minutes=5.0, changes={}, without_truth=True)
+    blind = tuning("t", [str(place)], minutes=5.0, changes={}, ignore_truth=True)
     assert blind.objectives == ("identity",)
     with pytest.raises(StudyError, match="cannot be read"):
         tuning("t", [str(tmp_path / "nothing")], minutes=5.0, changes={})

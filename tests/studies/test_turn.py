@@ -26,7 +26,7 @@ def test_one_runs_and_the_other_waits_and_says_for_which(folder: Path) -> None:
     with turn("first", lambda words: False) as mine:
         assert mine
         thread = threading.Thread(
-            target=lambda: run(store, crew, told=lambda status: told.append(status.words))
+            target=lambda: run(store, crew, on_status=lambda status: told.append(status.words))
         )
         thread.start()
         wait_until(lambda: any("first" in words for words in told))
@@ -45,7 +45,7 @@ def test_who_waits_can_be_stopped_and_its_time_does_not_run(folder: Path) -> Non
         status = run(store, crew, stopped=lambda: True)
     assert status.state == "stopped"
     assert crew.done == []
-    assert (store.told("spent") or 0.0) < 1.0
+    assert (store.fact("spent") or 0.0) < 1.0
 
 
 def test_who_computes_elsewhere_waits_for_nobody(folder: Path) -> None:

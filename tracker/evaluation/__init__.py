@@ -1,4 +1,5 @@
-"""Tracks against the truth: OSPA, OSPA(2), GOSPA, CLEAR MOT, identity, HOTA, and the report."""
+"""Evaluation of tracks against ground truth: OSPA, OSPA(2), GOSPA, CLEAR MOT, identity, HOTA, and
+the report."""
 
 from tracker.evaluation.difference import Difference, compare
 from tracker.evaluation.figures import DEFINITIONS, Definition, Figure

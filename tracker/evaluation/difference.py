@@ -1,4 +1,4 @@
-"""Two evaluations side by side: which figures are better, and by how much."""
+"""The comparison of two evaluations: which figures are better, and by how much."""
 
 from __future__ import annotations
 
@@ -24,27 +24,28 @@ class Difference:
     a: float | int | None
     b: float | int | None
     difference: float | int | None
-    """B − A of the values as they are shown, so that it is 0 where they look the same; None
+    """B − A of the displayed (rounded) values, so that it is 0 where they look the same; None
     where one of them is undefined."""
     verdict: Verdict
-    """What B is. ``same`` where the two agree in all decimals that are shown;
-    ``different`` where neither direction is better; ``undefined`` where one has no value."""
+    """Whether B is better than A. ``same`` means that the two agree in all displayed decimals;
+    ``different`` that neither direction is better; ``undefined`` that one has no value."""
     comparable: bool
     """False where A and B were measured with different settings."""
-    stated: str
-    """The settings of B beside the figure."""
+    measured_with: str
+    """The settings that B's value depends on, in words."""
 
     def to_json(self) -> dict[str, Any]:
-        """As a plain mapping."""
-        return asdict(self)
+        """Return the fields as a plain mapping; the settings are ``stated`` there."""
+        values = asdict(self)
+        return values | {"stated": values.pop("measured_with")}
 
 
 def verdict(direction: Direction, digits: int, a: float | None, b: float | None) -> Verdict:
-    """Whether B is better than A.
+    """Decide whether B is better than A.
 
     Args:
         direction: Which values are better.
-        digits: Decimals that matter.
+        digits: The number of decimals in which the values are compared.
         a: The reference; None where undefined.
         b: The new value; None where undefined.
     """
@@ -61,11 +62,11 @@ def verdict(direction: Direction, digits: int, a: float | None, b: float | None)
 
 
 def compare(a: Evaluation, b: Evaluation) -> tuple[Difference, ...]:
-    """Every figure of B against A, in the order of the tables.
+    """Compare every figure of two evaluations, in the order of the tables.
 
     Args:
-        a: The reference: the pinned or the previous run.
-        b: The run in question.
+        a: The reference, for instance the evaluation of the pinned or the previous run.
+        b: The evaluation that is compared with it.
     """
     before = {figure.definition.key: figure for figure in a.figures}
     return tuple(_difference(before[figure.definition.key], figure) for figure in b.figures)
@@ -90,6 +91,6 @@ def _difference(a: Figure, b: Figure) -> Difference:
         if before is None or after is None
         else round(after - before, definition.digits),
         verdict=verdict(definition.direction, definition.digits, a.value, b.value),
-        comparable=a.stated == b.stated,
-        stated=b.stated,
+        comparable=a.measured_with == b.measured_with,
+        measured_with=b.measured_with,
     )

@@ -1,4 +1,4 @@
-"""Every figure of an evaluation: name, unit, direction, definition and source."""
+"""The definition of every figure of an evaluation: name, unit, direction, meaning and source."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Literal
 from tracker.evaluation.settings import EvaluationSettings
 
 Direction = Literal["higher", "lower", "zero", "none"]
-"""Which values are better: higher, lower, nearer to zero, or it depends."""
+"""Which values are better: higher, lower, nearer to zero, or none in general."""
 
 SOURCES = {
     "BS08": "Bernardin, Stiefelhagen, EURASIP JIVP 2008 (CLEAR MOT)",
@@ -24,25 +24,27 @@ SOURCES = {
 
 @dataclass(frozen=True, slots=True)
 class Definition:
-    """One figure, without its value."""
+    """The definition of one figure."""
 
     key: str
     name: str
     group: str
     unit: str
-    """``{d}`` stands for the unit of the distance, ``{d^p}`` for its power in GOSPA's parts."""
+    """The unit; ``{d}`` stands for that of the distance, ``{d^p}`` for its power in GOSPA's
+    parts."""
     direction: Direction
     digits: int
-    """Decimals that are shown, and below which two values count as the same."""
-    stated: tuple[str, ...]
-    """The settings that stand beside the figure."""
+    """The number of decimals that are displayed, and in which values are compared."""
+    settings: tuple[str, ...]
+    """The names of the settings that the value depends on."""
     help: str
     source: str = ""
+    """The key of the reference in :data:`SOURCES`."""
     headline: bool = False
-    """Whether a short table shows it."""
+    """Whether short tables show the figure."""
 
     def unit_for(self, settings: EvaluationSettings) -> str:
-        """The unit with the chosen distance and order."""
+        """Return the unit with the chosen distance and order."""
         power = f"^{settings.order:g}" if settings.order != 1.0 and settings.unit else ""
         return self.unit.replace("{d^p}", settings.unit + power).replace("{d}", settings.unit)
 
@@ -198,28 +200,34 @@ DEFINITIONS: tuple[Definition, ...] = (
 )  # fmt: skip
 
 BY_KEY = {definition.key: definition for definition in DEFINITIONS}
-"""All figures, in the order in which tables show them."""
+"""All definitions by key, in the order of the tables."""
 
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """One figure with its value and what it was measured with."""
+    """The value of one figure, and the settings it was measured with."""
 
     definition: Definition
     value: float | int | None
-    """None where it is not defined (see the function that makes it)."""
+    """The value; None where it is undefined (see the function that computes it)."""
     unit: str
-    stated: str
-    """Gate, cut-off, order, window: whatever applies, in words."""
+    measured_with: str
+    """The settings that the value depends on, such as gate, cut-off, order and window, in words."""
 
     @property
     def text(self) -> str:
-        """The value as tables show it, without unit; an en dash where undefined."""
+        """The value as tables display it, without unit; an en dash where undefined."""
         return number(self.value, self.definition.digits)
 
 
 def number(value: float | int | None, digits: int, *, sign: bool = False) -> str:
-    """A value with fixed decimals and a true minus; an en dash for None."""
+    """Format a value with fixed decimals and a typographic minus; None becomes an en dash.
+
+    Args:
+        value: The value, or None.
+        digits: The number of decimals.
+        sign: Whether a positive value gets a plus.
+    """
     if value is None:
         return "–"
     rounded = round(float(value), digits) + 0.0  # −0.0 + 0.0 is 0.0

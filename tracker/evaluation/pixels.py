@@ -1,7 +1,7 @@
-"""Each camera by itself: reprojected boxes against the truth projected the same way.
+"""The evaluation in each camera's picture: projected estimates against the projected truth.
 
 Estimates and true positions become picture boxes by the same projection of the
-same upright box, so the figures hold what the position error looks like in the
+same upright box, so the figures measure the position error as it appears in the
 picture, not how well a box fits a silhouette. Only boxes that overlap the picture
 count, on both sides; they are not clipped to it.
 """
@@ -22,7 +22,7 @@ from tracker.geometry.camera import Camera
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CameraScore:
-    """What one camera's boxes score."""
+    """The scores of one camera's boxes."""
 
     camera: str
     errors: Float[ndarray, " M"]
@@ -42,7 +42,7 @@ class CameraScore:
 
     @property
     def error_95(self) -> float | None:
-        """95 of 100 pairs are nearer than this, pixels; None without pairs."""
+        """95th percentile of the distance of the centres, pixels; None without pairs."""
         return float(np.percentile(self.errors, 95)) if len(self.errors) else None
 
     @property
@@ -57,14 +57,15 @@ class CameraScore:
 
     @property
     def false_per_picture(self) -> float | None:
-        """Reprojected boxes without a pair, a picture; None without steps."""
+        """Mean number of reprojected boxes without a pair in a picture; None without steps."""
         return (self.estimates - len(self.errors)) / self.steps if self.steps else None
 
 
 def _seen(
     rows: Rows, camera: Camera, half_extents: Float[ndarray, " 3"]
 ) -> tuple[Float[ndarray, "V 4"], list[int]]:
-    """The boxes that overlap the picture, by step, and where each step's begin."""
+    """Return the boxes that overlap the picture, sorted by step, and the first index of each
+    step."""
     boxes, visible = camera.project_boxes(rows.positions, half_extents)
     starts = np.searchsorted(rows.frames[visible], np.arange(rows.steps + 1))
     return boxes[visible], starts.tolist()
@@ -77,15 +78,15 @@ def pixels(
     *,
     overlap: float,
 ) -> tuple[CameraScore, ...]:
-    """Score every camera.
+    """Score the boxes in every camera's picture.
 
     At each step the boxes of one picture are paired one to one by the protocol of
     :mod:`tracker.evaluation.measures.matching`, with the distance 1 − IoU and the gate
-    1 − ``overlap``. What matched a don't-care row in space is already set aside.
+    1 − ``overlap``. Estimates that matched a don't-care row in space are not in the comparison.
 
     Args:
         comparison: Truth and estimates.
-        cameras: None of them gives no scores.
+        cameras: The calibrated cameras; without any there are no scores.
         half_extents: Half width, depth and height of a target, metres.
         overlap: The least intersection over union of a pair, in (0, 1).
     """

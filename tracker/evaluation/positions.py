@@ -1,4 +1,4 @@
-"""Position errors in metres and the number of people, whoever the tracks say they are."""
+"""Position errors in metres and errors of cardinality, regardless of identity."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from tracker.evaluation.measures.matching import (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Positions:
-    """Errors of the pairs of the matching protocol, each step by itself."""
+    """Position errors of the pairs of the matching protocol, with each step paired on its own."""
 
     matches: Matches
     errors: Float[ndarray, " M"]
@@ -29,20 +29,20 @@ class Positions:
     by_person: Float[ndarray, "K S"]
     """The error of each person at each step; NaN where there is no pair."""
     found: Int[ndarray, " K"]
-    """Steps at which each person has an estimate within the near distance of his own."""
+    """The number of steps at which each person is paired with an estimate in the near distance."""
     present: Int[ndarray, " K"]
-    """Steps at which each person is there."""
+    """The number of steps at which each person is present."""
     stray: Int[ndarray, " S"]
-    """Estimates at each step without a person of their own within the near distance."""
+    """The number of estimates at each step that have no person within the near distance."""
 
     @property
     def mean(self) -> float | None:
-        """Of all pairs, metres; None without pairs."""
+        """Mean error of all pairs, metres; None without pairs."""
         return float(self.errors.mean()) if len(self.errors) else None
 
     @property
     def percentile_95(self) -> float | None:
-        """95 of 100 pairs are nearer than this, metres; None without pairs."""
+        """95th percentile of the error of all pairs, metres; None without pairs."""
         return float(np.percentile(self.errors, 95)) if len(self.errors) else None
 
     @property
@@ -57,8 +57,8 @@ def positions(comparison: Comparison, *, near: float) -> Positions:
 
     Args:
         comparison: Truth and estimates with the gate of the evaluation.
-        near: Metres. Found are the people whom a pairing with this for its gate
-            reaches, stray are the estimates that it leaves.
+        near: The gate, in metres, of a second pairing: people that it pairs are found,
+            estimates that it leaves unpaired are stray.
     """
     truth, tracks, measure = comparison.truth, comparison.tracks, comparison.measure
     metres = Measure(
@@ -88,10 +88,10 @@ def positions(comparison: Comparison, *, near: float) -> Positions:
 
 
 def cardinality_error(comparison: Comparison) -> tuple[float | None, float | None]:
-    """Mean of |estimates − people| over the steps, and of estimates − people (the bias).
+    """Return the mean of |estimates − people| over the steps, and of estimates − people (the bias).
 
     Don't-care rows and the estimates that matched them count on neither side.
-    None without steps.
+    Both values are None without steps.
     """
     if not comparison.steps:
         return None, None

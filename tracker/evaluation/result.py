@@ -1,4 +1,4 @@
-"""What an evaluation gives back: figures, series over time, rows by person and track."""
+"""The result of an evaluation: figures, series over time, and rows by person and track."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tracker.evaluation.tables import PersonRow, TrackRow
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Series:
-    """What changes over time, one value a step."""
+    """Figures over time, one value for each step."""
 
     ospa: Float[ndarray, " S"]
     ospa_localisation: Float[ndarray, " S"]
@@ -30,13 +30,13 @@ class Series:
     gospa_false: Float[ndarray, " S"]
     """The three parts are p-th powers and sum to that of GOSPA."""
     truth: Int[ndarray, " S"]
-    """People with a certain position."""
+    """The number of people with a certain position."""
     estimates: Int[ndarray, " S"]
-    """Estimates that count."""
+    """The number of estimates that count."""
     dont_care: Int[ndarray, " S"]
-    """People whose position is not certain."""
+    """The number of people with an uncertain position."""
     ignored: Int[ndarray, " S"]
-    """Estimates that matched one of those."""
+    """The number of estimates that matched an uncertain position."""
     matches: Int[ndarray, " S"]
     misses: Int[ndarray, " S"]
     false_positives: Int[ndarray, " S"]
@@ -45,20 +45,20 @@ class Series:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pairs:
-    """Who was paired with which track, by CLEAR's pairing, sorted by step."""
+    """The pairs of person and track, by CLEAR's pairing, sorted by step."""
 
     steps: Int[ndarray, " M"]
     people: Int[ndarray, " M"]
     tracks: Int[ndarray, " M"]
     distances: Float[ndarray, " M"]
-    """In the unit of the distance."""
+    """The distance of each pair, in the unit of the evaluation's distance."""
     switch: Bool[ndarray, " M"]
-    """Whether this pair is an identity switch."""
+    """Whether each pair is an identity switch."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Evaluation:
-    """Truth against tracks."""
+    """The evaluation of tracks against ground truth."""
 
     settings: EvaluationSettings
     steps: int
@@ -73,24 +73,24 @@ class Evaluation:
     cameras: tuple[CameraScore, ...]
     pairs: Pairs
     notes: tuple[str, ...]
-    """What a reader of the figures must know beside them."""
+    """Sentences that readers of the figures need, for instance on what is not scored."""
 
     def __getitem__(self, key: str) -> float | int | None:
-        """The value of one figure."""
+        """Return the value of the figure with this key."""
         return next(figure.value for figure in self.figures if figure.definition.key == key)
 
     def to_json(self) -> dict[str, Any]:
-        """Everything as plain lists, numbers and text; undefined values are None."""
+        """Return all fields as plain lists, numbers and text; undefined values are None."""
         return {
             "settings": self.settings.model_dump(),
             "steps": self.steps,
             "has_truth": self.has_truth,
             "figures": [
                 {
-                    **{k: v for k, v in asdict(figure.definition).items() if k != "stated"},
+                    **{k: v for k, v in asdict(figure.definition).items() if k != "settings"},
                     "value": figure.value,
                     "unit": figure.unit,
-                    "stated": figure.stated,
+                    "stated": figure.measured_with,
                     "source": SOURCES.get(figure.definition.source, ""),
                 }
                 for figure in self.figures

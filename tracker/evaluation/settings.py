@@ -1,4 +1,4 @@
-"""What the figures are measured with: distance, gate, cut-off, order, window."""
+"""The settings of the evaluation: distance, gate, cut-off, order, window."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ DISTANCE_WORDS: dict[Distance, str] = {
     "ground": "ground-plane distance",
     "box": "3D-box (1 − GIoU)/2",
 }
-"""How each distance is named beside a figure."""
+"""The name of each distance that is displayed beside a figure."""
 
 
 def _ui(symbol: str, unit: str = "", *, log: bool = False) -> Any:
@@ -23,13 +23,13 @@ def _ui(symbol: str, unit: str = "", *, log: bool = False) -> Any:
 
 
 class EvaluationSettings(Params):
-    """Settings of the evaluation. They change no run, only how it is scored."""
+    """Settings of the evaluation. They change how a run is scored, not the run."""
 
     distance: Annotated[Distance, _ui("d")] = "position"
-    """Between an estimate and a true position: in 3D, on the floor, or by their upright boxes."""
+    """Distance between an estimate and a true position: in 3D, on the floor, or of their boxes."""
 
     gate: Annotated[float, Field(ge=0.01, le=100.0), _ui("d_g", "m", log=True)] = 1.0
-    """An estimate farther than this from a person is not his (3D and ground-plane distance)."""
+    """An estimate farther than this from a person is not paired (3D and ground-plane distance)."""
 
     box_gate: Annotated[float, Field(ge=0.01, le=1.0), _ui("b_g")] = 0.5
     """The gate where boxes are compared: (1 − GIoU)/2, which is 0.5 where two boxes touch."""
@@ -56,14 +56,14 @@ class EvaluationSettings(Params):
 
     @property
     def unit(self) -> str:
-        """Of the chosen distance."""
+        """The unit of the chosen distance; empty for the box distance."""
         return "" if self.distance == "box" else "m"
 
-    def stated(self, names: tuple[str, ...]) -> str:
-        """Some settings in words, as they stand beside a figure.
+    def in_words(self, names: tuple[str, ...]) -> str:
+        """Describe some of the settings in words, for display beside a figure.
 
         Args:
-            names: Fields; ``gate`` is the effective gate.
+            names: The fields to describe; ``gate`` is the effective gate.
         """
         unit = f" {self.unit}" if self.unit else ""
         words = {

@@ -1,4 +1,4 @@
-"""A whole evaluation of tracks against the truth."""
+"""The evaluation of tracks against ground truth: all figures at once."""
 
 from __future__ import annotations
 
@@ -33,21 +33,21 @@ def evaluate(
     half_extents: Float[ndarray, " 3"] | None = None,
     cameras: Items[Camera] = (),
 ) -> Evaluation:
-    """Score tracks against the truth.
+    """Score tracks against ground truth.
 
-    Rows may come in any order and ids may come back; what cannot be scored is left
-    out and noted. Empty truth, empty tracks and a single step have defined figures,
-    None where a figure has no meaning.
+    Rows may be in any order, and an id may end and appear again. Rows that cannot be scored are
+    left out and noted. Empty truth, empty tracks and a single step have defined figures, which are
+    None where they have no meaning.
 
     Args:
-        truth: None, or without rows: every estimate is a false one.
+        truth: The ground truth; if it is None or has no rows, every estimate is false.
         tracks: Steps, ids and positions by columns.
-        settings: Distance, gate and so on; the defaults, if none.
-        steps: Steps 0 … ``steps`` − 1 are scored, for instance those that a run has
-            done; up to the last row of either side, if none.
+        settings: Distance, gate and so on; the defaults if None.
+        steps: Steps 0 … ``steps`` − 1 are scored, for instance those that a run has computed; if
+            None, all up to the last row of either side.
         half_extents: Half width, depth and height of a target, metres; needed for the
             box distance and for the pictures.
-        cameras: Cameras whose pictures are scored.
+        cameras: The cameras in whose pictures the tracks are scored.
 
     Raises:
         ValueError: If ``half_extents`` is missing where it is needed.
@@ -74,13 +74,13 @@ def evaluate_sequence(
     *,
     steps: int | None = None,
 ) -> Evaluation:
-    """Score tracks against a sequence's truth, in space and in every camera's picture.
+    """Score tracks against a sequence's ground truth, in space and in every camera's picture.
 
     Args:
-        sequence: One without truth is as one whose truth is empty.
+        sequence: The sequence; if it has no truth, every estimate is false.
         tracks: Steps, ids and positions by columns.
-        settings: The defaults, if none.
-        steps: The steps that a run has done; all of the sequence, if none.
+        settings: Distance, gate and so on; the defaults if None.
+        steps: The number of steps that a run has computed; all of the sequence if None.
     """
     return evaluate(
         sequence.ground_truth,
@@ -150,7 +150,7 @@ def _score(
         steps=comparison.steps,
         has_truth=bool(len(truth) or len(comparison.dont_care)),
         figures=tuple(
-            Figure(d, values[d.key], d.unit_for(settings), settings.stated(d.stated))
+            Figure(d, values[d.key], d.unit_for(settings), settings.in_words(d.settings))
             for d in DEFINITIONS
         ),
         series=Series(

@@ -1,4 +1,4 @@
-"""The evaluation by person and by track."""
+"""The evaluation of each person and of each track."""
 
 from __future__ import annotations
 
@@ -19,55 +19,56 @@ TrackKind = Literal["person", "false", "don't care"]
 
 @dataclass(frozen=True, slots=True)
 class PersonRow:
-    """One person of the truth. Only steps with a certain position count."""
+    """The scores of one person of the truth. Only steps with a certain position count."""
 
     id: int
     first: int
     last: int
     steps: int
-    """Steps at which the person is there."""
+    """The number of steps at which the person is present."""
     tracked: int
-    """Steps with a pair."""
+    """The number of steps at which the person is paired."""
     status: PersonStatus
     found_share: float
-    """Share of the steps with an estimate of his own within the near distance."""
+    """Share of the steps at which an estimate within the near distance is paired with the
+    person."""
     error: float | None
     """Mean position error, metres; None without pairs."""
     error_95: float | None
-    """95 of 100 errors are smaller, metres; None without pairs."""
+    """95th percentile of the position error, metres; None without pairs."""
     switches: int
     fragmentations: int
     track: int | None
-    """The track that stands for the person in the identity figures, if any."""
+    """The track that is assigned to the person in the identity figures, if any."""
 
 
 @dataclass(frozen=True, slots=True)
 class TrackRow:
-    """One track."""
+    """The scores of one track. Steps that matched a don't-care position do not count."""
 
     id: int
     first: int
     last: int
     steps: int
-    """Steps at which it is reported."""
+    """The number of steps at which the track is reported."""
     ignored: int
-    """Steps at which it matched a don't-care position."""
+    """The number of steps at which the track matched a don't-care position."""
     matched: int
-    """Steps with a pair."""
+    """The number of steps at which the track is paired."""
     kind: TrackKind
-    """``false`` where fewer than half of the steps that count have a pair."""
+    """``false`` where the track is paired at fewer than half of the steps that count."""
     person: int | None
-    """The person with whom it is paired most often (of equals the lowest id), if any."""
+    """The person with whom the track is paired most often (of equals the lowest id), if any."""
     person_share: float | None
-    """Share of the steps that count at which it is paired with that person."""
+    """Share of the steps that count at which the track is paired with that person."""
     error: float | None
-    """Mean distance to whomever it is paired with, in the unit of the distance."""
+    """Mean distance of all pairs of the track, in the unit of the distance; None without pairs."""
 
 
 def person_rows(
     comparison: Comparison, clear: Clear, identity: Identity, positions: Positions
 ) -> tuple[PersonRow, ...]:
-    """The people, by id."""
+    """Return the scores of all people of the truth, by id."""
     truth, tracks = comparison.truth, comparison.tracks
     rows = []
     for k, name in enumerate(truth.names.tolist()):
@@ -99,7 +100,7 @@ def person_rows(
 
 
 def track_rows(comparison: Comparison, clear: Clear) -> tuple[TrackRow, ...]:
-    """The tracks, by id; those whose every step is ignored are among them."""
+    """Return the scores of all tracks, by id, including those whose every step is ignored."""
     truth, tracks, ignored = comparison.truth, comparison.tracks, comparison.ignored
     matches = clear.matches
     apart = comparison.measure.between(

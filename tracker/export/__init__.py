@@ -1,4 +1,4 @@
-"""Tracks, cameras and films as files: the track file and the forms of other programs."""
+"""Tracks, cameras and films as files: the track file and the formats of other programs."""
 
 from tracker.export.tracks_csv import TrackFile, read_tracks_csv, save_tracks_csv, write_tracks_csv
 

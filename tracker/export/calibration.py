@@ -1,6 +1,7 @@
-"""Cameras written for other programs: OpenCV's FileStorage, and Pose2Sim's TOML.
+"""Camera calibrations for other programs: OpenCV's FileStorage, and Pose2Sim's TOML.
 
-Both lead from world to camera in OpenCV's axes, metres, z up.
+In both, rotation and translation map world coordinates (metres, z up) to camera coordinates in
+OpenCV's axes.
 """
 
 from __future__ import annotations
@@ -25,8 +26,14 @@ WRITTEN = ("OpenCV FileStorage (calibration)", "Pose2Sim TOML (calibration)")
 def save_calibration(path: Path, cameras: Sequence[Camera], form: Form) -> None:
     """Write all cameras into one file.
 
-    OpenCV: ``K_NAME``, ``D_NAME``, ``R_NAME``, ``T_NAME`` and ``size_NAME``, as YAML, or as XML
-    or JSON where the file's suffix says so. Pose2Sim: a table a camera.
+    In OpenCV's form there are ``K_NAME``, ``D_NAME``, ``R_NAME``, ``T_NAME`` and ``size_NAME``, as
+    YAML, or as XML or JSON where the file's suffix is one of these. In Pose2Sim's form there is a
+    table for each camera.
+
+    Args:
+        path: The file to write; an existing one is replaced.
+        cameras: The cameras, each with a name of its own.
+        form: The program that is to read the file.
 
     Raises:
         ValueError: If two cameras would have the same name in the file.

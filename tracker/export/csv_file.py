@@ -1,4 +1,4 @@
-"""The track file, as the program itself reads it back."""
+"""The export format CSV: the track file, which the program itself reads back."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from tracker.export.written import Options, Written
 
 
 def write(path: Path, written: Written, options: Options) -> None:
-    """Write the file."""
+    """Write a run as a track file."""
     with path.open("w", encoding="utf-8", newline="") as stream:
         tracks_csv.write_tracks_csv(
             stream,

@@ -1,8 +1,9 @@
-"""glTF 2.0 in one binary file: an upright box a person, which moves, and the room's floor.
+"""glTF 2.0 in one binary file: a moving upright box for each person, and the room's floor.
 
-Each track is a node of its own with its id as name and its page's colour; its animation moves it
-and has it there (scale 1) from birth to death and gone (scale 0) in gaps. The scene's root turns
-the world's z up into glTF's y up. Source: Khronos Group, "glTF 2.0 Specification", 2021.
+Each track is a node with its id as name and the colour that it has on the page. The node's
+animation moves the box and sets its scale to 1 while the track exists and to 0 in gaps. The
+scene's root rotates the world's z axis onto glTF's y axis. Source: Khronos Group, "glTF 2.0
+Specification", 2021.
 """
 
 from __future__ import annotations
@@ -22,11 +23,11 @@ from tracker.export.written import Options, Written
 _FLOAT, _UINT = 5126, 5125
 _ARRAY, _ELEMENTS = 34962, 34963
 _TURN = [-(0.5**0.5), 0.0, 0.0, 0.5**0.5]
-"""By −90° about x, as x, y, z, w."""
+"""The rotation by −90° about x, as the quaternion x, y, z, w."""
 
 
 class _Buffer:
-    """The binary part, and its views."""
+    """The binary chunk of the file, with its buffer views and accessors."""
 
     def __init__(self) -> None:
         self.data = bytearray()
@@ -34,7 +35,13 @@ class _Buffer:
         self.accessors: list[dict[str, Any]] = []
 
     def add(self, values: ndarray, *, target: int | None = None, bounds: bool = False) -> int:
-        """The number of a new accessor."""
+        """Append an array and return the index of its accessor.
+
+        Args:
+            values: Numbers of shape (N,), or vectors of shape (N, 3).
+            target: The kind of buffer for the graphics card, or None.
+            bounds: Whether the accessor has the least and largest value.
+        """
         floats = values.dtype.kind == "f"
         data = values.astype(np.float32 if floats else np.uint32)
         view = {"buffer": 0, "byteOffset": len(self.data), "byteLength": data.nbytes}
@@ -55,7 +62,7 @@ class _Buffer:
 
 
 def write(path: Path, written: Written, options: Options) -> None:
-    """Write the file."""
+    """Write a run as binary glTF, track by track."""
     sequence, ids = written.sequence, written.ids
     buffer = _Buffer()
     box = _box(buffer, sequence.target_half_extents)
@@ -120,7 +127,8 @@ def write(path: Path, written: Written, options: Options) -> None:
 
 
 def _presence(frames: ndarray, steps: int) -> tuple[ndarray, ndarray]:
-    """Steps at which a track comes or goes, with step 0, and whether it is there from then on."""
+    """Return the steps at which a track appears or disappears, beginning with step 0, and whether
+    it exists from each of them on (1.0 or 0.0)."""
     there = np.zeros(steps + 1)
     there[frames] = 1.0
     turns = np.flatnonzero(np.diff(there[:steps], prepend=-1.0))
@@ -141,7 +149,7 @@ def _material(name: str, colour: tuple[int, int, int]) -> dict[str, Any]:
 
 
 def _box(buffer: _Buffer, half: ndarray) -> dict[str, Any]:
-    """A box around the origin, each face with its own normal."""
+    """Return the primitive of a box around the origin, each face with its own normal."""
     points: list[ndarray] = []
     normals: list[ndarray] = []
     faces: list[int] = []

@@ -1,4 +1,4 @@
-"""A run as one JSON file, with its JSON Schema made from the same models."""
+"""The export format JSON, and its JSON Schema, which is made from the same models."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tracker import __version__
 from tracker.export.written import Options, Written
 
 SCHEMA_PLACE = "tracks.schema.json"
-"""Of the published schema, in the manual."""
+"""The name of the published schema's file in the manual."""
 
 
 class _Model(BaseModel):
@@ -88,7 +88,7 @@ class TracksFile(_Model):
 
 
 def schema() -> dict[str, Any]:
-    """The JSON Schema of the file."""
+    """Return the JSON Schema of the file."""
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         **TracksFile.model_json_schema(mode="serialization"),
@@ -96,7 +96,7 @@ def schema() -> dict[str, Any]:
 
 
 def write(path: Path, written: Written, options: Options) -> None:
-    """Write the file, track by track."""
+    """Write a run as JSON, track by track."""
     sequence = written.sequence
     head = TracksFile(
         program=f"multiview-phd {__version__}",
@@ -167,5 +167,5 @@ def _triple(values: Any) -> tuple[float, float, float]:
 
 
 def published() -> str:
-    """The schema as the manual has it."""
+    """Return the text of the schema as the manual publishes it."""
     return json.dumps(schema(), indent=2) + "\n"

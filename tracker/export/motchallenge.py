@@ -1,10 +1,10 @@
-"""MOTChallenge text in TrackEval's folders: each camera's pixels, and the ground plane.
+"""MOTChallenge text in TrackEval's folders: a file for each camera, and one for the ground plane.
 
-A row is ``frame, id, left, top, width, height, confidence, x, y, z``; frames and ids are from 1.
-Of a camera the box is the reprojected one in pixels, of which 1 is the first, as the challenge
-counts [MOT16, sec. 4.2]; on the ground plane it is the target's outline on the floor in metres.
-x, y, z are metres in both. A person of uncertain place (``valid = 0``) is written as a
-distractor: who matches one counts on neither side.
+A row is ``frame, id, left, top, width, height, confidence, x, y, z``; frames and ids start at 1.
+In a camera's file the box is the reprojected one in pixels, which also start at 1
+[MOT16, sec. 4.2]; in that of the ground plane it is the target's outline on the floor in metres.
+x, y, z are metres in both. A person of the truth with an uncertain position (``valid = 0``) is
+written as a distractor: a track that matches it counts neither as correct nor as false.
 
 [MOT16] Milan, Leal-Taixé, Reid, Roth, Schindler, "MOT16: a benchmark for multi-object
 tracking", arXiv 1603.00831, 2016. Folders: TrackEval, docs/MOTChallenge-Official/Readme.md.
@@ -25,15 +25,15 @@ from tracker.files.atomic import file_names
 BENCHMARK, SPLIT, TRACKER = "multiview", "train", "multiview-phd"
 GROUND = "ground-plane"
 PERSON, DISTRACTOR = 1, 8
-"""Classes of the challenge."""
+"""Class numbers of the challenge."""
 
 _FROM_1 = np.array([1.0, 1.0, 0.0, 0.0])
 _CLOSE = 10
-"""Decimals of metres: figures agree to what a double holds of a room."""
+"""Decimals of coordinates in metres: so many that metrics agree to the precision of a double."""
 
 
 def write(folder: Path, written: Written, options: Options) -> None:
-    """Fill a folder: ``gt`` (where there is a truth) and ``trackers``, for TrackEval."""
+    """Write a run into a folder: ``gt`` (if there is ground truth) and ``trackers``."""
     sequence, tracks = written.sequence, written.tracks
     name = "".join(c if c.isalnum() or c in "-_" else "-" for c in sequence.name)
     half = sequence.target_half_extents
@@ -119,7 +119,7 @@ def _truth_rows(
     counted: Int[ndarray, " G"],
     kinds: Int[ndarray, " G"],
 ) -> list[str]:
-    """``frame, id, left, top, width, height, whether it counts, class, visibility``."""
+    """Return rows of ``frame, id, left, top, width, height, counted, class, visibility``."""
     columns = (frames.tolist(), ids.tolist(), boxes.tolist(), counted.tolist(), kinds.tolist())
     return [
         f"{frame + 1},{number},{_numbers(box)},{counts},{kind},1\n"

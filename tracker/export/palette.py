@@ -1,4 +1,4 @@
-"""The colour of a track, the same as on the page and in the report."""
+"""The colours of tracks, the same as on the page and in the report."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ Rgb = tuple[int, int, int]
 
 @cache
 def rgb(number: int) -> Rgb:
-    """Red, green and blue, 0 … 255, of an id, for dark surfaces."""
+    """Return the colour of a track id for dark backgrounds, red, green and blue in 0 … 255."""
     from tracker.evaluation.report.figures import DARK_IDS  # brings plotly
 
     text = DARK_IDS[(number - 1) % len(DARK_IDS)]

@@ -1,4 +1,4 @@
-"""One Parquet table, one row a target a step: the track file's columns, in full precision."""
+"""The export format Parquet: the columns of the track file in full precision, as one table."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from tracker.export.tracks_csv import BOX
 from tracker.export.written import Options, Written
 
 _ROWS = 1 << 17
-"""Of a group, which is in memory at once."""
+"""Rows of a row group, which is held in memory."""
 
 
 def write(path: Path, written: Written, options: Options) -> None:
-    """Write the file."""
+    """Write a run as a Parquet table, a row group at a time."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -44,7 +44,7 @@ def write(path: Path, written: Written, options: Options) -> None:
         columns[f"{camera.name}_seen"] = tracks.seen[:, index]
         for k, side in enumerate(BOX):
             columns[f"{camera.name}_{side}"] = np.where(visible, boxes[:, k], np.nan)
-    kinds = {  # of no rows a text would be nothing at all
+    kinds = {  # the type of a text column cannot be inferred when it has no rows
         name: pa.string() if values.dtype == object else pa.array(values[:0]).type
         for name, values in columns.items()
     }

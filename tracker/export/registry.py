@@ -1,12 +1,14 @@
-"""Every form that tracks leave in, once: the command line, the page and the manual list these."""
+"""All export formats: the command line, the page and the manual list these."""
 
 from __future__ import annotations
 
 import importlib
 import shutil
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from tracker.export import csv_file, gltf, json_file, motchallenge, parquet, rerun_file, trc
 from tracker.export.written import Options, Written
 from tracker.files.atomic import filling, replacing, zip_folder
 from tracker.sequences.sequence import Sequence
@@ -14,30 +16,31 @@ from tracker.sequences.sequence import Sequence
 
 @dataclass(frozen=True, slots=True)
 class Format:
-    """One form."""
+    """One export format."""
 
     name: str
-    """As ``--format`` takes it."""
+    """The value of ``--format``."""
     word: str
-    """As a person reads it."""
+    """The name that is displayed."""
     suffix: str
-    """By which it is chosen; empty for a folder."""
+    """The suffix of files by which the format is chosen; empty for a folder."""
     help: str
-    module: str
-    """Has ``write(path, written, options)``."""
+    write: Callable[[Path, Written, Options], None]
+    """The function that writes a run to a new file, or into an empty folder."""
     media: str
+    """The media type."""
     needs_package: str = ""
-    """Beside the program."""
+    """A package that the format needs and that is not installed with the program."""
     extra: str = ""
-    """That installs it."""
+    """The optional dependency (extra) that installs this package."""
     needs_truth: bool = False
     needs_pictures: bool = False
 
     def check(self, sequence: Sequence) -> None:
-        """Whether runs of a sequence can be written in this form, before any work is done for it.
+        """Check that runs of a sequence can be written in this format, before any work is done.
 
         Raises:
-            ValueError: If the sequence has not what it needs, or a package is not installed.
+            ValueError: If the sequence lacks what the format needs, or a package is not installed.
         """
         if self.needs_truth and sequence.ground_truth is None:
             raise ValueError(
@@ -57,54 +60,76 @@ class Format:
 
     @property
     def folder(self) -> bool:
-        """Whether it is a folder of files."""
+        """Whether the format is a folder of files."""
         return not self.suffix
+
+
+def _write_report(path: Path, written: Written, options: Options) -> None:
+    from tracker.export import report  # brings the evaluation
+
+    report.write(path, written, options)
+
+
+def _write_video(path: Path, written: Written, options: Options) -> None:
+    from tracker.export import video  # brings OpenCV and the reading of videos
+
+    video.write(path, written, options)
 
 
 FORMATS: dict[str, Format] = {
     form.name: form
     for form in (
-        Format("csv", "CSV", ".csv", "one row a person a step, with boxes", "csv_file", "text/csv"),
+        Format(
+            "csv", "CSV", ".csv", "one row a person a step, with boxes",
+            csv_file.write, "text/csv",
+        ),
         Format(
             "motchallenge", "MOTChallenge", "", "a text a camera, in TrackEval's folders",
-            "motchallenge", "application/zip",
+            motchallenge.write, "application/zip",
         ),
         Format(
             "json", "JSON", ".json", "tracks and parameters, by tracks.schema.json",
-            "json_file", "application/json",
+            json_file.write, "application/json",
         ),
         Format(
-            "parquet", "Parquet", ".parquet", "one table in full precision", "parquet",
-            "application/vnd.apache.parquet", "pyarrow", "parquet",
-        ),
-        Format("trc", "TRC", ".trc", "a marker a person, for OpenSim", "trc", "text/plain"),
-        Format(
-            "gltf", "glTF", ".glb", "boxes that move, for Blender and viewers of 3D", "gltf",
-            "model/gltf-binary",
+            "parquet", "Parquet", ".parquet", "one table in full precision",
+            parquet.write, "application/vnd.apache.parquet", "pyarrow", "parquet",
         ),
         Format(
-            "rerun", "Rerun", ".rrd", "a recording for Rerun's viewer", "rerun_file",
-            "application/octet-stream", "rerun", "rerun",
+            "trc", "TRC", ".trc", "a marker a person, for OpenSim", trc.write, "text/plain"
+        ),
+        Format(
+            "gltf", "glTF", ".glb", "boxes that move, for Blender and viewers of 3D",
+            gltf.write, "model/gltf-binary",
+        ),
+        Format(
+            "rerun", "Rerun", ".rrd", "a recording for Rerun's viewer",
+            rerun_file.write, "application/octet-stream", "rerun", "rerun",
         ),
         Format(
             "html", "HTML report", ".html", "figures and differences against the truth, one file",
-            "report", "text/html", needs_truth=True,
+            _write_report, "text/html", needs_truth=True,
         ),
         Format(
-            "mp4", "MP4", ".mp4", "cameras with boxes, the room from above, lanes", "video.film",
-            "video/mp4", needs_pictures=True,
+            "mp4", "MP4", ".mp4", "cameras with boxes, the room from above, lanes",
+            _write_video, "video/mp4", needs_pictures=True,
         ),
     )
 }  # fmt: skip
-"""By name; CSV is what is written where nothing else is asked for."""
+"""The formats by name; CSV is the default."""
 
 
 def format_of(path: Path, name: str | None = None) -> Format:
-    """The form of a file by its name or, where none is given, its suffix; CSV where that says
-    nothing.
+    """Choose the format of a file.
+
+    Args:
+        path: The file; its suffix chooses the format where no name is given, and CSV is taken
+            where the suffix is unknown.
+        name: The format's name; None if it is to be chosen by the suffix.
 
     Raises:
-        ValueError: If there is no such form, or the suffix is the name of one that has another.
+        ValueError: If there is no such format, or the suffix is the name of a format whose files
+            have another suffix (``.gltf``).
     """
     if name is not None:
         if name not in FORMATS:
@@ -129,38 +154,38 @@ def save(
     *,
     zipped: bool = False,
 ) -> None:
-    """Write a run in one of the forms: wholly or not at all, whatever interrupts it.
+    """Write a run in one of the formats, atomically.
 
     Args:
-        path: A file, replaced if it is there; or a folder, which must be new or empty.
-        form: Of :data:`FORMATS`.
-        written: The run.
-        options: How much; all, if none are given.
-        zipped: A folder as one ZIP file.
+        path: The file to write, which is replaced if it exists; or the folder, which must be new or
+            empty.
+        form: The format, one of :data:`FORMATS`.
+        written: The run to write.
+        options: The range and the callbacks; the whole run if None.
+        zipped: Whether a format that is a folder is written as one ZIP file.
 
     Raises:
-        ValueError: If the run has not what the form needs, or a package is not installed.
-        OSError: With a sentence, if it cannot be written.
-        Stopped: If it is not wanted any more.
+        ValueError: If the run lacks what the format needs, or a package is not installed.
+        OSError: With a sentence, if the file cannot be written.
+        Stopped: If the caller cancelled the export.
     """
     options = options or Options()
     form.check(written.sequence)
-    module = importlib.import_module(f"tracker.export.{form.module}")
     if not form.folder:
         if not path.is_dir() and path.exists() and not path.is_file():
-            module.write(path, written, options)  # a pipe or device
+            form.write(path, written, options)  # a pipe or device
             return
         with replacing(path) as temporary:
-            module.write(temporary, written, options)
+            form.write(temporary, written, options)
     elif zipped:
         with replacing(path) as temporary:
             folder = temporary.with_name(temporary.name + ".folder")
             folder.mkdir()
             try:
-                module.write(folder, written, options)
+                form.write(folder, written, options)
                 zip_folder(folder, temporary)
             finally:
                 shutil.rmtree(folder, ignore_errors=True)
     else:
         with filling(path) as temporary:
-            module.write(temporary, written, options)
+            form.write(temporary, written, options)

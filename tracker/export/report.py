@@ -1,4 +1,4 @@
-"""The HTML report of a run, where its sequence has a truth."""
+"""The HTML report of a run whose sequence has ground truth."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from tracker.export.written import Options, Written
 
 
 def write(path: Path, written: Written, options: Options) -> None:
-    """Score the tracks and write the report."""
+    """Evaluate the tracks and write the report."""
     from tracker.evaluation.report.page import report_html  # brings plotly
 
     sequence = written.sequence

@@ -1,7 +1,8 @@
-"""A recording for Rerun's viewer: boxes and ways in 3D, cameras, and boxes in their pictures.
+"""A recording for Rerun's viewer: boxes and paths in 3D, cameras, and boxes in their pictures.
 
-Entities: ``world/tracks``, ``world/ways/<id>``, ``world/room``, ``world/cameras/<name>`` with its
-pinhole, and ``world/cameras/<name>/tracks``; the timeline is ``step``, and ``time`` in seconds.
+The entities are ``world/tracks``, ``world/ways/<id>``, ``world/room``, ``world/cameras/<name>``
+with its pinhole, and ``world/cameras/<name>/tracks``; the timelines are ``step``, and ``time`` in
+seconds.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ APPLICATION = "multiview-phd"
 
 
 def write(path: Path, written: Written, options: Options) -> None:
-    """Write the file, step by step."""
+    """Write a run as a Rerun recording, step by step."""
     import rerun as rr
 
     sequence, tracks = written.sequence, written.tracks

@@ -1,7 +1,7 @@
-"""The track file: one row a target a step, with the boxes it makes in every picture.
+"""The track file: one row for each target and step, with its reprojected box in every picture.
 
-The comment lines at the top say what made it: version, sequence, seed, methods and the
-value of every parameter, in words that ``multiview-phd track --set`` takes back.
+The comment lines at the top state how it was made: version, sequence, seed, methods and the
+value of every parameter, in the form that ``multiview-phd track --set`` accepts.
 """
 
 from __future__ import annotations
@@ -34,15 +34,15 @@ BOX = ("left", "top", "width", "height")
 COLUMNS = ("frame", "time", "id", "x", "y", "z", "existence", "sigma_x", "sigma_y", "sigma_z")
 
 CORRECTION = "correction"
-"""The column of a corrected run: the id of the correction that a row rests on, empty for none."""
+"""The column of a corrected run: the id of the correction that a row depends on, or empty."""
 
 NAME = "name"
-"""The column of a run in which somebody was named: the name of a row's track, empty for none."""
+"""The column of a run in which people were named: the name of a row's track, or empty."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrackFile:
-    """What a track file says. N rows, sorted by step and then id."""
+    """The content of a track file: N rows, sorted by step and then id."""
 
     frames: Int[ndarray, " N"]
     times: Float[ndarray, " N"]
@@ -58,9 +58,9 @@ class TrackFile:
     settings: Mapping[str, str]
     """The comment lines ``# key = value``: sequence, seed, methods and parameters."""
     done: int | None = None
-    """The number of steps computed, where the file says that it is not all of them."""
+    """The number of steps computed, if the file states that it is not all of them; else None."""
     remarks: tuple[str, ...] = ()
-    """What the file says is missing of it."""
+    """The sentences in which the file states what is missing."""
 
     def __len__(self) -> int:
         return len(self.frames)
@@ -83,16 +83,17 @@ def write_tracks_csv(
     Positions have 4 decimals (a tenth of a millimetre), boxes 2, times 6.
 
     Args:
-        stream: Text, opened with ``newline=""``; lines end with a single line feed.
-        sequence: What was tracked.
-        tracks: Its targets, by step and then id.
-        parameters: With which they were found.
-        seed: Of the run.
-        done: The number of steps computed; fewer than the sequence has are said at the top.
-        remarks: What else is said there of the result, for instance that pictures were missing.
-        resting: Of a run with corrections the id of the one that each row rests on; it becomes
-            the column :data:`CORRECTION`.
-        names: What people were called by hand, by track; they become the column :data:`NAME`.
+        stream: A text stream, opened with ``newline=""``; lines end with a single line feed.
+        sequence: The sequence that was tracked.
+        tracks: The result, sorted by step and then id.
+        parameters: The parameters of the run.
+        seed: The seed of the run.
+        done: The number of steps computed; a comment states it if the sequence has more.
+        remarks: Further sentences for the comments, for instance that pictures were missing.
+        resting: For a corrected run, the id of the correction that each row depends on, "" for
+            none; the ids become the column :data:`CORRECTION`.
+        names: The names that people were given by hand, by track id; they become the column
+            :data:`NAME`.
     """
     for line in _comments(sequence, parameters, seed, done, remarks):
         stream.write(f"# {line}\n")
@@ -123,14 +124,14 @@ def write_tracks_csv(
 
 
 def _cell(text: str) -> str:
-    """Text that somebody wrote as a cell of its own, and no formula."""
+    """Return text that a user wrote as one quoted cell that no spreadsheet reads as a formula."""
     cell = io.StringIO()
     csv.writer(cell, lineterminator="").writerow([guarded(" ".join(text.split()))])
     return cell.getvalue()
 
 
 def _fixed(values: Float[ndarray, "N C"], decimals: int) -> Iterator[list[str]]:
-    """Columns of text with a fixed number of decimals; NaN is empty, and zero has no sign."""
+    """Yield columns as text with a fixed number of decimals; NaN is empty, and zero has no sign."""
     rounded = np.round(values, decimals) + 0.0  # turns −0.0 into 0.0
     for column in rounded.T:
         yield [f"{number:.{decimals}f}" if number == number else "" for number in column.tolist()]

@@ -1,8 +1,8 @@
-"""TRC, as OpenSim and Mokka read it: each track a marker at its middle; metres, y up.
+"""The export format TRC, for OpenSim and Mokka: a marker at the centre of each track, in metres.
 
-Source: OpenSim documentation, "Marker (.trc) Files": five lines of a header, then frame, time
-and X, Y, Z of each marker, apart by tabs; empty where a marker is not there. World x, y, z
-(z up) become X = x, Y = z, Z = −y.
+Source: OpenSim documentation, "Marker (.trc) Files". After five lines of header a row has frame,
+time, and X, Y, Z of each marker, separated by tabs; the cells of a missing marker are empty. World
+x, y, z (z up) become X = x, Y = z, Z = −y (y up).
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from tracker.export.written import Options, Written
 
 
 def write(path: Path, written: Written, options: Options) -> None:
-    """Write the file, step by step."""
+    """Write a run as markers, step by step."""
     sequence, tracks, ids = written.sequence, written.tracks, written.ids
     place = {number: k for k, number in enumerate(ids)}
     fps, steps = f"{sequence.fps:g}", written.steps

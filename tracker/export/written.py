@@ -1,4 +1,4 @@
-"""What every form is given: a run's result with what belongs to it."""
+"""The input of every export format: a run's result with its sequence and parameters."""
 
 from __future__ import annotations
 
@@ -16,32 +16,37 @@ from tracker.sequences.sequence import Sequence
 
 
 class Stopped(Exception):
-    """Whoever asked for it does not want it any more; nothing was written."""
+    """The caller cancelled the export; nothing was written."""
 
 
-def _nobody_waits(done: int, total: int) -> None:
+def _ignore_progress(done: int, total: int) -> None:
     return
 
 
 @dataclass(frozen=True, slots=True)
 class Options:
-    """How much is written, and who is told; only a video heeds the first three."""
+    """The range of steps and the callbacks of an export; only a video uses the first three."""
 
     first: int = 0
+    """The first step that is written."""
     last: int | None = None
-    """Both included; None for the last step that is there."""
+    """The last step that is written, included; None for the last one computed."""
     speed: float = 1.0
-    """Of a second of the recording: 0.5 takes twice as long."""
-    progress: Callable[[int, int], None] = _nobody_waits
-    """Told of the steps written and their number."""
+    """The speed of playback relative to the recording: at 0.5 the video takes twice as long."""
+    progress: Callable[[int, int], None] = _ignore_progress
+    """A callback that gets the number of steps written and of all steps."""
     stopped: Callable[[], bool] = lambda: False
-    """Asked between steps."""
+    """A callback that is asked between steps whether to cancel."""
 
     def at(self, done: int, total: int) -> None:
-        """So far.
+        """Report progress, and stop if the caller cancelled.
+
+        Args:
+            done: The number of steps (or tracks) written.
+            total: The number of all of them.
 
         Raises:
-            Stopped: If it is not wanted any more.
+            Stopped: If the caller cancelled the export.
         """
         if self.stopped():
             raise Stopped
@@ -50,7 +55,7 @@ class Options:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Written:
-    """A run's result."""
+    """A run's result, as it is written."""
 
     sequence: Sequence
     tracks: Trajectories
@@ -59,15 +64,16 @@ class Written:
     done: int | None = None
     """The number of steps computed; None for all."""
     remarks: tuple[str, ...] = ()
-    """What must be said of it wherever it goes: that pictures were missing."""
+    """Sentences that must accompany the result, for instance that pictures were missing."""
     resting: Many[str] = ()
-    """Of a corrected run the id of the correction that each row rests on, empty for none."""
+    """For a corrected run, the id of the correction that each row depends on; "" for none."""
     names: Mapping[int, str] = field(default_factory=dict)
-    """What people were called by hand, by track."""
+    """The names that people were given by hand, by track id."""
     back: str = ""
-    """The address of the page that shows it, where there is one."""
+    """The URL of the page that shows the run; empty if there is none."""
     boxes: list[tuple[Float[ndarray, "N 4"], Bool[ndarray, " N"]]] = field(init=False)
-    """For each camera left, top, width, height in pixels, and whether the picture has them."""
+    """For each camera the reprojected boxes of all rows (left, top, width, height in pixels), and
+    whether each lies in the picture."""
 
     def __post_init__(self) -> None:
         half = self.sequence.target_half_extents
@@ -76,16 +82,16 @@ class Written:
 
     @property
     def steps(self) -> int:
-        """How many steps are there."""
+        """The number of steps computed."""
         return self.sequence.frames if self.done is None else self.done
 
     @property
     def ids(self) -> list[int]:
-        """Of all tracks, ascending."""
+        """The ids of all tracks, ascending."""
         found: list[int] = np.unique(self.tracks.ids).tolist()
         return found
 
     @property
     def settings(self) -> dict[str, str | int | float | bool]:
-        """Methods and every parameter's value, by key."""
+        """The chosen methods and the value of every parameter, by key."""
         return {key: value(self.parameters, key) for key in (*METHODS, *PARAMETERS)}

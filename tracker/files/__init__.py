@@ -1,1 +1,1 @@
-"""How files are written, where they lie, and how what was written is validated."""
+"""How files are written, where the user's folders are, and how stored JSON is validated."""

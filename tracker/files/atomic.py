@@ -1,4 +1,4 @@
-"""Where what is written goes: beside its place until it is complete, then there at once."""
+"""Atomic writing: a file or folder is written beside its place and renamed once it is complete."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ except ImportError:  # Windows
 
 
 def file_names(names: Sequence[str]) -> list[str]:
-    """Names of cameras as names of files: each its own, none that leads into another folder."""
+    """Turn camera names into distinct file names, none of which leads into another folder."""
     found: list[str] = []
     for name in names:
         plain = "".join(c if c.isprintable() and c not in "/\\" else "-" for c in name)
@@ -34,23 +34,23 @@ def file_names(names: Sequence[str]) -> list[str]:
 
 _BEGUN = "part"
 _LONGEST = 200
-"""Characters of a name that go into the name of what is to take its place."""
+"""Most characters of a name that are repeated in the name of its temporary file."""
 
 ABANDONED_SECONDS = 3600.0
-"""A file that was begun and not written to for so many seconds was left by a process that died."""
+"""A temporary file that was not written to for so many seconds was left by a dead process."""
 
 
 @contextmanager
 def replacing(path: Path, *, passing: bool = False) -> Iterator[Path]:
-    """A file to write, which takes its place when it is complete and never before.
+    """Yield a temporary file that replaces a file when the block ends without an exception.
 
     Args:
-        path: Replaced if it is there.
-        passing: Whether it is soon written anew, so that a machine that loses its power may lose
-            it: then nobody waits for the disk.
+        path: The file to write; an existing one is replaced.
+        passing: Whether the file is written again soon, so that it may be lost when the machine
+            loses power: it is then not forced to disk.
 
     Raises:
-        OSError: With a sentence, if it cannot be written; what was there still is.
+        OSError: With a sentence, if the file cannot be written; an existing file is then as it was.
     """
     if path.is_dir():
         raise IsADirectoryError(f"{path}: expected a file to write, found a folder; add a name")
@@ -72,7 +72,7 @@ def replacing(path: Path, *, passing: bool = False) -> Iterator[Path]:
 
 
 def write_whole(path: Path, data: bytes) -> None:
-    """Have a file hold this: all of it or, whatever happens, what it held before.
+    """Replace the content of a file atomically.
 
     Raises:
         OSError: With a sentence, if it cannot be written.
@@ -82,10 +82,11 @@ def write_whole(path: Path, data: bytes) -> None:
 
 
 def size_of(path: Path) -> int:
-    """The bytes of an ordinary file.
+    """Return the size of an ordinary file in bytes.
 
     Raises:
-        OSError: If there is none: whoever reads a pipe waits, and a device has no end.
+        OSError: If there is no such file, or it is a pipe (on which reading blocks) or a device
+            (which has no end).
     """
     there = path.stat()
     if not stat.S_ISREG(there.st_mode):
@@ -94,25 +95,25 @@ def size_of(path: Path) -> int:
 
 
 def sync_file(path: Path) -> None:
-    """Have the disk hold what was written into a file."""
+    """Force the content of a file to disk."""
     with path.open("rb") as file:
         os.fsync(file.fileno())
 
 
 def sync_folder(folder: Path) -> None:
-    """Have the disk hold the names in a folder, where the system lets folders be opened."""
+    """Force the entries of a folder to disk, where the system lets folders be opened."""
     if os.name != "posix":
         return
     handle = os.open(folder, os.O_RDONLY)
     try:
-        with contextlib.suppress(OSError):  # some file systems know no such thing
+        with contextlib.suppress(OSError):  # some file systems cannot sync a folder
             os.fsync(handle)
     finally:
         os.close(handle)
 
 
 def sweep(folder: Path, name: str) -> None:
-    """Remove what processes that died began to write under this name, or in a folder of it."""
+    """Remove the temporary files and folders that dead processes left for a name in a folder."""
     with contextlib.suppress(OSError):
         now = time.time()
         for path in folder.glob(f".*.{_BEGUN}.{glob.escape(name[-_LONGEST:])}"):
@@ -127,12 +128,13 @@ def sweep(folder: Path, name: str) -> None:
 
 @contextmanager
 def locked(path: Path) -> Iterator[None]:
-    """Only one process at a time does what is done within it, for a file that several change.
+    """Let only one process at a time run the block, for a file that several processes change.
 
-    The lock is of a file beside it, which stays. Where the system has no locks there is none.
+    The lock is held on a file beside it, which is never deleted. Where the system has no file
+    locks, nothing is locked.
 
     Raises:
-        OSError: If there is no place for it.
+        OSError: If the lock file cannot be created.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     with path.with_name(f".{path.name}.lock").open("ab") as file:
@@ -142,19 +144,20 @@ def locked(path: Path) -> Iterator[None]:
 
 
 def beside(path: Path) -> Path:
-    """A name for what is to take a place, in the same folder; of a length that fits."""
+    """Return a new temporary name in the same folder, no longer than file systems allow."""
     return path.with_name(f".{secrets.token_hex(4)}.{_BEGUN}.{path.name[-_LONGEST:]}")
 
 
 @contextmanager
 def filling(folder: Path) -> Iterator[Path]:
-    """A folder to fill, which takes its place when it is complete and never before.
+    """Yield a temporary folder that is renamed when the block ends without an exception.
 
     Args:
-        folder: It must not be there, or be empty: nobody's files are mixed with ours.
+        folder: The folder to make. It must not exist or be empty, so that the new files are not
+            mixed with others.
 
     Raises:
-        OSError: With a sentence, if it cannot be written.
+        OSError: With a sentence, if the folder cannot be written.
     """
     if folder.is_file() or (folder.is_dir() and any(folder.iterdir())):
         raise FileExistsError(

@@ -1,4 +1,4 @@
-"""Where the program keeps what it can make again, and what a person has set."""
+"""The user's folders: caches, data and settings, and the search for files in a folder."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ import platformdirs
 
 
 def home() -> Path:
-    """The person's folder; where the system knows of none, as in some containers and services, one
-    among the temporary files that nobody else can open."""
+    """Return the home folder; where there is none, as in some containers and services, a private
+    folder among the temporary files."""
     try:
         return Path.home()
     except RuntimeError:
@@ -29,14 +29,14 @@ def _instead() -> Path:
         place.mkdir(mode=0o700)
     with contextlib.suppress(OSError):
         found = place.lstat()
-        # somebody else may have made it, or have put a link there
+        # another user may have made the folder, or have put a link in its place
         if stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid() and not found.st_mode & 0o77:
             return place
     return Path(tempfile.mkdtemp(prefix="multiview-phd-"))
 
 
 def data_folder() -> Path:
-    """The platform's place for what a person keeps."""
+    """Return the platform's folder for user data."""
     try:
         found = platformdirs.user_data_path("multiview-phd", appauthor=False)
     except RuntimeError:  # there is no home
@@ -45,10 +45,10 @@ def data_folder() -> Path:
 
 
 def cache_folder() -> Path:
-    """``$MULTIVIEW_PHD_CACHE``, else the platform's place for caches.
+    """Return ``$MULTIVIEW_PHD_CACHE``, else the platform's folder for caches.
 
-    Rendered rooms, finished columns of runs and compiled kernels live there, each in a
-    folder of its own; all of it may be deleted at any time.
+    Rendered rooms, results of finished stages and compiled kernels each have a folder in it. All
+    of it can be computed again and may be deleted at any time.
     """
     own = os.environ.get("MULTIVIEW_PHD_CACHE")
     if own:
@@ -64,9 +64,9 @@ def cache_folder() -> Path:
 
 
 def settings_folder() -> Path:
-    """``$MULTIVIEW_PHD_SETTINGS``, else the platform's place for what a person has set.
+    """Return ``$MULTIVIEW_PHD_SETTINGS``, else the platform's folder for user settings.
 
-    Unlike the caches, nothing in it can be made again.
+    Unlike the caches, the settings cannot be computed again.
     """
     own = os.environ.get("MULTIVIEW_PHD_SETTINGS")
     if own:
@@ -82,7 +82,7 @@ def settings_folder() -> Path:
 
 
 def library_file() -> Path:
-    """``$MULTIVIEW_PHD_LIBRARY``, else ``library.sqlite3`` in the platform's place for data."""
+    """Return ``$MULTIVIEW_PHD_LIBRARY``, else ``library.sqlite3`` in :func:`data_folder`."""
     own = os.environ.get("MULTIVIEW_PHD_LIBRARY")
     if own:
         return Path(own).expanduser().absolute()
@@ -90,10 +90,14 @@ def library_file() -> Path:
 
 
 def files_matching(folder: Path, pattern: str) -> list[Path]:
-    """The files below a folder whose path in it is as a pattern says, sorted.
+    """Return the files below a folder that match a glob pattern, sorted.
+
+    Args:
+        folder: The folder to search.
+        pattern: A pattern of paths relative to the folder, for instance ``videos/*.mp4``.
 
     Raises:
-        ValueError: With the reason, if it is no pattern of paths below a folder.
+        ValueError: With the reason, if the pattern is not one of paths below a folder.
     """
     if not Path(pattern).parts:  # "." names the folder itself, for which `glob` has no word
         raise ValueError("it names no file")

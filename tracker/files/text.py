@@ -1,7 +1,8 @@
-"""Text of others: where it is none, and as a terminal or a message may show it.
+"""Untrusted text made safe for a terminal or a message.
 
-What cannot be printed is written out: a name may hold escape sequences that move a terminal's
-cursor, or signs that turn the direction of writing, and then what is read is not what is there.
+Characters that cannot be printed are escaped: a name may contain escape sequences that move the
+cursor of a terminal, or characters that reverse the direction of writing, and would then be
+displayed as something else than it is.
 """
 
 from __future__ import annotations
@@ -10,17 +11,17 @@ from typing import Any
 
 
 def visible(text: str) -> str:
-    """The text on one line, every character that cannot be printed as its escape, ``\\x1b``."""
+    """Return the text on one line, with characters that cannot be printed as escapes, ``\\x1b``."""
     if text.isprintable():
         return text
     return "".join(c if c.isprintable() else _escaped(c) for c in text)
 
 
 def shown(value: Any) -> str:
-    """A value as a message shows it: short, in TOML's notation."""
+    """Format a value for a message: at most 60 characters, in TOML's notation."""
     try:
         text = "true" if value is True else "false" if value is False else repr(value)
-    except ValueError:  # Python writes no whole number of thousands of digits
+    except ValueError:  # Python refuses to write integers of thousands of digits
         return "a number with thousands of digits"
     if isinstance(value, str):
         text = f'"{value}"'
@@ -28,7 +29,7 @@ def shown(value: Any) -> str:
 
 
 def not_utf_8(error: UnicodeDecodeError) -> str:
-    """What a message says of a file that is no text, after the file's name and a comma."""
+    """Describe where a file is not UTF-8; a message puts it after the file's name and a comma."""
     line = error.object.count(b"\n", 0, error.start) + 1
     found = f"found byte 0x{error.object[error.start]:02x}"
     return f"line {line}: expected text in UTF-8, {found}; save the file as UTF-8"

@@ -1,4 +1,4 @@
-"""JSON that was written by the program, checked field by field when it is read again."""
+"""JSON that the program wrote, validated field by field when it is read again."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from tracker.files.text import shown, visible
 T = TypeVar("T")
 
 MOST_LETTERS = 80
-"""Of the place of a field."""
+"""Most characters of a field's path that a message shows."""
 
 _adapter: Any = cache(TypeAdapter)
 
 
 class Spoilt(ValueError):
-    """What was read is not what was written."""
+    """Stored JSON does not have the expected structure: it was changed or damaged."""
 
     def __init__(self, place: str, words: str) -> None:
-        """Tell a field and what is wrong with it.
+        """Name the field and the problem.
 
         Args:
-            place: Its names, joined by full stops; empty for the whole.
+            place: The field's path, joined by full stops; empty for the whole document.
             words: What was expected and what was found.
         """
         super().__init__(f"{place}: {words}" if place else words)
@@ -33,14 +33,14 @@ class Spoilt(ValueError):
 
 
 def value_of(kind: type[T], text: str | bytes) -> T:
-    """A value of a kind, from its JSON.
+    """Parse JSON into a value of a type.
 
     Args:
-        kind: A dataclass, or what its fields are made of.
-        text: As it was written.
+        kind: A dataclass, or any other type that pydantic validates.
+        text: The JSON text.
 
     Raises:
-        Spoilt: With the first field that is not of its kind.
+        Spoilt: With the first field that does not have its type.
     """
     try:
         value: T = _adapter(kind).validate_json(text, strict=True)

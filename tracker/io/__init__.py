@@ -1,1 +1,1 @@
-"""How a foreign recording becomes a sequence: formats, conventions, import, check."""
+"""The import of recordings of other programs: formats, conventions, import and checks."""

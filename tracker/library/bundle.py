@@ -1,8 +1,8 @@
-"""One run in one ZIP file that opens anywhere: recording, tracks, parameters, report, small videos.
+"""A bundle: one run with its recording, tracks, parameters and report in one portable ZIP file.
 
-``run.json`` says what it is; ``tracks.bin`` is as the library keeps it, ``tracks.csv`` for
-everybody else; ``sequence/`` is an ordinary sequence folder, whose videos, where they are taken
-along, show step k in frame k at their size and a low rate of bits.
+``run.json`` describes the run; ``tracks.bin`` has the tracks as the library stores them, and
+``tracks.csv`` has them for other programs; ``sequence/`` is an ordinary sequence folder. Its
+videos, if they are included, show step k in frame k, in full size and at a low bit rate.
 """
 
 from __future__ import annotations
@@ -36,32 +36,34 @@ MANIFEST, TRACKS, FOLDER = "run.json", "tracks.bin", "sequence"
 
 MOST_FILES = 10_000
 MOST_BYTES = 8 << 30
-"""Of what an archive unpacks to: a small file can claim to hold more than any disk."""
+"""Largest size of an unpacked archive, bytes: a small file can claim to contain more than any
+disk holds."""
 
 _UNREADABLE = (
     OSError, ValueError, KeyError, TypeError, AttributeError, EOFError, NotImplementedError,
     RuntimeError, zipfile.BadZipFile, zlib.error,
 )  # fmt: skip
-"""What the standard library raises of an archive that is none, or of a spoilt or locked one."""
+"""What the libraries raise for a file that is no archive, or for a damaged or encrypted one."""
 
 _EXPECTED = "expected a bundle as `multiview-phd bundle` writes it"
 _QUALITY = {"preset": "veryfast", "crf": "32"}
 _ANEW = ("video", "images", "first_frame", "background", "detections",
          "detections_first_frame", "detected_steps", "appearance", *CLOCK)  # fmt: skip
-"""Fields of a camera that are written anew, by steps; its calibration stays as it is."""
+"""Fields of a camera that are replaced, since files are indexed by step in a bundle; all others,
+such as the calibration, are copied."""
 
 
 def write_bundle(path: Path, result: Result, sequence: Sequence, *, videos: bool = False) -> None:
-    """Write the archive: wholly or not at all.
+    """Write a bundle atomically.
 
     Args:
-        path: A ``.zip`` file, replaced if it is there.
+        path: The ``.zip`` file to write; an existing one is replaced.
         result: The run.
-        sequence: Its recording.
-        videos: Whether small videos are taken along.
+        sequence: The run's recording.
+        videos: Whether the videos are included.
 
     Raises:
-        OSError: With a sentence, if it cannot be written.
+        OSError: With a sentence, if the file cannot be written.
     """
     with replacing(path) as temporary, tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -82,7 +84,7 @@ def _fill(folder: Path, result: Result, sequence: Sequence, videos: bool) -> Non
     manifest = {
         "format": FORMAT,
         "program": f"multiview-phd {__version__}",
-        "final": bool(listed.pop("final")),  # beside the run, whose fields older programs know
+        "final": bool(listed.pop("final")),  # older programs do not know this field of a run
         "run": listed,
         "key": result.key,
         "digest": result.digest,
@@ -108,7 +110,7 @@ def _fill(folder: Path, result: Result, sequence: Sequence, videos: bool) -> Non
 
 
 def _write_sequence(folder: Path, sequence: Sequence, videos: bool) -> None:
-    """The recording as a folder of its own, everything by steps."""
+    """Write the recording as a sequence folder in which all files are indexed by step."""
     import tomlkit
 
     folder.mkdir()
@@ -125,23 +127,23 @@ def _write_sequence(folder: Path, sequence: Sequence, videos: bool) -> None:
     }
     document["target"] = {"half_extents": sequence.target_half_extents.tolist()}
     cameras: list[dict[str, Any]] = []
-    for index, (view, stated) in enumerate(zip(sequence.views, document["camera"], strict=True)):
-        camera = {name: value for name, value in stated.items() if name not in _ANEW}
+    for index, (view, original) in enumerate(zip(sequence.views, document["camera"], strict=True)):
+        camera = {name: value for name, value in original.items() if name not in _ANEW}
         camera["image_size"] = list(view.camera.image_size)
         if view.detections is not None:
             camera["detections"] = f"camera{index + 1}.csv"
             boxes = view.detections
             rows = np.column_stack([boxes.frames, boxes.boxes, boxes.scores]).tolist()
-            looks = boxes.looks
+            vectors = boxes.embeddings
             lines = [f"{int(row[0])}," + ",".join(f"{v:.9g}" for v in row[1:]) for row in rows]
-            if view.looked_at is not None:  # a step without a picture is no step without people
+            if view.looked_at is not None:  # tells steps without detector from steps without people
                 camera["detected_steps"] = "listed"
-                nobody = np.setdiff1d(np.flatnonzero(view.looked_at), boxes.frames)
-                lines += [f"{step},,,,," for step in nobody.tolist()]
-                looks = np.pad(looks, ((0, len(nobody) if looks.shape[1] else 0), (0, 0)))
-            if looks.shape[1]:
+                empty = np.setdiff1d(np.flatnonzero(view.looked_at), boxes.frames)
+                lines += [f"{step},,,,," for step in empty.tolist()]
+                vectors = np.pad(vectors, ((0, len(empty) if vectors.shape[1] else 0), (0, 0)))
+            if vectors.shape[1]:
                 camera["appearance"] = f"camera{index + 1}.npy"
-                np.save(folder / camera["appearance"], looks)
+                np.save(folder / camera["appearance"], vectors)
             _write_csv(folder / camera["detections"], "frame,left,top,width,height,score", lines)
         if videos and view.has_pictures:
             camera["video"] = f"camera{index + 1}.mp4"
@@ -185,7 +187,7 @@ def _write_video(path: Path, sequence: Sequence, camera: int) -> None:
         rate = Fraction(sequence.fps).limit_denominator(1000)
         stream = file.add_stream("libx264", rate=rate, options=_QUALITY)
         stream.width, stream.height = width, height
-        # an odd size cannot be halved, as the usual kind of colours is
+        # colours at half resolution, as players expect them, need even sizes
         stream.pix_fmt = "yuv420p" if even == (width, height) else "yuv444p"
         nothing = np.zeros((height, width, 3), dtype=np.uint8)
         for picture in reader.iterate(camera):
@@ -195,19 +197,20 @@ def _write_video(path: Path, sequence: Sequence, camera: int) -> None:
 
 
 def unpack_bundle(path: Path, folder: Path) -> Result:
-    """Unpack an archive into an empty folder, and read its run.
+    """Unpack a bundle into an empty folder, and read its run.
 
-    Nothing is written outside the folder, whatever names the archive has.
+    Nothing is written outside the folder, whatever names the archive contains.
 
     Args:
-        path: As :func:`write_bundle` writes it.
-        folder: Where to.
+        path: A bundle, as :func:`write_bundle` writes it.
+        folder: The folder to unpack to.
 
     Raises:
-        LibraryError: If it is no bundle, is damaged, of a newer version, or climbs out.
+        LibraryError: If the file is no bundle, is damaged or of a newer version, or contains names
+            that lead out of the folder.
     """
     try:
-        if path.exists() and not path.is_file():  # whoever reads a pipe waits
+        if path.exists() and not path.is_file():  # reading a pipe would block
             raise LibraryError(f"{path}: {_EXPECTED}, found a folder, pipe or device")
         with zipfile.ZipFile(path) as archive:
             _check_names(path, archive)

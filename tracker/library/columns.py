@@ -1,9 +1,9 @@
-"""A run's tracks as bytes: each column delta-encoded, byte-shuffled and compressed by zlib.
+"""The encoding of a run's tracks: each column delta-encoded, byte-shuffled and compressed by zlib.
 
-Rows are sorted by track and then step, so that neighbours differ little; of each number the
-difference from the one before is kept (delta encoding), its bytes separated by significance
-(byte shuffling). zlib's checksum detects damage. Positions are exact; existence and standard
-deviations are rounded to float32, and p_D to a thousandth.
+Rows are sorted by track and then step, so that neighbours differ little; each number is replaced
+by its difference from the previous one (delta encoding), and the bytes of all differences are
+grouped by significance (byte shuffling). zlib's checksum detects damage. Positions are exact;
+existence and standard deviations are rounded to float32, and p_D to a thousandth.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _MOST_ROWS = 1 << 28
 
 @dataclass(frozen=True, slots=True, eq=False)
 class KeptTracks:
-    """What is kept of a run's result."""
+    """The part of a run's result that the library stores."""
 
     tracks: Trajectories
     detection_probabilities: Float[ndarray, "N C"]
@@ -34,7 +34,7 @@ class KeptTracks:
 
 
 def pack(kept: KeptTracks) -> bytes:
-    """As bytes."""
+    """Encode tracks as bytes."""
     tracks = kept.tracks
     order = np.lexsort((tracks.frames, tracks.ids))
     rows, cameras = len(tracks), tracks.seen.shape[1]
@@ -53,7 +53,7 @@ def pack(kept: KeptTracks) -> bytes:
 
 
 def unpack(data: bytes) -> KeptTracks:
-    """What :func:`pack` was given, sorted by step and then id.
+    """Decode what :func:`pack` encoded; rows are sorted by step and then id.
 
     Raises:
         ValueError: If the bytes are damaged.
@@ -107,13 +107,15 @@ def _beside(columns: list[ndarray], rows: int, kind: type) -> ndarray:
 
 
 def _planes(values: Shaped[ndarray, " N"]) -> bytes:
-    """What differs from the value before, modulo the integer's size; its bytes by significance."""
+    """Return the differences of neighbours (modulo the integer's size), bytes by significance."""
     difference = values.copy()
     difference[1:] = values[1:] - values[:-1]
     return difference.view(np.uint8).reshape(-1, values.itemsize).T.tobytes()
 
 
 class _Reader:
+    """A reader of the columns, one after the other, from decompressed bytes."""
+
     def __init__(self, raw: bytes, rows: int) -> None:
         self._raw = raw
         self._rows = rows

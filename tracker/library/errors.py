@@ -1,4 +1,4 @@
-"""What goes wrong with a library, in a sentence each."""
+"""The errors of a library, each with a sentence."""
 
 from __future__ import annotations
 
@@ -13,15 +13,18 @@ class LibraryError(ValueError):
 
 
 class NoSuchRun(LibraryError):
-    """A run that the library does not have, or no longer."""
+    """The library does not have the run, or not any more."""
 
 
 @contextmanager
-def told(path: Path) -> Iterator[None]:
-    """Turn every failure of the database into a sentence about its file.
+def explained(path: Path) -> Iterator[None]:
+    """Turn every exception of the database into a sentence about its file.
+
+    Args:
+        path: The library's file.
 
     Raises:
-        LibraryError: Instead of what SQLite, or what reads a damaged row, raises.
+        LibraryError: For errors of SQLite and of decoding a damaged row.
     """
     try:
         yield

@@ -1,4 +1,4 @@
-"""From a finished run to a row of the library, and back to a run that can be shown."""
+"""The conversion of a finished run to a record of the library, and back to a run for display."""
 
 from __future__ import annotations
 
@@ -30,28 +30,28 @@ from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult
 
 THUMBNAIL = (144, 96)
-"""Width and height in pixels that a recording's picture fills: twice what the page shows."""
+"""Width and height of a recording's thumbnail, pixels: twice the size on the page."""
 
 _QUALITY = 80
 
 MISSING = "missing_pictures"
-"""The figure of a run that did not get all pictures: how many, over all cameras."""
+"""The figure that counts the missing pictures of a run, over all cameras."""
 
 
 def code_version() -> str:
-    """A short hash of all code that may change the tracks of a run."""
+    """Return a short hash of all code that may change the tracks of a run."""
     return hashlib.sha256(numbers_version("tracks").encode()).hexdigest()[:12]
 
 
 def recording_of(
     sequence: Sequence, opened_as: str, thumbnail: bytes | None = None
 ) -> NewRecording:
-    """What the library keeps of a recording.
+    """Return the record of a recording.
 
     Args:
-        sequence: It.
-        opened_as: The room's name or the folder that opened it.
-        thumbnail: From :func:`thumbnail_of`.
+        sequence: The recording.
+        opened_as: The name or the folder by which it was opened.
+        thumbnail: The thumbnail from :func:`thumbnail_of`, if any.
     """
     rendered = opens_by_name(sequence.folder)
     truth = sequence.ground_truth
@@ -71,7 +71,14 @@ def recording_of(
 
 
 def thumbnail_of(sequence: Sequence, reader: FrameReader | None = None) -> bytes | None:
-    """The middle picture of the first camera that has one, small; None without pictures."""
+    """Return the JPEG thumbnail of a recording, None without pictures.
+
+    It is made from the picture at the middle step, of the first camera that has one.
+
+    Args:
+        sequence: The recording.
+        reader: The reader of its pictures; if None, one is opened.
+    """
     if reader is None:
         with FrameReader(sequence) as own:
             return thumbnail_of(sequence, own)
@@ -95,18 +102,23 @@ CURVE = 300
 
 
 def stride(steps: int, values: int) -> int:
-    """How many steps a value of a curve stands for that has at most so many values."""
+    """Return the number of steps that each value of a stored curve stands for.
+
+    Args:
+        steps: The number of steps.
+        values: Most values of the curve.
+    """
     return max(1, -(-steps // values))
 
 
 def kept_of(run: Run) -> KeptTracks:
-    """What is kept of a run's result."""
+    """Return the part of a run's result that the library stores."""
     tracks = run.tracks
     probabilities = np.zeros(tracks.seen.shape)
     for step in range(run.done):
         rows = tracks.at(step)
         components = tracks.components[rows]
-        own = components >= 0  # what was put into a gap has none
+        own = components >= 0  # rows that smoothing put into gaps have no component
         known = run.fused[step].detection_probabilities
         probabilities[rows][own] = known[:, components[own]].T
     return KeptTracks(tracks, probabilities)
@@ -120,17 +132,17 @@ def run_of(
     seconds: float,
     evaluation: Evaluation | None = None,
 ) -> NewRun:
-    """What the library keeps of a finished run.
+    """Return the record of a finished run.
 
     Args:
-        run: Finished.
-        source: Who computed it.
-        began: When, seconds since 1970.
-        seconds: How long it took.
-        evaluation: Of its tracks, where there is a truth.
+        run: The finished run.
+        source: The command that computed it.
+        began: The time when its computation began, seconds since 1970.
+        seconds: The duration of its computation, seconds.
+        evaluation: The evaluation of its tracks, if there is ground truth.
 
     Raises:
-        ValueError: If the run is not finished, or steps of it were not scored.
+        ValueError: If the run is not finished, or the evaluation does not cover all its steps.
     """
     if not run.finished or (evaluation is not None and evaluation.steps != run.done):
         scored = "" if evaluation is None else f" and {evaluation.steps} scored"
@@ -167,14 +179,14 @@ def run_of(
 
 
 def figures_of(evaluation: Evaluation) -> dict[str, float | int | None]:
-    """The figures of a run by their names; none without a truth."""
+    """Return the figures of an evaluation by key; none without ground truth."""
     if not evaluation.has_truth:
         return {}
     return {figure.definition.key: figure.value for figure in evaluation.figures}
 
 
 def rescored(result: Result, evaluation: Evaluation) -> Result:
-    """A stored run with the figures of its tracks in place of provisional ones."""
+    """Return a stored run with the figures of an evaluation in the place of provisional ones."""
     figures = figures_of(evaluation)
     headlines: dict[str, Any] = {name: figures.get(name) for name in HEADLINES}
     return replace(
@@ -186,7 +198,7 @@ def rescored(result: Result, evaluation: Evaluation) -> Result:
 
 
 def ospa_of(evaluation: Evaluation) -> tuple[float, ...]:
-    """OSPA over time as it is stored: the mean over :func:`stride` steps each, in metres."""
+    """Return the stored curve of OSPA over time: means over :func:`stride` steps each, metres."""
     if not evaluation.has_truth:
         return ()
     values = evaluation.series.ospa
@@ -197,7 +209,7 @@ def ospa_of(evaluation: Evaluation) -> tuple[float, ...]:
 
 
 def remarks_of(result: Result) -> tuple[str, ...]:
-    """What must be said of a kept run wherever it is written to."""
+    """Return the sentences that must accompany a stored run wherever it is exported."""
     missing, corrected = result.figures.get(MISSING), result.run.corrected
     pictures = (f"{missing} pictures were missing",) if missing else ()
     words = "1 correction" if corrected == 1 else f"{corrected} corrections"
@@ -205,20 +217,20 @@ def remarks_of(result: Result) -> tuple[str, ...]:
 
 
 def run_from(sequence: Sequence, result: Result, *, key: str) -> Run:
-    """A run that shows what was kept: its tracks at once, without what the cameras found.
+    """Make a run for display from a stored one: it has the tracks, but no results of stage 1.
 
-    Each track is the one component of its step's posterior; boxes, measurements and the
-    associations are not there.
+    The posterior of each step has one component for each track; there are no boxes,
+    measurements and associations.
 
     Args:
         sequence: The recording, as it is now.
-        result: From the library.
-        key: By which the run is known.
+        result: The stored run.
+        key: The key of the new run.
 
     Raises:
         ValueError: If the recording has another number of cameras now.
     """
-    # what it has in place of its stages must never be taken over by a computation
+    # the stages' keys are unique, so that no computation re-uses these incomplete stages
     known = stage_keys(sequence, result.parameters, result.run.seed)
     keys = {stage: f"{one}-kept-{result.run.id}" for stage, one in known.items()}
     keys["tracks"] = key

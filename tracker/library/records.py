@@ -1,4 +1,4 @@
-"""What the library tells of a recording and of a run."""
+"""The records of the library: recordings and runs, as they are listed, read and inserted."""
 
 from __future__ import annotations
 
@@ -10,66 +10,69 @@ from tracker.library.columns import KeptTracks
 from tracker.parameters import RunParameters
 
 Source = Literal["track", "page", "bundle", "batch"]
+"""The origin of a run: a command, the page, or a bundle that was unpacked."""
 
 HEADLINES = (
     "mota", "idf1", "hota", "ospa", "position_error", "misses", "false_positives", "id_switches",
 )  # fmt: skip
-"""Figures that have a column of their own: runs are listed and sorted by them."""
+"""Figures that have a column of their own, by which runs are listed and sorted."""
 
 PROVISIONAL = "made before the run was finished; opening it computes them again"
-"""What is said of figures that an earlier version stored too early."""
+"""The note on figures that an earlier version computed before the run was finished."""
 
 
 class Recording(NamedTuple):
-    """A recording of which runs are kept, or that was opened."""
+    """A recording that was opened, with or without stored runs."""
 
     id: int
     place: str
-    """A rendered room's name, or a folder: what opens it again."""
+    """The name of a built-in recording, or the folder, by which it is opened again."""
     name: str
     kind: str
     """``rendered`` or ``folder``."""
     digest: str
-    """Of its content when it was opened last."""
+    """The hash of its content when it was last opened."""
     cameras: int
+    """The number of cameras."""
     frames: int
+    """The number of steps."""
     fps: float
     has_pictures: int
     has_detections: int
     people: int | None
-    """Of its truth; None without one."""
+    """The number of people in the ground truth; None without one."""
     opened: float
-    """Seconds since 1970."""
+    """The time when it was last opened, seconds since 1970."""
     runs: int
+    """The number of its runs."""
 
 
 class KeptRun(NamedTuple):
-    """A run without its tracks; of 10,000 a list is made at once."""
+    """A stored run without its tracks, so that thousands can be listed at once."""
 
     id: int
     recording: int
     recording_name: str
     began: float
-    """Seconds since 1970."""
+    """The time when its computation began, seconds since 1970."""
     seconds: float
-    """How long its computation took."""
+    """The duration of its computation, seconds."""
     steps: int
     single_view: str
     fusion_method: str
     changes_json: str
     seed: int
     version: str
-    """Of the program."""
+    """The version of the program."""
     code: str
-    """Hash of the code that computes, as in the keys of stages."""
+    """The hash of the code that computes results, as in the keys of stages."""
     source: str
-    """Who computed it: ``track``, ``batch``, ``page``, or ``bundle`` where it was taken from a
-    file."""
+    """The origin of the run, a :data:`Source`."""
     targets: int
-    """How many tracks."""
+    """The number of tracks."""
     mota: float | None
-    """As the following figures (OSPA and position error in metres), None where it is not defined
-    or the recording has no truth."""
+    """This and the following figures (OSPA and position error in metres) are None where they are
+    not defined or the recording has no truth."""
     idf1: float | None
     hota: float | None
     ospa: float | None
@@ -82,24 +85,24 @@ class KeptRun(NamedTuple):
     note: str
     tags_json: str
     corrected: int = 0
-    """How many corrections of a person it obeys."""
+    """The number of corrections of the run."""
     final: int = 0
-    """Whether the figures were made of the tracks of a finished run: of all steps, smoothed and
-    corrected. Earlier versions stored others, too."""
+    """Whether the figures are those of a finished run's tracks: of all steps, smoothed and
+    corrected. Earlier versions also stored figures of unfinished runs."""
 
     @property
     def provisional(self) -> bool:
-        """Whether the run has figures that are to be computed again."""
+        """Whether the run has figures that have to be computed again."""
         return not self.final and self.misses is not None
 
     @property
     def changes(self) -> dict[str, Any]:
-        """The values that were not at the recording's defaults, by key."""
+        """The values that differ from the recording's defaults, by key."""
         return dict(json.loads(self.changes_json))
 
     @property
     def tags(self) -> list[str]:
-        """Words that somebody put to it."""
+        """The tags that users gave the run."""
         return list(json.loads(self.tags_json))
 
     @property
@@ -109,15 +112,15 @@ class KeptRun(NamedTuple):
 
     @property
     def title(self) -> str:
-        """Its name with its number, or the number alone."""
+        """The run's name and number, or the number alone."""
         return f"{self.name} ({self.id})" if self.name else f"run {self.id}"
 
     def to_json(self) -> dict[str, Any]:
-        """Everything as plain values."""
-        told = self._asdict()
-        del told["changes_json"], told["tags_json"], told["final"]
+        """Return all fields as plain values."""
+        values = self._asdict()
+        del values["changes_json"], values["tags_json"], values["final"]
         return {
-            **told,
+            **values,
             "star": bool(self.star),
             "changes": self.changes,
             "tags": self.tags,
@@ -128,32 +131,32 @@ class KeptRun(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Result:
-    """A run as it is read back: what is needed to show it, score it and write it out."""
+    """A stored run with its tracks, for display, evaluation and export."""
 
     run: KeptRun
     place: str
-    """What opens its recording again."""
+    """The name or folder by which the recording is opened again."""
     key: str
-    """Of recording, parameters, seed and code."""
+    """The hash of recording, parameters, seed and code."""
     digest: str
-    """Of the recording as it was tracked."""
+    """The hash of the recording's content when it was tracked."""
     machine: str
     parameters: RunParameters
     unknown: tuple[str, ...]
-    """Keys of those that this version does not know or take: they are at their defaults."""
+    """The keys of parameters that this version does not accept; they are at their defaults."""
     values: dict[str, Any]
-    """All of them as they were written."""
+    """All parameters as they were stored."""
     figures: dict[str, Any]
     kept: KeptTracks
     ospa: tuple[float, ...] = ()
-    """Its mean over equally many steps each, metres; empty without a truth."""
+    """OSPA over time, as means over equally many steps each, metres; empty without truth."""
     corrections: tuple[dict[str, Any], ...] = ()
-    """What a person said that it obeys, as a log of corrections has it."""
+    """The corrections of the run, in the form of a log of corrections."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NewRecording:
-    """A recording that is opened."""
+    """The record of a recording, to be inserted; its fields are those of :class:`Recording`."""
 
     place: str
     name: str
@@ -170,7 +173,8 @@ class NewRecording:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NewRun:
-    """A run that came to its end."""
+    """The record of a finished run, to be inserted; its fields are those of :class:`KeptRun` and
+    :class:`Result`."""
 
     key: str
     digest: str
@@ -190,8 +194,6 @@ class NewRun:
     figures: dict[str, float | int | None]
     kept: KeptTracks
     ospa: tuple[float, ...] = ()
-    """Its mean over equally many steps each, metres; empty without a truth."""
     corrections: tuple[dict[str, Any], ...] = ()
-    """What a person said that it obeys, as a log of corrections has it."""
     name: str = ""
     note: str = ""

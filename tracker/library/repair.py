@@ -1,4 +1,4 @@
-"""Checking a library, and saving from a damaged one what can be read."""
+"""The check of a library, and the repair of a damaged one from all rows that can be read."""
 
 from __future__ import annotations
 
@@ -12,32 +12,32 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tracker.library import columns, schema
-from tracker.library.errors import LibraryError, told
+from tracker.library.errors import LibraryError, explained
 
 _MOST_COMPLAINTS = 20
 
 
 @dataclass(frozen=True, slots=True)
 class Checked:
-    """What a look through a library found."""
+    """The result of checking a library."""
 
     complaints: tuple[str, ...]
-    """One sentence each; none where it is whole."""
+    """A sentence for each problem; none if there is no damage."""
     runs: int
-    """How many runs can be read with their tracks."""
+    """The number of runs that can be read with their tracks."""
 
 
 def check(path: Path) -> Checked:
-    """Look through the whole file and every run's tracks; nothing is written.
+    """Check the whole file and the tracks of every run, without writing anything.
 
     Raises:
-        LibraryError: If it is not a library, of a newer version, or cannot be opened at all.
+        LibraryError: If the file is not a library, is of a newer version, or cannot be opened.
     """
     if not path.is_file():
         raise LibraryError(f"{path}: there is no library; it is made when a run is kept")
     complaints: list[str] = []
     with (
-        told(path),
+        explained(path),
         closing(_reader(path)) as connection,
         closing(sqlite3.connect(":memory:", isolation_level=None)) as memory,
     ):
@@ -49,25 +49,25 @@ def check(path: Path) -> Checked:
         ]
         schema.migrate(memory, path, schema.MIGRATIONS[: max(1, version)])
         lost = [f"row {row} of {table} {why}" for table, row, why in _save(connection, memory)]
-        # a row that the walk through a damaged table misses is told by the walk alone
+        # rows that the damage hides are complained of by the integrity check alone
         complaints += lost
         (good,) = memory.execute("SELECT count(*) FROM runs").fetchone()
     return Checked(tuple(complaints[:_MOST_COMPLAINTS]), good)
 
 
 def repair(path: Path) -> tuple[Path, int, int]:
-    """Put a copy of the file aside, and make a new one of all rows that can be read.
+    """Put a copy of the file aside, and replace the file by one of all rows that can be read.
 
     Returns:
-        The copy, how many runs were saved, and how many rows were not.
+        The copy, the number of runs that were saved, and the number of rows that were lost.
 
     Raises:
-        LibraryError: If nothing can be read; the file is as it was.
+        LibraryError: If nothing can be read; the file is then unchanged.
     """
     aside = path.with_name(f"{path.stem}-damaged-{time.strftime('%Y%m%d-%H%M%S')}{path.suffix}")
     made = path.with_name(f".{path.name}.repaired")
     beside = [path.with_name(path.name + end) for end in ("-wal", "-shm")]
-    with told(path):
+    with explained(path):
         for source in (path, *beside):
             if source.exists():
                 shutil.copy2(source, aside.with_name(aside.name + source.name[len(path.name) :]))
@@ -99,15 +99,15 @@ def _reader(path: Path) -> sqlite3.Connection:
 def _save(
     old: sqlite3.Connection, new: sqlite3.Connection, *, with_tracks: bool = False
 ) -> list[tuple[str, int, str]]:
-    """Copy what can be read, row by row: runs with their tracks, and their recordings.
+    """Copy all rows that can be read: runs with their tracks, and their recordings.
 
     Args:
-        old: The damaged one.
-        new: An empty one of the same version.
-        with_tracks: Copy the tracks too, rather than only look at them.
+        old: The damaged library.
+        new: An empty library of the same version.
+        with_tracks: Whether the tracks are copied too, rather than only decoded as a check.
 
     Returns:
-        What was not saved: table, row and why.
+        Table, row number and reason of each row that was not copied.
     """
     lost: list[tuple[str, int, str]] = []
     tracked: set[int] = set()
@@ -143,11 +143,11 @@ INSERT OR IGNORE INTO recordings
 VALUES (:id, 'lost-' || :id, 'a recording that was lost', 'folder', '', 0, 0, 25.0, 0, 0, NULL,
         NULL, 0.0)
 """
-"""Instead of a row that cannot be read: its runs still can be."""
+"""The substitute for a recording whose row cannot be read, so that its runs can be kept."""
 
 
 def _numbers(old: sqlite3.Connection, table: str) -> list[int]:
-    """The row numbers that can be walked to from either end."""
+    """Return the row numbers that can be reached from either end of the table."""
     found: set[int] = set()
     for order in ("ASC", "DESC"):
         try:

@@ -1,7 +1,7 @@
-"""The tables of the library, and how an older one becomes today's.
+"""The tables of the library, and the migrations of older files.
 
-``PRAGMA user_version`` counts the migrations that a file has gone through. A migration, once
-released, is never changed: what is new is another one behind it.
+``PRAGMA user_version`` is the number of migrations that a file has gone through. A migration is
+never changed once it is released; changes of the schema are new migrations.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from pathlib import Path
 from tracker.library.errors import LibraryError
 
 APPLICATION_ID = 0x4D56_5048
-"""``MVPH``: what ``file`` and SQLite's own tools know the file by."""
+"""``MVPH``, by which ``file`` and SQLite's own tools recognise the file."""
 
 MIGRATIONS: tuple[tuple[str, ...], ...] = (
     (
@@ -84,13 +84,13 @@ MIGRATIONS: tuple[tuple[str, ...], ...] = (
         "UPDATE runs SET final = 1 WHERE source IN ('track', 'batch')",
     ),
 )
-"""What leads from each version to the next, the first from an empty file."""
+"""The statements that lead from each version to the next, the first from an empty file."""
 
 VERSION = len(MIGRATIONS)
 
 
 def version_of(connection: sqlite3.Connection, path: Path) -> int:
-    """The version of a file; 0 for an empty one.
+    """Return the version of a file; 0 for an empty one.
 
     Raises:
         LibraryError: If the file is another program's, or of a newer version of this one.
@@ -116,7 +116,13 @@ def migrate(
     path: Path,
     migrations: tuple[tuple[str, ...], ...] = MIGRATIONS,
 ) -> None:
-    """Bring a file to today's version: wholly or not at all, whoever else tries at once."""
+    """Migrate a file to the current version in one transaction.
+
+    Args:
+        connection: The open file.
+        path: Its path, for messages.
+        migrations: The migrations up to the wanted version.
+    """
     connection.execute("BEGIN IMMEDIATE")
     try:
         for number in range(version_of(connection, path), len(migrations)):

@@ -1,27 +1,40 @@
-"""What the library holds: recordings, their runs, and the runs' tracks."""
+"""The library's file: recordings, their runs, and the runs' tracks.
+
+Several processes may read and write it at once. Every change is one transaction of SQLite in WAL
+mode: if a process ends at any time, all earlier changes are in the file, and a run is stored with
+its tracks or not at all.
+"""
 
 from __future__ import annotations
 
 import json
 import os
 import sqlite3
+import threading
 import time
 import zlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
-from tracker.library import KEEP, columns
-from tracker.library.errors import LibraryError, NoSuchRun, told
-from tracker.library.file import WAIT_SECONDS, LibraryFile
+from tracker.library import KEEP, columns, schema
+from tracker.library.errors import LibraryError, NoSuchRun, explained
 from tracker.library.records import HEADLINES, KeptRun, NewRecording, NewRun, Recording, Result
 from tracker.parameters import RunParameters, with_values
 
+WAIT_SECONDS = 5.0
+"""Longest wait for the transaction of another process, seconds."""
+
+CHECKED_BYTES = 64 << 20
+"""Size up to which a file is checked before the first write, so that a damaged one is not
+written to, bytes."""
+
 UNDO_SECONDS = 24 * 3600.0
-"""A deleted run can be taken back for so long, unless the space is freed before."""
+"""Time for which a deleted run can be restored, unless the space is freed before, seconds."""
 
 OSPA = "ospa over time"
-"""Beside a run's figures: a curve in small."""
+"""The key among a run's figures of its curve of OSPA."""
 
 _RUN = ", ".join(
     {
@@ -35,13 +48,48 @@ _RUNS = f"SELECT {_RUN} FROM runs JOIN recordings ON recordings.id = runs.record
 _UNTOUCHED = "star = 0 AND name = '' AND note = '' AND tags = '[]'"
 
 
-class Library(LibraryFile):
-    """One open library. Thread-safe; close it, or use ``with``."""
+class Library:
+    """One open library file. It is thread-safe; close it, or use ``with``."""
+
+    def __init__(
+        self, path: Path, *, read_only: bool = False, wait_seconds: float = WAIT_SECONDS
+    ) -> None:
+        """Open the file, or make it if there is none; an older one is migrated.
+
+        Args:
+            path: The library's file.
+            read_only: Whether the file is neither made nor changed.
+            wait_seconds: Longest wait for the transaction of another process, seconds.
+
+        Raises:
+            LibraryError: With a sentence, if the library cannot be opened.
+        """
+        self.path = path
+        self.read_only = read_only
+        self._lock = threading.RLock()
+        with explained(path):
+            self._connection = self._connect(wait_seconds)
+            try:
+                self._prepare()
+            except BaseException:
+                self._connection.close()
+                raise
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the file."""
+        with self._lock:
+            self._connection.close()
 
     # reading
 
     def recordings(self) -> list[Recording]:
-        """All of them, the one that was opened last first."""
+        """Return all recordings, the one that was opened last first."""
         with self._reading() as connection:
             found = connection.execute(
                 "SELECT recordings.id, place, recordings.name, kind, recordings.digest, cameras, "
@@ -52,7 +100,7 @@ class Library(LibraryFile):
             return [Recording._make(row) for row in found]
 
     def thumbnail(self, recording: int) -> bytes | None:
-        """A JPEG of a recording; None where it has none, or there is no such recording."""
+        """Return the JPEG thumbnail of a recording; None if it has none or does not exist."""
         with self._reading() as connection:
             found = connection.execute(
                 "SELECT thumbnail FROM recordings WHERE id = ?", (recording,)
@@ -60,7 +108,7 @@ class Library(LibraryFile):
             return None if found is None or found[0] is None else bytes(found[0])
 
     def runs(self, recording: int | None = None) -> list[KeptRun]:
-        """The runs of one recording, or all, the newest first; without the deleted ones."""
+        """Return the runs of one recording, or of all, the newest first, without deleted ones."""
         where, values = "deleted IS NULL", []
         if recording is not None:
             where, values = where + " AND recording = ?", [recording]
@@ -69,7 +117,7 @@ class Library(LibraryFile):
             return [KeptRun._make(row) for row in found]
 
     def run(self, number: int) -> KeptRun:
-        """One run.
+        """Return the run of this number.
 
         Raises:
             LibraryError: If there is no such run, or it was deleted.
@@ -85,10 +133,10 @@ class Library(LibraryFile):
             return KeptRun._make(row)
 
     def find(self, text: str) -> KeptRun:
-        """One run by its number, or by its name where no other has it.
+        """Return a run by its number, or by its name.
 
         Raises:
-            LibraryError: If there is none, or several have that name.
+            LibraryError: If there is no such run, or several have that name.
         """
         if text.isdecimal():
             return self.run(int(text))
@@ -102,7 +150,7 @@ class Library(LibraryFile):
         return named[0]
 
     def with_key(self, key: str) -> KeptRun | None:
-        """The run of this recording, these parameters, seed and code; None where it is not kept."""
+        """Return the run of this key (see :attr:`Result.key`); None if it is not stored."""
         with self._reading() as connection:
             row = connection.execute(
                 f"{_RUNS} WHERE runs.key = ? AND deleted IS NULL ORDER BY runs.id DESC", (key,)
@@ -110,7 +158,7 @@ class Library(LibraryFile):
             return None if row is None else KeptRun._make(row)
 
     def result(self, number: int) -> Result:
-        """One run with its parameters, figures and tracks.
+        """Return a run with its parameters, figures and tracks.
 
         Raises:
             LibraryError: If there is no such run, or its tracks are damaged.
@@ -129,41 +177,42 @@ class Library(LibraryFile):
             parameters, unknown = parameters_of(values)
             kept = columns.unpack(row[2])
             place, key, digest, machine = row[3:7]
-            said = tuple(_inflated(row[7])["corrections"]) if row[7] is not None else ()
+            corrections = tuple(_inflated(row[7])["corrections"]) if row[7] is not None else ()
             ospa = tuple(figures.pop(OSPA, ()))
             return Result(
                 run, place, key, digest, machine, parameters, unknown, values, figures, kept, ospa,
-                said,
+                corrections,
             )  # fmt: skip
 
     def size(self) -> int:
-        """Bytes on disk."""
+        """Return the size on disk, bytes."""
         beside = (self.path, self.path.with_name(self.path.name + "-wal"))
         return sum(part.stat().st_size for part in beside if part.exists())
 
     # writing
 
     def open_recording(self, new: NewRecording) -> int:
-        """Write down that a recording was opened; its number."""
+        """Record that a recording was opened, and return its number."""
         with self._writing() as connection:
             return self._recording(connection, new)
 
     def keep(self, recording: NewRecording, new: NewRun, budget: int = KEEP) -> int:
-        """Keep a run, and let the oldest untouched ones beyond the budget fall out.
+        """Store a run, and delete the oldest unmarked runs beyond the budget.
 
-        The same run computed again (same key) is one run; a deleted one comes back.
+        A run is unmarked if it has no star, name, note or tag. The same run computed again (with
+        the same key) replaces the stored one; a deleted one is restored.
 
         Args:
-            recording: Of which it is.
-            new: It.
-            budget: How many untouched runs stay, this one among them.
+            recording: The run's recording.
+            new: The run.
+            budget: Most unmarked runs that are kept, this one included.
 
         Returns:
             The run's number.
         """
         figures = {**new.figures, OSPA: list(new.ospa)} if new.ospa else new.figures
-        said = _deflated({"corrections": new.corrections}) if new.corrections else None
-        packed = (_deflated(new.parameters), _deflated(figures), columns.pack(new.kept), said)
+        made = _deflated({"corrections": new.corrections}) if new.corrections else None
+        packed = (_deflated(new.parameters), _deflated(figures), columns.pack(new.kept), made)
         with self._writing() as connection:
             place = self._recording(connection, recording)
             known = connection.execute(
@@ -175,7 +224,7 @@ class Library(LibraryFile):
                 connection.execute(
                     "UPDATE runs SET began = ?, deleted = NULL WHERE id = ?", (new.began, number)
                 )
-                if new.figures:  # scored anew, perhaps by another gate: the list tells the same
+                if new.figures:  # they may be of other settings than those in the list of runs
                     self._list_figures(connection, number, new.figures)
             connection.execute(
                 "INSERT OR REPLACE INTO results (run, parameters, figures, columns, corrections) "
@@ -183,7 +232,7 @@ class Library(LibraryFile):
                 (number, *packed),
             )
             connection.execute(
-                # this one stays, whatever the clock says of the others
+                # this run is kept even if the clock was set back
                 f"DELETE FROM runs WHERE id IN (SELECT id FROM runs WHERE {_UNTOUCHED} "
                 "AND deleted IS NULL ORDER BY id = ? DESC, began DESC LIMIT -1 OFFSET ?)",
                 (number, max(budget, 1)),
@@ -194,12 +243,12 @@ class Library(LibraryFile):
     def score(
         self, number: int, figures: dict[str, float | int | None], ospa: Sequence[float]
     ) -> None:
-        """Store the figures of a run anew: those of the tracks that are stored with it.
+        """Replace the figures of a run by those of the tracks that are stored with it.
 
         Args:
-            number: Of the run.
-            figures: By name; others that the run has stay.
-            ospa: OSPA over time, as :attr:`NewRun.ospa` has it.
+            number: The run's number.
+            figures: The new figures by name; other figures of the run are kept.
+            ospa: OSPA over time, in the form of :attr:`Result.ospa`.
 
         Raises:
             LibraryError: If there is no such run.
@@ -211,17 +260,17 @@ class Library(LibraryFile):
             self._list_figures(connection, number, figures)
 
     def move(self, recording: int, place: str) -> None:
-        """Have a recording opened from another place from now on.
+        """Change the place from which a recording is opened.
 
         Raises:
-            LibraryError: If there is no such recording, or another one lies at that place.
+            LibraryError: If there is no such recording, or another one has that place.
         """
         with self._writing() as connection:
-            taken = connection.execute(
+            other = connection.execute(
                 "SELECT name FROM recordings WHERE place = ? AND id <> ?", (place, recording)
             ).fetchone()
-            if taken is not None:
-                raise LibraryError(f"{self.path}: {place} is recording {taken[0]} already")
+            if other is not None:
+                raise LibraryError(f"{self.path}: {place} is recording {other[0]} already")
             changed = connection.execute(
                 "UPDATE recordings SET place = ? WHERE id = ?", (place, recording)
             )
@@ -229,26 +278,26 @@ class Library(LibraryFile):
                 raise LibraryError(f"{self.path}: there is no recording {recording}")
 
     def rename(self, number: int, name: str) -> None:
-        """Give a run a name; an empty one takes it away."""
+        """Name a run; an empty name removes it."""
         self._set(number, "name", " ".join(name.split()))
 
     def star(self, number: int, on: bool = True) -> None:
-        """Keep a run for ever, or as long as the others."""
+        """Star a run, so that it is kept whatever the budget, or remove the star."""
         self._set(number, "star", int(on))
 
     def note(self, number: int, text: str) -> None:
-        """Write something beside a run."""
+        """Set the note of a run."""
         self._set(number, "note", text.strip())
 
     def tag(self, number: int, tags: Sequence[str]) -> None:
-        """Put words to a run, instead of those it has."""
+        """Replace the tags of a run."""
         self._set(number, "tags", json.dumps(sorted(set(tags)), ensure_ascii=False))
 
     def delete(self, numbers: Sequence[int]) -> int:
-        """Delete runs; they can be taken back for a day.
+        """Delete runs; they can be restored for :data:`UNDO_SECONDS`.
 
         Returns:
-            The bytes that their tracks take.
+            The size of their tracks, bytes.
         """
         with self._writing() as connection:
             size = 0
@@ -263,10 +312,10 @@ class Library(LibraryFile):
             return size
 
     def take_back(self, numbers: Sequence[int]) -> None:
-        """Have deleted runs again.
+        """Restore deleted runs.
 
         Raises:
-            LibraryError: If one is gone for good.
+            LibraryError: If a run cannot be restored any more.
         """
         with self._writing() as connection:
             for number in numbers:
@@ -275,10 +324,10 @@ class Library(LibraryFile):
                     raise LibraryError(f"{self.path}: run {number} cannot be taken back any more")
 
     def collect(self, budget: int = KEEP) -> tuple[int, int]:
-        """Free the space of deleted runs and of untouched ones beyond the budget.
+        """Free the space of deleted runs and of unmarked ones beyond the budget.
 
         Returns:
-            How many runs went, and by how many bytes the file is smaller.
+            The number of runs that were removed, and the decrease of the file's size in bytes.
         """
         before = self.size()
         with self._writing() as connection:
@@ -288,12 +337,66 @@ class Library(LibraryFile):
                 "ORDER BY began DESC LIMIT -1 OFFSET ?)",
                 (max(budget, 0),),
             ).rowcount
-        with self._lock, told(self.path):
+        with self._lock, explained(self.path):
             self._connection.execute("VACUUM")
             self._connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
         return gone, max(0, before - self.size())
 
     # inside
+
+    def _connect(self, wait_seconds: float) -> sqlite3.Connection:
+        if not self.read_only:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+        mode = "ro" if self.read_only else "rwc"
+        return sqlite3.connect(
+            f"{self.path.absolute().as_uri()}?mode={mode}",
+            uri=True,
+            timeout=wait_seconds,
+            isolation_level=None,
+            check_same_thread=False,
+        )
+
+    def _prepare(self) -> None:
+        connection = self._connection
+        connection.execute("PRAGMA trusted_schema = OFF")
+        connection.execute("PRAGMA cell_size_check = ON")
+        connection.execute("PRAGMA foreign_keys = ON")
+        version = schema.version_of(connection, self.path)
+        if self.read_only:
+            if version != schema.VERSION:
+                raise LibraryError(
+                    f"{self.path}: the library is of version {version}, and reading alone cannot "
+                    f"bring it to {schema.VERSION}; open it once by `multiview-phd runs`"
+                )
+            return
+        if self.path.stat().st_size <= CHECKED_BYTES:
+            (word,) = connection.execute("PRAGMA quick_check(1)").fetchone()
+            if word != "ok":
+                raise sqlite3.DatabaseError(" ".join(word.split()))
+        connection.execute("PRAGMA journal_mode = WAL")
+        connection.execute("PRAGMA synchronous = NORMAL")
+        if version < schema.VERSION:
+            schema.migrate(connection, self.path)
+
+    @contextmanager
+    def _reading(self) -> Iterator[sqlite3.Connection]:
+        with self._lock, explained(self.path):
+            yield self._connection
+
+    @contextmanager
+    def _writing(self) -> Iterator[sqlite3.Connection]:
+        """Yield the connection within one transaction."""
+        with self._lock, explained(self.path):
+            if self.read_only:
+                raise LibraryError(f"{self.path}: the library is open for reading alone")
+            self._connection.execute("BEGIN IMMEDIATE")
+            try:
+                yield self._connection
+                self._connection.execute("COMMIT")
+            except BaseException:
+                if self._connection.in_transaction:
+                    self._connection.execute("ROLLBACK")
+                raise
 
     def _recording(self, connection: sqlite3.Connection, new: NewRecording) -> int:
         values = {
@@ -332,7 +435,7 @@ class Library(LibraryFile):
         number: int,
         figures: dict[str, float | int | None],
     ) -> None:
-        """Have the figures of a finished run in the list of runs."""
+        """Copy the figures of a finished run to the list of runs."""
         columns = ", ".join(f"{name} = ?" for name in HEADLINES)
         values = [figures.get(name) for name in HEADLINES]
         connection.execute(f"UPDATE runs SET {columns}, final = 1 WHERE id = ?", (*values, number))
@@ -377,12 +480,12 @@ def _inflated(data: bytes) -> dict[str, Any]:
 
 
 def parameters_of(values: dict[str, Any]) -> tuple[RunParameters, tuple[str, ...]]:
-    """The parameters that were written, and the keys that this version does not take."""
+    """Return stored parameters, and the keys that this version does not accept."""
     try:
         return RunParameters.model_validate(values), ()
     except ValueError:
         pass
-    taken, unknown = RunParameters(), []
+    accepted, unknown = RunParameters(), []
     for group, value in values.items():
         pairs = (
             {f"{group}.{name}": one for name, one in value.items()}
@@ -391,14 +494,14 @@ def parameters_of(values: dict[str, Any]) -> tuple[RunParameters, tuple[str, ...
         )
         for key, one in pairs.items():
             try:
-                taken = with_values(taken, {key: one})
+                accepted = with_values(accepted, {key: one})
             except ValueError:
                 unknown.append(key)
-    return taken, tuple(unknown)
+    return accepted, tuple(unknown)
 
 
 def open_library(path: Path, *, wait_seconds: float = WAIT_SECONDS) -> Library:
-    """A library to write to; one that cannot be written to is read.
+    """Open a library for writing, or for reading alone if its file is write-protected.
 
     Raises:
         LibraryError: If it cannot be read either.

@@ -87,8 +87,8 @@ _MADE_OF_ALL_METHODS = {
     "shown_keys": "reading",
     "stage_values": "reading",
 }
-"""What is made when it is first asked for: it needs the methods of other packages, which
-themselves import from here what a group of parameters is made of."""
+"""Names that are imported when they are first used, and their modules. These need the methods of
+plugins, which themselves import :class:`Params` and :class:`Method` from here."""
 
 
 def __getattr__(name: str) -> Any:

@@ -1,4 +1,4 @@
-"""Values by key: read, changed with all checks, and compared."""
+"""Values of parameters by key: they are read, changed with validation, and compared."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from tracker.parameters.run import RunParameters
 from tracker.parameters.table import METHODS, PARAMETERS, Parameter
 
 _READ = {key: attrgetter(key) for key in (*METHODS, *PARAMETERS)}
-"""How the value of each key is read: a slider asks for all of them many times."""
+"""The getter of each key, made once: the panel of sliders reads all values often."""
 
 
 class ParameterError(ValueError):
     """A parameter does not exist or its value is out of range; the message says what to do.
 
     Args:
-        key: Of the parameter, or the name of what else was asked for.
+        key: The key of the parameter, or the name that was asked for instead.
         message: What was expected and what was found.
-        hint: Where to find what there is, if that is not the table of parameters.
+        hint: Where the possible names are listed, if not in the table of parameters.
     """
 
     def __init__(self, key: str, message: str, hint: str | None = None) -> None:
@@ -32,19 +32,19 @@ class ParameterError(ValueError):
 
 
 def value(parameters: RunParameters, key: str) -> Any:
-    """The value of one parameter (``group.name``), or of a method choice."""
+    """Return the value of one parameter (``group.name``), or the chosen method of a stage."""
     return _READ[key](parameters)
 
 
 def with_values(parameters: RunParameters, changes: Mapping[str, Any]) -> RunParameters:
-    """The parameters with some values changed, all checked.
+    """Return the parameters with some values changed, after validation.
 
     Args:
-        parameters: What to start from.
-        changes: By key; numbers may come as text, as on a command line.
+        parameters: The parameters to start from; they are not modified.
+        changes: The new values by key; numbers may be text, as on a command line.
 
     Raises:
-        ParameterError: If a key does not exist or a value does not fit, with its range.
+        ParameterError: If a key does not exist or a value is out of its range.
     """
     data = parameters.model_dump()
     for key, new in changes.items():
@@ -63,10 +63,10 @@ def with_values(parameters: RunParameters, changes: Mapping[str, Any]) -> RunPar
 
 
 def _shown(value: Any) -> str:
-    """What was given, short: a number as it is, anything else as Python writes it."""
+    """Format a rejected value for a message: its ``repr``, at most 60 characters."""
     try:
         text = repr(value)
-    except ValueError:  # Python writes no whole number of thousands of digits
+    except ValueError:  # Python refuses to write integers of thousands of digits
         return "a number with thousands of digits"
     return visible(text if len(text) <= 60 else f"{text[:57]}…")
 
@@ -95,7 +95,7 @@ def _checked(parameter: Parameter, new: Any) -> Any:
         number = float(new)
     except (TypeError, ValueError):
         raise ParameterError(parameter.key, f"expected a number, got {_shown(new)}") from None
-    except OverflowError:  # a whole number of more digits than any other number has
+    except OverflowError:  # an integer beyond the range of floats
         number = math.inf if new > 0 else -math.inf
     if parameter.kind == "int":
         if number != int(number) if abs(number) < 1e18 else True:
@@ -114,7 +114,12 @@ def _checked(parameter: Parameter, new: Any) -> Any:
 
 
 def changed(parameters: RunParameters, reference: RunParameters | None = None) -> dict[str, Any]:
-    """The values that differ from the reference (the defaults, if none), by key."""
+    """Return the values that differ from those of a reference, by key.
+
+    Args:
+        parameters: The parameters whose values are returned.
+        reference: The parameters to compare with; the defaults if None.
+    """
     reference = reference or RunParameters()
     values = ((key, read(parameters), read(reference)) for key, read in _READ.items())
     return {key: own for key, own, other in values if own != other}

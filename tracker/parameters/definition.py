@@ -1,4 +1,4 @@
-"""What a parameter's definition is made of: a checked group, and how each number is presented."""
+"""The definition of a parameter: the validated group it belongs to, and how it is presented."""
 
 from __future__ import annotations
 
@@ -25,19 +25,19 @@ def ui(
     when: Mapping[str, tuple[Any, ...]] = NO_CONDITION,
     essential: bool = False,
 ) -> Any:
-    """How a parameter is presented, beyond its range and help.
+    """Return a pydantic field that says how a parameter is presented, beyond range and help.
 
     Args:
-        symbol: As the formulas write it, for instance ``p_S``.
-        unit: Empty for plain numbers.
-        step: Of the slider.
+        symbol: The symbol in formulas, for instance ``p_S``.
+        unit: The unit of the value; empty for numbers without unit.
+        step: The step of the slider, in the parameter's unit.
         log: Whether the slider is logarithmic; the range must be positive.
-        stage: The first stage that a change re-runs, where it is not the group's.
-        published: The value of the ``published`` preset, where it differs from the default.
-        advanced: Whether the page folds it away at first.
+        stage: The first stage that is computed again after a change; None for the group's stage.
+        published: The value in the ``published`` preset, where it differs from the default.
+        advanced: Whether the page folds the parameter away at first.
         when: Other parameters of the same group and the values of each with which this one has
             an effect; with any other value it is not shown.
-        essential: Whether it is among the few that the page shows first.
+        essential: Whether the parameter is among the few that the page shows first.
     """
     extra = {
         "symbol": symbol,
@@ -54,7 +54,7 @@ def ui(
 
 
 class Params(BaseModel):
-    """A group of parameters. Values are checked, never changed in place."""
+    """A group of parameters. Values are validated, and never changed in place."""
 
     model_config = ConfigDict(
         frozen=True,

@@ -1,10 +1,9 @@
-"""What a method is to everybody else: its name, what it uses, and how it is made.
+"""The description of a method: its name, what it uses, and the class that implements it.
 
-A method of stage 1, 2 or 3 is described once, by a :class:`Method`. From the descriptions
-come the choices of the command line and of the page, the parameters that are shown and
-that a result depends on, and whether a method can work on a recording. Those of this
-project and those of other packages are registered alike: see
-:mod:`tracker.parameters.registry`.
+A method of stage 1, 2 or 3 is described once, by a :class:`Method`. The descriptions give
+the choices of the command line and of the page, the parameters that are shown and
+that a result depends on, and whether a method can work on a recording. Methods of this
+project and of plugins are registered alike: see :mod:`tracker.parameters.registry`.
 """
 
 from __future__ import annotations
@@ -29,39 +28,39 @@ class Reads:
 
     group: str
     only: type[Params] | None = None
-    """The part: those of the group's numbers that this class defines; None for all."""
+    """The class whose parameters alone are read, a base class of the group's; None for all."""
     without: frozenset[str] = frozenset()
-    """Names in the group that have no effect all the same."""
+    """Names of parameters in the group that the method does not read."""
 
     def reads(self, group: str, name: str) -> bool:
-        """Whether a number is read."""
+        """Whether the method reads the parameter ``group.name``."""
         part = self.only is None or name in self.only.model_fields
         return group == self.group and part and name not in self.without
 
 
 @dataclass(frozen=True, slots=True)
 class Uses:
-    """What a method uses of a recording and of the parameters, with the values chosen."""
+    """What a method uses of a recording and of the parameters, given the chosen values."""
 
     pictures: bool = False
     """Whether every camera must have pictures."""
     detections: bool = False
     """Whether every camera must have an outside detector's boxes."""
     detector: bool = False
-    """Whether a detection network must be named, which it runs by itself."""
+    """Whether a detection network must be named, which the method runs itself."""
     templates: Literal["no", "if there", "needed"] = "no"
-    """Whether it looks at the colour templates, and whether it can do without any."""
+    """Whether the method uses the colour templates, and whether it needs at least one."""
     reads: tuple[Reads, ...] = ()
-    """Groups of parameters, its own included."""
+    """The groups of parameters that the method reads, its own included."""
 
     @property
     def finds_people(self) -> bool:
-        """Whether it finds people in pictures by itself, and so may draw several boxes around one;
-        an outside detector and a network keep one of those that overlap."""
+        """Whether the method detects people in pictures itself, and so may give several boxes for
+        one person; outside detectors and networks suppress boxes that overlap."""
         return self.pictures and not self.detector
 
     def reads_number(self, group: str, name: str) -> bool:
-        """Whether a number is read."""
+        """Whether the method reads the parameter ``group.name``."""
         return any(part.reads(group, name) for part in self.reads)
 
 
@@ -70,21 +69,21 @@ class Method:
     """One method of stage 1, 2 or 3.
 
     Args:
-        name: By which it is chosen; a word in snake_case.
-        help: What it is, in one sentence.
-        made_by: A class or function, or where it stands as ``module:name``, which is
-            imported when the method is first made; None for a method of this project,
+        name: The name by which the method is chosen; a word in snake_case.
+        help: What the method is, in one sentence.
+        made_by: The class or function that makes the method, or its place as ``module:name``,
+            which is imported when the method is first made; None for a method of this project,
             which the package of its stage imports by its name. Stage 1 calls it with ``(sequence,
-            camera_index, parameters, reader)`` and takes a
-            :class:`~tracker.single_view.protocol.SingleViewMethod`; stage 2 with
-            ``(sequence, parameters)`` and takes a
-            :class:`~tracker.fusion.protocol.FusionMethod`; stage 3 with the same and takes a
-            :class:`~tracker.smoothing.protocol.SmoothingMethod`. ``parameters`` are those of the
-            run, where its own are found by :meth:`RunParameters.of`.
-        uses: What it uses, or a function that tells it of the values chosen. Whatever is
-            left out here is shown to nobody and must change no result.
-        parameters: Its own numbers; None where it brings none.
-        group: Name of the group of these; its own name where empty.
+            camera_index, parameters, reader)`` and expects a
+            :class:`~tracker.single_view.protocol.SingleViewMethod`; stage 2 calls it with
+            ``(sequence, parameters)`` and expects a
+            :class:`~tracker.fusion.protocol.FusionMethod`; stage 3 calls it with the same and
+            expects a :class:`~tracker.smoothing.protocol.SmoothingMethod`. ``parameters`` are those
+            of the run; :meth:`RunParameters.of` returns the method's own group.
+        uses: What the method uses, or a function that returns it for the chosen values. A
+            parameter that is left out here is not shown and must not change any result.
+        parameters: The class of the method's own parameters; None if it has none.
+        group: The name of their group; the method's name if empty.
     """
 
     name: str
@@ -94,22 +93,23 @@ class Method:
     parameters: type[Params] | None = None
     group: str = ""
     settles_who: bool = False
-    """Of stage 3: whether it settles who is who, and obeys what a person said of that."""
+    """Whether a method of stage 3 resolves identities over the whole recording, and so applies
+    corrections of identity."""
 
     @property
     def own_group(self) -> str:
-        """The group of its own numbers."""
+        """The name of the group of the method's own parameters."""
         return self.group or self.name
 
     def used(self, parameters: RunParameters) -> Uses:
-        """What it uses with these values."""
+        """Return what the method uses with these values."""
         return self.uses if isinstance(self.uses, Uses) else self.uses(parameters)
 
     def load(self) -> Callable[..., Any]:
-        """The class or function that another package's method is made by, imported now.
+        """Import the class or function that makes the method of a plugin.
 
         Raises:
-            ValueError: If nothing is named, and the method is none of this project's.
+            ValueError: If ``made_by`` is None.
         """
         if self.made_by is None:
             raise ValueError(f"{self.name}: made_by names nothing; name a class or function")

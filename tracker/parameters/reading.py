@@ -1,4 +1,4 @@
-"""Which parameters count with the chosen methods and values: for results, and for people."""
+"""Which parameters have an effect with the chosen methods: for cache keys, and for display."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ CHOSEN_BY: dict[Stage, MethodKey] = {
     "smoothing": "smoothing_method",
     "tracks": "fusion_method",
 }
-"""The parameter that chooses the method which a stage's numbers are for."""
+"""The parameter that chooses the method which reads a stage's parameters."""
 
 
 def stage_values(parameters: RunParameters, stage: Stage) -> dict[str, Any]:
-    """What the result of one stage depends on by itself: its method and its parameters.
+    """Return the values that one stage's result depends on: its method and its parameters.
 
-    A number that has no effect with some value of another counts all the same: what is kept
-    of a run must never be taken for another's.
+    A parameter that has no effect only because of another's value (``when``) is included all the
+    same: a cached result must never be mistaken for that of other parameters.
     """
     values: dict[str, Any] = {}
     for method in METHODS:
@@ -36,7 +36,7 @@ def stage_values(parameters: RunParameters, stage: Stage) -> dict[str, Any]:
 
 @lru_cache(maxsize=256)
 def _keys_read(used: Uses, stage: Stage) -> tuple[str, ...]:
-    """The numbers of a stage that a method reads."""
+    """Return the keys of a stage's parameters that a method reads."""
     return tuple(
         key
         for key, parameter in PARAMETERS.items()
@@ -45,7 +45,7 @@ def _keys_read(used: Uses, stage: Stage) -> tuple[str, ...]:
 
 
 def shown_keys(parameters: RunParameters) -> list[str]:
-    """The choices of the methods, and the numbers that have an effect with what is chosen."""
+    """Return the keys of the method choices and of all parameters that now have an effect."""
     read = set[str]()
     for stage, method in CHOSEN_BY.items():
         read |= set(_keys_read(parameters.method(method).used(parameters), stage))

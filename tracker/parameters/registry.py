@@ -1,6 +1,6 @@
-"""Which methods there are: those of this project, a line each, and those of other packages.
+"""The registered methods: those of this project, a line each, and those of plugins.
 
-A package adds a method by an entry point that names a
+A plugin adds a method by an entry point that names a
 :class:`~tracker.parameters.methods.Method`, in its ``pyproject.toml``::
 
     [project.entry-points."multiview_phd.single_view"]
@@ -13,11 +13,21 @@ stage 3. Its own parameters, a subclass of
 
 from __future__ import annotations
 
-import importlib
 import warnings
 from collections.abc import Iterator
 from importlib.metadata import EntryPoint, entry_points
 
+from tracker.parameters.groups import (
+    association_matrix,
+    colour_phd,
+    detections,
+    fusion,
+    jpda,
+    onnx_detector,
+    pseudo_particle,
+    shapes,
+    smoothing,
+)
 from tracker.parameters.methods import Method, MethodKey
 
 ENTRY_POINTS: dict[MethodKey, str] = {
@@ -25,57 +35,49 @@ ENTRY_POINTS: dict[MethodKey, str] = {
     "fusion_method": "multiview_phd.fusion",
     "smoothing_method": "multiview_phd.smoothing",
 }
-"""The groups of entry points of other packages."""
+"""The group of entry points of each stage, by which plugins add methods."""
 
-BUILT_IN: dict[MethodKey, tuple[str, ...]] = {
+BUILT_IN: dict[MethodKey, tuple[Method, ...]] = {
     "single_view": (
-        "tracker.parameters.groups.colour_phd:METHOD",
-        "tracker.parameters.groups.shapes:METHOD",
-        "tracker.parameters.groups.jpda:METHOD",
-        "tracker.parameters.groups.pseudo_particle:METHOD",
-        "tracker.parameters.groups.association_matrix:METHOD",
-        "tracker.parameters.groups.onnx_detector:METHOD",
-        "tracker.parameters.groups.detections:FILTERED",
-        "tracker.parameters.groups.detections:AS_THEY_ARE",
+        colour_phd.METHOD,
+        shapes.METHOD,
+        jpda.METHOD,
+        pseudo_particle.METHOD,
+        association_matrix.METHOD,
+        onnx_detector.METHOD,
+        detections.FILTERED,
+        detections.AS_THEY_ARE,
     ),
-    "fusion_method": (
-        "tracker.parameters.groups.fusion:SEQUENTIAL_PHD",
-        "tracker.parameters.groups.fusion:MULTI_BERNOULLI",
-    ),
-    "smoothing_method": (
-        "tracker.parameters.groups.smoothing:NONE",
-        "tracker.parameters.groups.smoothing:POSITIONS",
-        "tracker.parameters.groups.smoothing:IDENTITIES",
-    ),
+    "fusion_method": (fusion.SEQUENTIAL_PHD, fusion.MULTI_BERNOULLI),
+    "smoothing_method": (smoothing.NONE, smoothing.POSITIONS, smoothing.IDENTITIES),
 }
-"""Where the descriptions of this project's methods stand, in the order of their lists."""
+"""This project's methods of each stage, in the order in which they are listed."""
 
 SHARED_GROUPS = ("pictures", "foreground", "fusion", "smoothing")
-"""Groups of parameters that are no single method's."""
+"""Groups of parameters that belong to no single method."""
 
 FOLLOWING = ("colour_phd", "none", "shapes")
-"""What ``single_view`` is by default follows the recording: the first of these that it has all
-for."""
+"""Candidates for the default of ``single_view``: the first whose requirements the recording
+meets is chosen."""
 
 FOLLOWS = (
     "follows the recording: onnx_detector where a detector is named, else colour_phd with "
     "pictures and templates, else none with detections, else shapes"
 )
-"""The same in words."""
+"""The same rule as text for help messages."""
 
 
 class PluginWarning(UserWarning):
-    """A method of another package cannot be used; all others can."""
+    """A plugin's method cannot be used; all other methods can."""
 
 
-def _built_in(place: str) -> Method:
-    module, _, name = place.partition(":")
-    method: Method = getattr(importlib.import_module(module), name)
-    return method
+def _of_plugins(group: str, names: set[str]) -> Iterator[tuple[Method, str]]:
+    """Yield the methods of a group of entry points, each with its distribution and version.
 
-
-def _of_others(group: str, taken: set[str]) -> Iterator[tuple[Method, str]]:
-    """The methods of a group of entry points, and the distribution of each."""
+    Args:
+        group: The group of entry points.
+        names: The names of methods and groups that are in use; those of the methods are added.
+    """
     found = sorted(entry_points(group=group), key=lambda point: (point.name, point.value))
     for point in dict.fromkeys(found):
         try:
@@ -87,12 +89,12 @@ def _of_others(group: str, taken: set[str]) -> Iterator[tuple[Method, str]]:
             _warn(point, f"expected a tracker.parameters.Method, found {type(method).__name__}")
         elif not method.name.isidentifier():
             _warn(point, f'a method\'s name is a word like my_tracker, found "{method.name}"')
-        elif method.name in taken:
+        elif method.name in names:
             _warn(point, f'there is a method "{method.name}" already; give it another name')
-        elif method.parameters is not None and method.own_group in taken:
+        elif method.parameters is not None and method.own_group in names:
             _warn(point, f'there is a group of parameters "{method.own_group}" already')
         else:
-            taken |= {method.name, method.own_group}
+            names |= {method.name, method.own_group}
             yield method, f"{point.dist.name} {point.dist.version}" if point.dist else point.value
 
 
@@ -109,17 +111,17 @@ def _warn(point: EntryPoint, words: str) -> None:
 def _registered() -> tuple[dict[MethodKey, dict[str, Method]], dict[str, str]]:
     methods: dict[MethodKey, dict[str, Method]] = {}
     origins: dict[str, str] = {}
-    for key, places in BUILT_IN.items():
-        methods[key] = {method.name: method for method in map(_built_in, places)}
+    for key, built_in in BUILT_IN.items():
+        methods[key] = {method.name: method for method in built_in}
     own = [method for of_stage in methods.values() for method in of_stage.values()]
-    taken = {*BUILT_IN, *SHARED_GROUPS, *(name for m in own for name in (m.name, m.own_group))}
+    names = {*BUILT_IN, *SHARED_GROUPS, *(name for m in own for name in (m.name, m.own_group))}
     for key, group in ENTRY_POINTS.items():
-        for method, origin in _of_others(group, taken):
+        for method, origin in _of_plugins(group, names):
             methods[key][method.name] = method
             origins[method.name] = origin
     return methods, origins
 
 
 REGISTERED, ORIGINS = _registered()
-"""Every method by the parameter that chooses it and by its name; and of those of other packages
-the distribution with its version."""
+"""All methods by the parameter that chooses them and by name; and the distribution and version of
+each plugin's method, by name."""

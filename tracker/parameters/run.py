@@ -1,4 +1,4 @@
-"""All parameters of a run: the methods, what they share, and a group for each method."""
+"""All parameters of a run: the chosen methods, the shared groups, and a group for each method."""
 
 from __future__ import annotations
 
@@ -36,10 +36,10 @@ class SharedParameters(Params):
     smoothing: SmoothingParams = SmoothingParams()
 
     def of(self, kind: type[_Group]) -> _Group:
-        """The numbers of one group, by their class.
+        """Return the parameters of one group, by their class.
 
         Raises:
-            KeyError: If no registered method brings them.
+            KeyError: If no registered method has this class for its parameters.
         """
         for name, field in type(self).model_fields.items():
             if field.annotation is kind:
@@ -47,12 +47,13 @@ class SharedParameters(Params):
         raise KeyError(f"no registered method has {kind.__name__} for its parameters")
 
     def method(self, key: MethodKey) -> Method:
-        """The chosen method."""
+        """Return the description of the chosen method."""
         return REGISTERED[key][getattr(self, key)]
 
 
 def _with_methods() -> type[SharedParameters]:
-    """The parameters with a group for every method that brings one, and the methods' names."""
+    """Make the class with a group for every method that has one, and the methods' names as
+    choices."""
     fields: dict[str, Any] = {}
     for key, methods in REGISTERED.items():
         shared: FieldInfo = SharedParameters.model_fields[key]

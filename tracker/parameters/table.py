@@ -16,7 +16,7 @@ from tracker.parameters.run import RunParameters
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """One parameter with all that slider, flag, schema and manual need of it."""
+    """One parameter with all that its slider, flag, schema and page of the manual show."""
 
     key: str
     """``group.name``, for instance ``fusion.survival_probability``."""
@@ -38,7 +38,7 @@ class Parameter:
     published: Any
     advanced: bool
     when: Mapping[str, tuple[Any, ...]]
-    """Keys of others, and the values of each with which this one has an effect."""
+    """Keys of other parameters, and the values of each with which this one has an effect."""
     essential: bool
 
 
@@ -88,7 +88,7 @@ def _describe(group: str, name: str, field: FieldInfo) -> Parameter:
 
 
 def _groups() -> dict[str, type[Params]]:
-    """Those of the methods in the order of their list, then what they share."""
+    """Return the class of each group: those of the methods in their order, then the shared."""
     found = {
         name: field.annotation
         for name, field in RunParameters.model_fields.items()
@@ -126,7 +126,11 @@ PRESETS: dict[str, dict[str, Any]] = {
 
 
 def method_of(key: MethodKey, name: str) -> Method:
-    """What a method uses and how it is made.
+    """Return the description of a registered method.
+
+    Args:
+        key: The parameter that chooses the method.
+        name: The method's name.
 
     Raises:
         ValueError: If there is no such method.

@@ -1,1 +1,1 @@
-"""What a person should look at: the queue, self-consistency, template suggestions."""
+"""What a person should review: the queue of items, self-consistency, and template suggestions."""

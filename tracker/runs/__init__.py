@@ -1,1 +1,1 @@
-"""A run: its stages, what is kept of each, in memory and on disk."""
+"""A run: its stages, and the cache of their results in memory and on disk."""

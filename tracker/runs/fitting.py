@@ -1,4 +1,4 @@
-"""What fits a recording: which methods can work on it, and what a run does by default."""
+"""Which methods can work on a recording, and the parameters of a run by default."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from tracker.sequences.sequence import Sequence
 
 
 def default_parameters(sequence: Sequence) -> RunParameters:
-    """The defaults of the definitions, with the single-view method that fits the recording.
+    """Return the default parameters, with a single-view method that can work on the recording.
 
-    That is the detector that is named, if there are pictures; else the first of
-    :data:`tracker.parameters.registry.FOLLOWING` that has pictures, templates and
-    detections as it wants them.
+    That is the detection network, if one is named and there are pictures; else the first of
+    :data:`tracker.parameters.registry.FOLLOWING` for which the recording has the pictures,
+    templates and detections that it needs.
 
     Raises:
         ValueError: If the sequence has neither pictures nor detections.
@@ -30,14 +30,14 @@ def default_parameters(sequence: Sequence) -> RunParameters:
 
 
 def unfit_methods(sequence: Sequence, parameters: RunParameters) -> dict[MethodKey, dict[str, str]]:
-    """The methods that cannot work on a sequence with these values, each with the reason why.
+    """Return the methods that cannot work on a sequence with these values, and why.
 
     Args:
-        sequence: The recording as it was taught.
-        parameters: Of the run; of a method that is not chosen, what it would be run with.
+        sequence: The recording, with its templates.
+        parameters: The parameters of the run; a method that is not chosen is judged with them too.
 
     Returns:
-        By the parameter that chooses a method; a sentence by the method's name.
+        For each parameter that chooses a method, a sentence by the name of the method.
     """
     return {
         key: {
@@ -52,7 +52,7 @@ def unfit_methods(sequence: Sequence, parameters: RunParameters) -> dict[MethodK
 def _lacks(
     sequence: Sequence, parameters: RunParameters, key: MethodKey, name: str, templates: bool
 ) -> str | None:
-    """What a method needs and does not find, and what to do about it; None for nothing."""
+    """Say what a method needs that the sequence lacks, and what to do; None if it lacks nothing."""
     used = method_of(key, name).used(parameters)
     if used.pictures and not sequence.has_pictures:
         without = [view.camera.name for view in sequence.views if not view.has_pictures]

@@ -1,8 +1,8 @@
-"""Pictures that a run did not get: how many, in which camera, and whether that was to be expected.
+"""Missing pictures of a run: how many, of which camera, and whether that was to be expected.
 
-A video that is shorter than the recording is known from its opening. One that vanishes, is cut
-off or cannot be decoded while a run reads it gives a result that looks like any other; here it
-is told apart, and nothing of it is kept for later runs.
+A video that is shorter than the recording is known when the sequence is opened. One that vanishes,
+is truncated or cannot be decoded while a run reads it would give a result that looks like any
+other; this module detects it, and its columns are not cached for later runs.
 """
 
 from __future__ import annotations
@@ -16,26 +16,27 @@ from tracker.runs.run import Run
 from tracker.sequences.pictures.frames import FrameReader
 
 Keeping = Literal["everywhere", "in memory", "nowhere"]
+"""Where columns may be cached."""
 
 
 @dataclass(frozen=True, slots=True)
 class Gap:
-    """The pictures that one camera did not give."""
+    """The missing pictures of one camera."""
 
     camera: str
     asked: int
-    """Steps computed at which the camera's clock has a frame."""
+    """The number of computed steps at which the camera's clock has a frame."""
     missing: int
-    """Those of them without a picture."""
+    """The number of these steps without a picture."""
     unexpected: tuple[int, ...]
-    """Steps among them that had a picture when the sequence was opened, by all that was known."""
+    """The steps without a picture that should have one by what was known at the opening."""
 
     def __str__(self) -> str:
         return f'{self.missing} of {self.asked} pictures of camera "{self.camera}" are missing'
 
 
 def gaps(run: Run) -> list[Gap]:
-    """What is missing, of the cameras that miss something; nothing where no pictures are used."""
+    """Return the gaps of all cameras with missing pictures; none if the method uses no pictures."""
     if not run.parameters.method("single_view").used(run.parameters).pictures:
         return []
     found = []
@@ -55,28 +56,30 @@ def gaps(run: Run) -> list[Gap]:
 
 
 def sentences(run: Run) -> list[str]:
-    """What somebody must know of a run's pictures: a sentence each, none where all were there."""
-    told = []
+    """Describe the missing pictures of a run, in a sentence for each camera and for files that
+    changed; empty if nothing is missing."""
+    remarks = []
     for gap in gaps(run):
         lost = len(gap.unexpected)
         why = f", {lost} of them cannot be read although the file has them" if lost else ""
-        told.append(f"{gap}{why}")
+        remarks.append(f"{gap}{why}")
     changed = run.sequence.changed_files()
     if changed:
         more = f" and {len(changed) - 1} other files" if changed[1:] else ""
-        told.append(
+        remarks.append(
             f"{changed[0].name}{more} changed or vanished since the recording was opened: the "
             "result is not of what is there now; put it back or open the recording again"
         )
-    return told
+    return remarks
 
 
 def where_to_keep(run: Run) -> Keeping:
-    """Where the columns of a run that read pictures may be kept for later ones.
+    """Decide where the columns of a run that read pictures may be cached.
 
-    Nowhere where a file changed since the sequence was opened, or a picture that could not be
-    read can be read now. Where a file is as it was and its picture still cannot be read, it is
-    spoilt: the columns stay for this start, and the next one looks again.
+    They are not cached if a file changed since the sequence was opened, or if a picture that could
+    not be read can be read now. If a file is unchanged and its picture still cannot be read, the
+    file is damaged: the columns are cached in memory alone, so that the program reads the file
+    again when it is next started.
     """
     lost = [gap for gap in gaps(run) if gap.unexpected]
     if run.sequence.changed_files():

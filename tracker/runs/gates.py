@@ -1,7 +1,7 @@
-"""What each camera's pictures offered stage 1, and at which gate it was dropped.
+"""The candidates of stage 1 in each camera's pictures, and the gates that rejected them.
 
-A method tells of each step in its ``information`` how many candidates it had and how many of
-them fell where; this module adds them up over a run and says so in words.
+A method reports in the ``information`` of each step how many candidates it had and how many
+each gate rejected; this module averages the counts over a run and describes them in words.
 """
 
 from __future__ import annotations
@@ -13,7 +13,8 @@ from tracker.single_view.dropped import CANDIDATES, DROPPED
 from tracker.single_view.protocol import SHAKE, TRUST, UNCERTAINTY, ViewResult
 
 _HALF = 0.5
-"""A foreground that is trusted less than this is not what finds people."""
+"""Trust in the foreground below which people are not detected by it; uncertainty of the
+background above which a notice is given."""
 
 
 _EMPTY = (
@@ -24,20 +25,23 @@ _EMPTY = (
 
 @dataclass(frozen=True, slots=True)
 class Gates:
-    """Of one camera, over the pictures that were looked at."""
+    """The counts of one camera, as means over the pictures that were processed."""
 
     camera: str
     pictures: int
+    """The number of pictures that were processed."""
     candidates: float
-    """A picture."""
+    """Candidates in a picture."""
     dropped: dict[str, float]
-    """By gate, a picture."""
+    """Candidates that each gate rejected in a picture, by gate."""
     passed: float
-    """To the fusion, a picture."""
+    """Boxes passed on to the fusion in a picture."""
     trust: float
-    """In the foreground about the people with templates, 0 … 1; 1 where nothing is said."""
-    doubt: float
-    """That the background was learnt of an empty scene, 0 … 1; 0 where nothing is said."""
+    """Trust in the foreground at the people with templates, 0 … 1; 1 if the method reports
+    none."""
+    uncertainty: float
+    """Uncertainty whether the background was learnt from an empty scene, 0 … 1; 0 if the method
+    reports none."""
 
     def __str__(self) -> str:
         fell = ", ".join(
@@ -51,59 +55,60 @@ class Gates:
 
 
 def count_gates(run: Run) -> list[Gates]:
-    """What fell where in every camera; cameras whose method says nothing of it are left out."""
+    """Average the counts of every camera; cameras whose method reports none are left out."""
     gates = []
     for number, view in enumerate(run.sequence.views):
-        told = [step[number] for step in run.views if CANDIDATES in step[number].information]
-        if not told:
+        counted = [step[number] for step in run.views if CANDIDATES in step[number].information]
+        if not counted:
             continue
         names = dict.fromkeys(
-            name for result in told for name in result.information if name.startswith(DROPPED)
+            name for result in counted for name in result.information if name.startswith(DROPPED)
         )
         gates.append(
             Gates(
                 camera=view.camera.name,
-                pictures=len(told),
-                candidates=_mean(told, CANDIDATES),
-                dropped={name.removeprefix(DROPPED): _mean(told, name) for name in names},
-                passed=sum(len(result.boxes) for result in told) / len(told),
-                trust=_mean(told, TRUST, 1.0),
-                doubt=_mean(told, UNCERTAINTY),
+                pictures=len(counted),
+                candidates=_mean(counted, CANDIDATES),
+                dropped={name.removeprefix(DROPPED): _mean(counted, name) for name in names},
+                passed=sum(len(result.boxes) for result in counted) / len(counted),
+                trust=_mean(counted, TRUST, 1.0),
+                uncertainty=_mean(counted, UNCERTAINTY),
             )
         )
     return gates
 
 
-def _mean(told: list[ViewResult], name: str, otherwise: float = 0.0) -> float:
-    return sum(result.information.get(name, otherwise) for result in told) / len(told)
+def _mean(results: list[ViewResult], name: str, otherwise: float = 0.0) -> float:
+    return sum(result.information.get(name, otherwise) for result in results) / len(results)
 
 
 def notices(run: Run) -> list[str]:
-    """What somebody should know of how people were looked for: a sentence each.
+    """Describe in sentences how people were detected where that needs attention.
 
-    Of a run without tracks every camera's gates; else those of cameras that passed nobody on.
+    The counts of all cameras are described if the run has no tracks, else those of cameras that
+    passed no box on.
     """
-    told = []
+    found = []
     gates = count_gates(run)
     given = {v.camera.name for v in run.sequence.views if v.background is not None}
     doubted = [one.camera for one in gates if one.trust < _HALF]
     unsure = [f'"{name}"' for name in doubted if name not in given]
     peopled = [f'"{name}"' for name in doubted if name in given]
     if peopled:
-        told.append(
+        found.append(
             f"the background given for {', '.join(peopled)} shows what the templates show: nobody "
             "may be in it, and the templates' boxes must be of people; they are looked for by "
             "colour, and by shape where their templates show one"
         )
     if unsure:
-        told.append(
+        found.append(
             f"the background of {', '.join(unsure)} was learnt from people who stay there, for "
             "their templates lie on it: they are looked for by colour, and by shape where "
             f"their templates show one; {_EMPTY}"
         )
-    restless = [f'"{one.camera}"' for one in gates if one.doubt > _HALF]
+    restless = [f'"{one.camera}"' for one in gates if one.uncertainty > _HALF]
     if restless:
-        told.append(
+        found.append(
             f"the background of {', '.join(restless)} was learnt from people who stay there, for "
             "much that moves never leaves: what moved lately counts as foreground; whoever keeps "
             f"still is found with a template; {_EMPTY}"
@@ -111,10 +116,10 @@ def notices(run: Run) -> list[str]:
     for number, view in enumerate(run.sequence.views):
         shake = max((step[number].information.get(SHAKE, 0.0) for step in run.views), default=0.0)
         if shake > 0.0:
-            told.append(
+            found.append(
                 f'camera "{view.camera.name}" shakes by {shake:.1f} pixels: its pictures are held '
                 "still"
             )
-    nobody = not len(run.tracks.ids)
-    told += [str(one) for one in gates if nobody or one.passed == 0.0]
-    return told
+    untracked = not len(run.tracks.ids)
+    found += [str(one) for one in gates if untracked or one.passed == 0.0]
+    return found

@@ -1,4 +1,4 @@
-"""Which code made a number: part of the key of everything that is kept between two starts."""
+"""The version of the code that computes results, which is part of every cache key."""
 
 from __future__ import annotations
 
@@ -18,28 +18,28 @@ from tracker.parameters.registry import ORIGINS
 
 _ROOT = Path(__file__).resolve().parents[1]
 
-_NO_PART = ("corrections/log.py", "corrections/merging.py", "evaluation", "export", "library",
-            "review", "studies")  # fmt: skip
-"""What looks at results or makes recordings; a change of it changes no run."""
+WITHOUT_EFFECT = ("corrections/log.py", "corrections/merging.py", "evaluation", "export", "library",
+                  "review", "studies")  # fmt: skip
+"""Prefixes of paths of code that only uses results of runs, so that a change of it changes none."""
 
-_LATER: dict[Stage, tuple[str, ...]] = {
+LATER: dict[Stage, tuple[str, ...]] = {
     "single_view": ("corrections", "fusion", "smoothing", "kernels/smoothing"),
     "fusion": ("smoothing", "kernels/smoothing", "fusion/trajectories.py"),
     "smoothing": (),
     "tracks": (),
 }
-"""What the rule of imports keeps out of a stage: it comes after it."""
+"""For each stage, prefixes of paths of code of later stages, which it cannot import."""
 
 
 @cache
 def numbers_version(stage: Stage) -> str:
-    """Another text for every code that may give other numbers up to this stage.
+    """Return a text that differs for every version of the code that may change a stage's result.
 
-    Made of the source files themselves and of what was learnt for them, so that nobody has to
-    remember to count a number up, and of the libraries that compute. Where the sources are not
-    at hand, the version of the program has to do.
+    It is made of the versions of numerical libraries and a hash of the source files and of learnt
+    models, so that no version number has to be incremented by hand. Where the sources are not
+    available, the version of the program alone identifies them.
     """
-    left_out = tuple(str(_ROOT / name) for name in (*_NO_PART, *_LATER[stage]))
+    left_out = tuple(str(_ROOT / name) for name in (*WITHOUT_EFFECT, *LATER[stage]))
     digest = hashlib.sha256()
     for path in sorted([*_ROOT.rglob("*.py"), *_ROOT.rglob("*.npz")]):
         if not str(path).startswith(left_out):
@@ -50,8 +50,8 @@ def numbers_version(stage: Stage) -> str:
 
 
 def method_version(method: Method) -> str:
-    """Of a method of another package its version and source; of this project's own nothing, for
-    :func:`numbers_version` has them."""
+    """Return the version and a hash of the source of a plugin's method; "" for one of this
+    project, which :func:`numbers_version` covers."""
     origin = ORIGINS.get(method.name)
     if origin is None:
         return ""

@@ -1,4 +1,4 @@
-"""Why a run ended with no tracks: what came out of each of its stages."""
+"""The explanation of a run without tracks, by the output of each of its stages."""
 
 from __future__ import annotations
 
@@ -9,26 +9,27 @@ from tracker.runs.run import Run
 
 @dataclass(frozen=True, slots=True)
 class StageCounts:
-    """What each stage of a run left over, over all steps and cameras."""
+    """The output of each stage of a run, over all steps and cameras."""
 
     frames: int
-    """Pictures, or frames of an outside detector, that were there."""
+    """The number of pictures, or frames of an outside detector, that were available."""
     found: int
-    """Boxes that stage 1 found or was given."""
+    """The number of boxes that stage 1 detected or was given."""
     passed: int
-    """Boxes that it passed on: sure enough, and where somebody can stand in the room."""
+    """The number of boxes that stage 1 passed on: those with a sufficient score at a possible
+    place in the room."""
     together: int
-    """Steps at which two cameras or more had such a box."""
+    """The number of steps at which two cameras or more passed on a box."""
     begun: int
-    """Tracks that the fusion began, however faint."""
+    """The number of tracks that the fusion began, whatever their existence."""
     surest: float
-    """The greatest existence or weight that one of them had."""
+    """The largest existence probability or weight of these."""
     tracks: int
-    """Tracks that were sure enough to be told, in the room."""
+    """The number of tracks that were reported, above the threshold and in the room."""
 
 
 def count_stages(run: Run) -> StageCounts:
-    """Count what each stage of a run left over."""
+    """Count the output of each stage of a run."""
     labels: set[int] = set()
     surest = 0.0
     for result in run.fused:
@@ -48,7 +49,7 @@ def count_stages(run: Run) -> StageCounts:
 
 
 def why_no_tracks(run: Run) -> str | None:
-    """One sentence on where a run without tracks lost everybody; None where it has tracks."""
+    """Explain in a sentence which stage of a run lost all people; None if the run has tracks."""
     if len(run.tracks):
         return None
     n = count_stages(run)

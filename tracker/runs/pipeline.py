@@ -1,4 +1,4 @@
-"""Sequence + parameters → run: stage after stage, with progress and cancel."""
+"""The pipeline: a sequence and parameters give a run, stage after stage, with progress."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ __all__ = [
 ]  # fmt: skip
 
 PROGRESS_SECONDS = 0.05
-"""At most this often a run tells how far it is."""
+"""Least interval between two reports of a run's progress, seconds."""
 
 
 def compute(
@@ -49,37 +49,40 @@ def compute(
 ) -> Run:
     """Run the stages over a sequence.
 
-    Step by step the run has what the filter says of the people, in ``tracks`` and ``filtered``
-    alike. When all steps are there, the smoothing looks at them together, and its people take
-    the place of the filter's in ``tracks``; ``on_progress`` is told of both.
+    While the filter runs, ``tracks`` and ``filtered`` are both its tracks so far. When all steps
+    are computed, the smoothing processes them together, and its tracks replace the filter's in
+    ``tracks``; ``on_progress`` is called for both.
 
     Args:
-        sequence: What to track in.
-        parameters: Methods and their numbers.
-        seed: Every camera and step draws from a generator of its own made of it, so
+        sequence: The sequence to track in.
+        parameters: The methods and their parameters.
+        seed: The seed; every camera and step has a generator of its own made from it, so that
             the result depends neither on threads nor on where a run was resumed.
-        corrections: What a person said, in its order. They are obeyed as far as the boxes still
-            meet them, and ``outcomes`` tells which are.
-        steps: Stop after this many steps, for a first look; None for all.
-        reader: The pictures; one is opened for the run where none is given.
+        corrections: The user's corrections, in the order they were made. They are applied as far
+            as they are compatible with the boxes; ``outcomes`` states which were.
+        steps: The number of steps after which to stop; None for all.
+        reader: The reader of the pictures; if None, one is opened for the run.
         previous: A run, complete or not, whose stages are re-used as far as their
-            keys agree. It is left as it is.
-        cache: Columns of earlier runs, re-used in the same way; those of this run are
-            kept there at its end, or as far as they came where it is cancelled.
-        meanwhile: What ``on_progress`` is shown of the people, where all steps are fused already,
-            until the smoothing has looked at them: nothing, if none are given, but the filter's.
-        wanted: The step that somebody looks at; it is told of the moment it is there.
-        on_progress: Called from this thread every so often, and at the end, with the
-            run so far: its steps below ``done`` may be read.
-        cancelled: Asked between steps and pictures, also by the threads of the cameras.
-        thread_begins: Called first in each of these threads, for instance to set its priority.
+            keys agree. It is not modified.
+        cache: The cache of earlier runs' columns, which are re-used in the same way; the columns
+            of this run are added to it at the end, or when it is cancelled.
+        meanwhile: The tracks that ``on_progress`` gets, if all steps are fused already, until the
+            smoothing is done; if None, it gets the filter's.
+        wanted: A callback that returns the step that is displayed; its result is reported as soon
+            as it is computed.
+        on_progress: A callback that is called from this thread at intervals, and at the end, with
+            the run so far: its steps below ``done`` may be read.
+        cancelled: A callback that is asked between steps and pictures whether to stop, also by the
+            threads of the cameras.
+        thread_begins: A callback that each of these threads calls first, for instance to set its
+            priority.
 
     Returns:
         The run, complete unless ``steps`` says otherwise.
 
     Raises:
-        Cancelled: If ``cancelled`` said so.
-        ValueError: If the methods do not fit the sequence.
+        Cancelled: If ``cancelled`` returned true.
+        ValueError: If a method cannot work on the sequence.
     """
     keys = stage_keys(sequence, parameters, seed, corrections)
     run = Run(sequence, parameters, seed, keys, corrections=corrections)
@@ -87,15 +90,15 @@ def compute(
     _adopt(run, previous)
     if cache is not None:
         _take(run, cache)
-    taken = len(run.views)
-    telling = _Telling(run, total, wanted, on_progress, meanwhile)
+    reused = len(run.views)
+    reporter = _Reporter(run, total, wanted, on_progress, meanwhile)
     sound = False
     try:
-        _fuse(run, total, reader, telling, cancelled, thread_begins)
-        # what changed while it was read is nothing to go on from
-        known = None if run.costly and len(run.views) > taken else cache
-        _smooth(run, total, telling, cancelled, known)
-        _settle(run, telling)
+        _fuse(run, total, reader, reporter, cancelled, thread_begins)
+        # a file may have changed while it was read: nothing computed from it may be cached yet
+        known = None if run.costly and len(run.views) > reused else cache
+        _smooth(run, total, reporter, cancelled, known)
+        _correct(run, reporter)
         run.finished = run.complete
         sound = True
     except Cancelled:
@@ -103,12 +106,12 @@ def compute(
         raise
     finally:
         if cache is not None:
-            _keep(run, cache, fused=sound, read=run.costly and len(run.views) > taken)
+            _keep(run, cache, fused=sound, read=run.costly and len(run.views) > reused)
     return run
 
 
-class _Telling:
-    """Makes the tracks of what is fused and tells of them, not too often and not too late."""
+class _Reporter:
+    """Extracts the tracks of the fused steps and reports them at suitable intervals."""
 
     def __init__(
         self,
@@ -124,7 +127,7 @@ class _Telling:
         self._wanted = wanted
         self._on_progress = on_progress
         self._first = len(run.fused)
-        self._begin = self._last_told = time.perf_counter()
+        self._begin = self._last_report = time.perf_counter()
         self._preparing = 0.0
         self.ids: dict[int, int] = {}
         self._stage: Stage = "single_view"
@@ -132,15 +135,16 @@ class _Telling:
             self._stage = "fusion" if len(run.fused) < total else _last_stage(run)
 
     def after_step(self) -> None:
-        """Tell if it is time."""
+        """Report if the interval has passed, or if the displayed step is computed."""
         run, now = self._run, time.perf_counter()
         self._preparing = self._preparing or now - self._begin
-        if now - self._last_told > PROGRESS_SECONDS or run.done <= self._wanted() < len(run.fused):
+        due = now - self._last_report > PROGRESS_SECONDS
+        if due or run.done <= self._wanted() < len(run.fused):
             self.now()
-            self._last_told = now
+            self._last_report = now
 
     def now(self) -> None:
-        """Make the tracks of all steps that are fused, and tell."""
+        """Extract the tracks of all fused steps, and report them."""
         run = self._run
         if run.done < len(run.fused):
             run.tracks = run.filtered = tracks_stage.concatenate(
@@ -156,7 +160,7 @@ class _Telling:
             self._on_progress(run, progress)
 
     def forget_meanwhile(self) -> None:
-        """Have the filter's people again instead of what was shown meanwhile."""
+        """Put the filter's tracks back in the place of those that were reported meanwhile."""
         if self._meanwhile is not None and self._run.tracks is self._meanwhile:
             self._run.tracks = self._run.filtered
         self._meanwhile = None
@@ -180,14 +184,16 @@ def _fuse(
     run: Run,
     total: int,
     reader: FrameReader | None,
-    telling: _Telling,
+    reporter: _Reporter,
     cancelled: Cancel,
     thread_begins: Callable[[], None],
 ) -> None:
-    """Compute what is missing of the first ``total`` steps."""
-    telling.now()
+    """Compute stages 1 and 2 of those of the first ``total`` steps that are missing."""
+    reporter.now()
     method = fusion.create(run.sequence, run.parameters)
-    told = constraints_by_step(run.corrections) if _takes(method.step, "constraints") else {}
+    constraints = (
+        constraints_by_step(run.corrections) if _accepts(method.step, "constraints") else {}
+    )
     state = run.fusion_state if run.fused else method.start()
     with ExitStack() as stack:
         if len(run.views) < total:
@@ -202,27 +208,27 @@ def _fuse(
                 views, view_states = next(single_views)
                 run.views.append(views)
                 run.view_states = view_states
-            if frame in told:
-                state, result = method.step(state, run.views[frame], told[frame])
+            if frame in constraints:
+                state, result = method.step(state, run.views[frame], constraints[frame])
             else:
                 state, result = method.step(state, run.views[frame])
             run.fused.append(result)
             run.fusion_state = state
-            telling.after_step()
-    telling.now()
+            reporter.after_step()
+    reporter.now()
 
 
 def _last_stage(run: Run) -> Stage:
-    """What is left of a run that is fused."""
+    """Return the stage that a fused run has yet to compute: the smoothing, or the tracks alone."""
     there = run.parameters.smoothing_method == "none" or run.smoothed is not None
     return "tracks" if there else "smoothing"
 
 
 def _smooth(
-    run: Run, total: int, telling: _Telling, cancelled: Cancel, cache: StageCache | None
+    run: Run, total: int, reporter: _Reporter, cancelled: Cancel, cache: StageCache | None
 ) -> None:
-    """Put the smoothed people in the place of the filter's."""
-    telling.forget_meanwhile()
+    """Compute stage 3, and replace the filter's tracks by the smoothed ones."""
+    reporter.forget_meanwhile()
     if run.parameters.smoothing_method == "none" or run.tracks is not run.filtered:
         return
 
@@ -234,10 +240,10 @@ def _smooth(
     if run.smoothed is None:
         method = smoothing.create(run.sequence, run.parameters)
         views, fused = run.views[:total], run.fused[:total]
-        if run.corrections and _takes(method.smooth, "corrections"):
+        if run.corrections and _accepts(method.smooth, "corrections"):
             more = {}
-            if cache and total == run.sequence.frames and _takes(method.smooth, "earlier"):
-                more["earlier"] = cache.on_the_way(key_without_names(run))
+            if cache and total == run.sequence.frames and _accepts(method.smooth, "earlier"):
+                more["earlier"] = cache.intermediate(key_without_names(run))
             run.smoothed = method.smooth(views, fused, check, run.corrections, **more)
         else:
             run.smoothed = method.smooth(views, fused, check)
@@ -246,43 +252,43 @@ def _smooth(
     run.tracks = smoothing.tracks_of(
         run.smoothed,
         run.fused,
-        telling.ids,
+        reporter.ids,
         extraction_threshold=run.parameters.fusion.extraction_threshold,
         bounds=_bounds(run),
         near=2.0 * float(run.sequence.target_half_extents[:2].mean()),
     )
-    telling.now()
+    reporter.now()
 
 
-def _settle(run: Run, telling: _Telling) -> None:
-    """Have the corrections in the tracks where no stage before settles who is who, and see which
-    are met."""
+def _correct(run: Run, reporter: _Reporter) -> None:
+    """Apply the corrections of identity to the tracks if no earlier stage does, and determine the
+    outcome of all corrections."""
     if not run.corrections or run.outcomes or not len(run.tracks):
         return
     step_time = run.sequence.step_time
-    if not run.settled and not run.parameters.method("smoothing_method").settles_who:
+    if not run.corrected and not run.parameters.method("smoothing_method").settles_who:
         run.tracks = corrected(run.tracks, run.corrections, step_time)
-    run.settled = True
+    run.corrected = True
     tracks = run.tracks
     run.outcomes = outcomes(
         tracks.frames, tracks.ids, tracks.positions, run.corrections, leeway=leeway(step_time)
     )
-    telling.now()
+    reporter.now()
 
 
-def _takes(function: Callable[..., object], name: str) -> bool:
-    """Whether a method of whoever wrote it takes an argument."""
+def _accepts(function: Callable[..., object], name: str) -> bool:
+    """Whether a function, which may be a plugin's, has a parameter of this name."""
     return name in inspect.signature(function).parameters
 
 
 def _bounds(run: Run) -> Bounds:
-    """Where people are reported."""
+    """Return the bounds within which people are reported."""
     below = float(run.sequence.target_half_extents[2]) / 2.0
     return Bounds(run.sequence.room, run.parameters.fusion.room_margin, below)
 
 
 def _adopt(run: Run, previous: Run | None) -> None:
-    """Take over the columns of an earlier run whose keys agree."""
+    """Re-use the columns of an earlier run whose keys agree."""
     if previous is None:
         return
     if previous.keys["single_view"] == run.keys["single_view"]:
@@ -295,7 +301,7 @@ def _adopt(run: Run, previous: Run | None) -> None:
 
 
 def _take(run: Run, cache: StageCache) -> None:
-    """Take over columns that are longer than what the run has."""
+    """Re-use the columns of the cache that are longer than those of the run."""
     frames, cameras = run.sequence.frames, len(run.sequence.views)
     views = cache.views(run.keys["single_view"], frames=frames, cameras=cameras)
     if views is not None and len(views.steps) > len(run.views):
@@ -310,17 +316,17 @@ def _take(run: Run, cache: StageCache) -> None:
     found = cache.tracks(run.key)
     if found is not None and _last_stage(run) == "tracks":
         run.tracks, run.filtered, run.done = found.tracks, found.filtered, frames
-        run.settled = True
+        run.corrected = True
 
 
 def _keep(run: Run, cache: StageCache, *, fused: bool, read: bool) -> None:
-    """Keep the run's columns for later ones; those of the fusion unless it failed.
+    """Add the run's columns to the cache.
 
     Args:
-        run: Whose.
-        cache: Where.
-        fused: Whether the fusion did not fail.
-        read: Whether pictures were read: then the files are looked at again.
+        run: The run.
+        cache: The cache.
+        fused: Whether no stage failed, so that the columns after stage 1 may be kept too.
+        read: Whether pictures were read, so that the files have to be checked for changes.
     """
     place = where_to_keep(run) if read else "everywhere"
     if place == "nowhere":

@@ -1,4 +1,4 @@
-"""Work spread over processes of this machine, with progress, that ends when it is cancelled."""
+"""Work distributed over processes of this machine, with progress and cancellation."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ Item = TypeVar("Item")
 Answer = TypeVar("Answer")
 
 POLL_SECONDS = 0.1
-"""Interval at which progress is reported and cancellation is looked up."""
+"""Interval at which progress is reported and cancellation is checked, seconds."""
 
 
 @dataclass(frozen=True, slots=True)
 class WorkerControl:
-    """What a worker process is given: where it reports progress, and whether it has to stop."""
+    """The callbacks that a worker process gets, for progress and cancellation."""
 
     advance: Callable[[int], None]
     """Called with the number of steps done since the last call."""
@@ -33,7 +33,7 @@ _shared: dict[str, Any] = {}
 
 
 def available_cores() -> int:
-    """Number of cores that this process may use."""
+    """Return the number of cores that this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
@@ -53,13 +53,13 @@ def map_in_processes(
     Args:
         work: A function of a module, so that another process can import it.
         items: Values that can be pickled.
-        steps: Sum of the steps by which all items advance.
+        steps: The total number of steps of all items.
         processes: Largest number of processes; with 1 the work is done in this one.
-        on_progress: Called with the steps done and ``steps``.
-        cancelled: Asked now and then whether to stop.
+        on_progress: A callback that gets the number of steps done and ``steps``.
+        cancelled: A callback that is asked now and then whether to stop.
 
     Returns:
-        The answers, in the order of the items.
+        The results, in the order of the items.
 
     Raises:
         Cancelled: If ``cancelled`` returned true.
@@ -73,7 +73,7 @@ def map_in_processes(
     import multiprocessing
     from concurrent.futures import ProcessPoolExecutor
 
-    spawn = multiprocessing.get_context("spawn")  # a fork would copy threads' locks as they are
+    spawn = multiprocessing.get_context("spawn")  # a fork would copy locks that threads hold
     stop, counter = spawn.Event(), spawn.Value("q", 0)
     pool = ProcessPoolExecutor(
         min(processes, len(items)),
@@ -88,7 +88,7 @@ def map_in_processes(
         while pending:
             done, pending = wait(pending, POLL_SECONDS, FIRST_COMPLETED)
             for future in done:
-                future.result()  # a failure ends all
+                future.result()  # raises what the work raised, which ends all others
             on_progress(min(counter.value, steps), steps)
             if cancelled():
                 raise Cancelled

@@ -1,4 +1,4 @@
-"""A run: the columns of its stages, its keys, and how far it is."""
+"""A run: the results of its stages, its cache keys, and its progress."""
 
 from __future__ import annotations
 
@@ -21,43 +21,45 @@ from tracker.smoothing import Smoothed
 
 
 class Cancelled(Exception):
-    """The run was superseded or stopped; what was computed stays usable."""
+    """The run was superseded or stopped; the steps that were computed stay usable."""
 
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """How far a run is."""
+    """The progress of a run."""
 
     stage: Stage
-    """The first stage that had to be computed: the one that takes the time."""
+    """The first stage that had to be computed, which takes most of the time."""
     done: int
-    """Steps whose tracks are ready, from step 0 on."""
+    """The number of steps whose tracks are ready, from step 0 on."""
     total: int
+    """The number of steps that the run computes."""
     seconds: float
-    """Since the run began."""
+    """Time since the run began, seconds."""
     fresh: int
-    """Steps that this run computed itself, rather than took from an earlier one."""
+    """The number of steps that this run computed itself rather than took from an earlier one."""
     preparing: float = 0.0
-    """Seconds until the first of them was there: a background to learn, kernels to load."""
+    """Time until the first of them was ready, for learning the background or loading kernels,
+    seconds."""
 
     @property
     def steps_per_second(self) -> float:
-        """Mean speed so far, from the first step on: the preparation does not come again."""
+        """Mean speed so far, without the preparation before the first step."""
         if self.fresh > 1 and self.seconds > self.preparing:
             return (self.fresh - 1) / (self.seconds - self.preparing)
         return self.fresh / self.seconds if self.seconds > 0.0 else 0.0
 
     @property
     def seconds_left(self) -> float | None:
-        """Estimated from the mean speed; None before the first step."""
+        """Remaining time by the mean speed, seconds; None before the first step."""
         return (self.total - self.done) / self.steps_per_second if self.fresh else None
 
 
 @dataclass(eq=False)
 class Run:
-    """One run: the columns of its stages, filled step by step from step 0.
+    """One run: the results (columns) of its stages, filled step by step from step 0.
 
-    One thread appends; any thread may read what is below :attr:`done`.
+    One thread appends; any thread may read the steps below :attr:`done`.
     """
 
     sequence: Sequence
@@ -66,72 +68,73 @@ class Run:
     keys: dict[Stage, str]
     """The cache key of each stage."""
     views: list[tuple[ViewResult, ...]] = field(default_factory=list)
-    """Stage 1 of each step, one result a camera."""
+    """The results of stage 1 of each step, one for each camera."""
     fused: list[FusionResult] = field(default_factory=list)
-    """Stage 2 of each step."""
+    """The result of stage 2 of each step."""
     tracks: Trajectories = field(init=False)
-    """The people of the steps below :attr:`done`: those of the filter while it runs, and the
-    smoothed ones in their place once :attr:`smoothed` is there."""
+    """The tracks of the steps below :attr:`done`: those of the filter while it runs, then the
+    smoothed ones once :attr:`smoothed` is computed."""
     filtered: Trajectories = field(init=False)
-    """The people as the filter alone has them, which is what a live system would see."""
+    """The tracks of the filter alone, as a live system would report them."""
     smoothed: Smoothed | None = None
-    """Stage 3 of all steps that were asked for; None until then, or where it is switched off."""
+    """The result of stage 3 for all requested steps; None before, or if it is switched off."""
     done: int = 0
-    """Steps whose people are there, be it the filter's."""
+    """The number of steps that have tracks, filtered or smoothed."""
     view_states: tuple[Any, ...] | None = None
-    """State of stage 1, one a camera, after the last step of :attr:`views`; None where that is
+    """The state of stage 1 of each camera after the last step of :attr:`views`; None if that is
     the last of the sequence."""
     costly: bool = False
-    """Whether stage 1 looked at pictures."""
+    """Whether stage 1 decoded pictures."""
     fusion_state: Any = None
-    """State of stage 2 after the last step of :attr:`fused`."""
+    """The state of stage 2 after the last step of :attr:`fused`."""
     corrections: tuple[Correction, ...] = ()
-    """What a person said, which the run obeys."""
+    """The user's corrections, which the run applies."""
     outcomes: tuple[Outcome, ...] = ()
-    """What became of each of them, once all steps are there."""
-    settled: bool = False
-    """Whether :attr:`tracks` has them."""
+    """The outcome of each correction, once all steps are computed."""
+    corrected: bool = False
+    """Whether :attr:`tracks` are those with the corrections applied."""
     finished: bool = False
-    """Whether every stage has been through all steps of the sequence: :attr:`tracks` are replaced
-    no more, and a figure made of them is the run's."""
+    """Whether every stage has processed all steps of the sequence, so that :attr:`tracks` are
+    final and figures computed from them are the run's."""
 
     def __post_init__(self) -> None:
         self.tracks = self.filtered = Trajectories.empty(len(self.sequence.views))
 
     @property
     def key(self) -> str:
-        """Hash of the sequence, all parameters, the seed and the version of the code's numbers."""
+        """The hash of the sequence, all parameters, the seed and the code."""
         return self.keys["tracks"]
 
     @property
     def revision(self) -> int:
-        """How often the people of all steps took the place of others: a step is told by the run's
-        key and this number.
+        """The number of times that the tracks of all steps were replaced. The run's key and this
+        number identify the tracks of a step.
 
-        0 while they are the filter's; 1 once they are the smoothed ones, or corrected ones where
-        nothing is smoothed; 2 once those who are smoothed have what a person said, too.
+        It is 0 while they are the filter's; 1 once they are smoothed, or corrected where nothing
+        is smoothed; 2 once they are smoothed and corrected.
         """
-        return (self.tracks is not self.filtered) + (self.settled and bool(self.corrections))
+        return (self.tracks is not self.filtered) + (self.corrected and bool(self.corrections))
 
     @property
     def complete(self) -> bool:
-        """Whether every step is there."""
+        """Whether all steps of the sequence have tracks."""
         return self.done == self.sequence.frames
 
     def still(self) -> Run:
-        """The run as it is now, for those who look at its people more than once: what computes it
-        may put the smoothed ones in their place meanwhile."""
+        """Return a shallow copy whose tracks stay the same, for readers that use them repeatedly:
+        the thread that computes the run may replace its tracks at any time."""
         return copy.copy(self)
 
 
-_OBEYED_BY: dict[Stage, tuple[Kind, ...]] = {
+_APPLIED_BY: dict[Stage, tuple[Kind, ...]] = {
     "fusion": IN_THE_FUSION, "smoothing": OF_PEOPLE,
 }  # fmt: skip
-"""The corrections that a stage obeys."""
+"""The kinds of corrections that a stage applies."""
 
 
 def resting_of(run: Run) -> list[str]:
-    """The id of the correction that each row of a run's tracks rests on; empty without any."""
+    """Return the id of the correction that each row of a run's tracks depends on, "" for none; an
+    empty list if the run has no corrections."""
     if not run.corrections:
         return []
     tracks = run.tracks
@@ -141,14 +144,15 @@ def resting_of(run: Run) -> list[str]:
 
 
 def given_names(run: Run) -> dict[int, str]:
-    """What people were called by hand, by track of a finished run."""
+    """Return the names that people were given by hand, by track id of a finished run."""
     return names_by_track(run.outcomes, run.corrections)
 
 
 def key_without_names(run: Run) -> str:
-    """The key of stage 3 without what a person said of who is who: what it begins with."""
-    said = tuple(one for one in run.corrections if one.kind in IN_THE_FUSION)
-    return stage_keys(run.sequence, run.parameters, run.seed, said)["smoothing"]
+    """Return the key of stage 3 without corrections of identity: it is the same for all runs that
+    differ in these alone."""
+    others = tuple(one for one in run.corrections if one.kind in IN_THE_FUSION)
+    return stage_keys(run.sequence, run.parameters, run.seed, others)["smoothing"]
 
 
 def stage_keys(
@@ -157,8 +161,17 @@ def stage_keys(
     seed: int,
     corrections: tuple[Correction, ...] = (),
 ) -> dict[Stage, str]:
-    """The cache key of each stage: a hash of the sequence, the seed, the code, and of the
-    parameters and corrections of the stage itself and of those before it."""
+    """Compute the cache key of each stage.
+
+    A key is a hash of the sequence, the seed, the code, and of the parameters and corrections of
+    the stage and of those before it.
+
+    Args:
+        sequence: The sequence to track in.
+        parameters: The parameters of the run.
+        seed: The seed of the run.
+        corrections: The user's corrections.
+    """
     keys: dict[Stage, str] = {}
     values: list[Any] = [sequence.digest, seed]
     stages: tuple[Stage, ...] = ("single_view", "fusion", "smoothing", "tracks")
@@ -167,8 +180,8 @@ def stage_keys(
         values += [numbers_version(stage), method_version(method), stage_values(parameters, stage)]
         if method.used(parameters).detector and sequence.detector is not None:
             values.append(sequence.detector.digest)
-        told = digest(corrections, _OBEYED_BY.get(stage, ()))
-        if told:
-            values.append(told)
+        applied = digest(corrections, _APPLIED_BY.get(stage, ()))
+        if applied:
+            values.append(applied)
         keys[stage] = hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()[:16]
     return keys

@@ -1,4 +1,4 @@
-"""Stage 1 of all cameras side by side: each in a thread of its own, handed over in order."""
+"""Stage 1 of all cameras in parallel: each camera has a thread, and steps are yielded in order."""
 
 from __future__ import annotations
 
@@ -18,16 +18,20 @@ from tracker.single_view.protocol import SHAKE, SingleViewMethod, ViewResult
 from tracker.single_view.working.sequence import Working
 
 BLOCK = 5
-"""Steps that a camera computes at a time: few, so that results stream; several, so that handing
-work to a thread pays."""
+"""The number of steps that a camera computes at a time: few, so that results arrive early; more
+than one, so that passing work to a thread costs little."""
 
 Cancel = Callable[[], bool]
+"""A callback that is asked whether to stop."""
 
 _Made = TypeVar("_Made")
 
 
 class SingleViews:
-    """Stage 1 from where a run's column ends, step by step: results and states, one a camera."""
+    """A context that iterates over the remaining steps of stage 1.
+
+    Each step gives the results and the new states, one of each for each camera.
+    """
 
     def __init__(
         self,
@@ -39,10 +43,10 @@ class SingleViews:
         """Prepare the threads.
 
         Args:
-            run: Whose columns.
-            reader: Of the pictures.
-            cancelled: Asked before every picture, by the threads of the cameras.
-            thread_begins: What each of these does first.
+            run: The run, whose column of stage 1 is continued.
+            reader: The reader of the pictures.
+            cancelled: A callback that the cameras' threads ask before every picture.
+            thread_begins: A callback that each of these threads calls first.
         """
         self._run = run
         self._cancelled = cancelled
@@ -58,7 +62,7 @@ class SingleViews:
         return self._iterate()
 
     def __exit__(self, *_: object) -> None:
-        self._stopped = True  # what is under way ends before its next picture
+        self._stopped = True  # the threads end before their next picture
         for pool in self._pools:
             pool.shutdown(wait=True, cancel_futures=True)
 
@@ -71,10 +75,10 @@ class SingleViews:
             pairs = zip(self._pools, workers, strict=True)
             blocks.append([pool.submit(worker.block, steps) for pool, worker in pairs])
 
-        order_block(1)  # somebody waits for the first
+        order_block(1)  # the first step is wanted soon
         left = self._run.sequence.frames - len(self._run.views)
         while left > 0:
-            order_block()  # is computed while the one before is fused
+            order_block()  # is computed while the previous block is fused
             parts = [future.result() for future in blocks.popleft()]
             if self._cancelled():
                 raise Cancelled
@@ -94,13 +98,13 @@ class SingleViews:
             run.parameters,
             self._working.reader,
         )
-        run.costly = run.costly or _looks_at_pictures(run)
+        run.costly = run.costly or _uses_pictures(run)
         state = run.view_states[camera] if run.view_states is not None else method.start()
         return _CameraWorker(method, state, camera, run, self._working, self._is_stopped)
 
 
 class _CameraWorker:
-    """Stage 1 of one camera, from where the run's column ends."""
+    """Stage 1 of one camera, which continues the run's column."""
 
     def __init__(
         self,
@@ -120,13 +124,13 @@ class _CameraWorker:
         self._frames = run.sequence.frames
         self._seed = run.seed
         self._stopped = stopped
-        looks = _looks_at_pictures(run)
-        self._shake = working.shake(camera) if looks else 0.0
-        self._pictures = working.reader.iterate(camera, self._frame) if looks else None
-        self._likeness = Likeness.of(working.sequence, working.reader) if looks else None
+        pictures = _uses_pictures(run)
+        self._shake = working.shake(camera) if pictures else 0.0
+        self._pictures = working.reader.iterate(camera, self._frame) if pictures else None
+        self._likeness = Likeness.of(working.sequence, working.reader) if pictures else None
 
     def block(self, steps: int) -> list[tuple[ViewResult, Any]]:
-        """The next few steps: result and state of each; none at the end."""
+        """Compute the next few steps, and return the result and state of each; none at the end."""
         done: list[tuple[ViewResult, Any]] = []
         while len(done) < steps and self._frame < self._frames and not self._stopped():
             picture = next(self._pictures, None) if self._pictures is not None else None
@@ -150,12 +154,13 @@ class _CameraWorker:
         return done
 
 
-def _looks_at_pictures(run: Run) -> bool:
+def _uses_pictures(run: Run) -> bool:
     return run.parameters.method("single_view").used(run.parameters).pictures
 
 
 def without_boxes(result: ViewResult) -> ViewResult:
-    """What a method makes of a missing picture: its own estimates, and nothing to the fusion."""
+    """Return the result for a missing picture: the method's estimates, without boxes for the
+    fusion."""
     nothing = ViewResult.of_no_frame()
     return replace(
         result,
@@ -169,10 +174,10 @@ def without_boxes(result: ViewResult) -> ViewResult:
 
 
 class _StoppingReader:
-    """The pictures of another reader, until the run is to stop: then :class:`Cancelled` is raised.
+    """A reader of pictures that raises :class:`Cancelled` once the run is to stop.
 
-    A background or the templates take many pictures before the first step: nobody waits for
-    the rest of them.
+    Learning the background or the templates takes many pictures before the first step; this ends
+    it early.
     """
 
     def __init__(self, reader: Pictures, stopped: Cancel) -> None:

@@ -1,7 +1,8 @@
-"""The columns of earlier runs, so that going back to a value, or on from it, costs nothing.
+"""A cache of the results of earlier runs' stages, for runs that share parameters with them.
 
-In memory within a number of bytes, those used last; stage 1, which decodes pictures, also
-on disk. What is kept is never changed: a run that takes a column over makes its own list.
+The most recently used results are in memory, up to a number of bytes; those of stage 1, which
+decodes pictures, are also on disk. A cached column is never modified: a run that takes it over
+copies the list.
 """
 
 from __future__ import annotations
@@ -24,60 +25,63 @@ from tracker.single_view.protocol import ViewResult
 from tracker.smoothing import Smoothed
 
 MEMORY_BYTES = 512 << 20
-"""Memory for the columns of all runs and sequences together."""
+"""Memory for the columns of all runs and sequences together, bytes."""
 
 _OBJECT_BYTES = 112
-"""Bytes of memory of an array or another object beside its content."""
+"""Overhead of an array or another object, bytes."""
 
 _SAMPLED = 32
-"""Steps of a column whose memory is counted; the others are taken to be as large."""
+"""The number of steps of a column whose memory is measured, as a sample of all."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ViewColumn:
-    """Stage 1 of a run, from step 0 on."""
+    """The results of stage 1 of a run, from step 0 on."""
 
     steps: Sequence[tuple[ViewResult, ...]]
+    """The results of each step, one for each camera."""
     states: tuple[Any, ...] | None
-    """One a camera, to go on from; None where the column is complete."""
+    """The state of each camera's method after the last step, from which the stage can be
+    continued; None where the column is complete."""
     costly: bool
-    """Whether pictures were looked at: worth a file."""
+    """Whether pictures were decoded, so that the column is worth a file."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FusionColumn:
-    """Stage 2 of a run, from step 0 on."""
+    """The results of stage 2 of a run, from step 0 on."""
 
     steps: Sequence[FusionResult]
     state: Any
+    """The state of the filter after the last step."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrackColumn:
-    """The people of a run, of all steps."""
+    """The tracks of a run, of all steps."""
 
     tracks: Trajectories
     filtered: Trajectories
-    """As the filter alone has them; the same ones where nothing is smoothed."""
+    """The tracks of the filter alone; the same object where nothing is smoothed."""
 
 
-class Kept:
-    """What smoothings that share a beginning found on their way, among the columns of a cache."""
+class IntermediateResults:
+    """Cached intermediate results of smoothings that differ in corrections of identity alone."""
 
     def __init__(self, cache: StageCache, key: str) -> None:
         self._cache, self._key = cache, key
 
-    def get(self, what: str) -> Any:
-        """Something that was kept, None where it is not there."""
-        return self._cache._get("smoothing", f"{self._key} {what}")
+    def get(self, name: str) -> Any:
+        """Return the result of this name; None if it is not cached."""
+        return self._cache._get("smoothing", f"{self._key} {name}")
 
-    def put(self, what: str, found: object) -> None:
-        """Keep something for later runs."""
-        self._cache._put("smoothing", f"{self._key} {what}", found)
+    def put(self, name: str, result: object) -> None:
+        """Cache a result for later runs."""
+        self._cache._put("smoothing", f"{self._key} {name}", result)
 
 
 class StageCache:
-    """Columns by the key of their stage. Thread-safe."""
+    """Columns by the key of their stage. The cache is thread-safe."""
 
     def __init__(
         self,
@@ -87,14 +91,15 @@ class StageCache:
         files: StageFiles | None = None,
         start: Callable[[Callable[[], object]], object] = lambda work: work(),
     ) -> None:
-        """Empty, but for the files.
+        """Start with an empty memory.
 
         Args:
-            memory_bytes: Bound on what is kept in memory. The newest column of each stage
-                stays whatever its size, so that a run's own parts are always there.
-            later_bytes: Of these at most so many for the stages after the first; None for all.
-            files: For finished columns of stage 1; None for memory only.
-            start: How a file is written: at once, or for instance in a thread.
+            memory_bytes: Largest size of all columns in memory. The newest column of each stage
+                stays whatever its size, so that the columns of the current run are available.
+            later_bytes: Largest size of the columns of stages 2 and 3; None for no limit beside
+                ``memory_bytes``.
+            files: The files of finished columns of stage 1; None for memory only.
+            start: Runs a function that writes a file: at once, or for instance in a thread.
         """
         self._limit = memory_bytes
         self._later_limit = memory_bytes if later_bytes is None else later_bytes
@@ -109,17 +114,17 @@ class StageCache:
         start: Callable[[Callable[[], object]], object] = lambda work: work(),
         memory_bytes: int = MEMORY_BYTES,
     ) -> StageCache:
-        """With files in the cache folder."""
+        """Make a cache that also keeps files in the user's cache folder."""
         files = StageFiles(cache_folder() / "stages")
         return StageCache(memory_bytes=memory_bytes, files=files, start=start)
 
     @property
     def used_bytes(self) -> int:
-        """Memory of all columns, by estimate."""
+        """The estimated memory of all columns, bytes."""
         return self._used
 
     def views(self, key: str, *, frames: int, cameras: int) -> ViewColumn | None:
-        """Stage 1 with this key, as far as it was computed; from memory, else from disk."""
+        """Return stage 1 with this key, complete or not, from memory or from disk."""
         column: ViewColumn | None = self._get("single_view", key)
         if self._files is not None and (column is None or len(column.steps) < frames):
             steps = self._files.read(key, frames=frames, cameras=cameras)
@@ -129,26 +134,26 @@ class StageCache:
         return column
 
     def fusion(self, key: str) -> FusionColumn | None:
-        """Stage 2 with this key, as far as it was computed."""
+        """Return stage 2 with this key, complete or not."""
         column: FusionColumn | None = self._get("fusion", key)
         return column
 
     def smoothed(self, key: str) -> Smoothed | None:
-        """Stage 3 with this key, of all steps."""
+        """Return stage 3 with this key, of all steps."""
         smoothed: Smoothed | None = self._get("smoothing", key)
         return smoothed
 
     def tracks(self, key: str) -> TrackColumn | None:
-        """The people of a run with this key, of all steps."""
+        """Return the tracks of a run with this key, of all steps."""
         tracks: TrackColumn | None = self._get("tracks", key)
         return tracks
 
-    def on_the_way(self, key: str) -> Kept:
-        """What was found on the way to stage 3, by the key of what it begins with."""
-        return Kept(self, key)
+    def intermediate(self, key: str) -> IntermediateResults:
+        """Return the cache of intermediate results of stage 3, by the key they have in common."""
+        return IntermediateResults(self, key)
 
     def keep_views(self, key: str, column: ViewColumn, *, complete: bool) -> None:
-        """Keep stage 1, unless more of it is there; a complete one on disk as well."""
+        """Keep stage 1, unless more steps of it are cached; a complete one is also put on disk."""
         before: ViewColumn | None = self._get("single_view", key)
         if before is None or len(before.steps) < len(column.steps):
             self._put("single_view", key, column)
@@ -157,7 +162,7 @@ class StageCache:
                 self._start(lambda: files.write(key, steps))
 
     def keep_fusion(self, key: str, column: FusionColumn) -> None:
-        """Keep stage 2, unless more of it is there."""
+        """Keep stage 2, unless more steps of it are cached."""
         before: FusionColumn | None = self._get("fusion", key)
         if before is None or len(before.steps) < len(column.steps):
             self._put("fusion", key, column)
@@ -168,12 +173,12 @@ class StageCache:
             self._put("smoothing", key, smoothed)
 
     def keep_tracks(self, key: str, tracks: TrackColumn) -> None:
-        """Keep the people of all steps."""
+        """Keep the tracks of all steps."""
         if self._get("tracks", key) is None:
             self._put("tracks", key, tracks)
 
     def clear(self) -> None:
-        """Let go of everything in memory."""
+        """Drop all columns in memory."""
         with self._lock:
             self._kept.clear()
             self._used = self._later = 0
@@ -208,7 +213,7 @@ class StageCache:
 
 
 def weigh(column: object) -> int:
-    """Bytes of memory; of what has steps estimated from some of them."""
+    """Estimate the memory of a column, bytes; for results of steps from a sample of them."""
     if not isinstance(column, ViewColumn | FusionColumn):
         return _weight(column, set())
     every = max(1, len(column.steps) // _SAMPLED)

@@ -1,14 +1,19 @@
-"""Finished columns of stage 1 on disk: whole files only, the oldest leave first.
+"""Finished results of stage 1 on disk, of which the least recently used are deleted first.
 
 A file is an uncompressed NumPy archive: every array carries a checksum and its index
-stands at the end, so what a crash cut short, or a disk spoilt, is found out when it is
-read. A file is written beside its place and moved there when it is complete; of two
-processes that write the same one the later wins, and both wrote the same.
+stands at the end, so that a file that a crash truncated or a disk damaged is recognised when it
+is read. A file is written beside its place and renamed when it is complete; of two
+processes that write the same one the later wins, and both write the same.
+
+The results of all steps of a camera are packed into a few long arrays, a column for each field.
+:func:`pack` and :func:`unpack` read the fields from the dataclass, so that a new field needs no
+change here.
 """
 
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import json
 import logging
 import os
@@ -16,60 +21,65 @@ import tempfile
 import time
 import zipfile
 import zlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any, TypeVar, get_args, get_type_hints
 
 import numpy as np
+from jaxtyping import AbstractArray
+from numpy import ndarray
 from numpy.lib.npyio import NpzFile
+from pydantic import TypeAdapter
 
 from tracker.files.atomic import sync_folder
-from tracker.runs.columns import pack, unpack
 from tracker.single_view.protocol import ViewResult
+
+Value = TypeVar("Value")
 
 logger = logging.getLogger(__name__)
 
 FORMAT = 1
-"""Of the files; what another version wrote is not read."""
+"""Version of the files; those of other versions are not read."""
 
 LIMIT_BYTES = 2 << 30
-"""Disk space for all columns together."""
+"""Disk space of all files together, bytes."""
 
 ABANDONED_SECONDS = 3600.0
-"""A file that was begun and not written to for so many seconds was left by a process that died."""
+"""A temporary file that was not written to for so many seconds was left by a dead process."""
 
 _UNREADABLE = (
     OSError, ValueError, KeyError, EOFError, NotImplementedError, RuntimeError,
     zipfile.BadZipFile, zlib.error,
 )  # fmt: skip
-"""What the standard library raises of an archive that is none, or of a spoilt one."""
+"""What the libraries raise for a file that is no archive, or a damaged one."""
 
 _HEAD = "head"
 _BEGUN = ".part"
 
 Views = list[tuple[ViewResult, ...]]
-"""Stage 1 of each step, one result a camera."""
+"""The results of stage 1 of each step, one for each camera."""
 
 
 class StageFiles:
-    """A folder of columns, by the keys of their stage. Any number of processes may use it."""
+    """A folder of results of stage 1, by their cache key. Several processes may use it at once."""
 
     def __init__(self, folder: Path, limit_bytes: int = LIMIT_BYTES) -> None:
-        """Nothing is made or read before it is needed.
+        """Store the arguments; the folder is made when a file is written.
 
         Args:
-            folder: Where; its files named ``*.npz`` and ``*.part`` belong to this.
-            limit_bytes: Bound on the space of the columns; those not used for longest go.
+            folder: The folder; all its files named ``*.npz`` and ``*.part`` belong to the cache.
+            limit_bytes: Largest size of all files together; the least recently used are deleted.
         """
         self._folder = folder
         self._limit = limit_bytes
 
     def read(self, key: str, *, frames: int, cameras: int) -> Views | None:
-        """A finished column, or None where there is none that can be used.
+        """Read the results of a finished stage 1; None if there is no usable file.
 
         Args:
-            key: Of the stage: sequence, parameters and version of the numbers.
-            frames: The number of steps it must have.
-            cameras: The number of results a step.
+            key: The cache key of the stage, a hash of sequence, parameters and code.
+            frames: The number of steps that the file must have.
+            cameras: The number of results at each step.
         """
         path = self._path(key)
         try:
@@ -91,7 +101,7 @@ class StageFiles:
                     columns.append(unpack(arrays, ViewResult))
                     if len(columns[-1]) != frames:
                         raise ValueError(f"expected {frames} steps, found {len(columns[-1])}")
-            os.utime(path)  # it was used
+            os.utime(path)  # marks it as used
         except (FileNotFoundError, NotADirectoryError):
             return None
         except _UNREADABLE as error:
@@ -102,10 +112,9 @@ class StageFiles:
         return list(zip(*columns, strict=True))
 
     def write(self, key: str, views: Sequence[tuple[ViewResult, ...]]) -> bool:
-        """Keep a finished column; whether it is there now.
+        """Write the results of a finished stage 1, and return whether the file now exists.
 
-        What cannot be written is told to the log and otherwise without effect: a cache
-        may always be empty.
+        An error is logged and has no other effect, since a cache may always be empty.
         """
         path = self._path(key)
         if path.exists():
@@ -135,7 +144,7 @@ class StageFiles:
         return True
 
     def prune(self) -> None:
-        """Delete what was used least recently, until the rest is within the limit."""
+        """Delete the least recently used files until the rest is within the limit."""
         now, found = time.time(), []
         for path in self._folder.glob("*"):
             with contextlib.suppress(OSError):  # another process prunes as well
@@ -162,3 +171,130 @@ def _head(key: str, frames: int, cameras: int) -> dict[str, object]:
 
 def _text(text: str) -> np.ndarray:
     return np.frombuffer(text.encode(), dtype=np.uint8)
+
+
+def pack(items: Sequence[Value], kind: type[Value]) -> dict[str, ndarray]:
+    """Pack instances of a dataclass into arrays, by name.
+
+    A field of arrays becomes the concatenated arrays, and their lengths, -1 for
+    None; a field of dataclasses is packed in turn; every other field is written as JSON.
+
+    Args:
+        items: Instances of one dataclass.
+        kind: The dataclass.
+
+    Raises:
+        TypeError: If a field has values that JSON cannot represent, or arrays of several shapes.
+    """
+    packed: dict[str, ndarray] = {}
+    for name, hint in _hints(kind).items():
+        values = [getattr(item, name) for item in items]
+        inner = _dataclass_in(hint)
+        if _is_array(hint):
+            packed[name], packed[f"{name}#"] = _joined(name, values)
+        elif inner is not None:
+            there = [value for value in values if value is not None]
+            packed[f"{name}?"] = np.array([value is not None for value in values], dtype=bool)
+            packed |= {f"{name}.{key}": array for key, array in pack(there, inner).items()}
+        else:
+            text = json.dumps([_plain(value) for value in values])
+            packed[name] = np.frombuffer(text.encode(), dtype=np.uint8)
+    return packed
+
+
+def unpack(packed: Mapping[str, ndarray], kind: type[Value]) -> list[Value]:
+    """Restore the instances that :func:`pack` packed.
+
+    Raises:
+        ValueError: If the arrays do not match the fields of the dataclass.
+    """
+    columns: dict[str, list[Any]] = {}
+    used: set[str] = set()
+    for name, hint in _hints(kind).items():
+        inner = _dataclass_in(hint)
+        if _is_array(hint):
+            columns[name] = _parted(_of(packed, name), _of(packed, f"{name}#"))
+            used |= {name, f"{name}#"}
+        elif inner is not None:
+            begin = f"{name}."
+            parts = {k.removeprefix(begin): v for k, v in packed.items() if k.startswith(begin)}
+            there = iter(unpack(parts, inner))
+            columns[name] = [
+                next(there) if is_there else None for is_there in _of(packed, f"{name}?")
+            ]
+            used |= {f"{name}?", *(begin + key for key in parts)}
+        else:
+            columns[name] = _reader(kind, name).validate_json(_of(packed, name).tobytes())
+            used.add(name)
+    if used != set(packed) or len({len(column) for column in columns.values()}) > 1:
+        raise ValueError(f"these are not columns of {kind.__name__}: {sorted(set(packed) ^ used)}")
+    names = list(columns)
+    return [
+        kind(**dict(zip(names, row, strict=True))) for row in zip(*columns.values(), strict=True)
+    ]
+
+
+def _hints(kind: type[Any]) -> dict[str, Any]:
+    hints = get_type_hints(kind)
+    return {field.name: hints[field.name] for field in dataclasses.fields(kind)}
+
+
+def _reader(kind: type[Any], name: str) -> TypeAdapter[list[Any]]:
+    column: Any = list[_hints(kind)[name]]  # type: ignore[misc]
+    return TypeAdapter(column)
+
+
+def _is_array(hint: Any) -> bool:
+    return any(
+        isinstance(part, type) and issubclass(part, ndarray | AbstractArray)
+        for part in (hint, *get_args(hint))
+    )
+
+
+def _dataclass_in(hint: Any) -> type[Any] | None:
+    """Return the dataclass of a field whose type is a dataclass, optional or not; else None."""
+    parts = [part for part in (get_args(hint) or (hint,)) if part is not type(None)]
+    if len(parts) == 1 and isinstance(parts[0], type) and dataclasses.is_dataclass(parts[0]):
+        return parts[0]
+    return None
+
+
+def _joined(name: str, values: list[ndarray | None]) -> tuple[ndarray, ndarray]:
+    lengths = np.array([-1 if value is None else len(value) for value in values], dtype=np.int64)
+    there = [value for value in values if value is not None]
+    filled = [value for value in there if len(value)] or there[:1]
+    if not filled:
+        return np.zeros(0), lengths
+    if len({(value.shape[1:], value.dtype) for value in filled}) > 1:
+        raise TypeError(f"{name}: arrays of one column must agree in shape and type")
+    return np.concatenate(filled), lengths
+
+
+def _parted(joined: ndarray, lengths: ndarray) -> list[ndarray | None]:
+    ends = np.cumsum(np.maximum(lengths, 0))
+    if len(joined) != (ends[-1] if len(ends) else 0):
+        raise ValueError("lengths do not add up")
+    starts = (ends - np.maximum(lengths, 0)).tolist()
+    return [
+        joined[start:end] if length >= 0 else None
+        for start, end, length in zip(starts, ends.tolist(), lengths.tolist(), strict=True)
+    ]
+
+
+def _plain(value: Any) -> Any:
+    """Convert a value for JSON: dataclasses to mappings, NumPy's numbers to Python's."""
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return {f.name: _plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
+    if isinstance(value, np.generic):
+        return value.item()
+    if isinstance(value, Mapping):
+        return {key: _plain(one) for key, one in value.items()}
+    if isinstance(value, tuple | list):
+        return [_plain(one) for one in value]
+    return value
+
+
+def _of(packed: Mapping[str, ndarray], name: str) -> ndarray:
+    if name not in packed:
+        raise ValueError(f"there is no column {name}")
+    return packed[name]

@@ -1,13 +1,13 @@
-"""Every kernel compiled before it is needed, by a few steps of every method.
+"""The compilation of all kernels ahead of the first run, by a few steps of every method.
 
-numba compiles a function when it is first called, for the arguments it is called with.
-So a tiny made-up recording is tracked with each method and in each way that calls other
-kernels; what the first real run calls is then there.
+numba compiles a function when it is first called, for the types of its arguments.
+So a tiny synthetic recording is tracked with each method and with all parameters that select
+other kernels; the first real run then finds its kernels compiled.
 
-``python -m tracker.runs.warm_up`` does it in two processes, one a half of the methods, which
-leave the interpreter of the workbench alone. Each tells how far it is: a line ``done
-total`` whenever a kernel has been compiled; the first half tells ``ready`` when the method
-that a sequence with templates starts with has what cannot run as plain Python.
+``python -m tracker.runs.warm_up`` does this in two processes, one for each half of the methods,
+so that the workbench's own interpreter stays responsive. Each process prints its progress: a line
+``done total`` whenever a kernel has been compiled. The first half prints ``ready`` when the
+default method of a sequence with templates has those kernels that cannot run as plain Python.
 """
 
 from __future__ import annotations
@@ -37,25 +37,27 @@ MAKERS: dict[MethodKey, Callable[[Method], Callable[..., Any]]] = {
     "fusion_method": fusion.maker,
     "smoothing_method": smoothing.maker,
 }
-"""What imports a method of each stage."""
+"""The function that imports a method of each stage."""
 
 STEPS = 36
+"""The number of steps of the synthetic recording."""
+
 EMPTY = 12
-"""Steps before anybody is there, of which the background is learnt."""
+"""The number of steps before people appear, from which the background is learnt."""
 
 SIZE = (160, 120)
-"""Pixels of a picture."""
+"""Width and height of a picture, pixels."""
 
 _HALF_EXTENTS = np.array([0.3, 0.3, 0.84])
 _WAYS = (((-1.2, 0.2, 0.84), (1.2, 0.2, 0.84)), ((1.2, -0.3, 0.84), (-1.2, -0.3, 0.84)))
-"""Where each of two people comes from and goes to, metres: they pass each other."""
+"""First and last position of each of two people, who pass each other, metres."""
 
 _COLOURS = ((40, 40, 220), (220, 60, 40))
-"""Of the two people, blue green red."""
+"""The colours of the two people, blue, green and red."""
 
 HALVES = ("first", "second")
-"""The work of two processes: stage 1 with the intensity filter; and the labelled fusion's step,
-which takes longest to compile, with what comes after it."""
+"""The two halves of the work: stage 1 with the PHD filter; and the step of the multi-Bernoulli
+filter, which takes longest to compile, with the smoothing."""
 
 _OTHER_WAYS = (
     {"fusion.update": "unscented"},
@@ -63,30 +65,30 @@ _OTHER_WAYS = (
     {"fusion.measurement": "box_and_width", "fusion.extraction": "boxes"},
     {"single_view": "colour_phd", "foreground.model": "adaptive"},
 )
-"""Values that call kernels which neither the defaults nor a preset call."""
+"""Parameters that select kernels which neither the defaults nor a preset use."""
 
 
 def compile_kernels(
     half: str,
-    told: Callable[[int, int], None] = lambda done, total: None,
+    progress: Callable[[int, int], None] = lambda done, total: None,
     ready: Callable[[], None] = lambda: None,
 ) -> None:
-    """Compile what has not been compiled on this machine.
+    """Compile the kernels that have not been compiled on this machine.
 
     Args:
-        half: One of :data:`HALVES`.
-        told: Called with the number of kernels that are ready and of all, whenever one has
+        half: The half of the methods, one of :data:`HALVES`.
+        progress: A callback that gets the number of compiled kernels and of all, whenever one has
             been compiled.
-        ready: Called by the first half when the method that a sequence with templates starts
-            with has the kernels that cannot run as plain Python.
+        ready: A callback that the first half calls when the default method of a sequence with
+            templates has the kernels that cannot run as plain Python.
     """
     for key, maker in MAKERS.items():
         for method in REGISTERED[key].values():
             if method.name not in ORIGINS:
-                maker(method)  # its kernels are counted from the beginning
+                maker(method)  # imports its kernels, so that the total is known from the start
     with (
         tempfile.TemporaryDirectory() as folder,
-        compilation.followed(lambda: told(*compilation.counts())),
+        compilation.followed(lambda: progress(*compilation.counts())),
     ):
         recording = _recording(Path(folder))
         if half == HALVES[0]:
@@ -100,7 +102,7 @@ def compile_kernels(
 
 
 def _ways(half: str) -> Iterable[RunParameters]:
-    """Ways of tracking that between them call every kernel, the usual ones first."""
+    """Return parameters that between them use every kernel, the most common ones first."""
     of_views = (
         with_values(
             RunParameters(),
@@ -126,7 +128,7 @@ def _ways(half: str) -> Iterable[RunParameters]:
         for single_view in FOLLOWING
         for smoothing_method in _own("smoothing_method")
     )
-    # each begins with what the other does last: whoever asks for what is compiled just then waits
+    # the orders are opposite, so that neither process waits for what the other compiles
     if half == HALVES[0]:
         return of_views
     boxes = RunParameters(single_view="none")
@@ -134,8 +136,8 @@ def _ways(half: str) -> Iterable[RunParameters]:
 
 
 def _own(key: MethodKey) -> list[str]:
-    """The methods of this project: another package compiles its kernels when they are called, and
-    a detection network has none."""
+    """Return the names of this project's methods that have kernels: those of plugins are compiled
+    when they are called, and a detection network has none."""
     return [
         name
         for name in METHODS[key]
@@ -144,7 +146,7 @@ def _own(key: MethodKey) -> list[str]:
 
 
 def _recording(folder: Path) -> Sequence:
-    """Two cameras, two people who cross a room, as pictures and as boxes."""
+    """Make a recording of two people who cross a room, by two cameras with pictures and boxes."""
     rng = np.random.default_rng(0)
     share = np.linspace(0.0, 1.0, STEPS - EMPTY)[:, None]
     paths = [np.array(one) * (1.0 - share) + np.array(other) * share for one, other in _WAYS]
@@ -190,7 +192,7 @@ def _recording(folder: Path) -> Sequence:
 
 
 def _camera(name: str, place: float) -> Camera:
-    """A camera at one side of the room that looks at its middle."""
+    """Make a camera at one side of the room that looks at its middle."""
     position = np.array([place, -3.4, 1.6])
     ahead = np.array([0.0, 0.0, 0.9]) - position
     ahead /= np.linalg.norm(ahead)
@@ -203,13 +205,13 @@ def _camera(name: str, place: float) -> Camera:
 
 
 def start(half: str, **how: Any) -> subprocess.Popen[str]:
-    """The process that compiles one half; what it tells comes through its standard output."""
+    """Start the process that compiles one half; it prints its progress to standard output."""
     line = [sys.executable, "-m", "tracker.runs.warm_up", half]
     return subprocess.Popen(line, stdin=subprocess.DEVNULL, text=True, **how)
 
 
 def main() -> int:
-    """Compile one half and tell of it, or both and wait; whoever works goes first."""
+    """Compile one half and print the progress, or compile both in processes; with low priority."""
     if len(sys.argv) < 2:
         statuses = [process.wait() for process in [start(half) for half in HALVES]]
         if not any(statuses):
@@ -218,20 +220,20 @@ def main() -> int:
     half = sys.argv[1]
     _give_way(5 if half == HALVES[0] else 19)
 
-    def say(words: str) -> None:
-        sys.stdout.write(f"{words}\n")
+    def report(line: str) -> None:
+        sys.stdout.write(f"{line}\n")
         sys.stdout.flush()
 
     def ready() -> None:
-        say("ready")
+        report("ready")
         _give_way(10)
 
-    compile_kernels(half, lambda done, total: say(f"{done} {total}"), ready)
+    compile_kernels(half, lambda done, total: report(f"{done} {total}"), ready)
     return 0
 
 
 def _give_way(steps: int) -> None:
-    """Whoever renders or tracks goes first; what a run waits for goes before the rest."""
+    """Lower the priority of this process by so many steps, below that of rendering and tracking."""
     if sys.platform != "win32":
         os.nice(steps)
 

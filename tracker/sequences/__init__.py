@@ -1,1 +1,1 @@
-"""Recorded multi-view sequences: the folder format, its pictures, and the built-in rooms."""
+"""Recorded multi-view sequences: the folder format, its pictures, and the built-in recordings."""

@@ -1,7 +1,7 @@
-"""The rooms that come with the program, and what names a recording in the user's own folders.
+"""The built-in recordings, and the names of a recording's files in the user's settings.
 
-The files of a built-in sequence are part of the installed program and are never written to. What
-a person adds to one, corrections or templates, lies in the user's settings under its name.
+The files of a built-in recording are part of the installed program and are never written to.
+Corrections and templates that a user adds to one are stored in the user's settings under its name.
 """
 
 from __future__ import annotations
@@ -18,40 +18,43 @@ EARLIER = (
     "made on the sequence as it was rendered before, which was longer: steps beyond its present "
     "end do not fit"
 )
-"""A remark about what lies in the user's settings from before the sequences came as files."""
+"""The remark on files in the user's settings that were made for the longer recordings of earlier
+versions, which were rendered by the program."""
 
 
 def built_in_name(folder: Path) -> str | None:
-    """The name of a built-in sequence by its folder; None for any other folder."""
+    """Return the name of a built-in recording by its folder; None for any other folder."""
     name = folder.name
     return name if name in BUILT_IN and folder.absolute() == ROOMS / name else None
 
 
 def opens_by_name(folder: Path) -> bool:
-    """Whether a folder is opened by its name: a built-in sequence, or a room in the cache."""
+    """Whether a folder is opened by its name: a built-in recording, or a rendered one in the
+    cache."""
     return built_in_name(folder) is not None or folder.absolute().is_relative_to(cache_folder())
 
 
 def cached_rooms() -> Path:
-    """Where earlier versions of the program rendered rooms: two cameras or three, or by a seed."""
+    """Return the folder into which earlier versions of the program rendered recordings."""
     return cache_folder() / "rooms" / "version-4"
 
 
 def key_of(folder: Path) -> str:
-    """The name of a recording's files in the user's settings.
+    """Return the name of a recording's files in the user's settings.
 
     Args:
-        folder: Of the recording.
+        folder: The folder of the recording.
 
     Returns:
-        A built-in sequence's own name, which stays the same wherever the program is installed;
-        a hash of the path of any other folder.
+        The name of a built-in recording, which does not depend on where the program is installed,
+        or a hash of the path of any other folder.
     """
     return built_in_name(folder) or _hash(folder)
 
 
 def earlier_key(folder: Path) -> str | None:
-    """The key of a built-in sequence while it was rendered into the cache; None for others."""
+    """Return the key that a built-in recording had in earlier versions, which rendered it into the
+    cache; None for other folders."""
     name = built_in_name(folder)
     return None if name is None else _hash((cached_rooms() / f"{name}-2-cameras").resolve())
 

@@ -1,4 +1,4 @@
-"""The calibration of one camera in ``sequence.toml``, checked."""
+"""The calibration of one camera in ``sequence.toml``, with its validation."""
 
 from __future__ import annotations
 
@@ -15,17 +15,22 @@ from tracker.sequences.fields import LARGEST, Fields, listed
 from tracker.sequences.sequence import Room
 
 POSE = ("K", "distortion", "lens", "R", "t")
-"""The fields that, without ``projection``, say how a camera sees."""
+"""The fields of a calibration without ``projection``."""
 
 LEAST_FOCAL = 0.1
-"""Pixels; of a real camera it is about the size of its picture."""
+"""Least focal length, pixels; that of a real camera is about the size of its picture."""
 
 ROTATION_TOLERANCE = 2e-3
-"""How far R Rᵀ may be from the identity: entries written with three decimals pass."""
+"""Largest deviation of R Rᵀ from the identity, which entries with three decimals meet."""
 
 
 def read_camera(name: str, image_size: tuple[int, int], fields: Fields) -> Camera:
-    """The camera of one ``[[camera]]`` table.
+    """Read the calibration of one ``[[camera]]`` table.
+
+    Args:
+        name: The camera's name.
+        image_size: Width and height of its pictures, pixels.
+        fields: The table.
 
     Raises:
         SequenceError: If the calibration is incomplete, of the wrong shape, or impossible.
@@ -84,7 +89,7 @@ def _intrinsics(fields: Fields) -> Float[ndarray, "3 3"]:
 
 
 def _check_size(fields: Fields, field: str, matrix: Float[ndarray, "3 3"]) -> None:
-    """Whether K is one that a camera can have, so that nothing later overflows."""
+    """Check that K is plausible, so that later computations do not overflow."""
     focal = matrix[[0, 1], [0, 1]]
     if not (np.abs(matrix).max() <= LARGEST and focal.min() >= LEAST_FOCAL):
         raise fields.error(
@@ -98,7 +103,7 @@ def _check_size(fields: Fields, field: str, matrix: Float[ndarray, "3 3"]) -> No
 def _rotation(fields: Fields) -> Float[ndarray, "3 3"]:
     matrix = fields.matrix("R", 3, 3)
     error = float(np.abs(matrix @ matrix.T - np.eye(3)).max())
-    with np.errstate(all="ignore"):  # of what is no rotation at all
+    with np.errstate(all="ignore"):  # the matrix may be far from a rotation
         determinant = float(np.linalg.det(matrix))
     if error > ROTATION_TOLERANCE:
         raise fields.error(
@@ -141,8 +146,8 @@ def _distortion(fields: Fields, *, fisheye: bool) -> Float[ndarray, " n"]:
     return np.concatenate([given[:5], np.zeros(max(0, 5 - len(given)))])
 
 
-def check_sight(camera: Camera, room: Room) -> Iterator[str]:
-    """Warn where a camera sees nothing of the room: usually a pose the wrong way round."""
+def check_view_of_room(camera: Camera, room: Room) -> Iterator[str]:
+    """Yield a warning if a camera sees nothing of the room, usually since its pose is inverted."""
     steps = np.linspace(0.0, 1.0, 13)
     grid = np.stack(np.meshgrid(steps, steps, steps), axis=-1).reshape(-1, 3)
     if not camera.sees(room.minimum + grid * (room.maximum - room.minimum)).any():

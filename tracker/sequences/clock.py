@@ -1,4 +1,4 @@
-"""When a camera took which of its frames: other rates, late starts, time stamps, missing frames."""
+"""The clock of a camera: frame rate, start, time stamps and missing frames."""
 
 from __future__ import annotations
 
@@ -17,34 +17,35 @@ FIELDS = ("fps", "time_offset", "timestamps")
 """The fields of a camera that give it a clock of its own."""
 
 _LONGEST_OFFSET = 86400.0
+"""Largest time offset of a camera, seconds."""
 
 _LATEST = 1e19
-"""Of a time stamp: some count from 1970, in nanoseconds."""
+"""Largest time stamp, which may be nanoseconds since 1970."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Clock:
-    """Which frame of its file a camera shows at each of S steps.
+    """The assignment of a camera's frames to the S steps.
 
     A step shows the frame that was taken nearest to it, and each frame belongs to the one step
-    that is nearest to it: so a camera that is slower than the steps shows nothing at some of
-    them, and one that is faster leaves frames out.
+    that is nearest to it. So a camera that is slower than the steps has no frame at some of
+    them, and one that is faster has frames without a step.
     """
 
     frame_of_step: Int[ndarray, " S"]
-    """-1 where the camera has no frame."""
+    """The frame of each step; −1 for none."""
     step_of_frame: Int[ndarray, " F"]
-    """-1 where a frame belongs to no step. F frames, those of the file or as many as needed."""
+    """The step of each frame; −1 for none. F is at least the number of frames in use."""
 
     @staticmethod
     def of_times(times: Float[ndarray, " F"], fps: float, steps: int) -> Clock:
-        """The clock of a camera that took its frames at these times.
+        """Assign frames that were taken at given times to steps.
 
         Args:
-            times: Seconds since step 0, of every frame of the file; NaN for one that is not to
-                be shown.
-            fps: Of the steps.
-            steps: S.
+            times: The time of every frame of the file since step 0, seconds; NaN for a frame that
+                is not shown.
+            fps: The rate of the steps, 1/s.
+            steps: The number S of steps.
         """
         frames = np.flatnonzero(np.isfinite(times))
         exact = times[frames] * fps
@@ -52,15 +53,15 @@ class Clock:
         order = np.argsort(np.abs(exact - nearest), kind="stable")
         inside = (nearest[order] >= 0) & (nearest[order] < steps)
         order = order[inside]
-        taken, first = np.unique(nearest[order], return_index=True)
+        filled, first = np.unique(nearest[order], return_index=True)
         frame_of_step = np.full(steps, -1, dtype=np.int64)
-        frame_of_step[taken] = frames[order[first]]
+        frame_of_step[filled] = frames[order[first]]
         step_of_frame = np.full(len(times), -1, dtype=np.int64)
-        step_of_frame[frame_of_step[taken]] = taken
+        step_of_frame[frame_of_step[filled]] = filled
         return Clock(frame_of_step, step_of_frame)
 
     def steps_of(self, frames: Int[ndarray, " N"]) -> Int[ndarray, " N"]:
-        """The step of each frame of the file, -1 where it belongs to none."""
+        """Return the step of each frame of the file; −1 for none."""
         steps = np.full(len(frames), -1, dtype=np.int64)
         known = (frames >= 0) & (frames < len(self.step_of_frame))
         steps[known] = self.step_of_frame[frames[known]]
@@ -69,32 +70,33 @@ class Clock:
 
 @dataclass(frozen=True, slots=True)
 class Timing:
-    """What a camera's table says of its clock."""
+    """The timing of a camera, as its table states it."""
 
     first_frame: int = 0
+    """The frame of the file with which the camera begins."""
     fps: float | None = None
-    """Of the camera, None for that of the steps."""
+    """The camera's frame rate, 1/s; None if it is that of the steps."""
     time_offset: float = 0.0
-    """Seconds that are added to the time of every frame."""
+    """The time that is added to that of every frame, seconds."""
     stamps: tuple[float, ...] | None = None
-    """Seconds, one each frame of the file, from a beginning that all cameras share."""
+    """The time of each frame of the file, seconds, from a beginning common to all cameras."""
 
     @property
     def is_own(self) -> bool:
-        """Whether it is not simply frame ``first_frame`` + k at step k."""
+        """Whether the frame at step k may differ from ``first_frame`` + k."""
         return self.fps is not None or self.time_offset != 0.0 or self.stamps is not None
 
     def clock(self, fps: float, steps: int, beginning: float = 0.0) -> Clock | None:
-        """Which frame belongs to which step; None where it is frame ``first_frame`` + k.
+        """Return the clock; None if step k shows frame ``first_frame`` + k.
 
         Frame n of the file was taken at
 
             (n − first_frame) / fps + time_offset,  or  stamp(n) − beginning + time_offset.
 
         Args:
-            fps: Of the steps.
-            steps: How many there are.
-            beginning: The time stamp of step 0.
+            fps: The rate of the steps, 1/s.
+            steps: The number of steps.
+            beginning: The time stamp of step 0, seconds.
         """
         if not self.is_own:
             return None
@@ -109,7 +111,13 @@ class Timing:
         return Clock.of_times(times + self.time_offset, fps, steps)
 
     def seconds(self, frames: int, fps: float, beginning: float = 0.0) -> float:
-        """How long a file of so many frames lasts after step 0."""
+        """Return the time from step 0 to the end of a file, seconds.
+
+        Args:
+            frames: The number of frames of the file.
+            fps: The frame rate that is assumed if the camera states none, 1/s.
+            beginning: The time stamp of step 0, seconds.
+        """
         if self.stamps is not None:
             last = max(self.stamps[:frames], default=beginning) - beginning
             return last + self.time_offset + 1.0 / fps
@@ -117,16 +125,16 @@ class Timing:
 
 
 def read_timing(fields: Fields, folder: Path, where: str, stamps: Path | None) -> Timing:
-    """The clock of one ``[[camera]]`` table.
+    """Read the timing of one ``[[camera]]`` table.
 
     Args:
         fields: The table.
-        folder: Of the sequence.
-        where: The sequence, as messages begin.
-        stamps: The file that ``timestamps`` names, found.
+        folder: The folder of the sequence.
+        where: The name of the sequence, for messages.
+        stamps: The path of the file that ``timestamps`` names; None if there is none.
 
     Raises:
-        SequenceError: If something in it is wrong.
+        SequenceError: If a field or the file is not valid.
     """
     timing = Timing(
         first_frame=fields.integer("first_frame", 0),
@@ -145,10 +153,10 @@ def read_timing(fields: Fields, folder: Path, where: str, stamps: Path | None) -
 
 
 def _stamps(file: Path, where: str, camera: str) -> tuple[float, ...]:
-    """The times of a camera's frames, seconds, in their order.
+    """Read the times of a camera's frames, seconds, ascending.
 
-    The layout is that of Caliscope's ``frame_time_history.csv``: a row a frame with its
-    ``frame_time``, of one camera or of several, which are told apart by ``port`` or ``cam_id``;
+    The layout is that of Caliscope's ``frame_time_history.csv``: a row for each frame with its
+    ``frame_time``, of one camera or of several, which are distinguished by ``port`` or ``cam_id``;
     the k-th row of a camera by time is frame k of its video.
     """
     columns = read_columns(

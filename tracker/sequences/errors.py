@@ -1,4 +1,4 @@
-"""The error of what cannot be read as a sequence."""
+"""The error of a sequence that cannot be read."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a ``sequence.toml`` leaves open, found out from videos, boxes and views."""
+"""The estimation of what a ``sequence.toml`` does not state, from videos, boxes and views."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from tracker.sequences.fields import Fields, listed
 from tracker.sequences.sequence import Room, View
 from tracker.sequences.views import Source, Time
 
-_SAME_RATE = 0.01  # share by which videos of one rate may differ
-_SCORE_THRESHOLD = 0.3
-_MOST_BOXES = 50_000  # of one camera, from which room and size are found out: more tell no more
+_SAME_RATE = 0.01  # largest relative difference of frame rates that are the same
+_SCORE_THRESHOLD = 0.3  # least score of a box from which room and size are estimated
+_MOST_BOXES = 50_000  # most boxes of a camera from which they are estimated
 
 
 def check_missing(fields: Fields, cameras: Many[Fields]) -> None:
-    """Tell everything at once that is missing and that nothing in the file lets be found out.
+    """Report all fields at once that are missing and cannot be estimated.
 
-    A single missing field is left to whoever reads it.
+    A single missing field is reported by the function that reads it.
 
     Raises:
-        SequenceError: If two or more are missing.
+        SequenceError: If two or more fields are missing.
     """
     missing = ["name"] if "name" not in fields else []
     has_videos = any("video" in camera for camera in cameras)
@@ -49,24 +49,31 @@ def check_missing(fields: Fields, cameras: Many[Fields]) -> None:
 
 
 def find_time(sources: Many[Source], fps: float | None, steps: int | None, fields: Fields) -> Time:
-    """Rate and number of steps, as stated or as the videos and boxes have them.
+    """Determine the rate and the number of steps, from the file or from videos and boxes.
 
-    Without a stated rate the steps are those of the fastest video; where videos differ, each is
-    shown at its own rate.
+    If the file states no rate, it is that of the fastest video; if the videos' rates differ, each
+    video is shown at its own rate.
+
+    Args:
+        sources: The files of all cameras.
+        fps: The rate that the file states, steps per second; None if it states none.
+        steps: The number of steps that the file states; None if it states none.
+        fields: The fields of the file.
 
     Raises:
-        SequenceError: If neither is stated and nothing tells it.
+        SequenceError: If a value is not stated and cannot be estimated.
     """
-    told: list[str] = []
+    remarks: list[str] = []
     own_rates = False
     if fps is None:
         rates = [s.timing.fps or (s.pictures.fps if s.pictures else None) for s in sources]
         known = [rate for rate in rates if rate]
         if not known:
-            fields.rate("fps")  # says what is missing
+            fields.rate("fps")  # raises that it is missing
         fps = max(known)
         own_rates = min(known) < (1.0 - _SAME_RATE) * fps
-        told.append(f"fps is not stated: {fps:g} as the {'fastest ' if own_rates else ''}video has")
+        fastest = "fastest " if own_rates else ""
+        remarks.append(f"fps is not stated: {fps:g} as the {fastest}video has")
     stamps = [s.timing.stamps[0] for s in sources if s.timing.stamps]
     beginning = min(stamps, default=0.0)
     if steps is None:
@@ -83,10 +90,10 @@ def find_time(sources: Many[Source], fps: float | None, steps: int | None, field
                 lasting.append(source.table.steps * fps / rate + source.timing.time_offset * fps)
         steps = int(np.floor(max(lasting, default=0.0) + 1e-6))
         if steps < 1:
-            fields.integer("frames", minimum=1)  # says what is missing
+            fields.integer("frames", minimum=1)  # raises that it is missing
             raise fields.error("frames", "no camera has a picture or a box after step 0")
-        told.append(f"frames is not stated: {steps} steps, as long as the longest camera lasts")
-    return Time(fps, steps, beginning, tuple(told), own_rates)
+        remarks.append(f"frames is not stated: {steps} steps, as long as the longest camera lasts")
+    return Time(fps, steps, beginning, tuple(remarks), own_rates)
 
 
 def find_room(
@@ -95,20 +102,28 @@ def find_room(
     half_extents: Float[ndarray, " 3"] | None,
     fields: Fields,
 ) -> tuple[Room, Float[ndarray, " 3"], list[str]]:
-    """Room and target, where boxes of two cameras meet or, without boxes, where views overlap.
+    """Estimate room and target from the places where boxes of two cameras agree or, without boxes,
+    where views overlap.
+
+    Args:
+        views: The cameras.
+        room: The room that the file states; None if it is to be estimated.
+        half_extents: Half width, depth and height of a target that the file states, metres; None
+            if they are to be estimated.
+        fields: The fields of the file.
 
     Returns:
-        Both, and what was found out.
+        The room, the half extents, and remarks on what was estimated.
 
     Raises:
-        SequenceError: If nothing tells them.
+        SequenceError: If they cannot be estimated.
     """
     cameras = [view.camera for view in views]
     agreed = None
     if sum(view.detections is not None for view in views) > 1:
         rays = []
         most = max(len(view.detections.frames) for view in views if view.detections is not None)
-        every = 1 + most // _MOST_BOXES  # the same steps of all cameras
+        every = 1 + most // _MOST_BOXES  # all cameras use the same steps
         for view in views:
             own = view.detections
             kept = np.zeros(0, int)
@@ -127,18 +142,18 @@ def find_room(
             "multiview-phd check, or write the table"
         )
     source = "where boxes of two cameras meet" if found.people else "where two views overlap"
-    told: list[str] = []
+    remarks: list[str] = []
     if room is None:
         room = Room(found.minimum, found.maximum)
-        told.append(
+        remarks.append(
             f"[room] is not stated: {source}, from {_metres(found.minimum)} to "
             f"{_metres(found.maximum)}"
         )
     if half_extents is None:
         half_extents = found.half_extents
         what = "as tall as the boxes are" if found.people else "a standing person"
-        told.append(f"[target] is not stated: {what}, half extents {_metres(half_extents)}")
-    return room, half_extents, told
+        remarks.append(f"[target] is not stated: {what}, half extents {_metres(half_extents)}")
+    return room, half_extents, remarks
 
 
 def _metres(vector: Float[ndarray, " 3"]) -> str:

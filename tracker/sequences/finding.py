@@ -1,4 +1,4 @@
-"""What one check found: a sentence, and what mends it."""
+"""The result of one check of a recording: a sentence, and remedies."""
 
 from __future__ import annotations
 
@@ -8,18 +8,19 @@ from types import MappingProxyType
 from typing import Literal
 
 Status = Literal["good", "warning", "absent"]
-"""As it should be; odd; or nothing there that could be checked."""
+"""The status of a check; ``absent`` means that there is nothing to check."""
 
 
 @dataclass(frozen=True, slots=True)
 class Remedy:
-    """What mends it, as a flag of ``multiview-phd import`` or a field of ``sequence.toml``."""
+    """A change that corrects the problem: a flag of ``multiview-phd import`` or a field of
+    ``sequence.toml``."""
 
     flag: str
-    """``--pose``, ``--axes``, …; or the field, for instance ``camera.time_offset``."""
+    """The flag, such as ``--pose`` or ``--axes``, or the field, such as ``camera.time_offset``."""
     value: str
     camera: str = ""
-    """Whose field it is."""
+    """The name of the camera that the field belongs to; empty for other fields."""
 
     def __str__(self) -> str:
         return (
@@ -31,15 +32,15 @@ class Remedy:
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """What one check found."""
+    """The result of one check."""
 
     name: str
     status: Status
     sentence: str
     remedies: tuple[Remedy, ...] = ()
-    """All of them together mend it."""
+    """The changes that correct the problem together."""
     numbers: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
-    """What the sentence is made of, by name."""
+    """The numbers in the sentence, by name."""
 
     def __str__(self) -> str:
         mended = " ".join(str(remedy) for remedy in self.remedies)
@@ -47,20 +48,20 @@ class Check:
 
 
 def good(name: str, sentence: str, **numbers: float) -> Check:
-    """All is as it should be."""
+    """Return the result of a check without problems."""
     return Check(name, "good", sentence, numbers=MappingProxyType(numbers))
 
 
 def warning(name: str, sentence: str, *remedies: Remedy, **numbers: float) -> Check:
-    """Something is odd."""
+    """Return the result of a check that found a problem."""
     return Check(name, "warning", sentence, remedies, MappingProxyType(numbers))
 
 
 def absent(name: str, sentence: str) -> Check:
-    """There is nothing that could be checked."""
+    """Return the result of a check for which there is nothing to check."""
     return Check(name, "absent", sentence)
 
 
 def percent(share: float) -> str:
-    """A share as a sentence has it."""
+    """Format a share in percent for a sentence."""
     return f"{100.0 * share:.0f} %"

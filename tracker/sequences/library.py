@@ -1,4 +1,4 @@
-"""Where sequences come from: the built-in rooms by name, any folder by its path."""
+"""The opening of sequences: built-in recordings by name, folders by path."""
 
 from __future__ import annotations
 
@@ -17,33 +17,34 @@ from tracker.sequences.reader import FILE, given_folder, read_sequence, read_sum
 from tracker.sequences.sequence import DetectorFile, Sequence
 
 _SEEDED = re.compile(r"random-\d{1,9}")
-"""A room that an earlier version of the program rendered by a seed."""
+"""The name of a random recording that an earlier version of the program rendered by a seed."""
 
 _RENDERED = re.compile(rf"({'|'.join(BUILT_IN)})-([23])-cameras")
-"""A built-in room as an earlier version rendered it, with so many cameras."""
+"""The name of a built-in recording that an earlier version rendered with 2 or 3 cameras."""
 
 
 @dataclass(frozen=True, slots=True)
 class SequenceEntry:
-    """One line of the list of sequences."""
+    """An entry of the list of sequences."""
 
     name: str
-    """What :func:`open_sequence` takes, or the folder's name under the data folder."""
+    """The name for :func:`open_sequence`, or the folder's name in the data folder."""
     description: str
     kind: Literal["rendered", "folder"]
-    """``rendered`` where the name alone opens it."""
+    """``rendered`` if the sequence can be opened by its name."""
     cameras: int
+    """The number of cameras."""
     frames: int
-    """0 where the file leaves it to its videos."""
+    """The number of steps; 0 if the file does not state it."""
     folder: Path
     error: str | None = None
-    """Why it cannot be opened, in one sentence."""
+    """The reason why the sequence cannot be opened, in one sentence."""
 
 
 def available(data: Path | None = None) -> list[SequenceEntry]:
-    """The built-in rooms, those of seeds that lie in the cache, then the folders under ``data``.
+    """Return the built-in recordings, random ones in the cache, then the folders in ``data``.
 
-    Only heads of files are read: what else is wrong with a folder shows on opening it.
+    Only ``sequence.toml`` is read; problems of other files appear when a sequence is opened.
     """
     entries = [_entry(ROOMS / name, "rendered") for name in BUILT_IN]
     entries += [_entry(folder, "rendered") for folder in _folders(cached_rooms() / "random")]
@@ -53,7 +54,7 @@ def available(data: Path | None = None) -> list[SequenceEntry]:
 
 
 def _folders(data: Path) -> list[Path]:
-    """Folders with a sequence's file, also where some of them may not be looked into."""
+    """Return the folders in ``data`` that have a ``sequence.toml``, readable or not."""
     try:
         with os.scandir(data) as inside:
             names = sorted(entry.name for entry in inside if not entry.name.startswith("."))
@@ -69,7 +70,7 @@ def _entry(folder: Path, kind: Literal["rendered", "folder"] = "folder") -> Sequ
         description, cameras = summary.description, summary.cameras
         frames = summary.frames or 0
     except (ValueError, OSError, RecursionError, MemoryError) as problem:
-        # whatever is wrong with one folder is a line of the list, and the others stay in it
+        # the problem of one folder is shown in its entry and does not affect the others
         error = " ".join(str(problem).split()) or type(problem).__name__
     return SequenceEntry(
         name=folder.name,
@@ -83,25 +84,26 @@ def _entry(folder: Path, kind: Literal["rendered", "folder"] = "folder") -> Sequ
 
 
 def is_room(name: str) -> bool:
-    """Whether a name is that of a room: a built-in one, or one that may lie in the cache."""
+    """Whether a name is that of a built-in recording, or of one that may be in the cache."""
     return name in BUILT_IN or _cached(name) is not None
 
 
 def _cached(name: str) -> Path | None:
-    """Where an earlier version of the program rendered the room of a name; None for other names."""
+    """Return the folder into which an earlier version rendered the recording of this name; None for
+    other names."""
     if _SEEDED.fullmatch(name):
         return cached_rooms() / "random" / name
     return cached_rooms() / name if _RENDERED.fullmatch(name) else None
 
 
 def open_sequence(name_or_folder: str | Path) -> Sequence:
-    """Open a room by its name, or a sequence folder.
+    """Open a recording by its name, or a sequence folder.
 
-    A folder of the same name as a room is opened by a path with a separator, for instance
-    ``./room44-3p``.
+    A folder with the name of a built-in recording is opened by a path with a separator, for
+    instance ``./room44-3p``.
 
     Args:
-        name_or_folder: Name of a room, or path of a folder.
+        name_or_folder: The name of a built-in recording, or the path of a folder.
 
     Raises:
         SequenceError: If there is no such sequence, or it cannot be read.
@@ -129,17 +131,17 @@ def open_sequence(name_or_folder: str | Path) -> Sequence:
 
 
 def _maker(name: str) -> str:
-    """What ``tests.rooms`` takes for a room that is missing."""
+    """Return the arguments of ``tests.rooms`` that render a missing recording."""
     match = _RENDERED.fullmatch(name)
     return name if match is None else f"{match[1]} --cameras {match[2]}"
 
 
 def with_detector(sequence: Sequence, path: Path | None) -> Sequence:
-    """The sequence with a detection network that may be run on its pictures.
+    """Return a sequence with a detection network that can be run on its pictures.
 
     Args:
-        sequence: Any.
-        path: An ONNX file; None leaves the sequence as it is.
+        sequence: The sequence.
+        path: The network's ONNX file; if None, the sequence is returned unchanged.
 
     Raises:
         SequenceError: If the file cannot be read.
@@ -147,7 +149,7 @@ def with_detector(sequence: Sequence, path: Path | None) -> Sequence:
     if path is None:
         return sequence
     try:
-        size_of(path)  # a pipe would be waited for
+        size_of(path)  # refuses a pipe, on which reading would block
         with path.open("rb") as file:
             digest = hashlib.file_digest(file, "sha256").hexdigest()[:16]
     except OSError as error:

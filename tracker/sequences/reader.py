@@ -1,8 +1,7 @@
-"""A folder with a ``sequence.toml`` → a checked :class:`Sequence`.
+"""The reading of a folder with a ``sequence.toml`` into a validated :class:`Sequence`.
 
-Whatever is wrong is told in one sentence that names the file, the line or the field,
-what was expected and what was found. What is odd but can be lived with becomes one of
-``Sequence.warnings``.
+Every error is one sentence that names the file, the line or the field, what was expected and what
+was found. Problems that do not prevent tracking become ``Sequence.warnings``.
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tracker.files.text import not_utf_8, shown
-from tracker.sequences.calibration import check_sight
+from tracker.sequences.calibration import check_view_of_room
 from tracker.sequences.errors import SequenceError
 from tracker.sequences.fields import LARGEST_COUNT, LONGEST_NAME, Fields, did_you_mean
 from tracker.sequences.filling import check_missing, find_room, find_time
@@ -28,11 +27,11 @@ FILE = "sequence.toml"
 FORMAT = 1
 MOST_FRAMES = LARGEST_COUNT
 MOST_BYTES = 4 * 2**20
-"""Of a sequence.toml: thousands of templates and entrances."""
+"""Largest size of a sequence.toml, which is enough for thousands of templates, bytes."""
 LONGEST_PATH = 4000
-"""Bytes of a whole path, as file systems have them."""
+"""Longest path that file systems accept, bytes."""
 MOST_DEPTH = 12
-"""Tables and lists within each other; the format itself needs five."""
+"""Deepest nesting of tables and lists; the format itself needs five levels."""
 
 TOP = ("format", "name", "description", "fps", "frames", "room", "target", "camera", "template",
        "ground_truth")  # fmt: skip
@@ -40,48 +39,49 @@ TOP = ("format", "name", "description", "fps", "frames", "room", "target", "came
 
 @dataclass(frozen=True, slots=True)
 class SequenceSummary:
-    """What a list of sequences shows of one, read without opening its videos and tables."""
+    """The summary of a sequence for lists, from its ``sequence.toml`` alone."""
 
     name: str
     description: str
     fps: float | None
-    """None where it is left to the videos."""
+    """The rate of the steps, 1/s; None if the file does not state it."""
     frames: int | None
-    """None where it is left to the videos and boxes."""
+    """The number of steps; None if the file does not state it."""
     cameras: int
 
 
 def read_sequence(folder: Path | str) -> Sequence:
-    """Read and check a sequence folder.
+    """Read and validate a sequence folder.
 
-    What the file does not state is found out: rate, steps and picture sizes from the videos, room
-    and target from where boxes of two cameras meet; the warnings say what was found.
+    What the file does not state is estimated: rate, number of steps and picture sizes from the
+    videos, room and target from the places where boxes of two cameras agree. The warnings state the
+    estimates.
 
     Args:
         folder: The folder, or the ``sequence.toml`` in it.
 
     Raises:
-        SequenceError: In one sentence: file, line or field, expected, found, what to do.
+        SequenceError: With a sentence that names the file and the line or field.
     """
     folder, text = _find(Path(folder))
     fields = _parse(folder, text)
     reading = Reading(folder)
-    stated_frames = (
-        fields.integer("frames", minimum=1, maximum=MOST_FRAMES) if "frames" in fields else None
-    )
-    stated_fps = fields.rate("fps") if "fps" in fields else None
+    frames = None
+    if "frames" in fields:
+        frames = fields.integer("frames", minimum=1, maximum=MOST_FRAMES)
+    fps = fields.rate("fps") if "fps" in fields else None
     room = read_room(fields) if "room" in fields else None
     half_extents = read_target(fields)
     check_missing(fields, _tables(fields))
     sources = read_sources(_tables(fields), reading)
-    time = find_time(sources, stated_fps, stated_frames, fields)
+    time = find_time(sources, fps, frames, fields)
     views = read_views(sources, time, reading)
     if room is None or half_extents is None:
-        room, half_extents, told = find_room(views, room, half_extents, fields)
-        reading.warnings += told
-    reading.warnings += time.told
+        room, half_extents, remarks = find_room(views, room, half_extents, fields)
+        reading.warnings += remarks
+    reading.warnings += time.remarks
     for view in views:
-        reading.warnings += check_sight(view.camera, room)
+        reading.warnings += check_view_of_room(view.camera, room)
     templates = read_templates(fields, views, time.steps)
     ground_truth = read_ground_truth(fields, reading, time.steps)
     files = _states(reading)
@@ -110,10 +110,13 @@ def _tables(fields: Fields) -> list[Fields]:
 
 
 def read_summary(folder: Path | str) -> SequenceSummary:
-    """Read the head of a sequence's file only, quickly.
+    """Read the summary of a sequence without opening its other files.
+
+    Args:
+        folder: The folder, or the ``sequence.toml`` in it.
 
     Raises:
-        SequenceError: As :func:`read_sequence`, for the fields it reads.
+        SequenceError: If the file cannot be read or one of these fields is not valid.
     """
     folder, text = _find(Path(folder))
     fields = _parse(folder, text)
@@ -129,7 +132,7 @@ def read_summary(folder: Path | str) -> SequenceSummary:
 
 
 def _find(folder: Path) -> tuple[Path, str]:
-    """The folder and the text of its sequence.toml."""
+    """Return the folder and the text of its sequence.toml."""
     if folder.name == FILE and folder.is_file():
         folder = folder.parent
     try:
@@ -160,16 +163,16 @@ def _find(folder: Path) -> tuple[Path, str]:
 
 
 def _import(source: Path) -> str:
-    """What makes a sequence folder of what other programs wrote."""
+    """Return a sentence with the command that imports files of other programs."""
     written = shlex.quote(str(source))
     return f"make one of other files by `multiview-phd import {written} -o NEW_FOLDER`"
 
 
 def given_folder(text: str | Path) -> Path:
-    """A path as somebody wrote it, with ``~`` for a person's home.
+    """Expand ``~`` in a path that a user gave, and check that it can be a path.
 
     Raises:
-        SequenceError: If no file system has such a name, or there is no such person.
+        SequenceError: If file systems do not accept the path, or the user after ``~`` is unknown.
     """
     written = str(text)
     if not written.isprintable():
@@ -192,11 +195,11 @@ def given_folder(text: str | Path) -> Path:
 
 
 def check_own_file(folder: Path) -> None:
-    """Whether a folder's own file may be read, and saved over.
+    """Check that the ``sequence.toml`` of a folder can be read and overwritten.
 
     Raises:
-        SequenceError: If it is too large, or a link that leads out of the folder.
-        OSError: If it is not there.
+        SequenceError: If the file is too large, or a link that leads out of the folder.
+        OSError: If the file does not exist.
     """
     file = folder / FILE
     if not file.resolve().is_relative_to(folder.resolve()):
@@ -213,7 +216,7 @@ def check_own_file(folder: Path) -> None:
 
 
 def _depth(values: object) -> int:
-    """How many tables and lists are within each other; stops counting beyond what is allowed."""
+    """Return the depth of nested tables and lists, at most one more than is allowed."""
     level, depth = [values], 0
     while level and depth <= MOST_DEPTH:
         inner = [one for one in level if isinstance(one, dict | list)]
@@ -240,7 +243,7 @@ def _parse(folder: Path, text: str) -> Fields:
             f"{where}: expected tables and lists at most {MOST_DEPTH} levels deep, found hundreds; "
             "remove them"
         ) from None
-    except ValueError:  # of a whole number with thousands of digits
+    except ValueError:  # an integer of thousands of digits
         raise SequenceError(
             f"{where}: expected numbers of at most 18 digits, found one with thousands; shorten it"
         ) from None

@@ -1,4 +1,4 @@
-"""What a sequence is: cameras, room, target, templates, boxes and truth, as values."""
+"""The data of a sequence: cameras, room, target, templates, boxes and ground truth."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ PRESETS: dict[str, tuple[float, float, float]] = {
     "Seated": (0.3, 0.3, 0.65),
     "Head": (0.12, 0.12, 0.15),
 }
-"""Usual targets: half width, depth and height, metres."""
+"""Half width, depth and height of common targets, metres."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Entrance:
-    """Where targets appear: a Gaussian in world metres."""
+    """A place where targets appear: a Gaussian in world coordinates, metres."""
 
     position: Float[ndarray, " 3"]
     sigma: Float[ndarray, " 3"]
@@ -31,7 +31,7 @@ class Entrance:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Room:
-    """The axis-aligned volume that people are tracked in, world metres."""
+    """The axis-aligned volume in which people are tracked, in world coordinates, metres."""
 
     minimum: Float[ndarray, " 3"]
     maximum: Float[ndarray, " 3"]
@@ -40,9 +40,12 @@ class Room:
     def contains(
         self, points: Float[ndarray, "N 3"], margin: float = 0.0, below: float = 0.0
     ) -> Bool[ndarray, " N"]:
-        """Whether each point lies inside, or at most ``margin`` metres outside.
+        """Whether each point lies in the volume enlarged by a margin.
 
-        ``below`` adds to the margin under the floor.
+        Args:
+            points: Points in world coordinates, metres.
+            margin: The margin on all sides, metres.
+            below: A further margin below the floor, metres.
         """
         inside = (points >= self.minimum - [margin, margin, margin + below]) & (
             points <= self.maximum + margin
@@ -55,10 +58,12 @@ class Template:
     """A box whose colour histogram models a target."""
 
     name: str
+    """The name of the person."""
     camera: str
     frame: int
+    """The step."""
     box: Float[ndarray, " 4"]
-    """left, top, width, height, pixels."""
+    """Left, top, width, height, pixels."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,12 +72,14 @@ class Detections:
 
     frames: Int[ndarray, " D"]
     boxes: Float[ndarray, "D 4"]
-    """left, top, width, height, pixels."""
+    """Left, top, width, height, pixels."""
     scores: Float[ndarray, " D"]
-    """0 … 1; 1 where the file has none."""
-    looks: Float16[ndarray, "D A"] = field(default_factory=lambda: np.zeros((0, 0), np.float16))
-    """What each box looks like to an outside network, as a unit vector, 0 where it does not say;
-    (0, 0) where there is no file of it."""
+    """The score of each box, 0 … 1; 1 if the file has none."""
+    embeddings: Float16[ndarray, "D A"] = field(
+        default_factory=lambda: np.zeros((0, 0), np.float16)
+    )
+    """Unit vectors of each box's appearance from an outside network, or zeros for a box without
+    one; of shape (0, 0) if there is no such file."""
 
     def at(self, frame: int) -> slice:
         """The rows of one step."""
@@ -82,16 +89,16 @@ class Detections:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GroundTruth:
-    """Where people really were: one row a person a step, sorted by step and then id."""
+    """The true positions of people: a row for each person and step, sorted by step and then id."""
 
     frames: Int[ndarray, " G"]
     ids: Int[ndarray, " G"]
     positions: Float[ndarray, "G 3"]
-    """World metres."""
+    """Positions in world coordinates, metres."""
     valid: Bool[ndarray, " G"]
-    """False where the person is there but the position is not certain."""
+    """False where the person is present but the position is uncertain."""
     known: Bool[ndarray, " F"] | None = None
-    """Of which steps anything is known; None for all. Of others nothing counts."""
+    """Whether the truth covers each step; None if it covers all. Other steps are not evaluated."""
 
     def at(self, frame: int) -> slice:
         """The rows of one step."""
@@ -101,23 +108,24 @@ class GroundTruth:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class View:
-    """One camera of a sequence and where its pictures and boxes are."""
+    """One camera of a sequence, with its pictures and boxes."""
 
     camera: Camera
     video: Path | None = None
     images: tuple[Path, ...] = ()
     first_frame: int = 0
-    """The frame of the video or image list that is step 0, where it has no clock of its own."""
+    """The frame of the video or image list at step 0, if the camera has no clock of its own."""
     detections: Detections | None = None
     clock: Clock | None = None
-    """Which frame each step shows; None where it is ``first_frame`` + k at step k."""
+    """The frame that each step shows; None if it is ``first_frame`` + k at step k."""
     looked_at: Bool[ndarray, " F"] | None = None
-    """At which steps the detector had a picture; None where it had one at every step."""
+    """Whether the detector had a picture at each step; None if it had one at every step."""
     there: Bool[ndarray, " N"] | None = None
-    """Which frames of the video or image list were there on opening; None where nobody looked."""
+    """Whether each frame of the video or image list existed when the sequence was opened; None if
+    that was not checked."""
     background: Path | range | None = None
-    """A picture of the empty scene, or the steps at which nobody is there; None where the
-    background has to be learnt from whatever the clip shows."""
+    """A picture of the empty scene, or the steps without people; None if the background has to be
+    learnt from the recording."""
 
     @property
     def has_pictures(self) -> bool:
@@ -125,14 +133,14 @@ class View:
         return self.video is not None or bool(self.images)
 
     def need_pictures(self, sequence: str, instead: str = "") -> None:
-        """Make sure that there are pictures.
+        """Check that there are pictures.
 
         Args:
-            sequence: The name of the sequence, for the sentence.
-            instead: What else can be done, as the sentence's end.
+            sequence: The name of the sequence, for the message.
+            instead: What else can be done, as the end of the message.
 
         Raises:
-            ValueError: If there are none.
+            ValueError: If there are no pictures.
         """
         if not self.has_pictures:
             raise ValueError(
@@ -141,19 +149,19 @@ class View:
             )
 
     def frame_at(self, step: int) -> int:
-        """The frame of the video or image list that a step shows, -1 for none."""
+        """Return the frame of the video or image list that a step shows; −1 for none."""
         if self.clock is None:
             return self.first_frame + step
         return int(self.clock.frame_of_step[step])
 
     def asked_for(self, steps: int) -> Bool[ndarray, " F"]:
-        """At which of the first steps the camera's clock has a frame: where a picture belongs."""
+        """Whether the camera's clock has a frame at each of the first steps."""
         if self.clock is None or not self.has_pictures:
             return np.full(steps, self.has_pictures)
         return np.asarray(self.clock.frame_of_step[:steps] >= 0)
 
     def expected(self, steps: int) -> Bool[ndarray, " F"]:
-        """At which of the first steps there was a picture when the sequence was opened."""
+        """Whether there was a picture for each of the first steps when the sequence was opened."""
         asked = self.asked_for(steps)
         if self.there is None or not self.has_pictures:
             return asked
@@ -166,33 +174,33 @@ class View:
         return found
 
     def was_looked_at(self, step: int) -> bool:
-        """Whether the outside detector had a picture of this step: else it says nothing there."""
+        """Whether the outside detector had a picture of this step, so that no box means nobody."""
         return self.looked_at is None or bool(self.looked_at[step])
 
 
 @dataclass(frozen=True, slots=True)
 class FileState:
-    """A file of a sequence as it was when the sequence was opened."""
+    """The state of a file when the sequence was opened."""
 
     path: Path
     size: int
-    """Bytes."""
+    """Size, bytes."""
     changed: int
     """Time of its last change, nanoseconds since 1970."""
 
     @staticmethod
     def of(path: Path) -> FileState:
-        """As it is now.
+        """Return the present state of a file.
 
         Raises:
-            OSError: If it is not there.
+            OSError: If the file does not exist.
         """
         status = path.stat()
         return FileState(path, status.st_size, status.st_mtime_ns)
 
     @property
     def is_same(self) -> bool:
-        """Whether it is still so."""
+        """Whether the file has not changed."""
         try:
             return FileState.of(self.path) == self
         except OSError:
@@ -201,17 +209,17 @@ class FileState:
 
 @dataclass(frozen=True, slots=True)
 class DetectorFile:
-    """A detection network that somebody brings."""
+    """A detection network of the user."""
 
     path: Path
-    """An ONNX file."""
+    """The ONNX file."""
     digest: str
-    """Hash of its content, for cache keys."""
+    """The hash of its content, for cache keys."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sequence:
-    """A recorded multi-view sequence, checked and ready to run."""
+    """A recorded multi-view sequence, validated and ready to be tracked."""
 
     name: str
     folder: Path
@@ -226,13 +234,13 @@ class Sequence:
     templates: tuple[Template, ...] = ()
     ground_truth: GroundTruth | None = None
     digest: str = field(default="")
-    """Hash of sequence.toml and of the size and time of every file it names, for cache keys."""
+    """The hash of sequence.toml and of size and time of every file it names, for cache keys."""
     detector: DetectorFile | None = None
-    """The network that may be run on its pictures; no part of :attr:`digest`."""
+    """The network that may be run on the pictures; it is not part of :attr:`digest`."""
     warnings: tuple[str, ...] = ()
-    """What is odd about it but does not keep it from running, one sentence each."""
+    """Sentences on problems that do not prevent tracking."""
     files: tuple[FileState, ...] = ()
-    """Every file that its sequence.toml names, as it was on opening."""
+    """Every file that sequence.toml names, in its state on opening."""
 
     @property
     def cameras(self) -> tuple[Camera, ...]:
@@ -250,10 +258,10 @@ class Sequence:
         return all(view.detections is not None for view in self.views)
 
     def changed_files(self) -> tuple[Path, ...]:
-        """The files that are gone, or others, since it was opened."""
+        """Return the files that changed or vanished since the sequence was opened."""
         return tuple(file.path for file in self.files if not file.is_same)
 
     @property
     def step_time(self) -> float:
-        """Seconds between two steps."""
+        """Time between two steps, seconds."""
         return 1.0 / self.fps

@@ -1,4 +1,5 @@
-"""The tables of a sequence folder: boxes of an outside detector, and the ground truth."""
+"""The tables of a sequence folder: boxes of an outside detector, their appearance vectors, and the
+ground truth."""
 
 from __future__ import annotations
 
@@ -11,7 +12,6 @@ from jaxtyping import Bool, Float, Float16, Int
 from numpy import ndarray
 
 from tracker.files.text import shown
-from tracker.sequences.appearance import read_appearance
 from tracker.sequences.clock import Clock
 from tracker.sequences.csv_columns import Columns, read_columns
 from tracker.sequences.errors import SequenceError
@@ -22,16 +22,22 @@ from tracker.sequences.sequence import Detections, GroundTruth
 BOX = ("left", "top", "width", "height")
 
 MOST_BOXES = 1000
-"""Of one camera at one step: a detector finds fewer, and the pairs of two cameras are their
-product."""
+"""Most boxes of a camera at a step; detectors find fewer, and the number of pairs of boxes of two
+cameras is the product."""
 
 KNOWN_STEPS = "steps"
-"""The comment of a truth that says of which steps it knows: ``# steps = 0-99 150-300``."""
+"""The key of the comment that states which steps a truth covers: ``# steps = 0-99 150-300``."""
+
+LONGEST = 4096
+"""Largest length of an appearance vector; re-identification networks give 128 to 2048 numbers."""
+
+_AT_ONCE = 4096
+"""The number of rows that are held in memory in full precision."""
 
 
 @dataclass(slots=True)
 class Reading:
-    """What is collected on the way through a sequence's file."""
+    """The files and warnings that are collected while a sequence is read."""
 
     folder: Path
     files: list[Path] = field(default_factory=list)
@@ -46,7 +52,7 @@ class Reading:
         optional: Mapping[str, float],
         blank: tuple[str, ...] = (),
     ) -> Columns:
-        """A table, which counts among the files from now on."""
+        """Read a table, and add it to the files."""
         self.files.append(path)
         where = f"{self.folder.name}/{path.relative_to(self.folder).as_posix()}"
         return read_columns(path, where, needed=needed, optional=optional, blank=blank)
@@ -54,36 +60,42 @@ class Reading:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BoxTable:
-    """A file of boxes as it was read, before anybody knows which step each frame is."""
+    """A file of boxes, before the step of each frame is known."""
 
     columns: Columns
     first: int
-    """The number in its column ``frame`` that is the first picture."""
+    """The number in the column ``frame`` of the first picture."""
     listed: bool
-    """Whether only frames that have a row were looked at."""
+    """Whether the detector was run on frames with a row alone."""
     file_starts: int
-    """Which frame of the camera's file the first picture is."""
-    looks: Float16[ndarray, "N A"]
-    """What each row's box looks like; (0, 0) where no file tells."""
+    """The frame of the camera's video or image list that is the first picture."""
+    embeddings: Float16[ndarray, "N A"]
+    """The appearance vector of each row's box; of shape (0, 0) if there is no such file."""
 
     @property
     def steps(self) -> int:
-        """How many steps there are at least, where each frame is a step."""
+        """The least number of steps, if each frame is a step."""
         frames = self.columns.values["frame"]
         return int(frames.max()) - self.first + 1 if len(frames) else 0
 
     @property
     def is_box(self) -> Bool[ndarray, " N"]:
-        """Which rows are boxes; a row without one says that a frame was looked at."""
+        """Whether each row has a box; a row without one states that the detector was run."""
         return np.asarray(~np.isnan(self.columns.stacked(*BOX)).all(axis=1))
 
     def detections(
         self, steps: int, clock: Clock | None
     ) -> tuple[Detections, Bool[ndarray, " F"] | None]:
-        """The boxes by step, and at which steps the detector had a picture, None for at all.
+        """Return the boxes by step, and whether the detector had a picture at each step.
+
+        The second value is None if the detector had a picture at every step.
+
+        Args:
+            steps: The number of steps.
+            clock: The camera's clock; None if each frame is a step.
 
         Raises:
-            SequenceError: If a row lies outside the recording, or is no box.
+            SequenceError: If a row is outside the recording, or has no valid box.
         """
         columns = self.columns
         if clock is None:
@@ -124,8 +136,8 @@ class BoxTable:
                 f"step {step}; leave out those with low scores",
             )
         boxes: Float[ndarray, "D 4"] = columns.stacked(*BOX)[kept]
-        looks = self.looks[kept] if self.looks.shape[1] else self.looks
-        return Detections(of_row[kept], boxes, scores[kept], looks), looked_at
+        embeddings = self.embeddings[kept] if self.embeddings.shape[1] else self.embeddings
+        return Detections(of_row[kept], boxes, scores[kept], embeddings), looked_at
 
     def _looked_at(
         self, steps: int, clock: Clock | None, of_row: Int[ndarray, " N"]
@@ -137,7 +149,7 @@ class BoxTable:
         return looked_at
 
     def _check_counting(self, steps: int) -> None:
-        """A file that counts its frames from 1 is told as such, not as a row too many."""
+        """Check that the file does not count its frames from 1, for a message that says so."""
         frames = self.columns.values["frame"]
         if self.first == 0 and len(frames) and frames.min() == 1 and frames.max() == steps:
             row = int(np.argmax(frames))
@@ -151,10 +163,15 @@ class BoxTable:
 
 
 def read_box_table(fields: Fields, reading: Reading, file_starts: int) -> BoxTable | None:
-    """The file that ``detections`` names; None where there is none.
+    """Read the file of boxes that ``detections`` names; None if there is none.
+
+    Args:
+        fields: The table of the camera.
+        reading: The files and warnings so far.
+        file_starts: The frame of the camera's video or image list that is the first picture.
 
     Raises:
-        SequenceError: If it cannot be read.
+        SequenceError: If the file cannot be read.
     """
     if "detections" not in fields:
         for name in ("detections_first_frame", "detected_steps", "appearance"):
@@ -172,19 +189,76 @@ def read_box_table(fields: Fields, reading: Reading, file_starts: int) -> BoxTab
     if steps not in ("all", "listed"):
         raise fields.error("detected_steps", f'expected "all" or "listed", found "{steps}"')
     first = fields.integer("detections_first_frame", 0)
-    looks = np.zeros((0, 0), dtype=np.float16)
+    embeddings = np.zeros((0, 0), dtype=np.float16)
     if "appearance" in fields:
         file = locate(reading.folder, fields, "appearance")
         reading.files.append(file)
-        looks = read_appearance(file, fields, path.name, len(columns))
-    return BoxTable(columns, first, steps == "listed", file_starts, looks)
+        embeddings = read_embeddings(file, fields, path.name, len(columns))
+    return BoxTable(columns, first, steps == "listed", file_starts, embeddings)
+
+
+def read_embeddings(path: Path, fields: Fields, boxes: str, rows: int) -> Float16[ndarray, "N A"]:
+    """Read the appearance vectors of a table's boxes, a NumPy file beside the table.
+
+    Args:
+        path: The ``.npy`` file.
+        fields: The fields of the camera whose ``appearance`` names the file.
+        boxes: The table's name, for messages.
+        rows: The number of the table's rows.
+
+    Returns:
+        A unit vector for each row; a zero vector, which means that nothing is known, stays zero.
+
+    Raises:
+        SequenceError: If the file is not such an array, or contains values that are not finite.
+    """
+
+    def wrong(problem: str) -> SequenceError:
+        return fields.error("appearance", f'"{path.name}": {problem}')
+
+    try:
+        values = np.lib.format.open_memmap(path, mode="r")
+    except (OSError, ValueError, EOFError, TypeError, SyntaxError, MemoryError, OverflowError):
+        raise wrong(
+            "expected an array of numbers in NumPy's format .npy, found none; write it with "
+            "numpy.save"
+        ) from None
+    if values.ndim != 2 or values.dtype.kind != "f" or values.dtype.itemsize > 8:
+        size = " × ".join(map(str, values.shape)) or "one number"
+        raise wrong(
+            "expected a table of floating-point numbers, rows × length of a vector, found "
+            f"{size} of {shown(str(values.dtype))}; convert it"
+        )
+    if len(values) != rows:
+        raise wrong(
+            f'expected a row for each of the {rows:,} rows of "{boxes}", found {len(values):,}; '
+            "write both in one order"
+        )
+    if not 1 <= values.shape[1] <= LONGEST:
+        raise wrong(
+            f"expected vectors of 1 to {LONGEST:,} numbers, found {values.shape[1]:,}; shorten them"
+        )
+    units = np.zeros(values.shape, dtype=np.float16)
+    for first in range(0, rows, _AT_ONCE):
+        some = np.array(values[first : first + _AT_ONCE], dtype=np.float64)
+        bad = ~np.isfinite(some).all(axis=1)
+        if bad.any():
+            raise wrong(
+                f"expected numbers, found one that is none in row {first + int(np.argmax(bad))} "
+                "(counted from 0); write zeros where nothing is known of a box"
+            )
+        largest = np.abs(some).max(axis=1, keepdims=True)
+        some /= np.where(largest > 0.0, largest, 1.0)  # else the squares may overflow
+        lengths = np.linalg.norm(some, axis=1, keepdims=True)
+        units[first : first + _AT_ONCE] = some / np.where(lengths > 0.0, lengths, 1.0)
+    return units
 
 
 def read_ground_truth(fields: Fields, reading: Reading, frames: int) -> GroundTruth | None:
-    """The file that ``[ground_truth]`` names; None where there is none.
+    """Read the file that ``[ground_truth]`` names; None if there is none.
 
     Raises:
-        SequenceError: If it cannot be read.
+        SequenceError: If the file cannot be read.
     """
     table = fields.table("ground_truth", ("file",), needed=False)
     if table is None:
@@ -197,16 +271,16 @@ def read_ground_truth(fields: Fields, reading: Reading, frames: int) -> GroundTr
 
 
 def truth_of(path: Path, where: str, frames: int) -> GroundTruth:
-    """A file of truth.
+    """Read a file of ground truth.
 
     Args:
-        path: A table ``frame, id, x, y, z`` with ``valid`` where there is one. A comment before
-            its head may say of which steps it knows; see :data:`KNOWN_STEPS`.
-        where: The file, as the messages begin.
-        frames: Steps of the sequence.
+        path: A table with the columns ``frame, id, x, y, z`` and optionally ``valid``. A comment
+            before the header may state which steps it covers; see :data:`KNOWN_STEPS`.
+        where: The file's name, for messages.
+        frames: The number of steps of the sequence.
 
     Raises:
-        SequenceError: If it cannot be read.
+        SequenceError: If the file cannot be read.
     """
     columns = read_columns(
         path, where, needed=("frame", "id", "x", "y", "z"), optional={"valid": 1.0}

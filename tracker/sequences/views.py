@@ -1,4 +1,4 @@
-"""The tables ``[[camera]]`` of a sequence: their files, their clocks, their calibration."""
+"""The tables ``[[camera]]`` of a sequence: files, clocks and calibration of the cameras."""
 
 from __future__ import annotations
 
@@ -36,14 +36,14 @@ CAMERA = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Source:
-    """One camera's table and files, before anybody knows how many steps there are."""
+    """One camera's table and files, before the number of steps is known."""
 
     name: str
     fields: Fields
     video: Path | None
     images: tuple[Path, ...]
     there: Bool[ndarray, " N"]
-    """Which of the images are there, where some are missing in the row of their numbers."""
+    """Whether each image exists, since some may be missing in their numbering."""
     pictures: Pictures | None
     timing: Timing
     table: BoxTable | None
@@ -54,17 +54,19 @@ class Time:
     """The steps of a sequence."""
 
     fps: float
+    """The rate of the steps, 1/s."""
     steps: int
+    """The number of steps."""
     beginning: float = 0.0
-    """The time stamp of step 0, where cameras have time stamps."""
-    told: tuple[str, ...] = ()
-    """What was found out rather than stated."""
+    """The time stamp of step 0, if cameras have time stamps, seconds."""
+    remarks: tuple[str, ...] = ()
+    """Sentences on what was estimated since the file does not state it."""
     own_rates: bool = False
-    """Whether each video's own rate counts, since none is stated and they differ."""
+    """Whether each video has its own rate, since none is stated and they differ."""
 
 
 def read_sources(tables: Many[Fields], reading: Reading) -> tuple[Source, ...]:
-    """The files of all cameras.
+    """Read the tables and find the files of all cameras.
 
     Raises:
         SequenceError: If a file is missing or cannot be read.
@@ -84,12 +86,16 @@ def read_sources(tables: Many[Fields], reading: Reading) -> tuple[Source, ...]:
 
 
 def _check_lengths(sources: Many[Source]) -> None:
-    """One network looked into all cameras."""
-    known = [one for one in sources if one.table is not None and one.table.looks.shape[1]]
+    """Check that the appearance vectors of all cameras have the same length.
+
+    Raises:
+        SequenceError: If two lengths differ, since the vectors are then of different networks.
+    """
+    known = [one for one in sources if one.table is not None and one.table.embeddings.shape[1]]
     for one in known[1:]:
         assert one.table is not None
         assert known[0].table is not None
-        own, first = one.table.looks.shape[1], known[0].table.looks.shape[1]
+        own, first = one.table.embeddings.shape[1], known[0].table.embeddings.shape[1]
         if own != first:
             raise one.fields.error(
                 "appearance",
@@ -122,10 +128,10 @@ def _source(name: str, fields: Fields, reading: Reading) -> Source:
 
 
 def read_views(sources: Many[Source], time: Time, reading: Reading) -> tuple[View, ...]:
-    """The cameras with all that is known of their pictures and boxes by step.
+    """Make the views: cameras with their pictures and boxes by step.
 
     Raises:
-        SequenceError: If something in a table is wrong.
+        SequenceError: If a table is not valid.
     """
     return tuple(_view(source, time, reading) for source in sources)
 
@@ -156,11 +162,11 @@ def _view(source: Source, time: Time, reading: Reading) -> View:
 
 
 def _background(view: View, fields: Fields, steps: int, reading: Reading) -> Path | range:
-    """What shows the scene without anybody: a picture, or some steps.
+    """Read the field ``background``: a picture of the empty scene, or steps without people.
 
     Raises:
-        SequenceError: If the camera has no pictures that could be compared with it, if it is
-            neither, cannot be read, is of another size, or names steps that are not there.
+        SequenceError: If the camera has no pictures, or if the field is neither, its picture cannot
+            be read or has another size, or its steps do not exist.
     """
     if not view.has_pictures:
         raise fields.error(
@@ -191,7 +197,8 @@ def _background(view: View, fields: Fields, steps: int, reading: Reading) -> Pat
 
 
 def _image_size(fields: Fields, pictures: Pictures | None) -> tuple[int, int]:
-    """As stated; else that of the pictures; else about twice the principal point."""
+    """Return the picture's size as stated, or that of the pictures, or about twice the principal
+    point."""
     if "image_size" in fields:
         size = fields.vector("image_size", 2, "width and height in pixels", positive=True)
         if (size != np.floor(size)).any() or (size > 65535).any():

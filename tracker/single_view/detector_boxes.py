@@ -66,7 +66,9 @@ class DetectorBoxes:
         above = all_boxes.scores >= p.score_threshold
         self._frames = all_boxes.frames[above]
         found = judged(sequence, view.camera, all_boxes.boxes[above], all_boxes.scores[above], p)
-        embeddings = all_boxes.looks[above] if all_boxes.looks.shape[1] else all_boxes.looks
+        embeddings = all_boxes.embeddings
+        if embeddings.shape[1]:
+            embeddings = embeddings[above]
         self._found = replace(found, embeddings=embeddings)
         """The boxes of all steps, for the consistency of a box does not depend on others."""
 

@@ -1,6 +1,7 @@
-"""Many recordings with the same values: every run kept in the library, none computed twice.
+"""Batches: many recordings tracked with the same parameters, and every run stored in the library.
 
-Each obeys the recording's corrections, as a run by itself does.
+Runs that the library has already are not computed again. Each recording's corrections are applied,
+as in a single run.
 """
 
 from __future__ import annotations
@@ -28,27 +29,29 @@ from tracker.studies.work.jobs import job_of
 from tracker.studies.work.recordings import content_of
 
 WAIT_SECONDS = 0.5
+"""Longest wait for an outcome before cancellation is checked, seconds."""
 
 
 @dataclass(frozen=True, slots=True)
 class BatchRun:
-    """One run of a batch, or why there is none."""
+    """One run of a batch, or the reason why it failed."""
 
     recording: str
-    """As it was named."""
+    """The name or folder of the recording."""
     seed: int
     run: KeptRun | None
+    """The stored run; None if it failed."""
     words: str = ""
-    """Why there is none."""
+    """The reason of a failure."""
     computed: bool = False
-    """Whether it was computed now, rather than found in the library."""
+    """Whether the run was computed now, rather than found in the library."""
 
 
 def places_of(names: Sequence[str]) -> list[str]:
-    """What a list of names stands for: rooms, folders, patterns of folders, files of names.
+    """Resolve names of recordings: built-in ones, folders, patterns of folders, files of names.
 
     Raises:
-        StudyError: If one stands for nothing.
+        StudyError: If a name matches nothing.
     """
     from tracker.sequences.library import is_room
 
@@ -89,29 +92,31 @@ def run_batch(
     library: Library,
     budget: int,
     crew: Callable[[], Crew],
-    told: Callable[[int, int], None] = lambda done, total: None,
+    on_progress: Callable[[int, int], None] = lambda done, total: None,
     stopped: Callable[[], bool] = lambda: False,
     *,
     corrected: bool = True,
 ) -> list[BatchRun]:
-    """Track recordings and keep every run as it ends.
+    """Track recordings, and store every run when it ends.
 
-    A recording that cannot be read or tracked is told of and keeps no other one up.
+    A recording that cannot be read or tracked is reported and does not affect the others.
 
     Args:
-        places: Rooms and folders.
-        changes: Values by key, against each recording's own defaults.
-        seeds: Runs of each recording.
-        library: Keeps the runs; what it has already, with final figures, is not computed again.
-        budget: How many untouched runs stay in it.
-        crew: Makes the workers, once there is something to compute.
-        told: Called with the runs that are there and their number.
-        stopped: Asked now and then; then what is there is given back.
-        corrected: Whether each recording's corrections are obeyed.
+        places: Names of built-in recordings, and folders.
+        changes: Values by key that differ from each recording's defaults.
+        seeds: The number of runs of each recording.
+        library: The library that stores the runs; runs that it has already, with final figures,
+            are not computed again.
+        budget: Most unmarked runs that the library keeps.
+        crew: A function that starts the workers; it is called once there is something to compute.
+        on_progress: A callback that gets the number of runs done and of all.
+        stopped: A callback that is asked now and then whether to stop; the runs so far are then
+            returned.
+        corrected: Whether each recording's corrections are applied.
 
     Raises:
-        StudyError: If the workers cannot work on.
-        LibraryError: If a run cannot be kept.
+        StudyError: If the workers cannot continue.
+        LibraryError: If a run cannot be stored.
     """
     found: dict[tuple[str, int], BatchRun] = {}
     wanted: dict[str, list[tuple[str, int]]] = {}
@@ -122,23 +127,23 @@ def run_batch(
         try:
             sequence = open_sequence(place)
             parameters = with_values(pipeline.default_parameters(sequence), changes)
-            told_by_hand = read_log(place_of(sequence.folder)) if corrected else ()
+            corrections = read_log(place_of(sequence.folder)) if corrected else ()
         except (SequenceError, ValueError, OSError) as error:
             words = " ".join(str(error).split())
             found |= {(place, seed): BatchRun(place, seed, None, words) for seed in range(seeds)}
             continue
         for seed in range(seeds):
-            key = pipeline.stage_keys(sequence, parameters, seed, told_by_hand)["tracks"]
+            key = pipeline.stage_keys(sequence, parameters, seed, corrections)["tracks"]
             kept = library.with_key(key)
             if kept is not None and not kept.provisional:
                 found[place, seed] = BatchRun(place, seed, kept)
                 continue
-            job = _job(sequence, place, parameters, seed, told_by_hand)
-            by_hand[job.key] = told_by_hand
+            job = _job(sequence, place, parameters, seed, corrections)
+            by_hand[job.key] = corrections
             if job.key not in wanted:
                 jobs.append(job)
             wanted.setdefault(job.key, []).append((place, seed))
-    told(len(found), total)
+    on_progress(len(found), total)
     if jobs:
         workers = crew()
         for number, job in enumerate(jobs):
@@ -149,7 +154,7 @@ def run_batch(
                 if outcome.kept is not None:
                     recording, new = outcome.kept
                     here, _ = wanted[outcome.key][0]
-                    # a worker may have it in another place: what counts is where it is here
+                    # the worker may have the recording in another folder than this machine
                     recording = recording_of(open_sequence(here), here, recording.thumbnail)
                     new = replace(
                         new, digest=recording.digest, key=_key(here, new, by_hand[outcome.key])
@@ -157,14 +162,14 @@ def run_batch(
                     run = library.run(library.keep(recording, new, budget))
                 for place, seed in wanted.pop(outcome.key, ()):
                     found[place, seed] = BatchRun(place, seed, run, outcome.words, True)
-                told(len(found), total)
+                on_progress(len(found), total)
     return [
         found[place, seed] for place in places for seed in range(seeds) if (place, seed) in found
     ]
 
 
 def _key(place: str, new: Any, corrections: tuple[Correction, ...]) -> str:
-    """Of the run on the recording as it lies here."""
+    """Return the key of a run on this machine's copy of the recording."""
     sequence = open_sequence(place)
     parameters = with_values(pipeline.default_parameters(sequence), new.changes)
     return pipeline.stage_keys(sequence, parameters, new.seed, corrections)["tracks"]

@@ -1,4 +1,4 @@
-"""What goes wrong with a study, in a sentence."""
+"""The errors of a study, each with a sentence."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from tracker.files.text import visible
 
 
 class StudyError(ValueError):
-    """A study cannot be read, run or gone on with; the message says why and what to do."""
+    """A study cannot be read, run or resumed; the message says why and what to do."""
 
     def __init__(self, message: str) -> None:
         super().__init__(visible(message))

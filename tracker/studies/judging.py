@@ -1,4 +1,4 @@
-"""What a trial is worth: its objectives over recordings and seeds, vetoes, and hopelessness."""
+"""The judgement of trials: objectives over recordings and seeds, vetoes, and pruning."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from tracker.studies.kept.records import JobRow, Trial
 from tracker.studies.work.jobs import Outcome
 
 FIRST_SHARE = 1.0 / 3.0
-"""Of a trial's runs those that it is judged by before the others are begun."""
+"""Share of a trial's runs after which it may be pruned."""
 
 FEWEST = 10
-"""Complete trials before one is given up."""
+"""Least number of complete trials before one is pruned."""
 
 Place = tuple[str, int]
 """A recording and a seed."""
 
 
 class Judge:
-    """Knows the trials that ended, and judges the next ones by them."""
+    """Judges trials by the trials that ended before."""
 
     def __init__(
         self,
@@ -29,16 +29,16 @@ class Judge:
         ended: Sequence[Trial],
         outcome: Callable[[str], Outcome | None],
     ) -> None:
-        """Take up what ended before.
+        """Take the trials that ended before into account.
 
         Args:
-            objectives: Of the study.
+            objectives: The objectives of the study.
             ended: Its trials so far.
-            outcome: Finds the outcome of a run by its key.
+            outcome: A function that returns the outcome of a run by its key.
         """
         self._objectives = tuple(objectives)
         self.complete: list[Trial] = []
-        """Those that ended with all their runs."""
+        """The trials that ended with all their runs."""
         self._runs: list[dict[Place, tuple[float, ...]]] = []
         self._overlaps: dict[Place, float] = {}
         for trial in ended:
@@ -63,13 +63,13 @@ class Judge:
         return tuple(float(v) for v in found if v is not None) if None not in found else None
 
     def first_runs(self, runs: int, prune: bool) -> int:
-        """How many of a trial's runs are done before it is judged."""
+        """Return the number of a trial's runs after which it may be pruned."""
         return max(1, round(runs * FIRST_SHARE)) if prune and runs > 1 else runs
 
     def is_hopeless(self, rows: Sequence[JobRow], outcomes: Mapping[str, Outcome]) -> bool:
-        """Whether a trial is worse in every objective than half of the complete ones were.
+        """Whether a trial is worse in every objective than the median of the complete trials.
 
-        Compared are means over the same recordings and seeds.
+        The means over the same recordings and seeds are compared.
         """
         if len(self.complete) < FEWEST:
             return False
@@ -102,16 +102,16 @@ class Judge:
         words: str,
         failed: bool,
     ) -> Trial:
-        """A trial that ended, and is among those that the next are judged by.
+        """Make the record of a trial that ended, and judge the next trials by it as well.
 
         Args:
-            number: Its number.
-            values: What was tried.
-            rows: Its runs.
-            outcomes: Theirs, by key.
-            pruned: Whether there would have been more.
-            words: Why it failed, or what it is.
-            failed: Whether a run of it failed.
+            number: The trial's number.
+            values: The parameters that were tried, by key.
+            rows: The trial's runs.
+            outcomes: The outcomes of the runs, by key.
+            pruned: Whether further runs were left out.
+            words: The reason of a failure, or a remark on the trial.
+            failed: Whether a run failed.
         """
         done = [(r, outcomes[r.key]) for r in rows if outcomes.get(r.key) is not None]
         done = [(row, outcome) for row, outcome in done if outcome.became == "done"]
@@ -155,7 +155,7 @@ class Judge:
         return any(outcome.figures.get(one.key) is None for _, outcome in done)
 
     def _is_vetoed(self, done: Sequence[tuple[JobRow, Outcome]]) -> bool:
-        """Whether people overlap clearly less with left-out cameras than the default's do."""
+        """Whether the tracks overlap clearly less with left-out cameras than the defaults' do."""
         for row, outcome in done:
             usual = self._overlaps.get((row.recording, row.seed))
             if usual is not None and (outcome.overlap or 0.0) < usual - VETO:
@@ -163,7 +163,7 @@ class Judge:
         return False
 
     def for_sampler(self, trial: Trial) -> tuple[float, ...]:
-        """What the sampler is told: of a vetoed trial no more than nothing for its identity."""
+        """Return the objectives for the sampler: the identity of a vetoed trial is 0."""
         assert trial.objectives is not None
         return tuple(
             0.0 if trial.vetoed and one.of == "agreement" else value
@@ -172,8 +172,8 @@ class Judge:
 
 
 def best_of(trials: Sequence[Trial], objectives: Sequence[Objective]) -> Trial | None:
-    """The trial that leads in the first objective, of as good ones in the next; None if none
-    ended. Where nothing is better than the defaults, it is they."""
+    """Return the trial that is best in the first objective, then in the next ones; None if none
+    ended. If no trial is better than the defaults, it is the trial of the defaults."""
     good = usable(trials)
     if not good:
         return None
@@ -187,10 +187,10 @@ def best_of(trials: Sequence[Trial], objectives: Sequence[Objective]) -> Trial |
 
 
 def front_of(trials: Sequence[Trial], objectives: Sequence[Objective]) -> list[int]:
-    """The trials that no other beats in all objectives."""
+    """Return the numbers of the trials on the Pareto front."""
     return front(((one.number, one.objectives or ()) for one in usable(trials)), objectives)
 
 
 def usable(trials: Sequence[Trial]) -> list[Trial]:
-    """Those that may be taken: complete and not vetoed."""
+    """Return the trials that are complete and not vetoed."""
     return [one for one in trials if one.state == "complete" and not one.vetoed and one.objectives]

@@ -1,4 +1,4 @@
-"""The recordings of a study, opened: their content, what is held on each, and their jobs."""
+"""The opened recordings of a study: their content, fixed parameters, and jobs."""
 
 from __future__ import annotations
 
@@ -28,21 +28,21 @@ class Opened:
     """One recording."""
 
     place: str
-    """What opens it: a room's name, or a folder."""
+    """The name or folder by which it is opened."""
     sequence: Sequence
     content: str
-    """Hash of its files."""
+    """The hash of its files."""
     defaults: RunParameters
     base: RunParameters
-    """What is held on it."""
+    """The parameters of all trials, apart from those that are varied."""
 
     @property
     def has_truth(self) -> bool:
-        """Whether it can be scored."""
+        """Whether it has ground truth."""
         return self.sequence.ground_truth is not None
 
-    def told(self) -> dict[str, Any]:
-        """What is written down of it."""
+    def to_json(self) -> dict[str, Any]:
+        """Return the facts that the study stores, as plain values."""
         return {
             "place": self.place,
             "name": self.sequence.name,
@@ -55,7 +55,7 @@ class Opened:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Recordings:
-    """All of a study, and what is asked of each run."""
+    """All recordings of a study, with the objectives and seeds of their runs."""
 
     every: tuple[Opened, ...]
     objectives: tuple[Objective, ...]
@@ -63,14 +63,14 @@ class Recordings:
 
     @property
     def bases(self) -> list[RunParameters]:
-        """What is held on each."""
+        """The parameters of all trials on each recording, apart from those that are varied."""
         return [one.base for one in self.every]
 
     def jobs(self, values: Mapping[str, Any]) -> list[tuple[JobRow, Job]]:
-        """The runs of a trial: all recordings with the first seed, then with the next.
+        """Return the runs of a trial: all recordings with the first seed, then with the next.
 
         Args:
-            values: Of what is varied.
+            values: The varied parameters, by key.
         """
         found = []
         for seed in self.seeds:
@@ -80,7 +80,13 @@ class Recordings:
         return found
 
     def job(self, one: Opened, values: Mapping[str, Any], seed: int) -> Job:
-        """One run."""
+        """Return the job of one run.
+
+        Args:
+            one: The recording.
+            values: The varied parameters, by key.
+            seed: The seed of the run.
+        """
         parameters = with_values(one.base, values)
         return job_of(
             one.sequence,
@@ -95,7 +101,12 @@ class Recordings:
         )
 
     def parameters(self, place: str, values: Mapping[str, Any]) -> RunParameters:
-        """What a trial was run with on a recording."""
+        """Return all parameters of a trial on a recording.
+
+        Args:
+            place: The recording's place.
+            values: The varied parameters, by key.
+        """
         one = next(each for each in self.every if each.place == place)
         return with_values(one.base, values)
 
@@ -107,12 +118,12 @@ def open_recordings(
     """Open all recordings of a study.
 
     Args:
-        definition: Of the study.
-        tell: Told what is being waited for.
+        definition: The study's definition.
+        tell: A callback that gets a sentence on what is being done.
 
     Raises:
-        StudyError: If one cannot be read, its method cannot work on it, or an objective needs a
-            truth that it does not have.
+        StudyError: If a recording cannot be read, a method cannot work on it, or an objective needs
+            ground truth that it does not have.
     """
     every = []
     for place in definition.recordings:
@@ -142,18 +153,18 @@ def _check_methods(definition: Definition, sequence: Sequence, base: RunParamete
 
 
 def check_same(store: Store, writer: Writer, recordings: Recordings) -> None:
-    """Old trials stand beside new ones only where nothing but the values differs.
+    """Check that recordings and code are those of the earlier trials, so that these are comparable.
 
-    The first time it is written down what they are of.
+    When a study begins, the facts on recordings and code are stored.
 
     Raises:
-        StudyError: If a recording or the code is another than when the study began.
+        StudyError: If a recording or the code has changed since the study began.
     """
-    now, before = [one.told() for one in recordings.every], store.told("recordings")
+    now, before = [one.to_json() for one in recordings.every], store.fact("recordings")
     if before is None:
-        writer.tell("recordings", now)
-        writer.tell("code", code_version())
-        writer.tell("objectives", [asdict(one) for one in recordings.objectives])
+        writer.put_fact("recordings", now)
+        writer.put_fact("code", code_version())
+        writer.put_fact("objectives", [asdict(one) for one in recordings.objectives])
         return
     for one, other in zip(before, now, strict=True):
         if one["content"] != other["content"]:
@@ -161,7 +172,7 @@ def check_same(store: Store, writer: Writer, recordings: Recordings) -> None:
                 f"{other['place']} has changed since the study {store.name} began; its trials "
                 "cannot be set beside new ones: give the study a new name"
             )
-    if store.told("code") != code_version():
+    if store.fact("code") != code_version():
         raise StudyError(
             f"the study {store.name} was begun by another version of the program; its trials "
             "cannot be set beside new ones: give the study a new name"

@@ -1,40 +1,38 @@
-"""A study at work: asks for trials, has their runs done, keeps what comes back.
+"""The run of a study: trials are asked for, their runs computed, and their results stored.
 
-Everything that ended is on disk before the sampler hears of it, so that the program may be ended
-at any moment: the next start goes on with the trials that were under way, and takes the runs that
-ended from the disk.
+Every result is on disk before the sampler gets it, so that the process may be killed at any time:
+the next start continues the trials that were active, with the runs that ended from disk.
 """
 
 from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import nullcontext
+from dataclasses import dataclass, field
 from typing import Any
 
-from tracker.studies.active import Active, at_work
 from tracker.studies.defined.definition import Definition
 from tracker.studies.defined.space import defaults_of
 from tracker.studies.errors import StudyError
+from tracker.studies.found.importance import Weighing
 from tracker.studies.found.proposing import SEARCH_SHARE, Proposer
-from tracker.studies.found.weighing import Weighing
 from tracker.studies.judging import Judge
-from tracker.studies.kept.records import Status, Trial
+from tracker.studies.kept.records import JobRow, Status, Trial
 from tracker.studies.kept.store import JOURNAL, Store
 from tracker.studies.kept.writer import Writer
 from tracker.studies.opened import Recordings, check_same, open_recordings
-from tracker.studies.pace import Pace
 from tracker.studies.sampling import Sampler, first_values
 from tracker.studies.turn import turn
-from tracker.studies.work.cluster import Crew
+from tracker.studies.work.cluster import Crew, WorkerState
 from tracker.studies.work.jobs import Job, Outcome
 
 SECONDS_BETWEEN = 0.5
-"""How often the status is written and the wish to stop is heard."""
+"""Interval at which the status is written and a request to stop is checked, seconds."""
 
 AHEAD = 1
-"""Runs that wait beside each one under way, so that no worker waits for the sampler."""
+"""The number of queued runs for each active one, so that no worker waits for the sampler."""
 
 
 def run_study(
@@ -42,28 +40,29 @@ def run_study(
     writer: Writer,
     crew: Callable[[Callable[[str], None]], Crew],
     *,
-    told: Callable[[Status], None] = lambda status: None,
+    on_status: Callable[[Status], None] = lambda status: None,
     stopped: Callable[[], bool] = lambda: False,
     beside: bool = False,
 ) -> Status:
-    """Run a study, or go on with it, to its end.
+    """Run a study to its end, or resume it.
 
     Args:
-        store: Its folder.
-        writer: From :meth:`~tracker.studies.kept.store.Store.running`.
-        crew: Makes the workers; given whom to tell what is being waited for.
-        told: Called with the status now and then.
-        stopped: Asked as often.
-        beside: Whether it runs beside other studies, since its workers are not this machine's;
-            else it waits for its turn.
+        store: The folder of the study.
+        writer: The writer from :meth:`~tracker.studies.kept.store.Store.running`.
+        crew: A function that starts the workers; it gets a callback for sentences on what is being
+            done.
+        on_status: A callback that gets the status at intervals.
+        stopped: A callback that is asked at the same intervals whether to stop.
+        beside: Whether the study runs beside others, since its workers are on other machines;
+            otherwise it waits until no other study runs on this machine.
 
     Returns:
-        The status at the end: ``done``, or ``stopped`` where that was asked for.
+        The status at the end: ``done``, or ``stopped`` if that was requested.
 
     Raises:
-        StudyError: If it cannot go on, with what to do; the status says the same.
+        StudyError: If the study cannot continue; the status has the same sentence.
     """
-    study = _Running(store, writer, told, stopped)
+    study = _Running(store, writer, on_status, stopped)
     try:
         study.prepare()
         with nullcontext(True) if beside else turn(store.name, study.waits) as mine:
@@ -87,7 +86,7 @@ def run_study(
 
 
 class _Running:
-    """One start of a study."""
+    """One session of a study."""
 
     crew: Crew
 
@@ -95,25 +94,26 @@ class _Running:
         self,
         store: Store,
         writer: Writer,
-        told: Callable[[Status], None],
+        on_status: Callable[[Status], None],
         stopped: Callable[[], bool],
     ) -> None:
-        self._store, self._writer, self._told, self._stopped = store, writer, told, stopped
+        self._store, self._writer = store, writer
+        self._on_status, self._stopped = on_status, stopped
         self._definition: Definition = store.definition()
         self._active: dict[int, Active] = {}
         self._waiting: dict[str, list[Active]] = {}
         self._queue: list[dict[str, Any]] = []
         self._begin = time.monotonic()
-        self._spent = float(store.told("spent") or 0.0)
+        self._spent = float(store.fact("spent") or 0.0)
         self._pace = Pace()
-        self._said = 0.0
+        self._last_status = 0.0
         self._slots = 1
         self.state: Any = "running"
         self.words = ""
         self.status = Status("running")
 
     def prepare(self) -> None:
-        """Open the recordings, and take up what was done before."""
+        """Open the recordings and the sampler, and load earlier results."""
         self.wait_for("opening the recordings")
         definition = self._definition
         self._recordings: Recordings = open_recordings(definition, self.wait_for)
@@ -131,7 +131,7 @@ class _Running:
         by_number = {trial.number: trial for trial in ended}
         for number in self._sampler.open_trials():
             values = self._sampler.again(number)
-            if number in by_number:  # ended before the sampler heard of it
+            if number in by_number:  # its result was stored but not reported to the sampler
                 self._sampler_hears(by_number[number])
             else:
                 self._take_up(number, values)
@@ -144,14 +144,14 @@ class _Running:
         self._weighing = Weighing(definition.varied, defaults)
 
     def close(self) -> None:
-        """Close what the sampler keeps."""
+        """Close the sampler's files."""
         if hasattr(self, "_sampler"):
             self._sampler.close()
 
     # the loop
 
     def work(self) -> None:
-        """Until all trials have ended, the time is over, or somebody stops it."""
+        """Run trials until all have ended, the time is over, or the study is stopped."""
         self._slots = self.crew.slots
         self.words = ""
         self._begin = time.monotonic()
@@ -166,17 +166,17 @@ class _Running:
                     break
                 self.state, self.words = "done", words
                 return
-            self._settle(self.crew.finished(SECONDS_BETWEEN))
+            self._receive(self.crew.finished(SECONDS_BETWEEN))
             self._now_and_then()
         self.end_early()
 
     def end_early(self) -> None:
-        """Be stopped, with everything kept."""
+        """Set the state to ``stopped``."""
         self.state = "stopped"
         self.words = "stopped; nothing that ended before is lost"
 
     def _fill(self) -> None:
-        """Ask for trials until nobody will wait."""
+        """Ask for trials until enough runs are queued for all workers."""
         while len(self._waiting) < self._slots * (1 + AHEAD) and self._may_ask():
             values = self._queue.pop(0) if self._queue else None
             number, drawn = self._sampler.ask(values)
@@ -185,8 +185,8 @@ class _Running:
                 drawn = values if number == 0 else drawn | values
             active = self._take_up(number, drawn)
             self._send(active)
-            if active.is_back:  # all its runs are there from other trials
-                self._settle()
+            if active.is_back:  # all its runs were computed for other trials
+                self._receive()
 
     def _may_ask(self) -> bool:
         if self._asked >= self._trials or self._stopped():
@@ -206,13 +206,13 @@ class _Running:
     def _take_up(self, number: int, values: dict[str, Any]) -> Active:
         if number == 0:
             values = defaults_of(self._definition.varied, self._recordings.bases[0])
-        # on each recording its own defaults: nothing is changed
+        # the first trial has the defaults of each recording
         jobs = self._recordings.jobs({} if number == 0 else values)
         active = self._active[number] = Active(number, values, jobs)
         return active
 
     def _send(self, active: Active) -> None:
-        """Have the next runs of a trial done; those that ended before are there at once."""
+        """Submit the next runs of a trial; outcomes that are stored already are taken at once."""
         first = self._judge.first_runs(len(active.jobs), self._definition.prune)
         upto = first if active.sent == 0 else len(active.jobs)
         for _, job in active.jobs[active.sent : upto]:
@@ -228,8 +228,8 @@ class _Running:
         active.wanted = len({row.key for row, _ in active.jobs[:upto]})
 
     def _propose(self) -> bool:
-        """Measure the best again on other seeds; False where somebody stopped it."""
-        if self._store.told("tuned") is not None:
+        """Measure the best trials again and store the proposal; False if the study was stopped."""
+        if self._store.fact("tuned") is not None:
             return True
         definition = self._definition
         first = max(definition.seeds) + 1
@@ -245,11 +245,11 @@ class _Running:
         found = proposer.propose()
         if self._is_stopped():
             return False
-        self._writer.tell("tuned", found)
+        self._writer.put_fact("tuned", found)
         return True
 
     def _measure(self, jobs: Sequence[Job]) -> dict[str, Outcome]:
-        """Have jobs done that are no trial's, as far as the time goes."""
+        """Have jobs done that belong to no trial, as far as the time allows."""
         found: dict[str, Outcome] = {}
         wanted = {job.key: job for job in jobs}
         for key, job in wanted.items():
@@ -262,7 +262,7 @@ class _Running:
             for outcome in self.crew.finished(SECONDS_BETWEEN):
                 self._came(outcome)
                 found[outcome.key] = outcome
-            if time.monotonic() - self._said >= SECONDS_BETWEEN:
+            if time.monotonic() - self._last_status >= SECONDS_BETWEEN:
                 self.say()
         return found
 
@@ -276,23 +276,28 @@ class _Running:
         for active in self._waiting.pop(outcome.key, ()):
             active.outcomes[outcome.key] = outcome
 
-    def _settle(self, outcomes: Sequence[Outcome] = ()) -> None:
-        """Take up runs that ended, and end the trials that have all of theirs.
+    def _receive(self, outcomes: Sequence[Outcome] = ()) -> None:
+        """Store outcomes, and end the trials whose runs have all ended.
 
-        All is on disk before the sampler hears of it.
+        Everything is on disk before the sampler gets it.
         """
         ended = []
         with self._writer.together():
             for outcome in outcomes:
                 self._came(outcome)
             for number in sorted(self._active):
-                if (trial := self._gone_on(self._active[number])) is not None:
+                if (trial := self._continued(self._active[number])) is not None:
                     ended.append(trial)
         for trial in ended:
             self._sampler_hears(trial)
 
-    def _gone_on(self, active: Active) -> Trial | None:
-        """A trial that ended now; none before the defaults, by which it is judged."""
+    def _continued(self, active: Active) -> Trial | None:
+        """Submit the next runs of a trial, or end it.
+
+        Returns:
+            The trial if it ended; None otherwise. No trial ends before that of the defaults, by
+            which it is judged.
+        """
         while active.is_back:
             failed = next((o for o in active.outcomes.values() if o.became != "done"), None)
             if failed is not None and active.number == 0:
@@ -334,28 +339,28 @@ class _Running:
         values = None if trial.state == "failed" else self._judge.for_sampler(trial)
         self._sampler.tell(trial.number, values, pruned=trial.state == "pruned")
 
-    # what is told
+    # the status
 
     def wait_for(self, words: str) -> None:
-        """Say what is being waited for."""
+        """Write a status that says what is being waited for."""
         self.words = words
         self.say()
 
     def waits(self, words: str) -> bool:
-        """Say what is being waited for, at no cost of its time; False where somebody stops it."""
+        """Write what is being waited for, and restart the clock; False if the study is stopped."""
         self._begin = time.monotonic()
         self.wait_for(words)
         return not self._is_stopped()
 
     def _now_and_then(self) -> None:
-        if time.monotonic() - self._said >= SECONDS_BETWEEN:
+        if time.monotonic() - self._last_status >= SECONDS_BETWEEN:
             self._slots = self.crew.slots
             self.words = "" if self.crew.workers() else "waits for a worker"
             self._weigh()
             self.say()
 
     def say(self) -> None:
-        """Write down how far it is."""
+        """Write the current status."""
         seconds = self._seconds()
         done = len(getattr(self, "_ended", ()))
         at_it = self.state == "running" and hasattr(self, "crew")
@@ -374,11 +379,11 @@ class _Running:
             process=os.getpid(),
             written=time.time(),
         )
-        self._writer.say(self.status)
+        self._writer.write_status(self.status)
         if hasattr(self, "_trials"):
-            self._writer.tell("spent", self._spent + seconds)
-        self._told(self.status)
-        self._said = time.monotonic()
+            self._writer.put_fact("spent", self._spent + seconds)
+        self._on_status(self.status)
+        self._last_status = time.monotonic()
 
     def _seconds_left(self, done: int) -> float | None:
         if self.state != "running" or not hasattr(self, "_trials"):
@@ -394,9 +399,91 @@ class _Running:
         return f"the {self._definition.minutes:g} minutes are over"
 
     def _weigh(self, *, last: bool = False) -> None:
-        """Write down what matters, where that was found out anew."""
+        """Store the importance of the parameters if there is a new estimate."""
         found = self._weighing.news(
             self._judge.complete, self.crew, worked=self._pace.worked, last=last
         )
         if found is not None:
-            self._writer.tell("importance", found)
+            self._writer.put_fact("importance", found)
+
+
+@dataclass(eq=False)
+class Active:
+    """A trial whose runs are being computed."""
+
+    number: int
+    values: dict[str, Any]
+    jobs: list[tuple[JobRow, Job]]
+    sent: int = 0
+    """The number of jobs that were submitted."""
+    wanted: int = 0
+    """The number of different runs among these."""
+    outcomes: dict[str, Outcome] = field(default_factory=dict)
+    """The outcomes of the runs that ended, by key."""
+
+    @property
+    def is_back(self) -> bool:
+        """Whether all runs that were submitted have ended."""
+        return len(self.outcomes) >= self.wanted
+
+
+def at_work(
+    workers: Iterable[WorkerState], waiting: Mapping[str, Sequence[Active]]
+) -> list[dict[str, Any]]:
+    """Return for each worker what it does, as plain values.
+
+    Args:
+        workers: The states of the workers.
+        waiting: The trials that wait for each run, by the key of its job.
+    """
+    found = []
+    for one in workers:
+        task: dict[str, Any] = {"trial": None, "recording": None, "seed": None}
+        for active in waiting.get(one.job or "", ())[:1]:
+            row = next(row for row, _ in active.jobs if row.key == one.job)
+            task = {"trial": active.number, "recording": row.recording, "seed": row.seed}
+        words = one.words or ("" if task["trial"] is not None else "waits for a run")
+        found.append(
+            {"name": one.name, "machine": one.machine, "words": words, "since": one.since} | task
+        )
+    return found
+
+
+class Pace:
+    """The speed of a study in one session."""
+
+    def __init__(self) -> None:
+        self.runs = 0
+        """The number of runs that ended."""
+        self.worked = 0.0
+        """The time that workers spent on them, seconds."""
+        self._warm: float | None = None
+        self._since_warm = 0.0
+        self._first: tuple[float, int] | None = None
+
+    def came(self, seconds: float) -> None:
+        """Count a run that ended after so many seconds of a worker's time."""
+        self.runs += 1
+        self.worked += seconds
+        if self._warm is None:
+            self._warm = time.monotonic()
+        else:
+            self._since_warm += seconds
+
+    def busy(self, slots: int) -> float | None:
+        """Return the share of the workers' time in which they worked, since the first run ended;
+        None before there are two runs for each worker."""
+        if self._warm is None or self.runs < 2 * slots:
+            return None
+        elapsed = time.monotonic() - self._warm
+        return min(1.0, self._since_warm / (elapsed * slots)) if elapsed > 0.0 else None
+
+    def seconds_left(self, done: int, trials: int) -> float | None:
+        """Estimate the remaining time from the mean time of a trial, seconds; None before two
+        trials ended."""
+        if self._first is None:
+            self._first = time.monotonic(), done
+        begin, before = self._first
+        if done - before < 2:
+            return None
+        return (trials - done) * (time.monotonic() - begin) / (done - before)

@@ -1,4 +1,4 @@
-"""Which values are tried next: by Optuna, whose storage is a file of the study.
+"""The choice of the next trial's values by Optuna, whose storage is a file of the study.
 
 [AYY19] Akiba, Sano, Yanase, Ohta, Koyama, "Optuna: a next-generation hyperparameter optimization
 framework", KDD 2019. TPE: Bergstra, Bardenet, Bengio, Kégl, NeurIPS 2011; for several objectives
@@ -7,8 +7,12 @@ NSGA-II: Deb, Pratap, Agarwal, Meyarivan, IEEE TEVC 6(2), 2002.
 
 from __future__ import annotations
 
+import heapq
 import itertools
-from collections.abc import Mapping, Sequence
+import json
+import os
+from collections.abc import Container, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -17,14 +21,20 @@ from tracker.studies.defined import space
 from tracker.studies.defined.definition import Definition, Varied
 from tracker.studies.defined.objectives import Objective
 from tracker.studies.errors import StudyError
-from tracker.studies.kept import journal
 
 STARTUP = 12
-"""Trials drawn at random before TPE trusts what it has."""
+"""The number of random trials before TPE is used."""
+
+BEST = 100
+LAST = 400
+"""The numbers of best and of last trials that TPE uses in a long search. TPE compares at most 25
+good trials with all others, among which old ones have little weight: so the good ones are the
+same, and the time for a new trial does not grow with the number of trials."""
 
 
 def first_values(definition: Definition, defaults: dict[str, Any]) -> list[dict[str, Any]]:
-    """What is tried before a sampler chooses: the defaults, and where somebody was."""
+    """Return the values of the first trials: the defaults, and the user's own values if they
+    differ."""
     first, start = [defaults], dict(definition.start or {})
     if start and start != {key: defaults[key] for key in start}:
         first.append({**defaults, **start})
@@ -32,10 +42,10 @@ def first_values(definition: Definition, defaults: dict[str, Any]) -> list[dict[
 
 
 class Sampler:
-    """Asks Optuna for the values of each trial and tells it what became of them.
+    """Asks Optuna for the values of each trial and reports the results to it.
 
-    A trial that was asked for and not told is there again when the file is opened anew: the same
-    number with the same values.
+    A trial that was asked for and has no result yet is still open when the file is opened again,
+    with the same number and values.
     """
 
     def __init__(
@@ -45,13 +55,13 @@ class Sampler:
         objectives: Sequence[Objective],
         bases: Sequence[RunParameters],
     ) -> None:
-        """Open the file, or make it.
+        """Open the journal, or make it.
 
         Args:
-            path: Optuna's journal.
-            definition: Of the study.
-            objectives: Whose values are told.
-            bases: Of each recording what is not varied.
+            path: The file of Optuna's journal.
+            definition: The study's definition.
+            objectives: The objectives whose values are reported.
+            bases: The parameters on each recording, apart from those that are varied.
 
         Raises:
             StudyError: If the file cannot be read.
@@ -63,17 +73,17 @@ class Sampler:
         self._definition, self._bases = definition, bases
         self._varied = {one.key: one for one in definition.varied}
         self._single = len(objectives) == 1
-        self._journal: journal.Journal | None = None
+        self._journal: Journal | None = None
         try:
-            self._journal = journal.Journal(path)
+            self._journal = Journal(path)
             self._study: Any = optuna.create_study(
-                storage=journal.storage(self._journal, minimized=self._minimized(objectives)),
+                storage=storage(self._journal, minimized=self._minimized(objectives)),
                 study_name=definition.name,
                 directions=["maximize" if one.higher else "minimize" for one in objectives],
                 sampler=self._sampler(),
                 load_if_exists=True,
             )
-            self._study.get_trials(deepcopy=False)  # here, where what fails is told
+            self._study.get_trials(deepcopy=False)  # here, where exceptions are handled
         except (ValueError, LookupError, TypeError, AttributeError, AssertionError,
                 RecursionError) as error:  # fmt: skip
             self.close()
@@ -103,33 +113,33 @@ class Sampler:
         return samplers.RandomSampler(seed=seed)
 
     def _minimized(self, objectives: Sequence[Objective]) -> bool | None:
-        """Of a search by TPE whether the smallest value is the best; None of other searches."""
+        """Whether the smallest value is the best, for a search by TPE; None for other searches."""
         by_tpe = self._single and self._definition.search in ("auto", "tpe")
         return not objectives[0].higher if by_tpe else None
 
     @property
     def asked(self) -> int:
-        """How many trials were asked for, ever."""
+        """The number of all trials that were ever asked for."""
         return len(self._study.get_trials(deepcopy=False))
 
     def open_trials(self) -> list[int]:
-        """Trials that were asked for and not told."""
+        """Return the numbers of trials that were asked for and have no result."""
         state = self._optuna.trial.TrialState
         found = self._study.get_trials(deepcopy=False, states=(state.RUNNING,))
         return [trial.number for trial in found]
 
     def again(self, number: int) -> dict[str, Any]:
-        """The values of a trial that was asked for before."""
+        """Return the values of a trial that was asked for before."""
         trials = self._study.get_trials(deepcopy=False)
         identity = trials[number]._trial_id
         self._trials[number] = self._optuna.trial.Trial(self._study, identity)
         return self._drawn(number)
 
     def ask(self, values: Mapping[str, Any] | None = None) -> tuple[int, dict[str, Any]]:
-        """Another trial: its number and values.
+        """Ask for a trial, and return its number and values.
 
         Args:
-            values: To be tried, where that is not the sampler's choice.
+            values: The values to try, if they are not the sampler's choice.
         """
         assert self._journal is not None
         with self._journal.together():
@@ -155,12 +165,12 @@ class Sampler:
         return space.drawn(self._definition.varied, self._bases, draw)
 
     def tell(self, number: int, values: Sequence[float] | None, *, pruned: bool = False) -> None:
-        """What became of a trial.
+        """Report the result of a trial.
 
         Args:
-            number: Of the trial.
-            values: Of the objectives; None where it failed.
-            pruned: Whether it was given up: then the values are of its first runs only.
+            number: The trial's number.
+            values: The values of the objectives; None if the trial failed.
+            pruned: Whether the trial was pruned, so that the values are those of its first runs.
         """
         trial, state = self._trials.pop(number), self._optuna.trial.TrialState
         assert self._journal is not None
@@ -175,10 +185,10 @@ class Sampler:
                 self._study.tell(trial, [float(one) for one in values])
 
     def grid(self) -> list[dict[str, Any]]:
-        """All trials of a grid.
+        """Return the values of all trials of a grid.
 
         Raises:
-            StudyError: If there are more than the study is to have.
+            StudyError: If there are more than the study's largest number of trials.
         """
         most = self._definition.trials
         found = list(itertools.islice(space.grid(self._definition.varied, self._bases), most + 1))
@@ -188,3 +198,120 @@ class Sampler:
                 "take fewer steps, or another search"
             )
         return found
+
+
+class Journal:
+    """A journal backend of Optuna without a lock, written by one process.
+
+    A last line that a killed process left incomplete is cut off. Lines are written at once but
+    not forced to disk: if the machine loses power, the last trials' values may be lost, but not
+    their results, which are stored elsewhere.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Open the file, or make it.
+
+        Raises:
+            ValueError: If the file is not a journal.
+        """
+        whole = path.read_bytes() if path.exists() else b""
+        complete = whole[: whole.rfind(b"\n") + 1]
+        if len(complete) < len(whole):
+            with path.open("r+b") as file:
+                file.truncate(len(complete))
+        self._path = path
+        self._lines: list[dict[str, Any]] = [json.loads(one) for one in complete.splitlines()]
+        self._first = 0
+        self._file = path.open("ab", buffering=0)
+        self._size = len(complete)
+        self._waiting: list[bytes] | None = None
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+    def read_logs(self, log_number_from: int) -> Iterator[dict[str, Any]]:
+        """Yield the lines from a number on; earlier ones are dropped, since Optuna reads a line
+        only once."""
+        del self._lines[: log_number_from - self._first]
+        self._first = max(self._first, log_number_from)
+        yield from list(self._lines)
+
+    def append_logs(self, logs: list[dict[str, Any]]) -> None:
+        """Append lines, all or none.
+
+        Raises:
+            StudyError: If they cannot be written.
+        """
+        texts = [json.dumps(one, separators=(",", ":")).encode() + b"\n" for one in logs]
+        if self._waiting is None:
+            self._write(b"".join(texts))
+        else:
+            self._waiting += texts
+        self._lines += [json.loads(one) for one in texts]
+
+    @contextmanager
+    def together(self) -> Iterator[None]:
+        """Collect the lines of the block, and write them at its end, all or none."""
+        self._waiting = []
+        try:
+            yield
+        finally:
+            waiting, self._waiting = self._waiting, None
+            self._write(b"".join(waiting))
+
+    def _write(self, data: bytes) -> None:
+        try:
+            if data and self._file.write(data) != len(data):
+                raise OSError(28, "No space left on device")
+        except OSError as error:
+            os.ftruncate(self._file.fileno(), self._size)
+            raise StudyError(
+                f"{self._path}: cannot be written ({error.strerror}); free some space and go on "
+                "by `multiview-phd study resume`: every run that ended is kept"
+            ) from None
+        self._size += len(data)
+
+
+def storage(journal: Any, *, minimized: bool | None) -> Any:
+    """Return Optuna's storage on a journal.
+
+    Args:
+        journal: A :class:`Journal`, which has the methods of Optuna's backends.
+        minimized: Whether the smallest value is the best, for a search by TPE; None for other
+            searches, which use all trials.
+    """
+    from optuna.storages import JournalStorage
+    from optuna.trial import TrialState
+
+    class Storage(JournalStorage):
+        """A storage that does not search all trials for waiting ones, and gives TPE a few alone."""
+
+        _waits = True  # an earlier process may have left waiting trials
+
+        def create_new_trial(self, study_id: int, template_trial: Any = None) -> int:
+            self._waits |= template_trial is not None
+            number: int = super().create_new_trial(study_id, template_trial)
+            return number
+
+        def get_all_trials(
+            self, study_id: int, deepcopy: bool = True, states: Container[Any] | None = None
+        ) -> list[Any]:
+            if states == (TrialState.WAITING,):
+                if not self._waits:
+                    return []
+                waiting: list[Any] = super().get_all_trials(study_id, deepcopy, states)
+                self._waits = bool(waiting)
+                return waiting
+            found: list[Any] = super().get_all_trials(study_id, deepcopy, states)
+            if minimized is None or states is None or TrialState.COMPLETE not in states:
+                return found
+            if len(found) <= BEST + LAST:
+                return found
+            last = found[-LAST:]
+            early = [one for one in found[:-LAST] if one.state == TrialState.COMPLETE]
+            sign = 1.0 if minimized else -1.0
+            best = heapq.nsmallest(BEST, early, key=lambda one: sign * one.value)
+            return sorted([*best, *last], key=lambda one: one.number)
+
+    return Storage(journal)

@@ -1,4 +1,4 @@
-"""The common case in one step: the dozen parameters that matter most, on a recording."""
+"""Tuning: the study of the most important parameters on given recordings."""
 
 from __future__ import annotations
 
@@ -21,13 +21,14 @@ MORE = (
     "fusion.start_velocity",
     "smoothing.doubt",
 )
-"""What is varied beside the essential parameters."""
+"""Parameters that are varied beside the essential ones."""
 
 PICTURES_MINUTES = 30.0
-"""Parameters by which pictures are looked at again are varied from this time on: with less, one
-look for all trials leaves more of them."""
+"""Least duration of a study that varies parameters of stage 1 on pictures, minutes. In a shorter
+one stage 1 is computed once for all trials, so that there are more of them."""
 
 OTHER_SEEDS = 3
+"""The number of further seeds with which the best trials are measured again."""
 
 
 def tuning(
@@ -36,16 +37,16 @@ def tuning(
     *,
     minutes: float,
     changes: Mapping[str, Any],
-    without_truth: bool = False,
+    ignore_truth: bool = False,
 ) -> Definition:
-    """The study that tunes recordings.
+    """Return the definition of a study that tunes the parameters for recordings.
 
     Args:
-        name: Of the study.
-        recordings: Rooms and folders.
-        minutes: How long it may take.
-        changes: Where somebody is, by key against the recordings' defaults.
-        without_truth: Whether truth is not looked at though it is there.
+        name: The name of the study.
+        recordings: Names of built-in recordings, and folders.
+        minutes: The duration of the study, minutes.
+        changes: The user's current values by key, where they differ from the recordings' defaults.
+        ignore_truth: Whether ground truth is not used even if the recordings have it.
 
     Raises:
         StudyError: If a recording cannot be read.
@@ -57,7 +58,7 @@ def tuning(
         except (SequenceError, OSError) as error:
             words = " ".join(str(error).split())
             raise StudyError(f"{place} cannot be read: {words}") from None
-    truth = not without_truth and all(one.ground_truth is not None for one in opened)
+    truth = not ignore_truth and all(one.ground_truth is not None for one in opened)
     now = [with_values(default_parameters(one), changes) for one in opened]
     defaults = default_parameters(opened[0])
     keys = [key for key in table.shown_keys(now[0]) if _is_varied(key, now[0], minutes)]
@@ -84,6 +85,6 @@ def _place(name: str) -> str:
 def _is_varied(key: str, now: RunParameters, minutes: float) -> bool:
     if key not in PARAMETERS or not (PARAMETERS[key].essential or key in MORE):
         return False
-    looks = now.method("single_view").used(now).pictures
-    at_pictures = PARAMETERS[key].stage == "single_view" and looks
-    return not at_pictures or minutes >= PICTURES_MINUTES
+    pictures = now.method("single_view").used(now).pictures
+    on_pictures = PARAMETERS[key].stage == "single_view" and pictures
+    return not on_pictures or minutes >= PICTURES_MINUTES

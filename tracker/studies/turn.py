@@ -1,4 +1,4 @@
-"""One study at a time on one machine: each takes all its cores, so others wait for their turn."""
+"""The lock of a machine's cores: one study at a time runs on a machine, and others wait."""
 
 from __future__ import annotations
 
@@ -14,21 +14,22 @@ from tracker.studies.kept.store import studies_folder
 _LOCK, _WHOSE = "turn.lock", "turn.txt"
 
 SECONDS_BETWEEN = 0.5
-"""How often who waits looks again."""
+"""Interval at which a waiting study tries again, seconds."""
 
 
 @contextmanager
 def turn(name: str, waits: Callable[[str], bool], folder: Path | None = None) -> Iterator[bool]:
-    """Be the one study that has this machine's cores; the system ends the turn with the process.
+    """Hold the lock of this machine's cores; the system releases it when the process ends.
 
     Args:
-        name: Of the study.
-        waits: Told what it waits for, as often as it looks; False where it should wait no more.
-        folder: Where it is noted whose turn it is; None for that of all studies.
+        name: The name of the study.
+        waits: A callback that gets a sentence on what is waited for at each attempt, and returns
+            False to wait no longer.
+        folder: The folder of the lock; None for the folder of all studies.
 
     Yields:
-        Whether it is this study's turn; False where it was to wait no more. Where the folder cannot
-        be written to nobody waits.
+        Whether the lock is held; False if ``waits`` ended the wait. If the folder is not writable,
+        studies do not wait for each other.
     """
     place = folder or studies_folder()
     lock: sqlite3.Connection | None = None
@@ -58,7 +59,7 @@ def _take(lock: sqlite3.Connection) -> bool:
     except sqlite3.OperationalError as error:
         if "locked" in str(error):
             return False
-    return True  # a disk that cannot lock keeps nobody waiting
+    return True  # on a file system without locks studies do not wait
 
 
 def _whose(place: Path) -> str:

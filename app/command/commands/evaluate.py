@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from contextlib import closing
-from dataclasses import asdict, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
@@ -128,7 +128,10 @@ def estimate_without_truth(command: Evaluate) -> None:
             "backwards": found.backwards,
             "without": dict(zip(names, found.without, strict=False)),
             "overlap": dict(zip(names, found.overlaps, strict=False)),
-            "doubts": [asdict(doubt) for doubt in found.doubts],
+            "doubts": [
+                {"step": one.step, "ids": one.ids, "looks": one.variants, "why": one.why}
+                for one in found.disagreements
+            ],
         }
         print_json(document)
     else:
@@ -149,11 +152,11 @@ def _print_estimate(found: Estimate, names: list[str]) -> None:
         words = f"its boxes overlap the others' people by {number(overlap, 2)}"
         rows.append((f"without {name}", number(agreed, 3), words))
     print_table(("figure", ">value", "measured with"), rows)
-    if found.doubts:
+    if found.disagreements:
         sys.stdout.write("\n")
         print_table(
             (">step", "doubtful"),
-            [(str(doubt.step), doubt.why) for doubt in found.doubts[:_SHOWN_DOUBTS]],
+            [(str(doubt.step), doubt.why) for doubt in found.disagreements[:_SHOWN_DOUBTS]],
         )
 
 
@@ -207,7 +210,7 @@ def print_evaluation(evaluation: Evaluation) -> None:
     """The figures with what each was measured with, then the people."""
     print_table(
         ("figure", ">value", "unit", "measured with"),
-        [(f.definition.name, f.text, f.unit, f.stated) for f in evaluation.figures],
+        [(f.definition.name, f.text, f.unit, f.measured_with) for f in evaluation.figures],
     )
     if not evaluation.people:
         return

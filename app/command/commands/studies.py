@@ -165,7 +165,9 @@ def run(store: Store, where: Where, *, as_json: bool = False, quiet: bool = Fals
                 bar.at(status.done, None if by_time_alone else status.trials)
 
         elsewhere = bool(where.scheduler or os.environ.get(ADDRESS))
-        status = run_study(store, writer, crew, told=told, stopped=stopped.is_set, beside=elsewhere)
+        status = run_study(
+            store, writer, crew, on_status=told, stopped=stopped.is_set, beside=elsewhere
+        )
     if as_json:
         _print({"study": store.name, "state": status.state, "trials": len(store.trials())})
     elif not quiet:

@@ -85,7 +85,9 @@ def _offer(action: OfferTemplates) -> None:
         say(f"{len(new)} of {len(found)} added to {sequence.folder / FILE}")
 
 
-def _found(sequence: Sequence, action: OfferTemplates) -> tuple[template_suggestions.Offer, ...]:
+def _found(
+    sequence: Sequence, action: OfferTemplates
+) -> tuple[template_suggestions.Suggestion, ...]:
     """What a run offers, its pictures written where they are wanted."""
     from app.command.commands.correcting import of_run
     from app.state.workers.compiling import Compiling
@@ -103,7 +105,7 @@ def _found(sequence: Sequence, action: OfferTemplates) -> tuple[template_suggest
             on_progress=lambda _, progress: tracking.at(progress.done, progress.total),
         )
     with FrameReader(sequence) as reader:
-        found = template_suggestions.offered(run, reader)
+        found = template_suggestions.suggest_templates(run, reader)
         if action.pictures is not None:
             _write_pictures(action.pictures, sequence, found, reader)
     return found
@@ -112,7 +114,7 @@ def _found(sequence: Sequence, action: OfferTemplates) -> tuple[template_suggest
 def _write_pictures(
     folder: Path,
     sequence: Sequence,
-    found: tuple[template_suggestions.Offer, ...],
+    found: tuple[template_suggestions.Suggestion, ...],
     reader: FrameReader,
 ) -> None:
     import cv2
@@ -132,7 +134,7 @@ def _write_pictures(
     say(f"{len(found)} pictures written to {folder}")
 
 
-def _values(one: template_suggestions.Offer) -> dict[str, Any]:
+def _values(one: template_suggestions.Suggestion) -> dict[str, Any]:
     return {
         **template_values(one.template),
         "track": one.track,

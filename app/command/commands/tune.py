@@ -37,7 +37,7 @@ def tune(command: Tune) -> int:
         command.recordings,
         minutes=command.minutes,
         changes=changes,
-        without_truth=command.without_truth,
+        ignore_truth=command.without_truth,
     )
     blind = definition.objectives == ("identity",)
     if blind:
@@ -47,7 +47,7 @@ def tune(command: Tune) -> int:
     if status == INTERRUPTED:
         say(f"stopped; `multiview-phd study resume {name!r}` goes on")
         return status
-    found = store.told("tuned")
+    found = store.fact("tuned")
     if found is None:
         raise StudyError(f"study {name}: it ended before anything was measured again")
     if found["better"]:

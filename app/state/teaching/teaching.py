@@ -100,7 +100,7 @@ class Teaching(Taught):
             raise SequenceError("the run goes on; ask for templates when it has ended")
         if not run.sequence.has_pictures:
             raise SequenceError("no camera has pictures, so there are no colours to learn")
-        found = template_suggestions.offered(run, reader)
+        found = template_suggestions.suggest_templates(run, reader)
         if not found:
             raise SequenceError(
                 "the tracks offer no further template: nobody is seen whole, apart from others and "
@@ -124,12 +124,12 @@ class Teaching(Taught):
         new = [template_values(one.template) for one in taken]
         self.edit(lambda values: values["template"].extend(new))
 
-    def offered(self) -> list[template_suggestions.Offer]:
+    def offered(self) -> list[template_suggestions.Suggestion]:
         """The templates that are offered and not taken yet."""
         now = self._workbench.snapshot()
         if now.sequence is None or now.offers is None:
             return []
-        return template_suggestions.untaken(now.offers, now.sequence)
+        return template_suggestions.without_templates(now.offers, now.sequence)
 
     def forget_offers(self) -> None:
         """List none any more."""

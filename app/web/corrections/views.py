@@ -26,7 +26,7 @@ from tracker.corrections.outcomes import Outcome, names_by_track
 from tracker.corrections.truth import checked_ranges
 from tracker.fusion.trajectories import Trajectories, corrected
 from tracker.review.queue import Queue, ReviewItem
-from tracker.review.queue.item import Lanes
+from tracker.review.queue.item import TrackRows
 from tracker.runs.pipeline import Run
 
 GHOST_SECONDS = 5.0
@@ -90,7 +90,7 @@ def queue_of(snapshot: Snapshot, found: Queue, skipped: AbstractSet[str]) -> Dou
         complete=run is not None and run.complete,
         how=found.how,
         answered=found.answered,
-        doubts=[_doubt(one, run) for one in found.doubts if one.id not in skipped],
+        doubts=[_doubt(one, run) for one in found.items if one.id not in skipped],
     )
 
 
@@ -127,7 +127,7 @@ def preview_of(snapshot: Snapshot, doubt: ReviewItem, alternative: int) -> Alter
     after = _after(run, doubt, alternative)
     first, last = _around(run, doubt)
     spans = _spans(run.tracks, after)
-    lanes = Lanes(after)
+    lanes = TrackRows(after)
     touched = _touched(doubt, spans) & set(lanes.rows)
     ghosts = [_ghost(lanes, track, first, last) for track in sorted(touched)]
     return AlternativePreview(tracks=ghosts, spans=spans)
@@ -160,7 +160,7 @@ def _touched(doubt: ReviewItem, spans: list[ChangedSpan]) -> set[int]:
     return {*doubt.tracks, *(one.id for one in spans if one.id)}
 
 
-def _ghost(lanes: Lanes, track: int, first: int, last: int) -> GhostTrack:
+def _ghost(lanes: TrackRows, track: int, first: int, last: int) -> GhostTrack:
     positions: list[Vector | None] = [None] * (last - first + 1)
     for row in lanes.rows[track].tolist():
         step = int(lanes.tracks.frames[row])
@@ -178,7 +178,7 @@ def _spans(before: Trajectories, after: Trajectories) -> list[ChangedSpan]:
             after.frames.tolist(), after.positions.tolist(), after.ids.tolist(), strict=True
         )
     }
-    lanes, found = Lanes(before), []
+    lanes, found = TrackRows(before), []
     for track, rows in lanes.rows.items():
         frames = before.frames[rows]
         new = np.array(

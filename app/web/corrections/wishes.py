@@ -7,7 +7,7 @@ from app.state.snapshot import Snapshot
 from tracker.corrections import Correction, CorrectionError, Place
 from tracker.corrections.kinds import KINDS, make
 from tracker.corrections.pointing import foot_on_floor, ground_under, stands, triangulated
-from tracker.review.queue.item import WITHIN, Lanes
+from tracker.review.queue.item import WITHIN, TrackRows
 from tracker.sequences.sequence import Sequence
 
 
@@ -41,7 +41,7 @@ def _of_tracks(
 ) -> tuple[Correction, ...]:
     if snapshot.run is None:
         raise CorrectionError("there is no run yet whose tracks could be meant")
-    lanes = Lanes(snapshot.run.tracks)
+    lanes = TrackRows(snapshot.run.tracks)
     needed = 2 if wish.kind in ("exchanged", "same") else 1
     if len(wish.tracks) != needed or len(set(wish.tracks)) != needed:
         raise CorrectionError(
@@ -99,7 +99,7 @@ def _here(
     return make(kind="here", places=places, accuracy=wish.accuracy, note=note)
 
 
-def _exchanged(lanes: Lanes, tracks: list[int], step: int, note: str) -> Correction:
+def _exchanged(lanes: TrackRows, tracks: list[int], step: int, note: str) -> Correction:
     one, other = tracks
     before = [lanes.place(track, step - 1) for track in (one, other)]
     after = [lanes.place(track, step, after=True) for track in (other, one)]
@@ -113,7 +113,7 @@ def _exchanged(lanes: Lanes, tracks: list[int], step: int, note: str) -> Correct
     return make(kind="exchanged", places=[*before, *after], note=note)
 
 
-def _nobody(lanes: Lanes, track: int, wish: CorrectionWish, note: str) -> Correction:
+def _nobody(lanes: TrackRows, track: int, wish: CorrectionWish, note: str) -> Correction:
     begin, end = lanes.span(track)
     first = begin if wish.first is None else wish.first
     last = end if wish.last is None else wish.last
@@ -152,7 +152,7 @@ def _shown_at(wish: CorrectionWish, snapshot: Snapshot, step: int) -> Place | No
     """Where the shown run has the track that is meant, if it is there."""
     if snapshot.run is None or not wish.tracks:
         return None
-    lanes = Lanes(snapshot.run.tracks)
+    lanes = TrackRows(snapshot.run.tracks)
     if wish.tracks[0] not in lanes.rows:
         return None
     found = lanes.place(wish.tracks[0], step)

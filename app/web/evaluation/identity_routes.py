@@ -119,7 +119,7 @@ def _told(now: Checked, bench: Bench) -> IdentityInfo:
         else [],
         doubts=[
             DoubtInfo(step=doubt.step, ids=list(doubt.ids), why=doubt.why)
-            for doubt in (() if found is None else found.doubts)
+            for doubt in (() if found is None else found.disagreements)
         ],
         warning=WARNING,
     )

@@ -41,7 +41,7 @@ def evaluation_of(scored: Scored, evaluation: Evaluation) -> models.EvaluationIn
                 digits=figure.definition.digits,
                 direction=figure.definition.direction,
                 help=figure.definition.help,
-                settings=figure.stated,
+                settings=figure.measured_with,
                 source=SOURCES.get(figure.definition.source, ""),
                 headline=figure.definition.headline,
             )
@@ -96,8 +96,8 @@ def series_of(
         first=window.first,
         stride=window.stride,
         unit=settings.unit,
-        cost=settings.stated(("cutoff", "order")),
-        gate=settings.stated(("distance", "gate")),
+        cost=settings.in_words(("cutoff", "order")),
+        gate=settings.in_words(("distance", "gate")),
         errors=[
             models.PersonError(person=person, **_trimmed(values, window))
             for person, values in evaluation.errors.items()
@@ -191,7 +191,7 @@ def switches_of(evaluation: Evaluation) -> list[models.Switch]:
 def stated_of(evaluation: Evaluation) -> str:
     """The settings behind the figures, in words."""
     settings = evaluation.settings
-    gate, cost = settings.stated(("distance", "gate")), settings.stated(("cutoff", "order"))
+    gate, cost = settings.in_words(("distance", "gate")), settings.in_words(("cutoff", "order"))
     return f"{gate} · {cost}"
 
 
@@ -220,7 +220,7 @@ def comparison_of(
             models.DifferenceInfo(
                 name=row.key,
                 label=row.name,
-                settings=row.stated,
+                settings=row.measured_with,
                 **{
                     name: getattr(row, name)
                     for name in models.DifferenceInfo.model_fields

@@ -108,7 +108,7 @@ def _all(values: dict[str, object], bench: Bench) -> dict[str, object]:
 def tuned(store: Named) -> models.Tuned:
     """What a study proposes at its end."""
     try:
-        found = store.told("tuned")
+        found = store.fact("tuned")
     except StudyError as error:
         raise no_study(error) from None
     return views.tuned_of(found)
@@ -130,7 +130,7 @@ def keep_tuned(store: Named, wish: models.PresetWish, bench: Bench, own: Own) ->
 
 def _proposed(store: Store, bench: Bench) -> dict[str, object]:
     try:
-        found, definition = store.told("tuned"), store.definition()
+        found, definition = store.fact("tuned"), store.definition()
     except StudyError as error:
         raise no_study(error) from None
     if found is None or not found["better"]:

@@ -215,7 +215,7 @@ def tune(wish: models.TuneWish, desk: Desk, bench: Bench) -> models.Study:
             [views.place_of(snapshot)],
             minutes=wish.minutes,
             changes=table.changed(snapshot.parameters, snapshot.defaults),
-            without_truth=wish.without_truth,
+            ignore_truth=wish.without_truth,
         )
         desk.define(definition)
         return _told(desk, desk.start(definition.name, wish.workers, wish.scheduler))

@@ -63,7 +63,7 @@ def event_table(
         return _doubts(check.now, snapshot)
     why = {} if run is None else dict[tuple[int, int, str], str](words_of(run))
     estimated = _found(check.now, snapshot)
-    for doubt in () if estimated is None else estimated.doubts:
+    for doubt in () if estimated is None else estimated.disagreements:
         found.append((doubt.step, doubt.ids[0], "doubt"))
         why[doubt.step, doubt.ids[0], "doubt"] = f"doubtful: {doubt.why}"
     found = sorted((event for event in found if kind in (None, event[2])), key=lambda e: e[:2])
@@ -152,7 +152,7 @@ def _doubts(now: Checked, snapshot: Snapshot) -> str:
         "Compare tells by what. ",
         quiet(WARNING),
     )
-    if not found.doubts:
+    if not found.disagreements:
         return head + line("All ways to look agree: no moment is doubtful.")
     return head + table(
         "Doubtful moments",
@@ -169,6 +169,6 @@ def _doubts(now: Checked, snapshot: Snapshot) -> str:
                 doubt.why,
                 joined(*(id_tag(name) for name in doubt.ids)),
             )
-            for doubt in found.doubts[:MOST_EVENTS]
+            for doubt in found.disagreements[:MOST_EVENTS]
         ],
     )

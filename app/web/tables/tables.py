@@ -383,7 +383,7 @@ def _differing(comparison: Comparison) -> str:
 
 def _measure(figure: Figure) -> Markup:
     words = joined(figure.definition.name, quiet(f" {figure.unit}".rstrip())).html
-    title = f"{figure.definition.help}\n{figure.stated}".strip()
+    title = f"{figure.definition.help}\n{figure.measured_with}".strip()
     return Markup(f'<span title="{escaped(title)}">{words}</span>')
 
 

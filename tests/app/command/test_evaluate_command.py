@@ -42,7 +42,7 @@ def test_the_table_says_what_was_measured_with_what(
         assert line.startswith(name)
         rest = line[len(name) :].split("  ")
         assert [cell.strip() for cell in rest if cell] == [
-            cell for cell in (figure.text, figure.unit, figure.stated) if cell
+            cell for cell in (figure.text, figure.unit, figure.measured_with) if cell
         ]
     assert "3D distance, cut-off 2 m, order 2, window 5 steps" in stdout
     assert lines[-2].split()[:2] == ["1", str(expected.people[0].steps)]

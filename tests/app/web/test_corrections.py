@@ -18,7 +18,7 @@ from app.web.server import Settings, create_app
 from tests.app.conftest import ADDRESS, Runs, connect, run_is, wait_until
 from tracker.corrections.log import read_log
 from tracker.review.queue import Alternative, Queue, ReviewItem
-from tracker.review.queue.item import Lanes, proposed
+from tracker.review.queue.item import TrackRows, proposed
 from tracker.sequences.reader import read_sequence
 
 PLACE = "/api/corrections"
@@ -258,7 +258,7 @@ def test_the_queue_is_answered_previewed_and_skipped(
 def test_how_it_would_be_is_shown_until_it_is_no_more(
     desk: TestClient, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    lanes = Lanes(desk.app.state.workbench.snapshot().run.tracks)  # type: ignore[attr-defined]
+    lanes = TrackRows(desk.app.state.workbench.snapshot().run.tracks)  # type: ignore[attr-defined]
     track = tracks(desk)[0]["id"]
     places = (lanes.place(track, 59), lanes.place(track, 60, after=True))
     two = Alternative("two people", 0.5, proposed("different", places))
@@ -283,7 +283,7 @@ def test_how_it_would_be_is_shown_until_it_is_no_more(
 def test_what_is_answered_of_the_run_before_counts_in_the_one_that_came_meanwhile(
     desk: TestClient, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    lanes = Lanes(desk.app.state.workbench.snapshot().run.tracks)  # type: ignore[attr-defined]
+    lanes = TrackRows(desk.app.state.workbench.snapshot().run.tracks)  # type: ignore[attr-defined]
     track = tracks(desk)[0]["id"]
     places = (lanes.place(track, 59), lanes.place(track, 60, after=True))
     now = Alternative("as it is", 0.5, proposed("same", places))
@@ -408,7 +408,7 @@ def test_who_may_be_missing_is_shown_where_each_camera_would_have_him(
     desk: TestClient, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     run = desk.app.state.workbench.snapshot().run  # type: ignore[attr-defined]
-    place = Lanes(run.tracks).place(tracks(desk)[0]["id"], 60)
+    place = TrackRows(run.tracks).place(tracks(desk)[0]["id"], 60)
     other = place._replace(step=70)
     here = (*proposed("here", (place,)), *proposed("here", (other,)))
     made = ReviewItem(

@@ -23,7 +23,7 @@ from tests.random_rooms import random_room
 from tracker.evaluation import evaluate_sequence
 from tracker.parameters import RunParameters, with_values
 from tracker.review.self_consistency import estimate
-from tracker.review.self_consistency.calibration import FILE
+from tracker.review.self_consistency.estimate import FILE
 from tracker.runs import pipeline
 from tracker.sequences.reader import read_sequence
 from tracker.sequences.sequence import Sequence

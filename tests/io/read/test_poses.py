@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.io.read.rig import read
-from tracker.io.read.detections.poses.body import NOSE_HEIGHT, boxes_of
+from tracker.io.read.detections.body import NOSE_HEIGHT, boxes_of
 from tracker.io.read.pieces import DetectionPiece
 
 

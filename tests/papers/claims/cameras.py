@@ -81,8 +81,8 @@ def run(context: Context) -> Result:
         figure=lambda: _draw(sequence.name, measured, len(seeds)),
         notes=(
             f"Means over {len(seeds)} seeds of the samples; all choices have the same boxes.",
-            f"Error, MOTA, IDF1: {settings.stated(('distance', 'gate'))}.",
-            f"OSPA: {settings.stated(('cutoff', 'order'))}.",
+            f"Error, MOTA, IDF1: {settings.in_words(('distance', 'gate'))}.",
+            f"OSPA: {settings.in_words(('cutoff', 'order'))}.",
         ),
     )  # fmt: skip
 

@@ -81,7 +81,7 @@ def run(context: Context) -> Result:
     gates = ", ".join(f"{name} {gate:g} m" for name, gate in GATES.items())
     notes.append(
         f"By 3D centres, gate: {gates}; OSPA(2) over the whole, "
-        f"{settings.stated(('cutoff', 'order'))}. Fusion alone on one core, no look-ahead."
+        f"{settings.in_words(('cutoff', 'order'))}. Fusion alone on one core, no look-ahead."
     )
     return Result(
         head=(

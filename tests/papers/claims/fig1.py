@@ -94,7 +94,7 @@ def run(context: Context) -> Result:
         numbers=numbers,
         findings=_findings(people, near),
         figure=lambda: _draw(tracked, whole),
-        notes=(f"Errors of pairs: {whole.settings.stated(('distance', 'gate'))}.",),
+        notes=(f"Errors of pairs: {whole.settings.in_words(('distance', 'gate'))}.",),
     )  # fmt: skip
 
 

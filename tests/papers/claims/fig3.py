@@ -124,7 +124,7 @@ def run(context: Context) -> Result:
         notes=(
             f"{len(seeds)} seeds of the samples and of picture noise (σ {NOISE:g} of 255); the "
             "single camera is each of the two in turn, with the same boxes.",
-            f"Errors of pairs: {settings.stated(('distance', 'gate'))}; in the last column a "
+            f"Errors of pairs: {settings.in_words(('distance', 'gate'))}; in the last column a "
             "missed person counts as an error of the gate.",
             *(_other(words, measured) for words in others),
             f"Without occlusion: both cameras see {100 * CLEAR:.0f} % of the person or more; with: "

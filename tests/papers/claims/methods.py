@@ -66,8 +66,9 @@ def run(context: Context) -> Result:
             )
     settings = EvaluationSettings()
     notes += [
-        f"{settings.stated(('distance', 'gate'))}; OSPA {settings.stated(('cutoff', 'order'))}; "
-        f"found {settings.stated(('near',))}. Default parameters, seed 0, fusion {FUSION}; "
+        f"{settings.in_words(('distance', 'gate'))}; "
+        f"OSPA {settings.in_words(('cutoff', 'order'))}; "
+        f"found {settings.in_words(('near',))}. Default parameters, seed 0, fusion {FUSION}; "
         "steps a second with all cores of this machine.",
         f"{ON_BOXES} needs an outside detector's boxes: the rooms and {cameras.RECORDING} have "
         f"none, and {BOXES_RECORDING} has no pictures for the others.",

@@ -14,8 +14,8 @@ from tracker.evaluation import EvaluationSettings, evaluate_sequence
 from tracker.fusion.trajectories import Trajectories
 from tracker.parameters import RunParameters
 from tracker.review.queue import ReviewItem, queue
-from tracker.review.queue.item import Lanes, confirmed
-from tracker.review.self_consistency.others import Given, Look, looked
+from tracker.review.queue.item import TrackRows, confirmed
+from tracker.review.self_consistency.estimate import Common, Variant, track_variant
 from tracker.runs import pipeline
 from tracker.runs.pipeline import Run
 from tracker.runs.stage_cache import StageCache
@@ -37,7 +37,7 @@ class Truthful:
             step_time: Seconds.
         """
         self._truth, self._gate, self._tracks = truth, gate, tracks
-        self._lanes = Lanes(tracks)
+        self._lanes = TrackRows(tracks)
         self._moment = leeway(step_time) + 1
         self._people = people_of(tracks, truth, gate)
 
@@ -152,13 +152,13 @@ def session(
     run = pipeline.compute(sequence, parameters, cache=cache)
     other: Trajectories | None = None
     if backwards:
-        given = Given(sequence, parameters, run.seed, tuple(run.views))
-        other = looked(given, Look(backwards=True))
+        given = Common(sequence, parameters, run.seed, tuple(run.views))
+        other = track_variant(given, Variant(backwards=True))
     told: tuple[Correction, ...] = ()
     skipped: set[str] = set()
     yield Answered(0, _idf1(run, settings), run)
     for count in range(1, answers + 1):
-        doubts = [one for one in queue(run, other).doubts if one.id not in skipped]
+        doubts = [one for one in queue(run, other).items if one.id not in skipped]
         if not doubts:
             return
         doubt = doubts[0]

@@ -71,8 +71,9 @@ def run(context: Context) -> Result:
         ]
         settings = evaluation.settings
     notes.append(
-        f"{settings.stated(('distance', 'gate'))}; OSPA {settings.stated(('cutoff', 'order'))}; "
-        f"found {settings.stated(('near',))}. Steps a second with all cores of this machine. "
+        f"{settings.in_words(('distance', 'gate'))}; "
+        f"OSPA {settings.in_words(('cutoff', 'order'))}; "
+        f"found {settings.in_words(('near',))}. Steps a second with all cores of this machine. "
         "Filter: step by step, as a live system would see it; smoothed: with hindsight, stage 3."
     )
     return Result(

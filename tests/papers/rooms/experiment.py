@@ -109,8 +109,8 @@ def _summed_up(found: dict[Case, list[dict[str, Any]]], seeds: range) -> Result:
     settings = EvaluationSettings()
     notes.append(
         f"Rooms {seeds.start} to {seeds.stop - 1}; a tenth: the value that one room in ten does "
-        f"not reach; found and false {settings.stated(('near',))}; IDF1 "
-        f"{settings.stated(('distance', 'gate'))}. Default parameters, seed 0. "
+        f"not reach; found and false {settings.in_words(('near',))}; IDF1 "
+        f"{settings.in_words(('distance', 'gate'))}. Default parameters, seed 0. "
         f"`python -m tests.rooms random-SEED -o FOLDER` makes any of the rooms again."
     )
     return Result(

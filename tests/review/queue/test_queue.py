@@ -11,12 +11,11 @@ from tracker.corrections import Place
 from tracker.corrections.kinds import Kind
 from tracker.fusion.trajectories import Trajectories, corrected
 from tracker.review.queue import queue
-from tracker.review.queue.clear import Clear
-from tracker.review.queue.item import Alternative, Lanes, confirmed, proposed
+from tracker.review.queue.clear_places import ClearPlaces
+from tracker.review.queue.item import Alternative, TrackRows, confirmed, proposed
 from tracker.review.queue.linking import Move, Piece
-from tracker.review.queue.opinion import Opinion
-from tracker.review.queue.ranking import _with_nobody_of_them
-from tracker.review.queue.trust import Trust
+from tracker.review.queue.other_run import OtherRun
+from tracker.review.queue.ranking import Trust, _with_none_of_them
 
 
 @pytest.mark.parametrize("smoothing", ["identities", "positions", "none"])
@@ -27,7 +26,7 @@ def test_who_was_away_is_asked_for_first_and_not_again(smoothing: str) -> None:
     run = run_of(whole, (), smoothing=smoothing)
     assert len(set(run.tracks.ids.tolist())) == 3
     found = queue(run)
-    first = found.doubts[0]
+    first = found.items[0]
     assert first.kind == "join"
     assert 25 <= first.first < first.last <= 55
     assert sum(one.probability for one in first.alternatives) == pytest.approx(1.0, abs=0.05)
@@ -36,26 +35,26 @@ def test_who_was_away_is_asked_for_first_and_not_again(smoothing: str) -> None:
     assert [one.met for one in after.outcomes] == [True]
     assert len(set(after.tracks.ids.tolist())) == 2
     rest = queue(after)
-    assert first.id not in [one.id for one in rest.doubts]
+    assert first.id not in [one.id for one in rest.items]
     kept = run_of(whole, confirmed(first.alternatives[0].corrections), smoothing=smoothing)
-    assert first.id not in [one.id for one in queue(kept).doubts]
+    assert first.id not in [one.id for one in queue(kept).items]
 
 
 def test_the_most_at_stake_comes_first() -> None:
-    weights = [one.weight for one in queue(run_of(with_a_gap())).doubts]
+    weights = [one.weight for one in queue(run_of(with_a_gap())).items]
     assert weights == sorted(weights, reverse=True)
 
 
 def test_nobody_is_nothing_to_check() -> None:
     found = queue(run_of(sequence([], 20)))
-    assert found.doubts == ()
+    assert found.items == ()
     assert "nobody" in found.how
 
 
 def test_the_other_run_weighs_a_move_by_who_is_who_there() -> None:
     run = run_of(sequence(crossing(60), 60))
     tracks = run.tracks
-    lanes = Lanes(tracks)
+    lanes = TrackRows(tracks)
     one, other = (int(track) for track in lanes.ids)
     places = [lanes.place(one, 29), lanes.place(other, 29), lanes.place(other, 30),
               lanes.place(one, 30)]  # fmt: skip
@@ -64,20 +63,20 @@ def test_the_other_run_weighs_a_move_by_who_is_who_there() -> None:
         Piece(track, lanes.place(track, 30), lanes.place(track, 29)) for track in (one, other)
     ]
     move = Move((pieces[0], pieces[1]), (pieces[0], pieces[1]), "exchange", 0.0)
-    assert Opinion(tracks, swapped, 1.0 / 25.0).weighed(move).odds > 0.0
-    assert Opinion(tracks, tracks, 1.0 / 25.0).weighed(move).odds < 0.0
-    told = [m for m in Opinion(tracks, swapped, 1.0 / 25.0).moves() if m.kind == "exchange"]
+    assert OtherRun(tracks, swapped, 1.0 / 25.0).weighed(move).odds > 0.0
+    assert OtherRun(tracks, tracks, 1.0 / 25.0).weighed(move).odds < 0.0
+    told = [m for m in OtherRun(tracks, swapped, 1.0 / 25.0).moves() if m.kind == "exchange"]
     assert told, "it sees the exchange itself"
     assert abs(told[0].earlier[0].end.step - 29) <= 1
-    assert not list(Opinion(tracks, tracks, 1.0 / 25.0).moves())
+    assert not list(OtherRun(tracks, tracks, 1.0 / 25.0).moves())
 
 
 def test_a_doubt_is_known_again_by_its_places() -> None:
     run = run_of(with_a_gap())
-    again = [one.id for one in queue(run).doubts]
-    assert again == [one.id for one in queue(run_of(with_a_gap())).doubts]
+    again = [one.id for one in queue(run).items]
+    assert again == [one.id for one in queue(run_of(with_a_gap())).items]
     assert len(set(again)) == len(again)
-    assert np.isfinite([one.weight for one in queue(run).doubts]).all()
+    assert np.isfinite([one.weight for one in queue(run).items]).all()
     assert Place(3, 1.0, 2.0, 0.8).words == "(1.00, 2.00) at step 3"
 
 
@@ -85,9 +84,9 @@ def test_who_is_who_is_asked_between_places_where_people_stand_clear() -> None:
     one = walk((-1.1, 0.0, 1.0), (1.1, 0.0, 1.0), 80)
     other = walk((0.0, -1.5, 1.0), (0.0, 1.5, 1.0), 80)
     run = run_of(sequence([(0, one), (0, other)], 80))
-    lanes = Lanes(run.tracks)
+    lanes = TrackRows(run.tracks)
     track, third = (int(name) for name in lanes.ids)
-    clear = Clear(lanes, 1.0 / 25.0, 0.25)
+    clear = ClearPlaces(lanes, 1.0 / 25.0, 0.25)
     apart = np.linalg.norm((one - other)[:, :2], axis=1)
     near = np.flatnonzero(apart < 1.0)
     before, after = clear.before(track, 40), clear.after(track, 40)
@@ -98,7 +97,7 @@ def test_who_is_who_is_asked_between_places_where_people_stand_clear() -> None:
 
 def test_what_hangs_on_a_moment_ends_where_the_next_mistake_may_be() -> None:
     run = run_of(sequence([(0, walk((-1.1, 0.0, 1.0), (1.1, 0.0, 1.0), 60))], 60))
-    lanes = Lanes(run.tracks)
+    lanes = TrackRows(run.tracks)
     track = int(lanes.ids[0])
     first, last = lanes.span(track)
     whole = Trust(lanes, [])
@@ -111,7 +110,7 @@ def test_what_hangs_on_a_moment_ends_where_the_next_mistake_may_be() -> None:
 
 def test_none_of_those_who_are_told_may_be_said() -> None:
     run = run_of(with_a_gap())
-    for one in queue(run).doubts:
+    for one in queue(run).items:
         parted = [a for a in one.alternatives if all(c.kind == "different" for c in a.corrections)]
         told = {pair for a in one.alternatives for c in a.corrections for pair in c.pairs}
         if one.kind != "short":
@@ -124,7 +123,7 @@ def test_who_says_that_it_is_as_it_is_changes_nothing() -> None:
         plain = run_of(whole)
         told = [
             one.alternatives[0].corrections
-            for one in queue(plain).doubts
+            for one in queue(plain).items
             if any(c.pairs or c.apart for c in one.alternatives[0].corrections)
         ]
         assert told or len(set(plain.tracks.ids.tolist())) == 2
@@ -151,7 +150,7 @@ def test_none_of_those_who_are_told_parts_from_all_of_them() -> None:
     now = Alternative("as it is", 0.5, proposed("same", (one.end, after.begin)))
     goes_on = Alternative("1 goes on as 3", 0.3, proposed("same", (one.end, begins.begin)))
     came = Alternative("2 goes on", 0.2, proposed("same", (other.end, after.begin)))
-    none = _with_nobody_of_them(move, now, [goes_on, came])[-1]
+    none = _with_none_of_them(move, now, [goes_on, came])[-1]
     assert none.words == "none of these"
     apart = {(a.step, b.step) for told in none.corrections for a, b in told.apart}
     assert apart == {(10, 20), (10, 22), (12, 20)}
@@ -159,45 +158,45 @@ def test_none_of_those_who_are_told_parts_from_all_of_them() -> None:
 
 def test_two_who_were_parted_anywhere_are_not_asked_for_again() -> None:
     run = run_of(with_a_gap())
-    join = next(one for one in queue(run).doubts if one.kind == "join")
-    lanes = Lanes(run.tracks)
+    join = next(one for one in queue(run).items if one.kind == "join")
+    lanes = TrackRows(run.tracks)
     first, second = join.tracks
     # far from the places that the queue would ask for
     far = proposed("different", (lanes.of_row(int(lanes.rows[first][2])),
                                lanes.of_row(int(lanes.rows[second][-3]))))  # fmt: skip
     after = run_of(with_a_gap(), confirmed(far))
     assert [one.met for one in after.outcomes] == [True]
-    assert all(one.kind != "join" for one in queue(after).doubts)
+    assert all(one.kind != "join" for one in queue(after).items)
 
 
 @pytest.mark.parametrize("kind", ["left", "came"])
 def test_who_left_or_came_in_is_not_asked_for_as_going_on(kind: Kind) -> None:
     run = run_of(with_a_gap())
-    join = next(one for one in queue(run).doubts if one.kind == "join")
-    lanes = Lanes(run.tracks)
+    join = next(one for one in queue(run).items if one.kind == "join")
+    lanes = TrackRows(run.tracks)
     first, second = join.tracks
     row = lanes.rows[first][-1] if kind == "left" else lanes.rows[second][0]
     after = run_of(with_a_gap(), confirmed(proposed(kind, (lanes.of_row(int(row)),))))
     assert [one.met for one in after.outcomes] == [True]
-    assert all(one.kind != "join" for one in queue(after).doubts)
+    assert all(one.kind != "join" for one in queue(after).items)
 
 
 def test_who_goes_on_as_another_is_asked_aside_of_the_moment_itself() -> None:
     run = run_of(sequence([(0, walk((-1.1, 0.0, 1.0), (1.1, 0.0, 1.0), 80))], 80))
-    lanes = Lanes(run.tracks)
+    lanes = TrackRows(run.tracks)
     track = int(lanes.ids[0])
-    clear = Clear(lanes, 1.0 / 25.0, 0.25)
+    clear = ClearPlaces(lanes, 1.0 / 25.0, 0.25)
     assert clear.before(track, 40).step == 30
     assert clear.after(track, 40).step == 50
-    slow = Clear(lanes, 0.5, 0.25)
+    slow = ClearPlaces(lanes, 0.5, 0.25)
     assert (slow.before(track, 40).step, slow.after(track, 40).step) == (38, 42)
 
 
 def test_who_was_named_is_not_asked_whether_he_is_anybody() -> None:
     """A short life is asked about, until something is said that is said of people alone."""
     whole = sequence([(20, walk((-0.4, 0.0, 1.0), (0.2, 0.0, 1.0), 14))], 60)
-    (asked,) = (one for one in queue(run_of(whole)).doubts if one.kind == "short")
+    (asked,) = (one for one in queue(run_of(whole)).items if one.kind == "short")
     (named,) = proposed("name", asked.places[:1], name="Anna")
     after = queue(run_of(whole, confirmed((named,))))
-    assert "short" not in [one.kind for one in after.doubts]
+    assert "short" not in [one.kind for one in after.items]
     assert after.answered > 0

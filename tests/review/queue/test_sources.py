@@ -12,9 +12,9 @@ from tests.runs.test_corrected_runs import run_of
 from tracker.corrections import Place
 from tracker.fusion.trajectories import Trajectories
 from tracker.review.queue import queue
-from tracker.review.queue.item import Alternative, Lanes, ReviewItem, confirmed, proposed
+from tracker.review.queue.item import Alternative, ReviewItem, TrackRows, confirmed, proposed
 from tracker.review.queue.meetings import draws, meetings
-from tracker.review.queue.ranking import once_each, settled
+from tracker.review.queue.ranking import is_answered, once_each
 from tracker.review.queue.unclaimed import unclaimed
 from tracker.runs.run import Run
 
@@ -52,10 +52,10 @@ def exchanged(tracks: Trajectories, step: int) -> Trajectories:
 
 def test_who_goes_straight_on_is_himself_and_who_turns_back_was_exchanged() -> None:
     run = near()
-    straight = [one.odds for one in meetings(run, Lanes(run.tracks)) if len(one.earlier) == 2]
+    straight = [one.odds for one in meetings(run, TrackRows(run.tracks)) if len(one.earlier) == 2]
     assert straight
     run.tracks = exchanged(run.tracks, 30)
-    turned = [one.odds for one in meetings(run, Lanes(run.tracks)) if len(one.earlier) == 2]
+    turned = [one.odds for one in meetings(run, TrackRows(run.tracks)) if len(one.earlier) == 2]
     assert min(turned) > max(straight) + 2.0
 
 
@@ -69,7 +69,7 @@ def test_boxes_are_drawn_between_people_no_more_than_they_are() -> None:
 def test_who_is_missing_is_asked_for_with_where_he_is() -> None:
     run = two()
     assert unclaimed(run) == []
-    assert not [one for one in queue(run).doubts if one.kind == "missing"]
+    assert not [one for one in queue(run).items if one.kind == "missing"]
     gone = int(run.tracks.ids[0])
     own = run.tracks.ids == gone
     path = dict(zip(run.tracks.frames[own].tolist(), run.tracks.positions[own], strict=True))
@@ -82,7 +82,7 @@ def test_who_is_missing_is_asked_for_with_where_he_is() -> None:
     ]
     assert len(away) > 70
     assert max(away) < HALF_EXTENTS[0]
-    told = [one for one in queue(without(run, gone)).doubts if one.kind == "missing"]
+    told = [one for one in queue(without(run, gone)).items if one.kind == "missing"]
     assert len(told) == 1
     assert told[0].tracks == ()
     now, other = told[0].alternatives
@@ -102,13 +102,13 @@ def test_a_track_that_begins_or_ends_inside_is_asked_for(first: int, last: int, 
         else step
         for number, step in enumerate(run.views)
     ]
-    told = [one for one in queue(cut).doubts if one.kind == kind]
+    told = [one for one in queue(cut).items if one.kind == kind]
     assert [one.tracks for one in told] == [(track,)]
     now, other = told[0].alternatives
     assert now.corrections[0].kind == {"begins": "came", "ends": "left"}[kind]
     assert other.corrections[0].kind == "here"
-    assert settled(told[0], confirmed(now.corrections), 25)
-    assert not [one for one in queue(two()).doubts if one.kind in ("begins", "ends")]
+    assert is_answered(told[0], confirmed(now.corrections), 25)
+    assert not [one for one in queue(two()).items if one.kind in ("begins", "ends")]
 
 
 def test_a_place_is_told_once_and_only_where_something_is_at_stake() -> None:

@@ -14,10 +14,13 @@ from tests.random_rooms import random_room
 from tracker.fusion.trajectories import Trajectories
 from tracker.parameters import RunParameters
 from tracker.review.self_consistency import estimate
-from tracker.review.self_consistency.agreement import agreement, compared, differences, doubts
-from tracker.review.self_consistency.calibration import FILE, interval
-from tracker.review.self_consistency.others import mirrored
-from tracker.review.self_consistency.overlap import overlap
+from tracker.review.self_consistency.agreement import (
+    agreement,
+    compared,
+    differences,
+    disagreements,
+)
+from tracker.review.self_consistency.estimate import FILE, interval, mirrored, overlap
 from tracker.runs import pipeline
 from tracker.runs.pipeline import Cancelled
 from tracker.single_view.protocol import ViewResult
@@ -87,7 +90,7 @@ def test_who_is_exchanged_is_told_with_step_and_ids() -> None:
     there = tracks([[7] * 25 + [8] * 15, [8] * 25 + [7] * 15])
     comparison = compared(here, there, 40, HALF)
     assert agreement(comparison) == pytest.approx(25 / 40)
-    found = doubts([("backwards", differences(comparison, 0.1))], 0.1)
+    found = disagreements([("backwards", differences(comparison, 0.1))], 0.1)
     assert {(one.step, one.ids) for one in found} == {(25, (1, 2)), (25, (2, 1))}
     assert found[0].why == f"{found[0].ids[0]} is taken for {found[0].ids[1]} backwards"
 
@@ -96,14 +99,14 @@ def test_who_is_missed_is_told_after_who_is_another() -> None:
     here = tracks([[1] * 40, [2] * 40, [3] * 40])
     there = tracks([[7] * 20 + [8] * 20, [8] * 20 + [7] * 20, [9] * 10 + [0] * 30])
     comparison = compared(here, there, 40, HALF)
-    found = doubts([("a", differences(comparison, 0.1))], 0.1)
+    found = disagreements([("a", differences(comparison, 0.1))], 0.1)
     assert [one.ids[0] for one in found] == [1, 2, 3]
     assert found[-1].why == "3 is not there a"
     # what two runs see otherwise comes first, whatever it is
     other = tracks([[1] * 40, [2] * 40, [3] * 10 + [0] * 30])
     second = differences(compared(here, other, 40, HALF), 0.1)
-    both = doubts([("a", differences(comparison, 0.1)), ("b", second)], 0.1)
-    assert (both[0].ids, both[0].looks) == ((3,), ("a", "b"))
+    both = disagreements([("a", differences(comparison, 0.1)), ("b", second)], 0.1)
+    assert (both[0].ids, both[0].variants) == ((3,), ("a", "b"))
 
 
 def test_a_moment_is_no_difference() -> None:

@@ -15,8 +15,12 @@ from tests.engine.synthetic import CAMERAS, HALF_EXTENTS, ROOM, walk
 from tracker.fusion.trajectories import Trajectories
 from tracker.geometry.boxes import box_overlaps
 from tracker.parameters import RunParameters
-from tracker.review.template_suggestions import Offer, offered, untaken
-from tracker.review.template_suggestions.candidates import drawn_boxes
+from tracker.review.template_suggestions import (
+    Suggestion,
+    drawn_boxes,
+    suggest_templates,
+    without_templates,
+)
 from tracker.runs.run import Run
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence, Template, View
@@ -103,20 +107,20 @@ Many = tuple[bool, bool, bool]
 
 
 @pytest.fixture
-def offers_of() -> Iterator[Callable[[Run], list[Offer]]]:
+def offers_of() -> Iterator[Callable[[Run], list[Suggestion]]]:
     """What a run offers, its pictures read and closed again."""
     readers: list[FrameReader] = []
 
-    def found(run: Run) -> list[Offer]:
+    def found(run: Run) -> list[Suggestion]:
         readers.append(FrameReader(run.sequence))
-        return list(offered(run, readers[-1]))
+        return list(suggest_templates(run, readers[-1]))
 
     yield found
     for reader in readers:
         reader.close()
 
 
-Found = Callable[[Run], list[Offer]]
+Found = Callable[[Run], list[Suggestion]]
 
 
 def test_who_has_a_template_in_one_camera_is_offered_one_in_the_others(
@@ -235,8 +239,8 @@ def test_nobody_and_a_recording_of_boxes_offer_nothing(room: Sequence, offers_of
 def test_what_was_taken_is_offered_no_more(room: Sequence, offers_of: Found) -> None:
     found = offers_of(tracked(room))
     taken = replace(room, templates=(found[0].template,))
-    assert untaken(found, taken) == found[1:]
-    assert untaken(found, room) == found  # and taken back it is offered again
+    assert without_templates(found, taken) == found[1:]
+    assert without_templates(found, room) == found  # and taken back it is offered again
 
 
 def test_a_box_of_a_rolled_camera_bounds_whom_it_shows() -> None:

@@ -18,28 +18,28 @@ from tracker.evaluation.measures.matching import Comparison, Matches, gather
 from tracker.geometry.assignment import linear_sum_assignment
 
 CONTINUATION = 1000.0
-"""What keeping last step's pair is worth beside the score of a pair, which is at most 1."""
+"""The bonus for keeping a pair of the last step, far above the score of a pair, at most 1."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Clear:
-    """The counts of the whole sequence, by step, and by person."""
+    """The CLEAR MOT counts of the whole sequence, by step, and by person."""
 
     matches: Matches
-    """The pairs, with those of the step before kept where they stay within the gate."""
+    """The pairs; those of the step before are kept where they stay within the gate."""
     switch: Bool[ndarray, " M"]
     """Whether the person of each pair had another id when last paired."""
     misses: Int[ndarray, " S"]
     false_positives: Int[ndarray, " S"]
     id_switches: Int[ndarray, " S"]
     present: Int[ndarray, " K"]
-    """Steps at which each person is there."""
+    """The number of steps at which each person is present."""
     tracked: Int[ndarray, " K"]
-    """Steps at which each person is paired."""
+    """The number of steps at which each person is paired."""
     fragmentations: Int[ndarray, " K"]
-    """How often the pairing of each person is taken up again after a gap."""
+    """The number of times that each person is paired again after a gap."""
     switches: Int[ndarray, " K"]
-    """Identity switches of each person."""
+    """The number of identity switches of each person."""
     motp: float | None
     """Mean distance of the pairs, in the unit of the distance; None without pairs."""
 
@@ -56,30 +56,30 @@ class Clear:
 
     @property
     def mostly_tracked(self) -> int:
-        """People paired at more than 80 % of their steps."""
+        """The number of people paired at more than 80 % of their steps."""
         return int((self._share > 0.8).sum())
 
     @property
     def mostly_lost(self) -> int:
-        """People paired at less than 20 % of their steps."""
+        """The number of people paired at less than 20 % of their steps."""
         return int((self._share < 0.2).sum())
 
     @property
     def partly_tracked(self) -> int:
-        """The others."""
+        """The number of the other people."""
         return len(self.present) - self.mostly_tracked - self.mostly_lost
 
 
 def clear(comparison: Comparison) -> Clear:
-    """Pair step after step, keeping last step's pairs, and count.
+    """Pair people and estimates step after step, keeping the pairs of the last step, and count.
 
     The pairs of a step are those of the matching protocol, but a person and an
     estimate that were a pair at the step before stay one while the gate allows.
     A switch is counted when a person is paired with another id than when last
-    paired, however long ago; an id that comes back to its person is no switch.
-    As in TrackEval, which this equals, a person who leaves and comes back is
-    fragmented by that too, and steps without any people or without any estimates
-    are not part of the memory: nobody is fragmented by them.
+    paired, however long ago; an id that returns to its person is not a switch.
+    The counts equal TrackEval's: a person who leaves and comes back counts as fragmented too,
+    and steps without any people or without any estimates are skipped, so that they cause no
+    fragmentation.
 
     Without people, MOTA is None and every estimate a false positive. Without
     estimates, MOTA is 0, every person is mostly lost and MOTP is None.

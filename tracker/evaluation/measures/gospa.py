@@ -31,16 +31,16 @@ class Gospa:
 def gospa_parts(
     distances: Float[ndarray, "M N"], *, cutoff: float, order: float
 ) -> tuple[float, int, int]:
-    """The localisation cost, the number of missed and the number of false targets.
+    """Return the localisation cost, the number of missed and the number of false targets.
 
-    Over all partial assignments γ, with α = 2 [RGS17], proposition 1:
+    They minimise, over all partial assignments γ, with α = 2 [RGS17], proposition 1:
 
         GOSPA^p = min_γ ( Σ_{(i, j) ∈ γ} d(x_i, y_j)^p + c^p/2 (missed + false) ).
 
     A pair at the cut-off or beyond counts as one missed and one false target.
 
     Args:
-        distances: Of every true target (rows) to every estimate (columns).
+        distances: The distance of every true target (rows) to every estimate (columns).
         cutoff: c > 0, in the unit of the distances.
         order: p >= 1.
 
@@ -59,7 +59,7 @@ def gospa_parts(
 
 
 def gospa(comparison: Comparison, *, cutoff: float, order: float) -> Gospa:
-    """GOSPA of each step, with the order and the units of :func:`gospa_parts`."""
+    """Compute GOSPA at each step; see :func:`gospa_parts` for the arguments."""
     parts = [gospa_parts(d, cutoff=cutoff, order=order) for d in comparison.distances]
     near = np.array([part[0] for part in parts], dtype=float)
     missed = np.array([part[1] for part in parts], dtype=np.int64)

@@ -1,4 +1,4 @@
-"""HOTA: detection and association in balance, over all strictnesses of localisation.
+"""HOTA: detection and association in balance, averaged over localisation thresholds.
 
 [LODTGLL21] Luiten, Ošep, Dendorfer, Torr, Geiger, Leal-Taixé, Leibe, "HOTA: a
 higher order metric for evaluating multi-object tracking", IJCV 129, 2021.
@@ -16,7 +16,7 @@ from tracker.evaluation.measures.matching import Comparison
 from tracker.geometry.assignment import linear_sum_assignment
 
 ALPHAS = np.arange(1, 20) * 0.05
-"""The strictnesses: similarity from which a pair counts, 0.05 … 0.95."""
+"""The localisation thresholds α: the least similarity of a pair that counts, 0.05 … 0.95."""
 
 _TINY = np.finfo(float).eps
 
@@ -39,14 +39,14 @@ class Hota:
 
 
 def hota(comparison: Comparison) -> Hota | None:
-    """HOTA with the similarity 1 − distance / gate, 0 from the gate on.
+    """Compute HOTA with the similarity 1 − distance / gate, which is 0 from the gate on.
 
-    With a gate of 1 m, α = 0.05 asks for 0.95 m and α = 0.95 for 0.05 m. At each
-    step the pairs maximise similarity times the alignment of their whole tracks;
+    With a gate of 1 m, α = 0.05 requires a distance below 0.95 m and α = 0.95 one below 0.05 m.
+    At each step the pairs maximise similarity times the alignment of their whole tracks;
     a pair counts at every α up to its similarity [LODTGLL21].
 
-    None where there are neither people nor estimates; zeros (LocA 1) where there
-    is only one of them.
+    The result is None where there are neither people nor estimates; its scores are zeros (LocA 1)
+    where there are only people or only estimates.
     """
     truth, tracks = comparison.truth, comparison.tracks
     people, estimates = len(truth), len(tracks)
@@ -86,7 +86,15 @@ def hota(comparison: Comparison) -> Hota | None:
 def _scores(
     who: ndarray, which: ndarray, close: ndarray, present: ndarray, reported: ndarray
 ) -> Hota:
-    """DetA, AssA and LocA at each α from all pairs of all steps and their similarity."""
+    """Compute DetA, AssA and LocA at each α.
+
+    Args:
+        who: The index of the person of each pair, over all steps.
+        which: The index of the track of each pair.
+        close: The similarity of each pair.
+        present: The number of steps of each person, as a column.
+        reported: The number of steps of each track.
+    """
     people, estimates = int(present.sum()), int(reported.sum())
     detection, association, localisation = np.zeros(19), np.zeros(19), np.ones(19)
     shape = (len(present), len(reported))

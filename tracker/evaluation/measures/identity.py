@@ -1,4 +1,4 @@
-"""Identity precision, recall and F1: one track for one person over the whole sequence.
+"""Identity precision, recall and F1: each person has one track over the whole sequence.
 
 [RSZCT16] Ristani, Solera, Zou, Cucchiara, Tomasi, "Performance measures and a data
 set for multi-target, multi-camera tracking", ECCV workshops 2016.
@@ -18,16 +18,19 @@ from tracker.geometry.assignment import linear_sum_assignment
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Identity:
-    """The best one-to-one map of people and tracks, and its counts."""
+    """The best one-to-one assignment of tracks to people, and its counts.
+
+    A people-step is one person at one step.
+    """
 
     true_positives: int
-    """IDTP: people-steps at which the person's own track is within the gate."""
+    """IDTP: the number of people-steps at which the person's own track is within the gate."""
     false_positives: int
-    """IDFP: the other estimates."""
+    """IDFP: the number of the other estimates."""
     false_negatives: int
-    """IDFN: the other people-steps."""
+    """IDFN: the number of the other people-steps."""
     track_of: Int[ndarray, " K"]
-    """For each person the index of his track in the tracks' names; −1 without one."""
+    """For each person the index of the assigned track in the tracks' names; −1 without one."""
 
     @property
     def precision(self) -> float | None:
@@ -49,10 +52,10 @@ class Identity:
 
 
 def identity(comparison: Comparison) -> Identity:
-    """Give each person at most one track so that IDTP is largest.
+    """Assign each person at most one track so that IDTP is largest.
 
-    IDTP of a map counts the steps at which a person and his track both exist and
-    lie within the gate of each other; the largest IDTP also has the fewest IDFP
+    IDTP of an assignment is the number of steps at which a person and the assigned track both
+    exist and lie within the gate of each other; the largest IDTP also has the fewest IDFP
     and IDFN together.
     """
     truth, tracks = comparison.truth, comparison.tracks

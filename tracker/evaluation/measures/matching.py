@@ -1,25 +1,26 @@
-"""The one matching protocol: which estimate belongs to which true position at a step.
+"""The matching protocol of all figures: which estimate belongs to which true position at a step.
 
 At each step, estimates and people are paired one to one so that
 
     Σ over pairs (1 − d / (2 gate))  is largest,  d <= gate in every pair:
 
 a pair counts from 1 (no distance) down to 1/2 (at the gate), so a second pair is
-nearly always worth more than a closer one. This is the score that TrackEval makes
-of 3D positions with a zero distance of twice the gate and a threshold of 1/2.
+nearly always worth more than a closer one. TrackEval scores 3D positions in the same way, with
+a zero distance of twice the gate and a threshold of 1/2.
 
 Rows of the truth with ``valid = 0`` are "don't care". At each step, before any figure:
 
-1. estimates are paired with *all* rows, don't-care ones included, as above, but a
-   don't-care row lies twice as far as it seems: it counts 1 − d / gate;
-2. an estimate paired with a don't-care row is set aside: it is neither right nor wrong;
-3. all don't-care rows are set aside: missing one is no miss.
+1. estimates are paired with *all* rows, don't-care ones included, as above, but the
+   distance of a don't-care row counts double: its score is 1 − d / gate;
+2. an estimate paired with a don't-care row is removed: it is neither correct nor false;
+3. all don't-care rows are removed: missing one is not a miss.
 
 So an uncertain position takes an estimate away from a certain one only where it is
-less than half as far. Without that handicap it would often take what belongs to the
-certain one; with certain rows served first throughout, a person whose own estimate
-is missing would be given his uncertain neighbour's, and two identity switches with
-it. All figures see what remains, and pair it by their own definitions.
+less than half as far. Without that handicap it would often take an estimate that belongs
+to the certain one. If certain rows were paired first throughout, a person whose own estimate
+is missing would be paired with that of an uncertain neighbour, which adds two identity
+switches. All figures are computed from the remaining rows, and pair them by their own
+definitions.
 
 Distances: Euclidean in 3D (metres, the default); Euclidean on the ground plane
 (metres); or (1 − GIoU)/2 of the two upright boxes, 0 for equal boxes, 1/2 for
@@ -51,11 +52,11 @@ class Tracks(Protocol):
 
     @property
     def ids(self) -> Int[ndarray, " N"]:
-        """The target of each row."""
+        """The track id of each row."""
 
     @property
     def positions(self) -> Float[ndarray, "N 3"]:
-        """World metres."""
+        """The position of each row, world metres."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,9 +69,9 @@ class Rows:
     offsets: Int[ndarray, " S+1"]
     """Rows ``offsets[t]`` up to ``offsets[t + 1]`` are those of step t."""
     names: Int[ndarray, " K"]
-    """Every id once, ascending."""
+    """The distinct ids, ascending."""
     indices: Int[ndarray, " N"]
-    """The place of each row's id in :attr:`names`."""
+    """The index of each row's id in :attr:`names`."""
 
     def __len__(self) -> int:
         return len(self.frames)
@@ -86,11 +87,11 @@ class Rows:
         return np.diff(self.offsets)
 
     def at(self, step: int) -> slice:
-        """The rows of one step."""
+        """Return the slice of the rows of one step."""
         return slice(int(self.offsets[step]), int(self.offsets[step + 1]))
 
     def select(self, rows: ndarray) -> Rows:
-        """Some of the rows, by mask or ascending index; an id without rows disappears."""
+        """Select rows by mask or ascending index; an id without rows disappears."""
         return _sorted_rows(self.frames[rows], self.ids[rows], self.positions[rows], self.steps)
 
 
@@ -106,19 +107,19 @@ def to_rows(
     positions: Float[ndarray, "N 3"],
     steps: int,
 ) -> tuple[Rows, Int[ndarray, " M"]]:
-    """Sort columns of any order; leave out what cannot be scored.
+    """Sort rows, and leave out those that cannot be scored.
 
     Left out are rows outside the steps 0 … ``steps`` − 1, rows whose position is
     not finite, and every row after the first that repeats an id within a step.
 
     Args:
         frames: The step of each row, in any order.
-        ids: The target of each row.
-        positions: World metres.
+        ids: The track or person of each row.
+        positions: The position of each row, world metres.
         steps: Number of steps.
 
     Returns:
-        The rows, and for each the index of the column entry that it came from.
+        The sorted rows, and the index of each in the arguments.
     """
     frames = np.asarray(frames, dtype=np.int64).reshape(-1)
     ids = np.asarray(ids, dtype=np.int64).reshape(-1)
@@ -134,17 +135,17 @@ def to_rows(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Measure:
-    """A distance and its gate."""
+    """A distance between positions, and its gate."""
 
     distance: Distance
     gate: float
     half_extents: Float[ndarray, " 3"]
-    """Of the upright boxes, metres; only the box distance needs them."""
+    """Half width, depth and height of the upright boxes, metres, for the box distance."""
 
     def between(
         self, first: Float[ndarray, "N 3"], second: Float[ndarray, "N 3"]
     ) -> Float[ndarray, " N"]:
-        """The distance of each pair of positions (world metres), in the unit of the distance."""
+        """Compute the distances between two arrays of positions (world metres), row by row."""
         apart = first - second
         if self.distance == "ground":
             return np.asarray(np.hypot(apart[:, 0], apart[:, 1]))
@@ -159,7 +160,7 @@ class Measure:
 def distances_by_step(
     truth: Rows, tracks: Rows, measure: Measure
 ) -> tuple[Float[ndarray, "G E"], ...]:
-    """The distance of every person to every estimate, one matrix a step."""
+    """Compute the distance of every person to every estimate, a matrix for each step."""
     rows, columns = truth.counts, tracks.counts
     sizes = rows * columns
     ends = np.cumsum(sizes)
@@ -179,14 +180,14 @@ def distances_by_step(
 def assign(
     distances: Float[ndarray, "G E"], gate: float
 ) -> tuple[Int[ndarray, " M"], Int[ndarray, " M"]]:
-    """The pairs of one step by the module's protocol; none for an empty side.
+    """Pair people and estimates of one step by the module's protocol.
 
     Args:
-        distances: Of every person (rows) to every estimate (columns).
+        distances: The distance of every person (rows) to every estimate (columns).
         gate: Largest distance of a pair, in the same unit.
 
     Returns:
-        Rows and columns of the pairs, each at most once.
+        The row and the column of each pair; empty if there are no people or no estimates.
     """
     if not distances.size:
         none = np.zeros(0, dtype=np.int64)
@@ -200,7 +201,13 @@ def assign(
 def _on_dont_care(
     certain: Float[ndarray, "G E"], uncertain: Float[ndarray, "D E"], gate: float
 ) -> Int[ndarray, " I"]:
-    """The estimates (columns) of one step that are paired with a don't-care row."""
+    """Return the estimates (columns) of one step that are paired with a don't-care row.
+
+    Args:
+        certain: The distance of every certain person (rows) to every estimate (columns).
+        uncertain: The distance of every don't-care row to every estimate.
+        gate: Largest distance of a pair, in the same unit.
+    """
     score = np.concatenate([1.0 - certain / (2.0 * gate), 1.0 - uncertain / gate])
     score[np.concatenate([certain, uncertain]) > gate] = 0.0
     rows, columns = linear_sum_assignment(score, maximize=True)
@@ -209,23 +216,23 @@ def _on_dont_care(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Comparison:
-    """Truth and estimates as the figures see them: what is "don't care" is set aside."""
+    """Truth and estimates that the figures are computed from, with "don't care" removed."""
 
     truth: Rows
     """The valid true positions."""
     tracks: Rows
     """The estimates that count."""
     distances: tuple[Float[ndarray, "G E"], ...]
-    """One matrix a step."""
+    """The distance of every person (rows) to every estimate (columns), a matrix for each step."""
     measure: Measure
     ignored: Rows
     """The estimates that matched a don't-care row."""
     dont_care: Rows
     """The true positions that are not certain."""
     unknown: int
-    """Steps of which the truth knows nothing."""
+    """The number of steps that the truth does not cover."""
     left_out: int
-    """Estimates that could not be scored (see :func:`to_rows`)."""
+    """The number of estimates that could not be scored (see :func:`to_rows`)."""
 
     @property
     def steps(self) -> int:
@@ -240,13 +247,13 @@ def prepare(
     *,
     steps: int,
 ) -> Comparison:
-    """Sort both sides and set aside what is "don't care", as the module's protocol says.
+    """Sort truth and estimates, and remove what is "don't care" by the module's protocol.
 
     Args:
-        truth: None is a truth without rows.
-        tracks: Estimates, in any order.
+        truth: The ground truth; None is a truth without rows.
+        tracks: The estimates, in any order.
         measure: Distance and gate.
-        steps: Steps 0 … ``steps`` − 1 are compared; of those of which the truth knows nothing
+        steps: Steps 0 … ``steps`` − 1 are compared; on steps that the truth does not cover
             neither side counts.
     """
     everyone, sources = to_rows(
@@ -307,7 +314,7 @@ class Matches:
 def gather(
     comparison: Comparison, pairs: list[tuple[Int[ndarray, " M"], Int[ndarray, " M"]]]
 ) -> Matches:
-    """Pairs of rows and columns, one entry a step, as :class:`Matches`."""
+    """Convert the pairs of each step (rows, columns) to rows of the whole sequence."""
     truth_rows = [
         rows + offset
         for (rows, _), offset in zip(pairs, comparison.truth.offsets[:-1].tolist(), strict=True)
@@ -321,6 +328,6 @@ def gather(
 
 
 def match(comparison: Comparison) -> Matches:
-    """Pair each step by itself. Without people or without estimates there are no pairs."""
+    """Pair people and estimates at each step on its own."""
     gate = comparison.measure.gate
     return gather(comparison, [assign(distances, gate) for distances in comparison.distances])

@@ -30,7 +30,7 @@ class Ospa:
 def ospa_parts(
     distances: Float[ndarray, "M N"], *, cutoff: float, order: float
 ) -> tuple[float, float, float]:
-    """OSPA between two finite sets, and its localisation and cardinality part.
+    """Compute OSPA between two finite sets, and its localisation and cardinality part.
 
     With m <= n elements and d^(c) = min(d, c) [SVV08], equation (3):
 
@@ -41,7 +41,7 @@ def ospa_parts(
     Two empty sets are at distance 0; one empty set is at distance c of any other.
 
     Args:
-        distances: Of every element of the first set to every one of the second.
+        distances: The distance of every element of the first set to every one of the second.
         cutoff: c > 0, in the unit of the distances.
         order: p >= 1.
     """
@@ -55,7 +55,7 @@ def ospa_parts(
 
 
 def ospa(comparison: Comparison, *, cutoff: float, order: float) -> Ospa:
-    """OSPA of each step; see :func:`ospa_parts`."""
+    """Compute OSPA at each step; see :func:`ospa_parts` for the arguments."""
     parts = [ospa_parts(d, cutoff=cutoff, order=order) for d in comparison.distances]
     columns = np.array(parts, dtype=float).reshape(-1, 3).T
     return Ospa(*columns)
@@ -64,7 +64,7 @@ def ospa(comparison: Comparison, *, cutoff: float, order: float) -> Ospa:
 def ospa2(
     comparison: Comparison, *, cutoff: float, order: float, window: int
 ) -> Float[ndarray, " S"]:
-    """OSPA(2) at each step t: OSPA between the two sets of tracks over a window.
+    """Compute OSPA(2) at each step t: OSPA between the two sets of tracks over a window.
 
     The base distance of a true track f and an estimated track g, both restricted
     to the steps t − w + 1 … t, is the mean of the cut distance over the steps at
@@ -77,10 +77,10 @@ def ospa2(
     c and order p. A window without tracks on either side gives 0.
 
     Args:
-        comparison: Truth and estimates. A don't-care step belongs to no domain.
+        comparison: Truth and estimates. A don't-care step belongs to neither D_f nor D_g.
         cutoff: c > 0, in the unit of the distances.
         order: p >= 1 of the outer OSPA; the time average is of order 1.
-        window: w >= 1 steps; the first steps have what there is.
+        window: w >= 1 steps; at the first steps it is as long as there are steps.
     """
     sums = _Window(comparison, cutoff)
     values = np.zeros(comparison.steps)
@@ -93,7 +93,7 @@ def ospa2(
 
 
 def ospa2_whole(comparison: Comparison, *, cutoff: float, order: float) -> float | None:
-    """OSPA(2) with all steps as its window; None without steps. See :func:`ospa2`."""
+    """Compute OSPA(2) with all steps as its window; None without steps. See :func:`ospa2`."""
     sums = _Window(comparison, cutoff)
     for step in range(comparison.steps):
         sums.add(step, 1)
@@ -112,7 +112,7 @@ class _Window:
         self.track_life = np.zeros(tracks, dtype=np.int64)
 
     def add(self, step: int, sign: int) -> None:
-        """Take a step in (1) or out (−1)."""
+        """Add a step to the window (``sign`` 1), or remove it (−1)."""
         truth, tracks = self.comparison.truth, self.comparison.tracks
         people = truth.indices[truth.at(step)]
         estimates = tracks.indices[tracks.at(step)]
@@ -124,12 +124,12 @@ class _Window:
             self.both[pairs] += sign
 
     def distance(self, order: float) -> float:
-        """OSPA of the tracks in the window."""
+        """Compute OSPA between the tracks in the window."""
         rows, columns = np.flatnonzero(self.truth_life), np.flatnonzero(self.track_life)
         pairs = np.ix_(rows, columns)
         together = self.both[pairs]
         union = self.truth_life[rows, None] + self.track_life[columns] - together
-        # what rounding leaves in a running sum must not outlive the pair
+        # rounding may leave a rest in a running sum after the pair has left the window
         near = np.where(together > 0, np.maximum(self.near[pairs], 0.0), 0.0)
         base = (near + self.cutoff * (union - together)) / union
         return ospa_parts(base, cutoff=self.cutoff, order=order)[0]

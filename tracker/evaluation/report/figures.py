@@ -1,7 +1,7 @@
-"""The report's figures: plots over time, who follows whom, and the paths from above.
+"""The report's plots: figures over time, the tracks of each person, and the paths from above.
 
-All colours are of the light set; :data:`DARK` has the partner of each, and the
-report's script exchanges them where the reader's system is dark.
+All colours are those of the light theme; :data:`DARK` has the dark partner of each, and the
+report's script exchanges them where the reader's system has a dark theme.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ LIGHT_IDS = (
     *("#c4667b", "#864e53", "#00586d", "#87628c", "#2386ae", "#057664", "#954095", "#89924f"),
     *("#58632f", "#b44366", "#45771f", "#0a9278", "#374386", "#913a03", "#897e34", "#2c5531"),
 )
-"""One colour an id, for light surfaces; beyond 24 they repeat, so the id is always written."""
+"""Colours of ids on light backgrounds; beyond 24 they repeat, so the id is always written."""
 DARK_IDS = (
     *("#e98f48", "#77b1fc", "#98c994", "#b3578b", "#f6dc4d", "#6b65e4", "#78ebf4", "#cb4645"),
     *("#ffbfca", "#c4878c", "#158eac", "#caa3cf", "#76cef8", "#0abba0", "#d780d6", "#d6e19c"),
@@ -46,32 +46,35 @@ DARK: dict[str, str] = {
 """The dark partner of every colour."""
 
 MOST_LANES = 30
-"""Lanes and error lines beyond this would be a grey mass; the tables have everyone."""
+"""Most people with a lane and a line of errors; more cannot be told apart. The tables have all."""
 
 
 def colour(name: int) -> str:
-    """Of an id, the same everywhere and always."""
+    """Return the colour of an id on light backgrounds, the same in all plots and tables."""
     return LIGHT_IDS[(name - 1) % len(LIGHT_IDS)]
 
 
 def broken(
     frames: Int[ndarray, " N"], *columns: Float[ndarray, " N"]
 ) -> tuple[Float[ndarray, " M"], ...]:
-    """Columns with a NaN wherever steps are missing, so that a line breaks there.
+    """Insert a NaN into columns wherever steps are missing, so that a plotted line breaks there.
 
     Args:
-        frames: Ascending.
-        columns: Of the same length.
+        frames: The steps, ascending.
+        columns: Values at these steps.
+
+    Returns:
+        The steps and the columns, with the NaNs.
     """
     gaps = np.flatnonzero(np.diff(frames) > 1) + 1
     return tuple(np.insert(np.asarray(c, dtype=float), gaps, np.nan) for c in (frames, *columns))
 
 
 def over_time(evaluation: Evaluation) -> go.Figure:
-    """People, OSPA, GOSPA, position errors and who follows whom, over one axis of steps."""
+    """Plot people, OSPA, GOSPA, position errors and the tracks of each person over the steps."""
     settings, series = evaluation.settings, evaluation.series
     unit = f" ({settings.unit})" if settings.unit else ""
-    cost = settings.stated(("cutoff", "order"))
+    cost = settings.in_words(("cutoff", "order"))
     shown = evaluation.people[:MOST_LANES]
     lanes = max(len(shown), 1)
     figure = make_subplots(
@@ -83,8 +86,8 @@ def over_time(evaluation: Evaluation) -> go.Figure:
             "People",
             f"OSPA{unit} · {cost}",
             f"GOSPA{unit if settings.order == 1.0 else ''} · {cost}, α = 2",
-            f"Position error (m) · {settings.stated(('gate',))}",
-            f"Who follows whom · {settings.stated(('gate',))}",
+            f"Position error (m) · {settings.in_words(('gate',))}",
+            f"Who follows whom · {settings.in_words(('gate',))}",
         ],
     )
     steps = np.arange(evaluation.steps)
@@ -101,7 +104,7 @@ def over_time(evaluation: Evaluation) -> go.Figure:
             [("localisation", series.ospa_localisation, NEAR),
              ("cardinality", series.ospa_cardinality, COUNT)],
             [("OSPA", series.ospa, INK, None),
-             (f"OSPA(2), {settings.stated(('window',))}", series.ospa2, MUTED, "dot")],
+             (f"OSPA(2), {settings.in_words(('window',))}", series.ospa2, MUTED, "dot")],
         ),
         (
             3,
@@ -136,7 +139,8 @@ def over_time(evaluation: Evaluation) -> go.Figure:
 
 
 def _lanes(evaluation: Evaluation, people: list[int]) -> list[go.Scatter]:
-    """One lane a person, in the colour of the track that follows, with the switches."""
+    """Return the lanes: a line for each person, in the colours of the paired tracks, with marks
+    at identity switches."""
     pairs = evaluation.pairs
     lane = {name: k for k, name in enumerate(people)}
     traces = []
@@ -170,7 +174,7 @@ def _lanes(evaluation: Evaluation, people: list[int]) -> list[go.Scatter]:
 
 
 def top_view(sequence: Sequence, tracks: Tracks, evaluation: Evaluation) -> go.Figure:
-    """Paths of people (dotted) and tracks (lines) on the floor, with room and cameras."""
+    """Plot the paths of people (dotted) and tracks (lines) on the floor, with room and cameras."""
     figure = go.Figure()
     truth = sequence.ground_truth
     if truth is not None:
@@ -273,7 +277,7 @@ def _layout() -> dict[str, Any]:
 
 
 def _legends(figure: go.Figure) -> None:
-    """Titles at the left, and each plot's own legend at the right of its title."""
+    """Put the titles at the left, and the legend of each plot at the right of its title."""
     for row, title in enumerate(figure.layout.annotations, start=1):
         title.update(x=0.0, xanchor="left", font={"size": 12, "color": INK})
         if row < 5:

@@ -1,4 +1,4 @@
-"""One HTML file that holds a whole evaluation and needs nothing from anywhere else."""
+"""The report of an evaluation: one self-contained HTML file."""
 
 from __future__ import annotations
 
@@ -38,17 +38,17 @@ def write_report(
     reference: Evaluation | None = None,
     seed: int | None = None,
 ) -> None:
-    """Write the report: wholly or not at all, whatever interrupts it.
+    """Write the report atomically.
 
     Args:
-        path: An ``.html`` file, replaced if it is there.
-        sequence: What was tracked.
-        tracks: What was found.
-        parameters: With which it was found; or the settings that a track file states;
-            None where they are not known.
-        evaluation: Of these tracks.
-        reference: An earlier evaluation that the figures are set against.
-        seed: Of the run.
+        path: The ``.html`` file to write; an existing one is replaced.
+        sequence: The sequence that was tracked.
+        tracks: The tracks that were evaluated.
+        parameters: The parameters of the run, or the settings that a track file states;
+            None if they are not known.
+        evaluation: The evaluation of the tracks.
+        reference: An earlier evaluation that the figures are compared with.
+        seed: The seed of the run.
 
     Raises:
         OSError: With a sentence, if the file cannot be written.
@@ -68,9 +68,10 @@ def report_html(
     seed: int | None = None,
     back: str = "",
 ) -> str:
-    """The report as text; see :func:`write_report`.
+    """Return the report as text; see :func:`write_report` for the other arguments.
 
-    ``back`` is the address at which the run can be looked into, where there is one.
+    Args:
+        back: The URL of the page that shows the run; empty if there is none.
     """
     figures = {
         "figure-time": over_time(evaluation),
@@ -122,7 +123,7 @@ def report_html(
 
 
 def _in_script(text: str) -> str:
-    """JSON that no text inside can end early."""
+    """Escape JSON for a script element, so that no text inside can end the element."""
     return text.replace("<", "\\u003c")
 
 
@@ -158,7 +159,7 @@ def _head(sequence: Sequence, evaluation: Evaluation, seed: int | None, back: st
 
 def _headline(evaluation: Evaluation) -> str:
     tiles = "".join(
-        f"<div title='{escaped(f.definition.help)} {escaped(f.stated)}'>"
+        f"<div title='{escaped(f.definition.help)} {escaped(f.measured_with)}'>"
         f"<dt>{f.definition.name}</dt><dd>{f.text} <small>{f.unit}</small></dd></div>"
         for f in evaluation.figures
         if f.definition.headline

@@ -19,16 +19,16 @@ from tracker.runs.fitting import default_parameters
 from tracker.sequences.sequence import Sequence
 
 MOST_ROWS = 60
-"""A longer table scrolls inside the page."""
+"""Most rows of a table that does not scroll."""
 
 
 def escaped(value: object) -> str:
-    """Text that HTML shows as it is."""
+    """Convert a value to text and escape it for HTML."""
     return html.escape(str(value))
 
 
 def _table(heads: Iterable[str], rows: Iterable[str]) -> str:
-    """A table; a head that begins with > stands over numbers, a long table scrolls."""
+    """Return a table; a head that begins with > is that of a column of numbers."""
     head = "".join(
         f'<th scope="col" class="n">{name[1:]}</th>'
         if name.startswith(">")
@@ -44,7 +44,7 @@ def _table(heads: Iterable[str], rows: Iterable[str]) -> str:
 
 
 def _row(first: str, *cells: str, kind: str = "") -> str:
-    """A row whose first cell is its head; a cell that begins with > is a number."""
+    """Return a row whose first cell is its head; a cell that begins with > is a number."""
     body = "".join(
         f'<td class="n">{cell[1:]}</td>' if cell.startswith(">") else f"<td>{cell}</td>"
         for cell in cells
@@ -56,7 +56,12 @@ _SIGNS = {"higher": "higher is better", "lower": "lower is better", "zero": "nea
 
 
 def figure_table(evaluation: Evaluation, reference: Evaluation | None) -> str:
-    """Every figure with its settings and definition, beside a reference if there is one."""
+    """Return the table of all figures with their settings and definitions.
+
+    Args:
+        evaluation: The evaluation.
+        reference: An earlier one whose values and differences are shown as well, or None.
+    """
     differences = compare(reference, evaluation) if reference else ()
     by_key = {difference.key: difference for difference in differences}
     heads = ["", ">value", "unit", "measured with", "definition"]
@@ -81,7 +86,7 @@ def figure_table(evaluation: Evaluation, reference: Evaluation | None) -> str:
                 definition.name,
                 *cells,
                 escaped(figure.unit),
-                f"<span class='stated'>{escaped(figure.stated)}</span>",
+                f"<span class='stated'>{escaped(figure.measured_with)}</span>",
                 f"<span class='muted'>{escaped(about)}</span>",
             )
         )
@@ -107,10 +112,10 @@ def _name(word: str, identifier: int) -> str:
 
 
 def people_table(evaluation: Evaluation) -> str:
-    """One row a person."""
+    """Return the table of people."""
     if not evaluation.people:
         return "<p class='muted'>There is nobody in the truth.</p>"
-    near = evaluation.settings.stated(("near",))
+    near = evaluation.settings.in_words(("near",))
     heads = ("", ">first step", ">last", ">steps", ">tracked", "status", f">found {near}",
              ">error (m)", ">95 % (m)", ">switches", ">fragmentations", "own track")  # fmt: skip
     return _table(
@@ -129,7 +134,7 @@ def people_table(evaluation: Evaluation) -> str:
 
 
 def track_table(tracks: Tracks, evaluation: Evaluation) -> str:
-    """One row a track, those that follow nobody faded."""
+    """Return the table of tracks; false tracks are faded."""
     if not evaluation.tracks:
         return "<p class='muted'>There are no tracks.</p>"
     existences = getattr(tracks, "existences", None)
@@ -158,10 +163,10 @@ def _share(value: float | None) -> str:
 
 
 def camera_table(evaluation: Evaluation) -> str:
-    """One row a camera."""
+    """Return the table of cameras."""
     if not evaluation.cameras:
         return "<p class='muted'>No cameras were scored.</p>"
-    overlap = escaped(evaluation.settings.stated(("overlap",)))
+    overlap = escaped(evaluation.settings.in_words(("overlap",)))
     heads = ("", ">true boxes", ">boxes", f">found, {overlap}", ">false a picture",
              ">centre error (px)", ">95 % (px)", ">mean IoU")  # fmt: skip
     return _table(
@@ -181,7 +186,10 @@ def camera_table(evaluation: Evaluation) -> str:
 def parameter_table(
     parameters: RunParameters | Mapping[str, str] | None, sequence: Sequence
 ) -> str:
-    """What the run depends on; values that are not the recording's defaults are marked."""
+    """Return the table of the parameters that the run depends on.
+
+    Values that differ from the recording's defaults are marked.
+    """
     if parameters is None:
         return "<p class='muted'>The parameters of these tracks are not known.</p>"
     if isinstance(parameters, RunParameters):
@@ -190,14 +198,14 @@ def parameter_table(
     try:
         defaults = _defaults(sequence)
         return _changed_table(table.with_values(defaults, known), defaults)
-    except table.ParameterError:  # of another version: show what the file says
+    except table.ParameterError:  # the file is of another version: show its text
         return _table(("", "value"), [_row(escaped(k), escaped(v)) for k, v in parameters.items()])
 
 
 def _defaults(sequence: Sequence) -> RunParameters:
     try:
         return default_parameters(sequence)
-    except ValueError:  # of truth alone, which tracks from elsewhere are compared with
+    except ValueError:  # the sequence has truth alone, to evaluate tracks from elsewhere
         return RunParameters()
 
 

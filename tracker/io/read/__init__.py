@@ -1,1 +1,1 @@
-"""What other programs write, read into pieces that become a sequence folder."""
+"""The formats of other programs, whose files are read into pieces of a sequence."""

@@ -1,4 +1,4 @@
-"""What names of pictures say: which frame one is, and of which camera."""
+"""The frame number and the camera in the names of pictures."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from pathlib import PurePosixPath
 
 
 def number_in(text: str) -> int | None:
-    """The last run of digits of a name: the frame of ``cam1/frame_0012.jpg``."""
+    """Return the last number in a name, which is the frame of ``cam1/frame_0012.jpg``; None if
+    there is none."""
     name = text.replace("\\", "/").rsplit("/", 1)[-1]
     stem = re.sub(r"\.[A-Za-z]\w{0,4}$", "", name)  # of "cam1.0012.json" the number stays
     runs = re.findall(r"\d+", stem)
@@ -15,7 +16,7 @@ def number_in(text: str) -> int | None:
 
 
 def camera_of(name: str) -> str:
-    """The folder of an image, or what is before the frame's number in its name."""
+    """Return the folder of an image, or else the part of its name before the frame number."""
     path = PurePosixPath(name.replace("\\", "/"))
     if path.parent.name:
         return path.parent.as_posix()
@@ -23,5 +24,5 @@ def camera_of(name: str) -> str:
 
 
 def is_camera_number(name: object) -> bool:
-    """``cam1``, in which the number is no frame's."""
+    """Whether a name is like ``cam1``, so that its number is the camera's and not the frame's."""
     return isinstance(name, str) and re.fullmatch(r"(cam|view)\D*\d+", name.lower()) is not None

@@ -1,11 +1,11 @@
-"""What is read from the files of others, as they wrote it: cameras, boxes, truth, pictures.
+"""The parsed content of files of other programs: cameras, boxes, truth, pictures.
 
-A piece holds what one file says and nothing that was guessed. What the file's format does
-not define (the unit of a translation, which way a pose leads, whether boxes are given by
-corners) is ``None``: it is found out from all pieces together, or told by who imports them.
+A piece has the content of one file without any guess. What the file's format does not define (the
+unit of a translation, the direction of a pose, whether boxes are given by corners) is ``None``: it
+is estimated from all pieces together, or stated by the user.
 
-Pixels have their origin at the centre of the top-left pixel; a reader of a format that puts
-it at the pixel's corner takes the half pixel off.
+The origin of pixels is the centre of the top-left pixel; readers of formats with the origin at the
+pixel's corner subtract half a pixel.
 """
 
 from __future__ import annotations
@@ -22,29 +22,31 @@ from numpy import ndarray
 Unit = Literal["m", "cm", "mm"]
 Direction = Literal["world-to-camera", "camera-to-world"]
 Axes = Literal["opencv", "opengl"]
-"""Of a camera: x right, y down, z ahead; or x right, y up, z back."""
+"""The axes of a camera: x right, y down, z ahead (OpenCV); or x right, y up, z back (OpenGL)."""
 Up = Literal["x", "y", "z", "-x", "-y", "-z"]
 Lens = Literal["pinhole", "rational", "fisheye"]
 Layout = Literal["ltwh", "xyxy", "cxcywh"]
-"""Of a box's four numbers: left, top, width, height; left, top, right, bottom; centre and size."""
+"""The meaning of a box's four numbers: left, top, width, height; left, top, right, bottom; or
+centre and size."""
 
 INVERSE = "-inverse"
-"""Behind the name of a product of turns: it leads into the camera."""
+"""The suffix of the name of an order of Euler angles whose rotation is inverted, so that it maps
+into the camera."""
 
 IN_DEGREES = " in degrees"
-"""Behind the name of a product of turns."""
+"""The suffix of the name of an order of Euler angles in degrees."""
 
 METRES: dict[Unit, float] = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 """Metres in one of each unit."""
 
 
 class FormatError(ValueError):
-    """A file cannot be read; the message names it and the field, expected, found, what to do."""
+    """A file cannot be read; the message names the file and the field, and says what to do."""
 
 
 @dataclass(frozen=True, slots=True)
 class Convention:
-    """How a format means its poses; None where it leaves it open."""
+    """The convention of a format's poses; None for what the format does not define."""
 
     unit: Unit | None = None
     direction: Direction | None = None
@@ -55,10 +57,10 @@ class Convention:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RawCamera:
-    """One camera as its file gives it; None where the file does not say.
+    """One camera as its file describes it; None for what the file does not state.
 
-    A file may hold the lens alone or the pose alone: pieces of the same camera are put together
-    by who collects them. ``projection`` stands in place of lens and pose.
+    A file may have the lens alone or the pose alone; pieces of the same camera are combined later.
+    ``projection`` replaces lens and pose.
     """
 
     name: str
@@ -71,14 +73,14 @@ class RawCamera:
     lens: Lens = "pinhole"
     rotation: Float[ndarray, "3 3"] | None = None
     translation: Float[ndarray, " 3"] | None = None
-    """As the file has it: t of ``x_camera = R x_world + t``, or the camera's place where the
-    direction is camera-to-world. In the convention's unit."""
+    """The translation as in the file, in the convention's unit: t of ``x_camera = R x_world + t``,
+    or the camera's position if the direction is camera-to-world."""
     convention: Convention = Convention()
     turns: Mapping[str, Float[ndarray, "3 3"]] = field(default_factory=lambda: MappingProxyType({}))
-    """Of a rotation given by angles all that it may be, by how these are composed; ``rotation`` is
-    the first of them."""
+    """For a rotation given by angles, all possible rotations by the name of the order of the
+    angles; ``rotation`` is the first of them."""
     projection: Float[ndarray, "3 4"] | None = None
-    """World (in the convention's unit) to pixels, up to scale."""
+    """The projection from world coordinates (in the convention's unit) to pixels, up to scale."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -92,46 +94,46 @@ class CalibrationPiece:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DetectionPiece:
-    """Boxes of one camera. D rows, in the file's order."""
+    """The D boxes of one camera, in the file's order."""
 
     source: Path
     format: str
     camera: str
-    """What the file or its name says of the camera; may be empty or a number."""
+    """The camera's name in the file or in the file's name; it may be empty or a number."""
     frames: Int[ndarray, " D"]
-    """As the file counts them."""
+    """The frame of each box, in the file's counting."""
     boxes: Float[ndarray, "D 4"]
-    """As the file has them, in ``layout``; left, top, width, height where it is None."""
+    """The boxes as in the file, in ``layout``; left, top, width, height if that is None."""
     scores: Float[ndarray, " D"]
-    """0 … 1; 1 where the file has none."""
+    """The score of each box, 0 … 1; 1 if the file has none."""
     layout: Layout | None = None
-    """None where the columns do not tell: four numbers that may be sizes or corners."""
+    """The meaning of the four numbers; None if the file does not tell sizes from corners."""
     normalised: bool | None = False
-    """Whether boxes are parts of the picture's size, not pixels."""
+    """Whether boxes are fractions of the picture's size rather than pixels."""
     first_index: Literal[0, 1] | None = None
-    """The number of the first frame; None where the format leaves it open."""
+    """The number of the first frame; None if the format does not define it."""
     last_frame: int | None = None
-    """The last frame that was looked at, where the file says so although nobody was seen in it."""
+    """The last frame that the detector processed, if the file states it though it has no box."""
     fps: float | None = None
-    """Frames a second, where the file has times."""
+    """The frame rate, if the file has times, 1/s."""
     keypoints: Float[ndarray, "D J 3"] | None = None
-    """x, y in pixels and confidence of J joints, NaN where not seen."""
+    """x, y in pixels and confidence of J joints; NaN for a joint that is not seen."""
     classes: tuple[str, ...] | None = None
-    """What each row is said to be."""
+    """The class of each row."""
     image_size: tuple[int, int] | None = None
-    """Width and height, where the file gives them."""
+    """Width and height of the pictures, if the file states them, pixels."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TruthPiece:
-    """Where people were. G rows."""
+    """The true positions of people, G rows."""
 
     source: Path
     format: str
     frames: Int[ndarray, " G"]
     ids: Int[ndarray, " G"]
     positions: Float[ndarray, "G 3"]
-    """In ``unit``; the third coordinate is NaN where the file gives a place on the floor."""
+    """Positions in ``unit``; the third coordinate is NaN if the file has places on the floor."""
     unit: Unit | None = None
     up: Up | None = None
     fps: float | None = None
@@ -149,7 +151,7 @@ class VideoPiece:
     size: tuple[int, int]
     """Width and height of a picture as it is decoded, pixels."""
     rotated: bool = False
-    """Whether the file tells players to turn its pictures (``size`` is after the turn)."""
+    """Whether the file asks players to rotate its pictures (``size`` is after the rotation)."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -158,20 +160,20 @@ class ImagesPiece:
 
     folder: Path
     files: tuple[Path, ...]
-    """In the order of their numbers."""
+    """The pictures in the order of their numbers."""
     size: tuple[int, int]
-    """Width and height of the first, pixels."""
+    """Width and height of the first picture, pixels."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TimesPiece:
-    """When one camera took its frames. F frames."""
+    """The times of one camera's F frames."""
 
     source: Path
     camera: str
-    """What the file says of the camera: the number of its port; may be empty."""
+    """The number of the camera's port in the file; it may be empty."""
     times: Float[ndarray, " F"]
-    """Seconds, ascending, from a beginning that all cameras share."""
+    """Times from a beginning that is common to all cameras, ascending, seconds."""
 
 
 Piece = CalibrationPiece | DetectionPiece | TruthPiece | VideoPiece | ImagesPiece | TimesPiece

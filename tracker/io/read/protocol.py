@@ -1,4 +1,4 @@
-"""What a format is: a module (or any object) that recognises its files and reads them."""
+"""The protocol of formats: a format is a module, or an object, that recognises and reads files."""
 
 from __future__ import annotations
 
@@ -13,38 +13,39 @@ Kind = Literal["calibration", "detections", "truth", "pictures", "time"]
 
 
 class Certainty(IntEnum):
-    """How sure a format is that a file is its own. The surest format reads the file."""
+    """How certain it is that a file has a format. The most certain format reads the file."""
 
     NO = 0
     POSSIBLE = 1
-    """The content could be of this format, and of others."""
+    """The content may be of this format, or of others."""
     LIKELY = 2
-    """The content has what is typical of the format."""
+    """The content is typical of the format."""
     SURE = 3
-    """The content says so itself."""
+    """The content states the format."""
 
 
 class Format(Protocol):
-    """One format. A laboratory adds its own by the entry point group ``multiview_phd.formats``."""
+    """One format. Plugins add formats by the entry point group ``multiview_phd.formats``."""
 
     NAME: str
-    """As it is shown: the program that writes it, and the kind of file."""
+    """The name for display: the program that writes the format, and the kind of file."""
     KIND: Kind
     SERIES: bool
-    """Whether one recording is a series of numbered files, which are read together."""
+    """Whether a recording may be a series of numbered files, which are read together."""
 
     def recognise(self, file: SourceFile) -> Certainty:
-        """Look at the content (``file.head``), never at the name alone. Must be quick.
+        """Judge by the content (``file.head``), and never by the name alone, in a short time.
 
         Raises:
-            FormatError: If it cannot be what it begins to be; the next format is asked then.
+            FormatError: If the beginning is of this format and the rest is not valid; the next
+                format is then tried.
         """
         ...
 
     def read(self, file: SourceFile) -> Iterable[Piece]:
-        """All pieces of the file, or of the series that it stands for.
+        """Read all pieces of the file, or of the series that it represents.
 
         Raises:
-            FormatError: In one sentence: file and field, expected, found, what to do.
+            FormatError: With a sentence that names the file and the field.
         """
         ...

@@ -1,4 +1,4 @@
-"""What people have and cannot be read: each is refused by its name, with what to do instead."""
+"""Known formats that are not read: each is named in the error, with what to do instead."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def _holds(pattern: str) -> Callable[[SourceFile], bool]:
 
 
 def _is_pickle(file: SourceFile) -> bool:
-    """Protocols 2 to 5 begin with their number."""
+    """Whether the file begins with the opcode and number of a pickle protocol, 2 to 5."""
     return re.match(rb"\x80[\x02-\x05]", file.head) is not None
 
 
@@ -38,7 +38,7 @@ def _is_motive(file: SourceFile) -> bool:
 
 
 def _is_dlt(file: SourceFile) -> bool:
-    """Eleven rows of a number a camera."""
+    """Whether the file has eleven rows with a number for each camera."""
     rows = file.head_text.split()
     widths = {row.count(",") for row in rows}
     return len(rows) == 11 and len(widths) == 1 and re.search("[A-Za-df-z]", "".join(rows)) is None
@@ -114,11 +114,12 @@ _ARCHIVE = _Refused(
 
 
 def refusal(file: SourceFile, complaint: FormatError | None = None) -> FormatError | None:
-    """What a file is that no format reads, and what to do; None where it is not known.
+    """Return the error that names the format of an unreadable file and what to do.
 
     Args:
-        file: Which no format reads.
-        complaint: What one of them said of it, who knows more than that it is an archive.
+        file: A file that no format reads.
+        complaint: The error of a format that recognised the beginning of the file; it is returned
+            if the file's format is not known here, and is preferred to its being an archive.
     """
     for one in (*_KNOWN, _ARCHIVE) if complaint is None else _KNOWN:
         if one.is_it(file):

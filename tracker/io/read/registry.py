@@ -1,4 +1,4 @@
-"""Every format that is read: one line each, and what is installed beside the program."""
+"""All formats that are read: those of this project, and those of plugins."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from tracker.io.read.calibration import (
     opencv,
     plain,
     projection,
+    qualisys,
     ros,
 )
-from tracker.io.read.calibration.capture import qualisys
 from tracker.io.read.calibration.datasets import middlebury, panoptic, tsai, voxelpose
 from tracker.io.read.calibration.reconstruction import (
     colmap,
@@ -27,9 +27,16 @@ from tracker.io.read.calibration.reconstruction import (
     nerfstudio,
     openmvg,
 )
-from tracker.io.read.detections import coco, motchallenge, nested, parquet, table, yolo
+from tracker.io.read.detections import (
+    coco,
+    motchallenge,
+    nested,
+    openpose,
+    parquet,
+    table,
+    yolo,
+)
 from tracker.io.read.detections.annotations import cvat, label_studio, labelme, via, voc
-from tracker.io.read.detections.poses import openpose
 from tracker.io.read.pictures import images, times, video
 from tracker.io.read.pieces import FormatError
 from tracker.io.read.protocol import Certainty, Format
@@ -39,7 +46,8 @@ from tracker.io.read.truth import panoptic as panoptic_skeletons
 from tracker.io.read.truth import trc, wildtrack
 
 GROUP = "multiview_phd.formats"
-"""Entry points: each names a module or object that is a :class:`Format`."""
+"""The group of entry points of plugins; each names a module or object that is a
+:class:`Format`."""
 
 FORMATS: tuple[Format, ...] = (
     opencv,
@@ -85,10 +93,10 @@ FORMATS: tuple[Format, ...] = (
 
 @cache
 def all_formats() -> tuple[Format, ...]:
-    """The program's own formats, and those of installed packages.
+    """Return this project's formats, and those of plugins.
 
     Raises:
-        FormatError: If an installed one is no format.
+        FormatError: If a plugin's entry point is not a format.
     """
     found: list[Format] = list(FORMATS)
     for point in entry_points(group=GROUP):
@@ -104,7 +112,13 @@ def all_formats() -> tuple[Format, ...]:
 
 
 def unforeseen(file: SourceFile, format_: Format, error: Exception) -> FormatError:
-    """What is said of a file over which a format's reader stumbled."""
+    """Return the error for an unexpected exception of a format's reader.
+
+    Args:
+        file: The file that was read.
+        format_: The format whose reader raised the exception.
+        error: The exception.
+    """
     words = " ".join(str(error).split()) or type(error).__name__
     return file.error(
         f"expected what {format_.NAME} has, found a value that cannot be read ({words[:200]}); "
@@ -115,11 +129,16 @@ def unforeseen(file: SourceFile, format_: Format, error: Exception) -> FormatErr
 def recognise(
     file: SourceFile, formats: Sequence[Format] | None = None
 ) -> tuple[Format | None, Certainty, FormatError | None]:
-    """The surest format of a file; of two that are as sure, the one registered last.
+    """Find the format of a file by the certainties of all formats.
+
+    Args:
+        file: The file.
+        formats: The formats to try; all if None.
 
     Returns:
-        The format, None where there is none; its certainty; and, where there is none, what
-        one of them said that saw the file begin as its own.
+        The format with the highest certainty, the last one of equals, or None; its certainty; and
+        if there is none, the error of a format that recognised the beginning of the file, or the
+        reason why files of its kind are not read.
     """
     best: tuple[Format | None, Certainty] = (None, Certainty.NO)
     complaint: FormatError | None = None
@@ -130,8 +149,7 @@ def recognise(
             complaint = complaint or error
             continue
         except Exception as error:
-            # whatever a reader, of this program or another package, does not foresee in a file
-            # says no more than that the file is not one of its own
+            # an unexpected exception of a reader means that the file is not of its format
             complaint = complaint or unforeseen(file, one, error)
             continue
         if certainty > Certainty.NO and certainty >= best[1]:

@@ -1,7 +1,7 @@
-"""One file to be recognised and read: its content on demand, within limits of size and depth.
+"""A file of another program: its content is parsed on demand, within limits of size and depth.
 
-Files come from anywhere. Whatever is read here is bounded in memory and time, executes
-nothing and follows no reference to another file; what breaks a limit is an error in one sentence.
+Files are not trusted. Reading is bounded in memory and time, executes nothing and follows no
+reference to another file; a file beyond a limit is an error with one sentence.
 """
 
 from __future__ import annotations
@@ -15,43 +15,45 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import yaml
+
 from tracker.files.text import not_utf_8
 from tracker.io.read.pieces import FormatError
-from tracker.io.read.yaml_text import parse_yaml
 
 HEAD_BYTES = 65536
-"""Read to recognise a file; a format shows itself within its first lines."""
+"""The number of bytes by which a file is recognised."""
 
 MOST_BYTES = 256 * 2**20
-"""A text table; an hour of a crowd in seven views takes some 100 MB."""
+"""Largest size of a text table, bytes; an hour of a crowd in seven views takes some 100 MB."""
 
 MOST_LINES = 10_000_000
-"""Of a text: each takes some fifty bytes more in memory than in the file."""
+"""Most lines of a text; each takes some fifty bytes more in memory than in the file."""
 
 MOST_TREE_BYTES = 64 * 2**20
-"""JSON and XML, which take about ten times their size in memory."""
+"""Largest size of JSON and XML, which take about ten times their size in memory, bytes."""
 
 MOST_CONFIGURATION_BYTES = 4 * 2**20
-"""TOML, YAML: calibrations, whose readers are slow."""
+"""Largest size of TOML and YAML, whose parsers are slow, bytes."""
 
 MOST_DEPTH = 100
-"""Levels of lists and tables within each other."""
+"""Deepest nesting of lists and tables."""
 
 
 _UTF16 = (b"\xff\xfe", b"\xfe\xff")
 _NOT_WRITTEN = re.compile(rb"[\x00-\x08\x0e-\x1f\x7f\x81\x8d\x8f\x90\x9d]")
-"""Bytes that stand for no sign in Windows' encoding of western Europe."""
+"""Bytes without a character in Windows' encoding of western Europe."""
 
 _MOST_FOREIGN = 0.2
-"""Share of a text's bytes that may be other than ASCII, where it is not UTF-8."""
+"""Largest share of bytes other than ASCII in a text that is not UTF-8."""
 
 
 def _encoding(data: bytes, *, whole: bool = False) -> str | None:
-    """How text is written: UTF-8, UTF-16 with its mark (Excel), or an older Windows' way.
+    """Return the encoding of a text: UTF-8, UTF-16 with byte-order mark (Excel), or that of older
+    Windows programs; None for binary data.
 
     Args:
         data: The file, or its beginning.
-        whole: Whether it is all of it, so that no sign can be cut in two.
+        whole: Whether the data is the whole file, so that no character is cut at its end.
     """
     if data.startswith(_UTF16):
         try:
@@ -76,12 +78,12 @@ class SourceFile:
     """One file, or a series of files whose names differ in a number only."""
 
     def __init__(self, path: Path, root: Path | None = None, series: tuple[Path, ...] = ()) -> None:
-        """Wrap a file; nothing is read yet.
+        """Wrap a file, which is read when its content is needed.
 
         Args:
-            path: The file; of a series the one that stands for all.
-            root: The folder that was asked for, which messages leave out.
-            series: All files of the series in the order of their numbers, this one among them.
+            path: The file, or the one that represents a series.
+            root: The folder to which paths in messages are relative.
+            series: All files of the series in the order of their numbers, this one included.
         """
         self.path = path
         self.series = series or (path,)
@@ -89,33 +91,33 @@ class SourceFile:
 
     @property
     def where(self) -> str:
-        """How messages call it."""
+        """The path of the file in messages."""
         if self._root is not None and self.path.is_relative_to(self._root):
             return self.path.relative_to(self._root).as_posix() or self.path.name
         return self.path.name
 
     def member(self, path: Path) -> SourceFile:
-        """Another file of the series or of the folder, by itself."""
+        """Return another file of the series or of the folder."""
         return SourceFile(path, self._root)
 
     @property
     def label(self) -> str:
-        """Folder and name without the suffix: what may name the camera."""
+        """Folder and name without the suffix, which may contain the camera's name."""
         return self.where.removesuffix(self.path.suffix)
 
     def error(self, message: str, field: str = "") -> FormatError:
-        """An error about the file or one field of it."""
+        """Return an error that names the file and, if given, a field of it."""
         return FormatError(f"{self.where}{', ' if field else ''}{field}: {message}")
 
     @cached_property
     def size(self) -> int:
-        """Bytes."""
+        """The size of the file, bytes."""
         return self.path.stat().st_size
 
     @cached_property
     def head(self) -> bytes:
         """The first bytes of the file."""
-        # several times faster than a stream, which counts where there are thousands of files
+        # several times faster than a stream, which matters for thousands of files
         try:
             descriptor = os.open(self.path, os.O_RDONLY | getattr(os, "O_BINARY", 0))
             try:
@@ -127,7 +129,7 @@ class SourceFile:
 
     @cached_property
     def is_text(self) -> bool:
-        """Whether the beginning is text in UTF-8, UTF-16 or Windows' own encoding."""
+        """Whether the beginning is text in a known encoding."""
         return _encoding(self.head) is not None
 
     @cached_property
@@ -137,10 +139,13 @@ class SourceFile:
         return "" if encoding is None else self.head.decode(encoding, errors="ignore")
 
     def bytes(self, most: int = MOST_BYTES) -> bytes:
-        """The whole file, at most so many bytes.
+        """Read the whole file.
+
+        Args:
+            most: Largest size, bytes.
 
         Raises:
-            FormatError: If it is larger or cannot be read.
+            FormatError: If the file is larger or cannot be read.
         """
         if self.size > most:
             raise self.error(
@@ -153,10 +158,13 @@ class SourceFile:
             raise self.error(f"cannot be read ({error.strerror})") from None
 
     def text(self, most: int = MOST_BYTES) -> str:
-        """The whole file as text.
+        """Read the whole file as text.
+
+        Args:
+            most: Largest size, bytes.
 
         Raises:
-            FormatError: If it is too large, has too many lines or is not text in UTF-8.
+            FormatError: If the file is too large, has too many lines or is not text.
         """
         data = self.bytes(most)
         count = data.count(b"\n")
@@ -176,7 +184,7 @@ class SourceFile:
             raise self.error(not_utf_8(error)) from None
 
     def lines(self) -> list[str]:
-        """The lines of a text file."""
+        """Read the lines of a text file."""
         return self.text().splitlines()
 
     @cached_property
@@ -200,7 +208,7 @@ class SourceFile:
 
     @cached_property
     def json_lines(self) -> list[Any] | None:
-        """The values of a file that has a JSON table on each line; None where it is no such file.
+        """The values of a file with a JSON object on each line; None for other files.
 
         Raises:
             FormatError: If a line is not JSON, or it is too large or too deep.
@@ -220,7 +228,7 @@ class SourceFile:
 
     @cached_property
     def xml(self) -> ElementTree.Element:
-        """The root of an XML file. Entities, which can make a small file endless, are refused.
+        """The root of an XML file. Entities, which can expand without limit, are refused.
 
         Raises:
             FormatError: If it is not XML, too large, too deep, or declares entities.
@@ -235,7 +243,7 @@ class SourceFile:
         depth = 0
         root: ElementTree.Element | None = None
         try:
-            # the declaration may name another encoding than the text has by now
+            # the declaration may name the encoding that the text had before it was decoded
             text = re.sub(r"^\s*<\?xml[^>]*\?>", "", text)
             for begin in range(0, len(text), HEAD_BYTES):
                 parser.feed(text[begin : begin + HEAD_BYTES])
@@ -272,7 +280,7 @@ class SourceFile:
 
     @cached_property
     def yaml(self) -> Any:
-        """The content of a YAML file; OpenCV's matrices come as tables of their fields.
+        """The content of a YAML file; OpenCV's matrices are mappings of their fields.
 
         Raises:
             FormatError: If it is not YAML, too large, too deep, or uses references.
@@ -291,3 +299,52 @@ class SourceFile:
 
     def _too_deep(self) -> FormatError:
         return self.error(f"has more than {MOST_DEPTH} levels of nesting; it is no data of ours")
+
+
+class _Loader(yaml.CSafeLoader):
+    """A loader of YAML that makes plain data alone, and of OpenCV's matrices mappings."""
+
+
+def _matrix(loader: yaml.CSafeLoader, node: yaml.Node) -> Any:
+    if not isinstance(node, yaml.MappingNode):
+        raise ValueError("is not valid YAML (an opencv-matrix must have rows, cols, dt and data)")
+    return loader.construct_mapping(node, deep=True)
+
+
+for _kind in ("opencv-matrix", "opencv-nd-matrix"):
+    _Loader.add_constructor(f"tag:yaml.org,2002:{_kind}", _matrix)
+
+
+def parse_yaml(text: str, most_depth: int = 100) -> Any:
+    """Parse the first document of a YAML text, as calibrations use it.
+
+    Args:
+        text: The text.
+        most_depth: Deepest nesting that is accepted.
+
+    Raises:
+        ValueError: If the text is not YAML, has references or unknown tags, or is nested too deep.
+    """
+    # OpenCV begins with "%YAML:1.0", which is not a valid directive
+    text = re.sub(r"\A%YAML[: ]\d\.\d\s*\n", "", text)
+    # older versions of OpenCV write no space after the colon of a key
+    text = re.sub(r"^(\s*\w+):(?=[^\s:/\\])", r"\1: ", text, flags=re.MULTILINE)
+    try:
+        depth = 0
+        for event in yaml.parse(text, Loader=yaml.CSafeLoader):
+            if isinstance(event, yaml.AliasEvent):  # nested references expand without limit
+                raise ValueError("uses YAML references (&name, *name), expected plain values")
+            depth += isinstance(event, yaml.CollectionStartEvent)
+            depth -= isinstance(event, yaml.CollectionEndEvent)
+            if depth > most_depth:
+                raise ValueError(f"has more than {most_depth} levels of nesting")
+        loader: Any = _Loader(text)
+        try:
+            return loader.get_data() if loader.check_data() else None
+        finally:
+            loader.dispose()
+    except yaml.YAMLError as error:
+        mark = getattr(error, "problem_mark", None)
+        place = f"line {mark.line + 1}: " if mark is not None else ""
+        problem = getattr(error, "problem", None) or "it cannot be parsed"
+        raise ValueError(f"{place}is not valid YAML ({problem})") from None

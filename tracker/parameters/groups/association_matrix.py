@@ -1,4 +1,4 @@
-"""Numbers of the single-view tracker by association matrices.
+"""Parameters of the single-view tracker by association matrices.
 
 [CMQ07] Chang, Ma, Qiao, "Human oriented multi-target tracking algorithm in video
 sequence", Control and Decision 22(4), 2007.

@@ -1,4 +1,4 @@
-"""Numbers of the single-view filter on colour.
+"""Parameters of the single-view GM-PHD filter on colour.
 
 [ZW21] Zhu, Wang, "3D target position tracking based on probability hypothesis
 density filtering", 2021.
@@ -123,7 +123,7 @@ class ColourPeakParams(Params):
 
     @property
     def asks_foreground(self) -> bool:
-        """Whether anything is made of the foreground."""
+        """Whether any parameter makes use of the foreground."""
         asked = (
             self.acceptance_foreground,
             self.foreground_weight,

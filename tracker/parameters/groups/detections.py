@@ -1,4 +1,4 @@
-"""Numbers of the single-view methods on an outside detector's boxes."""
+"""Parameters of the single-view methods on an outside detector's boxes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Numbers of the foreground: what in a picture is not the empty scene.
+"""Parameters of the foreground segmentation.
 
 [CMQ07] Chang, Ma, Qiao, "Human oriented multi-target tracking algorithm in video
 sequence", Control and Decision 22(4), 2007.
@@ -121,7 +121,7 @@ class ForegroundParams(Params):
 
     @property
     def read_by_colours(self) -> tuple[Reads, ...]:
-        """What a method on colour reads of the group: it asks for no pieces of the foreground,
-        which a learnt background has no least size of."""
+        """What a method on colour reads of this group. Such methods use the mask alone, not its
+        connected pieces; with a learnt background the least area of a piece has no effect on it."""
         without = frozenset({"minimum_area"}) if self.model == "learnt" else frozenset()
         return (Reads("foreground", without=without),)

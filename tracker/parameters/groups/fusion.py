@@ -1,4 +1,4 @@
-"""Numbers of the fusion of all cameras.
+"""Parameters of the fusion of all cameras.
 
 [ZW21] Zhu, Wang, "3D target position tracking based on probability hypothesis
 density filtering", 2021.
@@ -124,7 +124,7 @@ class FusionParams(Params):
     followed_margin: Annotated[
         float, Field(ge=0.0, le=5.0), ui("m_f", unit="m", step=0.05, published=0.6)
     ] = 0.5
-    """How far outside the room people are tracked, unreported, so that their boxes start nobody."""
+    """How far outside the room people are tracked, unreported, so their boxes start no track."""
 
     memory: Annotated[
         float, Field(ge=0.0, le=30.0), ui("t_m", unit="s", step=0.1, published=0.0, essential=True)
@@ -132,7 +132,7 @@ class FusionParams(Params):
     """How long a person whom no camera sees may be gone and still come back under the same id."""
 
     recognition: Annotated[bool, ui("π", published=False)] = True
-    """Multi-Bernoulli: whether colours say whose box it is, and give an id back to who has left."""
+    """Multi-Bernoulli: whether colours tell people apart, also when a person who left returns."""
 
     measurement_sigma: Annotated[float, Field(ge=0.1, le=10.0), ui("σ_v", step=0.1, log=True)] = 1.0
     """Factor on the noise that the single-view stage states for its boxes."""
@@ -204,7 +204,7 @@ class FusionParams(Params):
     memory_gate_probability: Annotated[
         float, Field(ge=0.1, le=0.9999), ui("P_m", step=0.01, advanced=True)
     ] = 0.9
-    """Probability that somebody who comes back lies within reach of where he should be."""
+    """Probability that a person who comes back is within the gate of the predicted position."""
 
     recognition_doubt: Annotated[
         float, Field(ge=0.0, le=1.0), ui("ε_r", step=0.01, advanced=True, when=_RECOGNITION)

@@ -1,4 +1,4 @@
-"""Numbers of the single-view tracker by joint probabilistic data association.
+"""Parameters of the single-view tracker by joint probabilistic data association.
 
 [WW10] Wang, Wan, "Fast tracking of multiple targets in video by joint probabilistic
 data association", patent CN101783020A, 2010.

@@ -1,4 +1,4 @@
-"""Numbers of the single-view method that runs a detection network."""
+"""Parameters of the single-view method that runs a detection network."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class OnnxDetectorParams(DetectionBoxParams):
     """What the network takes: 0 … 1 (YOLO, RT-DETR), ImageNet's (DETR), −1 … 1, or 0 … 255."""
 
 
-_PICTURES = Reads("pictures", without=frozenset({"steady_from"}))  # it knows no background
+_PICTURES = Reads("pictures", without=frozenset({"steady_from"}))  # needs no fixed background
 
 METHOD = Method(
     name="onnx_detector",

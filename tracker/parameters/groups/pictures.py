@@ -1,4 +1,4 @@
-"""Numbers of the pictures that stage 1 looks at: no larger than it needs, and upright."""
+"""Parameters of how pictures are prepared for stage 1: scaled, turned upright and stabilised."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Numbers of the particle filters on colour.
+"""Parameters of the particle filters on colour.
 
 [SG08] Sun, Guo, "Multiple object tracking with a pseudo particle filter", 2008. A field's
 ``published`` value makes the scheme of that paper: particles are drawn anew at a target's
@@ -192,7 +192,7 @@ class PseudoParticleParams(Params):
 
     @property
     def asks_foreground(self) -> bool:
-        """Whether anything is made of the foreground."""
+        """Whether any parameter makes use of the foreground."""
         asked = (self.foreground_weight, self.surroundings_weight, self.acceptance_foreground)
         return self.birth == "foreground" or max(asked) > 0.0
 

@@ -1,4 +1,4 @@
-"""Numbers of the single-view method that finds people by shape.
+"""Parameters of the single-view method that finds people by shape.
 
 [DTPB09] Dollár, Tu, Perona, Belongie, "Integral channel features", BMVC 2009.
 """
@@ -73,7 +73,8 @@ _TRACKING = frozenset(
         "confirmation_steps", "output", "longest_hidden", "same_size", "leap", "one_side",
     }
 )  # fmt: skip
-"""Of the association's numbers those that are about where measurements come from."""
+"""The parameters of the association that this method does not read: they are about how
+measurements are made."""
 
 METHOD = Method(
     name="shapes",

@@ -1,4 +1,4 @@
-"""Numbers of the smoothing over the whole recording."""
+"""Parameters of the smoothing over the whole recording."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from tracker.parameters.methods import Method, Reads, Uses
 
 
 class SmoothingParams(Params):
-    """Tracks settled with hindsight, over all steps: places, ends, gaps, who is who."""
+    """Smoothing of the tracks over all steps: positions, ends, gaps and identities."""
 
     iterations: Annotated[int, Field(ge=1, le=10), ui("n", step=1)] = 2
     """How often boxes are shared out anew by the smoothed tracks, and the tracks fitted to them."""
 
     learning: Annotated[bool, ui("s, b, f")] = True
-    """Whether people's heights and restlessness, the cameras' offsets and noise, and how low boxes
+    """Whether people's heights and process noise, the cameras' offsets and noise, and how low boxes
     lie against the templates are learnt."""
 
     memory: Annotated[float, Field(ge=0.05, le=10.0), ui("τ_z", unit="s", step=0.05, log=True)] = (
         0.25
     )
-    """Time within which boxes and misses of a camera repeat each other rather than tell anew."""
+    """Correlation time of a camera's boxes and misses: within it they repeat each other."""
 
     change: Annotated[float, Field(ge=0.0, le=20.0), ui("c", step=0.5)] = 4.0
-    """Log odds against a person's going away within a track, and against his coming back."""
+    """Log odds against a person's leaving within a track, and against a return."""
 
     reach: Annotated[float, Field(ge=0.0, le=10.0), ui("t_e", unit="s", step=0.1)] = 1.0
     """How far beyond its first and last box a track looks for more."""
@@ -44,16 +44,16 @@ class SmoothingParams(Params):
     """Identities: a track is cut where nobody saw it for longer."""
 
     longest: Annotated[float, Field(ge=0.1, le=60.0), ui("t_j", unit="s", step=0.5)] = 2.0
-    """Identities: pieces are joined by motion over gaps up to this; over longer ones by looks."""
+    """Identities: pieces are joined by motion over gaps up to this, by appearance over longer."""
 
     keeping: Annotated[float, Field(ge=0.0, le=20.0), ui("k", step=0.5)] = 2.0
-    """Identities: log odds with which the filter's label joins who is back after longer."""
+    """Identities: log odds with which the filter's label joins pieces over longer gaps."""
 
     rounds: Annotated[int, Field(ge=1, le=5), ui("n_i", step=1)] = 2
-    """Identities: how often who is who is settled, each time by the tracks of the time before."""
+    """Identities: how often they are resolved, each time from the tracks of the time before."""
 
     appearance: Annotated[float, Field(ge=0.0, le=5.0), ui("α", step=0.1)] = 1.0
-    """Identities: weight of what people look like; 0 leaves it out."""
+    """Identities: weight of the appearance; 0 leaves it out."""
 
 
 _IDENTITIES_ONLY = frozenset(
@@ -73,7 +73,7 @@ POSITIONS = Method(
 
 IDENTITIES = Method(
     name="identities",
-    help="Smoothed, and who is who settled over the whole recording.",
+    help="Smoothed, and identities resolved over the whole recording.",
     uses=Uses(reads=(Reads("smoothing"),)),
     settles_who=True,
 )

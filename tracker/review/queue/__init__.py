@@ -1,6 +1,6 @@
-"""Where a run may be wrong, the most at stake first: what a person should look at.
+"""The review queue: where a run may be wrong, ordered by the expected number of wrong steps.
 
-One file a source of doubt; :func:`tracker.review.queue.ranking.queue` has them all in one order.
+Each source of items has a module; :func:`tracker.review.queue.ranking.queue` orders all items.
 """
 
 from tracker.review.queue.item import Alternative, ReviewItem

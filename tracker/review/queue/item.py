@@ -1,4 +1,4 @@
-"""A doubtful place of a run: what is doubted, what depends on it, and what else it could be."""
+"""An item of the review queue: where a run may be wrong, and what may be true instead."""
 
 from __future__ import annotations
 
@@ -21,65 +21,72 @@ ItemKind = Literal[
 ]
 
 WITHIN = 0.5
-"""Of how far around its places nobody is: how near these keep to the course of who was nobody."""
+"""How close the places of a correction "nobody" follow the track that is removed, as a share of
+the correction's radius."""
 
-_UNSAID = datetime(2000, 1, 1, tzinfo=UTC)
-"""The time of what nobody said yet."""
+_UNMADE = datetime(2000, 1, 1, tzinfo=UTC)
+"""The time of a correction that is proposed and not made yet."""
 
 
 @dataclass(frozen=True, slots=True)
 class Alternative:
-    """What may be true at a doubtful place."""
+    """What may be true where a run may be wrong."""
 
     words: str
     probability: float
     corrections: tuple[Correction, ...]
-    """What somebody says who says that it is so."""
+    """The corrections that a person makes by choosing this alternative."""
 
 
 @dataclass(frozen=True, slots=True)
 class ReviewItem:
-    """One doubtful place."""
+    """One item of the queue: a place and time at which the run may be wrong."""
 
     kind: ItemKind
     title: str
     why: str
-    """One sentence."""
+    """The reason, in one sentence without a full stop."""
     first: int
-    """Steps, both included."""
+    """The first step that it concerns."""
     last: int
+    """The last step that it concerns, included."""
     tracks: tuple[int, ...]
-    """The run's ids of whom it is about."""
+    """The ids of the run's tracks that it concerns."""
     places: tuple[Place, ...]
     probability: float
-    """That the run is wrong here."""
+    """The probability that the run is wrong here."""
     stake: int
-    """Steps of tracks that depend on it."""
+    """The number of steps of tracks that are wrong if the run is wrong here."""
     alternatives: tuple[Alternative, ...]
-    """As it is, then what else it could be, the most probable first."""
+    """What may be true: the run's own answer, then all others, the most probable first."""
 
     @property
     def id(self) -> str:
-        """The same for the same place and people, whatever the run's numbers."""
-        said = [self.kind, *(f"{p.step} {p.x:.1f} {p.y:.1f}" for p in self.places)]
-        return hashlib.sha256("|".join(said).encode()).hexdigest()[:12]
+        """An id that depends on kind and places alone, not on the ids of tracks."""
+        parts = [self.kind, *(f"{p.step} {p.x:.1f} {p.y:.1f}" for p in self.places)]
+        return hashlib.sha256("|".join(parts).encode()).hexdigest()[:12]
 
     @property
     def weight(self) -> float:
-        """Steps that are expected to be wrong: what the queue is ordered by."""
+        """The expected number of wrong steps, by which the queue is ordered."""
         return self.probability * self.stake
 
 
 def proposed(kind: str, places: Iterable[Place], **values: Any) -> tuple[Correction, ...]:
-    """A correction that somebody may make; none where it could not be one."""
+    """Return the correction with these values as a tuple of one; empty if it is not valid."""
     try:
-        return (make(kind=kind, places=[tuple(p) for p in places], time=_UNSAID, **values),)
+        return (make(kind=kind, places=[tuple(p) for p in places], time=_UNMADE, **values),)
     except CorrectionError:
         return ()
 
 
 def confirmed(corrections: Iterable[Correction], note: str = "") -> tuple[Correction, ...]:
-    """What was only possible, said now."""
+    """Return proposed corrections as ones that are made now.
+
+    Args:
+        corrections: The proposed corrections.
+        note: The user's note; if empty, each keeps its own.
+    """
     now = datetime.now(UTC).replace(microsecond=0)
     return tuple(
         make(**{**one.model_dump(exclude={"id"}), "time": now, "note": note or one.note})
@@ -87,11 +94,11 @@ def confirmed(corrections: Iterable[Correction], note: str = "") -> tuple[Correc
     )
 
 
-class Lanes:
-    """A run's tracks one by one."""
+class TrackRows:
+    """The rows of a run's tracks, grouped by track."""
 
     def __init__(self, tracks: Trajectories) -> None:
-        """Sort them."""
+        """Group the rows by id; those of each track are in the order of steps."""
         self.tracks = tracks
         order = np.lexsort((tracks.frames, tracks.ids))
         self.ids, begins = np.unique(tracks.ids[order], return_index=True)
@@ -100,33 +107,40 @@ class Lanes:
         ) if len(order) else {}  # fmt: skip
 
     def span(self, track: int) -> tuple[int, int]:
-        """The first and the last step of a track."""
+        """Return the first and the last step of a track."""
         rows = self.rows[track]
         return int(self.tracks.frames[rows[0]]), int(self.tracks.frames[rows[-1]])
 
     def count(self, track: int, first: int = 0, last: int | None = None) -> int:
-        """How many steps of a track lie between two."""
+        """Count the steps of a track between two steps, both included."""
         frames = self.tracks.frames[self.rows[track]]
         end = len(frames) if last is None else int(np.searchsorted(frames, last, side="right"))
         return max(end - int(np.searchsorted(frames, first)), 0)
 
     def place(self, track: int, step: int, *, after: bool = False) -> Place:
-        """Where a track was at a step; where it is not there, at its last one before, or its first
-        one after."""
+        """Return the place of a track at a step.
+
+        Args:
+            track: The id of the track.
+            step: The step.
+            after: Which place is taken if the track has none at the step: the first one after it,
+                or (by default) the last one before it.
+        """
         rows = self.rows[track]
         frames = self.tracks.frames[rows]
         at = int(np.searchsorted(frames, step, side="left" if after else "right")) - (not after)
         return self.of_row(int(rows[min(max(at, 0), len(rows) - 1)]))
 
     def course(self, rows: Int[ndarray, " K"], within: float) -> tuple[Place, ...]:
-        """So few places of a track that the straight ways between them keep near it all along.
+        """Simplify a track to a few places, between which linear interpolation stays near it.
 
-        It is the polygon of Ramer, Douglas and Peucker in time: the place farthest from the way
-        from the first to the last, at its own step, is taken, and so on on both sides of it.
+        This is the algorithm of Ramer, Douglas and Peucker in time: the place with the largest
+        distance from the interpolation between the first and the last, at its own step, is kept,
+        and both parts are simplified in the same way.
 
         Args:
-            rows: Of the track, at least one, in the order of steps.
-            within: Metres on the ground.
+            rows: The rows of the track, at least one, in the order of steps.
+            within: Largest distance of the interpolation from the track, metres on the ground.
         """
         steps, ground = self.tracks.frames[rows], self.tracks.positions[rows, :2]
         chosen, parts = {0, len(rows) - 1}, [(0, len(rows) - 1)]
@@ -145,6 +159,6 @@ class Lanes:
         return tuple(self.of_row(int(rows[k])) for k in sorted(chosen))
 
     def of_row(self, row: int) -> Place:
-        """The place of a row."""
+        """Return the place of a row."""
         x, y, z = self.tracks.positions[row].tolist()
         return Place(int(self.tracks.frames[row]), x, y, z)

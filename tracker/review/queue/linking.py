@@ -1,4 +1,4 @@
-"""Doubts about who goes on as whom: moves from one way to link pieces to another."""
+"""Moves: changes of the run's links between pieces of tracks, at one place."""
 
 from __future__ import annotations
 
@@ -11,58 +11,62 @@ from tracker.review.queue.item import Alternative, ItemKind, proposed
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """A part of a track that is one person's."""
+    """A part of a track that follows one person (a tracklet)."""
 
     track: int
     begin: Place
     end: Place
     moment: int = -1
-    """The step at which it begins or ends, where a place of it is said that lies elsewhere."""
+    """The step at which the piece is linked, if its begin or end was moved to a clear place; −1
+    if it was not."""
 
     @property
     def last(self) -> int:
-        """The step up to which it is one person's, of one that goes on as another."""
+        """The last step of the piece, for one that is linked to a later piece."""
         return self.end.step if self.moment < 0 else self.moment
 
     @property
     def first(self) -> int:
-        """The step from which it is one person's, of one that others go on as."""
+        """The first step of the piece, for one that is linked to an earlier piece."""
         return self.begin.step if self.moment < 0 else self.moment
 
 
 @dataclass(frozen=True, slots=True)
 class Move:
-    """Other links than the run's, at one place: i → j' and i' → j, or no link at all."""
+    """A change of links at one place: instead of i → j and i' → j', i → j' and i' → j; or the
+    removal or addition of one link."""
 
     earlier: tuple[Piece, ...]
-    """i, then i' where there is one."""
+    """i, then i' if there is one."""
     later: tuple[Piece, ...]
-    """What they go on as now: j, then j'; for a join those that begin anew."""
+    """j, then j' if there is one: the pieces that i and i' are linked to in the run. For a join, j
+    is a piece that has no link to an earlier one."""
     kind: ItemKind
-    """exchange: both cross over; cut: i → j no more; join: i → j where both were free."""
+    """The kind of change: an exchange crosses both links over, a cut removes i → j, a join adds
+    i → j where both ends were free."""
     odds: float
-    """log of how much likelier than what the run has."""
+    """The log odds of the changed links against the run's."""
 
     why: str = ""
-    """In one sentence, where it is not what the odds of joining say."""
+    """The reason, in one sentence, if it is not the odds of the links."""
 
     @property
     def joins(self) -> bool:
-        """Whether it links what is linked to nothing."""
+        """Whether the move adds a link between free ends."""
         return self.kind == "join"
 
     def stake(self, heads: Many[float], tails: Many[float]) -> float:
-        """Steps that another person's track would get.
+        """Return the number of steps that get another identity by the move.
 
         Args:
-            heads: Steps that hang on each of the earlier.
-            tails: On each of the later.
+            heads: The number of steps that depend on each of the earlier pieces.
+            tails: The number of steps that depend on each of the later pieces.
         """
         return min(sum(heads), sum(tails))
 
     @property
     def alternative(self) -> Alternative:
-        """What somebody says who makes it; its probability is still to be found."""
+        """The alternative that makes this move, with its probability still at 0."""
         if len(self.earlier) == 1 and len(self.later) == 1:
             i, j = self.earlier[0], self.later[0]
             if self.joins:
@@ -70,15 +74,15 @@ class Move:
             return Alternative("two people", 0.0, proposed("different", (i.end, j.begin)))
         if len(self.earlier) == 2 and len(self.later) == 2:
             (i, other), (j, after) = self.earlier, self.later
-            told = proposed("exchanged", (i.end, other.end, after.begin, j.begin))
-            if not told:
-                told = (
+            exchange = proposed("exchanged", (i.end, other.end, after.begin, j.begin))
+            if not exchange:
+                exchange = (
                     *proposed("same", (i.end, after.begin)),
                     *proposed("same", (other.end, j.begin)),
                 )
             words = f"exchanged with {other.track if other.track != i.track else after.track}"
-            return Alternative(words, 0.0, told)
-        if len(self.earlier) == 2:  # j goes on from i', and i ends
+            return Alternative(words, 0.0, exchange)
+        if len(self.earlier) == 2:  # i' is linked to j, and i ends
             (_, other), (j,) = self.earlier, self.later
             return Alternative(_joined(other, j), 0.0, proposed("same", (other.end, j.begin)))
         (i,), (_, after) = self.earlier, self.later
@@ -86,7 +90,7 @@ class Move:
 
     @property
     def halves(self) -> tuple[Alternative, ...]:
-        """Of an exchange what somebody says who makes only one of its two links."""
+        """For an exchange, the alternatives that make only one of its two links; else none."""
         if len(self.earlier) < 2 or len(self.later) < 2:
             return ()
         (i, other), (j, after) = self.earlier, self.later

@@ -1,4 +1,5 @@
-"""Two people so near, or so alike to the cameras, that they may have been exchanged."""
+"""Moves at meetings: two people are so close, or their boxes so ambiguous, that their tracks may
+have been exchanged."""
 
 from __future__ import annotations
 
@@ -8,43 +9,45 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
-from tracker.review.queue.item import Lanes
+from tracker.review.queue.item import TrackRows
 from tracker.review.queue.linking import Move, Piece
 from tracker.runs.run import Run
 
 _CLOSE = 2.0
-"""Target widths within which two people are close."""
+"""Distance within which two people are close, in target widths."""
 
 _EXCHANGED = 0.12
-"""Probability, before anything is looked at, that two who touch are exchanged."""
+"""Prior probability that the tracks of two people who touch are exchanged."""
 
 _ALONE = 1.5
-"""Log odds by which it is rarer that of two who meet one goes on as the other and he as nobody."""
+"""Log odds against the half of an exchange, by which one track goes on as the other's person and
+the other track ends."""
 
 _TURN = 0.6
-"""Metres a second: standard deviation of how somebody's velocity changes while he meets another."""
+"""Standard deviation of the change of a person's velocity at a meeting, metres per second."""
 
 _STRIDE = 0.5
-"""Seconds before and after over which a velocity is taken."""
+"""Time before and after a meeting over which velocities are measured, seconds."""
 
 _MOST = 3.0
-"""Log odds that velocities add at most: their model is a rough one."""
+"""Largest log odds that velocities contribute, since their model is a rough one."""
 
 _EVEN = 0.3
-"""Share of two people's boxes that is drawn between them, from which on they are in doubt though
-they are not close."""
+"""Ambiguous share of two people's boxes (see :func:`draws`) from which they may be exchanged
+though they are not close."""
 
 
-def meetings(run: Run, lanes: Lanes) -> Iterator[Move]:
-    """Exchanges, and their halves, once for each time that two people meet.
+def meetings(run: Run, track_rows: TrackRows) -> Iterator[Move]:
+    """Yield the exchange, and its halves, for each time that two people meet.
 
-    The odds are those of a table by the distance, times how much likelier the exchange makes the
-    velocities before and after: with u and v those of the one relative to the other before and
-    after, and each one's change of velocity of N(0, σ² I),
+    The odds are a prior that depends on the distance, times the likelihood ratio of the velocities
+    before and after: with u and v the velocity of the one relative to the other before and
+    after, and changes of each one's velocity distributed as N(0, σ² I),
 
         log odds = −u · v / σ²
 
-    so who goes straight on stays himself, and two who seem to have turned back were exchanged.
+    so people who go straight on keep their identity, and two who seem to turn back at a meeting
+    were probably exchanged.
     """
     step_time = run.sequence.step_time
     width = 2.0 * float(run.sequence.target_half_extents[:2].mean())
@@ -55,18 +58,20 @@ def meetings(run: Run, lanes: Lanes) -> Iterator[Move]:
         for part in np.split(np.arange(len(met)), np.flatnonzero(np.diff(steps) > pause) + 1):
             nearest, apart = min((met[k] for k in part.tolist()), key=lambda at: at[1])
             first, last = int(steps[part[0]]) - 1, int(steps[part[-1]]) + 1
-            mine, theirs = (
-                Piece(track, lanes.place(track, last, after=True), lanes.place(track, first))
+            mine, its = (
+                Piece(
+                    track, track_rows.place(track, last, after=True), track_rows.place(track, first)
+                )
                 for track in (one, other)
             )
             draw = max(drawn.get((one, other, int(steps[k])), 0.0) for k in part.tolist())
             wrong = max(_EXCHANGED * float(np.exp(-apart / width)), 0.1 * (draw > _EVEN))
             odds = float(np.log(wrong) - np.log1p(-wrong))
-            odds += _straight_on(lanes, one, other, nearest, step_time)
+            odds += _straight_on(track_rows, one, other, nearest, step_time)
             why = f"{apart:.2f} m apart at step {nearest}"
             if draw > _EVEN:
                 why += f", and {100 * draw:.0f} % of their boxes fit either"
-            for i, j in ((mine, theirs), (theirs, mine)):
+            for i, j in ((mine, its), (its, mine)):
                 yield Move((i, j), (i, j), "crossing", odds, why)
                 yield Move((i,), (i, j), "crossing", odds - _ALONE, why)
 
@@ -74,7 +79,14 @@ def meetings(run: Run, lanes: Lanes) -> Iterator[Move]:
 def _near(
     run: Run, reach: float, drawn: dict[tuple[int, int, int], float]
 ) -> dict[tuple[int, int], list[tuple[int, float]]]:
-    """The steps at which two are near, or their boxes drawn between them, and how far apart."""
+    """Return for each pair of tracks the steps at which they are near, or their boxes ambiguous,
+    each with their distance in metres.
+
+    Args:
+        run: The run.
+        reach: Distance within which two tracks are near, metres.
+        drawn: The ambiguous shares, as returned by :func:`draws`.
+    """
     tracks = run.tracks
     found: dict[tuple[int, int], list[tuple[int, float]]] = {}
     for step in np.unique(tracks.frames).tolist():
@@ -88,12 +100,13 @@ def _near(
     return found
 
 
-def _straight_on(lanes: Lanes, one: int, other: int, step: int, step_time: float) -> float:
-    """Log odds of an exchange at a step by the velocities around it; 0 where they are not known."""
+def _straight_on(track_rows: TrackRows, one: int, other: int, step: int, step_time: float) -> float:
+    """Return the log odds of an exchange at a step by the velocities around it; 0 if a track is
+    too short for a velocity."""
     stride = max(round(_STRIDE / step_time), 1)
     relative: Float[ndarray, "3 2"] = np.zeros((3, 2))
     for k, at in enumerate((step - stride, step, step + stride)):
-        places = [lanes.place(track, at) for track in (one, other)]
+        places = [track_rows.place(track, at) for track in (one, other)]
         if any(place.step != at for place in places):
             return 0.0
         relative[k] = np.subtract(places[0][1:3], places[1][1:3])
@@ -102,13 +115,14 @@ def _straight_on(lanes: Lanes, one: int, other: int, step: int, step_time: float
 
 
 def draws(run: Run) -> dict[tuple[int, int, int], float]:
-    """How far the cameras' boxes could be either of two people's.
+    """Return the ambiguous share of the boxes of two tracks.
 
-    It is Σ_c Σ_z min(p_c(z | i), p_c(z | j)) over the cameras c that have boxes of theirs, divided
-    by their number, by the association probabilities p of the fusion.
+    It is Σ_c Σ_z min(p_c(z | i), p_c(z | j)) over the cameras c that have boxes of i or j, divided
+    by the number of these cameras, with the association probabilities p of the fusion.
 
     Returns:
-        By the ids of the two, the smaller first, and the step; who shares nothing is not there.
+        The share by the ids of the two tracks, the smaller first, and the step; pairs that share
+        no box are left out.
     """
     steps, labels, cameras, boxes, shares = _associated(run)
     if not len(steps):
@@ -122,9 +136,9 @@ def draws(run: Run) -> dict[tuple[int, int, int], float]:
     steps, cameras, boxes, shares, who = (
         column[order] for column in (steps, cameras, boxes, shares, who)
     )
-    looks: dict[tuple[int, int], set[int]] = {}
+    seen_by: dict[tuple[int, int], set[int]] = {}
     for step, track, camera in zip(steps.tolist(), who.tolist(), cameras.tolist(), strict=True):
-        looks.setdefault((step, track), set()).add(camera)
+        seen_by.setdefault((step, track), set()).add(camera)
     total: dict[tuple[int, int, int], float] = {}
     for lag in range(1, len(steps)):
         same = np.flatnonzero(
@@ -140,32 +154,32 @@ def draws(run: Run) -> dict[tuple[int, int, int], float]:
                 share = float(min(shares[k], shares[k + lag]))
                 total[a, b, step] = total.get((a, b, step), 0.0) + share
     return {
-        (a, b, step): share / len(looks[step, a] | looks[step, b])
+        (a, b, step): share / len(seen_by[step, a] | seen_by[step, b])
         for (a, b, step), share in total.items()
     }
 
 
 def _associated(run: Run) -> tuple[ndarray, ndarray, ndarray, ndarray, ndarray]:
-    """Step, label, camera, box and probability of every association."""
+    """Return step, label, camera, box and probability of every association, as columns."""
     each = [
         (step, result) for step, result in enumerate(run.fused) if len(result.associations.boxes)
     ]
     if not each:
         nothing = np.zeros(0, dtype=np.int64)
         return nothing, nothing, nothing, nothing, np.zeros(0)
-    told = [result.associations for _, result in each]
+    columns = [result.associations for _, result in each]
     return (
-        np.repeat([step for step, _ in each], [len(one.boxes) for one in told]),
+        np.repeat([step for step, _ in each], [len(one.boxes) for one in columns]),
         np.concatenate([result.posterior.labels[result.associations.components]
                         for _, result in each]),
-        np.concatenate([one.cameras for one in told]),
-        np.concatenate([one.boxes for one in told]),
-        np.concatenate([one.probabilities for one in told]),
+        np.concatenate([one.cameras for one in columns]),
+        np.concatenate([one.boxes for one in columns]),
+        np.concatenate([one.probabilities for one in columns]),
     )  # fmt: skip
 
 
 def _tracks_of(run: Run, steps: Int[ndarray, " A"], labels: Int[ndarray, " A"]) -> ndarray:
-    """The id of the track with a label at a step, -1 for none."""
+    """Return the id of the track that has each label at each step; −1 for none."""
     tracks = run.tracks
     own = np.flatnonzero(tracks.labels >= 0)
     if not len(own):

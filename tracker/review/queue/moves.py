@@ -1,5 +1,4 @@
-"""Other links between the pieces of a run: by the odds of its joining, and by what is likely of
-people who are lost from sight."""
+"""Moves by the costs of tracklet association, and by a model of people who are lost for a while."""
 
 from __future__ import annotations
 
@@ -8,46 +7,48 @@ from collections.abc import Iterator
 import numpy as np
 
 from tracker.corrections import Place
-from tracker.review.queue.item import Lanes
+from tracker.review.queue.item import TrackRows
 from tracker.review.queue.linking import Move, Piece
 from tracker.runs.run import Run
 from tracker.smoothing import names_of
 from tracker.smoothing.result import Joined
 
 _TEMPERED = 3.0
-"""What the odds of joins are divided by: their models take for independent what is not."""
+"""Divisor of the log odds of the association, whose model takes dependent boxes as independent."""
 
 _LONGEST = 20.0
-"""Seconds that somebody may be out of sight and come back, where no method says so itself."""
+"""Longest time that a lost person is expected to come back after, seconds."""
 
 _SPEED = 0.6
-"""Metres a second: standard deviation of where somebody goes who is out of sight."""
+"""Standard deviation of the velocity of a lost person, metres per second."""
 
 _NEAR = 0.4
-"""Metres: standard deviation of where somebody is at once."""
+"""Standard deviation of the place of a person that has just been lost, metres."""
 
 _EDGE = 0.5
-"""Metres from the room's sides within which people leave and come."""
+"""Distance from the room's sides within which people leave and come, metres."""
 
 _LEAVES_AT_AN_EDGE, _LEAVES_INSIDE = 0.9, 0.2
-"""How probable it is, before anything is looked at, that a track that ends there has left."""
+"""Prior probability that the person of a track has left where it ends, at a side or entrance of the
+room and inside."""
 
 _WORTH = -7.0
-"""log odds from which a move is worth a thought."""
+"""Least log odds of a move that is considered."""
 
 
-def pieces_of(run: Run, lanes: Lanes) -> tuple[list[Piece | None], Joined | None]:
-    """The pieces that the run's tracks were joined of; where it joined none, its tracks. So it is
-    while they are still the filter's, or those of another run that are shown meanwhile.
+def pieces_of(run: Run, track_rows: TrackRows) -> tuple[list[Piece | None], Joined | None]:
+    """Return the pieces that the smoothing linked to the run's tracks, and its link costs.
 
-    A piece of somebody who is not reported is None.
+    If no smoothing linked the tracks that the run has now (they may be the filter's, or those of
+    another run that are displayed until this one is computed), each track is one piece, and there
+    are no link costs. A piece whose track is not reported is None.
     """
     joined = None if run.smoothed is None else run.smoothed.joined
     if joined is None or run.smoothed is None:
-        return [_whole(lanes, int(track)) for track in lanes.ids], None
+        return [_whole(track_rows, int(track)) for track in track_rows.ids], None
     names = names_of(run.smoothed, run.tracks)
     if not names:
-        return [_whole(lanes, int(track)) for track in lanes.ids], None
+        return [_whole(track_rows, int(track)) for track in track_rows.ids], None
     found: list[Piece | None] = []
     for k, label in enumerate(joined.labels.tolist()):
         track = names.get(label)
@@ -61,17 +62,18 @@ def pieces_of(run: Run, lanes: Lanes) -> tuple[list[Piece | None], Joined | None
     return found, joined
 
 
-def _whole(lanes: Lanes, track: int) -> Piece:
-    rows = lanes.rows[track]
-    begin, end = lanes.of_row(int(rows[0])), lanes.of_row(int(rows[-1]))
+def _whole(track_rows: TrackRows, track: int) -> Piece:
+    rows = track_rows.rows[track]
+    begin, end = track_rows.of_row(int(rows[0])), track_rows.of_row(int(rows[-1]))
     return Piece(track, begin, end)
 
 
 def of_joining(pieces: list[Piece | None], joined: Joined) -> Iterator[Move]:
-    """Every way to link two or four ends otherwise, by the odds of the joining.
+    """Yield all changes of one or two links, by the gains of the tracklet association.
 
-    The run has the best of all ways; one step away from it are the exchange of two links, a link
-    that is cut, one between a free end and a free begin, and one that goes to a free one instead.
+    The run has the assignment of the largest gain. Its neighbours are the exchange of two links,
+    the cut of a link, a link between a free end and a free begin, and a link that goes to a free
+    begin or end instead.
     """
     gains = {
         (i, j): g
@@ -83,7 +85,7 @@ def of_joining(pieces: list[Piece | None], joined: Joined) -> Iterator[Move]:
     births, deaths = joined.births, joined.deaths
 
     def has(i: int) -> float:
-        """The odds of how a piece goes on now."""
+        """Return the gain of how a piece is continued in the run."""
         j = following.get(i, -1)
         return float(deaths[i]) if j < 0 else gains.get((i, j), float(deaths[i] + births[j]))
 
@@ -99,7 +101,7 @@ def of_joining(pieces: list[Piece | None], joined: Joined) -> Iterator[Move]:
         if after is not None and earlier is not None:
             if (pred, now) not in gains:
                 odds += float(deaths[pred] + births[now])
-                # the two that are left over end and begin
+                # the two pieces that remain end and begin
             else:
                 odds += gains[pred, now]
             move = Move((one, earlier), (after, other), "exchange", odds / _TEMPERED)
@@ -123,7 +125,7 @@ def of_joining(pieces: list[Piece | None], joined: Joined) -> Iterator[Move]:
 
 
 def _links(pieces: list[Piece | None], joined: Joined) -> tuple[dict[int, int], dict[int, int]]:
-    """Which piece follows which, and which comes before which."""
+    """Return the index of the next piece of each piece in its track, and of the previous one."""
     following: dict[int, int] = {}
     latest: dict[int, int] = {}
     for k in np.argsort(joined.firsts, kind="stable").tolist():
@@ -136,24 +138,25 @@ def _links(pieces: list[Piece | None], joined: Joined) -> tuple[dict[int, int], 
     return following, {j: i for i, j in following.items()}
 
 
-def of_the_lost(run: Run, lanes: Lanes, known: set[tuple[Place, Place]]) -> Iterator[Move]:
-    """Tracks that end and others that begin later, near enough to be one person's.
+def of_the_lost(run: Run, track_rows: TrackRows, known: set[tuple[Place, Place]]) -> Iterator[Move]:
+    """Yield joins of tracks that end with tracks that begin later near by.
 
-    With p_i that who is lost at the end of i has left, the room's area A, and where he would be
-    after a while N(x; x_i, S), i goes on as j with the odds
+    Let p_i be the probability that the person of track i has left where it ends, A the area of the
+    room, and N(x; x_i, S) the density of the place of a lost person after the gap. The odds that j
+    is the continuation of i are
 
         (1 − p_i) N(x_j; x_i, S) / [p_i / A + Σ_{k≠j} (1 − p_i) N(x_k; x_i, S)]
 
-    and likewise seen from j; the smaller of both counts.
+    and likewise with i and j exchanged; the smaller of both counts.
 
     Args:
-        run: Whose room and steps.
-        lanes: Its tracks.
-        known: Pairs of places that have odds already.
+        run: The run.
+        track_rows: Its tracks.
+        known: Pairs of end and begin for which there is a move already.
     """
     sequence = run.sequence
     area = float(np.prod((sequence.room.maximum - sequence.room.minimum)[:2]))
-    whole = [_whole(lanes, int(track)) for track in lanes.ids]
+    whole = [_whole(track_rows, int(track)) for track in track_rows.ids]
     ends = [one for one in whole if one.end.step < sequence.frames - 1]
     begins = [one for one in whole if one.begin.step > 0]
     if not ends or not begins:
@@ -182,7 +185,7 @@ def of_the_lost(run: Run, lanes: Lanes, known: set[tuple[Place, Place]]) -> Iter
 
 
 def ends_there(place: Place, run: Run) -> float:
-    """How probable it is that people leave, or come, at a place."""
+    """Return the prior probability that people leave, or come, at a place."""
     point, low, high = place.point, run.sequence.room.minimum, run.sequence.room.maximum
     margin = float(np.minimum(point - low, high - point)[:2].min())
     entrances = run.sequence.room.entrances

@@ -1,4 +1,4 @@
-"""The doubtful places of a run in one order: how probable a mistake is, times what is at stake."""
+"""The order of the review queue: the probability of a mistake, times the steps at stake."""
 
 from __future__ import annotations
 
@@ -7,53 +7,57 @@ from collections.abc import Sequence as Many
 from dataclasses import dataclass, replace
 
 import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
 
 from tracker.corrections import Correction, Place
 from tracker.corrections.kinds import Kind, leeway
 from tracker.fusion.trajectories import Trajectories
-from tracker.review.queue import alone, moves
-from tracker.review.queue.clear import Clear
-from tracker.review.queue.edges import of_edges
-from tracker.review.queue.item import Alternative, Lanes, ReviewItem, proposed
+from tracker.review.queue import moves, single_tracks
+from tracker.review.queue.clear_places import ClearPlaces
+from tracker.review.queue.item import Alternative, ReviewItem, TrackRows, proposed
 from tracker.review.queue.linking import Move
 from tracker.review.queue.meetings import meetings
-from tracker.review.queue.opinion import Opinion
-from tracker.review.queue.trust import Trust
-from tracker.review.queue.words import words_of
+from tracker.review.queue.other_run import OtherRun
+from tracker.review.queue.track_ends import track_ends
 from tracker.runs.run import Run
 
 MOST = 200
-"""Doubtful places that are told; who has answered so many asks again."""
+"""Most items of a queue; after so many answers it is computed again."""
 
 _ALTERNATIVES = 4
-"""Told of each place, beside what the run has and what is never left out."""
+"""Most alternatives of an item, beside the run's own answer and those that are always added."""
 
 _HALF = 0.1
-"""Of the probability of an exchange, that only one of the two goes on as the other."""
+"""Probability of each half of an exchange, as a share of that of the exchange."""
 
 LEAST = 1.0
-"""Steps expected to be wrong, below which a place is not told: nobody needs to look."""
+"""Least expected number of wrong steps of an item that is worth a review."""
 
 _SAME_MOMENT = 1.0
-"""Seconds within which what is asked of the same two people is one place."""
+"""Time within which items on the same two tracks are one, seconds."""
 
 _NEAR = 0.5
-"""Metres on the ground within which a place that was answered is the same."""
+"""Distance within which an item's place and that of a correction are the same, metres on the
+ground."""
 
 _ROUNDED = 1e-3
-"""Metres within which a place is the one that a correction was made of."""
+"""Difference between a place and the same one as a correction states it (rounded), metres."""
+
+_CERTAIN = 0.95
+"""Largest probability of a mistake that counts, so that no step is without any dependence."""
 
 
 @dataclass(frozen=True, slots=True)
 class Queue:
-    """What to look at."""
+    """The items to review."""
 
-    doubts: tuple[ReviewItem, ...]
-    """The most at stake first."""
+    items: tuple[ReviewItem, ...]
+    """The items, by the expected number of wrong steps."""
     answered: int
-    """Doubtful places that corrections settle already."""
+    """The number of items that corrections have answered already."""
     how: str
-    """By what it was judged."""
+    """The evidence that the items are based on, in words."""
 
 
 def queue(
@@ -61,73 +65,74 @@ def queue(
     backwards: Trajectories | None = None,
     corrections: Many[Correction] | None = None,
 ) -> Queue:
-    """The doubtful places of a run, but for those that its corrections settle.
+    """Return the review queue of a run, without items that corrections have answered.
 
     Args:
-        run: With all its steps, or as far as it is.
-        backwards: The tracks of the recording seen backwards in time, where that was made.
-        corrections: By which a place is settled; those of the run, if none.
+        run: The run, complete or not.
+        backwards: The tracks of a run backwards in time, if there is one.
+        corrections: The corrections that answer items; the run's own if None.
     """
-    said = run.corrections if corrections is None else corrections
+    made = run.corrections if corrections is None else corrections
     run = run.still()
-    lanes = Lanes(run.tracks)
+    track_rows = TrackRows(run.tracks)
     if not len(run.tracks):
         return Queue((), 0, "nobody is tracked")
-    linked = list(_linked(run, lanes, backwards))
+    linked = list(_linked(run, track_rows, backwards))
     asked = {place for one in linked for place in one.places}
-    found = [*linked, *alone.of_tracks(run, lanes), *of_edges(run, lanes, asked)]
+    found = [*linked, *single_tracks.items(run, track_rows), *track_ends(run, track_rows, asked)]
     ordered = sorted(found, key=lambda one: (-one.weight, one.first, one.id))
     steps = leeway(run.sequence.step_time)
-    parted, somebody = _parted_by(run), _somebody(run)
-    told: list[ReviewItem] = []
+    parted, people = _parted_by(run), _people(run)
+    items: list[ReviewItem] = []
     answered = 0
     for one in once_each(ordered, round(_SAME_MOMENT / run.sequence.step_time)):
         known = one.kind == "join" and parted(*one.tracks[:2])
-        known = known or (one.kind == "short" and one.tracks[0] in somebody)
-        if known or settled(one, said, steps):
+        known = known or (one.kind == "short" and one.tracks[0] in people)
+        if known or is_answered(one, made, steps):
             answered += 1
-        elif len(told) < MOST:
-            told.append(one)
+        elif len(items) < MOST:
+            items.append(one)
     how = "the odds of joining pieces" if _joins(run) else "where tracks end and begin"
     if backwards is not None:
         how += ", and what the recording says seen backwards in time"
     how += f"; less than {LEAST:.0f} step expected to be wrong is left out"
-    return Queue(tuple(told), answered, how)
+    return Queue(tuple(items), answered, how)
 
 
 def _parted_by(run: Run) -> Callable[[int, int], bool]:
-    """Whether somebody said that a track does not go on as another: that they are two people's,
-    wherever along them, or that the one left or the other came in."""
-    obeyed = _obeyed(run)
-    parted = {frozenset(tracks) for kind, tracks in obeyed if kind == "different"}
-    left = {track for kind, tracks in obeyed if kind == "left" for track in tracks}
-    came = {track for kind, tracks in obeyed if kind == "came" for track in tracks}
+    """Return a function that tells whether corrections rule out a join of two tracks: that they
+    are different people, or that the one left or the other came in."""
+    applied = _applied(run)
+    parted = {frozenset(tracks) for kind, tracks in applied if kind == "different"}
+    left = {track for kind, tracks in applied if kind == "left" for track in tracks}
+    came = {track for kind, tracks in applied if kind == "came" for track in tracks}
     return lambda one, other: one in left or other in came or frozenset((one, other)) in parted
 
 
-def _somebody(run: Run) -> set[int]:
-    """The tracks of whom something was said that is said of people alone."""
-    said = ("here", "name", "came", "left", "same")
-    return {track for kind, tracks in _obeyed(run) if kind in said for track in tracks}
+def _people(run: Run) -> set[int]:
+    """Return the tracks that corrections declare to be people."""
+    kinds = ("here", "name", "came", "left", "same")
+    return {track for kind, tracks in _applied(run) if kind in kinds for track in tracks}
 
 
-def _obeyed(run: Run) -> list[tuple[Kind | None, tuple[int, ...]]]:
-    """Kind and tracks of each correction that is met."""
+def _applied(run: Run) -> list[tuple[Kind | None, tuple[int, ...]]]:
+    """Return kind and tracks of each correction that is met."""
     kinds = {one.id: one.kind for one in run.corrections}
     return [(kinds.get(one.id), one.tracks) for one in run.outcomes if one.met]
 
 
 def once_each(ordered: Iterable[ReviewItem], pause: int) -> Iterable[ReviewItem]:
-    """What is worth a look, each place once: an exchange is found from either side.
+    """Yield the items that are worth a review, without duplicates: an exchange is found for
+    either track.
 
     Args:
-        ordered: The most at stake first.
-        pause: Steps within which two moments of the same two people are one.
+        ordered: The items, by the expected number of wrong steps.
+        pause: The number of steps within which two items on the same two tracks are one.
     """
     known: set[object] = set()
     moments: dict[frozenset[int], list[tuple[int, int]]] = {}
     for one in ordered:
-        same = frozenset(pair for told in one.alternatives[1].corrections for pair in told.pairs)
+        same = frozenset(pair for made in one.alternatives[1].corrections for pair in made.pairs)
         if one.weight < LEAST or one.id in known or (same and same in known):
             continue
         if len(one.tracks) == 2:
@@ -144,29 +149,31 @@ def _joins(run: Run) -> bool:
     return run.smoothed is not None and run.smoothed.joined is not None
 
 
-def _linked(run: Run, lanes: Lanes, backwards: Trajectories | None) -> Iterable[ReviewItem]:
-    """Doubts about who goes on as whom: the moves, gathered by the place they change."""
-    pieces, joined = moves.pieces_of(run, lanes)
+def _linked(
+    run: Run, track_rows: TrackRows, backwards: Trajectories | None
+) -> Iterable[ReviewItem]:
+    """Return items on identities: all moves, grouped by the place that they change."""
+    pieces, joined = moves.pieces_of(run, track_rows)
     every: list[Move] = [] if joined is None else list(moves.of_joining(pieces, joined))
     known = {(move.earlier[0].end, move.later[-1].begin) for move in every}
-    every += moves.of_the_lost(run, lanes, known)
-    every += alone.moves(run, lanes)
-    every += meetings(run, lanes)
+    every += moves.of_the_lost(run, track_rows, known)
+    every += single_tracks.moves(run, track_rows)
+    every += meetings(run, track_rows)
     step_time = run.sequence.step_time
-    opinion = None if backwards is None else Opinion(run.tracks, backwards, step_time)
-    if opinion is not None:
-        every += opinion.moves()
+    other = None if backwards is None else OtherRun(run.tracks, backwards, step_time)
+    if other is not None:
+        every += other.moves()
     width = 2.0 * float(run.sequence.target_half_extents[:2].mean())
-    clear = Clear(lanes, step_time, width)
+    clear = ClearPlaces(track_rows, step_time, width)
     every = [clear.move(move) for move in every]
-    if opinion is not None:
-        every = [opinion.weighed(move) for move in every]
+    if other is not None:
+        every = [other.weighed(move) for move in every]
     by_site: dict[tuple[int, Place], list[Move]] = {}
     for move in every:
         by_site.setdefault((move.earlier[0].track, move.earlier[0].end), []).append(move)
     sites = [_Site.of(moves) for moves in by_site.values()]
     trust = Trust(
-        lanes,
+        track_rows,
         (
             (one.move.earlier[0].track, one.move.earlier[0].last,
              one.move.later[0].first, one.wrong)
@@ -175,25 +182,26 @@ def _linked(run: Run, lanes: Lanes, backwards: Trajectories | None) -> Iterable[
         ),
     )  # fmt: skip
     for one in sites:
-        doubt = _doubt_of(run, one, trust)
-        if doubt is not None:
-            yield doubt
+        item = _item_of(run, one, trust)
+        if item is not None:
+            yield item
 
 
 @dataclass(frozen=True, slots=True)
 class _Site:
-    """One moment of a track, and the ways in which it may be otherwise."""
+    """One moment of a track, and the moves by which it may be changed."""
 
     moves: tuple[Move, ...]
-    """The most probable first, one for each thing that may be said."""
+    """The moves, the most probable first, one for each set of corrections."""
     alternatives: tuple[Alternative, ...]
+    """The alternative of each move, with its probability."""
     wrong: float
-    """Probability that it is otherwise."""
+    """The probability that the run is wrong at this moment."""
 
     @property
     def move(self) -> Move:
-        """The one by which the moment is told: the most probable, but where that only says that a
-        track is two people, the exchange that would explain it."""
+        """The move that describes the item: the most probable one; if that is a cut, the exchange
+        that would explain it, if any."""
         best = self.moves[0]
         if best.kind != "cut":
             return best
@@ -201,28 +209,30 @@ class _Site:
 
     @staticmethod
     def of(moves: list[Move]) -> _Site:
-        """What several sources say of one moment: of each way the one that thinks it likeliest."""
+        """Combine the moves of several sources at one moment: of those with the same corrections
+        the most probable one counts."""
         chosen: dict[object, Move] = {}
         for move in sorted(moves, key=lambda move: -move.odds):
             chosen.setdefault(move.alternative.corrections, move)
         kept = tuple(chosen.values())
         weights = np.exp(np.minimum([move.odds for move in kept], 50.0))
         total = 1.0 + float(weights.sum())
-        told = tuple(
+        alternatives = tuple(
             replace(move.alternative, probability=weight / total)
             for move, weight in zip(kept, weights.tolist(), strict=True)
         )
-        return _Site(kept, told, float(weights.sum()) / total)
+        return _Site(kept, alternatives, float(weights.sum()) / total)
 
 
-def _doubt_of(run: Run, site: _Site, trust: Trust) -> ReviewItem | None:
+def _item_of(run: Run, site: _Site, trust: Trust) -> ReviewItem | None:
+    """Return the item of a moment; None if no move can be expressed by corrections."""
     best = site.move
     now = Alternative("as it is", 1.0 - site.wrong, _as_it_is(best))
     others = [one for one in site.alternatives if one.corrections][:_ALTERNATIVES]
     others = [one for one in others if one.corrections != now.corrections]
     if not others:
         return None
-    others = _with_nobody_of_them(best, now, _with_halves(site.moves, others))
+    others = _with_none_of_them(best, now, _with_halves(site.moves, others))
     shares = np.array([one.probability for one in site.alternatives])
     stakes = [
         move.stake(
@@ -243,7 +253,7 @@ def _doubt_of(run: Run, site: _Site, trust: Trust) -> ReviewItem | None:
 
 
 def _with_halves(moves: Iterable[Move], others: list[Alternative]) -> list[Alternative]:
-    """The likeliest exchange also as each of its halves: of two who met, one may have left."""
+    """Add the halves of the most probable exchange: one of two people who met may have left."""
     words = {move.alternative.corrections: move.halves for move in moves}
     for place, one in enumerate(others):
         if one.corrections[0].kind == "exchanged":
@@ -258,19 +268,19 @@ def _with_halves(moves: Iterable[Move], others: list[Alternative]) -> list[Alter
     return others
 
 
-def _with_nobody_of_them(
+def _with_none_of_them(
     move: Move, now: Alternative, others: list[Alternative]
 ) -> list[Alternative]:
-    """Where people go on: that it is none of those who are told.
+    """Add the alternative that the person is continued by none of the tracks in question.
 
-    Who says so parts somebody from everybody he may have been.
+    Its corrections state that the person is different from each of these.
     """
     first, last = move.earlier[0].end, move.later[0].begin
     pairs = dict.fromkeys(
         (a, b)
         for one in (now, *others)
-        for told in one.corrections
-        for a, b in told.pairs
+        for made in one.corrections
+        for a, b in made.pairs
         if _is(a, first) or _is(b, last)
     )
     apart = [one for pair in pairs for one in proposed("different", pair)]
@@ -284,13 +294,15 @@ def _with_nobody_of_them(
     return sorted([*rest, none], key=lambda one: -one.probability)
 
 
-def _is(said: Place, place: Place) -> bool:
-    """Whether what is said is said of a place: a correction rounds it."""
-    return said.step == place.step and bool(np.allclose(said.point, place.point, atol=_ROUNDED))
+def _is(rounded: Place, place: Place) -> bool:
+    """Whether the place in a correction, which is rounded, is a certain place."""
+    return rounded.step == place.step and bool(
+        np.allclose(rounded.point, place.point, atol=_ROUNDED)
+    )
 
 
 def _as_it_is(move: Move) -> tuple[Correction, ...]:
-    """What somebody says who says that the run is right."""
+    """Return the corrections that confirm the run's own links."""
     if move.joins:
         return proposed("different", (move.earlier[0].end, move.later[0].begin))
     if len(move.earlier) == 2 and len(move.later) == 1:
@@ -302,13 +314,13 @@ def _as_it_is(move: Move) -> tuple[Correction, ...]:
     )
 
 
-def settled(doubt: ReviewItem, corrections: Many[Correction], steps: int) -> bool:
-    """Whether what somebody said speaks of the people of a doubtful place there.
+def is_answered(item: ReviewItem, corrections: Many[Correction], steps: int) -> bool:
+    """Whether a correction concerns the people of an item at its place and time.
 
     Args:
-        doubt: The place.
-        corrections: What was said.
-        steps: Within which a step is the same.
+        item: The item.
+        corrections: The corrections that were made.
+        steps: Largest difference between steps that are the same, as a number of steps.
     """
 
     def near(one: Place, other: Place) -> bool:
@@ -321,20 +333,121 @@ def settled(doubt: ReviewItem, corrections: Many[Correction], steps: int) -> boo
         if one.kind in ("name", "checked"):
             if one.kind == "checked":
                 first, last = one.steps
-                if first <= doubt.first and doubt.last <= last:
+                if first <= item.first and item.last <= last:
                     return True
             continue
-        for alternative in doubt.alternatives:
+        for alternative in item.alternatives:
             for own in alternative.corrections:
                 if own.kind in ("same", "different", "exchanged") and one.kind in (
                     "same", "different", "exchanged",
                 ):  # fmt: skip
                     pairs = (*own.pairs, *own.apart)
-                    theirs = (*one.pairs, *one.apart)
-                    if any(near(a, c) and near(b, d) for a, b in pairs for c, d in theirs):
+                    others = (*one.pairs, *one.apart)
+                    if any(near(a, c) and near(b, d) for a, b in pairs for c, d in others):
                         return True
                 elif own.kind == one.kind and any(
                     near(a, c) for a in own.places for c in one.places
                 ):
                     return True
     return False
+
+
+class Trust:
+    """The expected number of steps of a track that have the same identity as a given step.
+
+    With p_m the probability of a mistake at moment m, the expected number of rows r before step s
+    that have its identity is Σ_r Π_{m between r and s} (1 − p_m); likewise after it. So a mistake
+    costs little right after another probable mistake.
+    """
+
+    def __init__(
+        self, track_rows: TrackRows, mistakes: Iterable[tuple[int, int, int, float]]
+    ) -> None:
+        """Collect the probabilities of mistakes along each track.
+
+        Args:
+            track_rows: The tracks of the run.
+            mistakes: Track, last step before and first step after a possible mistake, and its
+                probability.
+        """
+        self._track_rows = track_rows
+        self._logs: dict[int, Float[ndarray, " K"]] = {}
+        for track, before, after, probability in mistakes:
+            rows = track_rows.rows[track]
+            logs = self._logs.setdefault(track, np.zeros(len(rows)))
+            frames = track_rows.tracks.frames[rows]
+            at = int(np.searchsorted(frames, (before + after + 1) // 2))
+            if 0 < at < len(rows):
+                logs[at] += np.log1p(-min(probability, _CERTAIN))
+
+    def before(self, track: int, step: int) -> float:
+        """Return the expected number of steps up to a step, which is included."""
+        frames = self._track_rows.tracks.frames[self._track_rows.rows[track]]
+        count = int(np.searchsorted(frames, step, side="right"))
+        logs = self._logs.get(track)
+        if logs is None or not count:
+            return float(count)
+        between = np.cumsum(logs[1:count][::-1])  # from the step backwards
+        return 1.0 + float(np.exp(between).sum())
+
+    def after(self, track: int, step: int) -> float:
+        """Return the expected number of steps from a step on, which is included."""
+        frames = self._track_rows.tracks.frames[self._track_rows.rows[track]]
+        first = int(np.searchsorted(frames, step))
+        logs = self._logs.get(track)
+        if logs is None or first >= len(frames):
+            return float(len(frames) - first)
+        return 1.0 + float(np.exp(np.cumsum(logs[first + 1 :])).sum())
+
+
+def words_of(run: Run, move: Move) -> tuple[str, str]:
+    """Return the title of a move's item, and the reason as a sentence without a full stop."""
+    i, j = move.earlier[0], move.later[-1]
+    far = _far(run, i.track, j.track, i.last, j.first)
+    if move.kind == "gap":
+        seconds = (j.first - i.last) * run.sequence.step_time
+        return f"{i.track} is gone for {seconds:.1f} s", move.why
+    if move.kind == "fast":
+        return f"{i.track} jumps", move.why
+    if move.kind == "crossing":
+        return f"{i.track} and {j.track} pass closely", move.why
+    if move.joins:
+        return f"{i.track} goes on as {j.track}?", f"{i.track} ends and {j.track} begins {far}"
+    if move.kind == "cut":
+        return f"{i.track} is two people?", f"after step {i.last} it goes on {far}"
+    others = [one.track for one in (*move.earlier, *move.later) if one.track != i.track]
+    if not others:
+        return f"{i.track} goes on elsewhere?", f"another piece of {i.track} fits, {far}"
+    if i.track != j.track:
+        return (
+            f"{i.track} and {j.track} exchanged?",
+            f"{j.track} is where {i.track} may have gone on, {far}",
+        )
+    other = others[0]
+    return (
+        f"{i.track} and {other} exchanged?",
+        f"{other} fits what {i.track} does from step {j.first} on",
+    )
+
+
+def _far(run: Run, one: int, other: int, last: int, first: int) -> str:
+    """Describe the distance of two pieces in space and time.
+
+    Args:
+        run: The run.
+        one: The id of the earlier track.
+        other: The id of the later track.
+        last: The last step of the earlier piece.
+        first: The first step of the later piece.
+    """
+    tracks, ground = run.tracks, []
+    for track, step in ((one, last), (other, first)):
+        own = np.flatnonzero(tracks.ids == track)
+        nearest = own[np.argmin(np.abs(tracks.frames[own] - step))]
+        ground.append(tracks.positions[nearest, :2])
+    metres = float(np.hypot(*(ground[1] - ground[0])))
+    seconds = (first - last) * run.sequence.step_time
+    away = "at the same place" if metres < 0.05 else f"{metres:.1f} m away"
+    if seconds < 0.0:
+        return f"{away}, {-seconds:.1f} s before that"
+    return f"{away}, {seconds:.1f} s later"

@@ -1,4 +1,4 @@
-"""Boxes of several cameras that meet where no track is: somebody who may be missing."""
+"""Unclaimed boxes: boxes of several cameras that agree on a place where there is no track."""
 
 from __future__ import annotations
 
@@ -17,52 +17,55 @@ from tracker.geometry.camera import Camera
 from tracker.runs.run import Run
 
 _MISS = 0.3
-"""Metres by which the rays through the middles of two boxes of one person may miss each other."""
+"""Largest distance between the rays through the centres of two boxes of one person, metres."""
 
 _SIZE = 1.6
-"""By which a box may be higher or lower than a target there would be."""
+"""Largest ratio between the height of a box and that of a target at the place, or its inverse."""
 
 _REACH, _FASTEST = 0.5, 2.0
-"""Metres, and metres a second, that somebody may be from where he was seen last."""
+"""Largest distance between consecutive places of one person: so many metres, plus so many metres
+per second."""
 
 _PAUSE = 0.5
-"""Seconds without a meeting after which it is somebody else."""
+"""Longest gap between consecutive places of one person, seconds."""
 
 _LASTS = 1.0
-"""Seconds for which boxes must meet."""
+"""Least time for which boxes must agree on a person, seconds."""
 
 _SHARE = 0.5
-"""Of the steps of which they must."""
+"""Least share of the steps of this time at which they must agree."""
 
 
 @dataclass(frozen=True, slots=True)
 class Unclaimed:
-    """Somebody whom boxes show and no track takes."""
+    """A person that boxes of several cameras show and that has no track."""
 
     places: tuple[Place, ...]
-    """One a step at which boxes meet."""
+    """The place at each step at which boxes agree."""
     cameras: tuple[int, ...]
-    """Whose boxes."""
+    """The indices of the cameras whose boxes agree."""
     share: float
-    """Of its steps, those at which they do."""
+    """The share of the steps between first and last at which boxes agree."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Free:
-    """Boxes of one camera that are no track's."""
+    """The B boxes of one camera that no track explains."""
 
     steps: Int[ndarray, " B"]
     rays: Float[ndarray, "B 3"]
+    """Unit vectors from the camera through the centre of each box, world frame."""
     heights: Float[ndarray, " B"]
-    """Pixels."""
+    """The height of each box, pixels."""
 
 
 def unclaimed(run: Run) -> list[Unclaimed]:
-    """Everybody whom at least two cameras' boxes show for a while and who is nobody's track.
+    """Return all people that boxes of at least two cameras show for a while without a track.
 
-    A box is a track's where its middle lies in the picture of that track's box. Free boxes of two
-    cameras meet where the rays through their middles pass within 0.3 m of each other, in the room,
-    where nobody is within the reach of a correction, and where both are as high as a target is.
+    A box is explained by a track if its centre lies in the track's reprojected box. Unexplained
+    boxes of two cameras agree if the rays through their centres pass within 0.3 m of each other at
+    a place in the room that is out of the reach of a correction from any track, and if both are as
+    high as a target there.
     """
     free = [_free(run, number) for number in range(len(run.sequence.cameras))]
     found = [
@@ -80,47 +83,62 @@ def _free(run: Run, number: int) -> _Free:
     counts = np.array([len(one) for one in boxes], dtype=np.int64)
     steps = np.repeat(np.arange(len(boxes)), counts)
     all_boxes = np.concatenate([np.zeros((0, 4)), *boxes])
-    taken = _taken(run, camera, steps, all_boxes)
-    own = all_boxes[~taken]
-    return _Free(steps[~taken], camera.back_project(own[:, :2]), 2.0 * own[:, 3])
+    explained = _explained(run, camera, steps, all_boxes)
+    own = all_boxes[~explained]
+    return _Free(steps[~explained], camera.back_project(own[:, :2]), 2.0 * own[:, 3])
 
 
-def _taken(
+def _explained(
     run: Run, camera: Camera, steps: Int[ndarray, " B"], boxes: Float[ndarray, "B 4"]
 ) -> Bool[ndarray, " B"]:
-    """Whether the middle of each box lies in a track's."""
+    """Whether the centre of each box lies in a track's reprojected box."""
     tracks = run.tracks
     drawn, _ = camera.project_boxes(tracks.positions, run.sequence.target_half_extents)
-    theirs = Boxes.from_left_top(drawn)
+    expected = Boxes.from_left_top(drawn)
     box, row = _at_one_step(steps, tracks.frames)
-    with np.errstate(invalid="ignore"):  # who is behind the camera takes nothing
-        inside = (np.abs(boxes[box, :2] - theirs.centres[row]) <= theirs.half_sizes[row]).all(
-            axis=1
-        )
-    taken = np.zeros(len(steps), dtype=bool)
-    taken[box[inside]] = True
-    return taken
+    with np.errstate(invalid="ignore"):  # boxes behind the camera are NaN and contain no centre
+        apart = np.abs(boxes[box, :2] - expected.centres[row])
+        inside = (apart <= expected.half_sizes[row]).all(axis=1)
+    explained = np.zeros(len(steps), dtype=bool)
+    explained[box[inside]] = True
+    return explained
 
 
 def _at_one_step(
     one: Int[ndarray, " A"], other: Int[ndarray, " B"]
 ) -> tuple[Int[ndarray, " P"], Int[ndarray, " P"]]:
-    """Rows of both that are of one step, every one with every one; the other's are in order."""
+    """Return all pairs of rows that have the same step.
+
+    Args:
+        one: The steps of the first rows, in any order.
+        other: The steps of the second rows, ascending.
+    """
     first, last = np.searchsorted(other, [one, one + 1])
     counts = last - first
     within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
     return np.repeat(np.arange(len(one)), counts), np.repeat(first, counts) + within
 
 
-def _meet(run: Run, one: int, other: int, mine: _Free, theirs: _Free) -> Float[ndarray, "M 6"]:
-    """Step, world place and the two cameras of every meeting of free boxes."""
+def _meet(run: Run, one: int, other: int, first: _Free, second: _Free) -> Float[ndarray, "M 6"]:
+    """Return the places on which boxes of two cameras agree, each box with each.
+
+    Args:
+        run: The run.
+        one: The index of the first camera.
+        other: The index of the second camera.
+        first: The unexplained boxes of the first camera.
+        second: Those of the second camera.
+
+    Returns:
+        Step, x, y and z in world metres, and the indices of the two cameras, a row for each pair.
+    """
     cameras, sequence = run.sequence.cameras, run.sequence
-    i, j = _at_one_step(mine.steps, theirs.steps)
+    i, j = _at_one_step(first.steps, second.steps)
     if not len(i):
         return np.zeros((0, 6))
     # the points of the two rays that are nearest to each other
     between = cameras[other].centre - cameras[one].centre
-    r, s = mine.rays[i], theirs.rays[j]
+    r, s = first.rays[i], second.rays[j]
     across = np.einsum("nk,nk->n", r, s)
     even = np.maximum(1.0 - across**2, 1e-9)
     along = (r @ between - across * (s @ between)) / even
@@ -132,18 +150,19 @@ def _meet(run: Run, one: int, other: int, mine: _Free, theirs: _Free) -> Float[n
     good &= sequence.room.contains(middle)
     i, j, middle = i[good], j[good], middle[good]
     as_high = np.ones(len(middle), dtype=bool)
-    for camera, heights in ((cameras[one], mine.heights[i]), (cameras[other], theirs.heights[j])):
+    for camera, heights in ((cameras[one], first.heights[i]), (cameras[other], second.heights[j])):
         expected = camera.project_boxes(middle, sequence.target_half_extents)[0][:, 3]
         with np.errstate(invalid="ignore"):
             as_high &= np.abs(np.log(heights / expected)) <= np.log(_SIZE)
     i, middle = i[as_high], middle[as_high]
-    steps = mine.steps[i]
-    alone = ~_somebody_near(run, steps, middle)
+    steps = first.steps[i]
+    alone = ~_track_near(run, steps, middle)
     pair = np.tile([one, other], (int(alone.sum()), 1))
     return np.column_stack([steps[alone], middle[alone], pair]).astype(float)
 
 
-def _somebody_near(run: Run, steps: ndarray, places: Float[ndarray, "M 3"]) -> Bool[ndarray, " M"]:
+def _track_near(run: Run, steps: ndarray, places: Float[ndarray, "M 3"]) -> Bool[ndarray, " M"]:
+    """Whether a track is within the reach of a correction from each place."""
     tracks = run.tracks
     near = np.zeros(len(steps), dtype=bool)
     for k, step in enumerate(steps.tolist()):
@@ -153,7 +172,12 @@ def _somebody_near(run: Run, steps: ndarray, places: Float[ndarray, "M 3"]) -> B
 
 
 def _chains(points: Float[ndarray, "M 6"], step_time: float) -> Iterator[Unclaimed]:
-    """Meetings that follow each other, as long as they last."""
+    """Chain places that follow each other to people, and yield those that last long enough.
+
+    Args:
+        points: The rows of :func:`_meet`, by step.
+        step_time: Duration of a step, seconds.
+    """
     going: list[list[ndarray]] = []
     ended: list[list[ndarray]] = []
     for point in points:

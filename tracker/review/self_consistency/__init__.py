@@ -1,7 +1,7 @@
-"""How well people are told apart where nobody knows the truth: do other ways to look agree?
+"""Self-consistency: an estimate of identity accuracy without ground truth, by variants of a run.
 
-A recording is tracked as it is, backwards in time, and once without each camera. What all of
-these hold alike was not an accident of one of them; where they differ one of them is wrong.
+A recording is tracked as it is, backwards in time, and once without each camera. Identities on
+which all of these agree are not an accident of one run; where they differ one of them is wrong.
 """
 
 from tracker.review.self_consistency.estimate import Estimate, estimate

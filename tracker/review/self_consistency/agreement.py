@@ -1,4 +1,4 @@
-"""How far two runs hold the same people for the same, and where they do not.
+"""The agreement of two runs on identities, and the moments at which they disagree.
 
 [RT16] Ristani, Solera, Zou, Cucchiara, Tomasi, "Performance measures and a data set for
 multi-target, multi-camera tracking", ECCV workshops 2016: IDF1.
@@ -20,67 +20,75 @@ from tracker.evaluation.settings import EvaluationSettings
 from tracker.sequences.sequence import GroundTruth
 
 _BRIEF = 0.4
-"""Seconds: who is found a little earlier or later is no other person."""
+"""Length up to which a difference is ignored, since tracks may begin a little earlier or later,
+seconds."""
 
 _TOGETHER = 1.0
-"""Seconds between two differences that are one moment."""
+"""Time between the beginnings of differences that are one moment, seconds."""
 
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """A stretch in which another run does not hold a person for who he is here."""
+    """A stretch of a track during which the other run has another identity, or no track."""
 
     first: int
     last: int
     person: int
-    """His id here."""
+    """The id of the track in this run."""
     other: int | None
-    """The id here of who he is there; None where he is nobody, or somebody unknown here."""
+    """The id in this run of the identity in the other run; None if that has no track in this run,
+    or if the other run has no track at all."""
     missing: bool
-    """Whether nobody is there at all."""
+    """Whether the other run has no track."""
 
 
 @dataclass(frozen=True, slots=True)
-class ReviewItem:
-    """A moment at which runs disagree."""
+class Disagreement:
+    """A moment at which other runs disagree with this one."""
 
     step: int
-    """The first."""
+    """The first step."""
     ids: tuple[int, ...]
-    """Of the people whom it is about, here."""
-    looks: tuple[str, ...]
-    """Which runs see it otherwise."""
+    """The ids of the tracks concerned, in this run."""
+    variants: tuple[str, ...]
+    """The names of the runs that disagree."""
     why: str
-    """In a few words."""
+    """The disagreement, in a few words."""
 
 
 def compared(
     here: Tracks, there: Tracks, steps: int, half_extents: Float[ndarray, " 3"]
 ) -> Comparison:
-    """Two runs by the protocol by which a run is compared with the truth."""
+    """Compare two runs by the protocol of the evaluation, the first in the place of the truth.
+
+    Args:
+        here: The tracks of this run.
+        there: The tracks of the other run.
+        steps: The number of steps.
+        half_extents: Half width, depth and height of a target, metres.
+    """
     settings = EvaluationSettings()
     measure = Measure(settings.distance, settings.effective_gate, half_extents)
-    everybody = np.ones(len(here.frames), dtype=bool)
+    valid = np.ones(len(here.frames), dtype=bool)
     return prepare(
-        GroundTruth(here.frames, here.ids, here.positions, everybody), there, measure, steps=steps
+        GroundTruth(here.frames, here.ids, here.positions, valid), there, measure, steps=steps
     )
 
 
 def agreement(comparison: Comparison) -> float:
-    """IDF1 of one run by the other ([RT16]), which is the same both ways; 1 where neither has
-    anybody."""
+    """Return IDF1 of one run by the other ([RT16]), which is symmetric; 1 if neither has tracks."""
     found = identity(comparison).f1
     return 1.0 if found is None else found
 
 
 def differences(comparison: Comparison, step_time: float) -> list[Difference]:
-    """The stretches, longer than a moment, in which a person is another one there, or nobody."""
+    """Return the stretches of tracks, longer than a moment, on which the two runs differ."""
     truth, tracks = comparison.truth, comparison.tracks
     partner = identity(comparison).track_of
     of_track = np.full(len(tracks.names), -1)
     of_track[partner[partner >= 0]] = np.flatnonzero(partner >= 0)
     matches = clear(comparison).matches
-    # -1: nobody is there; -2: somebody who is nobody here
+    # −1: the other run has no track; −2: its track has no partner in this run
     is_who = np.full(len(truth), -1)
     found = of_track[tracks.indices[matches.track_rows]]
     is_who[matches.truth_rows] = np.where(found >= 0, found, -2)
@@ -100,7 +108,15 @@ def _stretches(
     names: Int[ndarray, " n"],
     brief: float,
 ) -> list[Difference]:
-    """Of one person."""
+    """Return the differences of one track.
+
+    Args:
+        frames: The K steps of the track.
+        is_who: The index of the identity in the other run at each step, or −1 or −2.
+        person: The index of the track.
+        names: The ids of all tracks, by index.
+        brief: The number of steps up to which a difference is ignored.
+    """
     change = np.flatnonzero((np.diff(is_who) != 0) | (np.diff(frames) > brief)) + 1
     found = []
     for rows in np.split(np.arange(len(frames)), change):
@@ -113,13 +129,17 @@ def _stretches(
     return found
 
 
-def doubts(found: Items[tuple[str, Items[Difference]]], step_time: float) -> tuple[ReviewItem, ...]:
-    """The moments of all differences: those that most runs see otherwise first; of as many, who
-    somebody is before whether he is there, and the longer before the shorter.
+def disagreements(
+    found: Items[tuple[str, Items[Difference]]], step_time: float
+) -> tuple[Disagreement, ...]:
+    """Group the differences of several runs to moments, in the order of importance.
+
+    Moments with more runs that disagree come first; of as many, other identities before missing
+    tracks, and longer before shorter ones.
 
     Args:
-        found: Of each other run its name and its differences.
-        step_time: Seconds.
+        found: The name and the differences of each other run.
+        step_time: Duration of a step, seconds.
     """
     moments: list[list[tuple[str, Difference]]] = []
     every = [(name, one) for name, some in found for one in some]
@@ -139,10 +159,10 @@ def doubts(found: Items[tuple[str, Items[Difference]]], step_time: float) -> tup
         longest = max(one.last - one.first for _, one in moment)
         return -len({name for name, _ in moment}), moment[0][1].missing, -longest
 
-    return tuple(_doubt(moment) for moment in sorted(moments, key=rank))
+    return tuple(_disagreement(moment) for moment in sorted(moments, key=rank))
 
 
-def _doubt(moment: list[tuple[str, Difference]]) -> ReviewItem:
+def _disagreement(moment: list[tuple[str, Difference]]) -> Disagreement:
     first = moment[0][1]
     names = tuple(dict.fromkeys(name for name, _ in moment))
     others = sorted({one.other for _, one in moment if one.other is not None})
@@ -152,4 +172,4 @@ def _doubt(moment: list[tuple[str, Difference]]) -> ReviewItem:
         why = f"{first.person} is taken for {' or '.join(map(str, others))}"
     else:
         why = f"{first.person} is somebody else"
-    return ReviewItem(first.first, (first.person, *others), names, f"{why} {', '.join(names)}")
+    return Disagreement(first.first, (first.person, *others), names, f"{why} {', '.join(names)}")

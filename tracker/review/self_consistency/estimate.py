@@ -1,50 +1,71 @@
-"""The estimate of identity without truth: all looks, several at a time, and what they say."""
+"""The estimate of identity accuracy without ground truth: a run's variants and their agreement."""
 
 from __future__ import annotations
 
+import hashlib
+import json
 from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Sequence as Many
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
 
 import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
 
 from tracker.fusion.trajectories import Trajectories
+from tracker.geometry.assignment import linear_sum_assignment
+from tracker.geometry.camera import Camera
+from tracker.parameters import RunParameters
 from tracker.review.self_consistency.agreement import (
-    ReviewItem,
+    Disagreement,
     agreement,
     compared,
     differences,
-    doubts,
+    disagreements,
 )
-from tracker.review.self_consistency.calibration import interval
-from tracker.review.self_consistency.others import Given, Look, looked, looks
-from tracker.review.self_consistency.overlap import overlap
+from tracker.runs import pipeline
 from tracker.runs.processes import WorkerControl, map_in_processes
-from tracker.runs.run import Run
+from tracker.runs.run import Run, stage_keys
+from tracker.sequences.sequence import Sequence
+from tracker.single_view.protocol import ViewResult
 
 WARNING = (
     "Runs that agree may all be wrong alike: a tracker can be consistently wrong. "
     "This is an estimate, not a measurement."
 )
 
+FILE = Path(__file__).with_name("calibration.json")
+"""The calibration of the estimate: estimate and true IDF1 of runs with many settings, by
+recording."""
+
+_WITHIN = 0.9
+"""Share of these runs whose error lies in the interval."""
+
+_ALIKE = 60
+"""The number of runs with the nearest estimates from which the interval is made."""
+
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """How well people are told apart, as far as the recording alone can say."""
+    """The estimate of identity accuracy."""
 
     score: float
     """J = IDF1(forward, backwards) × mean over cameras of IDF1(all, all but one), 0 … 1."""
     backwards: float
-    """IDF1 of the run backwards in time by the run as it is."""
+    """IDF1 of the run backwards in time, with the run as it is in the place of the truth."""
     without: tuple[float, ...]
-    """IDF1 without each camera; empty where there is only one."""
+    """IDF1 of the run without each camera; empty where there is only one camera."""
     overlaps: tuple[float | None, ...]
-    """Of each camera's boxes with the people that the others found: a low one is a veto."""
-    doubts: tuple[ReviewItem, ...]
-    """The moments at which the runs disagree, the most doubtful first."""
+    """The overlap of each camera's boxes with the tracks of the run without it (see
+    :func:`overlap`); a low one is a veto."""
+    disagreements: tuple[Disagreement, ...]
+    """The moments at which the runs disagree, the most important first."""
 
     @property
     def interval(self) -> tuple[float, float]:
-        """Between these IDF1 lay in nine of ten of the runs by which J was calibrated."""
+        """The 90 % interval of the true IDF1; see :func:`interval`."""
         return interval(self.score)
 
 
@@ -55,13 +76,14 @@ def estimate(
     on_progress: Callable[[int, int], None] = lambda done, total: None,
     cancelled: Callable[[], bool] = lambda: False,
 ) -> Estimate:
-    """Look at a run's recording in the other ways, and see how far they agree.
+    """Track a run's recording in all variants, and measure how far they agree.
 
     Args:
-        run: Its boxes of stage 1 are used as they are, its steps as far as they go.
+        run: The run, whose results of stage 1 are used as they are; only the steps that it has
+            computed are tracked.
         processes: Largest number of processes.
-        on_progress: Called with the steps done in all ways, and how many there are.
-        cancelled: Asked now and then whether to stop.
+        on_progress: A callback that gets the number of steps done in all variants and of all.
+        cancelled: A callback that is asked now and then whether to stop.
 
     Raises:
         tracker.runs.pipeline.Cancelled: If ``cancelled`` returned true.
@@ -70,12 +92,12 @@ def estimate(
     if not run.done:
         raise ValueError(f"{run.sequence.name}: the run has no step yet; compute it first")
     sequence, steps = run.sequence, run.done
-    given = Given(sequence, run.parameters, run.seed, tuple(run.views[:steps]))
-    ways = looks(len(sequence.views))
+    common = Common(sequence, run.parameters, run.seed, tuple(run.views[:steps]))
+    every = variants(len(sequence.views))
     found = map_in_processes(
         _work,
-        [(given, way) for way in ways],
-        steps=steps * len(ways),
+        [(common, variant) for variant in every],
+        steps=steps * len(every),
         processes=processes,
         on_progress=on_progress,
         cancelled=cancelled,
@@ -86,21 +108,169 @@ def estimate(
     backwards, without = agreed[0], tuple(agreed[1:])
     score = backwards * (float(np.mean(without)) if without else 1.0)
     named = [
-        (way.words(sequence), differences(one, sequence.step_time))
-        for way, one in zip(ways, comparisons, strict=True)
+        (variant.words(sequence), differences(one, sequence.step_time))
+        for variant, one in zip(every, comparisons, strict=True)
     ]
     return Estimate(
         score,
         backwards,
         without,
         tuple(
-            overlap(tracks, sequence.cameras[c], half, [step[c] for step in given.views])
+            overlap(tracks, sequence.cameras[c], half, [step[c] for step in common.views])
             for c, tracks in enumerate(found[1:])
         ),
-        doubts(named, sequence.step_time),
+        disagreements(named, sequence.step_time),
     )
 
 
-def _work(item: tuple[Given, Look], control: WorkerControl) -> Trajectories:
-    given, way = item
-    return looked(given, way, control.advance, control.cancelled)
+def _work(item: tuple[Common, Variant], control: WorkerControl) -> Trajectories:
+    common, variant = item
+    return track_variant(common, variant, control.advance, control.cancelled)
+
+
+@dataclass(frozen=True, slots=True)
+class Variant:
+    """One variant of a run. Stage 1, by far the costliest, is the same for all of them."""
+
+    backwards: bool = False
+    """Whether the steps are tracked in reverse order."""
+    without: int | None = None
+    """The index of the camera that is left out; None for none."""
+
+    def words(self, sequence: Sequence) -> str:
+        """Return the variant's name for display."""
+        if self.without is not None:
+            return f"without {sequence.views[self.without].camera.name}"
+        return "backwards in time" if self.backwards else "as it is"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Common:
+    """The input that all variants of a run have in common."""
+
+    sequence: Sequence
+    parameters: RunParameters
+    seed: int
+    views: tuple[tuple[ViewResult, ...], ...]
+    """The results of stage 1 of each step, one for each camera."""
+
+
+def variants(cameras: int) -> tuple[Variant, ...]:
+    """Return the variants for a number of cameras; a single camera is not left out."""
+    left_out = [Variant(without=camera) for camera in range(cameras)] if cameras > 1 else []
+    return (Variant(backwards=True), *left_out)
+
+
+def track_variant(
+    common: Common,
+    variant: Variant,
+    advance: Callable[[int], None] = lambda more: None,
+    cancelled: Callable[[], bool] = lambda: False,
+) -> Trajectories:
+    """Track one variant, and return its tracks at the steps of the original recording.
+
+    Args:
+        common: The input that all variants have in common.
+        variant: The variant.
+        advance: A callback that gets the number of steps done since the last call.
+        cancelled: A callback that is asked now and then whether to stop.
+
+    Raises:
+        tracker.runs.pipeline.Cancelled: If ``cancelled`` returned true.
+    """
+    kept = [c for c in range(len(common.sequence.views)) if c != variant.without]
+    views = [tuple(step[c] for c in kept) for step in common.views]
+    if variant.backwards:
+        views = views[::-1]
+    digest = hashlib.sha256(f"{common.sequence.digest} {variant}".encode()).hexdigest()
+    sequence = replace(
+        common.sequence, views=tuple(common.sequence.views[c] for c in kept), digest=digest
+    )
+    keys = stage_keys(sequence, common.parameters, common.seed)
+    seen = Run(sequence, common.parameters, common.seed, keys)
+    seen.views = views
+    reported = 0
+
+    def on_progress(_: Run, progress: pipeline.Progress) -> None:
+        nonlocal reported
+        advance(progress.done - reported)
+        reported = progress.done
+
+    tracks = pipeline.compute(
+        sequence,
+        common.parameters,
+        seed=common.seed,
+        steps=len(views),
+        previous=seen,
+        on_progress=on_progress,
+        cancelled=cancelled,
+    ).tracks
+    return mirrored(tracks, len(views)) if variant.backwards else tracks
+
+
+def mirrored(tracks: Trajectories, steps: int) -> Trajectories:
+    """Reverse the steps 0 … ``steps`` − 1 of tracks; rows are again sorted by step and then id."""
+    order = np.lexsort((tracks.ids, -tracks.frames))
+    columns = {name: getattr(tracks, name)[order] for name in Trajectories.__slots__}
+    columns["frames"] = steps - 1 - columns["frames"]
+    return Trajectories(**columns)
+
+
+def overlap(
+    tracks: Trajectories,
+    camera: Camera,
+    half_extents: Float[ndarray, " 3"],
+    views: Many[ViewResult],
+) -> float | None:
+    """Return the mean overlap of a camera's boxes with tracks that were made without the camera.
+
+    With the best pairs of box and track at each step it is
+
+        2 Σ_pairs IoU / (boxes + tracks in the picture)
+
+    which is 1 if every box coincides with a track's reprojected box and the other way round. It
+    is None without any boxes and tracks. Steps at which the camera had no frame are skipped.
+
+    Args:
+        tracks: The tracks of the run without this camera.
+        camera: The camera.
+        half_extents: Half width, depth and height of a target, metres.
+        views: The camera's results of stage 1 at each step.
+    """
+    total, count = 0.0, 0
+    for step, view in enumerate(views):
+        if view.blind:
+            continue
+        boxes = view.boxes
+        drawn, visible = camera.project_boxes(tracks.positions[tracks.at(step)], half_extents)
+        drawn = drawn[visible]
+        count += len(boxes) + len(drawn)
+        if not len(boxes) or not len(drawn):
+            continue
+        low, high = drawn[:, None, :2], drawn[:, None, :2] + drawn[:, None, 2:]
+        own_low, own_high = boxes[:, :2] - boxes[:, 2:], boxes[:, :2] + boxes[:, 2:]
+        sides = np.minimum(high, own_high) - np.maximum(low, own_low)
+        both = np.maximum(sides, 0.0).prod(axis=2)
+        union = drawn[:, None, 2:].prod(axis=2) + 4.0 * boxes[:, 2:].prod(axis=1) - both
+        shares = both / np.maximum(union, 1e-9)
+        rows, columns = linear_sum_assignment(shares, maximize=True)
+        total += 2.0 * float(shares[rows, columns].sum())
+    return total / count if count else None
+
+
+@cache
+def _measured() -> Float[ndarray, "K 2"]:
+    """Return estimate and true IDF1 of the calibration, as many runs of each recording."""
+    kept = json.loads(FILE.read_text(encoding="utf-8"))
+    fewest = min(len(pairs) for pairs in kept.values())
+    return np.concatenate([np.array(pairs)[:fewest] for pairs in kept.values()])
+
+
+def interval(score: float) -> tuple[float, float]:
+    """Return the 90 % interval of IDF1 for an estimate, from the errors of the calibration's runs
+    with the nearest estimates."""
+    measured = _measured()
+    near = measured[np.argsort(np.abs(measured[:, 0] - score), kind="stable")[:_ALIKE]]
+    errors = near[:, 1] - near[:, 0]
+    low, high = np.quantile(errors, [(1.0 - _WITHIN) / 2.0, (1.0 + _WITHIN) / 2.0])
+    return float(np.clip(score + low, 0.0, 1.0)), float(np.clip(score + high, 0.0, 1.0))

@@ -186,7 +186,7 @@ def _complaining(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        told = f"{error.filename or path}: cannot be written ({error.strerror})"
+        words = f"{error.filename or path}: cannot be written ({error.strerror})"
         raise SequenceError(
-            f"{told if error.strerror else error}; choose another folder, or make room there"
+            f"{words if error.strerror else error}; choose another folder, or make room there"
         ) from None

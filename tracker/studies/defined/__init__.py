@@ -1,1 +1,1 @@
-"""What a study is: its definition, what may be sought, what is varied and where it counts."""
+"""The definition of a study: its file, objectives, varied parameters and their space."""

@@ -1,4 +1,4 @@
-"""A study's file, or what the page says, as a :class:`Definition`: checked field by field."""
+"""The parsing of a study's file, or of the page's form, into a :class:`Definition`."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def read_definition(path: Path) -> Definition:
     """Read a study's file.
 
     Raises:
-        StudyError: If it cannot be read or something in it is not as it must be, with the field.
+        StudyError: If the file cannot be read or a field is not valid, with the field.
     """
     text = _text_of(path)
     try:
@@ -63,12 +63,12 @@ def _text_of(path: Path) -> str:
 
 
 def definition_of(found: Mapping[str, Any], *, where: str, folder: Path) -> Definition:
-    """Check what a study's file, or the page, says.
+    """Validate the fields of a study's file, or of the page's form.
 
     Args:
-        found: By field.
-        where: Named in what is raised.
-        folder: From which relative paths go out.
+        found: The values by field.
+        where: The file's name, for messages.
+        folder: The folder that relative paths refer to.
 
     Raises:
         StudyError: With the field, what was expected and what was found.
@@ -138,7 +138,7 @@ def _recordings(fields: _Fields, folder: Path) -> tuple[str, ...]:
             found.append(name)
             continue
         pattern = str(folder / os.path.expanduser(name))
-        if os.path.exists(pattern):  # of the module: no name is too long for it
+        if os.path.exists(pattern):  # unlike Path.exists, this accepts names of any length
             found.append(pattern)
             continue
         some = sorted(
@@ -249,12 +249,12 @@ def _number(fields: _Fields, where: str, key: str, found: Any) -> float:
         return float(value(with_values(RunParameters(), {key: found}), key))
     except ValueError as error:
         words = str(error).removeprefix(f"{key}: ")
-        told = f"{words}; `multiview-phd parameters` tells how far each goes"
-        raise fields.error(where, told) from None
+        hint = "`multiview-phd parameters` tells how far each goes"
+        raise fields.error(where, f"{words}; {hint}") from None
 
 
 class _Fields:
-    """What was found, with sentences for what does not fit."""
+    """The fields of a definition, with checks of their types and error messages."""
 
     def __init__(self, found: Mapping[str, Any], where: str) -> None:
         self.found = found
@@ -312,7 +312,7 @@ class _Fields:
 
 
 def _flat(table: Mapping[str, Any]) -> dict[str, Any]:
-    """``fusion.clutter_rate = 2`` without quotes is a table in a table."""
+    """Flatten nested tables: ``fusion.clutter_rate = 2`` without quotes is a table in a table."""
     flat: dict[str, Any] = {}
     for key, found in table.items():
         if isinstance(found, Mapping):

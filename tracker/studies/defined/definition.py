@@ -1,4 +1,4 @@
-"""What a study is: recordings, what is varied and how far, seeds, trials, objectives."""
+"""The definition of a study: recordings, varied parameters, seeds, trials and objectives."""
 
 from __future__ import annotations
 
@@ -9,12 +9,13 @@ from typing import Any, Literal
 from tracker.parameters import PARAMETERS, PRESETS
 
 Search = Literal["auto", "tpe", "nsga2", "random", "grid"]
-"""How values are sought; ``auto`` is TPE for one objective and NSGA-II for several."""
+"""The search method; ``auto`` is TPE for one objective and NSGA-II for several."""
 
 MOST_TRIALS = 1_000_000
+"""Largest number of trials, which stands for as many as the time allows."""
 
 GRID_STEPS = 5
-"""Values of a number on a grid, unless its ``steps`` say otherwise."""
+"""The number of a parameter's values on a grid by default."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,22 +24,23 @@ class Varied:
 
     key: str
     low: float | None = None
+    """Smallest value of a number, in its unit; None if there are choices."""
     high: float | None = None
-    """Of a number, both included, in its unit."""
+    """Largest value of a number, included; None if there are choices."""
     log: bool = False
-    """Whether a number is drawn evenly over its logarithm."""
+    """Whether a number is drawn uniformly over its logarithm."""
     steps: int = GRID_STEPS
-    """Of a number on a grid."""
+    """The number of values on a grid."""
     choices: tuple[Any, ...] = ()
-    """Of anything else."""
+    """The values of a parameter that is not varied over a range."""
 
     @property
     def is_whole(self) -> bool:
-        """Whether it is a whole number."""
+        """Whether the parameter is an integer."""
         return self.key in PARAMETERS and PARAMETERS[self.key].kind == "int"
 
     def contains(self, tried: Any) -> bool:
-        """Whether a value is among those that are tried."""
+        """Whether a value lies in the range, or is one of the choices."""
         if self.choices:
             return tried in self.choices
         assert self.low is not None
@@ -46,7 +48,7 @@ class Varied:
         return bool(self.low <= tried <= self.high)
 
     def table(self) -> dict[str, Any]:
-        """As a study's file has it."""
+        """Return the parameter's table in a study's file."""
         if self.choices:
             return {"choices": list(self.choices)}
         return {"low": self.low, "high": self.high, "log": self.log, "steps": self.steps}
@@ -54,40 +56,41 @@ class Varied:
 
 @dataclass(frozen=True, slots=True)
 class Definition:
-    """A study, checked."""
+    """A validated definition of a study."""
 
     name: str
     recordings: tuple[str, ...]
-    """Names of rendered rooms, or absolute folders."""
+    """Names of built-in recordings, or absolute folders."""
     varied: tuple[Varied, ...]
     trials: int = 100
+    """Largest number of trials."""
     minutes: float | None = None
-    """No trial begins after so long; None for no such bound."""
+    """Time after which no trial begins, minutes; None for no limit."""
     seeds: tuple[int, ...] = (0,)
     search: Search = "auto"
     objectives: tuple[str, ...] = ()
-    """Keys of :data:`~tracker.studies.defined.objectives.OBJECTIVES`, the leading one first; where
-    there are none they follow the recordings."""
+    """Keys of :data:`~tracker.studies.defined.objectives.OBJECTIVES`, the most important one first;
+    if empty, they are chosen by whether the recordings have ground truth."""
     prune: bool = True
-    """Whether hopeless trials are given up after the first recordings."""
+    """Whether hopeless trials are pruned after their first runs."""
     preset: str | None = None
     propose: int = 0
-    """On how many seeds that no trial had the best are measured again at the end, and the best
-    of them proposed; 0 leaves it out."""
+    """The number of further seeds on which the best trials are measured again at the end, to
+    propose the best of them; 0 for no proposal."""
     seed: int = 0
-    """Of the sampler."""
+    """The seed of the sampler."""
     values: Mapping[str, Any] = field(default_factory=dict)
-    """What is held, against the recording's defaults and the preset."""
+    """Fixed values of all trials, which override the recording's defaults and the preset."""
     start: Mapping[str, Any] = field(default_factory=dict)
     """Values of varied parameters that are tried right after the defaults."""
 
     def held(self) -> dict[str, Any]:
-        """The values by key that every trial has: the preset's, then its own."""
+        """Return the fixed values of all trials by key: the preset's, then the study's own."""
         return {**(PRESETS[self.preset] if self.preset else {}), **self.values}
 
     def to_json(self) -> dict[str, Any]:
-        """As a study's file has it."""
-        told: dict[str, Any] = {
+        """Return the content of the study's file as plain values."""
+        content: dict[str, Any] = {
             "name": self.name,
             "recordings": list(self.recordings),
             "trials": self.trials,
@@ -99,25 +102,25 @@ class Definition:
             "seed": self.seed,
         }
         if self.minutes is not None:
-            told["minutes"] = self.minutes
+            content["minutes"] = self.minutes
         if self.preset is not None:
-            told["preset"] = self.preset
+            content["preset"] = self.preset
         for name in ("values", "start"):
             if table := dict(getattr(self, name)):
-                told[name] = table
-        return told | {"parameters": {one.key: one.table() for one in self.varied}}
+                content[name] = table
+        return content | {"parameters": {one.key: one.table() for one in self.varied}}
 
     @property
     def by_time_alone(self) -> bool:
-        """Whether there are as many trials as the time allows."""
+        """Whether the number of trials is limited by the time alone."""
         return self.minutes is not None and self.trials >= MOST_TRIALS
 
     def within(self) -> str:
-        """The bound on its trials, in words after their number."""
+        """Return the limit of trials in words, to be put after the number of trials done."""
         return f"in {self.minutes:g} minutes" if self.by_time_alone else f"of {self.trials}"
 
     def to_toml(self) -> str:
-        """The text of its file."""
+        """Return the text of the study's file."""
         import tomlkit
 
         return tomlkit.dumps(self.to_json())

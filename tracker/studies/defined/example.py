@@ -1,4 +1,4 @@
-"""The file that ``study new`` writes: every field with what it is for."""
+"""The example file that ``study new`` writes, with an explanation of every field."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ _KEYS = ("fusion.detection_probability", "fusion.clutter_rate", "fusion.accelera
 
 
 def example(name: str, recordings: Sequence[str]) -> str:
-    """The text of a study's file.
+    """Return the text of an example of a study's file.
 
     Args:
-        name: Of the study.
-        recordings: Rendered rooms, or folders.
+        name: The name of the study.
+        recordings: Names of built-in recordings, or folders.
     """
     listed = ", ".join(json.dumps(one, ensure_ascii=False) for one in recordings)
     ranges = []

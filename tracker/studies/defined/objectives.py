@@ -1,4 +1,4 @@
-"""What a study may seek: any figure of the evaluation, speed, or identity without a truth."""
+"""The objectives of studies: any figure of the evaluation, speed, or identity without truth."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tracker.evaluation import DEFINITIONS
 from tracker.studies.errors import StudyError
 
 Of = Literal["truth", "run", "agreement"]
-"""What a figure needs: a truth, nothing but the run, or other looks at the recording."""
+"""What a figure is computed from: ground truth, the run alone, or variants of the run."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,18 +22,18 @@ class Objective:
     key: str
     name: str
     higher: bool
-    """Whether more of it is better."""
+    """Whether larger values are better."""
     of: Of
     unit: str = ""
     digits: int = 3
     help: str = ""
 
     def better(self, one: float, other: float) -> bool:
-        """Whether one value beats another."""
+        """Whether one value is better than another."""
         return one > other if self.higher else one < other
 
     def words(self, value: float, spread: float | None) -> str:
-        """A value as a table shows it, with what the seeds make of it."""
+        """Format a value for a table, with its standard deviation over the seeds if known."""
         about = "" if spread is None else f" ± {spread:.{self.digits}f}"
         return f"{value:.{self.digits}f}{about}"
 
@@ -63,7 +63,7 @@ OBJECTIVES: dict[str, Objective] = {
     },
     **{one.key: one for one in (SCORE, SPEED, IDENTITY)},
 }  # fmt: skip
-"""All of them by their keys."""
+"""All objectives by key."""
 
 HELD_OUT = Objective(
     "held_out", "Held-out camera", True, "agreement", "", 3,
@@ -76,25 +76,25 @@ BESIDE: dict[str, Objective] = {
     HELD_OUT.key: HELD_OUT,
     **{key: OBJECTIVES[key] for key in ("idf1", "hota", "ospa", "position_error")},
 }
-"""What trials are shown with beside their objectives, where it is known of them."""
+"""Figures that are shown beside the objectives of trials that have them."""
 
 WITH_TRUTH = ("hota", "idf1", "speed")
 SELF_CONSISTENCY = ("identity",)
 
 VETO = 0.05
-"""By how much the overlap in a left-out camera may be below the default's before a trial is
-vetoed: intersection over union, mean over cameras."""
+"""Largest decrease of the held-out overlap (intersection over union, mean over cameras) below that
+of the defaults with which a trial is not vetoed."""
 
 
 def chosen(objectives: Sequence[str], has_truth: Mapping[str, bool]) -> tuple[Objective, ...]:
-    """The objectives of a study, those that fit its recordings where none is named.
+    """Return the objectives of a study; if none is named, those that suit its recordings.
 
     Args:
-        objectives: Their keys.
-        has_truth: Of each recording.
+        objectives: The keys of the objectives, or none.
+        has_truth: Whether each recording has ground truth, by name.
 
     Raises:
-        StudyError: If one needs a truth that a recording does not have.
+        StudyError: If an objective needs ground truth that a recording does not have.
     """
     if not objectives:
         objectives = WITH_TRUTH if all(has_truth.values()) else SELF_CONSISTENCY
@@ -111,7 +111,7 @@ def chosen(objectives: Sequence[str], has_truth: Mapping[str, bool]) -> tuple[Ob
 
 @dataclass(frozen=True, slots=True)
 class Mean:
-    """A figure over recordings and seeds."""
+    """The mean of a figure over recordings and seeds."""
 
     value: float
     spread: float | None
@@ -119,10 +119,10 @@ class Mean:
 
 
 def mean_over(values: Mapping[tuple[str, int], float]) -> Mean:
-    """Mean over the recordings of the mean over seeds, and its spread over seeds.
+    """Compute the mean over the recordings of the mean over seeds, and its spread over seeds.
 
     Args:
-        values: By recording and seed.
+        values: The values by recording and seed.
     """
     recordings = sorted({recording for recording, _ in values})
     seeds = sorted({seed for _, seed in values})
@@ -138,11 +138,11 @@ def mean_over(values: Mapping[tuple[str, int], float]) -> Mean:
 def front(
     rows: Iterable[tuple[int, Sequence[float]]], objectives: Sequence[Objective]
 ) -> list[int]:
-    """The trials that no other one beats in one objective without losing in another.
+    """Return the Pareto front: the trials that no other one dominates.
 
     Args:
-        rows: Number and values of each trial.
-        objectives: Of the values.
+        rows: The number and the values of each trial.
+        objectives: The objectives that the values are of.
     """
     every = list(rows)
     if not every:

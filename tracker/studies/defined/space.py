@@ -1,4 +1,4 @@
-"""The values of a trial: drawn where they have an effect, at their defaults elsewhere."""
+"""The search space: parameters of a trial are drawn where they have an effect."""
 
 from __future__ import annotations
 
@@ -19,23 +19,24 @@ from tracker.parameters import (
 from tracker.studies.defined.definition import Varied
 
 Draw = Callable[[Varied], Any]
-"""Gives a value of one varied parameter."""
+"""A function that draws a value of one varied parameter."""
 
 FACTOR = 4.0
+"""Reach of a range around a value of a logarithmic parameter, as a factor."""
+
 SHARE = 0.25
-"""How far around a value a range reaches: by a factor over logarithms, else by a share of the
-definition's range on either side."""
+"""Reach of a range around another value to either side, as a share of the definition's range."""
 
 
 def drawn(varied: Sequence[Varied], bases: Sequence[RunParameters], draw: Draw) -> dict[str, Any]:
-    """Values for what has an effect with the methods and values drawn before.
+    """Draw values of the parameters that have an effect with the values drawn before.
 
     Args:
-        varied: What is varied.
-        bases: Of each recording what is not varied; a parameter counts where it has an effect
-            with one of them.
-        draw: Called for each that counts: methods first, then others before those that have an
-            effect only with some of their values.
+        varied: The varied parameters.
+        bases: The other parameters on each recording; a varied parameter is drawn if it has an
+            effect on one recording.
+        draw: A function that draws a value. It is called for methods first, and for a parameter
+            before those whose effect depends on it.
 
     Returns:
         The values by key.
@@ -55,7 +56,7 @@ def drawn(varied: Sequence[Varied], bases: Sequence[RunParameters], draw: Draw) 
 
 
 def ordered(varied: Sequence[Varied]) -> list[Varied]:
-    """Each behind those that it depends on: methods, then conditions."""
+    """Sort parameters so that each comes after those that its effect depends on, methods first."""
     left, done = sorted(varied, key=lambda one: one.key not in METHODS), []
     while left:
         keys = {one.key for one in left}
@@ -74,7 +75,7 @@ def _shown(bases: Sequence[RunParameters]) -> set[str]:
 
 
 def grid(varied: Sequence[Varied], bases: Sequence[RunParameters]) -> Iterator[dict[str, Any]]:
-    """Every combination of a grid once, without those that differ only where it has no effect."""
+    """Yield the combinations of a grid, without those that differ only in values without effect."""
     order = ordered(varied)
     seen: set[tuple[tuple[str, Any], ...]] = set()
     for combination in itertools.product(*(points(one) for one in order)):
@@ -87,7 +88,7 @@ def grid(varied: Sequence[Varied], bases: Sequence[RunParameters]) -> Iterator[d
 
 
 def points(one: Varied) -> list[Any]:
-    """The values of one parameter on a grid."""
+    """Return the values of one parameter on a grid."""
     if one.choices:
         return list(one.choices)
     assert one.low is not None
@@ -104,11 +105,11 @@ def points(one: Varied) -> list[Any]:
 
 
 def around(key: str, *values: Any) -> Varied:
-    """A range around one or more values, within the parameter's definition.
+    """Return a range around one or more values, within the parameter's definition.
 
     Args:
-        key: Of a parameter or the choice of a method.
-        values: For instance today's and the default.
+        key: The key of a parameter, or of the choice of a method.
+        values: The values, for instance the current one and the default.
     """
     if key in METHODS:
         return Varied(key, choices=METHODS[key])
@@ -136,5 +137,5 @@ def _around(parameter: Parameter, now: float) -> tuple[float, float]:
 
 
 def defaults_of(varied: Sequence[Varied], base: RunParameters) -> dict[str, Any]:
-    """What the varied parameters are by default."""
+    """Return the values of the varied parameters in ``base``, by key."""
     return {one.key: value(base, one.key) for one in varied}

@@ -1,1 +1,1 @@
-"""What a study has found: which parameters matter, and the values it proposes."""
+"""The analysis of a study: importance of parameters, and the proposal of values."""

@@ -1,8 +1,8 @@
-"""What a study proposes at its end: the best values, measured again on other seeds.
+"""The proposal at the end of a study: the best values, measured again on other seeds.
 
-The best of many trials is partly the luckiest. So the best few, the defaults and the values where
-somebody was are run again on seeds that no trial had, and what leads there is proposed, without
-the changes that bring nothing. Never anything worse than the defaults.
+The best of many trials owes part of its lead to chance. So the best few, the defaults and the
+user's own values are run again on seeds that no trial had, and the best of these is proposed,
+without changes that have no effect. What is proposed is never worse than the defaults.
 """
 
 from __future__ import annotations
@@ -17,22 +17,24 @@ from tracker.studies.opened import Opened, Recordings
 from tracker.studies.work.jobs import Job, Outcome
 
 CANDIDATES = 4
-"""Best trials that are measured again."""
+"""The number of best trials that are measured again."""
 
 LEAST = 5e-4
-"""Of the leading figure: what is less than this better is as good."""
+"""Least difference of the first objective that counts as better."""
 
 SEARCH_SHARE = 0.6
-"""Of the time of a study that proposes something, the search's; the rest is for measuring again."""
+"""Share of a study's time for the search, if it makes a proposal; the rest is for measuring
+again."""
 
 SHOWN = ("score", "hota", "idf1", "mota", "identity", "speed")
+"""The keys of the figures that are compared in a proposal."""
 
 Measure = Callable[[Sequence[Job]], Mapping[str, Outcome]]
-"""Has jobs done, as far as the time goes."""
+"""A function that has jobs done, as far as the time allows, and returns outcomes by key."""
 
 
 class Proposer:
-    """Measures candidates on other seeds."""
+    """Measures candidates on other seeds, and proposes the best."""
 
     def __init__(
         self,
@@ -43,15 +45,15 @@ class Proposer:
         seeds: Sequence[int],
         measure: Measure,
     ) -> None:
-        """Nothing is measured yet.
+        """Store the candidates and how they are measured.
 
         Args:
-            recordings: Of the study.
-            trials: That ended.
-            defaults: What is varied, by default.
-            start: Where somebody was, of what is varied; empty at the defaults.
-            seeds: That no trial had.
-            measure: Has jobs done.
+            recordings: The recordings of the study.
+            trials: The trials that ended.
+            defaults: The default values of the varied parameters, by key.
+            start: The user's own values of the varied parameters; empty if they are the defaults.
+            seeds: Seeds that no trial had.
+            measure: A function that has jobs done.
         """
         self._recordings, self._trials = recordings, trials
         self._defaults, self._start = dict(defaults), dict(start)
@@ -62,7 +64,7 @@ class Proposer:
         self._judge = Judge(recordings.objectives, (), lambda key: None)
 
     def propose(self) -> dict[str, Any]:
-        """What is proposed, as it is written down: values, what they change and bring, words."""
+        """Measure the candidates, and return the proposal as plain values for storage."""
         drawn = self._seeds_matter()
         if not drawn:
             self._seeds = [self._trial_seed]
@@ -85,7 +87,7 @@ class Proposer:
         if not self._gain(best, now) >= LEAST:
             return self._nothing("nothing better was found", drawn, default, now)
         if best is not default and self._gain(best, default) < LEAST:
-            values, best = {}, default  # as good, and the simplest
+            values, best = {}, default  # as good, and simpler
         values = {k: v for k, v in values.items() if v != self._defaults.get(k)}
         values, best, brought = self._without_idle(values, best)
         number = next((t.number for t in self._trials if t.values == values), None)
@@ -111,10 +113,9 @@ class Proposer:
     def _nothing(
         self, words: str, drawn: bool, default: Trial | None = None, now: Trial | None = None
     ) -> dict[str, Any]:
-        told = words if drawn else f"{words} ({_NOT_DRAWN})"
         return {
             "better": False,
-            "words": told,
+            "words": words if drawn else f"{words} ({_NOT_DRAWN})",
             "trial": None,
             "values": {**self._defaults, **self._start},
             "rows": [],
@@ -156,7 +157,7 @@ class Proposer:
         return f"{words}; " + (f"measured on the seeds {seeds}" if drawn else _NOT_DRAWN)
 
     def _seeds_matter(self) -> bool:
-        """Whether another seed gives other tracks at all."""
+        """Whether runs with different seeds have different tracks."""
         one, other = self._jobs({}, [self._trial_seed]), self._jobs({}, self._seeds[:1])
         found = self._measure([job for _, job in (*one, *other)])
         pairs = zip(one, other, strict=True)
@@ -172,7 +173,11 @@ class Proposer:
     def _without_idle(
         self, values: dict[str, Any], best: Trial
     ) -> tuple[dict[str, Any], Trial, dict[str, float | None]]:
-        """Put back what brings nothing; what each of the others brings."""
+        """Remove the changes that have no effect, and return the effect of each of the others.
+
+        The effect of a change is how much worse the first objective is without it, or None if it
+        was not measured.
+        """
         keys = list(values)
         lists = [{k: v for k, v in values.items() if k != key} for key in keys]
         measured = self._measured(lists)
@@ -194,9 +199,10 @@ class Proposer:
         return values, best, brought
 
     def _measured(self, lists: Sequence[Mapping[str, Any]]) -> list[Trial | None]:
-        """Each set of values on the other seeds; None where the time was over before.
+        """Measure each set of values on the other seeds; None where the time was over before.
 
-        The first time the defaults are the first of the list: the vetoes go by them.
+        In the first call the first set is the defaults, with which the others are compared for
+        vetoes.
         """
         rows = [self._jobs(values, self._seeds) for values in lists]
         found = self._measure([job for some in rows for _, job in some])

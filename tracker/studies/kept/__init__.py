@@ -1,1 +1,1 @@
-"""A study on disk: its folder, what is written down, and the writing."""
+"""The storage of a study: its folder, records and results."""

@@ -1,4 +1,4 @@
-"""What was written down of a study, checked field by field when it is read again."""
+"""The validation of a study's stored JSON, field by field, when it is read again."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ T = TypeVar("T")
 
 
 def read_as(kind: type[T], text: str | bytes, where: str) -> T:
-    """A value of a kind, from its JSON.
+    """Parse JSON into a value of a type.
 
     Args:
-        kind: A dataclass, or what its fields are made of.
-        text: As it was written.
-        where: Named in what is raised: a file, and the place in it.
+        kind: A dataclass, or any other type that pydantic validates.
+        text: The JSON text.
+        where: The file and the place in it, for messages.
 
     Raises:
         StudyError: With the field, what was expected and what was found.

@@ -1,4 +1,4 @@
-"""What is written down of a study: trials that ended, their runs, and what it is doing."""
+"""The stored records of a study: trials that ended, their runs, and the status."""
 
 from __future__ import annotations
 
@@ -16,7 +16,9 @@ class JobRow:
     """One run of a trial."""
 
     key: str
+    """The key of the run's job."""
     recording: str
+    """The name or folder of the recording."""
     seed: int
 
 
@@ -27,56 +29,64 @@ class Trial:
     number: int
     state: TrialState
     values: dict[str, Any]
-    """What was tried, by key."""
+    """The varied parameters, by key."""
     objectives: tuple[float, ...] | None
-    """Over recordings and seeds; None where it failed. Of a pruned one over its first runs."""
+    """Means of the objectives over recordings and seeds; None if the trial failed. Those of a
+    pruned trial are means over its first runs."""
     spreads: tuple[float | None, ...]
-    """Of each objective over the seeds."""
+    """Standard deviations of the objectives over the seeds."""
     figures: dict[str, float]
-    """All other figures, over recordings and seeds."""
+    """Means of all other figures over recordings and seeds."""
     vetoed: bool
-    """Whether its people overlap too little with the cameras that were left out."""
+    """Whether the tracks overlap too little with the boxes of cameras that were left out."""
     words: str
-    """Why it failed or was given up, or what it is."""
+    """The reason of a failure or pruning, or a remark on the trial."""
     seconds: float
-    """Of its runs on the workers' clocks."""
+    """The time of its runs on the workers' clocks, seconds."""
     jobs: tuple[JobRow, ...]
     ended: float = 0.0
+    """The time when it ended, seconds since 1970."""
 
     def to_json(self) -> dict[str, Any]:
-        """As plain values."""
+        """Return all fields as plain values."""
         return asdict(self)
 
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """What a study is doing, as whoever runs it has said last."""
+    """The status of a study, as its process last wrote it.
+
+    A session is the time from one start of the study to its next end or interruption.
+    """
 
     state: Literal["new", "running", "stopped", "done", "failed"] = "new"
     words: str = ""
-    """What it waits for, or why it ended."""
+    """What the study waits for, or why it ended."""
     done: int = 0
-    """Trials that ended."""
+    """The number of trials that ended."""
     trials: int = 0
+    """The number of trials that the study has."""
     runs: int = 0
-    """Runs that ended in this start, those that were not needed again left out."""
+    """The number of runs computed in this session."""
     seconds: float = 0.0
-    """Since this start."""
+    """The duration of this session, seconds."""
     seconds_left: float | None = None
+    """The estimated time to the end, seconds; None if it is not known."""
     busy: float | None = None
-    """Share of the workers' time, since all were there, in which they worked."""
+    """Share of the workers' time in which they worked, since all had started."""
     workers: list[dict[str, Any]] = field(default_factory=list)
     all_runs: int = 0
-    """Runs that ended in all starts together."""
+    """The number of runs computed in all sessions together."""
     all_seconds: float = 0.0
-    """At work in all starts together."""
+    """The duration of all sessions together, seconds."""
     process: int = 0
+    """The id of the process."""
     written: float = 0.0
-    """Seconds since 1970."""
+    """The time when the status was written, seconds since 1970."""
 
 
-class ToldOutcome(TypedDict, total=False):
-    """A run that ended, as :meth:`tracker.studies.work.jobs.Outcome.to_json` writes it."""
+class StoredOutcome(TypedDict, total=False):
+    """The JSON of an outcome, made by :meth:`tracker.studies.work.jobs.Outcome.to_json`."""
 
     key: Required[str]
     became: Required[Literal["done", "failed", "unreadable", "version"]]
@@ -106,7 +116,7 @@ class _Recording(TypedDict):
     content: str
 
 
-TOLD: dict[str, Any] = {
+STORED: dict[str, Any] = {
     "spent": float,
     "code": str,
     "recordings": list[_Recording],
@@ -114,4 +124,4 @@ TOLD: dict[str, Any] = {
     "importance": _Importance,
     "tuned": dict[str, Any],
 }
-"""What is written down beside the trials, by name."""
+"""The types of the facts that are stored beside the trials, by name."""

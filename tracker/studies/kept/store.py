@@ -1,8 +1,8 @@
-"""A study on disk: a folder that whatever ends the program leaves whole.
+"""The folder of a study, which stays consistent if its process ends at any time.
 
-``study.toml`` is its definition, ``journal.log`` what the sampler was asked, ``results.sqlite3``
-every run that ended and every trial, ``status.json`` what it is doing. One process runs a study;
-any number read it meanwhile.
+``study.toml`` is the definition, ``journal.log`` the sampler's journal, ``results.sqlite3`` has
+every run and trial that ended, ``status.json`` the current status. One process runs a study;
+any number of processes may read it meanwhile.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from tracker.studies.defined.defining import read_definition
 from tracker.studies.defined.definition import Definition
 from tracker.studies.errors import StudyError
 from tracker.studies.kept.reading import read_as
-from tracker.studies.kept.records import TOLD, Status, ToldOutcome, Trial
+from tracker.studies.kept.records import STORED, Status, StoredOutcome, Trial
 from tracker.studies.kept.writer import RESULTS, STATUS, Writer
 from tracker.studies.work.jobs import Outcome
 
@@ -31,7 +31,7 @@ STOP = "stop"
 
 
 def studies_folder() -> Path:
-    """``$MULTIVIEW_PHD_STUDIES``, else the platform's place for data."""
+    """Return ``$MULTIVIEW_PHD_STUDIES``, else ``studies`` in the platform's folder for data."""
     own = os.environ.get("MULTIVIEW_PHD_STUDIES")
     if own:
         return Path(own).expanduser().absolute()
@@ -39,11 +39,11 @@ def studies_folder() -> Path:
 
 
 def create(definition: Definition, folder: Path) -> Store:
-    """Make a study's folder; the same one is opened where it is there already.
+    """Make the folder of a study, or open it if it has the same definition.
 
     Args:
-        definition: Of the study.
-        folder: Of all studies.
+        definition: The study's definition.
+        folder: The folder of all studies.
 
     Raises:
         StudyError: If there is another study of that name, or nothing can be written.
@@ -69,10 +69,14 @@ def create(definition: Definition, folder: Path) -> Store:
 
 
 def find(name: str | None, folder: Path) -> Store:
-    """A study by its name or folder; the one that ran last where none is named.
+    """Return a study by its name or folder, or the one that was last active.
+
+    Args:
+        name: The name or the folder of the study; None for the one that was last active.
+        folder: The folder of all studies.
 
     Raises:
-        StudyError: If there is none.
+        StudyError: If there is no such study.
     """
     if name is not None and (Path(name) / FILE).is_file():
         return Store(Path(name))
@@ -86,7 +90,7 @@ def find(name: str | None, folder: Path) -> Store:
 
 
 def stores(folder: Path) -> list[Store]:
-    """All studies, the one that was at work last first."""
+    """Return all studies, the one that was last active first."""
     if not folder.is_dir():
         return []
     found = [Store(path.parent) for path in folder.glob(f"*/{FILE}")]
@@ -97,24 +101,24 @@ class Store:
     """The folder of one study."""
 
     def __init__(self, folder: Path) -> None:
-        """Nothing is read before it is needed."""
+        """Store the path; files are read when they are needed."""
         self.folder = folder.absolute()
 
     @property
     def name(self) -> str:
-        """Of the study."""
+        """The name of the study."""
         return self.folder.name
 
     def definition(self) -> Definition:
-        """What the study is.
+        """Read the study's definition.
 
         Raises:
-            StudyError: If its file is not as it must be any more.
+            StudyError: If its file is not valid any more.
         """
         return read_definition(self.folder / FILE)
 
     def touched(self) -> float:
-        """When anything was written, seconds since 1970."""
+        """Return the time of the last change of any file, seconds since 1970."""
         times = [
             (self.folder / name).stat().st_mtime
             for name in (FILE, RESULTS, STATUS)
@@ -125,13 +129,13 @@ class Store:
     # reading
 
     def trials(self, after: float = 0.0) -> list[Trial]:
-        """Trials that ended, by number.
+        """Return the trials that ended, by number.
 
         Args:
-            after: Only those that ended later, seconds since 1970.
+            after: Only trials that ended after this time are returned, seconds since 1970.
 
         Raises:
-            StudyError: If one cannot be read any more, with the field.
+            StudyError: If a trial cannot be read any more, with the field.
         """
         with self._reading() as connection:
             if connection is None:
@@ -145,10 +149,10 @@ class Store:
         ]
 
     def trial(self, number: int) -> Trial:
-        """One that ended.
+        """Return a trial that ended, by its number.
 
         Raises:
-            StudyError: If there is none of that number.
+            StudyError: If there is no such trial.
         """
         for one in self.trials():
             if one.number == number:
@@ -156,30 +160,30 @@ class Store:
         raise StudyError(f"study {self.name}: no trial {number} has ended; `study show` lists them")
 
     def outcome(self, key: str) -> Outcome | None:
-        """A run that ended."""
+        """Return the outcome of a run, by the key of its job; None if there is none."""
         with self._reading() as connection:
             if connection is None:
                 return None
             row = connection.execute("SELECT outcome FROM jobs WHERE key = ?", (key,)).fetchone()
         if row is None:
             return None
-        return Outcome(**read_as(ToldOutcome, row[0], f"{self.folder / RESULTS}, run {key}"))
+        return Outcome(**read_as(StoredOutcome, row[0], f"{self.folder / RESULTS}, run {key}"))
 
-    def told(self, name: str) -> Any:
-        """Something that was written down beside the trials; None where it was not."""
+    def fact(self, name: str) -> Any:
+        """Return a fact that is stored beside the trials; None if it is not stored."""
         with self._reading() as connection:
             if connection is None:
                 return None
             row = connection.execute("SELECT value FROM told WHERE name = ?", (name,)).fetchone()
         if row is None:
             return None
-        return read_as(TOLD.get(name, object), row[0], f"{self.folder / RESULTS}, {name}")
+        return read_as(STORED.get(name, object), row[0], f"{self.folder / RESULTS}, {name}")
 
     def status(self) -> Status:
-        """What it is doing. Of a process that was killed the state is that it was stopped."""
+        """Return the status; if the process was killed, the state is ``stopped``."""
         try:
             status = read_as(Status, (self.folder / STATUS).read_bytes(), STATUS)
-        except (OSError, StudyError):  # it is told anew, and nothing else is in it
+        except (OSError, StudyError):  # the status is written again soon
             return Status()
         if status.state == "running" and not self.is_running():
             words = "the program that ran it was ended; nothing that ended before is lost"
@@ -190,12 +194,12 @@ class Store:
         return status
 
     def is_running(self) -> bool:
-        """Whether a process runs it."""
+        """Whether a process runs the study."""
         path = self.folder / _LOCK
         if not path.exists():
             return False
         lock = sqlite3.connect(path, timeout=0.0, isolation_level=None)
-        try:  # any number may read, but not beside the one that runs it
+        try:  # reading fails while the running process holds its exclusive lock
             lock.execute("SELECT count(*) FROM sqlite_master").fetchone()
         except sqlite3.OperationalError:
             return True
@@ -207,26 +211,30 @@ class Store:
 
     @contextmanager
     def running(self) -> Iterator[Writer]:
-        """Be the one that runs it.
+        """Hold the study's lock, and yield the writer of its results.
 
         Raises:
-            StudyError: If another process does, or the folder cannot be written to.
+            StudyError: If another process runs the study, or the folder cannot be written to.
         """
         with self._locked(1.0), Writer(self.folder) as writer:
             (self.folder / STOP).unlink(missing_ok=True)
             yield writer
 
     def ask_to_stop(self) -> None:
-        """Have the process that runs it end at once, with everything kept."""
+        """Ask the process that runs the study to stop; its results are kept."""
         (self.folder / STOP).touch()
 
     def asked_to_stop(self) -> bool:
-        """Whether somebody did."""
+        """Whether the process that runs the study was asked to stop."""
         return (self.folder / STOP).exists()
 
     @contextmanager
     def _locked(self, seconds: float) -> Iterator[None]:
-        """A lock that the system frees with the process, whatever ends it."""
+        """Hold the lock of the study, which the system releases when the process ends.
+
+        Args:
+            seconds: Longest wait for the lock, seconds.
+        """
         try:
             lock = sqlite3.connect(self.folder / _LOCK, timeout=seconds, isolation_level=None)
         except sqlite3.Error as error:

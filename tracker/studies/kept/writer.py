@@ -1,4 +1,4 @@
-"""Results of a study as they come in: written once, each wholly or not at all."""
+"""The writing of a study's results while it runs."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from typing import Any
 from tracker.files.atomic import replacing
 from tracker.studies.errors import StudyError
 from tracker.studies.kept.reading import read_as
-from tracker.studies.kept.records import Status, ToldOutcome, Trial
+from tracker.studies.kept.records import Status, StoredOutcome, Trial
 from tracker.studies.work.jobs import Outcome
 
 RESULTS = "results.sqlite3"
@@ -41,17 +41,17 @@ _TABLES = (
 
 
 class Writer:
-    """Results as they come in: each wholly or not at all."""
+    """Writes the results of a study; each one is stored completely or not at all."""
 
     def __init__(self, folder: Path) -> None:
-        """Open the results, or make them.
+        """Open the file of results, or make it.
 
         Raises:
-            StudyError: If they cannot be written to.
+            StudyError: If the file cannot be written to.
         """
         self._path = folder / RESULTS
         self._status = folder / STATUS
-        with self._told():
+        with self._explained():
             self._connection = sqlite3.connect(self._path, timeout=10.0, isolation_level=None)
             self._connection.execute("PRAGMA journal_mode = WAL")
             self._connection.execute("PRAGMA synchronous = NORMAL")
@@ -72,48 +72,52 @@ class Writer:
 
     @property
     def runs(self) -> int:
-        """How many are kept."""
+        """The number of stored runs."""
         return len(self._outcomes)
 
     def outcome(self, key: str) -> Outcome | None:
-        """A run that ended before."""
+        """Return the outcome of a run that ended before; None if there is none."""
         text = self._outcomes.get(key)
         return (
             None
             if text is None
-            else Outcome(**read_as(ToldOutcome, text, f"{self._path}, run {key}"))
+            else Outcome(**read_as(StoredOutcome, text, f"{self._path}, run {key}"))
         )
 
     def keep(self, outcome: Outcome) -> None:
-        """Write down a run that ended; one that is there stays as it is."""
+        """Store the outcome of a run, unless it is stored already."""
         text = json.dumps(outcome.to_json(), ensure_ascii=False)
-        with self._told():
+        with self._explained():
             self._connection.execute(
                 "INSERT OR IGNORE INTO jobs VALUES (?, ?, ?)", (outcome.key, text, time.time())
             )
         self._outcomes.setdefault(outcome.key, text)
 
     def end(self, trial: Trial) -> None:
-        """Write down a trial that ended."""
-        # whoever asks for the trials since the last one misses none where the clock goes back
+        """Store a trial that ended."""
+        # times increase even if the clock is set back, so that readers of new trials miss none
         self._ended = max(time.time(), self._ended + 1e-5)
-        told = {**trial.to_json(), "ended": self._ended}
-        with self._told():
+        row = {**trial.to_json(), "ended": self._ended}
+        with self._explained():
             self._connection.execute(
                 "INSERT OR REPLACE INTO trials VALUES (?, ?, ?, ?)",
-                (trial.number, trial.state, json.dumps(told, ensure_ascii=False), told["ended"]),
+                (trial.number, trial.state, json.dumps(row, ensure_ascii=False), row["ended"]),
             )
 
-    def tell(self, name: str, value: Any) -> None:
-        """Write down something beside the trials."""
-        with self._told():
+    def put_fact(self, name: str, value: Any) -> None:
+        """Store a fact beside the trials, by name."""
+        with self._explained():
             self._connection.execute(
                 "INSERT OR REPLACE INTO told VALUES (?, ?)",
                 (name, json.dumps(value, ensure_ascii=False)),
             )
 
-    def say(self, status: Status) -> None:
-        """Write down what is being done, for whoever looks; the results are elsewhere."""
+    def write_status(self, status: Status) -> None:
+        """Write the status for other processes.
+
+        Raises:
+            StudyError: If it cannot be written.
+        """
         try:
             with replacing(self._status, passing=True) as begun:
                 begun.write_text(json.dumps(asdict(status)), encoding="utf-8")
@@ -125,21 +129,21 @@ class Writer:
 
     @contextmanager
     def together(self) -> Iterator[None]:
-        """What is kept and ended within is written down at the end, by one transaction.
+        """Store all outcomes and trials of the block in one transaction.
 
-        It is written down too where something else goes wrong within.
+        The transaction is also committed if the block raises an exception.
         """
-        with self._told():
+        with self._explained():
             self._connection.execute("BEGIN IMMEDIATE")
         try:
             yield
         finally:
-            with self._told():
+            with self._explained():
                 if self._connection.in_transaction:  # a full disk has ended it already
                     self._connection.execute("COMMIT")
 
     @contextmanager
-    def _told(self) -> Iterator[None]:
+    def _explained(self) -> Iterator[None]:
         try:
             yield
         except sqlite3.Error as error:

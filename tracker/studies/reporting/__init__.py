@@ -1,1 +1,1 @@
-"""A study as it is told: in words, as commands, as a report."""
+"""The presentation of a study: a summary, commands, and reports."""

@@ -1,4 +1,4 @@
-"""A trial as commands: what repeats it by hand, bit for bit."""
+"""The commands that reproduce the runs of a trial exactly."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from tracker.studies.kept.records import JobRow, Trial
 
 
 def track_commands(definition: Definition, trial: Trial) -> list[str]:
-    """The ``track`` command of each run of a trial.
+    """Return the ``track`` command of each run of a trial.
 
     Args:
-        definition: Of its study.
-        trial: It.
+        definition: The definition of the study.
+        trial: The trial.
 
     Raises:
         SequenceError: If a recording cannot be read any more.
@@ -28,7 +28,13 @@ def track_commands(definition: Definition, trial: Trial) -> list[str]:
 
 
 def changes_of(definition: Definition, trial: Trial, recording: str) -> dict[str, Any]:
-    """The values of a trial against the recording's own defaults, by key."""
+    """Return the values of a trial that differ from the recording's defaults, by key.
+
+    Args:
+        definition: The definition of the study.
+        trial: The trial.
+        recording: The name or folder of the recording.
+    """
     defaults = pipeline.default_parameters(open_sequence(recording))
     values = trial.values if trial.number else {}
     return changed(with_values(defaults, {**definition.held(), **values}), defaults)

@@ -1,4 +1,4 @@
-"""A study as a table, as JSON, or as one HTML file that needs nothing from anywhere else."""
+"""The report of a study as a table, as JSON, or as one self-contained HTML file."""
 
 from __future__ import annotations
 
@@ -12,11 +12,12 @@ from typing import Any
 from tracker import __version__
 from tracker.evaluation.report.tables import escaped
 from tracker.files.atomic import replacing
+from tracker.parameters import PARAMETERS
 from tracker.sequences.errors import SequenceError
+from tracker.studies.judging import usable
 from tracker.studies.kept.records import Trial
 from tracker.studies.kept.store import Store
 from tracker.studies.reporting.commands import track_commands
-from tracker.studies.reporting.figures import importance_figure, objective_figure, parameter_figures
 from tracker.studies.reporting.summary import Summary, summary_of
 
 _STYLE = """
@@ -37,19 +38,28 @@ pre.command { white-space: pre-wrap; } summary { cursor: pointer; }
 """
 
 _BEST = 40
-"""Trials in the report's table."""
+"""Most trials in the report's table."""
+
+_HEIGHT = 340
+_FAINT, _ACCENT, _DEFAULT = "#6b7a90", "#d9480f", "#1971c2"
+_CALM = 1.5
+"""Range of the plotted values below the best, as a multiple of the lower quartile's distance from
+the best; a few failures would else leave no room to tell the good ones apart."""
+
+_MOST = 12
+"""Most parameters with a plot, which are the most important ones."""
 
 
 def everything(store: Store) -> dict[str, Any]:
-    """A study as plain values: definition, status, trials with the hashes of their runs, best."""
+    """Return a study as plain values, with its definition, status, trials and best trial."""
     summary = summary_of(store)
     return {
         "program": __version__,
-        "code": store.told("code"),
+        "code": store.fact("code"),
         "study": summary.name,
         "definition": summary.definition.to_json(),
         "status": asdict(summary.status),
-        "recordings": store.told("recordings"),
+        "recordings": store.fact("recordings"),
         "objectives": [asdict(one) for one in summary.objectives],
         "trials": [one.to_json() for one in summary.trials],
         "best": None if summary.best is None else summary.best.number,
@@ -60,7 +70,7 @@ def everything(store: Store) -> dict[str, Any]:
 
 
 def write_json(path: Path, store: Store) -> None:
-    """Everything, as JSON.
+    """Write a study as JSON.
 
     Raises:
         OSError: With a sentence, if the file cannot be written.
@@ -71,7 +81,7 @@ def write_json(path: Path, store: Store) -> None:
 
 
 def write_csv(path: Path, store: Store) -> None:
-    """One row a trial: number, state, objectives, values, other figures.
+    """Write a table with a row for each trial: number, state, values and figures.
 
     Raises:
         OSError: With a sentence, if the file cannot be written.
@@ -81,7 +91,7 @@ def write_csv(path: Path, store: Store) -> None:
 
 
 def csv_text(store: Store) -> str:
-    """The table as text."""
+    """Return the table of :func:`write_csv` as text."""
     import io
 
     summary, file = summary_of(store), io.StringIO(newline="")
@@ -101,7 +111,7 @@ def csv_text(store: Store) -> str:
 
 
 def write_report(path: Path, store: Store) -> None:
-    """The report.
+    """Write the HTML report.
 
     Raises:
         OSError: With a sentence, if the file cannot be written.
@@ -111,11 +121,11 @@ def write_report(path: Path, store: Store) -> None:
 
 
 def report_html(store: Store) -> str:
-    """The report's text: what was sought, what was found, how to repeat it."""
+    """Return the HTML report: the settings, the results, and how to reproduce them."""
     from plotly.offline import get_plotlyjs
 
     summary = summary_of(store)
-    recordings = store.told("recordings") or []
+    recordings = store.fact("recordings") or []
     definition = summary.definition
     sentences = "".join(f"<p>{escaped(one)}.</p>" for one in summary.sentences())
     figures = [objective_figure(summary), importance_figure(summary)]
@@ -135,7 +145,7 @@ def report_html(store: Store) -> str:
         ("Search", f"{definition.search}, sampler's seed {definition.seed}"),
         ("Objectives", ", ".join(one.name for one in summary.objectives)),
         *((f"Recording {r['name']}", f"{r['place']}, content {r['content']}") for r in recordings),
-        ("Program", f"multiview-phd {__version__}, code {store.told('code')}"),
+        ("Program", f"multiview-phd {__version__}, code {store.fact('code')}"),
     ]
     return "\n".join(
         [
@@ -146,7 +156,7 @@ def report_html(store: Store) -> str:
             f"<h1>Study {escaped(summary.name)}</h1>",
             sentences,
             _table(("", ""), facts),
-            _proposed(store.told("tuned")),
+            _proposed(store.fact("tuned")),
             "<h2>Figures</h2>",
             f'<div class="plots">{plots}</div>',
             "<h2>Best trials</h2>",
@@ -162,7 +172,7 @@ def report_html(store: Store) -> str:
 
 
 def _proposed(found: dict[str, Any] | None) -> str:
-    """What was measured again on other seeds, and what is proposed after that."""
+    """Return the section on the proposal."""
     if found is None:
         return ""
     parts = ["<h2>Proposed</h2>", f"<p>{escaped(found['words'])}.</p>"]
@@ -178,12 +188,12 @@ def _proposed(found: dict[str, Any] | None) -> str:
         head = ("parameter", "before", "default", "now", "brings")
         parts.append(f'<div class="wide">{_table(head, rows)}</div>')
     if found["figures"]:
-        told = [
+        figures = [
             (row["name"], *(_value(row[key]) for key in ("default", "before", "after")))
             for row in found["figures"]
         ]
         head_of_figures = ("figure", "default", "before", "now")
-        parts.append(f'<div class="wide">{_table(head_of_figures, told)}</div>')
+        parts.append(f'<div class="wide">{_table(head_of_figures, figures)}</div>')
     return "\n".join(parts)
 
 
@@ -237,3 +247,142 @@ def _value(value: Any) -> str:
     if value is None:
         return "–"
     return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def objective_figure(summary: Summary) -> Any | None:
+    """Plot two objectives against each other with the Pareto front, or one over the trials."""
+    import plotly.graph_objects as go
+
+    trials = usable(summary.trials)
+    if not trials:
+        return None
+    figure = go.Figure(layout=_layout())
+    several = len(summary.objectives) > 1
+    across = summary.objectives[-1] if several else None
+
+    def x(trial: Trial) -> float:
+        assert trial.objectives is not None
+        return trial.objectives[-1] if several else float(trial.number)
+
+    def points(some: list[Trial], name: str, **marker: Any) -> Any:
+        return go.Scatter(
+            x=[x(one) for one in some],
+            y=[(one.objectives or (0.0,))[0] for one in some],
+            text=[f"trial {one.number}" for one in some],
+            mode="markers",
+            name=name,
+            marker=marker,
+        )
+
+    figure.add_trace(points(trials, "trials", color=_FAINT, size=6, opacity=0.6))
+    if several:
+        front = sorted((one for one in trials if one.number in summary.front), key=x)
+        ways = points(front, "front", color=_ACCENT, size=7)
+        figure.add_trace(ways.update(mode="lines+markers", line_shape="vh", line_color=_ACCENT))
+    if summary.default is not None and summary.default.objectives is not None:
+        default = points([summary.default], "default", symbol="diamond", size=12, color=_DEFAULT)
+        figure.add_trace(default)
+    if summary.best is not None:
+        ring = {"color": _ACCENT, "width": 2}
+        best = points(
+            [summary.best], "best", color=_ACCENT, symbol="circle-open", size=15, line=ring
+        )
+        figure.add_trace(best)
+    figure.update_xaxes(title=_axis(across) if across is not None else "trial")
+    _calm(figure, summary)
+    return figure
+
+
+def importance_figure(summary: Summary) -> Any | None:
+    """Plot the importance of parameters with standard deviations."""
+    import plotly.graph_objects as go
+
+    if not summary.importance:
+        return None
+    shown = summary.importance[:_MOST][::-1]
+    bars = go.Bar(
+        x=[share for _, (share, _) in shown],
+        y=[key for key, _ in shown],
+        error_x={"type": "data", "array": [spread for _, (_, spread) in shown]},
+        orientation="h",
+        marker_color=_FAINT,
+    )
+    figure = go.Figure(bars, layout=_layout(90 + 24 * len(shown)) | {"showlegend": False})
+    figure.update_xaxes(title="share of the variance", range=[0.0, 1.0])
+    return figure
+
+
+def parameter_figures(summary: Summary) -> list[Any]:
+    """Plot the first objective over each parameter."""
+    import plotly.graph_objects as go
+
+    trials = usable(summary.trials)
+    if not trials:
+        return []
+    order = [key for key, _ in summary.importance] or [one.key for one in summary.definition.varied]
+    logs = {one.key: one.log for one in summary.definition.varied}
+    found = []
+    for key in order[:_MOST]:
+        some = [one for one in trials if key in one.values]
+        dots = go.Scatter(
+            x=[one.values[key] for one in some],
+            y=[(one.objectives or (0.0,))[0] for one in some],
+            text=[f"trial {one.number}" for one in some],
+            mode="markers",
+            marker={"color": _FAINT, "size": 6, "opacity": 0.6},
+            name="trials",
+        )
+        figure = go.Figure(dots, layout=_layout(260))
+        for trial, name, colour in (
+            (summary.default, "default", _DEFAULT), (summary.best, "best", _ACCENT),
+        ):  # fmt: skip
+            if trial is not None and key in trial.values and trial.objectives is not None:
+                marker: dict[str, Any] = {"color": colour, "size": 12, "symbol": "diamond"}
+                if name == "best":
+                    marker |= {"symbol": "circle-open", "line": {"color": colour, "width": 2}}
+                figure.add_trace(
+                    go.Scatter(
+                        x=[trial.values[key]], y=[trial.objectives[0]], mode="markers", name=name,
+                        marker=marker,
+                    )
+                )  # fmt: skip
+        unit = PARAMETERS[key].unit if key in PARAMETERS else ""
+        figure.update_xaxes(
+            title=f"{key}{f' [{unit}]' if unit else ''}", type="log" if logs.get(key) else None
+        )
+        _calm(figure, summary)
+        found.append(figure)
+    return found
+
+
+def _calm(figure: Any, summary: Summary) -> None:
+    """Set the title of the first objective's axis, and limit its range (see :data:`_CALM`)."""
+    lead = summary.objectives[0]
+    sign = 1.0 if lead.higher else -1.0
+    values = sorted(sign * one.objectives[0] for one in usable(summary.trials) if one.objectives)
+    best, quartile = values[-1], values[len(values) // 4]
+    least = best - max(_CALM * (best - quartile), 1e-6 * abs(best), 1e-9)
+    if summary.default is not None and summary.default.objectives is not None:
+        least = min(least, sign * summary.default.objectives[0])
+    beyond = sum(value < least for value in values)
+    if not beyond:
+        figure.update_yaxes(title=_axis(lead))
+        return
+    margin = 0.06 * (best - least)
+    ends = sign * (least - margin), sign * (best + margin)
+    words = f"{beyond} trial{'s' if beyond > 1 else ''} {'below' if lead.higher else 'above'}"
+    figure.update_yaxes(title=f"{_axis(lead)}<br><sub>{words}</sub>", range=sorted(ends))
+
+
+def _axis(objective: Any) -> str:
+    return f"{objective.name}{f' [{objective.unit}]' if objective.unit else ''}"
+
+
+def _layout(height: int = _HEIGHT) -> dict[str, Any]:
+    return {
+        "template": "plotly_white",
+        "height": height,
+        "margin": {"l": 70, "r": 20, "t": 40, "b": 50},
+        "showlegend": True,
+        "legend": {"orientation": "h", "x": 0.0, "y": 1.0, "yanchor": "bottom"},
+    }

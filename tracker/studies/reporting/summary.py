@@ -1,4 +1,4 @@
-"""A study as it is read: trials in their order, what is best, what matters, in words."""
+"""The summary of a study: trials, the best one, the importance of parameters, and sentences."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from tracker.studies.kept.store import Store
 from tracker.studies.kept.writer import RESULTS
 
 BETTER_SIGMAS = 2.0
-"""A difference within so many standard deviations over the seeds is said to be no sure one."""
+"""A difference below so many standard deviations over the seeds is described as uncertain."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Summary:
-    """What is told of a study."""
+    """The summary of a study."""
 
     name: str
     definition: Definition
@@ -30,13 +30,14 @@ class Summary:
     objectives: tuple[Objective, ...]
     trials: tuple[Trial, ...]
     best: Trial | None
-    """None where none ended. The defaults, where nothing is better."""
+    """The best trial, which is that of the defaults if none is better; None if none ended."""
     front: list[int]
-    """Trials that no other beats in all objectives."""
+    """The numbers of the trials on the Pareto front."""
     importance: list[tuple[str, tuple[float, float]]]
-    """Share of the variance of the first objective and its standard deviation, largest first;
-    nothing before there are enough trials."""
+    """The key of each parameter with its share of the variance of the first objective and the
+    standard deviation of the share, largest first; empty before there are enough trials."""
     importance_trials: int
+    """The number of trials that the importance is estimated from."""
 
     @property
     def default(self) -> Trial | None:
@@ -45,19 +46,19 @@ class Summary:
 
     @property
     def defaults(self) -> dict[str, Any]:
-        """What the varied parameters are by default."""
+        """The default values of the varied parameters, by key."""
         return dict(self.default.values) if self.default is not None else {}
 
     @property
     def beside(self) -> list[Objective]:
-        """Other figures worth a column: those that are known of a trial at least. Studies that
-        were run before a figure was kept do not have it."""
+        """Other figures that are shown: those that at least one trial has. Studies of earlier
+        versions may lack some."""
         known = {key for trial in self.trials for key in trial.figures}
         return [one for key, one in BESIDE.items() if key in known and one not in self.objectives]
 
     @property
     def ranked(self) -> list[Trial]:
-        """Those that may be taken, the best first."""
+        """The trials that are complete and not vetoed, the best first."""
         left, found = usable(self.trials), []
         while left and (best := best_of(left, self.objectives)) is not None:
             found.append(best)
@@ -65,11 +66,11 @@ class Summary:
         return found
 
     def changes(self, trial: Trial) -> dict[str, Any]:
-        """What a trial has that is not the default."""
+        """Return the values of a trial that differ from the defaults, by key."""
         return {k: v for k, v in trial.values.items() if self.defaults.get(k) != v}
 
     def remark(self, trial: Trial) -> str:
-        """What a trial is."""
+        """Return the remark on a trial, for instance that it is the best."""
         words = [trial.words] if trial.words else []
         if self.best is not None and trial.number == self.best.number:
             words.insert(0, "best")
@@ -78,7 +79,7 @@ class Summary:
         return ", ".join(words)
 
     def sentences(self) -> list[str]:
-        """What there is to say of it."""
+        """Return the main results as sentences without full stops."""
         found = []
         best, default = self.best, self.default
         lead = self.objectives[0]
@@ -109,19 +110,19 @@ class Summary:
 
 
 def summary_of(store: Store, before: Summary | None = None) -> Summary:
-    """Read a study.
+    """Read the summary of a study.
 
     Args:
-        store: Its folder.
-        before: As it was read last: what was written since is read alone, so that who looks often
-            at a long study does not read all of it each time.
+        store: The folder of the study.
+        before: An earlier summary, to which only new trials are added, so that reading a long
+            study repeatedly is fast.
 
     Raises:
-        StudyError: If its files are not as they must be.
+        StudyError: If its files are not valid.
     """
     definition, status = store.definition(), store.status()
     if before is not None and (before.definition != definition or status.done < len(before.trials)):
-        before = None  # another one of that name
+        before = None  # it is of another study with the same name
     known = {} if before is None else {one.number: one for one in before.trials}
     news = store.trials(max((one.ended for one in known.values()), default=0.0))
     known |= {one.number: one for one in news}
@@ -134,7 +135,7 @@ def summary_of(store: Store, before: Summary | None = None) -> Summary:
                 f"{len(objectives)}, found {len(one.objectives)}; start a study of another name"
             )
     same = before is not None and not news and objectives == before.objectives
-    importance = store.told("importance") or {"trials": 0, "shares": {}}
+    importance = store.fact("importance") or {"trials": 0, "shares": {}}
     return Summary(
         store.name,
         definition,
@@ -149,15 +150,15 @@ def summary_of(store: Store, before: Summary | None = None) -> Summary:
 
 
 def objectives_of(store: Store, definition: Definition) -> tuple[Objective, ...]:
-    """As they were chosen when it began; before that as its definition has them."""
-    told: Sequence[dict[str, Any]] | None = store.told("objectives")
-    if told is not None:
-        for one in told:
+    """Return the objectives that were stored when the study began, or else its definition's."""
+    stored: Sequence[dict[str, Any]] | None = store.fact("objectives")
+    if stored is not None:
+        for one in stored:
             if one["key"] not in OBJECTIVES:
                 raise StudyError(
                     f"{store.folder / RESULTS}, objectives: expected some of "
                     f"{', '.join(OBJECTIVES)}, found {shown(one['key'])}; start a study of "
                     "another name"
                 )
-        return tuple(OBJECTIVES[one["key"]] for one in told)
+        return tuple(OBJECTIVES[one["key"]] for one in stored)
     return tuple(OBJECTIVES[key] for key in definition.objectives or WITH_TRUTH)

@@ -1,1 +1,1 @@
-"""What a study has computed: jobs, where their recordings are, workers, and the cluster."""
+"""The computation of a study's runs: jobs, recordings on workers, workers, and the cluster."""

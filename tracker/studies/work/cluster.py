@@ -1,7 +1,7 @@
-"""Workers by Dask: a cluster of processes on this machine, or one that is there.
+"""Workers by Dask: a cluster of processes on this machine, or an existing one.
 
-Everything that distributes, restarts and counts workers is Dask's. What is ours: a job is sent
-under its own key, a recording goes where it cannot be read, and what a worker waits for is told.
+Dask distributes the jobs, and restarts and counts the workers. This module submits jobs under
+their keys, sends recordings to workers that cannot read them, and collects what workers report.
 """
 
 from __future__ import annotations
@@ -27,70 +27,81 @@ from tracker.studies.errors import StudyError
 from tracker.studies.work import recordings, working
 from tracker.studies.work.jobs import Job, Outcome
 from tracker.studies.work.local import how_many
+from tracker.studies.work.working import Tell
 
 ADDRESS = "DASK_SCHEDULER_ADDRESS"
-"""Environment variable: the cluster's scheduler, where none is named."""
+"""The environment variable with the scheduler's address, if none is named."""
 
 TOPIC = "multiview-phd"
+"""The topic of the events in which workers report what they do."""
 
 LOOK_SECONDS = 2.0
-"""How often the scheduler is asked who works for it."""
+"""Least interval between two queries of the scheduler's workers, seconds."""
 
 CONNECT_SECONDS = 10.0
+"""Longest wait for a connection, seconds."""
+
 SENDING_SECONDS = 600.0
+"""Longest time for sending a recording, seconds."""
 
 _QUIET = {
-    "distributed.worker.profile.enabled": False,  # looks at every worker a hundred times a second
-    "distributed.admin.tick.interval": "1 s",  # else fifty times a second, in each worker
+    "distributed.worker.profile.enabled": False,  # samples every worker a hundred times a second
+    "distributed.admin.tick.interval": "1 s",  # is fifty times a second by default
     "distributed.admin.tick.limit": "1 minute",
     "distributed.admin.system-monitor.interval": "10 s",
 }
-"""What Dask tells its dashboard; nobody looks there, and with many workers it takes the time that
-the scheduler has for them."""
-
-Told = Callable[[str], None]
+"""Settings that reduce what Dask collects for its dashboard, which is not used here; with many
+workers it would take much of the scheduler's time."""
 
 
 @dataclass(frozen=True, slots=True)
 class WorkerState:
-    """One worker as far as it has told."""
+    """The state of one worker, as it last reported it."""
 
     name: str
     machine: str
     words: str
-    """What it does or waits for."""
+    """What the worker does or waits for."""
     job: str | None
-    """Key of its job."""
+    """The key of its job; None if it has none."""
     since: float
-    """Seconds since 1970."""
+    """The time of the report, seconds since 1970."""
 
 
 class Crew(Protocol):
-    """Who does the jobs."""
+    """The workers that do the jobs of a study."""
 
     @property
     def slots(self) -> int:
-        """How many jobs are done at a time; at least 1."""
+        """The number of jobs that are done at a time, at least 1."""
 
     def submit(self, job: Job, priority: int = 0) -> None:
-        """Have a job done; of several those of higher priority come first."""
+        """Submit a job; jobs of higher priority are done first."""
 
     def finished(self, seconds: float) -> list[Outcome]:
-        """What has ended, waiting for the first so long.
+        """Return the outcomes of jobs that ended since the last call.
+
+        Args:
+            seconds: Longest wait for the first of them, seconds.
 
         Raises:
-            StudyError: If the crew cannot work on; nothing that ended before is lost.
+            StudyError: If the crew cannot continue; earlier outcomes are not lost.
         """
 
     def call(self, function: Callable[..., Any], *arguments: Any) -> Callable[[], Any | None]:
-        """Have something else computed; what is given back has it once it is there."""
+        """Have a function computed by a worker, and return a getter of its result, which returns
+        None until it is computed."""
 
     def workers(self) -> list[WorkerState]:
-        """All that there are."""
+        """Return the states of all workers."""
 
 
-def compile_first(tell: Told) -> None:
-    """Have this machine's kernels compiled before its workers start."""
+def compile_first(tell: Tell) -> None:
+    """Compile this machine's kernels before its workers start.
+
+    Args:
+        tell: A callback that gets a sentence on what is being done.
+    """
     if not compilation.is_compiled():
         tell(working.COMPILING)
         line = [sys.executable, "-m", "tracker.runs.warm_up"]
@@ -98,25 +109,29 @@ def compile_first(tell: Told) -> None:
 
 
 def _do(job: Job) -> Outcome:
-    """A job as Dask's task."""
+    """Do a job as a task of Dask, and report its progress as events."""
     from distributed import get_worker
 
     worker = get_worker()
     name = str(worker.address)
 
     def tell(words: str) -> None:
-        told = {"worker": name, "words": words, "job": job.key, "machine": working.machine()}
-        worker.log_event(TOPIC, told)
+        event = {"worker": name, "words": words, "job": job.key, "machine": working.machine()}
+        worker.log_event(TOPIC, event)
 
     tell("")
     return working.work(job, tell, name)
 
 
 def look_at(address: str, seconds: float) -> dict[str, Any]:
-    """Who works for a scheduler: ``workers``, ``threads``, ``machines``.
+    """Return the numbers of ``workers`` and ``threads`` of a scheduler, and its ``machines``.
+
+    Args:
+        address: The scheduler's address.
+        seconds: Longest wait for a connection, seconds.
 
     Raises:
-        StudyError: If there is none at the address, or it is none.
+        StudyError: If the address is not valid, or there is no scheduler.
     """
     check_address(address)
     distributed: Any = importlib.import_module("distributed")  # slow, and without types
@@ -134,11 +149,10 @@ def look_at(address: str, seconds: float) -> dict[str, Any]:
 
 
 def check_address(address: str) -> None:
-    """Whether a text may be a scheduler's address; what is none Dask may refuse by anything, an
-    assertion included.
+    """Check that a text may be a scheduler's address; for others Dask raises various exceptions.
 
     Raises:
-        StudyError: If it cannot be one.
+        StudyError: If the text cannot be an address.
     """
     found = re.fullmatch(
         r"(?:[a-z]+://)?(?:[A-Za-z0-9._-]+|\[[0-9A-Fa-f:.]+\]):(\d{1,5})/?", address
@@ -158,14 +172,14 @@ def _no_scheduler(address: str | None, error: Exception) -> StudyError:
 
 
 class DaskCrew:
-    """Jobs as tasks of a Dask cluster; close it, or use ``with``."""
+    """A crew whose jobs are tasks of a Dask cluster; close it, or use ``with``."""
 
     def __init__(
         self,
         scheduler: str | None = None,
         *,
         workers: int | None = None,
-        tell: Told = lambda words: None,
+        tell: Tell = lambda words: None,
         do: Callable[[Job], Outcome] = _do,
         processes: bool = True,
         sent_bytes: int = recordings.SENT_BYTES,
@@ -173,12 +187,13 @@ class DaskCrew:
         """Start workers on this machine, or join a cluster.
 
         Args:
-            scheduler: Address of one that is there; None for this machine.
-            workers: How many on this machine; as many as there are cores, if none is named.
-            tell: Told what is being waited for.
-            do: What a worker does with a job.
+            scheduler: The address of an existing scheduler; None for workers on this machine.
+            workers: The number of workers on this machine; one for each core if None.
+            tell: A callback that gets a sentence on what is being done.
+            do: The function with which a worker does a job.
             processes: Whether the workers of this machine are processes rather than threads.
-            sent_bytes: A recording up to this size is sent to a worker that cannot read it.
+            sent_bytes: Largest size of a recording that is sent to a worker that cannot read it,
+                bytes.
 
         Raises:
             StudyError: If there is no scheduler at the address.
@@ -189,7 +204,7 @@ class DaskCrew:
             logging.getLogger(name).setLevel(logging.CRITICAL)
         self._do, self._address, self._sent_bytes = do, scheduler, sent_bytes
         self._jobs: dict[Any, Job] = {}
-        """Each job under way by its future."""
+        """The jobs that have not ended, by their futures."""
         self._states: dict[str, WorkerState] = {}
         self._lock = threading.Lock()
         self._sent: set[tuple[str, str]] = set()
@@ -211,13 +226,13 @@ class DaskCrew:
         except (OSError, TimeoutError, ValueError) as error:
             self.close()
             raise _no_scheduler(scheduler, error) from None
-        # results come over beside us, so that nobody waits for one after the other
+        # results are transferred in the background
         self._ended: Any = distributed.as_completed(
             loop=self._client.loop, with_results=True, raise_errors=False
         )
         self._client.subscribe_topic(TOPIC, self._heard)
 
-    def _start(self, count: int, processes: bool, tell: Told) -> Any:
+    def _start(self, count: int, processes: bool, tell: Tell) -> Any:
         distributed: Any = importlib.import_module("distributed")  # slow, and without types
         dask: Any = importlib.import_module("dask")
         if processes:
@@ -230,8 +245,8 @@ class DaskCrew:
                 n_workers=count,
                 threads_per_worker=1,
                 processes=processes,
-                dashboard_address="127.0.0.1:0",  # Dask has one in any case
-                memory_limit=0,  # what a run takes is bounded by its recording
+                dashboard_address="127.0.0.1:0",  # Dask always starts a dashboard
+                memory_limit=0,  # the memory of a run is bounded by its recording
                 silence_logs=logging.CRITICAL,
                 **({"env": environment} if processes else {}),
                 **own,
@@ -244,7 +259,7 @@ class DaskCrew:
         self.close()
 
     def close(self) -> None:
-        """End the workers of this machine; those of another cluster only forget our jobs."""
+        """End the workers of this machine, or withdraw the jobs from another cluster."""
         self._closed = True
         client = getattr(self, "_client", None)
         if client is not None:
@@ -254,11 +269,11 @@ class DaskCrew:
 
     @property
     def slots(self) -> int:
-        """How many jobs are done at a time; at least 1."""
+        """The number of jobs that are done at a time, at least 1."""
         return max(1, sum(self._threads().values()))
 
     def _threads(self) -> Mapping[str, int]:
-        """Of each worker. The answer takes its time, in which nothing else can be done."""
+        """Return the number of threads of each worker; the slow query is repeated seldom."""
         if time.monotonic() - self._looked >= LOOK_SECONDS:
             with self._asking():
                 workers = self._client.scheduler_info(n_workers=-1).get("workers", {})
@@ -267,7 +282,7 @@ class DaskCrew:
         return self._there
 
     def submit(self, job: Job, priority: int = 0) -> None:
-        """Have a job done; of several those of higher priority come first."""
+        """Submit a job; jobs of higher priority are done first."""
         with self._asking():
             future = self._client.submit(
                 self._do, job, key=f"{TOPIC}-{job.key}-{time.monotonic_ns()}",
@@ -277,10 +292,14 @@ class DaskCrew:
         self._ended.add(future)
 
     def finished(self, seconds: float) -> list[Outcome]:
-        """What has ended, waiting for the first so long.
+        """Return the outcomes of jobs that ended since the last call.
+
+        Args:
+            seconds: Longest wait for the first of them, seconds.
 
         Raises:
-            StudyError: If the scheduler is gone, or a worker has another version or no recording.
+            StudyError: If the scheduler is gone, or if a worker has another version of the program
+                or cannot get a recording.
         """
         found: list[Outcome] = []
         until = time.monotonic() + seconds
@@ -302,14 +321,14 @@ class DaskCrew:
 
     @contextmanager
     def _asking(self) -> Iterator[None]:
-        """Whatever Dask raises where its scheduler does not answer is told as one sentence."""
+        """Turn the exceptions that Dask raises if its scheduler is gone into one sentence."""
         try:
             yield
         except (OSError, TimeoutError, RuntimeError, CancelledError) as error:
             raise self._gone() from error
 
     def _outcome(self, job: Job, status: str, result: Any) -> Outcome | None:
-        """What became of a job; None where it is sent once more."""
+        """Return the outcome of a job; None if the job is submitted again."""
         if status == "error":
             error = result[1]
             words = _words(error)
@@ -321,7 +340,7 @@ class DaskCrew:
                     "multiview-phd of the same version there"
                 )
             return Outcome(job.key, "failed", words)
-        if status != "finished":  # cancelled or lost, as all are when the connection breaks
+        if status != "finished":  # cancelled or lost, since the connection is broken
             raise self._gone()
         outcome: Outcome = result
         if outcome.became == "version":
@@ -337,7 +356,7 @@ class DaskCrew:
         return outcome
 
     def _send(self, job: Job, outcome: Outcome) -> None:
-        """Put a recording on the machine of a worker that cannot read it."""
+        """Send a recording to the machine of a worker that cannot read it."""
         if (job.content, outcome.worker) in self._sent:
             raise StudyError(
                 f"worker {outcome.worker} cannot read {job.place} though it was sent there "
@@ -360,9 +379,10 @@ class DaskCrew:
             sent.result(timeout=SENDING_SECONDS)
 
     def call(self, function: Callable[..., Any], *arguments: Any) -> Callable[[], Any | None]:
-        """Have something else computed; what is given back has it once it is there.
+        """Have a function computed by a worker, and return a getter of its result, which returns
+        None until it is computed.
 
-        By the same worker each time, if it is there: one alone loads what that takes.
+        The same worker is used each time if possible, so that others need not import the packages.
         """
         first = sorted(self._threads())[:1]
         with self._asking():
@@ -373,14 +393,14 @@ class DaskCrew:
         return lambda: future.result() if future.status == "finished" else None
 
     def _heard(self, event: tuple[float, Any]) -> None:
-        _, told = event
+        _, report = event
         with self._lock:
-            self._states[told["worker"]] = WorkerState(
-                told["worker"], told["machine"], told["words"], told["job"], time.time()
+            self._states[report["worker"]] = WorkerState(
+                report["worker"], report["machine"], report["words"], report["job"], time.time()
             )
 
     def workers(self) -> list[WorkerState]:
-        """All that there are."""
+        """Return the states of all workers."""
         if self._closed:
             return []
         there = self._threads()

@@ -1,4 +1,4 @@
-"""A job: one recording tracked with some values and one seed; and what became of it."""
+"""A job, which is one recording tracked with certain parameters and a seed, and its outcome."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from tracker.runs.run import stage_keys
 from tracker.sequences.sequence import Sequence
 
 FORMAT = 1
-"""Of what a job tells; another number computes all anew."""
+"""Version of the outcomes; with another number all jobs are computed again."""
 
 
 @cache
 def code_version() -> str:
-    """Another text for every code that may tell other figures: what tracks, and what scores."""
+    """Return a text that differs for every version of the code that may change a figure."""
     digest = hashlib.sha256(f"{FORMAT} {numbers_version('tracks')}".encode())
     for path in sorted(Path(evaluation.__file__).parent.glob("*.py")):
         digest.update(path.read_bytes())
@@ -33,58 +33,61 @@ def code_version() -> str:
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """What a worker is sent. The same key is the same job, wherever it is done."""
+    """A job for a worker. Jobs with the same key have the same outcome on every machine."""
 
     key: str
-    """Hash of the recording's content, of the values that have an effect, of seed and code."""
+    """The hash of the recording's content, the parameters that have an effect, seed and code."""
     place: str
-    """A rendered room's name, or a folder."""
+    """The name or folder by which the recording is opened."""
     content: str
-    """Hash of the recording's content."""
+    """The hash of the recording's content."""
     values: Mapping[str, Any]
-    """By key, against the recording's own defaults."""
+    """The values by key that differ from the recording's defaults."""
     seed: int
     code: str
+    """The version of the code, see :func:`code_version`."""
     truth: bool
-    """Whether the run is scored against the truth."""
+    """Whether the run is evaluated against ground truth."""
     agreement: bool
-    """Whether it is held against other looks at the recording."""
+    """Whether the run is compared with its variants (self-consistency)."""
     timed: bool
-    """Whether what stage 1 takes must be known, be it from an earlier run."""
+    """Whether the time of stage 1 must be known, if only from an earlier run."""
     keep: bool = False
-    """Whether the whole run is wanted, for the library."""
+    """Whether the outcome has the run's tracks, for the library."""
     corrections: tuple[Correction, ...] = ()
-    """What the run obeys of what was put right by hand."""
+    """The corrections that the run applies."""
 
 
 Became = Literal["done", "failed", "unreadable", "version"]
-"""``unreadable``: the worker does not have the recording. ``version``: nor this program."""
+"""The state of an outcome: ``unreadable`` if the worker cannot read the recording, ``version`` if
+it has another version of the program."""
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What became of a job."""
+    """The outcome of a job."""
 
     key: str
     became: Became
     words: str = ""
-    """Why it is not done."""
+    """The reason why the job is not done."""
     figures: Mapping[str, float | None] = field(default_factory=dict)
-    """By the keys of the objectives."""
+    """The figures, by the keys of the objectives."""
     overlap: float | None = None
-    """Mean over cameras of the overlap of each camera's boxes with whom the others found."""
+    """Overlap of each camera's boxes with the tracks of the run without it, mean over cameras."""
     tracks: str = ""
-    """Hash of the tracks, bit for bit."""
+    """The hash of the tracks."""
     people: int = 0
+    """The number of tracks."""
     seconds: float = 0.0
-    """On the clock of the worker, scoring included."""
+    """The duration on the worker's clock, with the evaluation, seconds."""
     worker: str = ""
     machine: str = ""
     kept: tuple[NewRecording, NewRun] | None = None
-    """The whole run, where it was wanted."""
+    """The records for the library, if they were wanted."""
 
     def to_json(self) -> dict[str, Any]:
-        """As plain values, without the whole run."""
+        """Return all fields but ``kept`` as plain values."""
         return {f.name: getattr(self, f.name) for f in fields(self) if f.name != "kept"}
 
 
@@ -101,24 +104,24 @@ def job_of(
     timed: bool,
     corrections: tuple[Correction, ...] = (),
 ) -> Job:
-    """The job of a run.
+    """Return the job of a run.
 
     Args:
         sequence: The recording.
-        place: What opens it.
-        content: Hash of its content.
-        parameters: All of them.
-        values: The same against the recording's defaults.
-        seed: Of the run.
-        truth: Whether to score it against the truth.
-        agreement: Whether to hold it against other looks.
-        timed: Whether its speed is asked for.
-        corrections: What it obeys of what was put right by hand.
+        place: The name or folder by which the recording is opened.
+        content: The hash of its content.
+        parameters: All parameters of the run.
+        values: Those that differ from the recording's defaults, by key.
+        seed: The seed of the run.
+        truth: Whether to evaluate the run against ground truth.
+        agreement: Whether to compare the run with its variants.
+        timed: Whether its speed must be known.
+        corrections: The corrections that the run applies.
     """
     own = replace(sequence, digest=content)
     run = stage_keys(own, parameters, seed, corrections)["tracks"]
     code = code_version()
-    # whoever asks for the speed alone asks for no other run
+    # ``timed`` is left out, since it does not change the run
     asked = [run, code, truth, agreement]
     key = hashlib.sha256(json.dumps(asked).encode()).hexdigest()[:24]
     return Job(

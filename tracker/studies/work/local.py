@@ -1,5 +1,4 @@
-"""Workers of this machine: how many there may be, and what each does as it starts (a preload of
-Dask's)."""
+"""Workers of this machine: their number, and their preparation at the start (a Dask preload)."""
 
 from __future__ import annotations
 
@@ -10,14 +9,14 @@ from tracker.studies.errors import StudyError
 from tracker.studies.work import working
 
 MOST_A_CORE = 4
-"""Processes for each core: more only wait for each other, and each takes up to a gigabyte."""
+"""Most processes for each core: more would wait for each other, and each takes up to 1 GB."""
 
 
 def how_many(wanted: int | None) -> int:
-    """Workers of this machine: as many as are wanted, or one a core.
+    """Return the number of workers for this machine: as wanted, or one for each core.
 
     Raises:
-        StudyError: If they are more than it can bear.
+        StudyError: If more are wanted than the machine can run.
     """
     cores = available_cores()
     most = MOST_A_CORE * cores
@@ -30,6 +29,6 @@ def how_many(wanted: int | None) -> int:
 
 
 def dask_setup(worker: Any) -> None:
-    """Give way to whoever uses the machine, and have all imported before the first job."""
+    """Lower the priority of the worker's process, and compile its kernels before the first job."""
     working.give_way()
     working.prepare()

@@ -1,4 +1,4 @@
-"""Recordings by their content: the same on every machine, wherever they lie."""
+"""Recordings identified by content, so that each machine may have them in another folder."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ from tracker.sequences.sequence import Sequence
 from tracker.studies.errors import StudyError
 
 SENT_BYTES = 256 << 20
-"""A recording up to this size is sent to a worker that cannot read it."""
+"""Largest size of a recording that is sent to a worker that cannot read it, bytes."""
 
 
 def files_of(folder: Path) -> list[Path]:
-    """``sequence.toml`` and every file below the folder that it names, sorted.
+    """Return ``sequence.toml`` and every file below the folder that it names, sorted.
 
-    Whatever a field of it says that is a file, or a pattern of files, counts.
+    A file counts if the text of any field is its path, or a pattern that matches it.
     """
     found = {folder / FILE}
     text = (folder / FILE).read_text(encoding="utf-8")
     for word in _words(tomllib.loads(text)):
         try:
             found |= set(files_matching(folder, word))
-        except (ValueError, OSError):  # no path that could be one
+        except (ValueError, OSError):  # the text cannot be a path
             continue
     return sorted(found)
 
@@ -46,7 +46,7 @@ def _words(value: Any) -> list[str]:
 
 
 def content_of(sequence: Sequence) -> str:
-    """Hash of all files of a recording: kept beside the caches by their sizes and times."""
+    """Return the hash of all files of a recording, which is cached by their sizes and times."""
     known = cache_folder() / "contents" / sequence.digest
     try:
         return known.read_text(encoding="ascii")
@@ -58,17 +58,21 @@ def content_of(sequence: Sequence) -> str:
         with path.open("rb") as file:
             digest.update(hashlib.file_digest(file, "sha256").digest())
     content = digest.hexdigest()[:24]
-    with contextlib.suppress(OSError):  # it is found out anew the next time
+    with contextlib.suppress(OSError):  # without the cache it is computed again
         known.parent.mkdir(parents=True, exist_ok=True)
         write_whole(known, content.encode("ascii"))
     return content
 
 
 def packed(folder: Path, limit: int = SENT_BYTES) -> bytes:
-    """A recording as one ZIP file in memory.
+    """Pack a recording into a ZIP file in memory.
+
+    Args:
+        folder: The recording's folder.
+        limit: Largest size of its files together, bytes.
 
     Raises:
-        StudyError: If it is larger than the limit; it says how large it is.
+        StudyError: If the files are larger, with their size.
     """
     files = files_of(folder)
     size = sum(path.stat().st_size for path in files)
@@ -85,12 +89,12 @@ def packed(folder: Path, limit: int = SENT_BYTES) -> bytes:
 
 
 def sent_folder(content: str) -> Path:
-    """Where a recording is that was sent to this machine."""
+    """Return the folder of a recording that was sent to this machine."""
     return cache_folder() / "recordings" / content
 
 
 def unpack(content: str, data: bytes) -> str:
-    """Put a recording that was sent where :func:`opened` finds it; the place."""
+    """Unpack a recording that was sent to this machine, and return its folder."""
     folder = sent_folder(content)
     folder.parent.mkdir(parents=True, exist_ok=True)
     if not (folder / FILE).is_file():
@@ -98,16 +102,16 @@ def unpack(content: str, data: bytes) -> str:
             with filling(folder) as begun, zipfile.ZipFile(io.BytesIO(data)) as archive:
                 archive.extractall(begun)
         except FileExistsError:
-            if not (folder / FILE).is_file():  # else another worker of this machine was first
+            if not (folder / FILE).is_file():  # if it is, another worker unpacked it meanwhile
                 raise
     return str(folder)
 
 
 def opened(place: str, content: str) -> Sequence:
-    """A recording with this content: from its place, or as it was sent.
+    """Open a recording with this content, from its place or as it was sent to this machine.
 
     Raises:
-        SequenceError: If neither has it.
+        SequenceError: If neither has this content.
     """
     try:
         found = open_sequence(place)

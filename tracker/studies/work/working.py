@@ -1,7 +1,8 @@
-"""What a worker does: prepare itself once, then one job after the other.
+"""The work of a worker's process: it prepares itself once, then does one job after the other.
 
-Nothing here knows who distributes the jobs. A process keeps the recordings that it opened, and
-the columns of its last runs: a trial that changes only the fusion takes stage 1 from there.
+This module does not depend on how jobs are distributed. The process keeps the recordings that it
+opened, and caches the columns of its last runs, so that a trial that changes only the fusion
+re-uses stage 1.
 """
 
 from __future__ import annotations
@@ -40,34 +41,36 @@ from tracker.studies.work import recordings
 from tracker.studies.work.jobs import Job, Outcome, code_version
 
 CACHE_BYTES = 128 << 20
-"""Memory of a worker for columns of runs, above all of stage 1, which every trial uses that changes
-what comes after."""
+"""Memory of a worker for columns of runs, bytes: mainly those of stage 1, which all trials use that
+change later stages alone."""
 
 LATER_BYTES = 16 << 20
-"""Of this for the stages after the first, which hardly any other trial uses: a worker has soon
-taken all that it ever takes."""
+"""Part of this memory for stages after the first, bytes; it is small since other trials seldom use
+these."""
 
 MOST_OPEN = 16
-"""Recordings that a worker keeps open."""
+"""Most recordings that a worker keeps open."""
 
 KNOWN_TIMES = 4096
+"""Most times of stage 1 that a worker remembers."""
 
 NICENESS = 5
-"""Of a worker on this machine: whoever uses it goes first."""
+"""Niceness of a worker on this machine, so that interactive programs have priority."""
 
 COMPILING = "compiling the kernels, once per machine"
 
 Tell = Callable[[str], None]
+"""A callback that gets a sentence on what is being done."""
 
 
 @dataclass
 class _Process:
-    """What a worker's process keeps."""
+    """The state of a worker's process."""
 
     cache: StageCache
     opened: OrderedDict[str, tuple[Sequence, FrameReader]] = field(default_factory=OrderedDict)
     stage_seconds: OrderedDict[str, float] = field(default_factory=OrderedDict)
-    """Processor time of stage 1, by its key."""
+    """Processor time of stage 1 by its key, seconds."""
     lock: threading.Lock = field(default_factory=threading.Lock)
 
 
@@ -76,21 +79,21 @@ _preparing = threading.Lock()
 
 
 def machine() -> str:
-    """This machine's name."""
+    """Return this machine's name."""
     return platform.node()
 
 
 def give_way() -> None:
-    """Have whoever uses this machine go first."""
+    """Lower the priority of this process to :data:`NICENESS`."""
     if sys.platform != "win32":
         os.nice(max(0, NICENESS - os.nice(0)))
 
 
 def prepare(tell: Tell = lambda words: None) -> None:
-    """Have the kernels compiled, once a machine; other workers of the machine wait for it.
+    """Compile the kernels, once for the machine (its other workers wait), and set up the cache.
 
     Args:
-        tell: Told what is being waited for.
+        tell: A callback that gets a sentence on what is being done.
     """
     global _process
     with _preparing:
@@ -107,43 +110,43 @@ def prepare(tell: Tell = lambda words: None) -> None:
 
 
 def _compile() -> None:
-    """In two processes, one worker a machine at a time; a worker that dies holds up nobody."""
+    """Compile the kernels in two processes, for one worker of the machine at a time."""
     folder = compilation.kernel_folder()
     folder.mkdir(parents=True, exist_ok=True)
     with closing(sqlite3.connect(folder / "compiling.lock", timeout=600.0)) as lock:
         lock.isolation_level = None
-        lock.execute("BEGIN EXCLUSIVE")  # the system frees it with the process
+        lock.execute("BEGIN EXCLUSIVE")  # the system releases it when the process ends
         if not compilation.is_compiled():
             line = [sys.executable, "-m", "tracker.runs.warm_up"]
             subprocess.run(line, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, check=False)
 
 
 def work(job: Job, tell: Tell = lambda words: None, worker: str = "") -> Outcome:
-    """Do a job. What is wrong with it is part of the outcome, never raised.
+    """Do a job. Its errors are part of the outcome and are not raised.
 
     Args:
-        job: What to do.
-        tell: Told what is being done.
-        worker: Who does it.
+        job: The job.
+        tell: A callback that gets a sentence on what is being done.
+        worker: The name of the worker.
     """
     begin = time.perf_counter()
     if job.code != code_version():
         return Outcome(job.key, "version", code_version(), worker=worker, machine=machine())
     prepare(tell)
     assert _process is not None
-    with _process.lock:  # processor time is the process's: one job at a time
+    with _process.lock:  # one job at a time, since processor time is measured for the process
         try:
             sequence, reader = _opened(job, tell)
         except SequenceError as error:
             words = " ".join(str(error).split())
             return Outcome(job.key, "unreadable", words, worker=worker, machine=machine())
         try:
-            told = _done(job, sequence, reader)
+            results = _done(job, sequence, reader)
         except (ValueError, OSError, ArithmeticError, MemoryError) as error:
             words = " ".join(str(error).split()) or type(error).__name__
             return Outcome(job.key, "failed", words, worker=worker, machine=machine())
     seconds = time.perf_counter() - begin
-    return Outcome(job.key, "done", seconds=seconds, worker=worker, machine=machine(), **told)
+    return Outcome(job.key, "done", seconds=seconds, worker=worker, machine=machine(), **results)
 
 
 def _opened(job: Job, tell: Tell) -> tuple[Sequence, FrameReader]:
@@ -176,14 +179,14 @@ def _done(job: Job, sequence: Sequence, reader: FrameReader) -> dict[str, Any]:
             if one.definition.key in OBJECTIVES
         }
         hota, idf1 = figures.get("hota"), figures.get("idf1")
-        # without anybody tracked nothing is right, though the figures are not defined
+        # without any tracks the figures are not defined, and the score is 0
         figures["score"] = ((hota or 0.0) + (idf1 or 0.0)) / 2.0
     overlap = None
     if job.agreement:
-        looked = estimate(run)
-        found = [one for one in looked.overlaps if one is not None]
-        overlap = sum(found) / len(looked.overlaps) if looked.overlaps else None
-        figures["identity"] = looked.score if len(run.tracks) else 0.0
+        estimated = estimate(run)
+        found = [one for one in estimated.overlaps if one is not None]
+        overlap = sum(found) / len(estimated.overlaps) if estimated.overlaps else None
+        figures["identity"] = estimated.score if len(run.tracks) else 0.0
     kept = None
     if job.keep:
         recording = recording_of(sequence, job.place, thumbnail_of(sequence, reader))
@@ -201,11 +204,11 @@ def _done(job: Job, sequence: Sequence, reader: FrameReader) -> dict[str, Any]:
 
 
 def _tracked(job: Job, sequence: Sequence, reader: FrameReader) -> tuple[Run, float | None]:
-    """The run, and the seconds of processor time that it takes where nothing is kept.
+    """Return the run, and the processor time that it takes without any cache, seconds.
 
-    Stage 1 has threads of its own: what they take is the process's time less this thread's. Of a
-    column that somebody else left without its time the seconds are None, unless they are asked
-    for: then it is computed once more.
+    Stage 1 has threads of its own, whose time is that of the process less that of this thread.
+    If stage 1 is in the cache and its time is not known, the time is None; if the job must be
+    timed, stage 1 is computed again.
     """
     assert _process is not None
     parameters = with_values(pipeline.default_parameters(sequence), job.values)
@@ -229,7 +232,7 @@ def _tracked(job: Job, sequence: Sequence, reader: FrameReader) -> tuple[Run, fl
     if "single_view" in began:
         known = max(0.0, time.process_time() - whole - own)
         _write_seconds(key, known, run)
-        if cache is None:  # for the next trials
+        if cache is None:  # put the columns into the cache for the next trials
             pipeline.compute(
                 sequence, parameters, seed=job.seed, corrections=job.corrections, previous=run,
                 cache=_process.cache,
@@ -250,17 +253,17 @@ def _write_seconds(key: str, seconds: float, run: Run) -> None:
     known[key] = seconds
     while len(known) > KNOWN_TIMES:
         known.popitem(last=False)
-    if run.costly:  # it is on disk too, for other processes
+    if run.costly:  # the column is on disk, where other processes find it
         place = cache_folder() / "stage-seconds"
         try:
             place.mkdir(parents=True, exist_ok=True)
             (place / key).write_text(repr(seconds), encoding="ascii")
         except OSError:
-            pass  # it is measured again
+            pass  # other processes measure it again
 
 
 def tracks_hash(run: Run) -> str:
-    """Of all columns of a run's tracks, bit for bit."""
+    """Return the hash of all columns of a run's tracks."""
     digest = hashlib.sha256()
     for name in ("frames", "ids", "positions", "existences", "sigmas", "seen"):
         digest.update(getattr(run.tracks, name).tobytes())

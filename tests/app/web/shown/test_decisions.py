@@ -9,7 +9,7 @@ from app.web.views.timeline import Timelines, Window
 from tests.engine.synthetic import crossing, sequence
 from tracker.parameters import RunParameters
 from tracker.review.queue import queue
-from tracker.review.queue.item import Lanes
+from tracker.review.queue.item import TrackRows
 from tracker.review.queue.moves import pieces_of
 from tracker.runs import pipeline
 from tracker.smoothing import Decision, names_of
@@ -49,7 +49,7 @@ def test_tracks_that_are_not_the_smoothed_ones_yet_have_no_names() -> None:
     assert names_of(run.smoothed, run.tracks)
     run.tracks = run.filtered
     assert names_of(run.smoothed, run.tracks) == {}
-    pieces, joined = pieces_of(run, Lanes(run.tracks))
+    pieces, joined = pieces_of(run, TrackRows(run.tracks))
     assert joined is None
     assert {piece.track for piece in pieces if piece} == set(run.tracks.ids.tolist())
     queue(run)

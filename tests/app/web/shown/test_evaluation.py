@@ -62,7 +62,7 @@ def test_figures_are_the_engines(client: TestClient, crossing: Path) -> None:
     assert [f["name"] for f in found["figures"]] == [d.key for d in DEFINITIONS]
     for shown, figure in zip(found["figures"], expected.figures, strict=True):
         assert shown["value"] == figure.value
-        assert shown["settings"] == figure.stated
+        assert shown["settings"] == figure.measured_with
         assert shown["label"]
         assert shown["help"].endswith(".")
     people = {row["id"]: row["mean_error"] for row in found["per_person"]}

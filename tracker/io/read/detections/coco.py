@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from tracker.io.read.columns import people, to_unit
-from tracker.io.read.detections.poses.body import read_people
+from tracker.io.read.detections.body import read_people
 from tracker.io.read.picture_names import camera_of, number_in
 from tracker.io.read.pieces import DetectionPiece, Piece
 from tracker.io.read.protocol import Certainty, Kind

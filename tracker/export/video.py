@@ -1,9 +1,16 @@
-"""One step as a picture: cameras in a mosaic, the room from above, lanes underneath."""
+"""The MP4 (H.264) of a run: the cameras in a mosaic, the room from above, the tracks' lanes.
+
+There is one frame a step; each is decoded, drawn and encoded before the next.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Generator
 from collections.abc import Sequence as Many
+from contextlib import ExitStack, closing
+from fractions import Fraction
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -11,7 +18,8 @@ from jaxtyping import Float, UInt8
 from numpy import ndarray
 
 from tracker.export.palette import rgb
-from tracker.export.written import Written
+from tracker.export.written import Options, Written
+from tracker.sequences.pictures.frames import FrameReader, Picture
 
 Bgr = tuple[int, int, int]
 
@@ -22,24 +30,72 @@ WORDS: Bgr = (200, 200, 200)
 BLACK: Bgr = (0, 0, 0)
 
 WIDEST = 1920
-"""Pixels of the whole picture."""
+"""Largest width of the whole picture, pixels."""
 
 LARGEST_CELL = 640
-"""Pixels of a camera's width."""
+"""Largest width of a camera's cell, pixels."""
 
 TRAIL_SECONDS = 3.0
 LANE = 12
-"""Pixels a track's lane."""
+"""Height of a track's lane, pixels."""
 
 MOST_LANES = 24
-"""Of the longest tracks; more would hide the cameras."""
+"""Most lanes, which are those of the longest tracks; more would leave little for the cameras."""
 
 _MARGIN = 6
 _FONT = cv2.FONT_HERSHEY_SIMPLEX
 
+_QUALITY = {"preset": "veryfast", "crf": "20"}
+_FINEST_RATE = 1000
+"""Largest denominator of the frame rate, which is encoded as a fraction."""
+
+
+def write(path: Path, written: Written, options: Options) -> None:
+    """Write the video; its frame k shows step ``options.first`` + k.
+
+    Raises:
+        ValueError: If the range of steps is empty, or the speed is out of range.
+        Stopped: If the caller cancelled the export.
+    """
+    import av
+
+    first = options.first
+    last = written.steps - 1 if options.last is None else min(options.last, written.steps - 1)
+    if not 0 <= first <= last:
+        raise ValueError(
+            f"a video from step {first} to {last}: expected two of 0 … {written.steps - 1}, "
+            "the first not after the last"
+        )
+    if not 0.01 <= options.speed <= 100.0:
+        raise ValueError(f"a video at speed {options.speed:g}: expected 0.01 … 100")
+    mosaic = Mosaic(written)
+    total = last - first + 1
+    rate = Fraction(written.sequence.fps * options.speed).limit_denominator(_FINEST_RATE)
+    with av.open(str(path), "w", format="mp4") as file:
+        stream = file.add_stream("libx264", rate=rate, options=_QUALITY)
+        stream.width, stream.height = mosaic.size
+        stream.pix_fmt = "yuv420p"
+        stream.codec_context.thread_type = "AUTO"
+        with ExitStack() as stack:
+            reader = stack.enter_context(FrameReader(written.sequence))
+            walks = [
+                stack.enter_context(closing(_walk(reader, camera, first)))
+                for camera in range(len(written.sequence.views))
+            ]
+            for step in range(first, last + 1):
+                options.at(step - first, total)
+                drawn = mosaic.draw(step, [next(walk, None) for walk in walks])
+                file.mux(stream.encode(av.VideoFrame.from_ndarray(drawn, format="bgr24")))
+        file.mux(stream.encode())
+    options.at(total, total)
+
+
+def _walk(reader: FrameReader, camera: int, first: int) -> Generator[Picture | None, None, None]:
+    yield from reader.iterate(camera, first)
+
 
 def colour(number: int) -> Bgr:
-    """Of a track."""
+    """Return the colour of a track id."""
     red, green, blue = rgb(number)
     return blue, green, red
 
@@ -48,7 +104,7 @@ class Mosaic:
     """Draws the steps of a run."""
 
     def __init__(self, written: Written) -> None:
-        """Lay out cameras and room, and draw what stays: room and lanes."""
+        """Lay out the cells, and draw the static parts: the room and the lanes."""
         self._written = written
         sequence, tracks = written.sequence, written.tracks
         cells = len(sequence.views) + 1
@@ -70,11 +126,11 @@ class Mosaic:
         self._still = self._draw_still()
 
     def draw(self, step: int, pictures: Many[ndarray | None]) -> UInt8[ndarray, "h w 3"]:
-        """One step.
+        """Draw one step.
 
         Args:
-            step: 0-based.
-            pictures: One a camera, BGR; None where there is none.
+            step: The step, 0-based.
+            pictures: The picture of each camera, BGR; None for a missing one.
         """
         canvas = self._still.copy()
         for index, picture in enumerate(pictures):
@@ -89,7 +145,7 @@ class Mosaic:
         return canvas
 
     def _at(self, canvas: ndarray, index: int) -> ndarray:
-        """The part of the canvas that a cell takes."""
+        """Return the view of the canvas that belongs to a cell."""
         width, height = self._cell
         row, column = divmod(index, self._columns)
         cell: ndarray = canvas[
@@ -149,7 +205,7 @@ class Mosaic:
             _write(cell, str(number), (place[0] + 7, place[1] + 4))
 
     def _above(self, points: Float[ndarray, "N 2"]) -> Float[ndarray, "N 2"]:
-        """World metres to pixels of the room's cell, y up."""
+        """Map world x, y in metres to pixels of the room's cell, with y pointing up."""
         room = self._written.sequence.room
         cameras = np.array([c.centre[:2] for c in self._written.sequence.cameras]).reshape(-1, 2)
         size = room.maximum[:2] - room.minimum[:2]
@@ -188,7 +244,7 @@ class Mosaic:
 
 
 def _lanes_of(written: Written) -> list[tuple[int, list[tuple[int, int]]]]:
-    """The longest tracks by id, each with the first and last steps of its parts."""
+    """Return the longest tracks by id, each with the first and last step of its parts."""
     tracks = written.tracks
     longest = sorted(written.ids, key=lambda n: -int((tracks.ids == n).sum()))[:MOST_LANES]
     lanes = []
@@ -214,5 +270,5 @@ def _write(cell: ndarray, text: str, place: tuple[int, int]) -> None:
 
 
 def _even(value: float) -> int:
-    """H.264 halves its colours."""
+    """Round to an even number of pixels, since H.264 halves the resolution of the colours."""
     return max(2, round(value / 2.0) * 2)

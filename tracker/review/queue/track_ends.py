@@ -1,4 +1,4 @@
-"""Where tracks begin and end though nobody comes or leaves there, and people whom none takes."""
+"""Review items of tracks that begin or end inside the room, and of people without a track."""
 
 from __future__ import annotations
 
@@ -10,64 +10,69 @@ from numpy import ndarray
 
 from tracker.corrections import Correction, Place
 from tracker.corrections.kinds import leeway
-from tracker.review.queue.item import Alternative, Lanes, ReviewItem, proposed
+from tracker.review.queue.item import Alternative, ReviewItem, TrackRows, proposed
 from tracker.review.queue.moves import ends_there
 from tracker.review.queue.unclaimed import Unclaimed, unclaimed
 from tracker.runs.run import Run
 
 _MISSED = 0.3
-"""Probability that a camera in whose picture somebody is has no box of him for a while."""
+"""Probability that a camera has no box for a while of a person in its picture."""
 
 _WALK = 1.0
-"""Metres a second: how fast who was missed came from where people come."""
+"""Speed at which a missed person is assumed to walk from an entrance or side of the room, metres
+per second."""
 
 _ASIDE = 0.5
-"""Seconds before a track begins, or after it ends, at which somebody else may have been."""
+"""Time before a track begins, or after it ends, at which the person may have been missed,
+seconds."""
 
 _ACCURACY = 0.3
-"""Metres: standard deviation of where he was."""
+"""Standard deviation of the place of a missed person, metres."""
 
 _APART = 1.0
-"""Seconds between two places along the way of who is missing."""
+"""Least time between two places of a proposed path of a missing person, seconds."""
 
 _MOST_PLACES = 12
+"""Most places of such a path."""
 
 _NEAR, _WHILE = 1.0, 1.0
-"""Metres and seconds between a track and boxes that nobody takes, which may be its person's."""
+"""Distance, in metres, and time, in seconds, between the end of a track and unclaimed boxes that
+may be of the same person."""
 
 
-def of_edges(run: Run, lanes: Lanes, asked: Collection[Place]) -> Iterator[ReviewItem]:
-    """Everybody who may be missing; then tracks that begin or end in the middle of the room.
+def track_ends(run: Run, track_rows: TrackRows, asked: Collection[Place]) -> Iterator[ReviewItem]:
+    """Yield items for missing people, then for tracks that begin or end in the middle of the room.
 
-    With q the probability that nobody comes, or leaves, at a place before anything is looked at,
-    and n cameras that have it in their pictures and show nobody there before, that he was there
-    has the odds q m^n / (1 − q), of m the probability of being missed by one.
+    Let q be the prior probability that people neither come nor leave at a place, n the number of
+    cameras that see the place a little earlier (or later) and have no box there, and m the
+    probability that one camera misses a person. Then the odds that the person was there are
+    q m^n / (1 − q).
 
     Args:
-        run: Whose boxes.
-        lanes: Its tracks.
-        asked: First and last places of tracks that are asked for already, since others end or
-            begin near there.
+        run: The run.
+        track_rows: Its tracks.
+        asked: First and last places of tracks for which there are items of other sources, since
+            other tracks end or begin near there.
     """
     free = unclaimed(run)
-    yield from (_missing(run, lanes, one) for one in free)
+    yield from (_missing(run, track_rows, one) for one in free)
     near = leeway(run.sequence.step_time)
-    for track in lanes.ids.tolist():
-        rows = lanes.rows[track]
-        first, last = lanes.of_row(int(rows[0])), lanes.of_row(int(rows[-1]))
+    for track in track_rows.ids.tolist():
+        rows = track_rows.rows[track]
+        first, last = track_rows.of_row(int(rows[0])), track_rows.of_row(int(rows[-1]))
         if first.step > near and first not in asked and not _shown(first, free, run, before=True):
-            yield from _edge(run, lanes, track, before=True)
+            yield from _edge(run, track_rows, track, before=True)
         if (
             run.complete
             and last.step < run.sequence.frames - 1 - near
             and last not in asked
             and not _shown(last, free, run, before=False)
         ):
-            yield from _edge(run, lanes, track, before=False)
+            yield from _edge(run, track_rows, track, before=False)
 
 
 def _shown(place: Place, free: list[Unclaimed], run: Run, *, before: bool) -> bool:
-    """Whether boxes that nobody takes say already what was there before, or after."""
+    """Whether unclaimed boxes show already where the person was before, or after."""
     for one in free:
         end = one.places[-1 if before else 0]
         seconds = (place.step - end.step) * run.sequence.step_time * (1 if before else -1)
@@ -77,8 +82,8 @@ def _shown(place: Place, free: list[Unclaimed], run: Run, *, before: bool) -> bo
     return False
 
 
-def _missing(run: Run, lanes: Lanes, one: Unclaimed) -> ReviewItem:
-    """Somebody whom boxes show."""
+def _missing(run: Run, track_rows: TrackRows, one: Unclaimed) -> ReviewItem:
+    """Return the item of a person that unclaimed boxes show."""
     seconds = len(one.places) * run.sequence.step_time
     wrong = float(0.8 * one.share * -np.expm1(-seconds * (len(one.cameras) - 1)))
     pause = max(round(_APART / run.sequence.step_time), 1)
@@ -87,13 +92,13 @@ def _missing(run: Run, lanes: Lanes, one: Unclaimed) -> ReviewItem:
                                                      _MOST_PLACES, len(one.places)))  # fmt: skip
     along = [one.places[k] for k in np.unique(spread.round().astype(int)).tolist()]
     names = [run.sequence.cameras[number].name for number in one.cameras]
-    told = f"{', '.join(names[:-1])} and {names[-1]}"
+    listed = f"{', '.join(names[:-1])} and {names[-1]}"
     here: tuple[Correction, ...] = tuple(
-        said for place in along for said in proposed("here", (place,), accuracy=_ACCURACY)
+        one for place in along for one in proposed("here", (place,), accuracy=_ACCURACY)
     )
     return ReviewItem(
         "missing", "Somebody is missing?",
-        f"boxes of {told} meet for {seconds:.1f} s where nobody is tracked",
+        f"boxes of {listed} meet for {seconds:.1f} s where nobody is tracked",
         first.step, last.step, (), tuple(along), wrong, last.step - first.step + 1,
         (
             Alternative("nobody", 1.0 - wrong, proposed("nobody", along)),
@@ -102,22 +107,22 @@ def _missing(run: Run, lanes: Lanes, one: Unclaimed) -> ReviewItem:
     )  # fmt: skip
 
 
-def _edge(run: Run, lanes: Lanes, track: int, *, before: bool) -> Iterator[ReviewItem]:
-    """A track that begins or ends where nobody should."""
+def _edge(run: Run, track_rows: TrackRows, track: int, *, before: bool) -> Iterator[ReviewItem]:
+    """Yield the item of a track that begins or ends inside the room, in view of a camera."""
     sequence = run.sequence
-    rows = lanes.rows[track]
+    rows = track_rows.rows[track]
     stride = max(round(_ASIDE / sequence.step_time), 1)
     if len(rows) <= stride:
-        return  # so short that it is asked for as nobody
+        return  # so short that there is an item on whether it is clutter
     at, inner = (rows[0], rows[stride]) if before else (rows[-1], rows[-1 - stride])
-    place, point = lanes.of_row(int(at)), lanes.tracks.positions[at]
-    beyond = 2.0 * point - lanes.tracks.positions[inner]
+    place, point = track_rows.of_row(int(at)), track_rows.tracks.positions[at]
+    beyond = 2.0 * point - track_rows.tracks.positions[inner]
     beyond[2] = point[2]
     if not sequence.room.contains(beyond[None])[0]:
         return
     cameras = sum(bool(camera.sees(beyond[None])[0]) for camera in sequence.cameras)
     if not cameras:
-        return  # out of sight
+        return  # no camera sees the place
     comes = ends_there(place, run)
     odds = (1.0 - comes) / comes * _MISSED**cameras
     wrong = odds / (1.0 + odds)
@@ -137,7 +142,7 @@ def _edge(run: Run, lanes: Lanes, track: int, *, before: bool) -> Iterator[Revie
 
 
 def _way_out(run: Run, point: Float[ndarray, " 3"]) -> float:
-    """Metres on the ground to the room's nearest side or entrance."""
+    """Return the distance on the ground to the room's nearest side or entrance, metres."""
     room = run.sequence.room
     sides = np.minimum(point - room.minimum, room.maximum - point)[:2].min()
     doors = [float(np.hypot(*(point - one.position)[:2])) for one in room.entrances]

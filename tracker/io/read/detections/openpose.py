@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from tracker.io.read.detections.poses.body import read_people
+from tracker.io.read.detections.body import read_people
 from tracker.io.read.picture_names import number_in
 from tracker.io.read.pieces import DetectionPiece, Piece
 from tracker.io.read.protocol import Certainty, Kind

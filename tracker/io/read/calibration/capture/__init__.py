@@ -1,1 +1,0 @@
-"""Cameras as motion capture systems export them."""

@@ -1,1 +1,0 @@
-"""Boxes out of the joints of poses."""

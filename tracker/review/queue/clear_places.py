@@ -1,0 +1,99 @@
+"""Places at which a track is clear of all others, so that a correction there is unambiguous."""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
+
+from tracker.corrections import Place
+from tracker.corrections.kinds import REACH
+from tracker.review.queue.item import TrackRows
+from tracker.review.queue.linking import Move, Piece
+
+_WIDTHS = 4.0
+"""Least distance of a clear place from the nearest other track, in target widths: a correction
+that is made a little beside the place is then still nearest to its track."""
+
+_FARTHEST = 2.0 * REACH
+"""Distance from the nearest other track beyond which every place is clear, metres."""
+
+_ASIDE, _FEWEST = 0.4, 2
+"""Time, in seconds, and least number of steps around the moment of a move at which the track may
+be on its way from one person to another."""
+
+_LONGEST = 5.0
+"""Time before and after the moment within which a clear place is searched, seconds."""
+
+
+class ClearPlaces:
+    """The places of a run's tracks that a correction can refer to without ambiguity.
+
+    While people are close, a place between them may belong to either, and in a run with other
+    parameters to a third. Before they meet and after they part their identity is evident to a
+    person who sees the pictures, and a correction there has the same meaning for every run.
+    """
+
+    def __init__(self, track_rows: TrackRows, step_time: float, width: float) -> None:
+        """Compute the distance of each row to the nearest other track.
+
+        Args:
+            track_rows: The tracks of the run.
+            step_time: Duration of a step, seconds.
+            width: Width of a target, metres.
+        """
+        self._track_rows, tracks = track_rows, track_rows.tracks
+        self._clear = min(_WIDTHS * width, _FARTHEST)
+        self._longest = max(round(_LONGEST / step_time), 1)
+        self._aside = max(round(_ASIDE / step_time), _FEWEST)
+        self._apart: Float[ndarray, " N"] = np.full(len(tracks), np.inf)
+        for step in np.unique(tracks.frames).tolist():
+            own = tracks.at(step)
+            ground = tracks.positions[own, :2]
+            apart = np.hypot(*(ground[:, None] - ground[None]).transpose(2, 0, 1))
+            np.fill_diagonal(apart, np.inf)
+            self._apart[own] = apart.min(axis=1)
+        self._apart[~tracks.seen.any(axis=1)] = 0.0
+
+    def before(self, track: int, step: int) -> Place:
+        """Return the last clear place of a track up to a step, or else the clearest one."""
+        rows = self._track_rows.rows[track]
+        frames = self._track_rows.tracks.frames[rows]
+        own = rows[(frames <= step) & (frames >= step - self._longest)]
+        if not len(own):
+            return self._track_rows.place(track, step)
+        aside = own[self._track_rows.tracks.frames[own] <= step - self._aside]
+        own = aside if len(aside) else own
+        apart = self._apart[own]
+        clear = np.flatnonzero(apart >= self._clear)
+        best = clear[-1] if len(clear) else len(own) - 1 - np.argmax(apart[::-1])
+        return self._track_rows.of_row(int(own[best]))
+
+    def after(self, track: int, step: int) -> Place:
+        """Return the first clear place of a track from a step on, or else the clearest one."""
+        rows = self._track_rows.rows[track]
+        frames = self._track_rows.tracks.frames[rows]
+        own = rows[(frames >= step) & (frames <= step + self._longest)]
+        if not len(own):
+            return self._track_rows.place(track, step, after=True)
+        aside = own[self._track_rows.tracks.frames[own] >= step + self._aside]
+        own = aside if len(aside) else own
+        apart = self._apart[own]
+        clear = np.flatnonzero(apart >= self._clear)
+        return self._track_rows.of_row(int(own[clear[0] if len(clear) else np.argmax(apart)]))
+
+    def move(self, move: Move) -> Move:
+        """Return a move with clear places in the place of its own."""
+        return Move(
+            tuple(
+                Piece(one.track, one.begin, self.before(one.track, one.last), one.last)
+                for one in move.earlier
+            ),
+            tuple(
+                Piece(one.track, self.after(one.track, one.first), one.end, one.first)
+                for one in move.later
+            ),
+            move.kind,
+            move.odds,
+            move.why,
+        )
