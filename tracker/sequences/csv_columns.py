@@ -1,4 +1,4 @@
-"""Number columns of a CSV file, read fast; what is wrong is said with its line and column."""
+"""The fast reading of number columns of a CSV file; errors name the line and the column."""
 
 from __future__ import annotations
 
@@ -22,41 +22,42 @@ _GUARDED = re.compile(r"(^|[,;\t]\s*)'(?='*[=+\-@\t\r])")
 
 
 def guarded(text: str) -> str:
-    """A name as a cell of a CSV file that no spreadsheet takes for a formula.
+    """Guard a name in a CSV file, so that no spreadsheet reads it as a formula.
 
-    An apostrophe stands before a beginning by ``=``, ``+``, ``-``, ``@`` or a tab, also behind a
-    comma or semicolon, where a comment line becomes cells. :func:`unguarded` takes it away.
-    Source: OWASP, "CSV Injection".
+    An apostrophe is put before ``=``, ``+``, ``-``, ``@`` or a tab at the beginning, and after a
+    comma or semicolon, at which a spreadsheet splits a comment line into cells. :func:`unguarded`
+    removes it. Source: OWASP, "CSV Injection".
     """
     return _FORMULA.sub(r"\1'", text)
 
 
 def unguarded(text: str) -> str:
-    """What :func:`guarded` made a cell of."""
+    """Remove the apostrophes that :func:`guarded` inserted."""
     return _GUARDED.sub(r"\1", text)
 
 
 MOST_BYTES = 256 * 2**20
-"""Of a file: some hours of a crowd."""
+"""Largest size of a file, which is enough for some hours of a crowd, bytes."""
 
 MOST_ROWS = 5_000_000
+"""Most rows of a file."""
 
 MOST_COLUMNS = 10_000
-"""A track file has four a camera."""
+"""Most columns of a file; a track file has four for each camera."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Columns:
     """Named columns of finite numbers, N rows in the file's order.
 
-    Every method that checks a column raises :class:`SequenceError` at the first bad row, with file,
-    line and column, what was expected and what was found.
+    Every method that checks a column raises :class:`SequenceError` at the first invalid row, with
+    file, line and column, what was expected and what was found.
     """
 
     where: str
-    """The file, as messages begin."""
+    """The name of the file, for messages."""
     names: tuple[str, ...]
-    """Every column of the file, also those that were not read."""
+    """The names of all columns of the file, including those that were not read."""
     values: Mapping[str, Float[ndarray, " N"]]
     lines: Int[ndarray, " N"]
     """The line of each row in the file, from 1."""
@@ -65,19 +66,19 @@ class Columns:
         return len(self.lines)
 
     def stacked(self, *names: str) -> Float[ndarray, "N C"]:
-        """Some columns side by side."""
+        """Return some columns side by side."""
         return np.column_stack([self.values[name] for name in names])
 
     def whole(
         self, name: str, minimum: int, maximum: int | None, meaning: str
     ) -> Int[ndarray, " N"]:
-        """A column of whole numbers within bounds.
+        """Return a column of integers within bounds.
 
         Args:
             name: The column.
-            minimum: Least value allowed.
-            maximum: Greatest value allowed, None for no bound.
-            meaning: What the numbers are, for the message.
+            minimum: The least value that is valid.
+            maximum: The largest value that is valid; None for no bound.
+            meaning: What the numbers mean, for the message.
         """
         values = self.values[name]
         bound = f"from {minimum} to {maximum}" if maximum is not None else f"of at least {minimum}"
@@ -87,7 +88,13 @@ class Columns:
         return values.astype(np.int64)
 
     def require(self, name: str, good: Bool[ndarray, " N"], expected: str) -> None:
-        """Refuse the first row whose value in column ``name`` is not as expected."""
+        """Raise an error for the first row whose value is not valid.
+
+        Args:
+            name: The column.
+            good: Whether the value of each row is valid.
+            expected: What is expected, for the message.
+        """
         if not good.all():
             row = int(np.argmin(good))
             raise self.error(
@@ -99,12 +106,12 @@ class Columns:
     def one_row_each(
         self, frames: Int[ndarray, " N"], ids: Int[ndarray, " N"], what: str
     ) -> Int[ndarray, " N"]:
-        """The order of the rows by step and id, after a check that no id is twice at a step.
+        """Return the order of the rows by step and id, and check that ids are unique at a step.
 
         Args:
             frames: The step of each row.
             ids: The id of each row, in the column ``id``.
-            what: What has an id, for the message: ``track`` or ``person``.
+            what: What the ids are of, for the message: ``track`` or ``person``.
         """
         order = np.lexsort([ids, frames])
         same = (np.diff(frames[order]) == 0) & (np.diff(ids[order]) == 0)
@@ -119,7 +126,7 @@ class Columns:
         return order
 
     def error(self, line: int, name: str, message: str) -> SequenceError:
-        """An error about one cell."""
+        """Return an error that names a line and a column."""
         return SequenceError(f'{self.where}, line {line}, column "{name}": {message}')
 
 
@@ -135,19 +142,19 @@ def read_columns(
 ) -> Columns:
     """Read a CSV file with a header.
 
-    Lines that begin with ``#`` before the header, and empty lines, are passed over.
+    Lines that begin with ``#`` before the header, and empty lines, are skipped.
 
     Args:
         path: The file.
-        where: What messages call it.
-        needed: Columns that must be there.
-        optional: Columns that may be there, and what stands for them where they are not.
-        blank: Columns whose cells may be empty; empty is NaN.
-        largest: No number lies beyond it, on either side.
-        called: What a cell of the header calls its column.
+        where: The file's name, for messages.
+        needed: Columns that the file must have.
+        optional: Columns that the file may have, each with its default value.
+        blank: Columns whose cells may be empty; an empty cell is NaN.
+        largest: Largest absolute value of a number.
+        called: A function that returns a column's name from its cell in the header.
 
     Raises:
-        SequenceError: Naming line and column, what was expected and what was found.
+        SequenceError: With line and column, what was expected and what was found.
     """
     optional = optional or {}
     lines, numbers = _lines(path, where)
@@ -169,7 +176,7 @@ def read_columns(
 
 
 def _lines(path: Path, where: str) -> tuple[list[str], list[int]]:
-    """The header and the rows, without line ends, and their line numbers."""
+    """Return the header and the rows, without line ends, and their line numbers."""
     try:
         size = path.stat().st_size
         if size > MOST_BYTES:
@@ -234,7 +241,7 @@ def _check_header(
 
 
 def _parse(lines: list[str], width: int, places: list[int]) -> Float[ndarray, "N C"] | None:
-    """All rows at once; None where something is not as it should be."""
+    """Parse all rows at once; None if a row is not valid, or has quoted or empty cells."""
     if not lines:
         return np.zeros((0, len(places)))
     if any(line.count(",") != width - 1 for line in lines):
@@ -254,7 +261,7 @@ def _parse_slowly(
     blank: set[str],
     largest: float,
 ) -> Float[ndarray, "N C"]:
-    """Row by row: cells in quotes, empty cells, and the sentence about what is wrong."""
+    """Parse row by row, with quoted and empty cells, and with an error that names the cell."""
     table = np.empty((len(lines), len(wanted)))
     places = [names.index(name) for name in wanted]
     for row, (line, number) in enumerate(zip(lines, numbers, strict=True)):

@@ -1,4 +1,4 @@
-"""Reading a TOML table field by field: every complaint is a sentence that names the field."""
+"""The reading of a TOML table field by field; every error is a sentence that names the field."""
 
 from __future__ import annotations
 
@@ -16,37 +16,37 @@ from tracker.files.text import shown
 from tracker.sequences.errors import SequenceError
 
 LARGEST = 1e6
-"""Metres or pixels: a number beyond is no measurement of a room, and its powers overflow."""
+"""Largest number, metres or pixels; powers of larger ones could overflow."""
 LARGEST_IN_MATRIX = 1e12
-"""Of a projection, which may bear any scale."""
+"""Largest number in a projection, whose scale is arbitrary."""
 SMALLEST = 1e-4
-"""Metres or pixels: what must be positive is not smaller, so that its square can be divided by."""
+"""Least value of a positive number, metres or pixels, so that its square is not too small."""
 
 SLOWEST, FASTEST = 1e-3, 1000.0
-"""Frames a second: from a picture in a quarter of an hour to a high-speed camera."""
+"""Least and largest frame rate, 1/s."""
 
 LONGEST_NAME = 255
-"""Bytes of the name of a file or folder, as file systems have them."""
+"""Longest name of a file or folder that file systems accept, bytes."""
 
 LARGEST_COUNT = 10_000_000
-"""Of steps, or of frames of a file: four days at 25 a second."""
+"""Largest number of steps, or of frames of a file: four days at 25 frames per second."""
 
 LONGEST_TEXT = 1000
-"""Characters of a name, a path or a description."""
+"""Longest name, path or description, characters."""
 
 MISSING: Any = object()
-"""The default of a field that must be there."""
+"""The default of a required field."""
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:
-    """``; did you mean …?`` where a known word is near, else nothing."""
+    """Return ``; did you mean …?`` with the most similar known word, or an empty text."""
     by_lower = {name.lower(): name for name in known}
     near = difflib.get_close_matches(word.lower(), by_lower, n=1, cutoff=0.6)
     return f'; did you mean "{by_lower[near[0]]}"?' if near else ""
 
 
 def listed(words: Iterable[str]) -> str:
-    """``a, b and c``."""
+    """Join words for a sentence: ``a, b and c``."""
     all_words = list(words)
     return " and ".join(
         [", ".join(all_words[:-1]), *all_words[-1:]] if all_words[1:] else all_words
@@ -54,19 +54,19 @@ def listed(words: Iterable[str]) -> str:
 
 
 class Fields:
-    """One table of the file. Unknown fields are refused at once, the others when they are read.
+    """One table of the file. Unknown fields are rejected at once, others are checked when read.
 
-    Every method that reads a field raises :class:`SequenceError` where its value is not as
-    expected, with file, field, what was expected and what was found.
+    Every method that reads a field raises :class:`SequenceError` if its value is not valid, with
+    file, field, what was expected and what was found.
     """
 
     def __init__(self, where: str, values: Any, known: Iterable[str]) -> None:
         """Wrap one table.
 
         Args:
-            where: File and table, as the messages begin.
-            values: What the file has there.
-            known: The fields that may occur.
+            where: File and table, for messages.
+            values: The parsed table.
+            known: The names of all possible fields.
         """
         self.where = where
         self._known = tuple(known)
@@ -83,19 +83,19 @@ class Fields:
         return name in self._values
 
     def is_list(self, name: str) -> bool:
-        """Whether the field is there and holds a list."""
+        """Whether the field exists and is a list."""
         return isinstance(self._values.get(name), list)
 
     def is_text(self, name: str) -> bool:
-        """Whether the field is there and holds text."""
+        """Whether the field exists and is text."""
         return isinstance(self._values.get(name), str)
 
     def shown(self, name: str) -> str:
-        """What the field holds, as a message quotes it."""
+        """Return the value of the field in the form of a message."""
         return shown(self._values.get(name))
 
     def error(self, name: str, message: str) -> SequenceError:
-        """An error about one field."""
+        """Return an error that names a field."""
         return SequenceError(f"{self.where}, {name}: {message}")
 
     def _get(self, name: str, default: Any, expected: str) -> Any:
@@ -106,7 +106,7 @@ class Fields:
         return default
 
     def text(self, name: str, default: Any = MISSING) -> str:
-        """Some text on one line, not empty unless that is the default."""
+        """Read text on one line, which may be empty only if that is the default."""
         value = self._get(name, default, "text in quotes")
         if not isinstance(value, str):
             raise self.error(name, f"expected text in quotes, found {shown(value)}")
@@ -174,11 +174,11 @@ class Fields:
         return vector
 
     def numbers(self, name: str) -> Float[ndarray, " length"]:
-        """Numbers of at most :data:`LARGEST`, any count; none where the field is missing."""
+        """Read any number of numbers of at most :data:`LARGEST`; none if the field is missing."""
         return self._numbers(name, self._get(name, [], ""), "a list of numbers")
 
     def matrix(self, name: str, rows: int, columns: int) -> Float[ndarray, "rows columns"]:
-        """``rows`` lists of ``columns`` numbers of at most :data:`LARGEST_IN_MATRIX`."""
+        """Read ``rows`` lists of ``columns`` numbers of at most :data:`LARGEST_IN_MATRIX`."""
         expected = f"{rows} rows of {columns} numbers"
         value = self._get(name, MISSING, expected)
         if not isinstance(value, list) or not all(isinstance(row, list) for row in value):
@@ -190,18 +190,18 @@ class Fields:
         return np.array([self._numbers(name, row, expected, LARGEST_IN_MATRIX) for row in value])
 
     def table(self, name: str, known: Iterable[str], *, needed: bool = True) -> Fields | None:
-        """The table ``[name]``; None where it is missing and not needed."""
+        """Read the table ``[name]``; None if it is missing and not needed."""
         expected = f"a table that begins with the line [{name}]"
         value = self._get(name, MISSING if needed else None, expected)
         return None if value is None else Fields(f"{self.where}, [{name}]", value, known)
 
     def tables(self, name: str, known: Iterable[str], header: str = "") -> list[Fields]:
-        """The tables in the list ``name``; none where it is missing.
+        """Read the tables in the list ``name``; none if it is missing.
 
         Args:
             name: The field.
-            known: The fields of each table.
-            header: How one is written, for the messages, for instance ``[[camera]]``.
+            known: The names of all possible fields of each table.
+            header: The header of one table for messages, for instance ``[[camera]]``.
         """
         value = self._get(name, [], "")
         if not isinstance(value, list):
@@ -230,15 +230,16 @@ class Fields:
 
 
 def _called(word: str, number: int, item: Any) -> str:
-    """A table by its name where it has one: ``camera "cam2"``, else ``camera 2``."""
+    """Name a table in a message, by its own name if it has one (``camera "cam2"``), else by its
+    number (``camera 2``)."""
     name = item.get("name") if isinstance(item, dict) else None
     plain = word.strip("[]")
     return f"{plain} {shown(name)}" if isinstance(name, str) and name else f"{plain} {number}"
 
 
 def is_number(value: Any, largest: float) -> bool:
-    """Whether a value is a finite number, and not beyond the largest on either side."""
+    """Whether a value is a finite number whose absolute value is at most the largest."""
     is_one = isinstance(value, int | float) and not isinstance(value, bool)
     limit = min(largest, sys.float_info.max)
-    # compared, not converted: a whole number may have more digits than a float can hold
+    # compared without conversion, since an integer may be too large for a float
     return is_one and -limit <= value <= limit

@@ -33,7 +33,9 @@ def modules() -> dict[str, list[str]]:
 def first_sentence(module: str) -> str:
     """What a module says that it is."""
     path = ROOT.joinpath(*module.split("."))
-    file = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
+    # a folder may be left behind, with compiled files alone, where a module is a file now
+    file = path.with_suffix(".py")
+    file = file if file.exists() else path / "__init__.py"
     text = ast.get_docstring(ast.parse(file.read_text(encoding="utf-8"))) or ""
     return " ".join(text.split("\n\n")[0].split())
 

@@ -1,1 +1,1 @@
-"""The pictures of a sequence: the files, what decodes them, which of the row are there."""
+"""The pictures of a sequence: their files, their decoding, and missing files."""

@@ -1,9 +1,9 @@
-"""Which files are opened as videos: containers that we name, told by their first bytes.
+"""The files that are opened as videos: known containers, recognised by their first bytes.
 
-FFmpeg also takes lists of other files for a video, whatever their suffix says (HLS, concat,
-SDP, numbered pictures): through them a recording from elsewhere would read any file of this
-machine, or wait for a network for good. So a file is looked at before FFmpeg sees it, and
-FFmpeg itself is held to these containers and to local files.
+FFmpeg also accepts lists of other files as videos, whatever their suffix (HLS, concat,
+SDP, numbered pictures): through these an untrusted recording could read any file of this
+machine, or wait for a network forever. So the first bytes are checked before FFmpeg opens a file,
+and FFmpeg itself is restricted to these containers and to local files.
 
 Source: FFmpeg, "Format Options" (``format_whitelist``, ``protocol_whitelist``).
 """
@@ -14,7 +14,7 @@ import os
 import stat
 from pathlib import Path
 
-# broken frames are reported by who reads them, in words; FFmpeg's own lines would litter stderr
+# broken frames are reported by the reader, so FFmpeg's own messages are switched off
 os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
 
 import cv2
@@ -34,14 +34,13 @@ os.environ[_OPTIONS] = "|".join(
 cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_ERROR)
 
 MOST_PIXELS = 2**26
-"""Of one picture, 67 million: a camera's has fewer, and each takes three bytes of memory. The
-package's first lines hold OpenCV's reader of images to the same."""
+"""Most pixels of a picture (67 million), each of which takes three bytes of memory."""
 
 PATIENCE_MS = 10_000
-"""How long a file may keep FFmpeg waiting, for opening and for each read."""
+"""Longest time of FFmpeg for opening a file and for each read, milliseconds."""
 
 HEAD = 3 * 192 + 4
-"""Bytes that are looked at."""
+"""The number of bytes by which a container is recognised."""
 
 _STARTS = (
     b"\x1aE\xdf\xa3",  # Matroska, WebM
@@ -51,9 +50,9 @@ _STARTS = (
     b"DKIF", b"YUV4MPEG2 ", b"\xff\xd8\xff", b"\x06\x0e\x2b\x34\x02\x05\x01\x01",  # the last: MXF
 )  # fmt: skip
 _BOXES = (b"ftyp", b"moov", b"mdat", b"wide", b"free", b"skip", b"pnot")
-"""Of MP4 and QuickTime, from the fifth byte."""
+"""The types of the first box of MP4 and QuickTime, from the fifth byte."""
 _PACKETS = ((188, 0), (192, 4))
-"""Lengths of a packet of an MPEG transport stream, and where in it the sign 0x47 stands."""
+"""The lengths of packets of MPEG transport streams, and the position of the sync byte 0x47."""
 
 _LISTS = {
     b"#EXTM3U": "an HLS playlist",
@@ -70,7 +69,7 @@ class VideoError(ValueError):
 
 
 def is_video(head: bytes) -> bool:
-    """Whether a file that begins like this is one of the containers that are opened."""
+    """Whether the first bytes of a file are those of a known container."""
     if head[:4] == b"RIFF":
         return head[8:12] == b"AVI "
     if head.startswith(_STARTS) or head[4:8] in _BOXES:
@@ -83,13 +82,13 @@ def is_video(head: bytes) -> bool:
 
 
 def check_container(path: Path) -> None:
-    """Look at a file before FFmpeg does.
+    """Check that a file is a known container.
 
     Raises:
-        VideoError: If it is no video that may be opened.
+        VideoError: If it is not.
         OSError: If it cannot be read.
     """
-    # a pipe or a device would be waited for
+    # reading a pipe or a device could block
     with os.fdopen(os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0)), "rb") as file:
         if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
             raise VideoError("it is a pipe or device; copy what it gives into a file")
@@ -103,14 +102,14 @@ def check_container(path: Path) -> None:
 
 
 def opened(path: Path, *, packets: bool = False) -> cv2.VideoCapture:
-    """A checked file, opened by FFmpeg.
+    """Open a video by FFmpeg, after a check of its container.
 
     Args:
         path: A local file.
-        packets: Read compressed packets rather than pictures.
+        packets: Whether to read compressed packets rather than pictures.
 
     Raises:
-        VideoError: If it is no video that may be opened.
+        VideoError: If the file is not a known container.
         OSError: If it cannot be read.
     """
     check_container(path)

@@ -1,8 +1,8 @@
-"""The pictures of a sequence: any step of any camera, exactly, in any order, by many threads.
+"""The reader of a sequence's pictures: exact frames of any camera, in any order, from any thread.
 
-Scrubbing asks for steps out of order, playing asks for one after the other, and the
-pipeline wants them all. The first two share a cache of bounded size, which a thread of
-its own keeps filled ahead of whoever plays; the pipeline decodes for itself.
+Scrubbing reads steps out of order, playback reads one after the other, and the pipeline reads all.
+The first two share a cache of bounded size, which a thread fills ahead of the playback; the
+pipeline has a decoder of its own.
 """
 
 from __future__ import annotations
@@ -25,58 +25,58 @@ _Made = TypeVar("_Made")
 Picture = UInt8[ndarray, "h w 3"]
 
 CACHE_BYTES = 256 * 2**20
-"""Memory for decoded pictures, over all cameras: about 800 of 360x288."""
+"""Memory for decoded pictures of all cameras, bytes: about 800 of 360x288."""
 
 AHEAD = 24
-"""Steps decoded ahead of playback: about a second."""
+"""The number of steps that are decoded ahead of playback, about a second."""
 
 BEHIND = 12
-"""Steps before the wanted one that are kept while the steps are asked for backwards."""
+"""The number of earlier steps that are cached during backward playback."""
 
 NEAR = 4
-"""Steps: requests no further apart than this are one movement through the recording, no jump."""
+"""Largest distance between requested steps that is playback rather than a jump."""
 
 
 class Pictures(Protocol):
-    """The pictures of a sequence as a method of stage 1 asks for them: a :class:`FrameReader`."""
+    """The reader of pictures that methods of stage 1 use, for instance a :class:`FrameReader`."""
 
     def picture(self, camera: int, step: int) -> Picture | None:
-        """The picture of one camera at one step, BGR."""
+        """Return the picture of one camera at one step, BGR; None if there is none."""
         ...
 
     def iterate(self, camera: int, first: int = 0) -> Iterator[Picture | None]:
-        """The pictures of one camera from one step to the last."""
+        """Yield the pictures of one camera from one step to the last."""
         ...
 
     def empty(self, camera: int) -> Picture | None:
-        """The picture of a camera's empty scene, BGR; None where the recording has none."""
+        """Return the picture of a camera's empty scene, BGR; None if the recording has none."""
         ...
 
     def once(self, name: Hashable, make: Callable[[], _Made]) -> _Made:
-        """What follows from the pictures alone, made when it is first asked for."""
+        """Return an object that depends on the pictures alone, made at the first call."""
         ...
 
     def check(self) -> None:
-        """Asked between parts of a long work: whoever may be told to stop raises here."""
+        """Raise an exception if the work is to stop; long computations call this repeatedly."""
         ...
 
 
 class FrameReader:
-    """The pictures of all cameras of one sequence. Thread-safe; close it, or use ``with``."""
+    """The reader of all pictures of a sequence. It is thread-safe; close it, or use ``with``."""
 
     def __init__(self, sequence: Sequence, *, cache_bytes: int = CACHE_BYTES) -> None:
         """Prepare to read; files are opened when first needed.
 
         Args:
-            sequence: Whose pictures.
-            cache_bytes: Bound on the memory of the pictures that are kept.
+            sequence: The sequence.
+            cache_bytes: Largest memory of cached pictures, bytes.
         """
         self._sequence = sequence
         self._cache = _Cache(cache_bytes)
         self._sources = [_Source(view) for view in sequence.views]
         self._walks = [_Walk() for _ in sequence.views]
         largest = max((w * h * 3 for w, h in (c.image_size for c in sequence.cameras)), default=1)
-        # reading ahead must never push out what is about to be shown
+        # reading ahead must not displace pictures that are shown next
         self._ahead = min(AHEAD, cache_bytes // (2 * max(1, len(sequence.views)) * largest))
         self._wanted = threading.Condition()
         self._closed = False
@@ -92,13 +92,13 @@ class FrameReader:
         self.close()
 
     def picture(self, camera: int, step: int) -> Picture | None:
-        """The picture of one camera at one step, BGR.
+        """Return the picture of one camera at one step, BGR.
 
-        Several callers may be given the same array: do not write to it.
+        Several callers may get the same array: do not write to it.
 
         Args:
-            camera: Index into ``sequence.views``.
-            step: 0-based.
+            camera: The index of the camera in ``sequence.views``.
+            step: The step, 0-based.
 
         Returns:
             None where the camera has no pictures, the file ends before, the frame or
@@ -135,10 +135,9 @@ class FrameReader:
         return picture
 
     def iterate(self, camera: int, first: int = 0) -> Iterator[Picture | None]:
-        """The pictures of one camera from one step to the last, for the pipeline.
+        """Yield the pictures of one camera from one step to the last, for the pipeline.
 
-        Decodes for itself, once through, beside and independent of :meth:`picture`.
-        Every array is new.
+        The decoder is independent of that of :meth:`picture`, and every array is new.
         """
         source = _Source(self._sequence.views[camera])
         try:
@@ -148,18 +147,18 @@ class FrameReader:
             source.close()
 
     def empty(self, camera: int) -> Picture | None:
-        """The picture of a camera's empty scene, BGR; None where the recording has none."""
+        """Return the picture of a camera's empty scene, BGR; None if the recording has none."""
         view = self._sequence.views[camera]
         if not isinstance(view.background, Path):
             return None
         return _of_its_size(view, read_image(view.background))
 
     def once(self, name: Hashable, make: Callable[[], _Made]) -> _Made:
-        """What follows from the pictures alone, made when it is first asked for.
+        """Return an object that depends on the pictures alone, made at the first call.
 
         Args:
-            name: Of what is made; whoever asks for the same name gets the same object.
-            make: Makes it. Others who ask for the name meanwhile wait.
+            name: The name of the object; calls with the same name return the same object.
+            make: A function that makes the object; other calls with the name wait for it.
         """
         with self._once_lock:
             lock = self._once_locks.setdefault(name, threading.Lock())
@@ -170,7 +169,7 @@ class FrameReader:
             return made
 
     def check(self) -> None:
-        """Asked between parts of a long work: whoever may be told to stop raises here."""
+        """Do nothing; readers that can be stopped raise an exception here."""
 
     def close(self) -> None:
         """Release files, memory and thread. Closing twice does no harm."""
@@ -185,7 +184,7 @@ class FrameReader:
         self._cache.clear()
 
     def _read_behind(self, camera: int, step: int) -> None:
-        """Keep some of the steps before, which a jump back decodes on its way."""
+        """Cache some earlier steps, which a jump backwards decodes anyway."""
         source = self._sources[camera]
         for earlier in range(max(0, step - min(BEHIND, self._ahead)), step):
             if not self._cache.has(camera, earlier):
@@ -199,7 +198,7 @@ class FrameReader:
             self._thread.start()
 
     def _read_ahead(self) -> None:
-        """Decode what the walks are about to want, one picture at a time, the cameras in turn."""
+        """Decode the next pictures of the playback, one at a time, the cameras in turn."""
         camera = 0
         while True:
             with self._wanted:
@@ -218,14 +217,14 @@ class FrameReader:
 
 
 def _of_its_size(view: View, picture: Picture | None) -> Picture | None:
-    """None for a picture that is not of the camera's size."""
+    """Return a picture, or None if it does not have the camera's size."""
     width, height = view.camera.image_size
     return picture if picture is not None and picture.shape[:2] == (height, width) else None
 
 
 @dataclass(slots=True)
 class _Walk:
-    """How somebody moves through the steps of one camera, and what is to be read ahead."""
+    """The movement of requests through the steps of one camera, and the steps to read ahead."""
 
     last: int | None = None
     next_ahead: int = 0
@@ -233,11 +232,11 @@ class _Walk:
 
     @property
     def pending(self) -> bool:
-        """Whether there is something to read ahead."""
+        """Whether there are steps to read ahead."""
         return self.next_ahead < self.end_ahead
 
     def move(self, step: int, frames: int, ahead: int) -> int:
-        """Note a request: 1 if it continues forwards, −1 backwards, 0 where it is a jump."""
+        """Record a request, and return 1 if it continues forwards, −1 backwards, 0 for a jump."""
         distance = 0 if self.last is None else step - self.last
         self.last = step
         if 0 < distance <= NEAR:
@@ -251,7 +250,7 @@ class _Walk:
         return -1 if -NEAR <= distance < 0 else 0
 
     def take(self) -> int | None:
-        """The next step to read ahead."""
+        """Return the next step to read ahead; None if there is none."""
         if not self.pending:
             return None
         self.next_ahead += 1
@@ -260,14 +259,14 @@ class _Walk:
 
 @dataclass(slots=True, eq=False)
 class _Source:
-    """Where the pictures of one camera come from: one open file, one thread at a time."""
+    """The open files of one camera, used by one thread at a time."""
 
     view: View
     lock: threading.Lock = field(default_factory=threading.Lock)
     _decoder: VideoDecoder | None = None
 
     def read(self, step: int) -> Picture | None:
-        """Decode one step; None where there is no picture of the camera's size."""
+        """Decode one step; None if there is no picture of the camera's size."""
         frame = self.view.frame_at(step)
         picture = None
         if frame < 0:
@@ -294,10 +293,10 @@ class _Source:
 
 
 class _Cache:
-    """The pictures used last, within a number of bytes; also remembers which do not exist."""
+    """A cache of the pictures that were used last, and of the steps that have none."""
 
     _OVERHEAD = 200
-    """Bytes that an entry without a picture counts."""
+    """The size of an entry without a picture, bytes."""
 
     def __init__(self, limit: int) -> None:
         self._limit = limit
@@ -306,12 +305,12 @@ class _Cache:
         self._lock = threading.Lock()
 
     def has(self, camera: int, step: int) -> bool:
-        """Whether it is there; does not count as use."""
+        """Whether a step is cached; this does not count as use."""
         with self._lock:
             return (camera, step) in self._pictures
 
     def get(self, camera: int, step: int) -> tuple[bool, Picture | None]:
-        """Whether it is there, and the picture."""
+        """Return whether a step is cached, and its picture."""
         key = (camera, step)
         with self._lock:
             if key not in self._pictures:
@@ -320,7 +319,7 @@ class _Cache:
             return True, self._pictures[key]
 
     def put(self, camera: int, step: int, picture: Picture | None) -> None:
-        """Keep a picture, letting go of those not used for longest."""
+        """Cache a picture, and drop the least recently used ones beyond the limit."""
         key = (camera, step)
         with self._lock:
             self._used += self._size(picture) - (
@@ -331,7 +330,7 @@ class _Cache:
                 self._used -= self._size(self._pictures.popitem(last=False)[1])
 
     def clear(self) -> None:
-        """Let go of everything."""
+        """Drop all pictures."""
         with self._lock:
             self._pictures.clear()
             self._used = 0

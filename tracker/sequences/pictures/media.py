@@ -1,4 +1,4 @@
-"""The files that a sequence names: found inside its folder, and its pictures checked on opening."""
+"""The files that a sequence names: they are found in its folder, and pictures are validated."""
 
 from __future__ import annotations
 
@@ -21,10 +21,15 @@ from tracker.sequences.sequence import View
 
 
 def locate(folder: Path, fields: Fields, name: str) -> Path:
-    """The file that a field names.
+    """Return the path of the file that a field names.
+
+    Args:
+        folder: The folder of the sequence.
+        fields: The table with the field.
+        name: The field.
 
     Raises:
-        SequenceError: If it is not there, is no file, or lies outside the folder.
+        SequenceError: If the file does not exist, is no ordinary file, or is outside the folder.
     """
     given = fields.text(name)
     path = _inside(folder, given, fields, name)
@@ -39,13 +44,13 @@ def locate(folder: Path, fields: Fields, name: str) -> Path:
 
 
 def find_images(folder: Path, fields: Fields) -> tuple[tuple[Path, ...], Bool[ndarray, " N"]]:
-    """The pictures that the pattern ``images`` names, sorted by name.
+    """Return the pictures that match the pattern ``images``, sorted by name.
 
     Returns:
-        They, with those that are missing in the row of their numbers, and which are there.
+        The pictures, with those that are missing in their numbering, and whether each exists.
 
     Raises:
-        SequenceError: If there is none, or one lies outside the folder.
+        SequenceError: If no picture matches, or one is outside the folder.
     """
     pattern = fields.text("images")
     _inside(folder, pattern, fields, "images")
@@ -63,7 +68,7 @@ def find_images(folder: Path, fields: Fields) -> tuple[tuple[Path, ...], Bool[nd
 
 
 def _inside(folder: Path, given: str, fields: Fields, name: str) -> Path:
-    """The path, which must stay in the folder, also where a symbolic link leads."""
+    """Return a path in the folder, and check that neither it nor a symbolic link leaves it."""
     path = folder / given
     longest = max((len(os.fsencode(part)) for part in path.parts), default=0)
     if longest > LONGEST_NAME:
@@ -74,7 +79,7 @@ def _inside(folder: Path, given: str, fields: Fields, name: str) -> Path:
     outright = Path(given).is_absolute() or ".." in Path(given).parts
     try:
         leaves = outright or not path.resolve().is_relative_to(folder.resolve())
-    except (OSError, RuntimeError, ValueError):  # a circle of links, or a name that cannot be
+    except (OSError, RuntimeError, ValueError):  # a loop of links, or an impossible name
         raise fields.error(
             name,
             f'expected a path to a file, found "{given}", which leads nowhere; put the file there',
@@ -91,20 +96,21 @@ def _inside(folder: Path, given: str, fields: Fields, name: str) -> Path:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pictures:
-    """The pictures of one camera, as far as opening them once tells."""
+    """The properties of one camera's pictures, found by opening them once."""
 
     size: tuple[int, int]
     """Width and height, pixels."""
     frames: int
+    """The number of frames."""
     fps: float | None
-    """None for images, and where a video does not say."""
+    """The frame rate, 1/s; None for images, and for a video that does not state it."""
 
 
 def probe(video: Path | None, images: tuple[Path, ...], fields: Fields) -> Pictures | None:
-    """Open a video or the first image once; None where there is neither.
+    """Determine the properties of a camera's video or images; None if there is neither.
 
     Raises:
-        SequenceError: If it cannot be read.
+        SequenceError: If the video or the first image cannot be read.
     """
     if video is not None:
         try:
@@ -126,13 +132,13 @@ def probe(video: Path | None, images: tuple[Path, ...], fields: Fields) -> Pictu
 
 
 def check_pictures(view: View, found: Pictures, fields: Fields, frames: int) -> Iterable[str]:
-    """Whether the pictures' size fits the calibration, and whether there are enough.
+    """Check the size and the number of a camera's pictures.
 
     Returns:
-        Warnings: pictures that end early, images whose names sort oddly.
+        Warnings on missing pictures, and on images whose names do not sort by number.
 
     Raises:
-        SequenceError: If they have another size.
+        SequenceError: If the size is not that of the calibration.
     """
     if view.video is not None:
         check_size(view, fields, found.size, "frame size")
@@ -152,10 +158,16 @@ def check_pictures(view: View, found: Pictures, fields: Fields, frames: int) -> 
 
 
 def check_size(view: View, fields: Fields, found: tuple[int, int], what: str) -> None:
-    """Whether pictures are as large as their camera's calibration says.
+    """Check that pictures have the size of their camera's calibration.
+
+    Args:
+        view: The camera.
+        fields: The camera's table, for the message.
+        found: Width and height of the pictures, pixels.
+        what: What has this size, for the message.
 
     Raises:
-        SequenceError: If they are not.
+        SequenceError: If the sizes differ.
     """
     expected = view.camera.image_size
     if found != expected:
@@ -188,7 +200,7 @@ def _short(view: View, there: int, frames: int, what: str) -> Iterable[str]:
 
 
 def _holes(view: View) -> Iterable[str]:
-    """Pictures that are missing in the row of their numbers."""
+    """Yield a warning if pictures are missing in the numbering."""
     if view.there is None or view.there.all():
         return
     names = [view.images[k].name for k in np.flatnonzero(~view.there)]
@@ -202,6 +214,6 @@ def _holes(view: View) -> Iterable[str]:
 
 
 def _by_number(path: Path) -> list[str | int]:
-    """Sorting key that takes digits as numbers."""
+    """Return a sort key that orders numbers in names by value."""
     parts = re.split(r"(\d+)", path.as_posix())
     return [int(part) if part.isdigit() else part for part in parts]

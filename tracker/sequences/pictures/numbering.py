@@ -1,7 +1,7 @@
-"""Pictures that are numbered one by one: which of the row are not there.
+"""Missing pictures of a numbered series.
 
-A picture that was deleted leaves a hole in the numbers. Whoever took the files one after the
-other would show every later picture a step too early.
+A picture that was deleted leaves a gap in the numbers. If the gap were ignored, every later picture
+would be shown a step too early.
 """
 
 from __future__ import annotations
@@ -18,16 +18,17 @@ _DIGITS = re.compile(r"(\d+)")
 
 
 def whole_row(images: Sequence[Path]) -> tuple[tuple[Path, ...], Bool[ndarray, " N"]]:
-    """The pictures with those that are missing between them, by the numbers in their names.
+    """Complete a series of pictures with those that are missing, by the numbers in their names.
 
-    Names that differ in one number alone, by one usual distance or multiples of it, are such a
-    row. Where more would be missing than are there, the numbers count something else.
+    The names of a series differ in one number alone, whose steps are multiples of the most frequent
+    step. If more pictures would be missing than exist, the numbers are not taken as those of a
+    series.
 
     Args:
-        images: In their order.
+        images: The existing pictures in their order.
 
     Returns:
-        The row, with the name that a missing picture would have, and which of it are there.
+        The series, with the names that missing pictures would have, and whether each exists.
     """
     files = tuple(images)
     everything = np.ones(len(files), dtype=bool)
@@ -56,7 +57,11 @@ def whole_row(images: Sequence[Path]) -> tuple[tuple[Path, ...], Bool[ndarray, "
 
 
 def _place(parts: Sequence[Sequence[str]]) -> int | None:
-    """Which part of the names differs, where they are split at their numbers, and no other does."""
+    """Return the index of the only part that differs between names, if it is a number; else None.
+
+    Args:
+        parts: The names, each split at its numbers.
+    """
     if not parts or any(len(one) != len(parts[0]) for one in parts):
         return None
     differing = [k for k, values in enumerate(zip(*parts, strict=True)) if len(set(values)) > 1]
@@ -64,6 +69,6 @@ def _place(parts: Sequence[Sequence[str]]) -> int | None:
 
 
 def _called(like: Sequence[str], place: int, number: int) -> Path:
-    """The name of a picture with another number, with as many digits."""
+    """Return the name of a picture with another number, padded to the same length."""
     digits = f"{number:0{len(like[place])}}"
     return Path("".join([*like[:place], digits, *like[place + 1 :]]))

@@ -27,38 +27,39 @@ from tracker.sequences.pictures.containers import MOST_PIXELS, VideoError, opene
 __all__ = ["VideoDecoder", "VideoError", "VideoIndex", "index_video", "read_image"]
 
 DECODED_TO_VERIFY = 24
-"""Frames decoded from the start to see whether the time stamps hold; more than any reordering."""
+"""The number of frames that are decoded from the start to check the time stamps; more than any
+codec reorders."""
 
 RUN_UP = 16
-"""Frames that OpenCV lands before the one it is to jump to, to decode them all again."""
+"""The number of frames before the wanted one at which a jump aims, from which all are decoded."""
 
 
 LARGEST_IMAGE = 2**28
-"""Bytes of one image file: more than any camera's picture has, whatever its compression."""
+"""Largest size of an image file, more than cameras' pictures have with any compression, bytes."""
 
 MOST_FRAMES = 10_000_000
-"""Of one video: four days at 25 a second."""
+"""Most frames of a video: four days at 25 frames per second."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VideoIndex:
-    """What a video file holds, without its pictures. F frames."""
+    """The index of the F frames of a video file."""
 
     path: Path
     size: tuple[int, int]
     """Width and height in pixels."""
     frames: int
-    """F, counted, not what the header claims: a file may be cut short."""
+    """The number F of frames, by counting, since the header of a truncated file is wrong."""
     times: Int[ndarray, " F"] | None
-    """Time stamps, microseconds, ascending; None where they do not identify the frames."""
+    """Time stamps, microseconds, ascending; None if they do not identify the frames."""
     keys: Int[ndarray, " K"]
-    """The frames that decode by themselves: where a jump can land."""
+    """The key frames, at which decoding can start."""
     fps: float | None = None
-    """Frames a second: by the time stamps, else as the header says; None where neither does."""
+    """The frame rate by the time stamps or else by the header, 1/s; None if neither has one."""
 
 
 def index_video(path: Path) -> VideoIndex:
-    """Read what a video file holds; a file that has not changed is read once.
+    """Return the index of a video file, which is cached until the file changes.
 
     Raises:
         VideoError: If no frame of it can be decoded.

@@ -1,1 +1,1 @@
-"""Changing a sequence that is there: teaching it, and saving it with its comments."""
+"""The changes of a sequence by the user: room, target and templates, and saving them."""

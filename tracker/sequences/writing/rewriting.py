@@ -1,7 +1,7 @@
-"""A ``sequence.toml`` with another room, target or templates, and all the rest as it is.
+"""The change of room, target or templates in the text of a ``sequence.toml``.
 
-Only the values that differ are touched, so that comments, order and notation of the rest
-stay; what comes out is read and compared before anybody gets it.
+Only values that differ are changed, so that comments, order and notation of the rest are kept. The
+new text is parsed and compared with the wanted values before it is returned.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ from tracker.sequences.writing.teaching import (
 def rewritten(
     text: str, saved: Sequence, sequence: Sequence, where: str, *, name: str | None = None
 ) -> str:
-    """A ``sequence.toml`` with another room, target or templates.
+    """Return the text of a ``sequence.toml`` with another room, target or templates.
 
     Args:
-        text: The file.
-        saved: Whose room, target and templates it has.
-        sequence: Whose room, target and templates it is to have.
-        where: The file, as the messages begin.
-        name: Another name for the sequence.
+        text: The text of the file.
+        saved: The sequence whose room, target and templates are in the text.
+        sequence: The sequence whose room, target and templates are to be in the new text.
+        where: The file's name, for messages.
+        name: Another name for the sequence, or None.
 
     Raises:
         SequenceError: If the file has not what ``saved`` has.
@@ -100,7 +100,7 @@ def _write_target(table: Any, before: Values, after: Values) -> None:
 
 
 def _insert(entrances: Any, index: int, entrance: Values) -> None:
-    """One more entrance in a list, at the end on a line of its own."""
+    """Insert an entrance into a list; at the end, it gets a line of its own."""
     written = ", ".join(f"{key} = {value}" for key, value in entrance.items())
     table = tomlkit.parse(f"entrance = {{ {written} }}")["entrance"]
     if index < len(entrances):
@@ -135,10 +135,10 @@ def _write_templates(document: Any, old: list[Values], new: list[Values]) -> Non
 
 
 def _steps(pairs: Pairs) -> tuple[list[tuple[int, int]], list[int], list[int]]:
-    """What stays where it is in a list, what is taken out, last first, and what is put in.
+    """Return the pairs of a list that are kept, the indices to remove (last first), and to insert.
 
-    What stays keeps its order; whatever is to stand before an earlier one is taken out
-    and put in again.
+    The kept elements keep their order; an element that moves before an earlier one is removed and
+    inserted again.
     """
     kept: list[tuple[int, int]] = []
     gone: list[int] = []
@@ -164,11 +164,11 @@ def _check_unchanged(values: dict[str, Any], before: Values, where: str) -> None
 
 
 def taught_in(values: dict[str, Any], otherwise: Values | None = None) -> Values:
-    """Room, target and templates of a file in the form of :func:`taught_values`.
+    """Return room, target and templates of a file in the form of :func:`taught_values`.
 
     Args:
-        values: Of the file.
-        otherwise: Has room and target where the file has none.
+        values: The parsed file.
+        otherwise: The values of room and target if the file has none.
     """
 
     def numbers(vector: list[Any]) -> list[float]:

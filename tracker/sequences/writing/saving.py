@@ -1,7 +1,7 @@
-"""What was taught, written back: into the sequence's own file, or into a copy of its folder.
+"""The saving of a changed sequence into its own file, or into a copy of its folder.
 
-A file is replaced in one go, and what was there before is kept beside it; a copy appears
-whole or not at all.
+A file is replaced atomically, and its earlier content is kept beside it as a backup; a copy is
+complete or not made at all.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from tracker.sequences.reader import FILE, check_own_file, given_folder, read_se
 from tracker.sequences.sequence import Sequence
 
 BACKUP = f"{FILE}.bak"
-"""What a file was before it was saved over; later ones have a number."""
+"""The name of the backup of a file; later backups have a number."""
 
 
 def why_not_in_place(folder: Path) -> str | None:
-    """Why a sequence cannot be saved where it is, in one sentence; None where it can."""
+    """Return the reason why a sequence cannot be saved in its folder; None if it can."""
     if built_in_name(folder) is not None:
         return f"{folder.name} comes with the program and is never written to"
     if folder.is_relative_to(cache_folder()):
@@ -40,11 +40,11 @@ def save(sequence: Sequence, saved: Sequence) -> Path:
     """Write room and templates into the sequence's own file.
 
     Args:
-        sequence: What is to be in the file.
-        saved: What is in it, as it was read or saved last.
+        sequence: The sequence with the changes.
+        saved: The sequence as it was last read or saved.
 
     Returns:
-        The backup: what the file was before.
+        The path of the backup.
 
     Raises:
         SequenceError: If the file may not be written, or somebody else changed what was
@@ -76,13 +76,13 @@ def save(sequence: Sequence, saved: Sequence) -> Path:
 def save_copy(sequence: Sequence, saved: Sequence, folder: Path) -> Sequence:
     """Write a sequence with all its files into another folder, under that folder's name.
 
-    Pictures and videos are hard links where the file system has them, and so take no room;
-    tables are copied, so that nobody alters the original by editing the copy.
+    Pictures and videos are hard links if the file system supports them, and so take no space;
+    tables are copied, so that editing the copy does not change the original.
 
     Args:
-        sequence: What is to be in the copy's file.
-        saved: What is in the original's.
-        folder: A new or an empty one.
+        sequence: The sequence with the changes.
+        saved: The sequence as it was last read or saved.
+        folder: The folder of the copy, which must be new or empty.
 
     Returns:
         The copy, read from there.
@@ -123,7 +123,7 @@ def save_copy(sequence: Sequence, saved: Sequence, folder: Path) -> Sequence:
 
 
 def _check_place(folder: Path, source: Path) -> None:
-    """Whether a copy may go there, before anything is written."""
+    """Check that a copy can be made in a folder, before anything is written."""
     if folder.resolve().is_relative_to(source):
         raise SequenceError(
             f"{folder}: expected a folder beside the sequence, found one inside it; choose another"
@@ -138,11 +138,11 @@ def _check_place(folder: Path, source: Path) -> None:
 
 
 def _files(sequence: Sequence, values: dict[str, Any]) -> Iterator[Path]:
-    """Every file that the sequence is made of, but for its ``sequence.toml``."""
+    """Yield every file of the sequence apart from its ``sequence.toml``."""
     for view, camera in zip(sequence.views, values["camera"], strict=True):
         if view.video is not None:
             yield view.video
-        yield from (path for path in view.images if path.exists())  # a row may have holes
+        yield from (path for path in view.images if path.exists())  # some may be missing
         if "detections" in camera:
             yield sequence.folder / camera["detections"]
     if "ground_truth" in values:
@@ -160,7 +160,7 @@ def _copy(path: Path, place: Path, *, link: bool) -> None:
 
 
 def _keep(folder: Path, data: bytes) -> Path:
-    """A backup beside the file; one that is there already is never written over."""
+    """Write a backup beside the file, under a name that does not exist yet."""
     number = 1
     while True:
         path = folder / (BACKUP if number == 1 else f"{BACKUP}{number}")
@@ -182,7 +182,7 @@ def _keep(folder: Path, data: bytes) -> Path:
 
 @contextlib.contextmanager
 def _complaining(path: Path) -> Iterator[None]:
-    """A failure of the disk in one sentence."""
+    """Turn an error of the disk into a :class:`SequenceError` with one sentence."""
     try:
         yield
     except OSError as error:

@@ -1,7 +1,7 @@
-"""The fields of a ``sequence.toml`` that a person teaches: room, target, boxes of colours.
+"""The fields of a ``sequence.toml`` that users change on the page: room, target and templates.
 
-Whatever is wrong with them is told in the same words, whether a file brings them or
-somebody who draws them on a picture or drags them in the room.
+Their errors are the same whether they come from a file, or from the page, where they are drawn on a
+picture or dragged in the 3D view.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ from tracker.sequences.fields import Fields, did_you_mean, listed
 from tracker.sequences.sequence import Entrance, Room, Template, View
 
 LEAST_TEMPLATE = 2.0
-"""Pixels a side of a template's box."""
+"""Least width and height of a template's box, pixels."""
 
 
 def read_room(fields: Fields) -> Room:
-    """The table ``[room]``.
+    """Read the table ``[room]``.
 
     Raises:
-        SequenceError: If it is missing, or something in it is wrong.
+        SequenceError: If the table is missing, or a field is not valid.
     """
     room = fields.table("room", ("min", "max", "entrances"))
     assert room is not None
@@ -43,10 +43,10 @@ def read_room(fields: Fields) -> Room:
 
 
 def read_target(fields: Fields) -> Float[ndarray, " 3"] | None:
-    """Half extents of the table ``[target]``, metres; None where there is none.
+    """Read half width, depth and height from the table ``[target]``, metres; None without it.
 
     Raises:
-        SequenceError: If something in it is wrong.
+        SequenceError: If a field is not valid.
     """
     target = fields.table("target", ("half_extents",), needed=False)
     if target is None:
@@ -55,15 +55,15 @@ def read_target(fields: Fields) -> Float[ndarray, " 3"] | None:
 
 
 def read_templates(fields: Fields, views: tuple[View, ...], frames: int) -> tuple[Template, ...]:
-    """The tables ``[[template]]``; none where there are none.
+    """Read the tables ``[[template]]``.
 
     Args:
-        fields: The whole file.
-        views: Whose pictures the boxes lie in.
-        frames: Number of steps.
+        fields: The fields of the file.
+        views: The cameras, in whose pictures the boxes lie.
+        frames: The number of steps.
 
     Raises:
-        SequenceError: If something in one of them is wrong.
+        SequenceError: If a field is not valid.
     """
     tables = fields.tables("template", ("name", "camera", "frame", "box"), "[[template]]")
     return tuple(_template(table, views, frames) for table in tables)

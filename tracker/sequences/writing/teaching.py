@@ -1,12 +1,12 @@
-"""A sequence that was taught: with another room, target or templates than its file has.
+"""A sequence with another room, target or templates than its file has.
 
-What is taught are plain values in the notation of ``sequence.toml``::
+The changes are plain values in the notation of ``sequence.toml``::
 
     {"room": {"min": […], "max": […], "entrances": [{"position": […], "sigma": […]}, …]},
      "target": {"half_extents": […]},
      "template": [{"name": …, "camera": …, "frame": …, "box": […]}, …]}
 
-metres in the world, pixels in a picture. They are checked by what checks the file.
+in metres in the world, and in pixels in a picture. They are validated like those of a file.
 """
 
 from __future__ import annotations
@@ -27,16 +27,16 @@ from tracker.sequences.writing.taught_fields import read_room, read_target, read
 Values = dict[str, Any]
 
 FACES = tuple((side, axis) for side in ("min", "max") for axis in range(3))
-"""The six faces of the room: whose corner's coordinate each is."""
+"""The six faces of the room, each by the corner and the axis of its coordinate."""
 
 AXES = "xyz"
 
 Pairs = list[tuple[int | None, int | None]]
-"""Which of the old is which of the new, by index: None where it is gone, or new."""
+"""Pairs of indices in an old and a new list; None for an element that was removed or added."""
 
 
 def taught_values(sequence: Sequence) -> Values:
-    """Room, target and templates of a sequence as plain values."""
+    """Return room, target and templates of a sequence as plain values."""
     room = sequence.room
     return {
         "room": {
@@ -53,7 +53,7 @@ def taught_values(sequence: Sequence) -> Values:
 
 
 def template_values(template: Template) -> Values:
-    """A template as one of ``[[template]]``."""
+    """Return a template as plain values of a table ``[[template]]``."""
     return {
         "name": template.name,
         "camera": template.camera,
@@ -67,18 +67,18 @@ def _numbers(vector: ndarray) -> list[float]:
 
 
 def with_taught(opened: Sequence, values: Values, where: str) -> Sequence:
-    """A sequence with this room, this target and these templates, the rest as it was opened.
+    """Return a sequence with another room, target and templates.
 
-    Its digest follows from the one that was opened and from the values, so that what was
-    computed of the same ones is found again.
+    The digest is made from that of the opened sequence and the values, so that cached results for
+    the same values are found again.
 
     Args:
-        opened: As its file was read.
+        opened: The sequence as its file was read.
         values: Room, target and templates.
-        where: The file, as the messages begin.
+        where: The file's name, for messages.
 
     Raises:
-        SequenceError: If a value does not fit; file, field, expected, found.
+        SequenceError: If a value is not valid, with file and field.
     """
     fields = Fields(where, values, ("room", "target", "template"))
     room, half_extents = read_room(fields), read_target(fields)
@@ -94,16 +94,16 @@ def with_taught(opened: Sequence, values: Values, where: str) -> Sequence:
 
 
 def carried_over(before: Values, after: Values, now: Values, steps: int) -> Values:
-    """What was taught on another rendering of the same scene, on this one.
+    """Apply changes that were made on another rendering of the same scene to this one.
 
-    Room and target are taken where they were changed, and templates that were added where their
-    step is still there. Other changes of templates are of boxes that this rendering may not have.
+    Changes of room and target are applied, and templates that were added if their step exists.
+    Other changes of templates are left out, since this rendering may not have their boxes.
 
     Args:
-        before: As the other rendering's file had it.
-        after: As it was taught.
-        now: As this rendering's file has it.
-        steps: Its number of steps.
+        before: The values in the other rendering's file.
+        after: The values after the user's changes.
+        now: The values in this rendering's file.
+        steps: The number of steps of this rendering.
     """
     values = copy.deepcopy(now)
     for part in ("room", "target"):
@@ -118,7 +118,7 @@ def carried_over(before: Values, after: Values, now: Values, steps: int) -> Valu
 
 
 def changes(before: Values, after: Values) -> list[str]:
-    """What differs, one short sentence each; none where nothing does."""
+    """Describe the differences of two sets of values, in a short sentence each."""
     words: list[str] = []
     for old, new in paired_templates(before["template"], after["template"]):
         if old is None and new is not None:
@@ -149,7 +149,7 @@ def changes(before: Values, after: Values) -> list[str]:
 
 
 def paired_templates(before: list[Values], after: list[Values]) -> Pairs:
-    """Which template is which: of the same box, whatever it is called."""
+    """Pair old and new templates that have the same box, whatever their names."""
 
     def place(template: Values) -> Any:
         return template["camera"], template["frame"], template["box"]
@@ -158,7 +158,7 @@ def paired_templates(before: list[Values], after: list[Values]) -> Pairs:
 
 
 def paired_entrances(before: list[Values], after: list[Values]) -> Pairs:
-    """Which entrance is which: the same one, else the next in order that is left over."""
+    """Pair old and new entrances: equal ones first, then the remaining ones in their order."""
     pairs = _paired(before, after, lambda old, new: old == new)
     gone = [old for old, new in pairs if new is None]
     come = [new for old, new in pairs if old is None]
