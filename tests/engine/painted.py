@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence as Many
-from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -88,19 +87,6 @@ def painted_sequence(
     )
 
 
-def true_boxes(sequence: Sequence, step: int) -> ndarray:
-    """Where the people are in the only camera."""
-    assert sequence.ground_truth is not None
-    positions = sequence.ground_truth.positions[sequence.ground_truth.at(step)]
-    boxes, _ = upright_boxes(sequence.cameras[0], positions, sequence.target_half_extents)
-    return boxes
-
-
 def corner_box(box: ndarray) -> ndarray:
     """Left, top, width and height of a box given by centre and half sizes."""
     return np.array([box[0] - box[2], box[1] - box[3], 2 * box[2], 2 * box[3]])
-
-
-def with_templates(sequence: Sequence, *templates: Template) -> Sequence:
-    """The same sequence with other templates."""
-    return replace(sequence, templates=templates)

@@ -12,12 +12,11 @@ from tests.world import HEAD as HALF_EXTENTS
 from tests.world import SMALL_CAMERAS as CAMERAS
 from tests.world import SMALL_ROOM as ROOM
 from tests.world import surveillance as look_at
-from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.geometry.camera import Camera
 from tracker.sequences.sequence import Detections, GroundTruth, Room, Sequence, View
 from tracker.single_view.protocol import ViewResult
 
-__all__ = ["CAMERAS", "HALF_EXTENTS", "ROOM", "crossing", "look_at", "observe", "people",
+__all__ = ["CAMERAS", "HALF_EXTENTS", "ROOM", "crossing", "look_at", "observe",
            "sequence", "views_at", "walk"]  # fmt: skip
 
 
@@ -144,14 +143,3 @@ def views_at(whole: Sequence, frame: int, *, sigma: float = 1.5) -> list[ViewRes
         sigmas = np.full((len(boxes), 4), sigma)
         results.append(ViewResult.of_boxes(boxes, view.detections.scores[rows], sigmas))
     return results
-
-
-def people(rng: np.random.Generator, count: int, first_label: int) -> GaussianMixture:
-    """Anywhere in the room, known to some decimetres, of any existence."""
-    places = np.concatenate([rng.uniform(-1.2, 1.2, (count, 2)), np.full((count, 1), 0.9)], axis=1)
-    return GaussianMixture(
-        rng.uniform(0.05, 1.0, count),
-        np.concatenate([places, np.zeros((count, 3))], axis=1),
-        np.tile(np.diag([0.05, 0.05, 0.01, 0.2, 0.2, 0.05]), (count, 1, 1)),
-        first_label + np.arange(count),
-    )
