@@ -30,7 +30,9 @@ def mixture(weights: list[float], means: list[list[float]], labels: list[int]) -
     )
 
 
-def plain(before: GaussianMixture, boxes: ndarray, p_d: float) -> PhdUpdate:
+def plain(
+    before: GaussianMixture, boxes: ndarray, p_d: float, clutter: float = CLUTTER
+) -> PhdUpdate:
     """The recursion of [VM06] with one linear camera."""
     return phd.update(
         before,
@@ -38,18 +40,22 @@ def plain(before: GaussianMixture, boxes: ndarray, p_d: float) -> PhdUpdate:
         expected=Expected.of(before.means, np.tile(np.eye(2), (before.size, 1, 1))),
         noise=R[None],
         detection_probability=p_d,
-        clutter_intensity=CLUTTER,
+        clutter_intensity=clutter,
         gate=25.0,
     )
 
 
 def shared(
-    before: GaussianMixture, boxes: ndarray, p_d: float, births: range = NO_BIRTHS
+    before: GaussianMixture,
+    boxes: ndarray,
+    p_d: float,
+    births: range = NO_BIRTHS,
+    clutter: float = CLUTTER,
 ) -> PhdUpdate:
     """The same with one person a label."""
     return one_person.share_boxes(
         before,
-        plain(before, boxes, p_d),
+        plain(before, boxes, p_d, clutter),
         np.full(before.size, p_d),
         births=births,
         next_label=1000,
@@ -137,6 +143,14 @@ def test_nobody_and_nothing() -> None:
     alone = mixture([0.5], [[0.0, 0.0]], [1])
     after = shared(alone, np.zeros((0, 2)), 0.9)
     assert after.posterior.weights[0] == pytest.approx(0.5 * 0.1 / (1 - 0.45))
+
+
+@pytest.mark.parametrize("clutter", [1.0, 1e-6, 1e-16, 1e-20, 1e-300, 5e-324])
+def test_however_little_clutter_there_is_a_box_is_shared_by_its_odds(clutter: float) -> None:
+    before = mixture([0.5], [[0.0, 0.0]], [1])
+    after = shared(before, before.means, 0.9, clutter=clutter).posterior
+    hit = np.exp(np.log(0.45 / (2.0 * np.pi * 0.13)) - np.log(clutter).clip(min=-600.0))
+    assert after.cardinality == pytest.approx((hit + 0.05) / (hit + 0.55))
 
 
 def test_sure_people_are_merged_with_nobody_else() -> None:

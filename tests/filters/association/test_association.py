@@ -49,10 +49,12 @@ def compare(missed: ndarray, detected: ndarray, unexplained: ndarray, tolerance:
     assert_allclose(found.unexplained, columns, atol=tolerance)
 
 
-@given(st.integers(0, 10_000), st.integers(1, 5))
-def test_one_target_or_one_measurement_is_exact(seed: int, other: int) -> None:
-    compare(*problem(seed, 1, other), tolerance=1e-5)
-    compare(*problem(seed, other, 1), tolerance=1e-5)
+@given(st.integers(0, 10_000), st.integers(1, 5), st.sampled_from((1.0, 1e-20, 1e10, 1e18, 1e200)))
+def test_one_target_or_one_measurement_is_exact(seed: int, other: int, scale: float) -> None:
+    """However much likelier a measurement is a target's than clutter."""
+    for targets, count in ((1, other), (other, 1)):
+        missed, detected, unexplained = problem(seed, targets, count)
+        compare(missed, scale * detected, unexplained, tolerance=1e-5)
 
 
 @given(st.integers(0, 10_000))

@@ -69,13 +69,19 @@ def belief_propagation(
             for pair in range(starts[i], starts[i + 1]):
                 total += weights[pair] * to_target[pair]
             for pair in range(starts[i], starts[i + 1]):
-                rest = max(total - weights[pair] * to_target[pair], 1e-300)
-                to_measurement[pair] = weights[pair] / rest
+                rest = total - weights[pair] * to_target[pair]
+                # beside a far larger part rounding leaves nothing of the others
+                if rest < 0.5 * missed[i]:
+                    rest = missed[i]
+                to_measurement[pair] = weights[pair] / max(rest, 1e-300)
                 totals[measured[pair]] += to_measurement[pair]
         change = 0.0
         for pair in range(len(measured)):
             j = measured[pair]
-            new = 1.0 / max(totals[j] - to_measurement[pair], 1e-300)
+            rest = totals[j] - to_measurement[pair]
+            if rest < 0.5 * unexplained[j]:
+                rest = unexplained[j]
+            new = 1.0 / max(rest, 1e-300)
             change = max(change, abs(new - to_target[pair]) * unexplained[j])
             to_target[pair] = new
         if change < settling.tolerance:
