@@ -12,19 +12,23 @@ from pathlib import Path
 from types import FrameType
 
 import pytest
-from hypothesis import HealthCheck, settings
+from hypothesis import HealthCheck, Phase, settings
 from playwright.sync_api import Browser, sync_playwright
 
 from tracker.kernels.compilation import kernel_folder
 
-# the same examples every time; how long one takes says nothing of whether it is right. Where
-# kernels are interpreted (``tests.mutate``), each example takes a hundred times as long
+INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT") == "1"
+"""As ``tests.mutate`` runs kernels: each example takes a hundred times as long, and which one is
+the smallest that fails nobody asks."""
+
+# the same examples every time; how long one takes says nothing of whether it is right
 settings.register_profile(
     "repeatable",
     derandomize=True,
     database=None,
     deadline=None,
-    max_examples=30 if os.environ.get("NUMBA_DISABLE_JIT") == "1" else 60,
+    max_examples=30 if INTERPRETED else 60,
+    phases=[Phase.explicit, Phase.generate] if INTERPRETED else tuple(Phase),
     suppress_health_check=[HealthCheck.too_slow],
 )
 settings.load_profile("repeatable")

@@ -71,25 +71,45 @@ def test_leaders_are_the_heaviest_of_their_groups(
     assert (np.diff(mixture.weights[leaders]) <= 0.0).all()
 
 
-@given(mixtures(), st.floats(0.0, 0.5), thresholds, st.integers(1, 30))
-def test_reducing_never_raises_the_cardinality(
-    mixture: GaussianMixture, pruning: float, merging: float, most: int
+@given(st.integers(0, 2**32 - 1), st.sampled_from((1, 2, 4, 6)), st.sampled_from((0.5, 4.0, 50.0)))
+def test_all_within_the_threshold_merge_however_far_they_reach_along_an_axis(
+    seed: int, dimension: int, threshold: float
 ) -> None:
-    reduced, leaders = gm.reduce(
-        mixture, pruning_threshold=pruning, merging_threshold=merging, max_components=most
-    )
-    assert reduced.cardinality <= mixture.cardinality * (1.0 + 1e-12)
-    assert reduced.size <= min(most, mixture.size)
-    assert (reduced.weights >= pruning * (1.0 - 1e-12)).all()
-    assert (np.diff(reduced.weights) <= 0.0).all()
-    assert len(np.unique(leaders)) == reduced.size
-    assert_array_equal(reduced.labels, mixture.labels[leaders])
-    if reduced.size:  # however few are left, they stand for all that were not pruned
-        heavy = mixture.weights[mixture.weights >= pruning]
-        assert reduced.cardinality == pytest.approx(heavy.sum())
-    reference = reference_reduce(mixture, pruning, merging, most)
-    assert_allclose(reduced.weights, reference.weights, rtol=1e-12)
-    assert_allclose(reduced.means, reference.means, rtol=1e-9, atol=1e-9)
+    """Where (m_i − m_l)ᵀ P_i⁻¹ (m_i − m_l) = U lies farthest along each axis, a millionth nearer
+    and farther: that is √(U / P_aa) P e_a from the leader."""
+    rng = np.random.default_rng(seed)
+    covariances = random_covariances(rng, 4 * dimension + 1, dimension)
+    means = rng.uniform(-100.0, 100.0, dimension) + np.zeros((len(covariances), 1))
+    farthest = np.sqrt(threshold / covariances.diagonal(axis1=1, axis2=2))[:, None] * covariances
+    for i in range(1, len(means)):
+        side, beyond, axis = (-1.0) ** i, 1.0 if i % 4 < 2 else -1.0, (i - 1) // 4
+        means[i] += side * (1.0 + 1e-6 * beyond) * farthest[i, :, axis]
+    order, nobody = np.arange(len(means)), np.full(len(means), -1)
+    group, _ = merging_kernels.merge_groups(means, covariances, order, nobody, threshold)
+    assert_array_equal(group == 0, (order == 0) | (order % 4 >= 2))
+
+
+@given(mixtures(), st.sampled_from((0.0, 1e-4, 0.1)), thresholds)
+def test_reducing_never_raises_the_cardinality(
+    mixture: GaussianMixture, pruning: float, merging: float
+) -> None:
+    count = reference_reduce(mixture, pruning, merging, 100).size
+    for most in {1, max(count - 1, 1), count + 1}:
+        reduced, leaders = gm.reduce(
+            mixture, pruning_threshold=pruning, merging_threshold=merging, max_components=most
+        )
+        assert reduced.cardinality <= mixture.cardinality * (1.0 + 1e-12)
+        assert reduced.size == min(most, count)
+        assert (reduced.weights >= pruning * (1.0 - 1e-12)).all()
+        assert (np.diff(reduced.weights) <= 0.0).all()
+        assert len(np.unique(leaders)) == reduced.size
+        assert_array_equal(reduced.labels, mixture.labels[leaders])
+        if reduced.size:  # however few are left, they stand for all that were not pruned
+            heavy = mixture.weights[mixture.weights >= pruning]
+            assert reduced.cardinality == pytest.approx(heavy.sum())
+        reference = reference_reduce(mixture, pruning, merging, most)
+        assert_allclose(reduced.weights, reference.weights, rtol=1e-12)
+        assert_allclose(reduced.means, reference.means, rtol=1e-9, atol=1e-9)
 
 
 @given(mixtures(), st.floats(0.0, 1.0), st.integers(0, 2**32 - 1), thresholds)
