@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -18,6 +19,7 @@ from tracker.smoothing.calibration import (
     SIZE_RIDGE,
     WIDEST,
     Calibration,
+    free,
     lower,
     upright,
 )
@@ -45,6 +47,14 @@ def planted(scene: Known, shares: list[ndarray]) -> Smoother:
         measurements = camera.measurements._replace(values=values)
         smoother.cameras[c] = replace(camera, measurements=measurements)
     return smoother
+
+
+def test_a_number_of_a_box_is_free_where_it_moves_along_any_axis() -> None:
+    ways = np.array(list(itertools.product([0.0, -1e-3], repeat=3)))
+    derivatives = np.hstack([ways, np.ones_like(ways)])[:, None]
+    seen = standing(2).smoother().model.target.expected(CAMERAS[0], np.zeros((8, 6)))
+    seen = replace(seen, expected=seen.expected._replace(jacobians=derivatives))
+    assert free(seen)[:, 0].tolist() == [False] + [True] * 7
 
 
 def test_the_shift_is_a_share_of_the_half_height_but_of_what_the_edge_holds_fast() -> None:

@@ -43,6 +43,8 @@ def test_who_is_said_to_be_the_other_later_turned_where_both_lives_fit(crossed: 
     assert turn(paths, 0, 1, crossed - 5, crossed + 4) == [crossed, 20 + crossed]
     assert turn(paths, 0, 1, 18, 30) == [19, 39]
     assert turn(paths, 0, 1, 19, 30) == []
+    assert turn(paths, 0, 1, -5, 0) == [], "nobody turns before the own second step"
+    assert turn(paths, 0, 1, -5, 1) == [1, 21]
 
 
 def test_who_goes_straight_on_is_not_cut() -> None:

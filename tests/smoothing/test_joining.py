@@ -3,21 +3,16 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from numpy import ndarray
 from numpy.testing import assert_allclose
 
-from tracker.filters.models import Motion
 from tracker.kernels.smoothing.presence import Habits, presence
-from tracker.parameters import FusionParams
-from tracker.smoothing.identity.ends import Ends
 from tracker.smoothing.identity.joining import chains, join
-from tracker.smoothing.identity.pieces import Pairs, contested, cut, motion_gains, near_pairs
+from tracker.smoothing.identity.pieces import contested, cut
 from tracker.smoothing.paths import Links, Paths
-from tracker.smoothing.smoother import Fitted
 
 
 def worth_of(
@@ -131,64 +126,6 @@ def together(*paths: Paths) -> Paths:
     )
 
 
-def as_fitted(paths: Paths, restlessness: float = 1.0) -> Fitted:
-    """Paths that are fitted already."""
-    rows = len(paths.states)
-    return Fitted(
-        paths, np.zeros(rows), paths.states, paths.covariances, np.zeros(rows),
-        np.full(rows, restlessness),
-    )  # fmt: skip
-
-
-def motion_pairs(paths: Paths, known: Ends, prior: ndarray, longest: int = 20) -> Pairs:
-    """The pairs of pieces with the gains of their motion alone, at 0.1 s a step."""
-    near = near_pairs(paths, longest=longest, fastest=0.3)
-    motion = Motion.of(FusionParams(), 0.1)
-    return replace(near, gains=motion_gains(paths, near, known, motion, prior, 0.0))
-
-
-def test_the_motion_prefers_who_goes_on_as_he_went() -> None:
-    # two people side by side; after a gap one is where the first must be, the other beside
-    paths = together(
-        straight(1, 0, 0.0, 10),
-        straight(2, 0, 0.0, 10, side=1.0),
-        straight(3, 14, 1.4, 10),
-        straight(4, 14, 1.4, 10, side=1.0),
-    )
-    prior = np.diag([100.0] * 3 + [0.49] * 3)
-    known = Ends.alone(as_fitted(paths), prior)
-    found = motion_pairs(paths, known, prior)
-    gain = {(i, j): g for i, j, g in zip(found.earlier, found.later, found.gains, strict=True)}
-    assert gain[0, 2] > gain[0, 3] + 3.0
-    assert gain[1, 3] > gain[1, 2] + 3.0
-    assert found.gaps.tolist() == [5] * len(found.gaps)
-    near = motion_pairs(paths, known, prior, longest=4)
-    assert len(near.gains) == 0
-
-
-def test_boxes_that_err_alike_contradict_each_other_less() -> None:
-    paths = together(straight(1, 0, 0.0, 10), straight(2, 11, 1.1, 10, side=0.8))
-    prior = np.diag([100.0] * 3 + [0.49] * 3)
-    known = Ends.alone(as_fitted(paths), prior)
-    gains = [
-        float(motion_pairs(paths, told, prior).gains[0])
-        for told in (known, known.told_by(0.2), known.told_by(1.0))
-    ]
-    assert gains[1] > gains[0] + 1.0
-    assert gains[2] == gains[0]
-
-
-def test_as_the_filter_had_it_is_always_possible() -> None:
-    # at once two metres further, the same label again, and another's who is as far
-    paths = together(
-        straight(1, 0, 0.0, 10), straight(1, 10, 1.0, 10, side=2.0), straight(2, 10, 1.0, 10, -2.0)
-    )
-    prior = np.diag([100.0] * 3 + [0.49] * 3)
-    known = Ends.alone(as_fitted(paths), prior)
-    found = motion_pairs(paths, known, prior)
-    assert list(zip(found.earlier.tolist(), found.later.tolist(), strict=True)) == [(0, 1)]
-
-
 def test_boxes_that_are_as_well_anothers_are_contested() -> None:
     paths = together(straight(1, 0, 0.0, 2), straight(2, 0, 0.0, 2, side=0.2))
     links = Links(
@@ -248,17 +185,3 @@ def test_the_best_chains_of_which_each_is_one_person_throughout(seed: int) -> No
         gain[earlier, later], people=people,
     )  # fmt: skip
     assert best - value(tuple(following.tolist()), tuple(used.tolist())) <= 1.0
-
-
-def test_who_has_whose_colours_outweighs_how_they_moved() -> None:
-    """Two who meet: motion has each go on as the other, through a piece that shows nobody's."""
-    first, second, alone = [0.0, -20.0, -20.0], [-20.0, 0.0, -20.0], [0.0, 0.0, 0.0]
-    pairs = {(0, 2): 1.0, (2, 4): 3.0, (2, 5): 0.0, (1, 3): 1.0, (3, 5): 3.0, (3, 4): 0.0}
-    earlier, later = np.array(list(pairs)).T
-    plain = np.full(6, 30.0), np.full(6, -5.0), np.full(6, -5.0), earlier, later
-    gains = np.array(list(pairs.values()))
-    people = np.array([first, second, alone, alone, second, first])
-    following, used = join(*plain, gains)
-    assert chains(following, used) == [[0, 2, 4], [1, 3, 5]]
-    following, used = join(*plain, gains, people=people)
-    assert chains(following, used) == [[0, 2, 5], [1, 3, 4]]

@@ -1,4 +1,4 @@
-"""Who stands is known better than the motion says, and one turn makes nobody restless."""
+"""Who stands is known better than the motion says: how restless each is, by the formula."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ def standing(steps: int, x: float, seed: int) -> ndarray:
     return np.array([x, 0.0, 1.0]) + np.random.default_rng(seed).normal(0.0, SIGMA, (steps, 3))
 
 
-def moving(steps: int, seed: int, scale: float = 1.0) -> ndarray:
-    """Somebody who moves as the motion model says, with so many times its noise."""
+def moving(steps: int, seed: int) -> ndarray:
+    """Somebody who moves as the motion model says."""
     motion, rng = Motion.of(PLAIN.fusion, STEP), np.random.default_rng(seed)
     states = [np.array([0.0, 0.0, 1.0, 0.5, 0.0, 0.0])]
     for _ in range(steps - 1):
-        driven = rng.multivariate_normal(np.zeros(6), scale * motion.noise)
+        driven = rng.multivariate_normal(np.zeros(6), motion.noise)
         states.append(motion.transition @ states[-1] + driven)
     return np.array(states)[:, :3] + rng.normal(0.0, SIGMA, (steps, 3))
 
@@ -51,22 +51,6 @@ def test_who_stands_is_not_restless_and_who_moves_as_stated_is() -> None:
     assert found[:200].max() < 0.2
     # each step counts in full up to twice the mean: a little less than 1
     assert 0.5 < np.median(found[200:]) < 1.2
-
-
-def test_more_of_the_same_noise_is_found_in_its_order() -> None:
-    told = [np.median(learnt([moving(300, 3, scale)]).restlessness) for scale in (0.1, 0.3, 1.0)]
-    assert told[0] < 0.6 * told[1] < 0.6 * told[2]
-
-
-def test_one_jump_to_anothers_place_makes_nobody_restless() -> None:
-    still = standing(60, 0.0, 4)
-    jumped = still.copy()
-    jumped[30:, 0] += 0.5
-    found = learnt([jumped])
-    assert found.restlessness.max() < 0.25
-    jump = found.jumps
-    assert np.argmax(jump) in (29, 30, 31)
-    assert jump.max() > 2.0 * learnt([jumped], turns=1).jumps.max()
 
 
 def test_without_boxes_nothing_is_learnt() -> None:

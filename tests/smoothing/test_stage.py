@@ -266,3 +266,6 @@ def test_who_comes_back_on_the_other_side_is_known_by_looks(weight: float) -> No
     before, after = of(5), of(40)
     assert (before[True] == after[False] and before[False] == after[True]) is (weight == 1.0)
     assert not weight or {d.kind for d in found.decisions} == {"joined"}
+    # where looks count for nothing, nobody is asked whether he is one of those who left
+    assert found.joined is not None
+    assert len(found.joined.gains) == (4 if weight else 0)
