@@ -174,7 +174,8 @@ def test_a_camera_without_a_frame_misses_no_newcomer_and_one_that_is_sure_never_
     assert blind is not None
     odds = [np.log(p) - np.log1p(-p) for p in (plain.existences[0], blind.existences[0])]
     assert odds[1] - odds[0] == pytest.approx(-np.log(0.05), abs=1e-6)
-    sure = births(p_d=1.0).propose(told)
+    with np.errstate(divide="raise"):
+        sure = births(p_d=1.0).propose(told)
     assert sure is not None
     assert sure.existences[0] == 0.0
     every = births(p_d=1.0).propose(evidence(exact([PLACE])))
@@ -216,6 +217,7 @@ def test_somebody_is_waited_for_as_long_as_is_said_and_no_longer() -> None:
     for _ in range(3):
         expected = MODEL.motion.predict(expected, 1.0)
     assert_allclose(lost_for(3).lost.covariances, expected.covariances)
+    assert lost_for(3).lost.weights.tolist() == [0.9]
 
 
 @pytest.mark.parametrize(("label", "back"), [(9, False), (10, True), (11, True)])
