@@ -436,24 +436,6 @@ def test_two_sure_components_of_one_label_are_two_people(other: float, parted: b
     assert free == (51 if parted else 50)
 
 
-def test_a_track_begun_at_a_door_by_the_boxes_of_a_newcomer_is_that_newcomer() -> None:
-    """Whichever box it is; and a track that was there before stays beside it."""
-    place = [-1.9, -1.9, 0.85]
-    for aside in (False, True):
-        views = exact([place], sigma=4.0)
-        if aside:
-            views = tuple(
-                of_boxes(np.concatenate([[[5.0, 5.0, 4.0, 12.0]], v.boxes]), 4.0) for v in views
-            )
-        p = FusionParams(duplicate_distance=0.0, birth_rate=0.5)
-        fusion = MultiBernoulli(empty_room(), RunParameters(fusion=p))
-        _, result = fusion.step(fusion.start(), views)
-        near = np.linalg.norm(result.posterior.means[:, :2] - place[:2], axis=1) < 0.5
-        heavy = near & (result.posterior.weights > 0.1)
-        assert heavy.sum() == 1, aside
-        assert set(result.sources[:, heavy].ravel().tolist()) == {int(aside)}
-
-
 # ── tracks
 
 

@@ -301,6 +301,7 @@ def test_a_step_is_pure(method: Method) -> None:
     assert_array_equal(first.posterior.means, second.posterior.means)
     assert_array_equal(first.posterior.weights, second.posterior.weights)
     assert once.next_label == twice.next_label
+    assert once.next_label > first.posterior.labels.max(), "nobody has a label that is free"
     after = (state.tracks if isinstance(state, MultiBernoulliState) else state.mixture).means
     assert_array_equal(before, after)
 
@@ -344,6 +345,17 @@ def test_a_box_that_began_a_newcomer_begins_nobody_at_the_entrance_on_its_ray(bo
         assert len(made) == count
         at = door if birth == "entrances" else place
         assert np.linalg.norm(result.posterior.means[made[0], :3] - at) < 0.5
+
+
+def test_who_comes_in_by_the_door_begins_beside_a_newcomer_of_other_boxes() -> None:
+    door, place = ROOM.entrances[0].position, [0.4, -0.3, 0.85]
+    first, *others = exact([place, door], CAMERAS[:3])  # the first camera alone sees the door
+    views = (first, *(reordered(view, np.array([0])) for view in others))
+    p = {"pruning_threshold": 1e-9, "duplicate_distance": 0.0}
+    (result,) = filtered(MultiBernoulli, [views], cameras=CAMERAS[:3], birth="both", **p)
+    for source, where in (([0, 0, 0], place), ([1, -1, -1], door)):
+        (component,) = np.flatnonzero((result.sources.T == source).all(axis=1))
+        assert np.linalg.norm(result.posterior.means[component, :3] - where) < 0.5
 
 
 @both_methods
