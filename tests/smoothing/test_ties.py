@@ -94,6 +94,16 @@ def test_the_best_of_all_ways_that_obey(seed: int) -> None:
     assert found == pytest.approx(best, abs=1e-6)
 
 
+def test_what_lies_between_two_who_are_one_leads_from_the_one_to_the_other() -> None:
+    """The first would go on as the second and end, and the third come and go on as the last."""
+    gains = {(0, 1): 10.0, (2, 3): 10.0, (0, 2): -8.0, (1, 3): -7.0, (1, 2): -30.0, (0, 3): -20.0}
+    alone, (earlier, later) = np.full(4, -1.0), np.array(list(gains)).T
+    plain = np.full(4, 9.0), alone, alone, earlier, later, np.array(list(gains.values()))
+    assert chains(*join(*plain)) == [[0, 1], [2, 3]]
+    assert chains(*join(*plain, Ties(together=((0, 3),)))) == [[0, 1, 3], [2]]
+    assert chains(*join(*plain, Ties(apart=((0, 1),)))) == [[0], [1], [2, 3]]
+
+
 def test_the_earlier_of_two_that_cannot_both_be_counts() -> None:
     firsts, lasts = np.array([0, 5, 20]), np.array([10, 15, 30])
     ties = possible(firsts, lasts, [Said([(0, 2)]), Said([(1, 2)])])
