@@ -58,6 +58,7 @@ TESTED_BY = {
     "kernels/lens.py": ("kernels", "geometry"),
     "kernels": ("kernels", "filters"),
     "sequences": ("sequences", "bad_input/test_table.py"),
+    "geometry/consistency": ("geometry", "io/checks"),
 }
 """Whose tests are not only in the folder of the same name; the first that fits counts."""
 

@@ -1,4 +1,4 @@
-"""Who is lost and who returns: labels given back by place, and only to newcomers."""
+"""Who is lost and who returns: one label one person, whoever left or came."""
 
 from __future__ import annotations
 
@@ -26,30 +26,15 @@ def people(*who: tuple[int, float, float, float]) -> GaussianMixture:
     )
 
 
-def run(*steps: GaussianMixture, firsts: list[int] | None = None) -> tuple[ndarray, Memory]:
+def run(*steps: GaussianMixture) -> tuple[ndarray, Memory]:
     """Labels of the last step, when each step gives labels from 10 times its number on."""
     memory, labels = Memory.start(6), np.zeros(0, dtype=int)
     for number, step in enumerate(steps):
-        labels, memory = recall(
-            memory, step, MODEL, 10 * number if firsts is None else firsts[number]
-        )
+        labels, memory = recall(memory, step, MODEL, 10 * number)
     return labels, memory
 
 
 NOBODY = people()
-
-
-def test_who_returns_near_his_place_gets_his_label_back() -> None:
-    labels, memory = run(people((1, 0.9, 0.0, 0.0)), NOBODY, NOBODY, people((31, 0.9, 0.2, 0.0)))
-    assert labels.tolist() == [1]
-    assert memory.known.labels.tolist() == [1]
-    assert memory.lost.size == 0
-
-
-def test_far_away_it_is_somebody_else() -> None:
-    labels, memory = run(people((1, 0.9, 0.0, 0.0)), NOBODY, people((21, 0.9, 1.9, 0.0)))
-    assert labels.tolist() == [21]
-    assert memory.lost.labels.tolist() == [1]
 
 
 def test_the_faint_rest_of_the_old_label_goes_on_under_the_new_one() -> None:

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy import ndarray
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_array_equal
 
 from tracker.filters import phd
 from tracker.filters.gaussian_mixture import GaussianMixture
@@ -106,22 +106,6 @@ def test_a_label_is_never_more_than_one_person() -> None:
     assert after.posterior.cardinality <= 1.0 + 1e-9
     assert_array_equal(after.posterior.labels, [7, 7, 7])
     assert after.measurement_weights.sum() <= 1.0 + 1e-9
-
-
-def test_two_people_and_two_boxes_pair_up() -> None:
-    before = mixture([0.99, 0.99], [[-0.2, 0.0], [0.2, 0.0]], [3, 4])
-    after = shared(before, before.means.copy(), 0.98).posterior
-    totals = [after.weights[after.labels == label].sum() for label in (3, 4)]
-    assert_allclose(totals, 1.0, atol=0.01)
-
-
-def test_one_box_of_two_people_leaves_the_other_as_missed() -> None:
-    before = mixture([0.9, 0.9], [[0.0, 0.0], [1.2, 0.0]], [3, 4])
-    after = shared(before, before.means[:1], 0.8).posterior
-    totals = np.array([after.weights[after.labels == label].sum() for label in (3, 4)])
-    bayes = 0.9 * 0.2 / (1 - 0.9 * 0.8)
-    assert totals[0] > 0.99
-    assert totals[1] == pytest.approx(bayes, abs=0.02)
 
 
 def test_a_newcomer_gets_a_label_of_its_box() -> None:

@@ -12,7 +12,7 @@ from numpy.testing import assert_array_equal
 from tests import world
 from tracker.sequences.clock import Clock, Timing
 from tracker.sequences.pictures.numbering import whole_row
-from tracker.sequences.sequence import FileState, Room, View
+from tracker.sequences.sequence import PRESETS, FileState, Room, View
 
 ROOM = Room(np.array([-1.0, -2.0, 0.0]), np.array([1.0, 2.0, 3.0]))
 
@@ -23,6 +23,13 @@ def test_a_room_ends_at_its_walls_and_a_margin_beyond() -> None:
     assert_array_equal(ROOM.contains(points), [True, True, False, False, False, False])
     assert_array_equal(ROOM.contains(points, 0.5), [True, True, True, True, True, False])
     assert_array_equal(ROOM.contains(points[:0]), [])
+
+
+def test_usual_targets_are_as_deep_as_wide_and_who_is_whole_stands_upright() -> None:
+    """Of every camera alike: the middle of width and depth is what a box is as wide as."""
+    for width, depth, height in PRESETS.values():
+        assert width == depth <= height
+    assert PRESETS["Head"] < PRESETS["Seated"] < PRESETS["Person"]
 
 
 def test_the_rows_of_a_step_are_those_between_its_neighbours() -> None:

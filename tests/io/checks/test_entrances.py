@@ -53,6 +53,8 @@ def test_who_is_there_at_the_beginning_and_the_end_says_nothing() -> None:
 def test_a_track_that_is_lost_and_found_again_came_through_no_door() -> None:
     lost = (THERE_ALREADY, (0, 399, (3.0, -3.0), (-3.0, 3.0)), (0, 200, (-2.0, 0.0), (0.0, 0.0)))
     assert found(*lost, (220, 399, (0.3, 0.0), (2.0, 0.0))) == []
+    assert found(*lost, (230, 399, (0.3, 0.0), (2.0, 0.0))) == [], "a second and a half"
+    assert found(*lost, (231, 399, (0.3, 0.0), (2.0, 0.0))) == [(0.2, 0.0, 2)]
     # much later it is somebody else, who appears where one vanished: a door in the middle
     assert found(*lost, (300, 399, (0.3, 0.0), (2.0, 0.0))) == [(0.2, 0.0, 2)]
 
