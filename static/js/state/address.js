@@ -18,6 +18,9 @@ const NOWHERE = {
 	view: {},
 };
 
+/** Milliseconds until the address follows: browsers limit how often it may change. */
+const WRITE_AFTER = 400;
+
 /** Where this browser was last. @param {{session: string, search: string, kept: number | null}} last */
 function note(last) {
 	try {
@@ -47,6 +50,8 @@ export function createAddress(store, actions) {
 	let standing = "";
 	/** @type {Timer} */
 	let writing;
+	/** Values that were asked for and are not there yet: until then the page is at no place. */
+	let restoring = 0;
 	if (unknown.length)
 		actions.note(
 			"warn",
@@ -167,16 +172,25 @@ export function createAddress(store, actions) {
 	 */
 	async function restore(server, values) {
 		const others = server.changed.filter((key) => !(key in values));
-		if (others.length) await actions.ask("POST", "parameters/reset", { keys: others });
 		const differing = Object.entries(values).filter(
 			([key, value]) => String(server.parameters[key]) !== String(value),
 		);
-		if (differing.length) await actions.change(Object.fromEntries(differing));
+		restoring += 1;
+		try {
+			if (others.length) await actions.ask("POST", "parameters/reset", { keys: others });
+			if (differing.length) await actions.change(Object.fromEntries(differing));
+		} finally {
+			restoring -= 1;
+		}
 		return others.length + differing.length > 0;
 	}
 
 	function write() {
 		writing = undefined;
+		if (restoring) {
+			writing = setTimeout(write, WRITE_AFTER);
+			return;
+		}
 		const { server, shown } = store.get();
 		if (!server?.sequence || shown < 0 || server.opening) return;
 		const now = here(server);
@@ -209,8 +223,8 @@ export function createAddress(store, actions) {
 		"listed",
 		"eventKind",
 	]);
-	// Browsers limit how often the address may change; while it plays, it follows slowly.
-	store.on([...seen], () => (writing ??= setTimeout(write, 400)));
+	// While it plays, the address follows slowly.
+	store.on([...seen], () => (writing ??= setTimeout(write, WRITE_AFTER)));
 	addEventListener("popstate", ({ state }) => {
 		const { server } = store.get();
 		if (!state?.view || !server) return;

@@ -21,7 +21,7 @@ from tests.browser.looking import ask
 from tests.browser.serving import Server
 from tests.browser.walkers import write_walkers
 
-SECONDS = float(os.environ.get("MULTIVIEW_PHD_SOAK", "22"))
+SECONDS = float(os.environ.get("MULTIVIEW_PHD_SOAK", "12"))
 PAGES = 4
 REST = 12.0
 """Seconds until no connection is kept open (5) and idle threads of the pool may go (10)."""

@@ -19,7 +19,6 @@ from app.scene.panel.controls import ORIGIN, Controls
 from app.scene.panel.sliders import Scale, hint_text, label_text, number_text, symbol_parts
 from app.scene.panel.topics import TOPICS, topic_of
 from app.state.workbench import Workbench
-from app.web.access.viewer import start_viser
 from tests.app.scene import scene_case
 from tracker import parameters as table
 from tracker.parameters import PARAMETERS
@@ -29,22 +28,14 @@ P_D = "fusion.detection_probability"
 NUMBERS = [p for p in PARAMETERS.values() if p.kind in ("float", "int")]
 
 
-@pytest.fixture(scope="module")
-def shared_server() -> Iterator[viser.ViserServer]:
-    server = start_viser()
-    yield server
-    server.stop()
-
-
 @pytest.fixture
 def workbench() -> Workbench:
     return scene_case.opened(scene_case.sequence())
 
 
 @pytest.fixture
-def panel(shared_server: viser.ViserServer, workbench: Workbench) -> Iterator[Controls]:
-    shared_server.gui.reset()
-    made = Controls(shared_server, workbench)
+def panel(server: viser.ViserServer, workbench: Workbench) -> Iterator[Controls]:
+    made = Controls(server, workbench)
     assert made.wait(SECONDS)
     yield made
     made.close()
@@ -79,10 +70,9 @@ class Eager:
 
 
 def test_who_asks_before_the_panel_is_there_is_answered_when_it_is(
-    shared_server: viser.ViserServer, workbench: Workbench
+    server: viser.ViserServer, workbench: Workbench
 ) -> None:
-    shared_server.gui.reset()
-    made = Controls(shared_server, workbench, Eager())  # type: ignore[arg-type]
+    made = Controls(server, workbench, Eager())  # type: ignore[arg-type]
     assert made.wait(SECONDS)
     made.close()
 
@@ -248,22 +238,22 @@ def test_every_parameter_and_method_has_one_input(panel: Controls) -> None:
         assert isinstance(panel._inputs.by_key[key], kinds[parameter.kind])
 
 
-def test_an_edit_reaches_the_workbench(panel: Controls, workbench: Workbench) -> None:
-    move(panel, "fusion.survival_probability", 0.9)
+def test_edits_reach_the_workbench_the_last_of_many_and_within_the_range(
+    panel: Controls, workbench: Workbench
+) -> None:
+    key = "fusion.survival_probability"
+    for hundredth in range(50, 91):
+        move(panel, key, hundredth / 100.0)
     move(panel, "fusion.pruning_threshold", -3.0)
     move(panel, "fusion.max_components", 80)
     assert panel.wait(SECONDS)
-    assert value(workbench, "fusion.survival_probability") == 0.9
+    assert value(workbench, key) == 0.9
     assert value(workbench, "fusion.pruning_threshold") == 1e-3
     assert value(workbench, "fusion.max_components") == 80
     assert workbench.snapshot().parameters_origin == ORIGIN
-
-
-def test_many_edits_end_in_the_last(panel: Controls, workbench: Workbench) -> None:
-    for hundredth in range(50, 100):
-        move(panel, "fusion.survival_probability", hundredth / 100.0)
+    move(panel, key, 7.0)
     assert panel.wait(SECONDS)
-    assert value(workbench, "fusion.survival_probability") == 0.99
+    assert value(workbench, key) == panel._inputs.by_key[key].value == 1.0
 
 
 def test_a_change_elsewhere_moves_the_slider_without_an_echo(
@@ -297,54 +287,45 @@ def test_a_slider_that_is_being_moved_is_not_written(panel: Controls, workbench:
     assert value(workbench, key) == 3.13e-3
 
 
-def test_what_is_out_of_range_is_clamped_and_written_back(
-    panel: Controls, workbench: Workbench
+@pytest.mark.parametrize(
+    ("changes", "shown", "hidden"),
+    [
+        ({}, "fusion.clutter_rate", "jpda.gate_probability colour_phd.bandwidth"),
+        (
+            {"single_view": "colour_phd"},
+            "colour_phd.bandwidth colour_phd.survival_probability",
+            "detection_boxes.score_threshold",
+        ),
+        (
+            {"single_view": "jpda"},
+            "jpda.gate_probability foreground.threshold",
+            "colour_phd.bandwidth",
+        ),
+        # of a shared group only the numbers that are read
+        (
+            {"single_view": "jpda", "jpda.measurements": "colour"},
+            "colour_phd.bandwidth",
+            "colour_phd.survival_probability",
+        ),
+        (
+            {"single_view": "jpda", "jpda.measurements": "detections"},
+            "detection_boxes.pixel_sigma",
+            "foreground.threshold",
+        ),
+    ],
+)
+def test_only_what_the_methods_read_is_shown(
+    panel: Controls, changes: dict[str, str], shown: str, hidden: str
 ) -> None:
-    move(panel, "fusion.survival_probability", 7.0)
-    assert panel.wait(SECONDS)
-    assert value(workbench, "fusion.survival_probability") == 1.0
-    assert panel._inputs.by_key["fusion.survival_probability"].value == 1.0
-
-
-def test_only_what_the_methods_read_is_shown(panel: Controls, workbench: Workbench) -> None:
-    def shown() -> set[str]:
-        return {
-            PARAMETERS[key].group
-            for folder, keys in panel._inputs.blocks
-            for key in keys
-            if folder.visible
-        }
-
-    assert "colour_phd" not in shown()
-    assert "fusion" in shown()
-    move(panel, "single_view", "colour_phd")
-    assert panel.wait(SECONDS)
-    assert value(workbench, "single_view") == "colour_phd"
-    assert "colour_phd" in shown()
-    assert "detection_boxes" not in shown()
-
-
-def test_of_a_shared_group_only_the_numbers_that_are_read_are_shown(
-    panel: Controls, workbench: Workbench
-) -> None:
-    def shown(key: str) -> bool:
+    def is_shown(key: str) -> bool:
         blocks = [folder for folder, keys in panel._inputs.blocks if key in keys]
         return bool(panel._inputs.by_key[key].visible) and all(folder.visible for folder in blocks)
 
-    assert not shown("jpda.gate_probability")
-    move(panel, "single_view", "jpda")
+    for key, choice in changes.items():
+        move(panel, key, choice)
     assert panel.wait(SECONDS)
-    assert shown("jpda.gate_probability")
-    assert shown("foreground.threshold")
-    assert not shown("colour_phd.bandwidth")
-    move(panel, "jpda.measurements", "colour")
-    assert panel.wait(SECONDS)
-    assert shown("colour_phd.bandwidth")
-    assert not shown("colour_phd.survival_probability")
-    move(panel, "jpda.measurements", "detections")
-    assert panel.wait(SECONDS)
-    assert shown("detection_boxes.pixel_sigma")
-    assert not shown("foreground.threshold")
+    assert [key for key in shown.split() if not is_shown(key)] == []
+    assert [key for key in hidden.split() if is_shown(key)] == []
 
 
 def test_changed_values_are_marked_and_can_be_reset(panel: Controls, workbench: Workbench) -> None:
@@ -368,7 +349,15 @@ def test_changed_values_are_marked_and_can_be_reset(panel: Controls, workbench: 
     assert not panel._reset_all.visible
 
 
-def test_presets_of_ones_own_are_in_the_panel(panel: Controls, workbench: Workbench) -> None:
+def test_presets_move_the_sliders_and_those_of_ones_own_are_in_the_panel(
+    panel: Controls, workbench: Workbench
+) -> None:
+    take_preset(panel, "published")
+    assert panel.wait(SECONDS)
+    for key, wanted in table.PRESETS["published"].items():
+        assert value(workbench, key) == wanted
+        at = panel._inputs.by_key[key].value
+        assert at == wanted or panel._inputs.scales[key].stands_at(at, wanted)
     workbench.apply_preset("robust")
     assert panel.wait(SECONDS)
     assert panel._presets.value == "robust"
@@ -386,15 +375,6 @@ def test_presets_of_ones_own_are_in_the_panel(panel: Controls, workbench: Workbe
     assert panel.wait(SECONDS)
     assert value(workbench, P_D) == 0.7
     assert "quick" not in panel._presets.options
-
-
-def test_a_preset_moves_the_sliders(panel: Controls, workbench: Workbench) -> None:
-    take_preset(panel, "published")
-    assert panel.wait(SECONDS)
-    for key, wanted in table.PRESETS["published"].items():
-        assert value(workbench, key) == wanted
-        at = panel._inputs.by_key[key].value
-        assert at == wanted or panel._inputs.scales[key].stands_at(at, wanted)
 
 
 def test_keys_of_the_3d_view_are_those_of_the_page() -> None:

@@ -4,26 +4,18 @@ from __future__ import annotations
 
 import sys
 import tracemalloc
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 import pytest
 import viser
 
 from app.scene.scene import Scene
-from app.web.access.viewer import start_viser
 from tests.app.scene import scene_case
 from tracker.runs.pipeline import Run
 from tracker.sequences.sequence import Sequence
 
 SECONDS = 60.0
 SHORT, LONG = 100, 10_000
-
-
-@pytest.fixture(scope="module")
-def server() -> Iterator[viser.ViserServer]:
-    server = start_viser()
-    yield server
-    server.stop()
 
 
 @pytest.fixture(scope="module")

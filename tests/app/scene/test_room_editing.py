@@ -13,19 +13,11 @@ from viser import _messages
 from app.scene.room.editing import FACES, Face, RoomEditing, dragged, grips
 from app.state.teaching import Teaching
 from app.state.workbench import Workbench
-from app.web.access.viewer import start_viser
 from tests.app.scene import scene_case
 from tracker.parameters import RunParameters
 from tracker.sequences.pictures.frames import FrameReader
 
 RIGHT = Face("max", 0)
-
-
-@pytest.fixture(scope="module")
-def server() -> Iterator[viser.ViserServer]:
-    server = start_viser()
-    yield server
-    server.stop()
 
 
 @pytest.fixture

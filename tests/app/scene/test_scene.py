@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -19,33 +20,75 @@ from app.scene.nodes import DISC, crowded, linear
 from app.scene.scene import Scene
 from app.scene.worker import LatestWorker
 from app.state.snapshot import Ghosts
-from app.web.access.viewer import start_viser
+from app.state.workbench import Workbench
 from tests.app.scene import scene_case
-from tracker.runs.pipeline import Progress
+from tracker.runs.pipeline import Progress, Run
+from tracker.sequences.sequence import Sequence
 
 SECONDS = 20.0
 
 
-@pytest.fixture(scope="module")
-def shared_server() -> Iterator[viser.ViserServer]:
-    server = start_viser()
-    yield server
-    server.stop()
+@dataclass
+class View:
+    """The 3D view of a workbench, and what it has in viser."""
+
+    server: viser.ViserServer
+    workbench: Workbench
+    scene: Scene
+
+    @property
+    def nodes(self) -> dict[str, Any]:
+        """All nodes by their names, once everything is drawn."""
+        assert self.scene.wait(SECONDS)
+        return dict(self.server.scene._handle_from_node_name)
+
+    def visible(self, prefix: str) -> set[str]:
+        return {n for n, h in self.nodes.items() if n.startswith(prefix + "/") and h.visible}
+
+    def progress(self, run: Run, done: int) -> None:
+        """Have the workbench hear of a run."""
+        self.workbench.run_begins(run.key)
+        frames = run.sequence.frames
+        self.workbench.run_progresses(run, Progress("tracks", done, frames, 1.0, done))
 
 
 @pytest.fixture
-def server(shared_server: viser.ViserServer) -> viser.ViserServer:
-    shared_server.scene.reset()
-    shared_server.gui.reset()
-    return shared_server
+def of() -> Sequence:
+    return scene_case.sequence()
 
 
-def nodes(server: viser.ViserServer) -> dict[str, Any]:
-    return dict(server.scene._handle_from_node_name)
+@pytest.fixture
+def run(of: Sequence) -> Run:
+    return scene_case.run(of)
 
 
-def visible(server: viser.ViserServer, prefix: str) -> set[str]:
-    return {n for n, h in nodes(server).items() if n.startswith(prefix + "/") and h.visible}
+@pytest.fixture
+def looking(server: viser.ViserServer) -> Iterator[Callable[[Workbench], View]]:
+    """Makes the view of a workbench, and ends it after the test."""
+    made: list[Scene] = []
+
+    def look(workbench: Workbench) -> View:
+        made.append(Scene(server, workbench))
+        return View(server, workbench, made[0])
+
+    yield look
+    for one in made:
+        one.close()
+
+
+@pytest.fixture
+def view(of: Sequence, run: Run, looking: Callable[[Workbench], View]) -> View:
+    """Of two walkers and a finished run, at step 30, where every layer is on."""
+    workbench = scene_case.opened(of, run)
+    workbench.seek(30)
+    return looking(workbench)
+
+
+def another(of: Sequence) -> Run:
+    """A run that found somebody more."""
+    run = scene_case.run(of, walkers=3)
+    run.keys = {**run.keys, "tracks": "another"}
+    return run
 
 
 # the worker
@@ -99,69 +142,46 @@ def test_a_failure_is_told_and_the_worker_goes_on(caplog: pytest.LogCaptureFixtu
 # the scene
 
 
-def test_the_nodes_are_a_fixed_set(server: viser.ViserServer) -> None:
-    first, second = scene_case.sequence(3), scene_case.sequence(2, name="other")
-    workbench = scene_case.opened(first, scene_case.run(first))
-    view = Scene(server, workbench)
-    assert view.wait(SECONDS)
-    before = set(nodes(server))
-    handles = {name: id(handle) for name, handle in nodes(server).items()}
+def test_the_nodes_are_a_fixed_set(view: View) -> None:
+    before = {name: id(handle) for name, handle in view.nodes.items()}
     for step in range(1, 50):
-        workbench.seek(step)
-        workbench.select(step % 3 or None)
-        assert view.wait(SECONDS)
-    workbench.look(1)
-    workbench.set_theme("light")
-    workbench.set_layers({"trails": False})
-    assert view.wait(SECONDS)
-    scene_case.show(workbench, second, scene_case.run(second))
-    assert view.wait(SECONDS)
-    assert set(nodes(server)) == before
-    assert {name: id(handle) for name, handle in nodes(server).items()} == handles
-    assert visible(server, "/cameras") == {"/cameras/00", "/cameras/01"}
-    view.close()
+        view.workbench.seek(step)
+        view.workbench.select(step % 3 or None)
+        assert view.scene.wait(SECONDS)
+    view.workbench.look(1)
+    view.workbench.set_theme("light")
+    view.workbench.set_layers({"trails": False})
+    second = scene_case.sequence(2, name="other")
+    scene_case.show(view.workbench, second, scene_case.run(second))
+    assert {name: id(handle) for name, handle in view.nodes.items()} == before
+    assert view.visible("/cameras") == {"/cameras/00", "/cameras/01"}
 
 
-def test_pools_grow_to_the_need_and_stay(server: viser.ViserServer) -> None:
+def test_pools_grow_to_the_need_and_stay(looking: Callable[[Workbench], View]) -> None:
     few, many = scene_case.sequence(2), scene_case.sequence(6, frames=3, name="many")
-    workbench = scene_case.opened(few)
-    view = Scene(server, workbench)
-    assert view.wait(SECONDS)
-    crowd = scene_case.run(many, walkers=24)
-    scene_case.show(workbench, many, crowd)
-    assert view.wait(SECONDS)
-    grown = set(nodes(server))
-    assert len(visible(server, "/cameras")) == 6
-    assert len(visible(server, "/labels/people")) == 24
-    label, discs = nodes(server)["/labels/people/00"], nodes(server)["/labels/people_discs"]
-    assert label.font_screen_scale == pytest.approx(crowded(24))
-    assert discs.thickness == pytest.approx(DISC * crowded(24))
-    scene_case.show(workbench, few)
-    assert view.wait(SECONDS)
-    assert set(nodes(server)) == grown
-    assert len(visible(server, "/cameras")) == 2
-    assert not visible(server, "/labels/people")
-    view.close()
-
-
-def test_labels_are_smaller_in_a_crowd() -> None:
+    view = looking(scene_case.opened(few))
+    assert view.scene.wait(SECONDS)
+    scene_case.show(view.workbench, many, scene_case.run(many, walkers=24))
+    grown = view.nodes
+    assert len(view.visible("/cameras")) == 6
+    assert len(view.visible("/labels/people")) == 24
+    # in a crowd labels are smaller
     assert [crowded(count) for count in (0, 1, 14)] == [1.0, 1.0, 1.0]
-    assert 0.7 <= crowded(24) < 0.9
-    assert crowded(400) == 0.6
+    assert 0.6 == crowded(400) < crowded(24) < 0.9
+    assert grown["/labels/people/00"].font_screen_scale == pytest.approx(crowded(24))
+    assert grown["/labels/people_discs"].thickness == pytest.approx(DISC * crowded(24))
+    scene_case.show(view.workbench, few)
+    assert set(view.nodes) == set(grown)
+    assert len(view.visible("/cameras")) == 2
+    assert not view.visible("/labels/people")
 
 
-def test_a_step_is_drawn_as_the_run_has_it(server: viser.ViserServer) -> None:
-    of = scene_case.sequence()
-    shown = scene_case.run(of)
-    workbench = scene_case.opened(of, shown)
-    view = Scene(server, workbench)
-    workbench.seek(30)
-    assert view.wait(SECONDS)
-    drawn = nodes(server)
+def test_a_step_is_drawn_as_the_run_has_it(view: View, of: Sequence, run: Run) -> None:
+    drawn = view.nodes
     assert drawn["/people/boxes"].points.shape == (24, 2, 3)
     assert not drawn["/people/selected_box"].visible
     assert drawn["/people/truth"].visible
-    posterior = shown.fused[30].posterior
+    posterior = run.fused[30].posterior
     ball = drawn["/people/ellipsoids"]
     middle = (of.room.minimum + of.room.maximum) / 2.0
     np.testing.assert_allclose(ball.batched_positions + middle, posterior.means, atol=1e-6)
@@ -170,28 +190,53 @@ def test_a_step_is_drawn_as_the_run_has_it(server: viser.ViserServer) -> None:
     turn = tf.SO3(np.asarray(ball.batched_wxyzs[0], dtype=float)).as_matrix()
     rebuilt = turn @ np.diag((ball.batched_scales[0] / mass_radius(0.9)) ** 2) @ turn.T
     np.testing.assert_allclose(rebuilt, posterior.covariances[0], rtol=1e-4, atol=1e-6)
-    assert {drawn[n].text for n in visible(server, "/labels/people")} == {"1", "2"}
-    assert 'data-step="30" data-state="computed"' in view._status.content
-    assert "2 people" in view._status.content
+    assert {drawn[n].text for n in view.visible("/labels/people")} == {"1", "2"}
+    status = view.scene._status.content
+    assert 'data-step="30" data-state="computed"' in status
+    assert "2 people" in status
+    # lines from truth to estimate
+    now, truth = run.tracks.at(30), of.ground_truth
+    assert truth is not None
+    lines = drawn["/people/errors"].points
+    np.testing.assert_allclose(lines[:, 0], truth.positions[truth.at(30)], rtol=1e-6)
+    np.testing.assert_allclose(lines[:, 1], run.tracks.positions[now], rtol=1e-6)
+    # a person stands on the floor, in the colour of the label
+    body = drawn["/people/figures"]
+    low = body.batched_positions[:, 2] + body.position[2]
+    np.testing.assert_allclose(low, scene_case.ROOM.minimum[2], atol=1e-6)
+    top = run.tracks.positions[now][:, 2] + scene_case.HALF[2]
+    np.testing.assert_allclose(body.batched_scales[:, 2], top, rtol=1e-6)
+    colours = linear(PALETTES["dark"].of(run.tracks.ids[now]))
+    np.testing.assert_array_equal(drawn["/labels/people_discs"].colors[:, 0], colours)
+    assert "/labels/entrances_discs" not in view.visible("/labels")
 
+
+def test_layers_and_the_selection_decide_what_is_drawn(view: View) -> None:
+    workbench, drawn = view.workbench, view.nodes
+    workbench.set_layers({"others": False})
+    assert view.nodes["/people/boxes"].points.shape == (24, 2, 3)  # nobody is selected
     workbench.select(2)
-    assert view.wait(SECONDS)
+    assert not view.nodes["/people/boxes"].visible
     assert drawn["/people/selected_box"].points.shape == (12, 2, 3)
-    assert drawn["/people/boxes"].points.shape == (12, 2, 3)
+    assert len(drawn["/people/ellipsoids"].batched_positions) == 1
+    assert len(view.visible("/labels/people")) == 1
+    workbench.set_layers({"others": True})
+    assert view.nodes["/people/boxes"].points.shape == (12, 2, 3)
     assert drawn["/people/rays"].visible
+    for layers, gone in (
+        ({"truth": False}, {"errors", "truth"}),
+        ({"bodies": False}, {"figures", "feet"}),
+    ):
+        workbench.set_layers(layers)
+        assert not {f"/people/{name}" for name in gone} & view.visible("/people")
     workbench.set_layers(dict.fromkeys(workbench.layers, False))
-    assert view.wait(SECONDS)
-    assert not visible(server, "/people")
+    assert not view.visible("/people")
     assert not drawn["/room/volume"].visible
-    view.close()
 
 
-def test_a_click_selects_and_the_next_one_clears(server: viser.ViserServer) -> None:
-    of = scene_case.sequence()
-    workbench = scene_case.opened(of, scene_case.run(of))
-    view = Scene(server, workbench)
-    assert view.wait(SECONDS)
-    people = view._people
+def test_a_click_selects_and_the_next_one_clears(view: View) -> None:
+    assert view.scene.wait(SECONDS)
+    people, workbench = view.scene._people, view.workbench
     people._pick_box(1)
     assert workbench.snapshot().selection == 2
     people._pick_component(1)
@@ -199,18 +244,12 @@ def test_a_click_selects_and_the_next_one_clears(server: viser.ViserServer) -> N
     people._pick_component(3)  # belongs to no track
     people._pick_box(99)  # was drawn before the click arrived
     assert workbench.snapshot().selection is None
-    view.close()
 
 
-def test_what_takes_the_clicks_on_a_person_hides_nothing(server: viser.ViserServer) -> None:
-    of = scene_case.sequence()
-    workbench = scene_case.opened(of, scene_case.run(of))
-    view = Scene(server, workbench)
-    workbench.seek(30)
+def test_what_takes_the_clicks_on_a_person_hides_nothing(view: View) -> None:
     for bodies in (True, False):
-        workbench.set_layers({"bodies": bodies})
-        assert view.wait(SECONDS)
-        target = nodes(server)["/people/bodies"]
+        view.workbench.set_layers({"bodies": bodies})
+        target = view.nodes["/people/bodies"]
         assert target.visible
         assert len(target.batched_positions) == 2
         # a plain mesh of viser's writes depth at any opacity; three.js has the blending
@@ -220,25 +259,18 @@ def test_what_takes_the_clicks_on_a_person_hides_nothing(server: viser.ViserServ
         (material,) = json.loads(target.glb_data[20 : 20 + length])["materials"]
         assert material["alphaMode"] == "BLEND"
         assert material["pbrMetallicRoughness"]["baseColorFactor"][3] == 0.0
-        assert nodes(server)["/people/ellipsoids"].visible
+        assert view.nodes["/people/ellipsoids"].visible
     # bodies write no depth either, as long as their backs alone are drawn
-    assert nodes(server)["/people/figures"].side == "back"
-    view.close()
+    assert view.nodes["/people/figures"].side == "back"
 
 
-def test_the_client_makes_bodies_once_and_draws_their_ellipsoids_after_them(
-    server: viser.ViserServer,
-) -> None:
-    of = scene_case.sequence()
-    workbench = scene_case.opened(of, scene_case.run(of))
-    view = Scene(server, workbench)
-    drawn = nodes(server)
+def test_the_client_makes_bodies_once_and_draws_their_ellipsoids_after_them(view: View) -> None:
     faint = set()
     once = ("figures", "selected_figure", "feet", "selected_feet")
     for step, selected in ((10, None), (30, None), (31, 2), (32, 2)):
-        workbench.seek(step)
-        workbench.select(selected)
-        assert view.wait(SECONDS)
+        view.workbench.seek(step)
+        view.workbench.select(selected)
+        drawn = view.nodes
         # other opacities make the client's copies new, and what is newer is drawn later
         for name in (*(f"/people/{name}" for name in once), "/room/entrances", "/room/ground"):
             assert drawn[name].batched_opacities is None
@@ -251,173 +283,66 @@ def test_the_client_makes_bodies_once_and_draws_their_ellipsoids_after_them(
     np.testing.assert_array_equal(
         drawn["/people/figures"].position, drawn["/people/ellipsoids"].position
     )
-    view.close()
 
 
-def test_the_selected_track_alone(server: viser.ViserServer) -> None:
-    of = scene_case.sequence()
-    workbench = scene_case.opened(of, scene_case.run(of))
-    view = Scene(server, workbench)
-    workbench.seek(30)
-    workbench.set_layers({"others": False})
-    assert view.wait(SECONDS)
-    assert nodes(server)["/people/boxes"].points.shape == (24, 2, 3)  # nobody is selected
-    workbench.select(2)
-    assert view.wait(SECONDS)
-    assert not nodes(server)["/people/boxes"].visible
-    assert nodes(server)["/people/selected_box"].points.shape == (12, 2, 3)
-    assert len(nodes(server)["/people/ellipsoids"].batched_positions) == 1
-    assert len(visible(server, "/labels/people")) == 1
-    view.close()
-
-
-def test_lines_from_truth_to_estimate_say_how_far(server: viser.ViserServer) -> None:
-    of = scene_case.sequence()
-    shown = scene_case.run(of)
-    workbench = scene_case.opened(of, shown)
-    view = Scene(server, workbench)
-    workbench.seek(10)
-    assert view.wait(SECONDS)
-    lines = nodes(server)["/people/errors"].points
-    assert lines.shape == (2, 2, 3)
-    np.testing.assert_allclose(
-        lines[:, 0], of.ground_truth.positions[of.ground_truth.at(10)], rtol=1e-6
-    )
-    np.testing.assert_allclose(lines[:, 1], shown.tracks.positions[shown.tracks.at(10)], rtol=1e-6)
-    workbench.set_layers({"truth": False})
-    assert view.wait(SECONDS)
-    assert not nodes(server)["/people/errors"].visible
-    view.close()
-
-
-def test_a_person_stands_on_the_floor_in_the_colour_of_the_label(
-    server: viser.ViserServer,
+def test_how_it_would_be_is_drawn_until_the_run_is_another(
+    view: View, of: Sequence, run: Run
 ) -> None:
-    of = scene_case.sequence()
-    shown = scene_case.run(of)
-    workbench = scene_case.opened(of, shown)
-    view = Scene(server, workbench)
-    workbench.seek(30)
-    assert view.wait(SECONDS)
-    now = shown.tracks.at(30)
-    body = nodes(server)["/people/figures"]
-    top = shown.tracks.positions[now][:, 2] + scene_case.HALF[2]
-    low = body.batched_positions[:, 2] + body.position[2]
-    np.testing.assert_allclose(low, scene_case.ROOM.minimum[2], atol=1e-6)
-    np.testing.assert_allclose(body.batched_scales[:, 2], top, rtol=1e-6)
-    discs = nodes(server)["/labels/people_discs"]
-    expected = linear(PALETTES["dark"].of(shown.tracks.ids[now]))
-    np.testing.assert_array_equal(discs.colors[:, 0], expected)
-    assert "/labels/entrances_discs" not in visible(server, "/labels")
-    workbench.set_layers({"bodies": False})
-    assert view.wait(SECONDS)
-    assert not nodes(server)["/people/figures"].visible
-    assert not nodes(server)["/people/feet"].visible
-    view.close()
-
-
-def test_how_it_would_be_is_drawn_until_the_run_is_another(server: viser.ViserServer) -> None:
-    of = scene_case.sequence()
-    run = scene_case.run(of)
-    workbench = scene_case.opened(of, run)
-    view = Scene(server, workbench)
-    workbench.seek(30)
     near = run.tracks.take((run.tracks.frames > 20) & (run.tracks.frames < 40))
-    workbench.show_ghosts(Ghosts(run.key, near))
-    assert view.wait(SECONDS)
-    ways = nodes(server)["/people/ghost_ways"]
+    view.workbench.show_ghosts(Ghosts(run.key, near))
+    ways = view.nodes["/people/ghost_ways"]
     assert ways.visible
     # a piece of way between each two steps of a track, and none from one track to another
     assert len(ways.points) == len(near) - len(np.unique(near.ids))
-    assert len(nodes(server)["/people/ghost_boxes"].points) == 12 * len(np.unique(near.ids))
-    other = scene_case.run(of, walkers=3)
-    other.keys = {**other.keys, "tracks": "another"}
-    workbench.run_begins(other.key)
-    workbench.run_progresses(other, Progress("tracks", of.frames, of.frames, 1.0, of.frames))
-    assert view.wait(SECONDS)
-    assert not ways.visible
-    view.close()
+    assert len(view.nodes["/people/ghost_boxes"].points) == 12 * len(np.unique(near.ids))
+    view.progress(another(of), of.frames)
+    assert not view.nodes["/people/ghost_ways"].visible
 
 
-def test_the_pinned_run_is_drawn_beside_another(server: viser.ViserServer) -> None:
-    of = scene_case.sequence()
-    workbench = scene_case.opened(of, scene_case.run(of))
-    view = Scene(server, workbench)
-    workbench.seek(30)
-    assert workbench.pin()
-    assert view.wait(SECONDS)
-    assert not nodes(server)["/people/pinned"].visible  # it is the shown one
-    other = scene_case.run(of, walkers=3)
-    other.keys = {**other.keys, "tracks": "another"}
-    workbench.run_begins(other.key)
-    workbench.run_progresses(other, Progress("tracks", of.frames, of.frames, 1.0, of.frames))
-    assert view.wait(SECONDS)
-    assert nodes(server)["/people/pinned"].visible
-    assert nodes(server)["/people/pinned_trails"].visible
-    workbench.set_layers({"pinned": False})
-    assert view.wait(SECONDS)
-    assert not nodes(server)["/people/pinned"].visible
-    view.close()
+def test_the_pinned_run_is_drawn_beside_another(view: View, of: Sequence) -> None:
+    pinned = {"/people/pinned", "/people/pinned_trails"}
+    assert view.workbench.pin()
+    assert not view.nodes["/people/pinned"].visible  # it is the shown one
+    view.progress(another(of), of.frames)
+    assert pinned <= view.visible("/people")
+    view.workbench.set_layers({"pinned": False})
+    assert not pinned & view.visible("/people")
 
 
-def test_the_theme_reaches_every_line(server: viser.ViserServer) -> None:
-    of = scene_case.sequence()
-    workbench = scene_case.opened(of, scene_case.run(of))
-    view = Scene(server, workbench)
-    assert view.wait(SECONDS)
-    dark = {
-        name: np.array(nodes(server)[name].colors) for name in ("/room/volume", "/people/boxes")
-    }
-    workbench.set_theme("light")
-    assert view.wait(SECONDS)
+def test_the_theme_reaches_every_line(view: View) -> None:
+    names = ("/room/volume", "/people/boxes")
+    dark = {name: np.array(view.nodes[name].colors) for name in names}
+    view.workbench.set_theme("light")
     for name, before in dark.items():
-        assert (nodes(server)[name].colors != before).any(), name
-    view.close()
+        assert (view.nodes[name].colors != before).any(), name
 
 
-def test_nothing_of_another_run_is_shown(server: viser.ViserServer) -> None:
-    of = scene_case.sequence()
-    workbench = scene_case.opened(of, scene_case.run(of))
-    view = Scene(server, workbench)
-    workbench.seek(40)
-    assert view.wait(SECONDS)
-    assert visible(server, "/people") > {"/people/truth", "/people/errors", "/people/future"}
-    workbench.run_begins("another")
-    assert view.wait(SECONDS)
-    assert visible(server, "/people") == {"/people/truth"}
-    assert not visible(server, "/labels/people")
-    assert 'data-state="computing"' in view._status.content
-    view.close()
+def test_nothing_of_another_run_is_shown(view: View) -> None:
+    assert view.visible("/people") > {"/people/truth", "/people/errors", "/people/future"}
+    view.workbench.run_begins("another")
+    assert view.visible("/people") == {"/people/truth"}
+    assert not view.visible("/labels/people")
+    assert 'data-state="computing"' in view.scene._status.content
 
 
-def test_a_step_appears_as_soon_as_it_is_computed(server: viser.ViserServer) -> None:
-    of = scene_case.sequence()
-    workbench = scene_case.opened(of)
-    view = Scene(server, workbench)
-    workbench.seek(40)
+def test_a_step_appears_as_soon_as_it_is_computed(
+    of: Sequence, run: Run, looking: Callable[[Workbench], View]
+) -> None:
+    view = looking(scene_case.opened(of))
+    view.workbench.seek(40)
     partial = scene_case.run(of, done=20)
-    workbench.run_begins(partial.key)
-    workbench.run_progresses(partial, Progress("fusion", 20, of.frames, 1.0, 20))
-    assert view.wait(SECONDS)
-    assert visible(server, "/people") == {"/people/truth"}
-    whole = scene_case.run(of)
-    partial.fused, partial.tracks, partial.done = whole.fused, whole.tracks, whole.done
-    workbench.run_progresses(partial, Progress("fusion", of.frames, of.frames, 1.0, of.frames))
-    assert view.wait(SECONDS)
-    assert nodes(server)["/people/boxes"].visible
-    view.close()
+    view.progress(partial, 20)
+    assert view.visible("/people") == {"/people/truth"}
+    partial.fused, partial.tracks, partial.done = run.fused, run.tracks, run.done
+    view.workbench.run_progresses(partial, Progress("fusion", 60, 60, 1.0, 60))
+    assert view.nodes["/people/boxes"].visible
 
 
-def test_an_empty_workbench_shows_nothing(server: viser.ViserServer) -> None:
-    view = Scene(server, scene_case.Workbench())
-    assert view.wait(SECONDS)
-    assert not visible(server, "/people") | visible(server, "/room") | visible(server, "/cameras")
-    assert "No sequence" in view._status.content
-    view.close()
-    view.close()
-
-
-def test_words_of_the_status() -> None:
-    of = scene_case.sequence()
-    workbench = scene_case.opened(of)
-    assert 'data-state="missing"' in scene.status_html(workbench.snapshot(), None)
+def test_an_empty_workbench_shows_nothing(looking: Callable[[Workbench], View]) -> None:
+    view = looking(scene_case.Workbench())
+    for prefix in ("/people", "/room", "/cameras"):
+        assert not view.visible(prefix)
+    assert "No sequence" in view.scene._status.content
+    view.scene.close()
+    snapshot = scene_case.opened(scene_case.sequence()).snapshot()
+    assert 'data-state="missing"' in scene.status_html(snapshot, None)

@@ -40,28 +40,21 @@ def test_an_ellipsoid_holds_the_stated_share_of_its_gaussian(mass: float) -> Non
         assert abs(inside.mean() - mass) < 4.0 * np.sqrt(mass * (1.0 - mass) / count)
 
 
-def test_no_component_makes_no_ellipsoid() -> None:
-    wxyzs, axes = ellipsoids(np.zeros((0, 3, 3)))
-    assert wxyzs.shape == (0, 4)
-    assert axes.shape == (0, 3)
-
-
 @pytest.mark.parametrize("mass", [0.0, 1.0, -1.0])
 def test_a_mass_must_be_a_probability(mass: float) -> None:
     with pytest.raises(ValueError, match=r"above 0 and below 1"):
         mass_radius(mass)
+    wxyzs, axes = ellipsoids(np.zeros((0, 3, 3)))  # and none of no component
+    assert (wxyzs.shape, axes.shape) == ((0, 4), (0, 3))
 
 
 @given(st.integers(0, 2**32 - 1))
 def test_quaternions_agree_with_scipy(seed: int) -> None:
-    rotation = Rotation.random(7, rng=np.random.default_rng(seed))
+    turns = Rotation.random(7, rng=np.random.default_rng(seed))
+    halves = Rotation.from_matrix([2.0 * np.diag(axis) - np.eye(3) for axis in np.eye(3)])
+    rotation = Rotation.concatenate([turns, halves])
     ours, theirs = quaternions(rotation.as_matrix()), rotation.as_quat()[:, [3, 0, 1, 2]]
     np.testing.assert_allclose(np.abs((ours * theirs).sum(axis=1)), 1.0, atol=1e-12)
-
-
-def test_quaternions_of_half_turns() -> None:
-    turns = np.array([np.eye(3), *(2.0 * np.diag(axis) - np.eye(3) for axis in np.eye(3))])
-    np.testing.assert_allclose(np.abs(quaternions(turns)), np.eye(4), atol=1e-15)
 
 
 @pytest.mark.parametrize("subdivisions", [0, 1, 2])
@@ -104,6 +97,11 @@ def test_trails_fade_end_at_the_step_and_have_a_gap_where_nobody_saw() -> None:
     # steps 0 … 30; unseen at 20 … 25: the five segments wholly inside the gap are missing
     assert [int((way.ids == track).sum()) for track in (1, 2)] == [25, 30]
     assert len(geometry.trails(tracks, -5, 4.0, fps=10.0).ids) == 0
+    past = geometry.trails(tracks, 40, 1.0, 10.0)
+    both = geometry.trails(tracks, 40, 1.0, 10.0, ahead=0.5)
+    assert (past.ages.min(), both.ages.min()) == (0.0, pytest.approx(-0.5))
+    assert past.ages.max() == pytest.approx(1.0)
+    assert len(both.segments) == len(past.segments) + 2 * 5  # two walkers
 
 
 # pictures
@@ -137,16 +135,6 @@ def test_looking_through_a_camera_fits_its_whole_picture_into_any_window() -> No
         assert np.tan(pose.fov / 2.0) >= np.tan(view.fov / 2.0)
         assert np.tan(pose.fov / 2.0) * aspect >= np.tan(view.fov / 2.0) * view.aspect
         np.testing.assert_allclose(pose.position, view.camera.centre)
-
-
-def test_trails_go_back_and_ahead() -> None:
-    tracks = scene_case.run(scene_case.sequence()).tracks
-    past = geometry.trails(tracks, 40, 1.0, 10.0)
-    both = geometry.trails(tracks, 40, 1.0, 10.0, ahead=0.5)
-    assert past.ages.min() == 0.0
-    assert past.ages.max() == pytest.approx(1.0)
-    assert both.ages.min() == pytest.approx(-0.5)
-    assert len(both.segments) == len(past.segments) + 2 * 5  # two walkers
 
 
 def test_a_flight_begins_and_ends_where_it_should() -> None:
@@ -184,18 +172,11 @@ def test_the_colours_are_those_of_the_page() -> None:
                 assert tokens[f"on-{index}"] == colours.track_ink(index)
 
 
-def test_a_colour_follows_the_id() -> None:
-    assert colours.track_colour(1) == colours.track_colour(25) == (0xE9, 0x8F, 0x48)
-    dark = colours.PALETTES["dark"]
-    np.testing.assert_array_equal(dark.of(np.array([2, 26]))[1], colours.track_colour(2))
-    assert dark.of(np.zeros(0, dtype=np.int64)).shape == (0, 3)
-    with pytest.raises(ValueError, match="#rrggbb"):
-        colours.from_hex("red")
-
-
 @pytest.mark.parametrize("palette", colours.PALETTES.values(), ids=colours.PALETTES)
-def test_fading_ends_in_the_background(palette: colours.Palette) -> None:
+def test_a_colour_follows_the_id_and_fades_into_the_background(palette: colours.Palette) -> None:
     full = palette.of(np.array([1, 2]))
+    np.testing.assert_array_equal(palette.of(np.array([25, 26])), full)
+    assert palette.of(np.zeros(0, dtype=np.int64)).shape == (0, 3)
     np.testing.assert_array_equal(palette.fade(full, np.array([1.0, 1.0])), full)
     np.testing.assert_array_equal(palette.fade(full, 0.0), [palette.canvas] * 2)
     np.testing.assert_array_equal(

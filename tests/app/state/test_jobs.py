@@ -21,7 +21,6 @@ from tests.synthetic import write_sequence
 from tracker.runs import pipeline
 from tracker.runs.pipeline import Cancelled, Run
 from tracker.sequences.errors import SequenceError
-from tracker.sequences.reader import read_sequence
 from tracker.sequences.sequence import Sequence
 
 P_D = "fusion.detection_probability"
@@ -345,7 +344,3 @@ def test_closing_stops_a_run_midway(data: Path, slow: dict[str, int]) -> None:
     desk.jobs.close()
     wait_until(lambda: slow["now"] == 0)
     assert slow["stopped"] == 1
-
-
-def test_the_sequences_of_the_data_folder_have_keys_of_their_own(crossing: Path) -> None:
-    assert read_sequence(crossing).digest

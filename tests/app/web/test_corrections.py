@@ -124,46 +124,6 @@ def test_what_can_be_taken_back_survives_a_start(own: Path) -> None:
 
 
 @pytest.mark.full
-def test_after_another_slider_a_correction_still_holds(desk: TestClient) -> None:
-    one = max(tracks(desk), key=lambda life: life["last"] - life["first"])
-    step = (one["first"] + one["last"]) // 2
-    wish = {"kind": "different", "step": step, "tracks": [one["id"]]}
-    desk.post(PLACE, json={"corrections": [wish]})
-    settled(desk)
-    desk.patch("/api/parameters", json={"changes": {"fusion.survival_probability": 0.97}})
-    assert [c["met"] for c in settled(desk)["corrections"]] == [True]
-
-
-@pytest.mark.full
-def test_who_is_moved_far_and_then_farther_stays_one_person_moved_once(desk: TestClient) -> None:
-    lives = tracks(desk)
-    one = max(lives, key=lambda life: life["last"] - life["first"])
-    step = (one["first"] + one["last"]) // 2
-
-    def places() -> dict[int, np.ndarray]:
-        told = desk.get(f"/api/step/{step}").json()["tracks"]
-        return {track["id"]: np.array(track["position"]) for track in told}
-
-    start = places().pop(one["id"])
-    (other,) = (place for track, place in places().items() if track != one["id"])
-    away = (start - other)[:2] / np.linalg.norm((start - other)[:2])
-    for far in (0.6, 0.95):
-        place = [*(start[:2] + far * away).tolist(), float(start[2])]
-        wish = {"kind": "here", "step": step, "tracks": [one["id"]], "place": place}
-        assert desk.post(PLACE, json={"corrections": [wish]}).status_code == 200
-        (told,) = settled(desk)["corrections"]
-        assert (told["met"], told["tracks"]) == (True, [one["id"]])
-        assert told["places"][1][1:] == pytest.approx(start.tolist(), abs=1e-3)
-        assert np.linalg.norm(places()[one["id"]][:2] - place[:2]) < 0.1
-        assert len(tracks(desk)) == len(lives), "nobody else begins"
-    desk.post(f"{PLACE}/undo")
-    assert settled(desk)["corrections"][0]["places"][0][0] == step
-    desk.post(f"{PLACE}/undo")
-    settled(desk)
-    assert places()[one["id"]].tolist() == start.tolist()
-
-
-@pytest.mark.full
 def test_what_cannot_be_is_refused_with_a_sentence(desk: TestClient, own: Path) -> None:
     lives = tracks(desk)
     two = [life["id"] for life in lives[:2]]
@@ -333,24 +293,6 @@ def test_a_name_that_is_dropped_is_gone_before_the_run_is_another(desk: TestClie
     answer = desk.delete(f"{PLACE}/{one['id']}")
     assert answer.status_code == 200, answer.text
     assert answer.json()["names"] == {}
-
-
-@pytest.mark.full
-@pytest.mark.parametrize("share", [0.0, 0.3, 0.95])
-def test_one_point_of_a_person_in_two_pictures_says_where_the_middle_is(
-    desk: TestClient, share: float
-) -> None:
-    sequence = desk.app.state.workbench.snapshot().sequence  # type: ignore[attr-defined]
-    middle = sequence.room.minimum[2] + sequence.target_half_extents[2]
-    height = 2.0 * float(sequence.target_half_extents[2])
-    point = np.array([0.1, -0.2, sequence.room.minimum[2] + share * height])
-    clicks = []
-    for camera in sequence.cameras[:2]:
-        ((x, y),), _ = camera.project(point[None])
-        clicks.append({"camera": camera.name, "x": float(x), "y": float(y)})
-    wish = {"kind": "here", "step": 30, "clicks": clicks}
-    (told,) = desk.post(PLACE, json={"corrections": [wish]}).json()["corrections"]
-    assert told["places"][0] == pytest.approx([30, 0.1, -0.2, middle], abs=2e-3)
 
 
 @pytest.mark.full

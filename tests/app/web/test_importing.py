@@ -9,8 +9,6 @@ from itertools import combinations
 from pathlib import Path
 from typing import Any
 
-import cv2
-import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
@@ -20,8 +18,6 @@ from app.web.server import Settings, create_app
 from tests.app.conftest import ADDRESS, run_is, wait_until
 from tests.io.importing.test_angles import lay_out
 from tests.io.read.recorded import PLACES, detections, settled_of, toml, videos
-from tests.single_view.shaken import SIZE as SHAKEN_SIZE
-from tests.single_view.shaken import shaken
 from tracker.io.importing import bringing
 from tracker.io.importing.writing import write
 from tracker.runs.pipeline import Cancelled
@@ -176,25 +172,6 @@ def test_pictures_of_cameras_are_shown(client: TestClient, tmp_path: Path) -> No
     assert "only lenses, places of the cameras and motion" in names["boxes meet in 3D"]["sentence"]
     assert {"lenses", "cameras above the floor", "views overlap"} <= set(names)
     assert names["cameras hold still"]["status"] == "good"
-
-
-@pytest.mark.full
-def test_a_camera_that_shakes_is_named(client: TestClient, tmp_path: Path) -> None:
-    folder = tmp_path / "filmed"
-    folder.mkdir()
-    toml(folder, size=SHAKEN_SIZE)
-    pictures = shaken(np.random.default_rng(3), 2.0)
-    videos(folder, size=SHAKEN_SIZE, frames=len(pictures))
-    code = cv2.VideoWriter.fourcc(*"MJPG")
-    writer = cv2.VideoWriter(str(folder / "cam2.avi"), code, 20.0, SHAKEN_SIZE)
-    for picture in pictures:
-        writer.write(picture)
-    writer.release()
-    info = _settled(client, _send(client, folder))
-    found = [one for one in info["checks"] if one["name"] == "cameras hold still"]
-    assert [one["status"] for one in found] == ["warning"]
-    assert 'camera "cam2" shakes by' in found[0]["sentence"]
-    assert "Camera &quot;cam2&quot; shakes by" in info["sheet"]
 
 
 @pytest.mark.full
