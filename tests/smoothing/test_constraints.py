@@ -154,11 +154,13 @@ def test_limits_and_ties_of_chains_are_those_of_their_pieces() -> None:
     assert LinkConstraints(must_link=((0, 3),)).of_chains([[0], [3]], cut) is None
 
 
-@pytest.mark.parametrize("kind", ["together", "apart", "somebody", "nobody", "firsts", "lasts"])
-def test_one_tie_of_any_kind_is_something_to_obey(kind: str) -> None:
-    assert not Ties()
-    pairs = kind in ("together", "apart")
-    assert replace(Ties(), **{kind: ((0, 1),) if pairs else frozenset({0})})
+@pytest.mark.parametrize(
+    "kind", ["must_link", "cannot_link", "targets", "clutter", "firsts", "lasts"]
+)
+def test_one_constraint_of_any_kind_is_something_to_obey(kind: str) -> None:
+    assert not LinkConstraints()
+    pairs = kind in ("must_link", "cannot_link")
+    assert replace(LinkConstraints(), **{kind: ((0, 1),) if pairs else frozenset({0})})
 
 
 def test_one_person_is_in_one_place_whatever_the_order_of_pairs() -> None:
