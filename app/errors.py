@@ -170,7 +170,9 @@ def install(app: FastAPI) -> None:
         return _answer(error.status_code, detail, error.headers)
 
     @app.exception_handler(OSError)
-    async def _system(request: Request, error: OSError) -> JSONResponse:
+    async def _system(request: Request, error: OSError) -> JSONResponse | None:
+        if request.scope["type"] == "websocket":
+            return None  # whoever was connected has left, and takes no answer
         if error.errno not in FULL:
             return await _unexpected(request, error)
         detail = ErrorDetail(
@@ -182,7 +184,8 @@ def install(app: FastAPI) -> None:
 
     @app.exception_handler(Exception)
     async def _unexpected(request: Request, error: Exception) -> JSONResponse:
-        logger.error("%s %s failed", request.method, request.url.path, exc_info=error)
+        method = request.scope.get("method", request.scope["type"])
+        logger.error("%s %s failed", method, request.url.path, exc_info=error)
         detail = ErrorDetail(
             code="internal",
             message=f"The server failed: {type(error).__name__}: {sentence(error)}",

@@ -26,7 +26,10 @@ from tracker.parameters import FOLLOWS, METHODS, PRESETS, Parameter, ParameterEr
 
 DEFAULT_SEQUENCE = "room44-3p"
 
-ONLY_IN_A_CHECKOUT = {"experiment": "python -m tests.papers", "render": "python -m tests.rooms"}
+ONLY_IN_A_CHECKOUT = {
+    "experiment": "python -m tests.papers NAME",
+    "render": "python -m tests.rooms NAME -o FOLDER",
+}
 """Commands of earlier versions that only developers need, and what replaces each."""
 
 
@@ -318,7 +321,11 @@ def parse(arguments: list[str] | None = None) -> Arguments:
     # its settings come with the engine, which only who evaluates has to wait for
     asked = sys.argv[1:] if arguments is None else arguments
     if asked[:1] and asked[0] in ONLY_IN_A_CHECKOUT:
-        raise ParameterError(asked[0], f"run `{ONLY_IN_A_CHECKOUT[asked[0]]}` in a checkout")
+        raise ParameterError(
+            asked[0],
+            f"the program no longer has this command; run `{ONLY_IN_A_CHECKOUT[asked[0]]}` in a "
+            "checkout",
+        )
     evaluate: Any = _evaluate_with_flags() if asked[:1] == ["evaluate"] else Evaluate
     if asked[:1] == ["study"] and asked[1:2] and asked[1].endswith(".toml"):
         arguments = ["study", "run", *asked[1:]]  # `study STUDY.toml` runs it

@@ -275,6 +275,8 @@ def export_tracks(bench: Bench) -> Response:
     name = file_name(sequence.name, "tracks.csv")
     stream = io.StringIO(newline="")
     told = gaps.sentences(run)
+    if done == run.sequence.frames and not finished:
+        told = (*told, "these are the filter's tracks, since the smoothing is not finished")
     tracks_csv.write_tracks_csv(
         stream,
         sequence,

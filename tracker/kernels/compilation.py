@@ -256,8 +256,12 @@ def _version() -> str:
 
 
 def _mark() -> Path:
-    """The path of a file that exists once all kernels were compiled."""
-    return kernel_folder() / f"{_version()}.complete"
+    """The path of a file that exists once all kernels were compiled.
+
+    numba keeps machine code by the path of its source, so each installation has a file of its own.
+    """
+    name = hashlib.sha256(f"{_version()} {_ROOT}".encode()).hexdigest()[:16]
+    return kernel_folder() / f"{name}.complete"
 
 
 def is_compiled() -> bool:

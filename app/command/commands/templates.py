@@ -50,6 +50,8 @@ def _list(action: ListTemplates) -> None:
         print_table(_HEADS, rows)
 
 
+_COPY = "copy its folder, and name the copy"
+
 _HEADS = ("number", "person", "camera", "step", "left, top, width, height (px)")
 
 
@@ -67,7 +69,7 @@ def _offer(action: OfferTemplates) -> None:
         raise CommandError(f"{sequence.name}: no camera has pictures to cut templates from")
     reason = saving.why_not_in_place(sequence.folder)
     if (action.add or action.add_all) and reason is not None:
-        raise CommandError(f"{sequence.name}: nothing can be added, since {reason}; copy it first")
+        raise CommandError(f"{sequence.name}: nothing can be added, since {reason}; {_COPY}")
     found = _found(sequence, action)
     if action.json:
         print_json([_values(one) for one in found])
@@ -148,6 +150,9 @@ def _remove(action: RemoveTemplates) -> None:
     sequence = library.open_sequence(action.sequence)
     if not action.numbers:
         raise CommandError("expected the number of a template; `templates list` has them")
+    reason = saving.why_not_in_place(sequence.folder)
+    if reason is not None:
+        raise CommandError(f"{sequence.name}: nothing can be taken away, since {reason}; {_COPY}")
     _check(action.numbers, len(sequence.templates), "NUMBER")
 
     def remove(values: Values) -> None:
