@@ -25,10 +25,10 @@ multiview-phd evaluate SEQUENCE tracks.csv --html report.html
 does stands on the page [Tuning](tuning.md).
 
 Three places are kept outside the sequences: compiled kernels and what cameras found in
-`~/.cache/multiview-phd` or `$MULTIVIEW_PHD_CACHE`; your presets, and what you teach and correct of a
-built-in room, in `~/.config/multiview-phd` or `$MULTIVIEW_PHD_SETTINGS`; the library of runs and the
-studies in `~/.local/share/multiview-phd`. With `MULTIVIEW_PHD_TRACEBACK=1` an unexpected failure shows where it
-happened.
+`~/.cache/multiview-phd` or `$MULTIVIEW_PHD_CACHE`; your presets, and what you teach and correct
+of a built-in room, in `~/.config/multiview-phd` or `$MULTIVIEW_PHD_SETTINGS`; the library of runs
+and the studies in `~/.local/share/multiview-phd`. With `MULTIVIEW_PHD_TRACEBACK=1` an unexpected
+failure shows where it happened.
 """
 
 WIDTH = "88"
