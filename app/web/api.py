@@ -274,9 +274,9 @@ def export_tracks(bench: Bench) -> Response:
     sequence = snapshot.named(run.sequence)
     name = file_name(sequence.name, "tracks.csv")
     stream = io.StringIO(newline="")
-    told = gaps.sentences(run)
+    remarks = list(gaps.sentences(run))
     if done == run.sequence.frames and not finished:
-        told = (*told, "these are the filter's tracks, since the smoothing is not finished")
+        remarks.append("these are the filter's tracks, since the smoothing is not finished")
     tracks_csv.write_tracks_csv(
         stream,
         sequence,
@@ -284,7 +284,7 @@ def export_tracks(bench: Bench) -> Response:
         run.parameters,
         run.seed,
         done=done,
-        remarks=told,
+        remarks=remarks,
         resting=resting_of(run),
         names=given_names(run),
     )

@@ -96,7 +96,7 @@ def _taken(table: _Rows, inside: ndarray, first: int) -> _Rows:
         name: getattr(table, name)[inside]
         for name in type(table).__slots__
         if name != "known"  # of steps, not of rows
-        and not (name == "looks" and not getattr(table, name).shape[1])  # nobody told
+        and not (name == "embeddings" and not getattr(table, name).shape[1])  # nobody told
     }
     columns["frames"] = columns["frames"] - first
     make: Callable[..., _Rows] = type(table)

@@ -84,4 +84,8 @@ def test_a_number_that_is_none_is_refused(
 def test_a_built_in_room_is_looked_at_and_not_written(capsys: pytest.CaptureFixture[str]) -> None:
     status, _, err = told(capsys, "offer", "room24-2p", "--add-all")
     assert status == 1
-    assert "room24-2p comes with the program and is never written to; copy it first" in err
+    refused = "room24-2p comes with the program and is never written to; copy its folder"
+    assert refused in err
+    status, _, err = told(capsys, "remove", "room24-2p", "1")
+    assert status == 1
+    assert refused in err

@@ -14,6 +14,7 @@ from app.state.scores import Scored
 from app.state.workbench import Workbench
 from app.state.workers.evaluator import Evaluator
 from app.state.workers.keeper import Keeper
+from app.web.api import export_tracks
 from tests.app.conftest import wait_until
 from tests.app.folders import FRAMES
 from tracker.evaluation import evaluate_sequence
@@ -80,6 +81,24 @@ def test_a_run_that_was_scored_in_part_is_kept_with_the_figures_of_its_end(
     assert kept.mota == true["mota"]
     np.testing.assert_allclose(result.ospa, true.series.ospa, atol=1e-3)
     np.testing.assert_array_equal(result.kept.tracks.positions, run.tracks.positions)
+
+
+def test_tracks_exported_before_smoothing_say_so(bench: Workbench) -> None:
+    now, key = bench.snapshot(), begun(bench)
+    assert now.sequence is not None
+    files: list[bytes] = []
+
+    def report(run: Run, progress: Progress) -> None:
+        bench.run_progresses(run, progress)
+        if run.complete and run.tracks is run.filtered:
+            files.append(bytes(export_tracks(bench).body))
+
+    pipeline.compute(now.sequence, now.parameters, on_progress=report)
+    bench.run_ends(key, "done")
+    words = b"# incomplete: these are the filter's tracks, since the smoothing is not finished\n"
+    assert files
+    assert all(words in file for file in files)
+    assert words not in bytes(export_tracks(bench).body)
 
 
 @pytest.mark.parametrize("steps", [PART, FRAMES])
