@@ -309,6 +309,16 @@ sys.exit(cli.main())
 """The command line, saying when the first steps are there."""
 
 
+@pytest.mark.parametrize(
+    ("command", "instead"),
+    [("render", "tests.rooms NAME -o FOLDER"), ("experiment", "tests.papers")],
+)
+def test_a_command_of_before_says_what_replaces_it(run: Runs, command: str, instead: str) -> None:
+    status, _, stderr = run(command, "random-7")
+    assert status == 2
+    assert f"the program no longer has this command; run `python -m {instead}" in stderr
+
+
 def test_sequences(run: Runs, data: Path) -> None:
     status, stdout, stderr = run("sequences", "--data", data)
     assert (status, stderr) == (0, "")
