@@ -34,9 +34,9 @@ python3 -m tests.manual --record --data DIR
 
 One experiment alone, figure included, is run by `python -m tests.papers NAME --data DIR`; what
 took too long to be run whole says in which smaller form it was. The rooms are rendered. Three of
-them come with the program, in 600 steps, of which `sequences` and `methods` speak; `fig1` to
-`fig3` render 1,500 steps of the same scenes, since the papers' claims are of later steps. AV16.3
-and the Curtin recordings are real
+them come with the program, in 600 steps, of which `sequences` speaks; `fig1` to `fig3` and
+`methods` render 1,500 steps of the same scenes, since the papers' claims are of later steps.
+AV16.3 and the Curtin recordings are real
 ([sources](methods.md#sources)). *Found* is the share of true positions with an estimate within
 the stated distance, *error* the mean distance of those that are matched; every other figure is
 defined in [`tracker.evaluation`](api/evaluation.md).
