@@ -18,7 +18,7 @@ COLOURS = (((40.0, 40.0, 90.0), (50.0, 60.0, 210.0)), ((40.0, 90.0, 40.0), (60.0
 """Red and green, the upper half darker."""
 
 
-@pytest.fixture(scope="session", autouse=True)
+@pytest.fixture(scope="module", autouse=True)  # in other folders it holds no more
 def _few_positions() -> Iterator[None]:
     """Sixty thousand positions are projected in no time by a compiled kernel alone."""
     with pytest.MonkeyPatch.context() as patch:
