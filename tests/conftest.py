@@ -13,6 +13,7 @@ from types import FrameType
 
 import pytest
 from hypothesis import HealthCheck, Phase, settings
+from hypothesis.internal.conjecture import providers
 from playwright.sync_api import Browser, sync_playwright
 
 from tracker.kernels.compilation import kernel_folder
@@ -32,6 +33,8 @@ settings.register_profile(
     suppress_health_check=[HealthCheck.too_slow],
 )
 settings.load_profile("repeatable")
+# else it draws constants from whatever modules a process has imported, and each process others
+providers.is_local_module_file = lambda path: False
 
 # a shell starts what runs in the background deaf to Ctrl-C, and so is all that it starts
 signal.signal(signal.SIGINT, signal.default_int_handler)
