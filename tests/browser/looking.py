@@ -155,11 +155,3 @@ def by_palette(page: Page, words: str) -> None:
     page.keyboard.type(words)
     page.locator("dialog[open] [role=option]").first.wait_for()
     page.keyboard.press("Enter")
-
-
-def choose_what_is_gone(page: Page) -> None:
-    """Choose a sequence that is not there any more."""
-    page.get_by_role("combobox", name="Sequence").evaluate(
-        "select => { select.append(new Option('gone', 'gone')); select.value = 'gone';"
-        " select.dispatchEvent(new Event('change')); }"
-    )

@@ -2,21 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
-import pytest
 from playwright.sync_api import Page, expect
 
-from tests.browser.conftest import walking
 from tests.browser.looking import ask, readout, shown_in_3d, until, viser
 from tests.browser.serving import Server
-
-
-@pytest.fixture(scope="module")
-def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    """A workbench of its own: it is stopped."""
-    with walking(tmp_path_factory) as running:
-        yield running
 
 
 def test_the_page_and_the_3d_view_recover_where_they_were(page: Page, server: Server) -> None:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from collections.abc import Iterator
 
 import pytest
 from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Browser, Page, expect
 
-from tests.browser.conftest import opened
-from tests.browser.looking import as_at_first, ask, choose_what_is_gone
+from tests.browser.looking import as_at_first, ask
 from tests.browser.serving import Server
 
 SERIOUS = ("serious", "critical")
@@ -28,22 +27,29 @@ def found(page: Page) -> list[str]:
     ]
 
 
-@pytest.mark.parametrize("theme", ["dark", "light"])
-def test_nothing_serious_in_any_state_of_a_theme_that_stays(
-    browser: Browser, server: Server, theme: Literal["dark", "light"]
-) -> None:
-    """At the first start on a system that prefers it; colours are judged when at rest."""
+@pytest.fixture(params=["dark", "light"])
+def themed(
+    browser: Browser, server: Server, request: pytest.FixtureRequest
+) -> Iterator[tuple[Page, str]]:
+    """The page at its first start on a system that prefers a theme."""
+    as_at_first(server)
     ask(server, "POST", "seek", {"step": 45})
-    with opened(
-        browser, server, flat=True, new=True, color_scheme=theme, reduced_motion="reduce"
-    ) as page:
-        expect(page.locator("#panel-tracks tbody tr").first).to_be_visible()
-        nothing_serious_in_any_state(page, server, theme)
-        as_at_first(server)
-        the_chosen_theme_stays(page, theme)
+    context = browser.new_context(
+        viewport={"width": 1440, "height": 900},
+        color_scheme=request.param,
+        reduced_motion="reduce",  # colours are judged when they have come to rest
+    )
+    context.set_default_timeout(60_000)
+    context.route("**/viser/**", lambda route: route.abort())
+    page = context.new_page()
+    page.goto(server.address)
+    expect(page.locator("#panel-tracks tbody tr").first).to_be_visible()
+    yield page, request.param
+    context.close()
 
 
-def nothing_serious_in_any_state(page: Page, server: Server, theme: str) -> None:
+def test_nothing_serious_in_any_state(themed: tuple[Page, str], server: Server) -> None:
+    page, theme = themed
     assert page.locator("html").get_attribute("data-theme") == theme
     states: dict[str, list[str]] = {"tracks": found(page)}
     ask(server, "POST", "run/pin")
@@ -62,14 +68,19 @@ def nothing_serious_in_any_state(page: Page, server: Server, theme: str) -> None
     page.keyboard.press("Control+k")
     states["palette"] = found(page)
     page.keyboard.press("Escape")
-    choose_what_is_gone(page)
+    page.get_by_role("combobox", name="Sequence").evaluate(
+        "select => { select.append(new Option('gone', 'gone')); select.value = 'gone';"
+        " select.dispatchEvent(new Event('change')); }"
+    )
     expect(page.locator(".note[role=alert]")).to_be_visible()
     states["failure"] = found(page)
+    as_at_first(server)
     assert {name: list_ for name, list_ in states.items() if list_} == {}
 
 
-def the_chosen_theme_stays(page: Page, theme: Literal["dark", "light"]) -> None:
-    other: Literal["dark", "light"] = "light" if theme == "dark" else "dark"
+def test_the_chosen_theme_stays(themed: tuple[Page, str]) -> None:
+    page, theme = themed
+    other = "light" if theme == "dark" else "dark"
     page.keyboard.press("Shift+D")
     expect(page.locator("html")).to_have_attribute("data-theme", other)
     page.emulate_media(color_scheme=theme)

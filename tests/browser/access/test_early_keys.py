@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 import pytest
 from playwright.sync_api import Browser, Page, Route, expect
 
+from tests.browser.looking import as_at_first
 from tests.browser.serving import Server
 
 Held = Callable[[str, str], tuple[Page, Callable[[], None]]]
@@ -15,7 +16,10 @@ Held = Callable[[str, str], tuple[Page, Callable[[], None]]]
 @pytest.fixture
 def held(browser: Browser, server: Server) -> Iterator[Held]:
     """Open an address while a file of the page does not come; what lets it come."""
+    as_at_first(server)
+    server.wait_for_run()
     context = browser.new_context(viewport={"width": 1280, "height": 800})
+    context.set_default_timeout(60_000)
     context.route("**/viser/**", lambda route: route.abort())
 
     def open_(address: str, file: str) -> tuple[Page, Callable[[], None]]:
@@ -35,6 +39,26 @@ def held(browser: Browser, server: Server) -> Iterator[Held]:
 
     yield open_
     context.close()
+
+
+def test_what_is_sought_before_the_modules_are_there_is_found(held: Held) -> None:
+    page, release = held("", "**/js/main.js")
+    page.keyboard.press("Control+k")
+    page.keyboard.type("library")
+    release()
+    expect(page.get_by_role("option", name="Library").first).to_be_visible()
+    page.keyboard.press("Enter")
+    expect(page.locator("main")).to_be_hidden()
+
+
+def test_the_palette_takes_words_before_it_has_offers(held: Held) -> None:
+    page, release = held("", "**/js/later.js")
+    page.locator(".cam").first.wait_for()
+    page.keyboard.press("Control+k")
+    expect(page.get_by_role("dialog", name="Commands")).to_be_visible()
+    page.keyboard.type("dark")
+    release()
+    expect(page.get_by_role("option", name="dark").first).to_be_visible()
 
 
 @pytest.mark.parametrize("file", ["main", "later"])

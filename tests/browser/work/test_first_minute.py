@@ -1,40 +1,157 @@
-"""The first minute: what a new person is told once, and how it goes for good."""
+"""The first minute, and what once tripped people up on the way."""
 
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import Browser, Page, expect
 
-from tests.browser.conftest import opened
-from tests.browser.looking import ask
+from tests.browser.looking import as_at_first, ask, by_palette, readout, until
 from tests.browser.serving import Server
+from tests.long_recording import write_long
+
+P_D = "fusion.detection_probability"
 
 
-def test_what_a_new_person_is_told_goes_for_good_and_comes_back_by_help(
+def test_reset_all_resets_all(flat_page: Page, server: Server) -> None:
+    page = flat_page
+    as_at_first(server)
+    for way in ("button", "palette"):
+        ask(server, "PATCH", "parameters", {"changes": {P_D: 0.6}})
+        page.get_by_role("tab", name=re.compile("Changes")).click()
+        button = page.get_by_role("button", name="Reset all", exact=True)
+        expect(button).to_be_enabled()
+        if way == "button":
+            button.click()
+        else:
+            by_palette(page, "reset all")
+        server.wait(lambda state: state["changed"] == [])
+        expect(page.locator(".note")).to_have_count(0)
+
+
+def test_undo_is_offered_only_where_there_is_something_to_undo(
+    flat_page: Page, server: Server
+) -> None:
+    page = flat_page
+    as_at_first(server)
+    page.reload()
+    page.get_by_role("tab", name=re.compile("Changes")).click()
+    undo = page.get_by_role("button", name="Undo", exact=True)
+    expect(undo).to_be_disabled()
+    ask(server, "PATCH", "parameters", {"changes": {P_D: 0.6}})
+    expect(undo).to_be_enabled()
+    undo.click()
+    server.wait(lambda state: state["changed"] == [])
+    expect(undo).to_be_disabled()
+    as_at_first(server)
+
+
+def test_a_note_under_the_pointer_stays_while_a_run_goes_on(
+    flat_page: Page, server: Server
+) -> None:
+    page = flat_page
+    as_at_first(server)
+    page.evaluate("localStorage.removeItem('page')")
+    page.add_init_script("localStorage.page = '{}'")
+    page.reload()
+    close = page.locator(".note", has_text="graphics card").get_by_role("button", name="Dismiss")
+    close.evaluate("button => (button.isTheOne = true)")
+    ask(server, "PATCH", "parameters", {"changes": {P_D: 0.6}})
+    expect(page.locator("#tab-changes .count")).to_have_text("1")
+    server.wait_for_run()
+    expect(page.locator(".status")).to_contain_text("smoothed")
+    assert close.evaluate("button => button.isTheOne")
+    close.click()
+    expect(close).to_have_count(0)
+    as_at_first(server)
+
+
+def test_who_did_not_open_the_other_recording_is_told_with_the_way_back(
+    flat_page: Page, server: Server, tmp_path: Path
+) -> None:
+    page = flat_page
+    before = server.get("/api/state").json()["sequence"]
+    folder = write_long(tmp_path / "ring", 20, cameras=3)
+    other = page.context.new_page()
+    other.goto(f"{server.address}?seq={folder}&step=7")
+    until(other, lambda: readout(other) == "7", "a link to a folder keeps its step")
+    expect(other.locator(".note", has_text="another window")).to_have_count(0)
+    page.bring_to_front()
+    note = page.locator(".note", has_text="was opened in another window")
+    expect(note).to_be_visible()
+    note.get_by_role("button", name=f"Back to {before['name']}").click()
+    server.wait(lambda state: state["sequence"]["key"] == before["key"])
+    expect(note).to_have_count(0)
+    other.close()
+    as_at_first(server)
+
+
+def test_a_link_decides_who_is_selected_and_how_it_is_looked_at(
     browser: Browser, server: Server
 ) -> None:
-    with opened(browser, server, flat=True, new=True) as page:
-        strip = page.locator(".tour")
-        expect(strip).to_contain_text("Play on")
-        page.keyboard.press("Space")
-        expect(strip.locator(".done")).to_have_count(1)
-        # a note under the pointer stays while a run goes on
-        note = page.locator(".note", has_text="without a graphics card")
-        close = note.get_by_role("button", name="Dismiss")
-        close.evaluate("button => (button.isTheOne = true)")
-        ask(server, "PATCH", "parameters", {"changes": {"fusion.detection_probability": 0.6}})
-        expect(page.locator("#tab-changes .count")).to_have_text("1")
-        server.wait_for_run()
-        expect(page.locator(".status")).to_contain_text("smoothed")
-        assert close.evaluate("button => button.isTheOne")
-        close.click()
-        expect(close).to_have_count(0)
-        strip.get_by_role("button", name=re.compile("Close for good")).click()
-        page.reload()
-        expect(page.locator(".cam canvas").first).to_be_visible()
-        expect(strip).to_be_hidden()
-        expect(note).to_have_count(0)
-        page.keyboard.press("?")
-        page.get_by_role("button", name="Three things to try").click()
-        expect(strip).to_be_visible()
+    as_at_first(server)
+    name = server.get("/api/state").json()["sequence"]["name"]
+    ask(server, "POST", "select", {"id": 1})
+    context = browser.new_context(viewport={"width": 1440, "height": 900})
+    context.route("**/viser/**", lambda route: route.abort())
+    page = context.new_page()
+    link = f"?seq={name}&step=12&tab=events&zoom=5-40&loop=10-30&layers=boxes"
+    page.goto(server.address + link)
+    until(page, lambda: readout(page) == "12", "the step")
+    server.wait(lambda state: state["selection"] is None)
+    expect(page.locator("#panel-events")).to_be_visible()
+    expect(page.locator("[data-ref=range]")).to_have_text("10 – 30")
+    expect(page.locator("[data-layer2d=truth]")).to_have_attribute("aria-pressed", "false")
+    until(page, lambda: "zoom=5-40" in page.url and "layers=boxes" in page.url, "it is kept")
+    context.close()
+    as_at_first(server)
+
+
+def test_the_wheel_zooms_over_the_lanes_and_values_stand_by_the_pointer(
+    flat_page: Page, server: Server
+) -> None:
+    page = flat_page
+    as_at_first(server)
+    card = page.locator(".hint-card")
+
+    def told() -> bool:
+        plot = page.locator(".plot").bounding_box()
+        lane = page.locator(".lane").first.bounding_box()
+        if plot is None or lane is None:
+            return False
+        # lanes of a run that has just ended may be laid out meanwhile
+        page.mouse.move(plot["x"] + plot["width"] / 2 - 9, lane["y"] + lane["height"] / 2)
+        page.mouse.move(plot["x"] + plot["width"] / 2, lane["y"] + lane["height"] / 2)
+        return bool(re.search(r"step \d+.*people", card.inner_text(), re.DOTALL))
+
+    until(page, told, "values by the pointer")
+    page.mouse.wheel(0, -300)
+    until(page, lambda: "zoom=" in page.url, "a part is shown")
+    page.keyboard.press("x")
+    until(page, lambda: "zoom=" not in page.url, "all of it again")
+
+
+def test_three_things_to_try_go_for_good_and_come_back_by_help(
+    browser: Browser, server: Server
+) -> None:
+    context = browser.new_context(viewport={"width": 1440, "height": 900})
+    context.route("**/viser/**", lambda route: route.abort())
+    page = context.new_page()
+    page.goto(server.address)
+    strip = page.locator(".tour")
+    expect(strip).to_contain_text("Play on")
+    page.keyboard.press("Space")
+    expect(strip.locator(".done")).to_have_count(1)
+    note = page.locator(".note", has_text="without a graphics card")
+    note.get_by_role("button", name="Dismiss").click()
+    strip.get_by_role("button", name=re.compile("Close for good")).click()
+    page.reload()
+    expect(page.locator(".cam canvas").first).to_be_visible()
+    expect(strip).to_be_hidden()
+    expect(note).to_have_count(0)
+    page.keyboard.press("?")
+    page.get_by_role("button", name="Three things to try").click()
+    expect(strip).to_be_visible()
+    context.close()
+    as_at_first(server)

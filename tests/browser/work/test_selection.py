@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 
+import pytest
 from playwright.sync_api import Page, Route, expect
 
-from tests.browser.looking import ask, readout, shown_in_3d, until, until_still, viser
+from tests.browser.looking import as_at_first, ask, readout, shown_in_3d, until, until_still, viser
 from tests.browser.serving import Server
 
 STEP = 45
@@ -67,59 +69,60 @@ def box_of(server: Server, track: int, camera: int) -> list[float]:
     return box
 
 
-def test_a_selection_reaches_every_view(page: Page, server: Server) -> None:
+@pytest.mark.parametrize("choose", [by_row, by_lane, by_plot, by_picture, by_3d])
+def test_a_selection_reaches_every_view(
+    request: pytest.FixtureRequest, server: Server, choose: Callable[[Page, Server, int], None]
+) -> None:
+    # the others come the same way as that of a picture
+    with_3d = choose in (by_picture, by_3d)
+    page: Page = request.getfixturevalue("page" if with_3d else "flat_page")
+    as_at_first(server)
     ask(server, "POST", "seek", {"step": STEP})
     until(page, lambda: readout(page) == str(STEP), "both people are there")
     tracks = [track["id"] for track in server.get(f"/api/step/{STEP}").json()["tracks"]]
     assert len(tracks) == 2
     # the one nearest to the camera, whom nobody hides
     track = max(tracks, key=lambda track: box_of(server, track, 0)[3])
-    for choose in (by_row, by_lane, by_plot, by_picture, by_3d):
-        choose(page, server, track)
-        state = server.wait(lambda state: state["selection"] is not None)
-        assert state["selection"] == track, choose.__name__
-        lane = page.locator(".lane[aria-pressed=true]")
-        expect(lane).to_have_count(1)
-        expect(lane).to_have_attribute("aria-label", f"Track {track}")
-        row = page.locator("#panel-tracks tr[aria-selected=true]")
-        expect(row).to_have_count(1)
-        assert re.match(rf"{track}\b", row.inner_text()), choose.__name__
-        until(page, lambda: f"sel={track}" in page.url, "the address has it")
-        page.keyboard.press("Escape")
-        server.wait(lambda state: state["selection"] is None)
-        expect(row).to_have_count(0)
-        expect(lane).to_have_count(0)
-    # with Shift a click looks through the camera
-    page.locator(".cam").nth(1).click(position={"x": 4, "y": 4}, modifiers=["Shift"])
-    server.wait(lambda state: state["view"] == 1)
-    expect(page.locator(".cam").nth(1)).to_have_attribute("aria-pressed", "true")
-    page.keyboard.press("0")
-    server.wait(lambda state: state["view"] is None)
-    expect(page.locator(".cam[aria-pressed=true]")).to_have_count(0)
+    choose(page, server, track)
+    state = server.wait(lambda state: state["selection"] is not None)
+    assert state["selection"] == track
+    lane = page.locator(".lane[aria-pressed=true]")
+    expect(lane).to_have_count(1)
+    expect(lane).to_have_attribute("aria-label", f"Track {track}")
+    row = page.locator("#panel-tracks tr[aria-selected=true]")
+    expect(row).to_have_count(1)
+    assert re.match(rf"{track}\b", row.inner_text())
+    until(page, lambda: f"sel={track}" in page.url, "the address has it")
+
+    page.locator("body").press("f")  # this one alone
+    expect(page.locator(".lane")).to_have_count(1)
+    expect(page.locator("#panel-tracks tbody tr")).to_have_count(1)
+    expect(page.get_by_role("button", name="only selected")).to_have_attribute(
+        "aria-pressed", "true"
+    )
+    page.locator("body").press("f")
+    expect(page.locator(".lane")).to_have_count(2)
+    page.keyboard.press("Escape")
+    server.wait(lambda state: state["selection"] is None)
+    expect(page.locator("#panel-tracks tr[aria-selected=true]")).to_have_count(0)
+    expect(page.locator(".lane[aria-pressed=true]")).to_have_count(0)
 
 
-def test_one_alone_stays_so_whatever_is_told_before_the_answer(
+def test_others_stay_away_whatever_is_told_before_the_answer(
     flat_page: Page, server: Server
 ) -> None:
     page = flat_page
+    as_at_first(server)
     ask(server, "PATCH", "trail", {"seconds": 4})
     ask(server, "POST", "seek", {"step": STEP})
     until(page, lambda: readout(page) == str(STEP), "both people are there")
-    # one alone, by Alt and a click, and back
-    for left in (1, 2):
-        page.locator(".lane").first.click(modifiers=["Alt"])
-        expect(page.locator(".lane")).to_have_count(left)
-    ask(server, "POST", "select", {"id": 1})
+    by_lane(page, server, 1)
     server.wait(lambda state: state["selection"] == 1)
-    expect(page.locator(".lane[aria-pressed=true]")).to_have_count(1)
     kept: list[Route] = []
     page.route("**/api/layers", lambda route: kept.append(route))
     page.keyboard.press("f")
     until(page, lambda: len(kept) == 1, "the server is asked")
     expect(page.locator(".lane")).to_have_count(1)
-    expect(page.locator("#panel-tracks tbody tr")).to_have_count(1)
-    alone = page.get_by_role("button", name="only selected")
-    expect(alone).to_have_attribute("aria-pressed", "true")
     ask(server, "PATCH", "trail", {"seconds": 15})  # news of something else
     expect(page.get_by_label("Length of the trails")).to_have_value("15")
     expect(page.locator(".lane")).to_have_count(1)
@@ -133,3 +136,13 @@ def test_one_alone_stays_so_whatever_is_told_before_the_answer(
     server.wait(lambda state: state["layers"]["others"])
     expect(page.locator(".lane")).to_have_count(2)
     ask(server, "PATCH", "trail", {"seconds": 4})
+
+
+def test_shift_and_a_click_look_through_the_camera(page: Page, server: Server) -> None:
+    as_at_first(server)
+    page.locator(".cam").nth(1).click(position={"x": 4, "y": 4}, modifiers=["Shift"])
+    assert server.wait(lambda state: state["view"] == 1)["view"] == 1
+    expect(page.locator(".cam").nth(1)).to_have_attribute("aria-pressed", "true")
+    page.keyboard.press("0")
+    server.wait(lambda state: state["view"] is None)
+    expect(page.locator(".cam[aria-pressed=true]")).to_have_count(0)

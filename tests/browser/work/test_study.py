@@ -2,25 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Page, Route, expect
 
-from tests.browser.conftest import walking
 from tests.browser.looking import ask
 from tests.browser.serving import Server
 
 TRIALS = 4
-
-
-@pytest.fixture(scope="module")
-def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    """A workbench of its own: a study runs on it."""
-    with walking(tmp_path_factory) as running:
-        yield running
 
 
 @pytest.fixture(scope="module", autouse=True)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import copy
 import re
 import tomllib
-from collections.abc import Iterator
 from pathlib import Path
 
 import httpx2
@@ -15,20 +14,12 @@ from playwright.sync_api import Page, expect
 
 from app.scene import framing
 from app.scene.scene import _margin_around
-from tests.browser.conftest import walking
+from tests.browser.conftest import Server
 from tests.browser.looking import as_at_first, ask, by_palette, readout, until, viser
-from tests.browser.serving import Server
 from tracker.export.tracks_csv import read_tracks_csv
 from tracker.runs import pipeline
 from tracker.sequences.reader import FILE, read_sequence
 from tracker.sequences.writing.teaching import taught_values, with_taught
-
-
-@pytest.fixture(scope="module")
-def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    """A workbench of its own: what is taught is saved."""
-    with walking(tmp_path_factory) as running:
-        yield running
 
 
 def drag(page: Page, begin: tuple[float, float], end: tuple[float, float], pause: int = 0) -> None:

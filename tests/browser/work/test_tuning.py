@@ -1,89 +1,58 @@
-"""Tuning: two runs beside each other, presets by name, back to the defaults, undo."""
+"""Tuning: a pinned run against the engine's own figures, presets by name, undo."""
 
 from __future__ import annotations
 
-import re
+from playwright.sync_api import Page, expect
 
-import pytest
-from playwright.sync_api import Browser, Page, expect
-
-from tests.browser.conftest import opened
-from tests.browser.looking import as_at_first, ask, by_palette, until
+from app.web.tables.markup import number
+from tests.browser.looking import as_at_first, ask
 from tests.browser.serving import Server
-from tracker.parameters import PARAMETERS
+from tracker.evaluation import compare, evaluate_sequence
+from tracker.parameters import PARAMETERS, with_values
+from tracker.runs import pipeline
+from tracker.sequences.library import open_sequence
 
 P_D = "fusion.detection_probability"
 
 
-def test_a_pinned_run_is_compared_exchanged_and_in_the_link(
-    browser: Browser, flat_page: Page, server: Server
-) -> None:
+def test_a_pinned_run_is_compared_with_the_engines_figures(flat_page: Page, server: Server) -> None:
     page = flat_page
+    as_at_first(server)
     page.get_by_role("tab", name="Compare").click()
-    page.get_by_role("button", name="Pin as A").click()
+    pin = page.get_by_role("button", name="Pin as A")
+    expect(pin).to_be_enabled(timeout=20_000)
+    pin.click()
     server.wait(lambda state: state["pinned"] is not None)
     ask(server, "PATCH", "parameters", {"changes": {P_D: 0.15}})
     server.wait_for_run()
     differing = page.get_by_role("table", name="Parameters that differ")
     expect(differing.locator("tbody tr")).to_have_count(1)
     expect(differing).to_contain_text("0.15")
-    figures = page.get_by_role("table", name="Figures").locator("tbody tr")
-    few = figures.count()
     page.get_by_role("button", name="All figures").click()
-    until(page, lambda: figures.count() > few, "all figures")
-    until(page, lambda: "worse" in " ".join(figures.all_inner_texts()), "the change is judged")
+
+    sequence = open_sequence(str(server.folder))
+    defaults = pipeline.default_parameters(sequence)
+    runs = [
+        pipeline.compute(sequence, parameters, seed=0)
+        for parameters in (defaults, with_values(defaults, {P_D: 0.15}))
+    ]
+    assert runs[0].tracks.positions.tolist() != runs[1].tracks.positions.tolist()
+    rows = compare(*(evaluate_sequence(sequence, run.tracks) for run in runs))
+    body = page.get_by_role("table", name="Figures").locator("tbody tr")
+    expect(body).to_have_count(len(rows))
+    verdicts = set()
+    for wanted, row in zip(rows, body.all(), strict=True):
+        name, a, b, difference, verdict = (cell.inner_text() for cell in row.locator("td").all())
+        assert name.startswith(wanted.name)
+        assert (a, b) == (number(wanted.a, wanted.digits), number(wanted.b, wanted.digits))
+        assert difference == number(wanted.difference, wanted.digits, signed=True)
+        assert verdict.endswith(wanted.verdict) or wanted.verdict == "undefined"
+        if a == b:
+            assert "worse" not in verdict
+            assert "better" not in verdict
+        verdicts.add(wanted.verdict)
+    assert {"worse", "same"} <= verdicts, "the change makes a difference"
     expect(page.get_by_role("button", name="run A")).to_be_visible()  # its layer in 3D
-    page.get_by_role("button", name="Exchange A and B").click()
-    server.wait(lambda state: state["pinned"]["parameters"][P_D] == 0.15)
-    state = server.wait(lambda state: state["parameters"][P_D] != 0.15)
-    assert P_D not in state["changed"]
-    server.wait_for_run()
-    # the address follows a little later: for a while it is that of both runs with the same value
-    until(
-        page,
-        lambda: f"a.{P_D}=0.15" in page.url and page.url.count(f"{P_D}=0.15") == 1,
-        "the link names run A, and B by its own values",
-    )
-    link = page.url
-
-    as_at_first(server)
-    with opened(browser, server, flat=True) as other:
-        other.goto(link)
-        state = server.wait(lambda state: state["pinned"] is not None)
-        assert state["pinned"]["parameters"][P_D] == pytest.approx(0.15)
-        server.wait(lambda state: state["changed"] == [])
-
-
-def test_reset_all_resets_all(flat_page: Page, server: Server) -> None:
-    page = flat_page
-    as_at_first(server)
-    for way in ("button", "palette"):
-        ask(server, "PATCH", "parameters", {"changes": {P_D: 0.6}})
-        page.get_by_role("tab", name=re.compile("Changes")).click()
-        button = page.get_by_role("button", name="Reset all", exact=True)
-        expect(button).to_be_enabled()
-        if way == "button":
-            button.click()
-        else:
-            by_palette(page, "reset all")
-        server.wait(lambda state: state["changed"] == [])
-        expect(page.locator(".note")).to_have_count(0)
-
-
-def test_undo_is_offered_only_where_there_is_something_to_undo(
-    flat_page: Page, server: Server
-) -> None:
-    page = flat_page
-    as_at_first(server)
-    page.reload()
-    page.get_by_role("tab", name=re.compile("Changes")).click()
-    undo = page.get_by_role("button", name="Undo", exact=True)
-    expect(undo).to_be_disabled()
-    ask(server, "PATCH", "parameters", {"changes": {P_D: 0.6}})
-    expect(undo).to_be_enabled()
-    undo.click()
-    server.wait(lambda state: state["changed"] == [])
-    expect(undo).to_be_disabled()
     as_at_first(server)
 
 
