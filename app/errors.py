@@ -184,8 +184,7 @@ def install(app: FastAPI) -> None:
 
     @app.exception_handler(Exception)
     async def _unexpected(request: Request, error: Exception) -> JSONResponse:
-        method = request.scope.get("method", request.scope["type"])
-        logger.error("%s %s failed", method, request.url.path, exc_info=error)
+        logger.error("%s %s failed", request.method, request.url.path, exc_info=error)
         detail = ErrorDetail(
             code="internal",
             message=f"The server failed: {type(error).__name__}: {sentence(error)}",

@@ -115,7 +115,7 @@ def test_update_agrees_with_the_recursion_pair_by_pair(
 def test_the_gate_bounds_the_squared_mahalanobis_distance(
     seed: int, size: int, gate: float, shared: bool
 ) -> None:
-    """Of two measurements in one direction, one just inside and one just outside, one is left."""
+    """A measurement just inside the gate forms a pair, and one just outside of it none."""
     rng = np.random.default_rng(seed)
     own, noise = random_covariances(rng, 1, size), random_covariances(rng, 1, size)
     direction = rng.normal(size=size)

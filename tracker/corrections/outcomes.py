@@ -92,7 +92,7 @@ def _against(own: Correction, unmet: Outcome, holds: Many[tuple[Correction, Outc
 
     Args:
         own: The unmet correction.
-        unmet: Its outcome.
+        unmet: The outcome of ``own``.
         holds: Met corrections of identity and their outcomes.
     """
     if own.kind == "here":

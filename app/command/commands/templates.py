@@ -50,8 +50,6 @@ def _list(action: ListTemplates) -> None:
         print_table(_HEADS, rows)
 
 
-_COPY = "copy its folder, and name the copy"
-
 _HEADS = ("number", "person", "camera", "step", "left, top, width, height (px)")
 
 
@@ -67,9 +65,8 @@ def _offer(action: OfferTemplates) -> None:
     sequence = library.open_sequence(action.sequence)
     if not sequence.has_pictures:
         raise CommandError(f"{sequence.name}: no camera has pictures to cut templates from")
-    reason = saving.why_not_in_place(sequence.folder)
-    if (action.add or action.add_all) and reason is not None:
-        raise CommandError(f"{sequence.name}: nothing can be added, since {reason}; {_COPY}")
+    if action.add or action.add_all:
+        _check_place(sequence, "added")
     found = _found(sequence, action)
     if action.json:
         print_json([_values(one) for one in found])
@@ -150,9 +147,7 @@ def _remove(action: RemoveTemplates) -> None:
     sequence = library.open_sequence(action.sequence)
     if not action.numbers:
         raise CommandError("expected the number of a template; `templates list` has them")
-    reason = saving.why_not_in_place(sequence.folder)
-    if reason is not None:
-        raise CommandError(f"{sequence.name}: nothing can be taken away, since {reason}; {_COPY}")
+    _check_place(sequence, "taken away")
     _check(action.numbers, len(sequence.templates), "NUMBER")
 
     def remove(values: Values) -> None:
@@ -161,6 +156,16 @@ def _remove(action: RemoveTemplates) -> None:
 
     _write(sequence, remove)
     say(f"{len(set(action.numbers))} removed from {sequence.folder / FILE}")
+
+
+def _check_place(sequence: Sequence, done: str) -> None:
+    """Refuse to change a sequence that cannot be saved where it is."""
+    reason = saving.why_not_in_place(sequence.folder)
+    if reason is not None:
+        raise CommandError(
+            f"{sequence.name}: nothing can be {done}, since {reason}; copy its folder, and name "
+            "the copy"
+        )
 
 
 def _check(numbers: Any, count: int, where: str) -> None:

@@ -78,7 +78,7 @@ def looking(server: viser.ViserServer) -> Iterator[Callable[[Workbench], View]]:
 
 @pytest.fixture
 def view(of: Sequence, run: Run, looking: Callable[[Workbench], View]) -> View:
-    """Of two walkers and a finished run, at step 30, where every layer is on."""
+    """The view of two walkers and a finished run, at step 30, where every layer is on."""
     workbench = scene_case.opened(of, run)
     workbench.seek(30)
     return looking(workbench)

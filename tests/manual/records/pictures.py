@@ -39,7 +39,7 @@ def record() -> None:
         server = Server(ROOM, Path(cache))
         try:
             context = browser.new_context(
-                viewport={"width": 1600, "height": 1000}, color_scheme="dark", device_scale_factor=1
+                viewport={"width": 1600, "height": 1000}, color_scheme="dark"
             )
             context.add_init_script(
                 "localStorage.page = JSON.stringify({ dismissed: ['software', 'tour'] })"

@@ -46,11 +46,12 @@ class CameraRule(NamedTuple):
     confirmed: float
     """Weight above which a track occludes others."""
     near: float
-    """As the next two fields, of :class:`tracker.kernels.boxes.Occlusion`."""
+    """This and the next two fields are those of :class:`tracker.kernels.boxes.Occlusion`."""
     strength: float
     reporting_share: float
     tolerance: float
-    """As the next field, of :class:`tracker.kernels.association.belief_propagation.Settling`."""
+    """This and the next field are those of
+    :class:`tracker.kernels.association.belief_propagation.Settling`."""
     iterations: int
     reporting_threshold: float
     """Association probability from which a pair is reported."""
