@@ -26,7 +26,7 @@ from tests.test_export import PARAMETERS_OF_RUN, SEQUENCE, TRACKS
 from tracker.corrections.kinds import make
 from tracker.corrections.log import read_log, write_log
 from tracker.export import tracks_csv
-from tracker.files.atomic import filling, write_whole
+from tracker.files.atomic import new_folder, write_whole
 from tracker.kernels.checked_cache import CheckedFiles
 from tracker.library import repair
 from tracker.library.store import Library
@@ -253,7 +253,7 @@ def kept_kernel(folder: Path) -> int:
 
 
 def fill(folder: Path, number: int) -> None:
-    with filling(folder / f"imported-{number}") as begun:
+    with new_folder(folder / f"imported-{number}") as begun:
         for part in range(5):
             (begun / f"{part}.txt").write_text(str(number))
 

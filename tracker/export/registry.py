@@ -10,7 +10,7 @@ from pathlib import Path
 
 from tracker.export import csv_file, gltf, json_file, motchallenge, parquet, rerun_file, trc
 from tracker.export.written import Options, Written
-from tracker.files.atomic import filling, replacing, zip_folder
+from tracker.files.atomic import new_folder, replacing, zip_folder
 from tracker.sequences.sequence import Sequence
 
 
@@ -187,5 +187,5 @@ def save(
             finally:
                 shutil.rmtree(folder, ignore_errors=True)
     else:
-        with filling(path) as temporary:
+        with new_folder(path) as temporary:
             form.write(temporary, written, options)

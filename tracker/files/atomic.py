@@ -24,7 +24,7 @@ except ImportError:  # Windows
 
 
 def file_names(names: Sequence[str]) -> list[str]:
-    """Turn camera names into distinct file names, none of which leads into another folder."""
+    """Convert camera names to distinct file names, none of which leads into another folder."""
     found: list[str] = []
     for name in names:
         plain = "".join(c if c.isprintable() and c not in "/\\" else "-" for c in name)
@@ -33,24 +33,27 @@ def file_names(names: Sequence[str]) -> list[str]:
 
 
 _BEGUN = "part"
+"""The part of a temporary file's name by which it is recognised."""
+
 _LONGEST = 200
 """Most characters of a name that are repeated in the name of its temporary file."""
 
 ABANDONED_SECONDS = 3600.0
-"""A temporary file that was not written to for so many seconds was left by a dead process."""
+"""Time without a write after which a temporary file counts as left by a dead process, seconds."""
 
 
 @contextmanager
-def replacing(path: Path, *, passing: bool = False) -> Iterator[Path]:
+def replacing(path: Path, *, transient: bool = False) -> Iterator[Path]:
     """Yield a temporary file that replaces a file when the block ends without an exception.
 
     Args:
         path: The file to write; an existing one is replaced.
-        passing: Whether the file is written again soon, so that it may be lost when the machine
+        transient: Whether the file is written again soon, so that it may be lost when the machine
             loses power: it is then not forced to disk.
 
     Raises:
-        OSError: With a sentence, if the file cannot be written; an existing file is then as it was.
+        OSError: If the file cannot be written; the message names the file and the reason, and an
+            existing file is unchanged.
     """
     if path.is_dir():
         raise IsADirectoryError(f"{path}: expected a file to write, found a folder; add a name")
@@ -60,10 +63,10 @@ def replacing(path: Path, *, passing: bool = False) -> Iterator[Path]:
     temporary = beside(path)
     try:
         yield temporary
-        if not passing:
+        if not transient:
             sync_file(temporary)
         temporary.replace(path)
-        if not passing:
+        if not transient:
             sync_folder(path.parent)
     except OSError as error:
         raise OSError(f"{path}: cannot be written ({error.strerror or error})") from None
@@ -75,14 +78,14 @@ def write_whole(path: Path, data: bytes) -> None:
     """Replace the content of a file atomically.
 
     Raises:
-        OSError: With a sentence, if it cannot be written.
+        OSError: If the file cannot be written; the message names the file and the reason.
     """
     with replacing(path) as temporary:
         temporary.write_bytes(data)
 
 
 def size_of(path: Path) -> int:
-    """Return the size of an ordinary file in bytes.
+    """Return the size of a regular file, bytes.
 
     Raises:
         OSError: If there is no such file, or it is a pipe (on which reading blocks) or a device
@@ -144,20 +147,20 @@ def locked(path: Path) -> Iterator[None]:
 
 
 def beside(path: Path) -> Path:
-    """Return a new temporary name in the same folder, no longer than file systems allow."""
+    """Return the path of a new temporary file in the same folder, with a name of valid length."""
     return path.with_name(f".{secrets.token_hex(4)}.{_BEGUN}.{path.name[-_LONGEST:]}")
 
 
 @contextmanager
-def filling(folder: Path) -> Iterator[Path]:
+def new_folder(folder: Path) -> Iterator[Path]:
     """Yield a temporary folder that is renamed when the block ends without an exception.
 
     Args:
-        folder: The folder to make. It must not exist or be empty, so that the new files are not
+        folder: The folder to make. If it exists it must be empty, so that the new files are not
             mixed with others.
 
     Raises:
-        OSError: With a sentence, if the folder cannot be written.
+        OSError: If the folder cannot be written; the message names the folder and the reason.
     """
     if folder.is_file() or (folder.is_dir() and any(folder.iterdir())):
         raise FileExistsError(

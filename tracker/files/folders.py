@@ -24,6 +24,7 @@ def home() -> Path:
 
 @cache
 def _instead() -> Path:
+    """Return a folder among the temporary files that no other user can read or write."""
     place = Path(tempfile.gettempdir()) / f"multiview-phd-{os.getuid()}"
     with contextlib.suppress(OSError):
         place.mkdir(mode=0o700)
@@ -47,8 +48,8 @@ def data_folder() -> Path:
 def cache_folder() -> Path:
     """Return ``$MULTIVIEW_PHD_CACHE``, else the platform's folder for caches.
 
-    Rendered rooms, results of finished stages and compiled kernels each have a folder in it. All
-    of it can be computed again and may be deleted at any time.
+    Rendered recordings, results of finished stages and compiled kernels each have a folder in it.
+    All of it can be computed again and may be deleted at any time.
     """
     own = os.environ.get("MULTIVIEW_PHD_CACHE")
     if own:
@@ -97,9 +98,9 @@ def files_matching(folder: Path, pattern: str) -> list[Path]:
         pattern: A pattern of paths relative to the folder, for instance ``videos/*.mp4``.
 
     Raises:
-        ValueError: With the reason, if the pattern is not one of paths below a folder.
+        ValueError: If the pattern is not one of paths below a folder; the message is the reason.
     """
-    if not Path(pattern).parts:  # "." names the folder itself, for which `glob` has no word
+    if not Path(pattern).parts:  # "." is the folder itself and no pattern
         raise ValueError("it names no file")
     try:
         return sorted(path for path in folder.glob(pattern) if path.is_file())

@@ -17,22 +17,22 @@ MOST_LETTERS = 80
 _adapter: Any = cache(TypeAdapter)
 
 
-class Spoilt(ValueError):
+class InvalidJson(ValueError):
     """Stored JSON does not have the expected structure: it was changed or damaged."""
 
-    def __init__(self, place: str, words: str) -> None:
+    def __init__(self, field: str, problem: str) -> None:
         """Name the field and the problem.
 
         Args:
-            place: The field's path, joined by full stops; empty for the whole document.
-            words: What was expected and what was found.
+            field: The field's path, joined by full stops; empty for the whole document.
+            problem: What was expected and what was found.
         """
-        super().__init__(f"{place}: {words}" if place else words)
-        self.place = place
-        self.words = words
+        super().__init__(f"{field}: {problem}" if field else problem)
+        self.field = field
+        self.problem = problem
 
 
-def value_of(kind: type[T], text: str | bytes) -> T:
+def parse_json(kind: type[T], text: str | bytes) -> T:
     """Parse JSON into a value of a type.
 
     Args:
@@ -40,19 +40,19 @@ def value_of(kind: type[T], text: str | bytes) -> T:
         text: The JSON text.
 
     Raises:
-        Spoilt: With the first field that does not have its type.
+        InvalidJson: If the text is no JSON, or a field does not have its type; it names the first.
     """
     try:
         value: T = _adapter(kind).validate_json(text, strict=True)
     except ValidationError as error:
         first = error.errors(include_url=False, include_context=False)[0]
-        place = visible(".".join(str(part) for part in first["loc"]))[:MOST_LETTERS]
-        words = first["msg"].replace("Input should be", "expected")
+        field = visible(".".join(str(part) for part in first["loc"]))[:MOST_LETTERS]
+        problem = first["msg"].replace("Input should be", "expected")
         if first["type"] == "missing":
-            words = "expected a value, found none"
-        elif first["type"] == "json_invalid":  # as half a letter in a name
-            words = f"expected JSON, found something else ({words})"
+            problem = "expected a value, found none"
+        elif first["type"] == "json_invalid":  # for instance an unpaired surrogate in a string
+            problem = f"expected JSON, found something else ({problem})"
         else:
-            words += f", found {visible(shown(first['input']))}"
-        raise Spoilt(place, words) from None
+            problem += f", found {visible(shown(first['input']))}"
+        raise InvalidJson(field, problem) from None
     return value

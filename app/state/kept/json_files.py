@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from tracker.files.atomic import write_whole
-from tracker.files.validated import value_of
+from tracker.files.validated import parse_json
 
 logger = logging.getLogger("app")
 
@@ -73,7 +73,7 @@ def read_as(path: Path, kind: type[T]) -> T:
         OSError: If it cannot be read.
         ValueError: With the field, what was expected and what was found.
     """
-    return value_of(kind, json.dumps(read_json(path)))
+    return parse_json(kind, json.dumps(read_json(path)))
 
 
 def set_aside(path: Path) -> Path | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TypeVar
 
-from tracker.files.validated import Spoilt, value_of
+from tracker.files.validated import InvalidJson, parse_json
 from tracker.studies.errors import StudyError
 
 T = TypeVar("T")
@@ -22,10 +22,10 @@ def read_as(kind: type[T], text: str | bytes, where: str) -> T:
         StudyError: With the field, what was expected and what was found.
     """
     try:
-        return value_of(kind, text)
-    except Spoilt as spoilt:
-        at = f", {spoilt.place}" if spoilt.place else ""
+        return parse_json(kind, text)
+    except InvalidJson as error:
+        at = f", {error.field}" if error.field else ""
         raise StudyError(
-            f"{where}{at}: {spoilt.words}; what the study wrote "
+            f"{where}{at}: {error.problem}; what the study wrote "
             "was changed since: take the file from a copy, or start a study of another name"
         ) from None

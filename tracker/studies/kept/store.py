@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from tracker.files.atomic import filling
+from tracker.files.atomic import new_folder
 from tracker.files.folders import data_folder
 from tracker.studies.defined.defining import read_definition
 from tracker.studies.defined.definition import Definition
@@ -59,7 +59,7 @@ def create(definition: Definition, folder: Path) -> Store:
         return store
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        with filling(place) as begun:
+        with new_folder(place) as begun:
             (begun / FILE).write_text(definition.to_toml(), encoding="utf-8")
     except FileExistsError:
         return create(definition, folder)  # another process was first

@@ -119,7 +119,7 @@ class Writer:
             StudyError: If it cannot be written.
         """
         try:
-            with replacing(self._status, passing=True) as begun:
+            with replacing(self._status, transient=True) as begun:
                 begun.write_text(json.dumps(asdict(status)), encoding="utf-8")
         except OSError as error:
             raise StudyError(

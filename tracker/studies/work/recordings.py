@@ -10,7 +10,7 @@ import zipfile
 from pathlib import Path
 from typing import Any
 
-from tracker.files.atomic import filling, write_whole
+from tracker.files.atomic import new_folder, write_whole
 from tracker.files.folders import cache_folder, files_matching
 from tracker.sequences.errors import SequenceError
 from tracker.sequences.library import open_sequence
@@ -99,7 +99,7 @@ def unpack(content: str, data: bytes) -> str:
     folder.parent.mkdir(parents=True, exist_ok=True)
     if not (folder / FILE).is_file():
         try:
-            with filling(folder) as begun, zipfile.ZipFile(io.BytesIO(data)) as archive:
+            with new_folder(folder) as begun, zipfile.ZipFile(io.BytesIO(data)) as archive:
                 archive.extractall(begun)
         except FileExistsError:
             if not (folder / FILE).is_file():  # if it is, another worker unpacked it meanwhile
