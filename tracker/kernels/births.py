@@ -16,9 +16,9 @@ from tracker.kernels.linear_algebra import factorise, solve, squared_length
 from tracker.kernels.measurement import Target
 
 STEEPEST = 1e8
-"""Ratio of the covariances of a place, projected, and of a box above which the box is left out:
-such a place lies far aside of the camera's view, where a lens's polynomial makes a millimetre many
-image widths, and the floating-point numbers do not hold both."""
+"""Ratio of a place's projected variance to a box's variance above which the box is not used. The
+place is then far outside the image, where the polynomial of the lens maps a millimetre to many
+image widths, and adding the two would lose the smaller one to rounding."""
 
 
 class FreeBoxes(NamedTuple):
@@ -29,7 +29,7 @@ class FreeBoxes(NamedTuple):
     starts: ndarray
     """(C + 1,), index of each camera's first box among them, and F."""
     cameras: int
-    """Number of cameras that have any."""
+    """Number of cameras that have such a box."""
 
 
 class MeetingPoints(NamedTuple):
@@ -86,7 +86,11 @@ def free_boxes(unexplained: ndarray, starts: ndarray, least: float) -> FreeBoxes
 def meeting_points(
     rays: ndarray, starts: ndarray, centres: ndarray, largest_gap: float
 ) -> MeetingPoints:
-    """Compute the midpoints between rays of two cameras that pass close by, ahead of both.
+    """Compute the midpoints between rays of two cameras that pass close by each other.
+
+    Two rays o_a + s u and o_b + t v are nearest to each other where (o_a + s u − o_b − t v) is
+    perpendicular to both: the midpoint method (Hartley, Sturm, "Triangulation", Computer Vision and
+    Image Understanding 68(2), 1997, §5.3). Points less than 0.1 m ahead of a lens are left out.
 
     Args:
         rays: (B, 3) unit directions, camera after camera, world axes.
@@ -140,13 +144,14 @@ def fit_places(
 ) -> FittedPlaces:
     """Move each seed to the place that explains the nearest free box of every camera best.
 
-    Gauss-Newton over the boxes' residuals, with a weak prior at the seed; each pass chooses
-    the nearest boxes anew. A camera that a place lies far aside of is left out.
+    Gauss-Newton steps minimise the boxes' residuals, with a weak prior at the seed; each step
+    chooses the nearest box of every camera anew. Boxes of a camera are not used for a place that
+    is far outside its image (:data:`STEEPEST`).
 
     Args:
         seeds: (N, 3), world metres.
         measurements: The B boxes as measurements, camera after camera, each with its noise.
-        free: (B,), whether a box may be of a new target.
+        free: (B,), whether no track explains each box, so that it may be of a new target.
         starts: (C + 1,), index of each camera's first box, and B.
         target: The model of an upright target.
         cameras: The C cameras.

@@ -1,4 +1,7 @@
-"""Gating: the pairs of components and measurements within the gates, compiled."""
+"""Gating: the pairs of components and measurements within the gates, compiled.
+
+A pair is inside its gate where (z − h)ᵀ S⁻¹ (z − h) ≤ gate, with S = H P Hᵀ + R.
+"""
 
 from __future__ import annotations
 
@@ -57,11 +60,17 @@ def _widest_axis(values: ndarray, reach: ndarray) -> int:
 def factor_innovation(
     own: ndarray, j: int, noises: ndarray, n: int, lower: ndarray, place: int, rows: Sequence[int]
 ) -> float:
-    """Cholesky factor of S = own + R into ``lower[place]``; returns log of 1 / √det(2π S).
+    """Write the Cholesky factor of S = own + R to ``lower[place]``; returns log(1 / √det(2π S)).
 
-    The diagonal has 1 / L_pp instead of L_pp, so that solving multiplies.
+    The diagonal of the factor has 1 / L_pp instead of L_pp, so that solving multiplies.
 
     Args:
+        own: H P Hᵀ (J, m, m) of all components.
+        j: Index of the component.
+        noises: R (N, m, m), covariances of measurement noise.
+        n: Index of the measurement noise.
+        lower: (K, m, m), receives the factor.
+        place: Index at which the factor is written.
         rows: Components of the measurement: a range, or a tuple of as many for unrolled loops.
     """
     constant: float = -0.5 * len(rows) * math.log(2.0 * math.pi)
@@ -96,7 +105,7 @@ def gated_pairs(
         expected: (J, m), predicted measurement of each component.
         measurements: M measurements with their noise.
         own: (J, m, m), H P Hᵀ of each component, which is added to the noise.
-        gate: Squared Mahalanobis distance of the gate.
+        gate: Largest squared Mahalanobis distance of a pair.
         lower: (J, m, m) with one noise for all, else (1, m, m): receives the result of
             :func:`factor_innovation` for each component, or for the last one.
     """

@@ -1,4 +1,7 @@
-"""The Kalman update of all components by all measurements in their gates, compiled."""
+"""The Kalman update of all components by all measurements in their gates, compiled.
+
+Shapes: J components of a state of size d, M measurements of size m, P gated pairs.
+"""
 
 from __future__ import annotations
 
@@ -66,7 +69,7 @@ class Pairs(NamedTuple):
     means: ndarray
     """(P, d), updated states."""
     covariances: ndarray
-    """(P, d, d), updated covariances in Joseph form, which stays symmetric and positive."""
+    """(P, d, d), updated covariances in Joseph form, which stay symmetric and positive definite."""
 
 
 class _Innovations(NamedTuple):
@@ -79,13 +82,16 @@ class _Innovations(NamedTuple):
 
 
 class _Spot(NamedTuple):
-    """Indices of one updated covariance."""
+    """Indices of one updated covariance, and of what it is computed from."""
 
     component: int
+    """Index of the component."""
     noise: int
+    """Index of the measurement noise R."""
     factored: int
-    """Index of the Cholesky factor of its S."""
+    """Index of the Cholesky factor of the innovation covariance S."""
     place: int
+    """Index at which gain and covariance are stored."""
 
 
 class _Filtered(NamedTuple):
@@ -94,15 +100,15 @@ class _Filtered(NamedTuple):
     gains: ndarray
     """K (N, d, m)."""
     covariances: ndarray
-    """(I − K H) P (I − K H)ᵀ + K R Kᵀ (N, d, d)."""
+    """(I − K H) P (I − K H)ᵀ + K (R + Ω) Kᵀ (N, d, d)."""
     noise: ndarray
-    """(m, m), working memory as the following."""
+    """R + Ω (m, m); this and the next three are working memory."""
     factor: ndarray
-    """(d, d)."""
+    """I − K H (d, d)."""
     half: ndarray
-    """(d, d)."""
+    """(I − K H) P (d, d)."""
     noisy: ndarray
-    """(d, m)."""
+    """K (R + Ω) (d, m)."""
 
 
 @kernel

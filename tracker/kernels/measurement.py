@@ -15,7 +15,10 @@ from tracker.kernels.lens import Calibration
 from tracker.kernels.linear_algebra import factorise, solve
 
 _SIGMA_POINTS = 6
-"""Number of sigma points of a 3D position: at ±√3 standard deviations, with the weight 1/6 each."""
+"""Number of sigma points of a 3D position: at ±√3 standard deviations along each axis of the
+Cholesky factor, with the weight 1/6 each. This is the cubature rule of degree three for n = 3
+(Arasaratnam, Haykin, "Cubature Kalman filters", IEEE Transactions on Automatic Control 54(6),
+2009), the unscented transform with κ = 0."""
 
 
 class Target(NamedTuple):
@@ -37,8 +40,9 @@ class Target(NamedTuple):
     """(m, m), noise covariance of the box in the other posture, for one pixel of the upright box's
     half height; (0, 0) where there is no other posture."""
     posture_drift: ndarray
-    """(d, d), as ``posture_share`` a field of :class:`tracker.kernels.kalman.Expected`."""
+    """D (d, d), covariance of the change of a state with the posture."""
     posture_share: float
+    """ε, share of the boxes that show the other posture, 0 … 1."""
 
 
 class ExpectedBoxes(NamedTuple):
@@ -166,7 +170,7 @@ def _regress(
     jacobian: ndarray,
     spread: ndarray,
 ) -> None:
-    """Compute the statistical linear regression over one state's uncertainty, into the last three.
+    """Compute the statistical linear regression over one state's uncertainty ([LBS02]), in place.
 
         ẑ = Σ w h(χ),  H = [Σ w (h(χ) − ẑ)(χ − m)ᵀ] P⁻¹,
         Ω = Σ w (h(χ) − ẑ)(h(χ) − ẑ)ᵀ − H P Hᵀ
@@ -175,9 +179,11 @@ def _regress(
         drawn: h(χ) (6, m).
         offsets: χ − m (6, 3).
         covariance: (d, d), of which the part P of the position is used.
-        value: ẑ (m,).
-        jacobian: H (m, d).
-        spread: Ω (m, m).
+        value: ẑ (m,), receives the mean.
+        jacobian: H (m, d), receives the regression matrix in its first three columns.
+        spread: Ω (m, m), receives the covariance of the residual.
+
+    [LBS02] Lefebvre, Bruyninckx, De Schutter, IEEE Transactions on Automatic Control 47(8), 2002.
     """
     size = drawn.shape[1]
     cross = np.zeros((size, 3))

@@ -1,4 +1,8 @@
-"""Marginal association probabilities by belief propagation, compiled."""
+"""Marginal association probabilities by belief propagation, compiled.
+
+The equations and their source are those of
+:func:`tracker.filters.association.belief_propagation.marginals`.
+"""
 
 from __future__ import annotations
 
@@ -11,10 +15,11 @@ from tracker.kernels.compilation import kernel
 
 
 class Settling(NamedTuple):
-    """The convergence criterion of the messages."""
+    """The criterion by which the iteration of the messages ends."""
 
     tolerance: float
-    """Largest change of a message at convergence, relative to the intensity that it meets."""
+    """Largest |Δν_ji| ρ_j at convergence: change of a message to a target, times the intensity of
+    clutter and new targets at its measurement."""
     iterations: int
     """Largest number of iterations."""
 
@@ -35,10 +40,11 @@ def belief_propagation(
     """Compute association marginals by messages between targets and measurements.
 
     Args:
-        missed: (n,) weight of each target's miss.
-        detected: (n, M) weight of each pair, 0 outside the gate.
-        unexplained: (M,) weight of each measurement having no target.
-        settling: The convergence criterion.
+        missed: w_i0 (n,), weight of each target being missed.
+        detected: w_ij (n, M), weight of each target having made each measurement, 0 outside the
+            gate.
+        unexplained: ρ_j (M,), intensity of clutter and new targets at each measurement, > 0.
+        settling: The criterion of convergence.
     """
     targets, count = detected.shape
     # only pairs inside a gate exchange messages: listed row by row, with measurement and weight
@@ -70,7 +76,7 @@ def belief_propagation(
                 total += weights[pair] * to_target[pair]
             for pair in range(starts[i], starts[i + 1]):
                 rest = total - weights[pair] * to_target[pair]
-                # beside a far larger part rounding leaves nothing of the others
+                # where one pair has nearly all of the sum, the rest is rounding error
                 if rest < 0.5 * missed[i]:
                     rest = missed[i]
                 to_measurement[pair] = weights[pair] / max(rest, 1e-300)

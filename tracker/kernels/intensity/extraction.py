@@ -1,4 +1,7 @@
-"""Extraction of targets by measurement from a PHD update, compiled."""
+"""Extraction of targets by measurement from a PHD update, compiled.
+
+:func:`tracker.filters.phd.extract_measured` has the equations and the source.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +20,8 @@ class Payments(NamedTuple):
     """The weight that P pairs of a component and a measurement contribute to extracted targets."""
 
     spent: ndarray
-    """(P,), weight of each pair that is used."""
+    """(P,), the part of each pair's weight that counts for the target of its measurement; 0 where
+    the measurement is not reported."""
     places: ndarray
     """(P,), index of the pair's measurement among the reported ones, -1 for none."""
     reported: int
@@ -49,8 +53,12 @@ def pay_for_measurements(
 ) -> Payments:
     """Determine the measurements that components can explain, by decreasing weight.
 
+    A component explains no more targets than its own expected number: what it contributes to one
+    measurement is subtracted from what it can contribute to the next.
+
     Args:
-        left: (J,), expected number of targets that each component may still explain; changed.
+        left: (J,), expected number of targets that each component may still explain; reduced in
+            place.
         weights: (P,), weight of each pair of a component and a measurement.
         parents: (P,), the component of each pair.
         measured: (P,), the measurement of each pair, ascending.

@@ -20,7 +20,7 @@ class PairWeights(NamedTuple):
     weights: ndarray
     """(P,), expected number of targets of each pair."""
     log_odds: ndarray
-    """(P,), log odds of each pair against clutter."""
+    """(P,), log(p_D w q(z) / κ(z)) of each pair: this component against clutter."""
     sums: ndarray
     """(M,), sum of the weights of each measurement's pairs."""
 
@@ -80,7 +80,7 @@ def phd_weights(log_terms: ndarray, measured: ndarray, log_clutter: ndarray) -> 
 
 @kernel
 def _vectors(values: ndarray, which: ndarray) -> ndarray:
-    """The rows ``which`` of (J, d): indexing with brackets takes longer, also to compile."""
+    """Select rows of (J, d) by index; ``values[which]`` is slower, also to compile."""
     picked = np.empty((len(which), values.shape[1]))
     for k in range(len(which)):
         for a in range(values.shape[1]):
@@ -90,7 +90,7 @@ def _vectors(values: ndarray, which: ndarray) -> ndarray:
 
 @kernel
 def _matrices(values: ndarray, which: ndarray) -> ndarray:
-    """The matrices ``which`` of (J, n, d), for the same reason."""
+    """Select matrices of (J, n, d) by index, as :func:`_vectors` does rows."""
     picked = np.empty((len(which), values.shape[1], values.shape[2]))
     for k in range(len(which)):
         for a in range(values.shape[1]):
@@ -101,7 +101,7 @@ def _matrices(values: ndarray, which: ndarray) -> ndarray:
 
 @kernel
 def _picked(expected: Expected, which: ndarray, size: int) -> Expected:
-    """Select the predictions of the components ``which`` of ``size``."""
+    """Select the predictions of the components ``which``; J, the number of all, is ``size``."""
     nothing, of_all = which[:0], np.zeros(1, dtype=np.int64)
     there = which if len(expected.posture_values) else nothing
     return Expected(
@@ -127,13 +127,15 @@ def phd_update(
 ) -> UpdatedIntensity:
     """Compute the GM-PHD update: every component as missed, then one for every gated pair.
 
+    The equations are those of :func:`tracker.filters.phd.update`.
+
     Args:
         predicted: J predicted components.
         expected: The measurement that each component predicts.
         measurements: M measurements with their noise.
         detection_probabilities: (J,), p_D of each component.
         clutter: (M,), κ(z) per unit of the measurement space.
-        gate: Squared Mahalanobis distance of the gate.
+        gate: Largest squared Mahalanobis distance of a pair.
     """
     weights, means, covariances = predicted.weights, predicted.means, predicted.covariances
     size, dimension = means.shape

@@ -271,7 +271,9 @@ def jumps(
     ahead: ndarray,
     ahead_covariances: ndarray,
 ) -> ndarray:
-    """Compute squared Mahalanobis distances of estimates from the rows before and from then on.
+    """Compute how far the boxes before each row and those from it on contradict each other.
+
+    The value is the squared Mahalanobis distance between the two estimates of the state.
 
     The covariances of the two estimates sum up to P⁻ (P⁻ − P)⁻¹ P⁻.
 
@@ -298,7 +300,12 @@ def jumps(
 
 @kernel
 def drives(found: SmoothedRows, noise: ndarray, axes: ndarray) -> ndarray:
-    """Compute tr Q (λ λᵀ + P⁻⁻¹ P P⁻⁻¹ − P⁻⁻¹) of each row, with λ = P⁻⁻¹ (m − m⁻).
+    """Compute the evidence of each row on the scale of its process noise, by some components.
+
+        tr Q (λ λᵀ + P⁻⁻¹ P P⁻⁻¹ − P⁻⁻¹),   λ = P⁻⁻¹ (m − m⁻)
+
+    It is above 0 where the state moves more than its process noise expects:
+    :func:`tracker.smoothing.smoother.process_noise_scales` uses it.
 
     Args:
         found: The N smoothed rows.

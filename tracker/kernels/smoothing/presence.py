@@ -26,7 +26,8 @@ class Presence(NamedTuple):
     """The existence of n tracks over N rows."""
 
     probabilities: ndarray
-    """(N,), existence probability at each row."""
+    """(N,), 1 / (1 + e^−δ) at each row, with the log odds δ of the best sequence in which the track
+    exists there against the best in which it does not."""
     odds: ndarray
     """(n,), log odds of the best sequence that exists at some step against never existing."""
 
@@ -35,17 +36,18 @@ class Presence(NamedTuple):
 def presence(
     starts: ndarray, firsts: ndarray, votes: ndarray, habits: Habits, end: int
 ) -> Presence:
-    """Compute the existence of each path at each step, exactly, by Viterbi's recursion both ways.
+    """Compare, for each path and step, the best sequences of presence with and without the step.
 
     A track is born once and dies once, with the probability e^enter each, and may be absent in
-    between, with e^change for each change; staying present has e^stay, being absent has 1. At
-    each step the best sequence in which the track exists is compared with the best in which it
-    does not.
+    between, with e^change for each change; staying present has e^stay, being absent has 1.
+    Viterbi's recursion, forwards and backwards, gives the exact maximum over all sequences in
+    which the track exists at a step, and over those in which it does not (max-marginals, no sums).
 
     Args:
         starts: (n + 1,), index of each path's first row, and N.
         firsts: (n,), first step of each path.
-        votes: (N,), log likelihood ratio of each row's evidence, of existing against not.
+        votes: (N,), log likelihood ratio of each row's evidence: the track exists against it does
+            not.
         habits: The transition model of all paths.
         end: Last step of the recording: a track that exists at it has not died, and one that
             exists at step 0 was not born.
