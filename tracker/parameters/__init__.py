@@ -5,7 +5,7 @@ From these definitions come the sliders, the command-line flags, the table of
 
 [ZW21] Zhu, Wang, "3D target position tracking based on probability hypothesis
 density filtering", 2021. A field's ``published`` value is the one of that paper,
-where ours differs.
+where the default differs from it.
 """
 
 from __future__ import annotations
@@ -87,7 +87,7 @@ _MADE_OF_ALL_METHODS = {
     "shown_keys": "reading",
     "stage_values": "reading",
 }
-"""Names that are imported when they are first used, and their modules. These need the methods of
+"""The module of each name that is imported at its first use. These modules import the methods of
 plugins, which themselves import :class:`Params` and :class:`Method` from here."""
 
 

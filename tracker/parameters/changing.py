@@ -20,9 +20,9 @@ class ParameterError(ValueError):
     """A parameter does not exist or its value is out of range; the message says what to do.
 
     Args:
-        key: The key of the parameter, or the name that was asked for instead.
+        key: The key of the parameter, or the given name if there is no such parameter.
         message: What was expected and what was found.
-        hint: Where the possible names are listed, if not in the table of parameters.
+        hint: The list that has the possible names, if it is not the table of parameters.
     """
 
     def __init__(self, key: str, message: str, hint: str | None = None) -> None:

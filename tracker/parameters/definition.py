@@ -9,8 +9,10 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 Stage = Literal["single_view", "fusion", "smoothing", "tracks"]
+"""The stages of a run: boxes in each camera, 3D posterior, smoothed tracks, reported tracks."""
 
 NO_CONDITION: Mapping[str, tuple[Any, ...]] = MappingProxyType({})
+"""The condition of a parameter that has an effect with any values of the others."""
 
 
 def ui(
@@ -25,7 +27,7 @@ def ui(
     when: Mapping[str, tuple[Any, ...]] = NO_CONDITION,
     essential: bool = False,
 ) -> Any:
-    """Return a pydantic field that says how a parameter is presented, beyond range and help.
+    """Return a pydantic field with the presentation of a parameter, beyond range and help.
 
     Args:
         symbol: The symbol in formulas, for instance ``p_S``.
@@ -54,7 +56,7 @@ def ui(
 
 
 class Params(BaseModel):
-    """A group of parameters. Values are validated, and never changed in place."""
+    """A group of parameters. Values are validated, and an instance is never changed."""
 
     model_config = ConfigDict(
         frozen=True,

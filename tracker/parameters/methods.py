@@ -27,6 +27,7 @@ class Reads:
     """A group of parameters that a method reads, or a part of it."""
 
     group: str
+    """The name of the group."""
     only: type[Params] | None = None
     """The class whose parameters alone are read, a base class of the group's; None for all."""
     without: frozenset[str] = frozenset()
@@ -59,7 +60,7 @@ class Uses:
         one person; outside detectors and networks suppress boxes that overlap."""
         return self.pictures and not self.detector
 
-    def reads_number(self, group: str, name: str) -> bool:
+    def reads_parameter(self, group: str, name: str) -> bool:
         """Whether the method reads the parameter ``group.name``."""
         return any(part.reads(group, name) for part in self.reads)
 
@@ -83,7 +84,7 @@ class Method:
         uses: What the method uses, or a function that returns it for the chosen values. A
             parameter that is left out here is not shown and must not change any result.
         parameters: The class of the method's own parameters; None if it has none.
-        group: The name of their group; the method's name if empty.
+        group: The name of the group of these parameters; the method's name if empty.
     """
 
     name: str
@@ -92,7 +93,7 @@ class Method:
     uses: Uses | Callable[[RunParameters], Uses] = field(default_factory=Uses)
     parameters: type[Params] | None = None
     group: str = ""
-    settles_who: bool = False
+    resolves_identities: bool = False
     """Whether a method of stage 3 resolves identities over the whole recording, and so applies
     corrections of identity."""
 
@@ -102,7 +103,7 @@ class Method:
         return self.group or self.name
 
     def used(self, parameters: RunParameters) -> Uses:
-        """Return what the method uses with these values."""
+        """Return what the method uses with the values of these parameters."""
         return self.uses if isinstance(self.uses, Uses) else self.uses(parameters)
 
     def load(self) -> Callable[..., Any]:

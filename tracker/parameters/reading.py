@@ -40,7 +40,7 @@ def _keys_read(used: Uses, stage: Stage) -> tuple[str, ...]:
     return tuple(
         key
         for key, parameter in PARAMETERS.items()
-        if parameter.stage == stage and used.reads_number(parameter.group, parameter.name)
+        if parameter.stage == stage and used.reads_parameter(parameter.group, parameter.name)
     )
 
 

@@ -28,7 +28,7 @@ class SharedParameters(Params):
     """Method of stage 2: how the cameras' boxes become 3D positions."""
 
     smoothing_method: str = "identities"
-    """Method of stage 3: the filter's tracks as they are, smoothed, or who is who as well."""
+    """Method of stage 3: the filter's tracks as they are, smoothed, or with identities resolved."""
 
     pictures: PictureParams = PictureParams()
     foreground: ForegroundParams = ForegroundParams()

@@ -25,21 +25,31 @@ class Parameter:
     label: str
     """The name in words."""
     help: str
+    """The meaning in one sentence."""
     symbol: str
     unit: str
+    """The unit of the value; empty for numbers without unit, and for choices."""
     stage: Stage
+    """The first stage that is computed again after a change."""
     kind: Literal["float", "int", "bool", "choice"]
     default: Any
     minimum: float | None
+    """The least value, included; None for a switch or a choice, as :attr:`maximum`."""
     maximum: float | None
     step: float | None
+    """The step of the slider, in the unit of the value; None where it has none of its own."""
     log: bool
+    """Whether the slider is logarithmic."""
     choices: tuple[str, ...]
+    """The possible values of a choice; empty for other kinds."""
     published: Any
+    """The value in the ``published`` preset; None where it is the default."""
     advanced: bool
+    """Whether the page folds the parameter away at first."""
     when: Mapping[str, tuple[Any, ...]]
     """Keys of other parameters, and the values of each with which this one has an effect."""
     essential: bool
+    """Whether the parameter is among the few that the page shows first."""
 
 
 def _group_stage(group: str) -> Stage:

@@ -173,7 +173,7 @@ class _Reporter:
             run.fused[run.done :],
             cameras=len(run.sequence.views),
             extraction_threshold=p.extraction_threshold,
-            rule=p.extraction if used.reads_number("fusion", "extraction") else "components",
+            rule=p.extraction if used.reads_parameter("fusion", "extraction") else "components",
             bounds=_bounds(run),
             first_frame=run.done,
             ids=self.ids,
@@ -266,7 +266,7 @@ def _correct(run: Run, reporter: _Reporter) -> None:
     if not run.corrections or run.outcomes or not len(run.tracks):
         return
     step_time = run.sequence.step_time
-    if not run.corrected and not run.parameters.method("smoothing_method").settles_who:
+    if not run.corrected and not run.parameters.method("smoothing_method").resolves_identities:
         run.tracks = corrected(run.tracks, run.corrections, step_time)
     run.corrected = True
     tracks = run.tracks

@@ -46,20 +46,20 @@ class AssociationMatrixParams(Params):
     """An object continues an interrupted track if its colours are at least so similar."""
 
     follow_mild: Annotated[bool, ui("MS")] = True
-    """Whether two who merge under mild occlusion are followed apart by mean shift."""
+    """Whether two people who merge under mild occlusion are tracked separately by mean shift."""
 
     mild_share: Annotated[
         float, Field(ge=0.1, le=1.5), ui("S_k/(S_a+S_b)", step=0.01, when=_APART)
     ] = 0.8
-    """Two who merge into an object larger than this share of both are mildly occluded."""
+    """Two people are mildly occluded if their merged object is larger than this share of both."""
 
     occlusion_distance: Annotated[
         float, Field(ge=0.0, le=3.0), ui("ε", unit="half widths", step=0.05, when=_APART)
     ] = 0.5
-    """Two who are followed apart are one object once their centres are this near."""
+    """Two people who are tracked separately become one object once their centres are this near."""
 
     histogram_rate: Annotated[float, Field(ge=0.0, le=1.0), ui("β", step=0.01)] = 0.1
-    """How far a track's colours go towards those of each step in which it is alone."""
+    """Weight of the present colours in a track's colours, at each step in which it is alone."""
 
     output: Annotated[Literal["targets", "objects"], ui("Y", published="objects")] = "targets"
     """What goes to the fusion: target boxes fitted to the objects' outlines, or the objects."""
@@ -69,17 +69,17 @@ class AssociationMatrixParams(Params):
         Field(ge=-10.0, le=0.0),
         ui("s_min", step=0.1, when=_TARGETS, essential=True),
     ] = -2.0
-    """Targets: an object's best box is not taken if the outline fits it worse than this."""
+    """Targets: least score of the best box of an object."""
 
     further_acceptance: Annotated[
         float, Field(ge=-10.0, le=0.0), ui("s_2", step=0.1, when=_TARGETS)
     ] = -1.7
-    """Targets: nor are the other boxes of a merged object if they fit worse than this."""
+    """Targets: least score of further boxes of an object, up to its number of tracks."""
 
     spare_acceptance: Annotated[
         float, Field(ge=-10.0, le=0.0), ui("s_+", step=0.1, when=_TARGETS)
     ] = -0.7
-    """Targets: a box that fits better than this is taken beyond the object's number of tracks."""
+    """Targets: least score of boxes of an object beyond its number of tracks."""
 
     centre_sigma: Annotated[
         float, Field(ge=0.02, le=3.0), ui("σ_x", unit="half sizes", step=0.01, log=True)
@@ -94,17 +94,18 @@ class AssociationMatrixParams(Params):
     straying: Annotated[
         float, Field(ge=0.0, le=2.0), ui("v_s", unit="1/step", step=0.01, advanced=True)
     ] = 0.1
-    """How much further a lost object may be found with every step, as a share of its reach."""
+    """Growth of the distance at which an interrupted object may be found again, per step, as a
+    share of its reach."""
 
     inside_weight: Annotated[
         float, Field(ge=0.0, le=20.0), ui("a", step=0.5, advanced=True, when=_TARGETS)
     ] = 3.0
-    """Targets: how much the foreground inside a box counts for it."""
+    """Targets: weight of the foreground inside a box in its score."""
 
     around_weight: Annotated[
         float, Field(ge=0.0, le=20.0), ui("b", step=0.5, advanced=True, when=_TARGETS)
     ] = 3.0
-    """Targets: how much the foreground above and beside it counts against it."""
+    """Targets: weight of the foreground above and beside a box, which lowers its score."""
 
     least_inside: Annotated[
         float, Field(ge=0.0, le=1.0), ui("f_min", step=0.05, advanced=True, when=_TARGETS)

@@ -36,12 +36,13 @@ class ColourPeakParams(Params):
     acceptance_distance: Annotated[
         float, Field(ge=0.05, le=1.0), ui("D_max", step=0.01, published=1.0, essential=True)
     ] = 0.52
-    """A peak less likely, with its foreground, than a box at this distance is not taken."""
+    """A peak is rejected if its likelihood, that of its foreground included, is below the colour
+    likelihood at this distance."""
 
     acceptance_foreground: Annotated[
         float, Field(ge=0.0, le=1.0), ui("f_min", step=0.01, published=0.0)
     ] = 0.35
-    """A peak with a smaller share of foreground in its box is not taken."""
+    """A peak with a smaller share of foreground in its box is rejected."""
 
     foreground_weight: Annotated[
         float, Field(ge=0.0, le=10.0), ui("a", step=0.1, published=0.0)
@@ -54,22 +55,22 @@ class ColourPeakParams(Params):
     """The likelihood falls by exp(-b · share of foreground above and beside the box)."""
 
     carry_templates: Annotated[bool, ui("q_c", published=False)] = True
-    """Whether a camera without a template of a person gets one from where the others' templates
-    and the calibration say that the person is."""
+    """Whether a camera without a template of a person gets one at the place that the calibration
+    and the templates in other cameras predict."""
 
     shapes: Annotated[
         Literal["never", "unsure", "fitting", "always"], ui("S_h", published="never")
     ] = "unsure"
-    """Whether people found by shape count as well: where the foreground is not to be believed
-    about somebody, or, if they lie where the templates are, where not everybody has one in every
-    camera and several in one; wherever they lie so; or always."""
+    """Whether people detected by shape count as well: never; where the foreground misses a person,
+    or, if shapes agree with the templates, where templates are few; wherever shapes agree with the
+    templates; or always."""
 
     shape_odds: Annotated[
         float,
         Field(ge=-6.0, le=10.0),
         ui("ln o", step=0.1, when={"shapes": ("unsure", "fitting", "always")}),
     ] = 2.0
-    """Logarithm of the odds from which somebody found by shape is a peak."""
+    """Log odds from which a person detected by shape is passed on like a peak."""
 
     samples: Annotated[int, Field(ge=20, le=5000), ui("S", unit="1/(camera·step)", log=True)] = 400
     """Boxes that are compared with the templates."""
@@ -83,10 +84,11 @@ class ColourPeakParams(Params):
     """Whether peaks are sought for each person's templates by themselves, not for all at once."""
 
     mean_shift_starts: Annotated[int, Field(ge=1, le=100), ui("K", step=1)] = 20
-    """Samples at most from which the search for peaks starts."""
+    """Largest number of samples from which the search for peaks starts."""
 
     spread_starts: Annotated[bool, ui("K_s", published=False)] = True
-    """Whether starts keep apart; else the heaviest samples are taken, often all on one person."""
+    """Whether starts keep apart; if not, the heaviest samples are used, which are often all on one
+    person."""
 
     bandwidth: Annotated[
         float, Field(ge=0.1, le=3.0), ui("h", unit="half sizes", step=0.05, log=True)
@@ -101,15 +103,16 @@ class ColourPeakParams(Params):
     size_sigma: Annotated[
         float, Field(ge=0.02, le=3.0), ui("σ_h", unit="half sizes", step=0.01, log=True)
     ] = 0.5
-    """Standard deviation of a peak's half sizes: colour alone hardly tells them."""
+    """Standard deviation of a peak's half sizes, which colour alone hardly determines."""
 
     sigma_height: Annotated[
         float, Field(ge=5.0, le=1000.0), ui("h_σ", unit="px", log=True, advanced=True)
     ] = 60.0
-    """Half height beyond which a peak's deviations grow no more: a large target shows details."""
+    """Half height up to which a peak's deviations grow with its size: a large target shows
+    details."""
 
     size_jitter: Annotated[float, Field(ge=0.0, le=1.0), ui("σ_s", step=0.01, advanced=True)] = 0.1
-    """Spread of the samples' sizes around what a target has at a place: people differ."""
+    """Relative spread of the samples' sizes around that of a target at the place: people differ."""
 
     merge_distance: Annotated[
         float, Field(ge=0.1, le=5.0), ui("d_m", unit="half sizes", step=0.1, advanced=True)
@@ -119,7 +122,7 @@ class ColourPeakParams(Params):
     same_person_distance: Annotated[
         float, Field(ge=0.1, le=5.0), ui("d_g", unit="half sizes", step=0.1, advanced=True)
     ] = 1.5
-    """Peaks of one person's colours keep this far apart."""
+    """Least distance between two peaks of one person's colours."""
 
     @property
     def asks_foreground(self) -> bool:
@@ -147,17 +150,17 @@ class ColourPhdParams(ColourPeakParams):
     motion_sigma: Annotated[
         float, Field(ge=0.1, le=50.0), ui("σ_w", unit="half sizes/√s", step=0.1, log=True)
     ] = 3.0
-    """How far a person strays in the picture in one second."""
+    """Random walk: standard deviation of a person's displacement in the picture in one second."""
 
     growth_sigma: Annotated[
         float, Field(ge=0.01, le=5.0), ui("σ_H", unit="half sizes/√s", step=0.01, log=True)
     ] = 0.4
-    """How much a person's box grows or shrinks in one second."""
+    """Random walk: standard deviation of the change of a box's half sizes in one second."""
 
     birth: Annotated[Literal["peaks", "entrances", "both"], ui("γ(x)", published="entrances")] = (
         "peaks"
     )
-    """Where people may appear: at peaks that nothing explained, at the entrances, or both."""
+    """Where people may appear: at peaks that no component explained, at the entrances, or both."""
 
     birth_rate: Annotated[float, Field(ge=1e-3, le=50.0), ui("γ", unit="1/(place·s)", log=True)] = (
         1.0
@@ -167,7 +170,7 @@ class ColourPhdParams(ColourPeakParams):
     clutter_rate: Annotated[
         float, Field(ge=0.001, le=50.0), ui("λ_c", unit="1/step", step=0.1, log=True)
     ] = 1.0
-    """Expected number of peaks that are nobody, uniform over the picture and the sizes."""
+    """Expected number of false peaks, uniform over the picture and the sizes."""
 
     pruning_threshold: Annotated[float, Field(ge=1e-8, le=0.1), ui("T", log=True)] = 1e-4
     """Components lighter than this are dropped."""

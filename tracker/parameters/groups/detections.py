@@ -29,18 +29,20 @@ class DetectionBoxParams(Params):
     size_sigma: Annotated[
         float, Field(ge=0.005, le=3.0), ui("σ_h", unit="half heights", step=0.01, log=True)
     ] = 0.12
-    """Standard deviation of a box's half height, as a share of it: how far its edges tell depth."""
+    """Standard deviation of a box's half height, as a share of it; the smaller, the more it tells
+    depth."""
 
     width_sigma: Annotated[
         float, Field(ge=0.005, le=3.0), ui("σ_b", unit="half widths", step=0.01, log=True)
     ] = 0.3
-    """Standard deviation of a box's half width, as a share of it: arms and turning change it."""
+    """Standard deviation of a box's half width, as a share of it; arms and turning change it."""
 
     pixel_sigma: Annotated[float, Field(ge=0.0, le=50.0), ui("σ_px", unit="px", step=0.1)] = 1.5
-    """Noise of a box's centre and half sizes however small it is; it adds to the shares."""
+    """Part of the noise of a box's centre and half sizes that does not depend on the box's size."""
 
     depth_sigmas: Annotated[float, Field(ge=0.0, le=10.0), ui("k_σ", step=0.5, advanced=True)] = 3.0
-    """Standard deviations by which the size of a box may be off when it is set against the room."""
+    """Largest error of a box's size, in standard deviations, for the check whether its target can
+    stand in the room."""
 
 
 class DetectionPhdParams(DetectionBoxParams):
@@ -55,23 +57,23 @@ class DetectionPhdParams(DetectionBoxParams):
     clutter_rate: Annotated[
         float, Field(ge=0.001, le=50.0), ui("λ_c", unit="1/step", step=0.1, log=True)
     ] = 1.0
-    """Expected number of boxes that are nobody, uniform over the picture and the sizes."""
+    """Expected number of false boxes, uniform over the picture and the sizes."""
 
     score_clutter: Annotated[float, Field(ge=0.0, le=5.0), ui("b_s", step=0.1)] = 1.0
     """How much likelier a box of low score is clutter: the rate times exp(2 b_s (½ − score))."""
 
     birth_rate: Annotated[float, Field(ge=1e-3, le=50.0), ui("γ", unit="1/(box·s)", log=True)] = 1.0
-    """Expected number of people who appear in one second at a box that nobody explained."""
+    """Expected number of people who appear in one second at a box that no component explained."""
 
     motion_sigma: Annotated[
         float, Field(ge=0.05, le=50.0), ui("σ_w", unit="half heights/√s", step=0.1, log=True)
     ] = 0.5
-    """How far a person strays in the picture in one second."""
+    """Random walk: standard deviation of a person's displacement in the picture in one second."""
 
     growth_sigma: Annotated[
         float, Field(ge=0.01, le=5.0), ui("σ_H", unit="half sizes/√s", step=0.01, log=True)
     ] = 0.2
-    """How much a person's box grows or shrinks in one second."""
+    """Random walk: standard deviation of the change of a box's half sizes in one second."""
 
     pruning_threshold: Annotated[float, Field(ge=1e-8, le=0.1), ui("T", log=True)] = 1e-4
     """Components lighter than this are dropped."""
@@ -86,7 +88,8 @@ class DetectionPhdParams(DetectionBoxParams):
     """A component whose weight is above this is a 2D estimate."""
 
     output: Annotated[Literal["boxes", "estimates"], ui("Y", published="estimates")] = "boxes"
-    """What goes to the fusion: the boxes that the filter believes in, or its estimates."""
+    """What goes to the fusion: the boxes that more likely are of a target than not, or the
+    estimates."""
 
     gate_probability: Annotated[float, Field(ge=0.5, le=0.999999), ui("P_G", advanced=True)] = (
         0.9999

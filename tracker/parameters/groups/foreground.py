@@ -30,19 +30,22 @@ class ForegroundParams(Params):
     restless_from: Annotated[
         float, Field(ge=0.0, le=1.0), ui("u_0", step=0.01, advanced=True, when=_LEARNT)
     ] = 0.25
-    """Learnt: with this share of the changing pixels often away from their median, doubt begins."""
+    """Learnt: the median is uncertain from this share on of changing pixels that are often away
+    from it."""
 
     restless_to: Annotated[
         float, Field(ge=0.0, le=1.0), ui("u_1", step=0.01, advanced=True, when=_LEARNT)
     ] = 0.35
-    """Learnt: and with this share the median is not believed, for people stay in front of it."""
+    """Learnt: the median is not used from this share on of changing pixels that are often away from
+    it, since people then stay in one place."""
 
     motion_memory: Annotated[
         float,
         Field(ge=0.0, le=4.0),
         ui("T_m", unit="s", step=0.1, published=0.0, when=_LEARNT),
     ] = 0.6
-    """Learnt: where the median is not believed, what changed within this time is foreground."""
+    """Learnt: where the median is uncertain, pixels that changed within this time are
+    foreground."""
 
     motion_threshold: Annotated[
         float,

@@ -58,7 +58,7 @@ class FusionParams(Params):
         Field(ge=0.0, le=0.5),
         ui("ε", step=0.01, published=0.0, when=_BOXES),
     ] = 0.1
-    """Share of the boxes that show a person lying, crouching or bent; 0: everybody stands."""
+    """Share of the boxes that show a person lying, crouching or bent; 0 if all people stand."""
 
     update: Annotated[Literal["extended", "unscented"], ui("h(x)")] = "extended"
     """How the nonlinear projection is handled: linearised at the mean, or by unscented points."""
@@ -71,19 +71,20 @@ class FusionParams(Params):
     motion_sigma: Annotated[
         float, Field(ge=0.01, le=3.0), ui("σ_w", unit="m/√s", step=0.01, log=True, when=_WALK)
     ] = 0.4
-    """Random walk: how far a person strays in one second, along each axis."""
+    """Random walk: standard deviation of a person's displacement in one second, along each axis."""
 
     acceleration_sigma: Annotated[
         float,
         Field(ge=0.05, le=10.0),
         ui("σ_a", unit="m/s per √s", step=0.05, log=True, when=_VELOCITY, essential=True),
     ] = 0.6
-    """Constant velocity: how much a person's speed changes in one second, along each axis."""
+    """Constant velocity: standard deviation of the change of a person's velocity in one second,
+    along each horizontal axis."""
 
     vertical_share: Annotated[
         float, Field(ge=0.01, le=1.0), ui("σ_z/σ_x", step=0.01, when=_VELOCITY)
     ] = 0.1
-    """Constant velocity: the same for the height, as a share of that along the floor."""
+    """Constant velocity: σ_a along the vertical axis, as a share of that along the floor."""
 
     velocity_memory: Annotated[
         float, Field(ge=0.1, le=100.0), ui("τ", unit="s", step=0.1, log=True, when=_VELOCITY)
@@ -93,7 +94,8 @@ class FusionParams(Params):
     start_velocity: Annotated[
         float, Field(ge=0.01, le=5.0), ui("σ_v0", unit="m/s", step=0.1, when=_VELOCITY)
     ] = 0.7
-    """Constant velocity: spread of a newcomer's speed along each axis."""
+    """Constant velocity: standard deviation of a new target's velocity along each axis, around
+    0."""
 
     birth: Annotated[
         Literal["entrances", "measurements", "both"], ui("γ(x)", published="entrances")
@@ -147,7 +149,7 @@ class FusionParams(Params):
     """Squared Mahalanobis distance within which a component joins a heavier one."""
 
     max_components: Annotated[int, Field(ge=5, le=500), ui("J_max", step=1)] = 60
-    """The heaviest components that are kept."""
+    """Largest number of components; the heaviest ones remain."""
 
     extraction: Annotated[
         Literal["components", "boxes"], ui("W_z", stage="tracks", published="components")
@@ -164,42 +166,42 @@ class FusionParams(Params):
         Field(ge=0.1, le=1.0),
         ui("h_p", unit="half heights", step=0.05, advanced=True, when=_BOXES),
     ] = 0.5
-    """Other posture: half height of the box, seen in perspective and from any side."""
+    """Other posture: half height of the target, relative to the upright one's half height."""
 
     posture_width: Annotated[
         float,
         Field(ge=0.1, le=2.0),
         ui("w_p", unit="half heights", step=0.05, advanced=True, when=_BOXES),
     ] = 0.6
-    """Other posture: half width of the box."""
+    """Other posture: half width of the target, relative to the upright one's half height."""
 
     posture_centre_sigma: Annotated[
         float,
         Field(ge=0.01, le=2.0),
         ui("σ_pc", unit="half heights", step=0.01, advanced=True, when=_BOXES),
     ] = 0.15
-    """Other posture: deviation of the box's centre, across and down."""
+    """Other posture: standard deviation of the box's centre, across and down."""
 
     posture_width_sigma: Annotated[
         float,
         Field(ge=0.01, le=2.0),
         ui("σ_pw", unit="half heights", step=0.01, advanced=True, when=_BOXES),
     ] = 0.5
-    """Other posture: deviation of its half width."""
+    """Other posture: standard deviation of the box's half width."""
 
     posture_height_sigma: Annotated[
         float,
         Field(ge=0.01, le=2.0),
         ui("σ_ph", unit="half heights", step=0.01, advanced=True, when=_BOXES),
     ] = 0.25
-    """Other posture: deviation of its half height."""
+    """Other posture: standard deviation of the box's half height."""
 
     posture_drop: Annotated[
         float,
         Field(ge=0.0, le=1.0),
         ui("σ_pd", unit="half heights", step=0.05, advanced=True, when=_BOXES),
     ] = 0.3
-    """Other posture: how far the middle moves from one box to the next."""
+    """Other posture: standard deviation of the vertical displacement of the person's centre."""
 
     memory_gate_probability: Annotated[
         float, Field(ge=0.1, le=0.9999), ui("P_m", step=0.01, advanced=True)
@@ -209,7 +211,7 @@ class FusionParams(Params):
     recognition_doubt: Annotated[
         float, Field(ge=0.0, le=1.0), ui("ε_r", step=0.01, advanced=True, when=_RECOGNITION)
     ] = 0.1
-    """Recognition: probability that a box's colours tell nothing of who it is."""
+    """Recognition: probability that a box's colours are uninformative about the person."""
 
     recognition_interval: Annotated[
         float,
@@ -228,12 +230,14 @@ class FusionParams(Params):
     recognition_odds: Annotated[
         float, Field(ge=1.0, le=10000.0), ui("o_s", log=True, advanced=True, when=_RECOGNITION)
     ] = 20.0
-    """Recognition: odds against any other assignment of ids from which a pair of it holds."""
+    """Recognition: least odds of the best assignment of ids against the best without a pair, for
+    the pair to be accepted."""
 
     recognition_own_odds: Annotated[
         float, Field(ge=1.0, le=1000.0), ui("o_o", log=True, advanced=True, when=_RECOGNITION)
     ] = 3.0
-    """Recognition: odds of a track's own colours, from which it may get a person's id."""
+    """Recognition: least odds of a track's colours, for one person against every other, for it to
+    get that person's id."""
 
 
 def _multi_bernoulli_uses(parameters: RunParameters) -> Uses:

@@ -37,7 +37,7 @@ class JpdaParams(Params):
     association: Annotated[
         Literal["exact", "murty", "simplified_murty"], ui("β", published="simplified_murty")
     ] = "exact"
-    """Over which joint events: all of them, the K best, or n + M that share no pair."""
+    """Joint events that are summed over: all of them, the K best, or n + M that share no pair."""
 
     events: Annotated[
         int, Field(ge=1, le=500), ui("K", log=True, advanced=True, when={"association": ("murty",)})
@@ -56,14 +56,14 @@ class JpdaParams(Params):
     """Probability that a person in the picture makes a measurement."""
 
     clutter: Annotated[Literal["poisson", "diffuse"], ui("g(Φ)", published="diffuse")] = "poisson"
-    """What is known of the number of false measurements: its mean, or nothing at all."""
+    """Model of the number of false measurements: Poisson with a known mean, or nothing is known."""
 
     clutter_rate: Annotated[
         float,
         Field(ge=0.001, le=50.0),
         ui("λ_c", unit="1/step", step=0.1, log=True, when={"clutter": ("poisson",)}),
     ] = 0.5
-    """For poisson: expected number of measurements that are nobody, uniform over the picture."""
+    """For poisson: expected number of false measurements, uniform over the picture."""
 
     gate_volume: Annotated[
         float,
@@ -81,7 +81,7 @@ class JpdaParams(Params):
     velocity_sigma: Annotated[
         float, Field(ge=0.1, le=100.0), ui("σ_v", unit="half sizes/s", step=0.1, log=True)
     ] = 6.0
-    """How fast a newcomer may move, who is taken to stand still."""
+    """Standard deviation of a new target's velocity along each axis, around 0."""
 
     centre_sigma: Annotated[
         float,
@@ -95,15 +95,16 @@ class JpdaParams(Params):
         Field(ge=0.01, le=3.0),
         ui("σ_h", unit="half sizes", step=0.01, log=True, when=_FOREGROUND),
     ] = 0.2
-    """Standard deviation of the half sizes of a foreground box: how far they tell depth."""
+    """Standard deviation of the half sizes of a foreground box; the smaller, the more it tells
+    depth."""
 
     pixel_sigma: Annotated[
         float, Field(ge=0.0, le=50.0), ui("σ_px", unit="px", step=0.1, when=_FOREGROUND)
     ] = 2.5
-    """Noise of a foreground box's centre however small it is; it adds to the share."""
+    """Part of the noise of a foreground box's centre that does not depend on the box's size."""
 
     size_rate: Annotated[float, Field(ge=0.01, le=1.0), ui("α", step=0.01)] = 0.2
-    """How far a target's box takes the size of its measurement in one step."""
+    """Weight of a measurement's size in the smoothed size of its target, at each step."""
 
     least_probability: Annotated[
         float, Field(ge=0.0, le=0.9), ui("β_min", step=0.01, published=0.0, when=_FIVE)
@@ -113,8 +114,8 @@ class JpdaParams(Params):
     occlusion: Annotated[
         Literal["inside", "measurement"], ui("x|z", published="measurement", when=_FIVE)
     ] = "inside"
-    """Occluded targets are predicted on inside the piece of foreground that hides them; or all
-    whose gates meet in one measurement take its place and stand still."""
+    """Where occluded targets are: predicted inside the piece of foreground that hides them, or at
+    rest at the one measurement that lies in all their gates."""
 
     vanish_steps: Annotated[int, Field(ge=1, le=100), ui("k_v", unit="steps", step=1)] = 3
     """A target without measurement at so many steps in a row has vanished."""
@@ -122,17 +123,17 @@ class JpdaParams(Params):
     return_steps: Annotated[
         int, Field(ge=0, le=250), ui("k_s", unit="steps", step=1, when=_FIVE)
     ] = 5
-    """A newcomer where somebody vanished at most so many steps ago is the same person."""
+    """A new target in the gate of one that vanished at most so many steps ago continues it."""
 
     confirmation_steps: Annotated[
         int, Field(ge=1, le=50), ui("k_n", unit="steps", step=1, published=1)
     ] = 5
-    """A newcomer counts once measured at so many steps in a row."""
+    """A new target is confirmed once it was measured at so many steps in a row."""
 
     output: Annotated[Literal["estimates", "measurements"], ui("Y", published="estimates")] = (
         "estimates"
     )
-    """What goes to the fusion: the targets' boxes, or the measurements that are somebody's."""
+    """What goes to the fusion: the targets' boxes, or the measurements that belong to targets."""
 
     longest_hidden: Annotated[
         float, Field(ge=0.0, le=60.0), ui("t_h", unit="s", step=0.5, advanced=True, when=_FIVE)
@@ -142,7 +143,8 @@ class JpdaParams(Params):
     same_size: Annotated[
         float, Field(ge=1.0, le=5.0), ui("k_m", step=0.1, advanced=True, when=_FIVE)
     ] = 1.5
-    """A measurement larger or smaller than its target by this factor shows others too."""
+    """A measurement larger or smaller than its target by this factor is not of this target
+    alone."""
 
     leap: Annotated[
         float,
@@ -154,7 +156,8 @@ class JpdaParams(Params):
     one_side: Annotated[
         float, Field(ge=1.0, le=10.0), ui("k_e", step=0.1, advanced=True, when=_FIVE)
     ] = 2.0
-    """A piece's edge is a hidden target's if boxes leave so much more free there than opposite."""
+    """An edge of a piece of foreground is a hidden target's if the boxes measured in the piece
+    leave this factor more free there than at the opposite edge."""
 
     cover: Annotated[
         float,
@@ -167,12 +170,13 @@ class JpdaParams(Params):
             when={"measurements": ("colour", "detections")},
         ),
     ] = 2.0
-    """Without a piece of foreground, who is hidden lies within so many half sizes of the box."""
+    """Without foreground, a hidden target lies within so many half sizes of the box that hides
+    it."""
 
     height_sigmas: Annotated[
         float, Field(ge=0.0, le=10.0), ui("k_z", step=0.5, advanced=True, when=_CROWNS)
     ] = 2.0
-    """Targets keep within so many deviations of the heights that they come in at."""
+    """Range of a target's height around that of the entrances, in standard deviations."""
 
     crack: Annotated[
         float,
@@ -186,36 +190,36 @@ class JpdaParams(Params):
         Field(ge=0.1, le=5.0),
         ui("w_t", unit="half widths", step=0.1, advanced=True, when=_CROWNS),
     ] = 1.2
-    """The pixels under a top within so many half widths are its target."""
+    """The pixels below the top of a piece, up to so many half widths aside, are of its target."""
 
     least_inside: Annotated[
         float, Field(ge=0.0, le=1.0), ui("f_i", step=0.05, advanced=True, when=_CROWNS)
     ] = 0.4
-    """A box with a smaller share of foreground is no target's."""
+    """A box with a smaller share of foreground is of no target."""
 
     most_above: Annotated[
         float, Field(ge=0.0, le=1.0), ui("f_a", step=0.05, advanced=True, when=_CROWNS)
     ] = 0.5
-    """Nor is one with a larger share of foreground above it."""
+    """A box with a larger share of foreground above it is of no target."""
 
     most_beside: Annotated[
         float, Field(ge=0.0, le=1.0), ui("f_b", step=0.05, advanced=True, when=_CROWNS)
     ] = 0.8
-    """Nor is one with a larger share beside its upper part."""
+    """A box with a larger share of foreground beside its upper part is of no target."""
 
     shoulder_across: Annotated[
         float,
         Field(ge=0.0, le=5.0),
         ui("w_s", unit="half widths", step=0.1, advanced=True, when=_CROWNS),
     ] = 1.0
-    """A top no further beside another may be that target's shoulder."""
+    """Largest distance aside of a target's top at which another top may be its shoulder."""
 
     shoulder_down: Annotated[
         float,
         Field(ge=0.0, le=5.0),
         ui("h_s", unit="half heights", step=0.1, advanced=True, when=_CROWNS),
     ] = 1.5
-    """And no further below it."""
+    """Largest distance below a target's top at which another top may be its shoulder."""
 
 
 def _uses(parameters: RunParameters) -> Uses:

@@ -22,7 +22,7 @@ class OnnxDetectorParams(DetectionBoxParams):
     suppression_overlap: Annotated[
         float, Field(ge=0.05, le=0.99), ui("o_s", step=0.01, essential=True)
     ] = 0.6
-    """Of two boxes with a larger intersection over union the one with the higher score stays."""
+    """Of two boxes with a larger intersection over union the one with the higher score remains."""
 
     person_class: Annotated[int, Field(ge=-1, le=1000), ui("c", step=1, advanced=True)] = -1
     """Which of the network's classes are people, counted from 0; -1: by the kind of network."""
@@ -35,7 +35,8 @@ class OnnxDetectorParams(DetectionBoxParams):
     pixel_values: Annotated[
         Literal["unit", "imagenet", "signed", "bytes"], ui("v", advanced=True)
     ] = "unit"
-    """What the network takes: 0 … 1 (YOLO, RT-DETR), ImageNet's (DETR), −1 … 1, or 0 … 255."""
+    """Range of the network's input: 0 … 1 (YOLO, RT-DETR), ImageNet's (DETR), −1 … 1, or 0 …
+    255."""
 
 
 _PICTURES = Reads("pictures", without=frozenset({"steady_from"}))  # needs no fixed background

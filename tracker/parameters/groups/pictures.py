@@ -10,18 +10,19 @@ from tracker.parameters.definition import Params, ui
 
 
 class PictureParams(Params):
-    """Size and turn of the pictures that stage 1 looks at; its boxes come back in full pixels."""
+    """Size and rotation of the pictures of stage 1; its boxes are converted back to full pixels."""
 
     lines: Annotated[int, Field(ge=120, le=4320), ui("n_l", unit="px", log=True)] = 480
     """A picture whose shorter side is longer than this is reduced to it."""
 
     target_height: Annotated[int, Field(ge=16, le=2000), ui("n_t", unit="px", log=True)] = 160
-    """And further, down to half of that, until the middle one of the targets is this high."""
+    """A picture is reduced further, by a factor of two at most, until the median target is this
+    high."""
 
     least_height: Annotated[
         int, Field(ge=8, le=500), ui("n_m", unit="px", log=True, advanced=True)
     ] = 40
-    """But never so far that the middle one of the targets is lower than this."""
+    """Least height of the median target to which a picture is reduced."""
 
     level_from: Annotated[
         float, Field(ge=0.0, le=3.2), ui("θ_l", unit="rad", step=0.01, advanced=True)
@@ -31,4 +32,4 @@ class PictureParams(Params):
     steady_from: Annotated[
         float, Field(ge=0.0, le=100.0), ui("σ_s", unit="px", step=0.05, advanced=True)
     ] = 0.25
-    """The pictures of a camera that shakes by more than this, once reduced, are held still."""
+    """The pictures of a camera that shakes by more than this, in reduced pixels, are stabilised."""

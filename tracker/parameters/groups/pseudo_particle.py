@@ -27,7 +27,7 @@ class PseudoParticleParams(Params):
     """Clusters of particles as targets, or one posterior whose mean is the only one."""
 
     samples: Annotated[int, Field(ge=20, le=5000), ui("S", unit="1/(camera·step)", log=True)] = 400
-    """Particles, of all targets together."""
+    """Number of particles of all targets together."""
 
     colour_space: Annotated[Literal["hue_saturation", "rgb"], ui("u", published="rgb")] = (
         "hue_saturation"
@@ -70,12 +70,12 @@ class PseudoParticleParams(Params):
     motion_sigma: Annotated[
         float, Field(ge=0.1, le=50.0), ui("σ_w", unit="half sizes/√s", step=0.1, log=True)
     ] = 3.0
-    """How far a person strays in the picture in one second."""
+    """Random walk: standard deviation of a person's displacement in the picture in one second."""
 
     growth_sigma: Annotated[
         float, Field(ge=0.01, le=5.0), ui("σ_H", unit="half sizes/√s", step=0.01, log=True)
     ] = 0.4
-    """How much a person's box grows or shrinks in one second."""
+    """Random walk: standard deviation of the change of a box's half sizes in one second."""
 
     velocity_share: Annotated[
         float, Field(ge=0.0, le=1.0), ui("v", step=0.05, published=0.0, when=_PSEUDO)
@@ -109,26 +109,27 @@ class PseudoParticleParams(Params):
     acceptance_distance: Annotated[
         float, Field(ge=0.05, le=1.0), ui("d_0", step=0.01, published=0.6, essential=True)
     ] = 0.5
-    """Column of the background: a mode less likely than one at this distance is nobody."""
+    """Colour distance of the background: a mode less likely than a box at this distance is
+    background."""
 
     acceptance_foreground: Annotated[
         float, Field(ge=0.0, le=1.0), ui("f_min", step=0.01, published=0.0, when=_PSEUDO)
     ] = 0.35
-    """A mode with a smaller share of foreground in its box is nobody."""
+    """A mode with a smaller share of foreground in its box is background."""
 
     position_sigma: Annotated[
         float,
         Field(ge=0.1, le=10.0),
         ui("σ_a", unit="half sizes", step=0.1, log=True, when=_PSEUDO),
     ] = 1.0
-    """How far from where a target is expected its mode lies, when they are assigned."""
+    """Standard deviation of a mode's centre around the predicted centre of its target."""
 
     separation: Annotated[
         float,
         Field(ge=0.0, le=5.0),
         ui("r_n", unit="half sizes", step=0.1, published=0.0, when=_PSEUDO),
     ] = 2.0
-    """A mode nearer than this to a target's mode is no newcomer."""
+    """Least distance of a new target's mode from that of another target."""
 
     targets_per_person: Annotated[
         int, Field(ge=1, le=10), ui("n_g", step=1, published=1, when=_PSEUDO)
@@ -138,27 +139,27 @@ class PseudoParticleParams(Params):
     confirmation: Annotated[
         int, Field(ge=1, le=50), ui("n_c", unit="steps", step=1, when=_PSEUDO)
     ] = 3
-    """Steps in which a new target must be found before it counts."""
+    """Number of steps at which a new target must be detected before it is confirmed."""
 
     patience: Annotated[
         float, Field(ge=0.0, le=10.0), ui("t_p", unit="s", step=0.05, when=_PSEUDO)
     ] = 0.8
-    """How long a target that is not found is still waited for."""
+    """Time for which a target that is not detected is predicted before it has vanished."""
 
     memory: Annotated[
         float, Field(ge=0.0, le=100.0), ui("t_m", unit="s", step=0.5, when=_PSEUDO)
     ] = 10.0
-    """How long after it vanished a target of the same colours returns under its id."""
+    """Time after a target vanished within which one of the same colours continues its id."""
 
     centre_sigma: Annotated[
         float, Field(ge=0.02, le=3.0), ui("σ_x", unit="half sizes", step=0.01, log=True)
     ] = 0.5
-    """Standard deviation of a mode's centre, as the fusion is told."""
+    """Standard deviation of a mode's centre, as measurement noise of the fusion."""
 
     size_sigma: Annotated[
         float, Field(ge=0.02, le=3.0), ui("σ_h", unit="half sizes", step=0.01, log=True)
     ] = 0.5
-    """Standard deviation of a mode's half sizes: colour alone hardly tells them."""
+    """Standard deviation of a mode's half sizes, which colour alone hardly determines."""
 
     output: Annotated[Literal["modes", "targets"], ui("Y", published="targets", when=_PSEUDO)] = (
         "modes"
@@ -166,7 +167,8 @@ class PseudoParticleParams(Params):
     """What goes to the fusion: every mode that is not background, or the confirmed targets."""
 
     size_jitter: Annotated[float, Field(ge=0.0, le=1.0), ui("σ_s", step=0.01, advanced=True)] = 0.1
-    """Spread of the newcomers' sizes around what a target has at a place: people differ."""
+    """Relative spread of new particles' sizes around that of a target at the place: people
+    differ."""
 
     merge_distance: Annotated[
         float,
@@ -178,17 +180,17 @@ class PseudoParticleParams(Params):
     newcomer_misses: Annotated[
         int, Field(ge=1, le=50), ui("n_m", unit="steps", step=1, advanced=True, when=_PSEUDO)
     ] = 2
-    """An unconfirmed target that is not found at so many steps in a row is given up."""
+    """An unconfirmed target that is not detected at so many steps in a row ends."""
 
     velocity_memory: Annotated[
         float, Field(ge=0.0, le=0.99), ui("μ", step=0.05, advanced=True, when=_PSEUDO)
     ] = 0.8
-    """Share of the mean displacement that a new one leaves as it is."""
+    """Weight of the old mean displacement at each new one."""
 
     position_gate: Annotated[
         float, Field(ge=0.5, le=10.0), ui("k_a", step=0.5, advanced=True, when=_PSEUDO)
     ] = 3.0
-    """A target at an unknown place is as likely as one so many deviations σ_a off."""
+    """A target at an unknown place is as likely as one so many standard deviations σ_a away."""
 
     @property
     def asks_foreground(self) -> bool:

@@ -20,26 +20,27 @@ class ShapesParams(Params):
     least_odds: Annotated[float, Field(ge=-6.0, le=10.0), ui("ln o", step=0.1, essential=True)] = (
         0.5
     )
-    """Logarithm of the odds from which a window of the picture is taken for a person there."""
+    """Log odds from which a window of the picture counts as a person in this camera."""
 
     passed_odds: Annotated[float, Field(ge=-6.0, le=10.0), ui("ln o_2", step=0.1)] = -1.5
-    """Likewise from which it is passed on to the fusion, where several cameras may agree on it."""
+    """Log odds from which a window is passed on to the fusion, where several cameras may agree on
+    it."""
 
     even_odds: Annotated[float, Field(ge=-6.0, le=10.0), ui("ln o_0", step=0.1, advanced=True)] = (
         2.3
     )
-    """Logarithm of the odds at which what was passed on is as likely somebody's as nobody's."""
+    """Log odds at which a window that was passed on is equally likely a person and clutter."""
 
     odds_weight: Annotated[float, Field(ge=0.0, le=5.0), ui("a_s", step=0.1, advanced=True)] = 2.0
-    """By how much each further unit of them speaks for a person, and each below it against one."""
+    """Factor from the log odds beyond the even ones to the log likelihood ratio of a person."""
 
     largest_ratio: Annotated[float, Field(ge=0.0, le=20.0), ui("ln Λ", step=0.1, advanced=True)] = (
         3.0
     )
-    """Logarithm of the largest likelihood ratio with which a shape alone speaks for a person."""
+    """Largest log likelihood ratio of a person that a shape alone can give."""
 
     overlap: Annotated[float, Field(ge=0.05, le=0.9), ui("o_s", step=0.05, advanced=True)] = 0.3
-    """Windows whose intersection over union is larger are of one person: the best one stays."""
+    """Intersection over union above which two windows are of one person; the better one remains."""
 
     place_sigma: Annotated[
         float, Field(ge=0.01, le=1.0), ui("σ_s", unit="m", step=0.01, log=True)
@@ -49,17 +50,19 @@ class ShapesParams(Params):
     size_sigma: Annotated[
         float, Field(ge=0.01, le=3.0), ui("σ_h", unit="half sizes", step=0.01, log=True)
     ] = 0.2
-    """Standard deviation of the half sizes of a person's box: how far they tell depth."""
+    """Standard deviation of the half sizes of a person's box; the smaller, the more it tells
+    depth."""
 
     pixel_sigma: Annotated[
         float, Field(ge=0.0, le=50.0), ui("σ_px", unit="px", step=0.1, advanced=True)
     ] = 1.5
-    """Noise of a place however small the person is; it adds to the other."""
+    """Part of the noise of a person's place that does not depend on the person's size in the
+    picture."""
 
     cover: Annotated[
         float, Field(ge=1.0, le=10.0), ui("k_c", unit="half sizes", step=0.1, advanced=True)
     ] = 2.0
-    """Who is hidden by another lies within so many half sizes of that one's box."""
+    """An occluded person lies within so many half sizes of the box that hides the person."""
 
 
 _TRACKING = frozenset(

@@ -14,43 +14,49 @@ class SmoothingParams(Params):
     """Smoothing of the tracks over all steps: positions, ends, gaps and identities."""
 
     iterations: Annotated[int, Field(ge=1, le=10), ui("n", step=1)] = 2
-    """How often boxes are shared out anew by the smoothed tracks, and the tracks fitted to them."""
+    """Number of times that boxes are associated with the smoothed tracks, and tracks fitted to
+    them."""
 
     learning: Annotated[bool, ui("s, b, f")] = True
-    """Whether people's heights and process noise, the cameras' offsets and noise, and how low boxes
-    lie against the templates are learnt."""
+    """Whether people's heights and process noise, the cameras' offsets and noise, and the offset of
+    boxes from the templates are estimated."""
 
     memory: Annotated[float, Field(ge=0.05, le=10.0), ui("τ_z", unit="s", step=0.05, log=True)] = (
         0.25
     )
-    """Correlation time of a camera's boxes and misses: within it they repeat each other."""
+    """Correlation time of a camera's boxes and misses, within which they count as one
+    observation."""
 
     change: Annotated[float, Field(ge=0.0, le=20.0), ui("c", step=0.5)] = 4.0
-    """Log odds against a person's leaving within a track, and against a return."""
+    """Log odds against a person becoming absent within a track, and against a return."""
 
     reach: Annotated[float, Field(ge=0.0, le=10.0), ui("t_e", unit="s", step=0.1)] = 1.0
-    """How far beyond its first and last box a track looks for more."""
+    """Time before the first and after the last box of a track in which further boxes are sought."""
 
     doubt: Annotated[float, Field(ge=0.05, le=1.0), ui("d", step=0.05)] = 0.6
-    """Identities: a track is cut where so great a share of its boxes may as well be another's."""
+    """Identities: a track is split where this share of its boxes may as well belong to another
+    track."""
 
     jump: Annotated[float, Field(ge=5.0, le=1000.0), ui("J", step=5.0, log=True)] = 40.0
-    """Identities: squared Mahalanobis distance of past and future from which a track is cut."""
+    """Identities: squared Mahalanobis distance between past and future from which a track is
+    split."""
 
     exchange: Annotated[float, Field(ge=-20.0, le=50.0), ui("x", step=0.5)] = -2.0
-    """Identities: log odds of two people exchanged from which both are cut, to be joined anew."""
+    """Identities: log odds of a swap of two tracks from which both are split, and then linked
+    again."""
 
     gap: Annotated[float, Field(ge=0.1, le=30.0), ui("t_g", unit="s", step=0.1)] = 1.0
-    """Identities: a track is cut where nobody saw it for longer."""
+    """Identities: a track is split where no camera detected it for longer."""
 
     longest: Annotated[float, Field(ge=0.1, le=60.0), ui("t_j", unit="s", step=0.5)] = 2.0
-    """Identities: pieces are joined by motion over gaps up to this, by appearance over longer."""
+    """Identities: tracklets are linked by motion over gaps up to this, by appearance over
+    longer."""
 
     keeping: Annotated[float, Field(ge=0.0, le=20.0), ui("k", step=0.5)] = 2.0
-    """Identities: log odds with which the filter's label joins pieces over longer gaps."""
+    """Identities: log odds that the filter's label adds to links over longer gaps."""
 
     rounds: Annotated[int, Field(ge=1, le=5), ui("n_i", step=1)] = 2
-    """Identities: how often they are resolved, each time from the tracks of the time before."""
+    """Identities: number of resolutions, each from the tracks of the one before."""
 
     appearance: Annotated[float, Field(ge=0.0, le=5.0), ui("α", step=0.1)] = 1.0
     """Identities: weight of the appearance; 0 leaves it out."""
@@ -75,5 +81,5 @@ IDENTITIES = Method(
     name="identities",
     help="Smoothed, and identities resolved over the whole recording.",
     uses=Uses(reads=(Reads("smoothing"),)),
-    settles_who=True,
+    resolves_identities=True,
 )

@@ -46,7 +46,7 @@ class Working:
         used = parameters.method("single_view").used(parameters)
         if not used.pictures:
             return Working(sequence, reader, views)
-        if used.reads_number("pictures", "lines"):
+        if used.reads_parameter("pictures", "lines"):
             views = tuple(
                 working_view(
                     camera, sequence.room, sequence.target_half_extents, parameters.pictures
@@ -55,7 +55,7 @@ class Working:
             )
         if any(view is not None for view in views):
             sequence, reader = _reduced(sequence, views), _WorkingReader(reader, views)
-        if used.reads_number("pictures", "steady_from"):
+        if used.reads_parameter("pictures", "steady_from"):
             reader = SteadyReader(sequence, reader, views, parameters.pictures.steady_from)
         return Working(sequence, reader, views)
 
