@@ -22,7 +22,7 @@ from tracker.kernels import lens
 from tracker.kernels.lens import Calibration, Calibrations, Projection
 
 NEAREST_DEPTH = 0.05
-"""Metres: a point nearer than this in front of the lens counts as behind the camera."""
+"""Depth below which a point counts as behind the camera, metres."""
 
 _LENS_ITERATIONS = 12
 """Largest number of Newton iterations, each of which doubles the correct digits."""
@@ -97,10 +97,10 @@ class Camera:
 
     @cached_property
     def largest_radius(self) -> float:
-        """The normalised radius up to which the lens model is one-to-one.
+        """The radius, in units of the depth, up to which the lens model is one-to-one.
 
         Beyond the first extremum of r (1 + k1 r² + k2 r⁴ + k3 r⁶) the polynomial
-        folds back and would project far-outside points inside the image.
+        folds back and would project points far outside the view inside the image.
         """
         if len(self._lens) == lens.GENERAL:
             angles = np.linspace(0.0, np.pi / 2.0, 2000)[1:-1]
@@ -145,10 +145,10 @@ class Camera:
     def project(
         self, points: Float[ndarray, "N 3"]
     ) -> tuple[Float[ndarray, "N 2"], Bool[ndarray, " N"]]:
-        """Project world points (metres) to pixels, and say whether each is in front of the lens.
+        """Project world points (metres) to pixels, and return whether each projection is valid.
 
-        Points behind the camera, and points so far aside that the lens model
-        is not valid, result in NaN and False.
+        Points behind the camera, and points so far aside that the lens model is not valid
+        (:attr:`largest_radius`), result in NaN and False.
         """
         projection = self._project(points, with_jacobian=False)
         return projection.pixels, projection.valid
@@ -216,7 +216,10 @@ class Camera:
 
 
 def stacked(cameras: Many[Camera]) -> Calibrations:
-    """Stack C cameras to the form that the compiled kernels take."""
+    """Stack C cameras in the form that the compiled kernels take.
+
+    The shorter distortions are padded with zeros; without cameras all arrays are empty.
+    """
     each = [camera.calibration for camera in cameras]
     longest = max((len(one.distortion) for one in each), default=5)
     return Calibrations(

@@ -9,7 +9,7 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from tracker.geometry.consistency.observed import upright_rays
-from tracker.geometry.consistency.suggestion import agreement, suggest
+from tracker.geometry.consistency.suggestion import consensus_of_cameras, suggest
 from tracker.sequences.errors import SequenceError
 from tracker.sequences.fields import Fields, listed
 from tracker.sequences.sequence import Room, View
@@ -132,7 +132,7 @@ def find_room(
             frames = np.zeros(0, int) if own is None else own.frames[kept]
             boxes = np.zeros((0, 4)) if own is None else own.boxes[kept]
             rays.append(upright_rays(frames, boxes, view.camera))
-        agreed = agreement(cameras, rays)
+        agreed = consensus_of_cameras(cameras, rays)
     found = suggest(cameras, agreed, half_extents)
     if found is None:
         missing = "room" if room is None else "target"

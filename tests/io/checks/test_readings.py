@@ -9,7 +9,7 @@ import pytest
 
 from tests.mistakes import MISTAKES
 from tests.random_rooms import random_room
-from tracker.geometry.consistency.suggestion import agreement, suggest
+from tracker.geometry.consistency.suggestion import consensus_of_cameras, suggest
 from tracker.io.checks import check
 from tracker.io.checks.boxes import listen, raw_cameras
 from tracker.io.checks.reading import FLIP, Reading, pose, read_boxes, to_camera, upright
@@ -176,7 +176,7 @@ def test_room_and_people_are_suggested(seed: int) -> None:
         for v in sequence.views
         if v.detections is not None
     ]
-    found = suggest(sequence.cameras, agreement(sequence.cameras, rays))
+    found = suggest(sequence.cameras, consensus_of_cameras(sequence.cameras, rays))
     assert found is not None
     truth = sequence.ground_truth
     assert truth is not None

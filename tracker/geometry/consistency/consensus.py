@@ -3,7 +3,7 @@
 Two cameras see head and foot of a person as four rays. Rays of the same person meet, in front
 of both lenses; rays of different people, or of cameras with a wrong calibration, meet by chance
 only. All people stand in the same direction and are of about one height, so the vectors from
-foot to head (here *rises*) agree with each other, in whatever axes and unit the
+foot to head (here *rises*) are nearly equal, in whatever axes and unit the
 world has. Points are triangulated by the midpoint method: the middle of the shortest segment
 between two rays (Hartley, Sturm, "Triangulation", Computer Vision and Image Understanding
 68(2), 1997, §5.3).
@@ -22,20 +22,20 @@ from numpy import ndarray
 from tracker.geometry.consistency.observed import PairsOfBoxes, Pose, Rays, in_world
 
 LARGEST_GAP = 0.15
-"""Largest distance between two rays that meet, as a share of the person's height there."""
+"""Largest distance between two rays of one point, as a share of the person's height there."""
 
 SPREAD = 0.25
-"""Largest distance of a rise from the common one, as a share of the latter's length."""
+"""Largest distance of a rise from the common one, as a share of the length of the common one."""
 
-_LEAST_SINE = 0.05  # of the angle between two rays, below which their depth is undetermined
-_LARGEST_RATIO = 2.5  # between the heights that two cameras see; one may look down steeply
-_HYPOTHESES = 200  # rises that are tried as the common one
-_MOST_VOTES = 2000  # rises that vote for each
+_LEAST_SINE = 0.05  # sine of the angle between two rays below which their depth is undetermined
+_LARGEST_RATIO = 2.5  # largest ratio of one person's heights by two cameras, for steep views
+_HYPOTHESES = 200  # number of rises that are tried as the common one
+_MOST_VOTES = 2000  # largest number of rises that are compared with each of these
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Meetings:
-    """N pairs of boxes whose rays meet, in the axes and the unit of the calibration's world."""
+class TriangulatedPairs:
+    """N pairs of boxes whose rays nearly intersect, in the world's axes and unit."""
 
     pairs: Int[ndarray, " N"]
     """Index into the pairs of boxes."""
@@ -44,7 +44,8 @@ class Meetings:
     rises: Float[ndarray, "N 3"]
     """Vectors from foot to head."""
     gaps: Float[ndarray, " N"]
-    """Distance between two rays, the larger of that at head and foot, as a share of the height."""
+    """The larger of the distances between the two rays to the head and between those to the foot,
+    as a share of the person's height."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,15 +53,15 @@ class Consensus:
     """The consensus of all pairs of boxes, with N agreeing pairs, in the world's axes and unit."""
 
     rise: Float[ndarray, " 3"]
-    """The common vector from foot to head; zero without any person."""
+    """The common vector from foot to head; zero without any pair."""
     share: float
     """:attr:`agreeing` / :attr:`possible`, 0 … 1."""
     shares: Mapping[tuple[int, int], float]
-    """The same share for every pair of cameras that have boxes at the same steps."""
+    """The same share by the indices of two cameras that have boxes at the same steps."""
     agreeing: int
-    """Number of pairs of boxes that meet with the common rise, each box in one pair at most."""
+    """N: number of pairs of boxes with a rise near the common one, each box in one pair at most."""
     possible: int
-    """Largest possible number of such pairs."""
+    """Largest possible number of such pairs: :attr:`PairsOfBoxes.most`, summed over the cameras."""
     steps: Int[ndarray, " N"]
     """Step of each agreeing pair."""
     feet: Float[ndarray, "N 3"]
@@ -68,9 +69,10 @@ class Consensus:
     rises: Float[ndarray, "N 3"]
     """Vector from foot to head of each agreeing pair."""
     gaps: Float[ndarray, " N"]
-    """Distance between the rays of each agreeing pair, as in :class:`Meetings`."""
+    """Distance between the rays of each agreeing pair, as in :class:`TriangulatedPairs`."""
     fits: Float[ndarray, " N"]
-    """Weight of each agreeing pair: 1 for a perfect fit, 0 at the bound."""
+    """Weight of each agreeing pair, 1 … 0: (1 − (gap / :data:`LARGEST_GAP`)²) (1 − (distance of the
+    rise from the common one / :data:`SPREAD`)²)."""
     cameras: Int[ndarray, "N 2"]
     """Indices of the two cameras of each agreeing pair."""
 
@@ -80,8 +82,13 @@ class Consensus:
         return float(np.linalg.norm(self.rise))
 
 
-def meet(pairs: PairsOfBoxes, first: Rays, second: Rays, one: Pose, other: Pose) -> Meetings:
-    """Triangulate pairs of boxes; those whose heads and feet meet before both cameras remain.
+def triangulate_pairs(
+    pairs: PairsOfBoxes, first: Rays, second: Rays, one: Pose, other: Pose
+) -> TriangulatedPairs:
+    """Triangulate heads and feet of pairs of boxes, and select the pairs that may be one person.
+
+    The gap between the rays is below :data:`LARGEST_GAP`, both points are in front of both cameras,
+    and the heights of the person by the two cameras differ by a factor of at most 2.5.
 
     Args:
         pairs: Pairs of boxes of two cameras.
@@ -89,6 +96,9 @@ def meet(pairs: PairsOfBoxes, first: Rays, second: Rays, one: Pose, other: Pose)
         second: Rays of the second camera's boxes.
         one: Pose of the first camera.
         other: Pose of the second camera.
+
+    Returns:
+        The selected pairs, in the order of ``pairs``.
     """
     whole = np.flatnonzero(first.whole[pairs.first] & second.whole[pairs.second])
     rows, columns = pairs.first[whole], pairs.second[whole]
@@ -105,7 +115,9 @@ def meet(pairs: PairsOfBoxes, first: Rays, second: Rays, one: Pose, other: Pose)
         ratio = np.maximum(seen_one, seen_other) / size
         good = good_h & good_f & (gaps < LARGEST_GAP) & (ratio < _LARGEST_RATIO)
     kept = np.flatnonzero(good)
-    return Meetings(whole[kept], one.centre + feet[kept], heads[kept] - feet[kept], gaps[kept])
+    return TriangulatedPairs(
+        whole[kept], one.centre + feet[kept], heads[kept] - feet[kept], gaps[kept]
+    )
 
 
 def _between(
@@ -113,9 +125,14 @@ def _between(
 ) -> tuple[ndarray, ndarray, ndarray, ndarray, ndarray]:
     """Triangulate rays from the origin and from ``base`` by the midpoint method.
 
+    Args:
+        base: Second camera's position relative to the first one's, world axes and unit.
+        one: Unit directions from the first camera, world axes.
+        other: Unit directions from the second camera, world axes.
+
     Returns:
-        Midpoints, distances along both rays, gaps between the rays, and whether the midpoint is in
-        front of both cameras.
+        Midpoints relative to the first camera, distances along both rays, gaps between the rays,
+        and whether the depth is determined and in front of both cameras.
     """
     together = np.einsum("ni,ni->n", one, other)
     sine_squared = np.maximum(1.0 - together**2, 1e-12)
@@ -135,21 +152,22 @@ def consensus(
     pairs: Mapping[tuple[int, int], PairsOfBoxes],
     rng: np.random.Generator | None = None,
 ) -> Consensus:
-    """Find the consensus of the boxes of all cameras under some poses.
+    """Find the rise that most pairs of boxes have in common, and the pairs that agree with it.
 
     Args:
         rays: Rays of the boxes of each camera.
         poses: Pose of each camera.
         pairs: Pairs of boxes by the indices of two cameras, of
             :func:`tracker.geometry.consistency.observed.pair_up`.
-        rng: Generator that samples where there are many rises; None for a fixed seed.
+        rng: Generator that samples rises where there are many; None for one with the seed 0.
     """
     rng = np.random.default_rng(0) if rng is None else rng
     found = {
-        (a, b): meet(own, rays[a], rays[b], poses[a], poses[b]) for (a, b), own in pairs.items()
+        (a, b): triangulate_pairs(own, rays[a], rays[b], poses[a], poses[b])
+        for (a, b), own in pairs.items()
     }
     rises = np.concatenate([np.zeros((0, 3)), *(met.rises for met in found.values())])
-    rise = _usual(rises, rng)
+    rise = _common_rise(rises, rng)
     shares: dict[tuple[int, int], float] = {}
     agreeing = 0
     feet, all_rises, gaps, fits = (
@@ -162,7 +180,7 @@ def consensus(
     steps = [np.zeros(0, dtype=np.int64)]
     for key, met in found.items():
         own = pairs[key]
-        near = np.flatnonzero(_agree(met.rises, rise))
+        near = np.flatnonzero(_is_near(met.rises, rise))
         kept = near[_one_to_one(own.first[met.pairs[near]], own.second[met.pairs[near]],
                                 met.gaps[near])]  # fmt: skip
         agreeing += len(kept)
@@ -190,13 +208,17 @@ def consensus(
     )
 
 
-def _agree(rises: Float[ndarray, "N 3"], rise: Float[ndarray, " 3"]) -> Bool[ndarray, " N"]:
+def _is_near(rises: Float[ndarray, "N 3"], rise: Float[ndarray, " 3"]) -> Bool[ndarray, " N"]:
+    """Whether each rise is within :data:`SPREAD` of a common one."""
     height = float(np.linalg.norm(rise))
     return np.asarray(np.linalg.norm(rises - rise, axis=1) < SPREAD * height)
 
 
-def _usual(rises: Float[ndarray, "N 3"], rng: np.random.Generator) -> Float[ndarray, " 3"]:
-    """Find the rise with the most others near it, and then their median: a consensus (RANSAC)."""
+def _common_rise(rises: Float[ndarray, "N 3"], rng: np.random.Generator) -> Float[ndarray, " 3"]:
+    """Find the rise with the most others near it, and refine it to their median (RANSAC).
+
+    Source: Fischler, Bolles, "Random sample consensus", Communications of the ACM 24(6), 1981.
+    """
     if not len(rises):
         return np.zeros(3)
     votes = rises
@@ -212,7 +234,7 @@ def _usual(rises: Float[ndarray, "N 3"], rng: np.random.Generator) -> Float[ndar
     near = own @ all_.T > 0.0
     best = tried[int(np.argmax(near.sum(axis=1)))]
     for _ in range(3):
-        around = rises[_agree(rises, best)]
+        around = rises[_is_near(rises, best)]
         if not len(around):
             break
         best = np.median(around, axis=0)
@@ -222,7 +244,7 @@ def _usual(rises: Float[ndarray, "N 3"], rng: np.random.Generator) -> Float[ndar
 def _one_to_one(
     first: Int[ndarray, " N"], second: Int[ndarray, " N"], gaps: Float[ndarray, " N"]
 ) -> Int[ndarray, " K"]:
-    """The pairs with the smallest gap of both their boxes."""
+    """Indices of the pairs that have the smallest gap of all pairs of either of their boxes."""
     order = np.argsort(gaps, kind="stable")
     best_of_first = np.zeros(len(gaps), dtype=bool)
     best_of_second = np.zeros(len(gaps), dtype=bool)

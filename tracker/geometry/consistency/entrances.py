@@ -13,18 +13,19 @@ RADIUS = 1.0
 """Distance on the floor within which tracks begin at the same entrance, metres."""
 
 AT_THE_EDGE = 0.75
-"""Distance from the edge of the occupied area within which a single beginning counts, metres."""
+"""Distance from the edge of the area that tracks cover within which a single end of a track makes
+an entrance, metres."""
 
 AGAIN_WITHIN = 1.5
-"""Metres and seconds: a track that begins within both of the end of another one was lost there and
-found again, and did not come in."""
+"""Distance in metres, and time in seconds, after the end of a track within which a track that
+begins is a continuation of it and not a new person."""
 
 SOON = 0.5
-"""Seconds at both ends of the recording in which tracks do not begin or end at an entrance, and the
-least duration of a track."""
+"""Time at both ends of the recording in which beginnings and ends of tracks are ignored, and least
+duration of a track, seconds."""
 
-_LEAST_SIGMA = np.array([0.3, 0.3, 0.15])  # metres: a door, and people of several heights
-_PRIOR = 3.0  # weight of the least deviations, in beginnings
+_LEAST_SIGMA = np.array([0.3, 0.3, 0.15])  # prior deviations, metres: a door, people's heights
+_PRIOR = 3.0  # weight of the prior deviations, in ends of tracks
 
 MOST = 12
 """Largest number of entrances that are suggested."""
@@ -74,25 +75,25 @@ def suggest_entrances(
     lasting = frames[last] - frames[first] >= soon
     first, last = first[lasting], last[lasting]
     begun, ended = frames[first], frames[last]
-    again = _again(begun, positions[first], ended, positions[last], fps)
-    lost = _again(-ended, positions[last], -begun, positions[first], fps)
+    again = _reappears(begun, positions[first], ended, positions[last], fps)
+    lost = _reappears(-ended, positions[last], -begun, positions[first], fps)
     comes = first[(begun >= soon) & ~again]
     goes = last[(ended < steps - soon) & ~lost]
     places = positions[np.concatenate([comes, goes])]
-    at_edge = _from_edge(positions[:, :2], places[:, :2]) <= AT_THE_EDGE
+    at_edge = _distance_from_edge(positions[:, :2], places[:, :2]) <= AT_THE_EDGE
     doors: list[Door] = []
     while len(places):
         apart = np.linalg.norm(places[:, None, :2] - places[None, :, :2], axis=2)
         near = apart <= RADIUS
         near = near[int(near.sum(axis=1).argmax())]
         if near.sum() > 1 or at_edge[near].all():
-            doors.append(_door(places[near]))
+            doors.append(_entrance(places[near]))
         places, at_edge = places[~near], at_edge[~near]
     return sorted(doors, key=lambda door: -door.tracks)[:MOST]
 
 
 def not_yet_there(doors: list[Door], known: Iterable[Float[ndarray, " 3"]]) -> list[Door]:
-    """Select the entrances that are near none of the known places, world metres."""
+    """Select the entrances that are farther than :data:`RADIUS` from all known places, metres."""
     places = [place[:2] for place in known]
     return [
         door
@@ -101,14 +102,22 @@ def not_yet_there(doors: list[Door], known: Iterable[Float[ndarray, " 3"]]) -> l
     ]
 
 
-def _again(
+def _reappears(
     begun: Int[ndarray, " T"],
     where: Float[ndarray, "T 3"],
     ended: Int[ndarray, " T"],
     there: Float[ndarray, "T 3"],
     fps: float,
 ) -> Bool[ndarray, " T"]:
-    """Whether each track begins where another one ended shortly before."""
+    """Whether each track begins near the end of another one, within :data:`AGAIN_WITHIN`.
+
+    Args:
+        begun: First step of each of T tracks.
+        where: Position of each track at its first step, world metres.
+        ended: Last step of each track.
+        there: Position of each track at its last step, world metres.
+        fps: Steps per second.
+    """
     if not len(begun):
         return np.zeros(0, dtype=bool)
     seconds = (begun[:, None] - ended[None]) / fps
@@ -117,7 +126,7 @@ def _again(
     return np.asarray(near.any(axis=1))
 
 
-def _from_edge(
+def _distance_from_edge(
     points: Float[ndarray, "N 2"], places: Float[ndarray, "M 2"]
 ) -> Float[ndarray, " M"]:
     """The distance of each place inside the convex hull of points from its edge, metres."""
@@ -131,7 +140,8 @@ def _from_edge(
     )
 
 
-def _door(places: Float[ndarray, "M 3"]) -> Door:
+def _entrance(places: Float[ndarray, "M 3"]) -> Door:
+    """Estimate mean and standard deviations of an entrance from M ends of tracks, world metres."""
     middle = places.mean(axis=0)
     squares = ((places - middle) ** 2).sum(axis=0)
     sigma = np.sqrt((squares + _PRIOR * _LEAST_SIGMA**2) / (len(places) + _PRIOR))

@@ -64,7 +64,8 @@ class PairsOfBoxes:
     second: Int[ndarray, " P"]
     """Index of the box of the second camera."""
     most: int
-    """Largest number of pairs of one person: the smaller number of boxes, summed over the steps."""
+    """Largest number of pairs with each box in one pair at most: the smaller one of the two
+    cameras' numbers of boxes, summed over the steps."""
 
 
 def pair_up(first: Rays, second: Rays, most_pairs: int = 20_000) -> PairsOfBoxes:
@@ -107,6 +108,7 @@ def pair_up(first: Rays, second: Rays, most_pairs: int = 20_000) -> PairsOfBoxes
 
 
 def _span(frames: Int[ndarray, " D"], steps: Int[ndarray, " S"]) -> tuple[ndarray, ndarray]:
+    """The first row of each step, and one past the last, in ascending steps of rows."""
     return np.searchsorted(frames, steps, "left"), np.searchsorted(frames, steps, "right")
 
 
@@ -165,5 +167,5 @@ def rays_of(
 
 
 def upright_rays(frames: ndarray, boxes: Float[ndarray, "D 4"], camera: Camera) -> Rays:
-    """Convert boxes of a calibrated camera to rays, in a world in which people stand along z."""
+    """Convert boxes of a calibrated camera to rays, where people stand along the world's z axis."""
     return rays_of(frames, boxes, camera, up=camera.rotation[:, 2])

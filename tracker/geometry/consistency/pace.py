@@ -13,7 +13,7 @@ from scipy.spatial import KDTree
 
 from tracker.geometry.camera import Camera
 from tracker.geometry.consistency.observed import Rays
-from tracker.geometry.consistency.suggestion import agreement
+from tracker.geometry.consistency.suggestion import consensus_of_cameras
 
 WALKING = 1.2
 """Speed at which people walk indoors and among others, metres per second: a little below the
@@ -23,17 +23,18 @@ SHARE = 0.8
 """Quantile of the displacements: most people in a room stand, talk or sit at any moment."""
 
 CLEAR = 0.3
-"""Displacement above which it is not due to measurement errors, metres."""
+"""Displacement above which people have moved, and which measurement errors do not explain,
+metres."""
 
 LAGS = (1, 2, 4, 8, 16, 32)
 """Numbers of steps over which displacements are measured."""
 
-_FARTHEST = 1.5  # metres: largest displacement, beyond which people are confused
-_SAME = 0.4  # metres: pairs of boxes that meet so near to each other show one person
-_LEAST_WAYS = 30  # displacements
-_APART = 1e4  # metres between the points of one step and those of the next, in one tree
-_BLOCK = 2 * LAGS[-1]  # consecutive steps
-_MOST_BOXES = 12_000  # of all cameras
+_FARTHEST = 1.5  # largest displacement, metres; beyond it people would be confused
+_SAME = 0.4  # distance below which two triangulated places are of one person, metres
+_LEAST_WAYS = 30  # least number of displacements for an estimate
+_APART = 1e4  # distance between the points of consecutive steps in one search tree, metres
+_BLOCK = 2 * LAGS[-1]  # number of consecutive steps that are sampled together
+_MOST_BOXES = 12_000  # largest number of boxes of all cameras that are used
 
 
 def pace(cameras: Many[Camera], rays: Many[Rays]) -> float | None:
@@ -46,20 +47,20 @@ def pace(cameras: Many[Camera], rays: Many[Rays]) -> float | None:
     Returns:
         Metres per step; None where no displacement exceeds the measurement errors.
     """
-    within = [own.take(np.flatnonzero(np.isin(own.frames, _looked_at(rays)))) for own in rays]
-    agreed = agreement(cameras, within, most_pairs=10**9)
+    within = [own.take(np.flatnonzero(np.isin(own.frames, _sampled_steps(rays)))) for own in rays]
+    agreed = consensus_of_cameras(cameras, within, most_pairs=10**9)
     steps, places = _people(agreed.steps, agreed.feet[:, :2])
     for lag in LAGS:
-        ways = _ways(steps, places, lag)
-        if len(ways) >= _LEAST_WAYS:
-            way = float(np.quantile(ways, SHARE))
-            if way > CLEAR:
-                return way / lag
+        displacements = _displacements(steps, places, lag)
+        if len(displacements) >= _LEAST_WAYS:
+            displacement = float(np.quantile(displacements, SHARE))
+            if displacement > CLEAR:
+                return displacement / lag
     return None
 
 
-def _looked_at(rays: Many[Rays]) -> Int[ndarray, " K"]:
-    """Blocks of consecutive steps, spread over the recording, with a limited number of boxes."""
+def _sampled_steps(rays: Many[Rays]) -> Int[ndarray, " K"]:
+    """The steps that are used: blocks spread over the recording, with a limited number of boxes."""
     frames = np.concatenate([np.zeros(0, dtype=np.int64), *(own.frames for own in rays)])
     if not len(frames):
         return frames
@@ -83,10 +84,10 @@ def _people(
     return first, np.stack(means, axis=1)
 
 
-def _ways(
+def _displacements(
     steps: Int[ndarray, " M"], places: Float[ndarray, "M 2"], lag: int
 ) -> Float[ndarray, " W"]:
-    """The distances between people ``lag`` steps apart, paired as mutual nearest neighbours."""
+    """Displacements over ``lag`` steps, metres, of people paired as mutual nearest neighbours."""
     if not len(steps):
         return np.zeros(0)
     now, later = _in_one_tree(steps, places), _in_one_tree(steps - lag, places)
@@ -98,10 +99,12 @@ def _ways(
 
 
 def _nearest(tree: Float[ndarray, "M 3"], points: Float[ndarray, "K 3"]) -> tuple[ndarray, ndarray]:
-    """The distance of each point from the nearest of a tree, infinite beyond reach, and its row."""
+    """Distance of each point from the nearest point of a tree, infinite beyond 1.5 m, and the index
+    of that point."""
     far, row = KDTree(tree).query(points, distance_upper_bound=_FARTHEST)
     return np.asarray(far), np.asarray(row)
 
 
 def _in_one_tree(steps: Int[ndarray, " N"], places: Float[ndarray, "N 2"]) -> ndarray:
+    """Points (N, 3) whose third coordinate separates different steps, for one search tree."""
     return np.column_stack([places, steps * _APART])

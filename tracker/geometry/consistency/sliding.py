@@ -19,12 +19,12 @@ SIGMA = 0.06
 DEPTH_SIGMA = 0.15
 """σ_λ: standard deviation of the logarithm of the distance that is estimated from a box's size."""
 
-_LINKED = 0.5  # heights that a box may move in a step, and by which share its height may change
-_STEP = 0.05  # of the logarithm of the distance, for the derivative
+_LINKED = 0.5  # largest motion of a box's head or foot in a step, in heights of the box
+_STEP = 0.05  # change of the logarithm of the distance for the numerical derivative
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Course:
+class LinkedBoxes:
     """The D boxes of one camera over F steps, sorted by step."""
 
     camera: Camera
@@ -39,7 +39,9 @@ class Course:
     """Index of the box of the same person one step later, -1 for none."""
 
 
-def course(camera: Camera, rays: Rays, boxes: Float[ndarray, "D 4"], frames: int) -> Course:
+def link_boxes(
+    camera: Camera, rays: Rays, boxes: Float[ndarray, "D 4"], frames: int
+) -> LinkedBoxes:
     """Link the boxes of a camera from step to step.
 
     Args:
@@ -52,11 +54,11 @@ def course(camera: Camera, rays: Rays, boxes: Float[ndarray, "D 4"], frames: int
     ends = np.stack([middle, boxes[:, 1], middle, boxes[:, 1] + boxes[:, 3]], axis=1)
     ends[~rays.whole] = np.nan
     starts = np.searchsorted(rays.frames, np.arange(frames + 1))
-    return Course(camera, rays, ends, starts, _following(ends, starts))
+    return LinkedBoxes(camera, rays, ends, starts, _following(ends, starts))
 
 
 def _following(ends: Float[ndarray, "D 4"], starts: Int[ndarray, " F1"]) -> Int[ndarray, " D"]:
-    """The box of the next step that follows each, where both are mutual nearest neighbours."""
+    """Index of the box one step later that is each box's mutual nearest neighbour, -1 for none."""
     following = np.full(len(ends), -1, dtype=np.int64)
     for first, last, end in zip(starts[:-2], starts[1:-1], starts[2:], strict=True):
         if first == last or last == end:
@@ -72,17 +74,17 @@ def _following(ends: Float[ndarray, "D 4"], starts: Int[ndarray, " F1"]) -> Int[
     return following
 
 
-def slid(
-    one: Course,
-    other: Course,
+def agreement_by_offset(
+    one: LinkedBoxes,
+    other: LinkedBoxes,
     offsets: Float[ndarray, " O"],
     height: float,
     most_steps: int = 150,
 ) -> tuple[Float[ndarray, "O S"], Float[ndarray, "O S"]]:
-    """Compute the agreement of two cameras' boxes for time offsets between them.
+    """Compute the agreement of two cameras' boxes as a function of the time offset between them.
 
-    The size of a box in camera ``one`` gives the person's distance, and so the box in the other
-    camera: across the epipolar line within the noise, along it within the error of that
+    The size of a box in camera ``one`` gives the person's distance, and so predicts the box in the
+    other camera: across the epipolar line up to the noise, along it up to the error of that
     distance. :mod:`tracker.kernels.sliding` has the equation.
 
     Args:
@@ -93,7 +95,8 @@ def slid(
         most_steps: Largest number S of steps of ``one`` that are sampled evenly.
 
     Returns:
-        Sum of the fits, 0 … 1 each, for every offset and sampled step, and their number.
+        For every offset and sampled step the sum of the predictions' fits, 0 … 1 each, and the
+        number of predictions.
     """
     counts = np.diff(one.starts)
     steps = np.flatnonzero(counts)
@@ -103,7 +106,7 @@ def slid(
         [np.zeros(0, dtype=np.int64), *(np.arange(*one.starts[k : k + 2]) for k in steps)]
     )
     starts = np.concatenate([[0], np.cumsum(counts[steps])])
-    expected, tangents = _seen_by(other.camera, one, rows, height)
+    expected, tangents = _predicted_boxes(other.camera, one, rows, height)
     fits: tuple[ndarray, ndarray] = sliding.slide(
         expected, tangents, starts, steps, other.ends, other.following, other.starts,
         np.asarray(offsets, dtype=float), SIGMA, DEPTH_SIGMA,
@@ -111,8 +114,8 @@ def slid(
     return fits
 
 
-def _seen_by(
-    camera: Camera, one: Course, rows: Int[ndarray, " N"], height: float
+def _predicted_boxes(
+    camera: Camera, one: LinkedBoxes, rows: Int[ndarray, " N"], height: float
 ) -> tuple[Float[ndarray, "N 4"], Float[ndarray, "N 4"]]:
     """Predict heads and feet in another camera, and their derivatives by the log distance.
 
@@ -123,11 +126,12 @@ def _seen_by(
         height: Height of people, metres.
 
     Returns:
-        x and y of head and foot, pixels, NaN where not in the image; and the derivatives.
+        x and y of head and foot, pixels, NaN where not in the image; and their derivatives by the
+        logarithm of the distance, pixels.
     """
     heads = one.rays.heads[rows] @ one.camera.rotation
     feet = one.rays.feet[rows] @ one.camera.rotation
-    # s u − t v = (0, 0, h) in the least squares, for unit vectors u, v
+    # the distances s and t of head and foot solve s u − t v = (0, 0, h) in the least squares
     together = (heads * feet).sum(axis=1)
     determinant = np.maximum(1.0 - together**2, 1e-9)
     s = height * (heads[:, 2] - together * feet[:, 2]) / determinant

@@ -28,15 +28,15 @@ from numpy import ndarray
 
 from tracker.geometry.camera import Camera
 
-_SLIMMEST, _BROADEST = 0.2, 0.8  # T / L of people and of parts of them
-_USUAL = 0.4
+_SLIMMEST, _BROADEST = 0.2, 0.8  # bounds of T / L, of people and of parts of them
+_USUAL = 0.4  # T / L where the box does not determine it
 _APART = 0.25  # least difference of d_x² and d_y² for which L and T are determined
-_LEAST_SINE = 0.25  # of φ: a person seen from above shows no height
-_STEP = 1e-3  # of a ray, for the direction of its motion in the image
+_LEAST_SINE = 0.25  # least sin φ: a person seen from above shows no height
+_STEP = 1e-3  # change of a unit direction for the numerical derivative of its pixel
 
 
 def sides(boxes: Float[ndarray, "D 4"], turn: int) -> tuple[ndarray, ndarray]:
-    """The middles of the side with the head and of the opposite side, pixels.
+    """The middles of the side with the head and of the opposite side, two arrays (D, 2), pixels.
 
     Args:
         boxes: Left, top, width, height of D boxes, pixels.

@@ -14,17 +14,17 @@ from tracker.geometry.consistency.consensus import Consensus, consensus
 from tracker.geometry.consistency.observed import Rays, pair_up, pose_of
 
 STANDING = np.array([0.3, 0.3, 0.85])
-"""Half width, depth and height of a standing person, metres, the target by default."""
+"""Half width, depth and height of a standing person, metres: the default target."""
 
 LEAST_AGREEING = 20
 """Least number of agreeing pairs of boxes for an estimate of room and people."""
 
-_SHORTEST_STANDING, _TALLEST_STANDING = 1.45, 2.3  # metres, of boxes: a detector's may be padded
-_USUAL_HEIGHT, _TRUST = 1.70, 0.3  # metres, of standing people; weight of the boxes against it
-_USUAL_SLENDERNESS = 0.36  # ratio of width and height of a standing person's box in the model
-_MARGIN = 0.5  # metres around the places of feet
-_OUTLIERS = 0.01  # share on either side
-_FARTHEST = 30.0  # metres: farther overlaps of views are of no use
+_SHORTEST_STANDING, _TALLEST_STANDING = 1.45, 2.3  # heights of standing people's boxes, metres
+_USUAL_HEIGHT, _TRUST = 1.70, 0.3  # prior height, metres; weight of the boxes' height against it
+_USUAL_SLENDERNESS = 0.36  # ratio of width and height of a standing target
+_MARGIN = 0.5  # extent of the room beyond the places of people, metres
+_OUTLIERS = 0.01  # share of the places on either side that may be outside the room
+_FARTHEST = 30.0  # largest distance between a camera and the overlap of views, metres
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,10 +40,12 @@ class Suggestion:
     floor: float
     """Height z of the floor, world metres."""
     people: int
-    """Number of pairs of boxes behind the estimate; 0 where it is from the cameras alone."""
+    """Number of pairs of boxes that the estimate is made from; 0 if from the cameras alone."""
 
 
-def agreement(cameras: Many[Camera], rays: Many[Rays], most_pairs: int = 20_000) -> Consensus:
+def consensus_of_cameras(
+    cameras: Many[Camera], rays: Many[Rays], most_pairs: int = 20_000
+) -> Consensus:
     """Find the consensus of the boxes of calibrated cameras, metres.
 
     Args:
@@ -110,6 +112,7 @@ def stands(height: float) -> bool:
 
 
 def _size(agreed: Consensus) -> Float[ndarray, " 3"]:
+    """Estimate half width, depth and height of a target from the common height, metres."""
     height = agreed.height
     if stands(height):
         height = _USUAL_HEIGHT + _TRUST * (height - _USUAL_HEIGHT)

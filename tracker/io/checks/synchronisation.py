@@ -11,8 +11,8 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from tracker.geometry.consistency.observed import Rays, upright_rays
-from tracker.geometry.consistency.sliding import Course, course, slid
-from tracker.geometry.consistency.suggestion import LEAST_AGREEING, agreement
+from tracker.geometry.consistency.sliding import LinkedBoxes, agreement_by_offset, link_boxes
+from tracker.geometry.consistency.suggestion import LEAST_AGREEING, consensus_of_cameras
 from tracker.io.checks.motion import MOST_STEPS, motion_pairings
 from tracker.io.checks.offsets import Curve, Offset, Pairing, solve
 from tracker.sequences.pictures.frames import FrameReader
@@ -107,10 +107,10 @@ def _told(name: str, offset: Offset, fps: float) -> CameraOffset:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BoxPairing:
-    """The boxes of two cameras, each slid along where the other says that people are."""
+    """The boxes of two cameras, each shifted in time against the predictions from the other."""
 
-    first: Course
-    second: Course
+    first: LinkedBoxes
+    second: LinkedBoxes
     height: float
 
     def scores(
@@ -118,8 +118,8 @@ class BoxPairing:
     ) -> tuple[Float[ndarray, "O S"], Float[ndarray, "O S"]]:
         """Fits and their numbers, of each offset and sampled step."""
         most = 600 if fine else 150
-        there = slid(self.first, self.second, offsets, self.height, most)
-        back = slid(self.second, self.first, -offsets, self.height, most)
+        there = agreement_by_offset(self.first, self.second, offsets, self.height, most)
+        back = agreement_by_offset(self.second, self.first, -offsets, self.height, most)
         return (
             np.concatenate([there[0], back[0]], axis=1),
             np.concatenate([there[1], back[1]], axis=1),
@@ -137,7 +137,7 @@ def box_pairings(
         score_threshold: Boxes below it are left out.
     """
     rays: list[Rays] = []
-    courses: list[Course | None] = []
+    linked: list[LinkedBoxes | None] = []
     for view in sequence.views:
         own = view.detections
         kept = (
@@ -146,16 +146,16 @@ def box_pairings(
         frames = np.zeros(0, dtype=int) if own is None else own.frames[kept]
         boxes = np.zeros((0, 4)) if own is None else own.boxes[kept]
         rays.append(upright_rays(frames, boxes, view.camera))
-        courses.append(
-            course(view.camera, rays[-1], boxes, sequence.frames) if len(frames) else None
+        linked.append(
+            link_boxes(view.camera, rays[-1], boxes, sequence.frames) if len(frames) else None
         )
     if height is None:
-        agreed = agreement(sequence.cameras, rays)
+        agreed = consensus_of_cameras(sequence.cameras, rays)
         known = 2.0 * float(sequence.target_half_extents[2])
         near = 0.5 < agreed.height / known < 2.0 and agreed.agreeing >= LEAST_AGREEING
         height = agreed.height if near else known
     return {
         (a, b): BoxPairing(one, other, height)
-        for (a, one), (b, other) in itertools.combinations(enumerate(courses), 2)
+        for (a, one), (b, other) in itertools.combinations(enumerate(linked), 2)
         if one is not None and other is not None
     }

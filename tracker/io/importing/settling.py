@@ -10,7 +10,12 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from tracker.geometry.camera import Camera
-from tracker.geometry.consistency.suggestion import STANDING, Suggestion, agreement, suggest
+from tracker.geometry.consistency.suggestion import (
+    STANDING,
+    Suggestion,
+    consensus_of_cameras,
+    suggest,
+)
 from tracker.io.checks.level import lean_of
 from tracker.io.checks.reading import Reading, pose, read_boxes, to_camera
 from tracker.io.checks.readings import Open, Seen, find_meaning
@@ -376,7 +381,7 @@ def _room(
     """Where people are, and how large they are: from the boxes, else from the views."""
     agreed = None
     if any(own is not None for own in detections):
-        agreed = agreement(cameras, rays_of_all(cameras, detections))
+        agreed = consensus_of_cameras(cameras, rays_of_all(cameras, detections))
     room = suggest(cameras, agreed)
     if room is None:
         centres = np.array([camera.centre for camera in cameras])
