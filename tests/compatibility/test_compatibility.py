@@ -602,7 +602,7 @@ def test_every_field_of_a_camera_is_read() -> None:
     looks = [detections.embeddings for detections in boxes if detections]
     np.testing.assert_allclose(looks[0], [[0, 1, 0], [0.6, 0.8, 0]], atol=1e-3)
     np.testing.assert_allclose(looks[1], [[0, 0, 1], [0, 1, 0]], atol=1e-3)
-    looked_at = [door.was_looked_at(step) for step in range(8)]
+    looked_at = [door.detector_ran_at(step) for step in range(8)]
     assert looked_at == [True, False, True, False, False, False, False, False]
 
 

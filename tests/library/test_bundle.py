@@ -81,17 +81,17 @@ def test_a_camera_without_a_picture_is_blind_elsewhere_too(tmp_path: Path) -> No
     every = view.detections
     looks = np.eye(5, dtype=np.float16)[np.arange(chosen.sum()) % 5]
     boxes = Detections(every.frames[chosen], every.boxes[chosen], every.scores[chosen], looks)
-    odd = replace(view, detections=boxes, looked_at=looked_at)
+    odd = replace(view, detections=boxes, detector_ran=looked_at)
     path = tmp_path / "run.zip"
     result = kept(folder, tmp_path / "library.sqlite3")
     write_bundle(path, result, replace(sequence, views=(odd, *sequence.views[1:])))
     there = read_sequence(Path(unpack_bundle(path, tmp_path / "elsewhere").place)).views
-    assert there[0].looked_at is not None
-    np.testing.assert_array_equal(there[0].looked_at, looked_at)
+    assert there[0].detector_ran is not None
+    np.testing.assert_array_equal(there[0].detector_ran, looked_at)
     assert there[0].detections is not None
     np.testing.assert_array_equal(there[0].detections.frames, boxes.frames)
     np.testing.assert_array_equal(there[0].detections.embeddings, looks)
-    assert there[1].looked_at is None
+    assert there[1].detector_ran is None
 
 
 def test_small_videos_show_the_same_steps(tmp_path: Path) -> None:

@@ -47,23 +47,24 @@ def view(**more: object) -> View:
 def test_a_step_has_a_picture_where_its_frame_was_there() -> None:
     there = np.array([True, False, True, False])
     assert [view().frame_at(step) for step in range(3)] == [2, 3, 4]
-    assert_array_equal(view().asked_for(3), [True] * 3)
-    assert_array_equal(view().expected(3), [True] * 3)
+    assert_array_equal(view().frames_due(3), [True] * 3)
+    assert_array_equal(view().pictures_expected(3), [True] * 3)
     # frames 2, 3, 4 and 5 of four
-    assert_array_equal(view(there=there).expected(4), [True, False, False, False])
+    assert_array_equal(view(pictures_exist=there).pictures_expected(4), [True, False, False, False])
     clock = Clock(np.array([0, -1, 1, 2, 3, 4]), np.array([0, 2, 3, 4, 5]))
-    assert_array_equal(view(clock=clock).asked_for(6), [True, False, True, True, True, True])
+    assert_array_equal(view(clock=clock).frames_due(6), [True, False, True, True, True, True])
     assert_array_equal(
-        view(clock=clock, there=there).expected(6), [True, False, False, True, False, False]
+        view(clock=clock, pictures_exist=there).pictures_expected(6),
+        [True, False, False, True, False, False],
     )
     assert [view(clock=clock).frame_at(step) for step in range(3)] == [0, -1, 1]
-    blind = view(images=(), there=there)
+    blind = view(images=(), pictures_exist=there)
     assert not blind.has_pictures
-    assert not blind.asked_for(4).any()
-    assert not blind.expected(4).any()
-    assert view(looked_at=None).was_looked_at(9)
-    looked = view(looked_at=np.array([True, False]))
-    assert [looked.was_looked_at(step) for step in range(2)] == [True, False]
+    assert not blind.frames_due(4).any()
+    assert not blind.pictures_expected(4).any()
+    assert view(detector_ran=None).detector_ran_at(9)
+    looked = view(detector_ran=np.array([True, False]))
+    assert [looked.detector_ran_at(step) for step in range(2)] == [True, False]
 
 
 def test_a_sequence_has_what_every_camera_has(tmp_path: Path) -> None:

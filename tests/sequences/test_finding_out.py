@@ -194,7 +194,7 @@ def test_pictures_that_are_too_few_are_counted() -> None:
 def test_holes_in_a_row_are_named(gone: list[int], reported: str) -> None:
     there = np.ones(9, dtype=bool)
     there[gone] = False
-    found = warnings(images(*(f"{k:02d}.png" for k in range(9)), there=there), 9, 9)
+    found = warnings(images(*(f"{k:02d}.png" for k in range(9)), pictures_exist=there), 9, 9)
     assert [one.startswith(reported) for one in found] == ([True] if reported else [])
 
 

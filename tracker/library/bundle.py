@@ -136,9 +136,10 @@ def _write_sequence(folder: Path, sequence: Sequence, videos: bool) -> None:
             rows = np.column_stack([boxes.frames, boxes.boxes, boxes.scores]).tolist()
             vectors = boxes.embeddings
             lines = [f"{int(row[0])}," + ",".join(f"{v:.9g}" for v in row[1:]) for row in rows]
-            if view.looked_at is not None:  # tells steps without detector from steps without people
+            # a step without a detector differs from a step without people
+            if view.detector_ran is not None:
                 camera["detected_steps"] = "listed"
-                empty = np.setdiff1d(np.flatnonzero(view.looked_at), boxes.frames)
+                empty = np.setdiff1d(np.flatnonzero(view.detector_ran), boxes.frames)
                 lines += [f"{step},,,,," for step in empty.tolist()]
                 vectors = np.pad(vectors, ((0, len(empty) if vectors.shape[1] else 0), (0, 0)))
             if vectors.shape[1]:

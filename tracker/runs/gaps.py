@@ -44,11 +44,11 @@ def gaps(run: Run) -> list[Gap]:
     for number, view in enumerate(run.sequence.views):
         if not view.has_pictures:
             continue
-        asked = view.asked_for(steps)
+        asked = view.frames_due(steps)
         blind = np.fromiter((step[number].blind for step in run.views), bool, steps)
         missing = asked & blind
         if missing.any():
-            lost = tuple(np.flatnonzero(missing & view.expected(steps)).tolist())
+            lost = tuple(np.flatnonzero(missing & view.pictures_expected(steps)).tolist())
             found.append(
                 Gap(view.camera.name, int(asked.sum()), int(missing.sum()), lost),
             )

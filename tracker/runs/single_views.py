@@ -134,7 +134,7 @@ class _CameraWorker:
         done: list[tuple[ViewResult, Any]] = []
         while len(done) < steps and self._frame < self._frames and not self._stopped():
             picture = next(self._pictures, None) if self._pictures is not None else None
-            if self._pictures is None and not self._view.was_looked_at(self._frame):
+            if self._pictures is None and not self._view.detector_ran_at(self._frame):
                 done.append((ViewResult.of_no_frame(), self._state))
                 self._frame += 1
                 continue

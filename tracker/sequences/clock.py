@@ -77,13 +77,14 @@ class Timing:
     fps: float | None = None
     """The camera's frame rate, 1/s; None if it is that of the steps."""
     time_offset: float = 0.0
-    """The time that is added to that of every frame, seconds."""
+    """Offset that is added to the time of every frame, seconds."""
     stamps: tuple[float, ...] | None = None
     """The time of each frame of the file, seconds, from a beginning common to all cameras."""
 
     @property
     def is_own(self) -> bool:
-        """Whether the frame at step k may differ from ``first_frame`` + k."""
+        """Whether the camera has a rate, an offset or time stamps of its own, so that the frame at
+        step k may differ from ``first_frame`` + k."""
         return self.fps is not None or self.time_offset != 0.0 or self.stamps is not None
 
     def clock(self, fps: float, steps: int, beginning: float = 0.0) -> Clock | None:

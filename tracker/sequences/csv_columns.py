@@ -48,7 +48,7 @@ MOST_COLUMNS = 10_000
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Columns:
-    """Named columns of finite numbers, N rows in the file's order.
+    """Named columns of numbers, with N rows in the file's order.
 
     Every method that checks a column raises :class:`SequenceError` at the first invalid row, with
     file, line and column, what was expected and what was found.

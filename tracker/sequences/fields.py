@@ -54,7 +54,7 @@ def listed(words: Iterable[str]) -> str:
 
 
 class Fields:
-    """One table of the file. Unknown fields are rejected at once, others are checked when read.
+    """One table of a TOML file. Unknown fields are rejected at once, others are checked when read.
 
     Every method that reads a field raises :class:`SequenceError` if its value is not valid, with
     file, field, what was expected and what was found.
@@ -127,11 +127,11 @@ class Fields:
         return words
 
     def rate(self, name: str) -> float:
-        """Frames or steps a second."""
+        """Read a rate of frames or steps, 1/s."""
         return self.number(name, above=SLOWEST, at_most=FASTEST)
 
     def number(self, name: str, *, above: float, at_most: float) -> float:
-        """A finite number in (above, at_most]."""
+        """Read a finite number in (above, at_most]."""
         expected = f"a number above {above:g} and at most {at_most:g}"
         value = self._get(name, MISSING, expected)
         if not is_number(value, LARGEST) or not above < value <= at_most:
@@ -141,7 +141,7 @@ class Fields:
     def integer(
         self, name: str, default: Any = MISSING, *, minimum: int = 0, maximum: int | None = None
     ) -> int:
-        """A whole number in [minimum, maximum]; up to :data:`LARGEST_COUNT` where none is given."""
+        """Read an integer in [minimum, maximum]; ``maximum`` None is :data:`LARGEST_COUNT`."""
         expected = f"a whole number of at least {minimum}"
         if maximum is not None:
             expected = f"a whole number from {minimum} to {maximum}"
@@ -159,7 +159,14 @@ class Fields:
     def vector(
         self, name: str, length: int, what: str, *, positive: bool = False
     ) -> Float[ndarray, " length"]:
-        """``length`` numbers of at most :data:`LARGEST`; positive ones from :data:`SMALLEST` on."""
+        """Read ``length`` numbers of an absolute value of at most :data:`LARGEST`.
+
+        Args:
+            name: The field.
+            length: The number of numbers.
+            what: What they are, for the message.
+            positive: Whether each must be at least :data:`SMALLEST`.
+        """
         expected = f"{length} {'positive ' if positive else ''}numbers ({what})"
         value = self._get(name, MISSING, f"a list of {expected}")
         vector = self._numbers(name, value, expected)

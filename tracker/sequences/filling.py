@@ -15,7 +15,7 @@ from tracker.sequences.fields import Fields, listed
 from tracker.sequences.sequence import Room, View
 from tracker.sequences.views import Source, Time
 
-_SAME_RATE = 0.01  # largest relative difference of frame rates that are the same
+_SAME_RATE = 0.01  # largest relative difference of frame rates that count as equal
 _SCORE_THRESHOLD = 0.3  # least score of a box from which room and size are estimated
 _MOST_BOXES = 50_000  # most boxes of a camera from which they are estimated
 

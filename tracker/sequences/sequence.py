@@ -22,20 +22,24 @@ PRESETS: dict[str, tuple[float, float, float]] = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Entrance:
-    """A place where targets appear: a Gaussian in world coordinates, metres."""
+    """A place where targets appear, as a Gaussian in world coordinates."""
 
     position: Float[ndarray, " 3"]
+    """Mean, world metres."""
     sigma: Float[ndarray, " 3"]
-    """Standard deviations, metres."""
+    """Standard deviation along x, y and z, metres."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Room:
-    """The axis-aligned volume in which people are tracked, in world coordinates, metres."""
+    """The axis-aligned volume in which people are tracked, z up."""
 
     minimum: Float[ndarray, " 3"]
+    """The corner of least x, y and z, world metres; z is that of the floor."""
     maximum: Float[ndarray, " 3"]
+    """The corner of largest x, y and z, world metres."""
     entrances: tuple[Entrance, ...] = ()
+    """The places where targets appear; none if they may appear anywhere."""
 
     def contains(
         self, points: Float[ndarray, "N 3"], margin: float = 0.0, below: float = 0.0
@@ -55,22 +59,24 @@ class Room:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Template:
-    """A box whose colour histogram models a target."""
+    """A box around a person, whose colour histogram models that person's appearance."""
 
     name: str
     """The name of the person."""
     camera: str
+    """The name of the camera."""
     frame: int
-    """The step."""
+    """The step of the picture, from 0."""
     box: Float[ndarray, " 4"]
     """Left, top, width, height, pixels."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Detections:
-    """Boxes of an outside detector in one camera, sorted by step."""
+    """D boxes of an outside detector in one camera, sorted by step."""
 
     frames: Int[ndarray, " D"]
+    """The step of each box."""
     boxes: Float[ndarray, "D 4"]
     """Left, top, width, height, pixels."""
     scores: Float[ndarray, " D"]
@@ -78,11 +84,11 @@ class Detections:
     embeddings: Float16[ndarray, "D A"] = field(
         default_factory=lambda: np.zeros((0, 0), np.float16)
     )
-    """Unit vectors of each box's appearance from an outside network, or zeros for a box without
-    one; of shape (0, 0) if there is no such file."""
+    """A unit vector of each box's appearance from an outside network, zero for a box without one;
+    of shape (0, 0) if there is no such file."""
 
     def at(self, frame: int) -> slice:
-        """The rows of one step."""
+        """Return the slice of the rows of one step."""
         first, last = np.searchsorted(self.frames, [frame, frame + 1])
         return slice(int(first), int(last))
 
@@ -92,16 +98,18 @@ class GroundTruth:
     """The true positions of people: a row for each person and step, sorted by step and then id."""
 
     frames: Int[ndarray, " G"]
+    """The step of each row."""
     ids: Int[ndarray, " G"]
+    """The person of each row."""
     positions: Float[ndarray, "G 3"]
-    """Positions in world coordinates, metres."""
+    """The position of the person's centre, world metres."""
     valid: Bool[ndarray, " G"]
     """False where the person is present but the position is uncertain."""
     known: Bool[ndarray, " F"] | None = None
     """Whether the truth covers each step; None if it covers all. Other steps are not evaluated."""
 
     def at(self, frame: int) -> slice:
-        """The rows of one step."""
+        """Return the slice of the rows of one step."""
         first, last = np.searchsorted(self.frames, [frame, frame + 1])
         return slice(int(first), int(last))
 
@@ -118,14 +126,14 @@ class View:
     detections: Detections | None = None
     clock: Clock | None = None
     """The frame that each step shows; None if it is ``first_frame`` + k at step k."""
-    looked_at: Bool[ndarray, " F"] | None = None
-    """Whether the detector had a picture at each step; None if it had one at every step."""
-    there: Bool[ndarray, " N"] | None = None
+    detector_ran: Bool[ndarray, " F"] | None = None
+    """Whether the outside detector was run at each step; None if at every step."""
+    pictures_exist: Bool[ndarray, " N"] | None = None
     """Whether each frame of the video or image list existed when the sequence was opened; None if
     that was not checked."""
     background: Path | range | None = None
-    """A picture of the empty scene, or the steps without people; None if the background has to be
-    learnt from the recording."""
+    """The file of a picture of the empty scene, or the steps without people; None if the background
+    has to be learnt from the recording."""
 
     @property
     def has_pictures(self) -> bool:
@@ -154,28 +162,29 @@ class View:
             return self.first_frame + step
         return int(self.clock.frame_of_step[step])
 
-    def asked_for(self, steps: int) -> Bool[ndarray, " F"]:
-        """Whether the camera's clock has a frame at each of the first steps."""
+    def frames_due(self, steps: int) -> Bool[ndarray, " F"]:
+        """Whether the camera's clock has a frame at each of the first steps; False without
+        pictures."""
         if self.clock is None or not self.has_pictures:
             return np.full(steps, self.has_pictures)
         return np.asarray(self.clock.frame_of_step[:steps] >= 0)
 
-    def expected(self, steps: int) -> Bool[ndarray, " F"]:
+    def pictures_expected(self, steps: int) -> Bool[ndarray, " F"]:
         """Whether there was a picture for each of the first steps when the sequence was opened."""
-        asked = self.asked_for(steps)
-        if self.there is None or not self.has_pictures:
-            return asked
+        due = self.frames_due(steps)
+        if self.pictures_exist is None or not self.has_pictures:
+            return due
         frames = np.arange(steps) + self.first_frame
         if self.clock is not None:
             frames = self.clock.frame_of_step[:steps]
-        found = np.zeros(steps, dtype=bool)
-        known = asked & (frames < len(self.there))
-        found[known] = self.there[frames[known]]
-        return found
+        expected = np.zeros(steps, dtype=bool)
+        known = due & (frames < len(self.pictures_exist))
+        expected[known] = self.pictures_exist[frames[known]]
+        return expected
 
-    def was_looked_at(self, step: int) -> bool:
-        """Whether the outside detector had a picture of this step, so that no box means nobody."""
-        return self.looked_at is None or bool(self.looked_at[step])
+    def detector_ran_at(self, step: int) -> bool:
+        """Whether the outside detector was run at this step, so that a missing box is a miss."""
+        return self.detector_ran is None or bool(self.detector_ran[step])
 
 
 @dataclass(frozen=True, slots=True)
@@ -224,17 +233,20 @@ class Sequence:
     name: str
     folder: Path
     fps: float
+    """The rate of the steps, 1/s."""
     frames: int
-    """The number of steps."""
+    """The number F of steps."""
     room: Room
+    """The tracked volume."""
     target_half_extents: Float[ndarray, " 3"]
     """Half width, depth and height of an upright target, metres."""
     views: tuple[View, ...]
+    """The cameras with their files."""
     description: str = ""
     templates: tuple[Template, ...] = ()
     ground_truth: GroundTruth | None = None
     digest: str = field(default="")
-    """The hash of sequence.toml and of size and time of every file it names, for cache keys."""
+    """A hash of sequence.toml and of size and time of every file that it names, for cache keys."""
     detector: DetectorFile | None = None
     """The network that may be run on the pictures; it is not part of :attr:`digest`."""
     warnings: tuple[str, ...] = ()

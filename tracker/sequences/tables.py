@@ -66,7 +66,8 @@ class BoxTable:
     first: int
     """The number in the column ``frame`` of the first picture."""
     listed: bool
-    """Whether the detector was run on frames with a row alone."""
+    """Whether the file lists the frames on which the detector was run; if not, it was run on
+    all."""
     file_starts: int
     """The frame of the camera's video or image list that is the first picture."""
     embeddings: Float16[ndarray, "N A"]
@@ -86,9 +87,9 @@ class BoxTable:
     def detections(
         self, steps: int, clock: Clock | None
     ) -> tuple[Detections, Bool[ndarray, " F"] | None]:
-        """Return the boxes by step, and whether the detector had a picture at each step.
+        """Return the boxes by step, and whether the detector was run at each step.
 
-        The second value is None if the detector had a picture at every step.
+        The second value is None if the detector was run at every step.
 
         Args:
             steps: The number of steps.
@@ -122,7 +123,7 @@ class BoxTable:
         scores = columns.values["score"]
         within = (scores >= 0.0) & (scores <= 1.0)
         columns.require("score", ~is_box | within, "a score from 0 to 1")
-        looked_at = self._looked_at(steps, clock, of_row)
+        detector_ran = self._detector_ran(steps, clock, of_row)
         kept = np.flatnonzero(is_box & (of_row >= 0))
         kept = kept[np.argsort(of_row[kept], kind="stable")]
         counts = np.bincount(of_row[kept], minlength=1)
@@ -137,19 +138,26 @@ class BoxTable:
             )
         boxes: Float[ndarray, "D 4"] = columns.stacked(*BOX)[kept]
         embeddings = self.embeddings[kept] if self.embeddings.shape[1] else self.embeddings
-        return Detections(of_row[kept], boxes, scores[kept], embeddings), looked_at
+        return Detections(of_row[kept], boxes, scores[kept], embeddings), detector_ran
 
-    def _looked_at(
+    def _detector_ran(
         self, steps: int, clock: Clock | None, of_row: Int[ndarray, " N"]
     ) -> Bool[ndarray, " F"] | None:
+        """Whether the detector was run at each step; None if at every step.
+
+        Args:
+            steps: The number of steps.
+            clock: The camera's clock; None if each frame is a step.
+            of_row: The step of each row, -1 for a frame without a step.
+        """
         if not self.listed:
             return None if clock is None else np.asarray(clock.frame_of_step >= 0)
-        looked_at = np.zeros(steps, dtype=bool)
-        looked_at[of_row[of_row >= 0]] = True
-        return looked_at
+        detector_ran = np.zeros(steps, dtype=bool)
+        detector_ran[of_row[of_row >= 0]] = True
+        return detector_ran
 
     def _check_counting(self, steps: int) -> None:
-        """Check that the file does not count its frames from 1, for a message that says so."""
+        """Raise an error with the remedy if the file counts its frames from 1 instead of 0."""
         frames = self.columns.values["frame"]
         if self.first == 0 and len(frames) and frames.min() == 1 and frames.max() == steps:
             row = int(np.argmax(frames))

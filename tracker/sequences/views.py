@@ -23,7 +23,7 @@ from tracker.sequences.pictures.media import (
     locate,
     probe,
 )
-from tracker.sequences.pictures.video import not_a_picture, read_image
+from tracker.sequences.pictures.video import read_image, why_no_picture
 from tracker.sequences.sequence import View
 from tracker.sequences.tables import BoxTable, Reading, read_box_table
 
@@ -42,8 +42,9 @@ class Source:
     fields: Fields
     video: Path | None
     images: tuple[Path, ...]
-    there: Bool[ndarray, " N"]
-    """Whether each image exists, since some may be missing in their numbering."""
+    pictures_exist: Bool[ndarray, " N"]
+    """Whether each frame of the video or image list exists: images may be missing in their
+    numbering."""
     pictures: Pictures | None
     timing: Timing
     table: BoxTable | None
@@ -141,9 +142,9 @@ def _view(source: Source, time: Time, reading: Reading) -> View:
     if time.own_rates and timing.fps is None and pictures is not None and pictures.fps:
         timing = Timing(timing.first_frame, pictures.fps, timing.time_offset, timing.stamps)
     clock = timing.clock(time.fps, time.steps, time.beginning)
-    detections, looked_at = (None, None)
+    detections, detector_ran = (None, None)
     if source.table is not None:
-        detections, looked_at = source.table.detections(time.steps, clock)
+        detections, detector_ran = source.table.detections(time.steps, clock)
     view = View(
         camera=read_camera(source.name, _image_size(fields, pictures), fields),
         video=source.video,
@@ -151,8 +152,8 @@ def _view(source: Source, time: Time, reading: Reading) -> View:
         first_frame=timing.first_frame,
         detections=detections,
         clock=clock,
-        looked_at=looked_at,
-        there=source.there,
+        detector_ran=detector_ran,
+        pictures_exist=source.pictures_exist,
     )
     if pictures is not None:
         reading.warnings += check_pictures(view, pictures, fields, time.steps)
@@ -177,7 +178,7 @@ def _background(view: View, fields: Fields, steps: int, reading: Reading) -> Pat
         reading.files.append(path)
         picture = read_image(path)
         if picture is None:
-            raise fields.error("background", f'"{path.name}" {not_a_picture(path)}')
+            raise fields.error("background", f'"{path.name}" {why_no_picture(path)}')
         check_size(view, fields, (picture.shape[1], picture.shape[0]), "background")
         return path
     if not fields.is_list("background"):

@@ -16,7 +16,7 @@ from tracker.files.folders import files_matching
 from tracker.sequences.errors import SequenceError
 from tracker.sequences.fields import LONGEST_NAME, Fields, did_you_mean, listed
 from tracker.sequences.pictures.numbering import whole_row
-from tracker.sequences.pictures.video import VideoError, index_video, not_a_picture, read_image
+from tracker.sequences.pictures.video import VideoError, index_video, read_image, why_no_picture
 from tracker.sequences.sequence import View
 
 
@@ -126,7 +126,7 @@ def probe(video: Path | None, images: tuple[Path, ...], fields: Fields) -> Pictu
     if images:
         picture = read_image(images[0])
         if picture is None:
-            raise fields.error("images", f'"{images[0].name}" {not_a_picture(images[0])}')
+            raise fields.error("images", f'"{images[0].name}" {why_no_picture(images[0])}')
         return Pictures((picture.shape[1], picture.shape[0]), len(images), None)
     return None
 
@@ -201,9 +201,9 @@ def _short(view: View, there: int, frames: int, what: str) -> Iterable[str]:
 
 def _holes(view: View) -> Iterable[str]:
     """Yield a warning if pictures are missing in the numbering."""
-    if view.there is None or view.there.all():
+    if view.pictures_exist is None or view.pictures_exist.all():
         return
-    names = [view.images[k].name for k in np.flatnonzero(~view.there)]
+    names = [view.images[k].name for k in np.flatnonzero(~view.pictures_exist)]
     shown = listed(f'"{name}"' for name in names[:3]) if len(names) < 4 else f'"{names[0]}"'
     others = "" if len(names) < 4 else f" and {len(names) - 1} others"
     yield (

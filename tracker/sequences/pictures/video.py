@@ -3,9 +3,9 @@
 A container answers "go to frame k" with an estimate: frame rate times time. With a
 varying frame rate, a stream that starts late or a missing index the estimate is wrong
 by a few frames, or by seconds. So the time stamps of all frames are read first, without
-decoding (which is quick), and wherever a jump lands, the time stamp
-of the decoded picture says which frame it is. Files whose time stamps cannot tell (some
-AVI and MPEG files) are never jumped in: they are decoded from their start.
+decoding, which is fast. Where a jump ends, the time stamp of the decoded picture identifies the
+frame. Files whose time stamps do not identify frames (some AVI and MPEG files) are always decoded
+from their start.
 """
 
 from __future__ import annotations
@@ -106,10 +106,18 @@ def _index_video(path: Path, bytes_: int, changed: int) -> VideoIndex:
 
 
 def _rate(times: Int[ndarray, " F"], claimed: float) -> float | None:
-    """Frames a second by the time stamps, microseconds; where they are few, as claimed."""
+    """Return the frame rate by the time stamps, 1/s, or else by the header.
+
+    Args:
+        times: Time stamps of the frames, microseconds.
+        claimed: The rate in the header, 1/s.
+
+    Returns:
+        The rate; None if there are fewer than two time stamps and the header has no valid rate.
+    """
     if len(times) > 1:
         measured = 1e6 * (len(times) - 1) / float(times[-1] - times[0])
-        # stamps are rounded: what the header says is exact where both agree
+        # time stamps are rounded, so the header's rate is more precise where both agree
         agree = 0.0 < claimed < 1000.0 and abs(measured / claimed - 1.0) < 2e-3
         return claimed if agree else round(measured, 3)
     return claimed if 0.0 < claimed < 1000.0 else None
@@ -119,7 +127,7 @@ _SIDES = (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT)
 
 
 def _scan(path: Path) -> tuple[Int[ndarray, " F"], ndarray]:
-    """Time stamp and key flag of every packet, in the file's order, without decoding."""
+    """Read time stamp, microseconds, and key flag of every packet, in the file's order."""
     capture = opened(path, packets=True)
     stamps: list[int] = []
     keys: list[bool] = []
@@ -141,27 +149,33 @@ def _scan(path: Path) -> tuple[Int[ndarray, " F"], ndarray]:
 
 
 def _first_times(capture: cv2.VideoCapture, count: int) -> Iterator[int]:
+    """Yield the time stamps of the next pictures that can be decoded, microseconds."""
     for _ in range(count):
         if capture.grab():
             yield _time(capture)
 
 
 def _time(capture: cv2.VideoCapture) -> int:
-    """Time stamp of the packet or picture just read, microseconds."""
+    """Return the time stamp of the packet or picture that was read last, microseconds."""
     return round(capture.get(cv2.CAP_PROP_POS_MSEC) * 1000.0)
 
 
 def _in_order(times: Int[ndarray, " F"], decoded: Int[ndarray, " D"]) -> bool:
-    """Whether decoding begins with frame 0 and only ever drops frames."""
+    """Whether the decoded pictures are frame 0 and later frames in ascending order.
+
+    Args:
+        times: Time stamps of all F frames, ascending, microseconds.
+        decoded: Time stamps of D pictures in the order of decoding.
+    """
     places = np.searchsorted(times, decoded)
     known = bool((times[np.minimum(places, len(times) - 1)] == decoded).all())
     return known and int(places[0]) == 0 and bool((np.diff(places) > 0).all())
 
 
 class VideoDecoder:
-    """One open decoder of one file: frames in any order, cheapest in ascending order.
+    """A decoder of one file. It gives frames in any order, fastest in ascending order.
 
-    Not thread-safe: one thread at a time.
+    It is not thread-safe.
     """
 
     def __init__(self, index: VideoIndex) -> None:
@@ -169,9 +183,9 @@ class VideoDecoder:
         self._times = index.times
         self._capture: cv2.VideoCapture | None = None
         self._at = -1
-        """The frame grabbed last; -1 before the first."""
+        """Index of the frame that was read last; -1 before the first."""
         self._broken = False
-        """Whether the frame grabbed last could not be decoded."""
+        """Whether the frame that was read last could not be decoded."""
 
     def __enter__(self) -> VideoDecoder:
         return self
@@ -181,25 +195,25 @@ class VideoDecoder:
 
     @property
     def position(self) -> int:
-        """The frame that was read last, -1 before the first."""
+        """Index of the frame that was read last; -1 before the first."""
         return self._at
 
     def read(self, frame: int) -> UInt8[ndarray, "h w 3"] | None:
-        """The picture of one frame, BGR, a new array.
+        """Decode one frame.
 
         Returns:
-            None where the file ends before it, or the frame cannot be decoded.
+            The picture, BGR, a new array; None if there is no such frame, or it cannot be decoded.
         """
         if not 0 <= frame < self._index.frames:
             return None
         try:
-            if self._capture is None or frame < self._at or self._jump_pays(frame):
+            if self._capture is None or frame < self._at or self._jump_saves_decoding(frame):
                 self._jump(frame)
             self._advance_to(frame)
             if self._at != frame or self._broken or self._capture is None:
                 return None
             good, picture = self._capture.retrieve()
-        except (cv2.error, VideoError, OSError):  # a spoilt frame, or another file in its place
+        except (cv2.error, VideoError, OSError):  # a damaged frame, or the file was replaced
             self.close()
             return None
         return np.asarray(picture, dtype=np.uint8) if good else None
@@ -210,8 +224,11 @@ class VideoDecoder:
             self._capture.release()
             self._capture = None
 
-    def _jump_pays(self, frame: int) -> bool:
-        """Whether a jump would begin to decode ahead of here: at a key frame before its run-up."""
+    def _jump_saves_decoding(self, frame: int) -> bool:
+        """Whether a jump to a frame would decode less than reading on from the present one.
+
+        A jump decodes from the last key frame at least :data:`RUN_UP` frames before its target.
+        """
         if self._times is None or frame - RUN_UP <= self._at:
             return False
         keys = self._index.keys
@@ -219,10 +236,10 @@ class VideoDecoder:
         return last_key > self._at + 1
 
     def _jump(self, frame: int) -> None:
-        """Bring the decoder to ``frame`` or before it, as near as the file allows."""
+        """Move to ``frame`` or to a frame before it, as near as the file allows."""
         if self._capture is None:
             self._open()
-            if frame <= RUN_UP:  # it stands at its start already
+            if frame <= RUN_UP:  # the start of the file is near enough
                 return
         back = 0
         while self._times is not None and frame - back > 0:
@@ -237,41 +254,43 @@ class VideoDecoder:
         self._open()
 
     def _open(self) -> None:
+        """Open the file, or open it again, at its start."""
         self.close()
         self._capture = opened(self._index.path)
         self._at, self._broken = -1, False
 
     def _advance_to(self, frame: int) -> None:
-        """Decode forward until ``frame``, or the first frame after it that can be decoded."""
+        """Read frames up to ``frame``, or to the first later one that can be decoded."""
         assert self._capture is not None
         while self._at < frame:
-            if self._times is None:  # every attempt is one frame, decodable or not
+            if self._times is None:  # each call of `grab` is one frame, decodable or not
                 self._broken = not self._capture.grab()
                 self._at += 1
                 continue
-            # a broken frame fails once and the next attempt gives the next frame; at the end
-            # of the file every attempt fails
+            # at a damaged frame `grab` fails once, and the next call gives the next frame; at the
+            # end of the file every call fails
             good = any(self._capture.grab() for _ in range(self._index.frames - self._at))
             landed = self._frame_of(_time(self._capture)) if good else self._index.frames
             if landed is None or landed <= self._at:
-                self._distrust()
+                self._ignore_times()
             else:
                 self._at = landed
 
     def _frame_of(self, time: int) -> int | None:
-        """The frame with this time stamp."""
+        """Return the index of the frame with this time stamp, microseconds; None if none has it."""
         assert self._times is not None
         place = int(np.searchsorted(self._times, time))
         return place if place < len(self._times) and self._times[place] == time else None
 
-    def _distrust(self) -> None:
-        """The file's time stamps contradict each other: from now on count from its start."""
+    def _ignore_times(self) -> None:
+        """Count frames from the start of the file from now on, since its time stamps are
+        inconsistent."""
         self._times = None
         self._open()
 
 
 def read_image(path: Path) -> UInt8[ndarray, "h w 3"] | None:
-    """One picture file, BGR; None where it is missing or not a picture."""
+    """Read a picture file, BGR; None if it is missing, too large or not a picture."""
     with contextlib.suppress(OSError, cv2.error):
         status = path.stat()
         if not stat.S_ISREG(status.st_mode) or status.st_size > LARGEST_IMAGE:
@@ -282,8 +301,8 @@ def read_image(path: Path) -> UInt8[ndarray, "h w 3"] | None:
     return None
 
 
-def not_a_picture(path: Path) -> str:
-    """What is said of a file of which :func:`read_image` makes nothing, but its name."""
+def why_no_picture(path: Path) -> str:
+    """Return the reason why :func:`read_image` returned None; a message puts the name before it."""
     try:
         status = path.stat()
         found = f"{status.st_size:,} bytes" if stat.S_ISREG(status.st_mode) else "no file"

@@ -37,7 +37,7 @@ def rewritten(
         name: Another name for the sequence, or None.
 
     Raises:
-        SequenceError: If the file has not what ``saved`` has.
+        SequenceError: If the file does not have the room, target and templates of ``saved``.
     """
     values = tomllib.loads(text)
     before, after = taught_values(saved), taught_values(sequence)
@@ -47,7 +47,7 @@ def rewritten(
         document["name"] = values["name"] = name
     if "room" in values:
         _write_room(document["room"], before["room"], after["room"])
-    elif before["room"] != after["room"]:  # it was found out; now somebody says where it is
+    elif before["room"] != after["room"]:  # the file has no room; a user has now set one
         document["room"] = tomlkit.item(after["room"])
     if "target" in values:
         _write_target(document["target"], before["target"], after["target"])

@@ -47,8 +47,8 @@ def save(sequence: Sequence, saved: Sequence) -> Path:
         The path of the backup.
 
     Raises:
-        SequenceError: If the file may not be written, or somebody else changed what was
-            taught in it meanwhile; it is then as it was.
+        SequenceError: If the file may not be written, or its room, target or templates were
+            changed meanwhile by another program; it is then unchanged.
     """
     from tracker.sequences.writing.rewriting import rewritten
 
@@ -88,7 +88,7 @@ def save_copy(sequence: Sequence, saved: Sequence, folder: Path) -> Sequence:
         The copy, read from there.
 
     Raises:
-        SequenceError: If it cannot be written there; nothing is left then.
+        SequenceError: If the copy cannot be written; no file is left then.
     """
     from tracker.sequences.writing.rewriting import rewritten
 

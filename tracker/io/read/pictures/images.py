@@ -10,7 +10,7 @@ from tracker.io.read.pieces import ImagesPiece, Piece
 from tracker.io.read.protocol import Certainty, Kind
 from tracker.io.read.source import SourceFile
 from tracker.sequences.pictures.numbering import whole_row
-from tracker.sequences.pictures.video import not_a_picture, read_image
+from tracker.sequences.pictures.video import read_image, why_no_picture
 
 NAME = "numbered pictures"
 KIND: Kind = "pictures"
@@ -30,7 +30,7 @@ def read(file: SourceFile) -> Iterator[Piece]:
     """One piece, its size that of the first picture."""
     picture = read_image(file.series[0])
     if picture is None:
-        raise file.member(file.series[0]).error(not_a_picture(file.series[0]))
+        raise file.member(file.series[0]).error(why_no_picture(file.series[0]))
     files, _ = whole_row(sorted(file.series, key=_by_number))
     yield ImagesPiece(file.path.parent, files, (picture.shape[1], picture.shape[0]))
 
