@@ -20,7 +20,7 @@ from tracker.kernels.intensity import mixture as mixture_kernels
 from tracker.kernels.linear_algebra import Gaussians
 
 _NO_OWNERS = np.zeros(0, dtype=np.int64)
-"""The owners in the case that no component has one."""
+"""The owners where no component has one, in the form that the kernels take."""
 
 
 class _Weighted(Protocol):
@@ -149,8 +149,9 @@ def predict(
     Args:
         mixture: J components. The labels do not change.
         transition: F, the transition matrix of one step.
-        noise: Q, in squared state units per step, one for all or one for each component.
-        survival_probability: p_S per step, one for all or one for each component.
+        noise: Q, process noise of one step in products of the state's units, (d, d) for all
+            components or (J, d, d), one for each.
+        survival_probability: p_S of one step, one for all components or one for each.
     """
     moved = mixture_kernels.predict(
         mixture.means,
@@ -189,9 +190,8 @@ def merge(
             every other.
 
     Returns:
-        At most J components, the heaviest leader first, and for each the index of the
-        component l that absorbed the others, by which data about the leader can be carried
-        along.
+        At most J components, in descending order of their leaders' weights; and for each the index
+        of its leader l in ``mixture``, by which other data about the leader can be looked up.
 
     Raises:
         ValueError: If ``threshold`` is negative.
@@ -257,14 +257,14 @@ def reduce(
 def gate_distance(probability: float, dimension: int) -> float:
     """The squared Mahalanobis distance within which a Gaussian has a share of its mass.
 
-    The quantile of χ² with d degrees of freedom, 2 P⁻¹(d/2, P_G), with the regularised
-    incomplete gamma function P. (``scipy.stats`` has it too, and is slow to import.)
+    It is the quantile of χ² with d degrees of freedom, 2 P⁻¹(d/2, P_G), with the regularised
+    incomplete gamma function P. (``scipy.stats`` has the quantile too, and is slow to import.)
 
     Args:
         probability: P_G, the share of the mass, 0 … 1.
         dimension: d, the degrees of freedom.
     """
-    from scipy.special import gammaincinv  # a server starts without it
+    from scipy.special import gammaincinv  # slow to import
 
     return float(2.0 * gammaincinv(dimension / 2.0, probability))
 

@@ -23,18 +23,21 @@ from tracker.sequences.sequence import Room
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
-    """A linear motion model over one step, of the position (d = 3) or with velocity (d = 6)."""
+    """A linear Gaussian motion model of one step, x ← F x + w with w ~ N(0, Q).
+
+    The state is the position (d = 3), or position and velocity (d = 6), world axes.
+    """
 
     transition: Float[ndarray, "d d"]
     """F, from the state of one step to that of the next."""
     noise: Float[ndarray, "d d"]
-    """Q, the covariance of the process noise of one step, in metres and seconds."""
+    """Q, the covariance of the process noise of one step, in products of m and m/s."""
     start_velocity: float
     """Standard deviation of a newborn target's velocity along each axis, m/s."""
 
     @staticmethod
     def of(parameters: FusionParams, step_time: float) -> Motion:
-        """The motion model that the parameters name, for steps of ``step_time`` seconds."""
+        """Make the motion model that the parameters choose, for steps of ``step_time`` seconds."""
         if parameters.motion == "random_walk":
             noise = random_walk_noise(parameters.motion_sigma, step_time, 3)
             return Motion(np.eye(3), noise, 0.0)
@@ -72,11 +75,17 @@ class Motion:
 def constant_velocity(
     sigmas: Float[ndarray, " 3"], step_time: float, memory: float
 ) -> tuple[Float[ndarray, "6 6"], Float[ndarray, "6 6"]]:
-    """The matrices F and Q of nearly constant velocity with exponentially decaying velocity.
+    """Compute F and Q of nearly constant velocity, with exponentially decaying velocity.
 
     The velocity follows dv = −v/τ dt + σ dW (an Ornstein-Uhlenbeck process), so
-    that an occluded person is not predicted far beyond a wall. For τ → ∞ this is white
-    acceleration: F = [[I, Δt I], [0, I]], Q = σ² [[Δt³/3, Δt²/2], [Δt²/2, Δt]].
+    that an occluded person is not predicted far beyond a wall. With a = exp(−Δt/τ) and b = 1 − a,
+    per axis,
+
+        F = [[1, τ b], [0, a]]
+        Q = σ² [[τ² (Δt − 2 τ b + τ (1 − a²)/2), τ² b²/2], [τ² b²/2, τ (1 − a²)/2]]
+
+    For τ → ∞ this is white acceleration: F = [[1, Δt], [0, 1]], Q = σ² [[Δt³/3, Δt²/2], [Δt²/2,
+    Δt]].
 
     Args:
         sigmas: σ along x, y and z, in m/s per √s.
@@ -84,14 +93,14 @@ def constant_velocity(
         memory: Time constant τ of the velocity, in seconds.
     """
     dt, tau = step_time, memory
-    kept = np.exp(-dt / tau)
-    reach = tau * (1.0 - kept)
-    velocity = tau / 2.0 * (1.0 - kept**2)
-    cross = tau**2 / 2.0 * (1.0 - kept) ** 2
-    position = tau**2 * (dt - 2.0 * tau * (1.0 - kept) + tau / 2.0 * (1.0 - kept**2))
+    decay = np.exp(-dt / tau)
+    reach = tau * (1.0 - decay)
+    velocity = tau / 2.0 * (1.0 - decay**2)
+    cross = tau**2 / 2.0 * (1.0 - decay) ** 2
+    position = tau**2 * (dt - 2.0 * tau * (1.0 - decay) + tau / 2.0 * (1.0 - decay**2))
     transition = np.eye(6)
     transition[:3, 3:] = reach * np.eye(3)
-    transition[3:, 3:] = kept * np.eye(3)
+    transition[3:, 3:] = decay * np.eye(3)
     variances = np.diag(sigmas**2)
     noise = np.block(
         [[position * variances, cross * variances], [cross * variances, velocity * variances]]
@@ -100,11 +109,11 @@ def constant_velocity(
 
 
 def random_walk_noise(sigma: float, step_time: float, dimension: int) -> Float[ndarray, "d d"]:
-    """Q = σ² Δt I: the covariance of one step of a random walk.
+    """Compute Q = σ² Δt I, the covariance of one step of a random walk.
 
     Args:
         sigma: Standard deviation after one second, along each axis, in m/√s.
-        step_time: Δt in seconds, so that the walk does not depend on the frame rate.
+        step_time: Δt in seconds; by it the walk over a second does not depend on the frame rate.
         dimension: d, the number of axes.
     """
     return sigma**2 * step_time * np.eye(dimension)
@@ -142,12 +151,13 @@ def label_births(births: GaussianMixture, first_label: int) -> GaussianMixture:
 
 @lru_cache(maxsize=64)
 def visible_area(camera: Camera, room: Room) -> float:
-    """The area of the image that the room's volume fills, in squared pixels.
+    """The area of the image that the room's volume covers, in squared pixels.
 
-    False boxes are taken as uniform over it ([ZW21] §2.4: clutter uniform over
-    the volume, as this camera sees it). It is at least one per cent of the
-    image, so that the clutter intensity stays finite for a camera that looks
-    elsewhere. The result is cached for each camera and room, since every run needs it.
+    False boxes are modelled as uniform over it ([ZW21] §2.4: clutter uniform over
+    the volume, projected into this camera). It is the convex hull of a grid of 12³ points of the
+    volume, and at least one per cent of the image, so that the clutter intensity stays finite for a
+    camera that does not view the room. The result is cached for each camera and room, since every
+    run needs it.
     """
     axes = np.linspace(room.minimum, room.maximum, 12).T
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
@@ -164,8 +174,13 @@ def measurement_volume(camera: Camera, room: Room, size: int) -> float:
     """The volume of the space of possible boxes, in pixels to the power of ``size``.
 
     The centre is uniform over :func:`visible_area`. A box's height and width, where they are
-    measured, are taken as uniform up to half of the image's, as they are for the false boxes
-    of a detector.
+    measured, are modelled as uniform up to half of the image's height and width.
+
+    Args:
+        camera: The calibrated camera.
+        room: The tracked volume.
+        size: m, the number of measured components: 2 for the centre, 3 with the height, 4 with the
+            width as well.
     """
     width, height = camera.image_size
     volume = visible_area(camera, room)

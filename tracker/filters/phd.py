@@ -23,20 +23,21 @@ from tracker.kernels.intensity import mixture as mixture_kernels
 from tracker.kernels.kalman import Expected
 
 SPARE = 0.25
-"""Expected number of targets by which reported targets may exceed a component's weight, or 1 where
-that is less: weights are uncertain, but less than half a target cannot be reported."""
+"""Expected number of targets by which the targets that a component explains may exceed its
+predicted weight, or 1 where the weight is less: weights are uncertain. The tolerance is below the
+half target from which one is reported."""
 
 
 @dataclass(frozen=True, slots=True)
 class PhdUpdate:
-    """The intensity after one measurement set, and the pairs of which it consists."""
+    """The intensity after one measurement set, and where its components come from."""
 
     posterior: GaussianMixture
     """The J predicted components as missed, followed by one component for every gated pair."""
     parents: Int[ndarray, " K"]
-    """The predicted component that each posterior component comes from."""
+    """Index of the predicted component that each posterior component comes from."""
     measurements: Int[ndarray, " K"]
-    """The measurement that updated each component, -1 where it was missed."""
+    """Index of the measurement that updated each component, -1 for a missed one."""
     log_odds: Float[ndarray, " P"]
     """log(p_D w' q(z) / κ(z)) of each gated pair: this component against clutter."""
     measurement_weights: Float[ndarray, " M"]
@@ -65,9 +66,9 @@ def update(
 
     Args:
         predicted: v', the predicted intensity of J components.
-        measurements: z, one a row; M may be 0.
-        expected: h(m_j) for each component, for a linear model H m_j; H for each or one for
-            all; and the noise that each adds where h is nonlinear (Ω of the unscented form).
+        measurements: z, a row for each; M may be 0.
+        expected: h(m_j) of each component (H m_j of a linear model), H of each or one for all, and
+            the noise Ω that each adds where h is nonlinear (unscented form).
         noise: R, one for all measurements (N = 1) or one for each (N = M).
         detection_probability: p_D, one for all or one for each component. Where it is
             0 the component does not change.
@@ -119,18 +120,19 @@ def extract_measured(
         W_z = Σ_j w_j(z),   m_z = Σ_j w_j(z) m_j(z) / W_z
 
     is reported where W_z is above the threshold, beside heavy components that no
-    measurement updated. Beyond [RCV10], the targets that a predicted component may explain
-    are limited: to min(w'_j, 1) and a tolerance (:data:`SPARE`). Measurements are processed
-    by decreasing W_z, so a false alarm beside a target, which the PHD filter gives a weight
-    near 1 as well, is not reported too.
+    measurement updated. Beyond [RCV10], the expected number of targets that a predicted component
+    may explain is limited to max(w'_j, 1) and a tolerance (:data:`SPARE`). Measurements are
+    processed by decreasing log odds of their likeliest pair, so a false alarm beside a target,
+    to which the PHD filter also gives a weight near 1, is not reported too.
 
     Args:
         predicted: v', the predicted intensity before the update.
         updated: The update of v' by one measurement set, before any reduction.
-        threshold: Expected number of targets above which one is reported.
+        threshold: Expected number W_z of targets above which one is reported.
 
     Returns:
-        The reported targets: first those of measurements, by decreasing W_z.
+        The reported targets: first those of measurements, by decreasing log odds of the likeliest
+        pair, then missed components above the threshold.
     """
     posterior = updated.posterior
     found = extraction.report(

@@ -52,8 +52,8 @@ def update(
     mean and covariance.
 
     Args:
-        tracks: n Bernoullis: existence probability as weight, Gaussian, label.
-        measurements: z, one a row; M may be 0.
+        tracks: n Bernoulli components; the weight is the existence probability r_i.
+        measurements: z, a row for each; M may be 0.
         expected: h(m_i), H_i, and the noise that each track adds where h is nonlinear.
         noise: R, one for all measurements (N = 1) or one for each (N = M).
         detection_probability: p_i, the detection probability of each track.

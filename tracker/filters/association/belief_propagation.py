@@ -16,11 +16,11 @@ from numpy import ndarray
 from tracker.kernels.association.belief_propagation import Settling, belief_propagation
 
 TOLERANCE = 1e-6
-"""Convergence: the largest change of a message, relative to the intensity that it meets; far below
-the precision to which an association probability matters."""
+"""Default criterion of convergence: the largest |Δν_ji| ρ_j of an iteration. It is far below the
+precision to which an association probability matters."""
 
 ITERATIONS = 200
-"""Largest number of iterations, where the messages have not converged before."""
+"""Default largest number of iterations, if the messages do not converge before."""
 
 SETTLING = Settling(TOLERANCE, ITERATIONS)
 """Tolerance and number of iterations, in the form that the kernels take."""
@@ -46,18 +46,19 @@ def marginals(
     tolerance: float = TOLERANCE,
     iterations: int = ITERATIONS,
 ) -> Marginals:
-    """Marginals of the one-to-one association, by loopy belief propagation ([WL14]_).
+    """Compute marginals of the one-to-one association by loopy belief propagation ([WL14]_).
 
         μ_ij = w_ij / (w_i0 + Σ_{j'≠j} w_ij' ν_j'i),  ν_ji = 1 / (ρ_j + Σ_{i'≠i} μ_i'j)
         P(i ← j) ∝ w_ij ν_ji,  P(i misses) ∝ w_i0,  P(j unexplained) = ρ_j / (ρ_j + Σ_i μ_ij)
 
-    The messages converge to a unique point; on a tree they are exact.
+    The messages converge to a unique fixed point ([WL14]_); on a graph without cycles the marginals
+    are exact.
 
     Args:
-        missed: w_i0, the weight of target i being missed, > 0 or with a row that is not 0.
+        missed: w_i0 ≥ 0, the weight of target i being missed; 0 only if the target has a pair.
         detected: w_ij, the weight of target i having made measurement j; 0 outside the gate.
         unexplained: ρ_j, clutter and newborn intensity at measurement j, > 0.
-        tolerance: Largest change of a message at which the iteration stops.
+        tolerance: Largest |Δν_ji| ρ_j at which the iteration stops.
         iterations: Largest number of iterations.
     """
     found = belief_propagation(

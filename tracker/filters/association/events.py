@@ -1,5 +1,8 @@
 """Lists of joint events: the K best, or K that share no pair, and their marginals.
 
+The weights w_i0, w_ij and ρ_j of n targets and M measurements are defined in
+:mod:`tracker.filters.association`.
+
 [WW10] Wang, Wan, patent CN101783020A, 2010.
 [FBS83] Fortmann, Bar-Shalom, Scheffe, "Sonar tracking of multiple targets using joint
 probabilistic data association", IEEE Journal of Oceanic Engineering 8(3), 1983.
@@ -71,11 +74,11 @@ def simplified_murty(
     matching are removed from the graph, and the next matching is that of the remaining graph.
     Exact Murty would split the rest into n parts and search each.
 
-    A heaviest matching leaves no two free ends of a pair, so a pair that is still there
-    after r of them has lost a neighbour to each, of which there are n + M − 2: K = n + M
-    events are enough for every pair, and for the event without any. Since no pair comes
-    twice, what is likely in many joint events is in one only: the marginals are rougher
-    the more targets compete.
+    K = n + M events are enough for every pair to occur. In a heaviest matching at least one end of
+    every pair that is not chosen is matched to another partner. So while a pair (i, j) remains,
+    each matching removes another pair of i or of j, of which there are n + M − 2. The last event
+    has no pair at all. Since each pair occurs in one event only, an association that is likely in
+    many joint events counts once: the more targets compete, the less exact are the marginals.
 
     Args:
         missed: w_i0 > 0, the weight of target i being missed.
@@ -104,8 +107,8 @@ def murty(
 ) -> JointEvents:
     """The K joint events of the greatest weight Π w_i0 Π w_ij Π ρ_j, greatest first.
 
-    By Murty's partition [M68] of a square assignment problem in which target i may also take
-    a dummy of its own for w_i0, and measurement j one for ρ_j.
+    They are ranked by Murty's partition [M68] of a square assignment problem, in which target i may
+    also be assigned to a dummy with the weight w_i0, and measurement j to one with the weight ρ_j.
 
     Args:
         missed: w_i0 > 0, the weight of target i being missed.
@@ -135,7 +138,7 @@ def log_weights(
     *,
     false_counts: Float[ndarray, " M1"] | None = None,
 ) -> Float[ndarray, " K"]:
-    """ln w(θ) of each event.
+    """Compute ln w(θ) of each event, -inf for one of weight 0.
 
     With w_i0 = 1 − P_D, w_ij = P_D Λ_ij, ρ_j = 1/V and g(Φ) = Φ! this is the numerator of
     Bayes' rule for a number of false measurements of which nothing is known ([FBS83]_,
@@ -148,8 +151,8 @@ def log_weights(
         missed: w_i0, the weight of target i being missed.
         detected: w_ij, the weight of target i having made measurement j; 0 outside the gate.
         unexplained: ρ_j, clutter and newborn intensity at measurement j.
-        false_counts: g(0) … g(M), the factor by the number of false measurements; None stands
-            for 1, which a Poisson number of false measurements has.
+        false_counts: g(0) … g(M), the factor by the number of measurements without a target; None
+            for 1, which is that of a Poisson number of false measurements.
     """
     indices = np.arange(events.sources.shape[1])
     with np.errstate(divide="ignore"):
@@ -163,11 +166,11 @@ def log_weights(
 
 
 def marginals_of(events: JointEvents, log_weight: Float[ndarray, " K"]) -> Marginals:
-    """Marginals over listed events alone: β_jt = Σ_θ P(θ) [t ← j].
+    """Compute marginals over listed events alone: β_jt = Σ_θ P(θ) [t ← j].
 
     Args:
-        events: K events, at least one of them with a finite weight.
-        log_weight: ln w(θ), up to a constant.
+        events: K events of n targets and M measurements.
+        log_weight: ln w(θ) of each event, up to a constant; at least one is finite.
     """
     probabilities = np.exp(log_weight - log_weight.max())
     probabilities /= probabilities.sum()

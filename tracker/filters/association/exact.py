@@ -18,7 +18,7 @@ from tracker.filters.association.belief_propagation import Marginals
 from tracker.kernels.association.subsets import subset_marginals
 
 MOST_ITEMS = 18
-"""Largest value of min(n, M), beyond which the memory that is needed becomes too large."""
+"""Largest value of min(n, M): the memory grows as 2^min(n, M)."""
 
 
 def exact_marginals(
@@ -28,7 +28,7 @@ def exact_marginals(
     *,
     false_counts: Float[ndarray, " M1"] | None = None,
 ) -> Marginals:
-    """Marginals of the one-to-one association over all joint events, to rounding.
+    """Compute marginals of the one-to-one association over all joint events, up to rounding.
 
     Args:
         missed: w_i0, the weight of target i being missed.

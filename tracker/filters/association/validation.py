@@ -10,9 +10,9 @@ from numpy import ndarray
 def validation_matrix(
     squared_distances: Float[ndarray, "n M"], bound: float
 ) -> Bool[ndarray, "M n1"]:
-    """The validation matrix Ω = [ω_jt]: row j a measurement, column t its possible source.
+    """Compute the validation matrix Ω = [ω_jt]: row j is a measurement, column t a possible source.
 
-    Column 0 is the false alarm, which every measurement can be; ω_jt is true where
+    Column 0 is clutter, a possible source of every measurement; ω_jt with t ≥ 1 is true where
 
         (z_j − ẑ_t)ᵀ S_t⁻¹ (z_j − ẑ_t) ≤ bound
 
@@ -30,7 +30,7 @@ def validation_matrix(
 
 
 def clusters(possible: Bool[ndarray, "n M"]) -> list[tuple[ndarray, ndarray]]:
-    """Groups of targets that compete for measurements, each to be associated by itself.
+    """Find groups of targets that share measurements; each can be associated independently.
 
     Args:
         possible: Whether target i may have made measurement j.

@@ -51,7 +51,8 @@ def pay_for_measurements(
     sums: ndarray,
     threshold: float,
 ) -> Payments:
-    """Determine the measurements that components can explain, by decreasing weight.
+    """Determine the measurements that components can explain, by decreasing log odds of their
+    pairs.
 
     A component explains no more targets than its own expected number: what it contributes to one
     measurement is subtracted from what it can contribute to the next.
@@ -102,7 +103,8 @@ def report(
         predicted: (J,) weights of the predicted components.
         updated: The update by one measurement set, before any reduction.
         threshold: Expected number of targets from which one is reported.
-        spare: Expected number of targets by which a component may exceed its weight, or 1.
+        spare: Expected number of targets by which the targets that a component explains may exceed
+            its weight, or 1 where the weight is less.
     """
     size = len(predicted)
     weights, means, covariances = updated.weights, updated.means, updated.covariances
