@@ -34,7 +34,7 @@ PARAMETERS = {
 """Names of parameters: files have them, and only the package of parameters can change them."""
 
 NOT_DONE = {
-    "io", "parameters", "single_view", "app",
+    "io", "parameters", "app",
 }  # fmt: skip
 """Packages whose inner names are not the field's yet."""
 

@@ -79,7 +79,7 @@ def test_a_known_background_is_not_doubted(tmp_path: Path) -> None:
             _Forgetful(reader),
         )
     assert isinstance(background, BackgroundModel)
-    assert background.restlessness == 0.0
+    assert background.changing_share == 0.0
     assert learnt is not None
     np.testing.assert_array_equal(background.spread, learnt.spread)
 

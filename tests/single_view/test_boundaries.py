@@ -197,7 +197,7 @@ def step(
 
 
 def test_a_target_of_particles_is_waited_for_so_long() -> None:
-    tracks = Tracks(particle_targets([1, 2, 3, 0, 0], misses=[1, 2, 3, 0, 1]), Departed.nobody(), 9)
+    tracks = Tracks(particle_targets([1, 2, 3, 0, 0], misses=[1, 2, 3, 0, 1]), Departed.none(), 9)
     after, events = step(tracks, [])
     assert after.targets.labels.tolist() == [1, 2, 0]
     assert after.targets.misses.tolist() == [2, 3, 1]
@@ -211,7 +211,7 @@ def test_a_target_of_particles_is_waited_for_so_long() -> None:
 
 def test_whoever_departed_is_remembered_up_to_the_memory() -> None:
     departed = Departed(np.array([5, 6, 7]), np.zeros(3, dtype=np.int64), np.array([2, 3, 4]))
-    after, _ = step(Tracks(track_management.Targets.nobody(), departed, 9), [])
+    after, _ = step(Tracks(track_management.Targets.none(), departed, 9), [])
     assert after.departed.labels.tolist() == [5, 6]
     assert after.departed.ages.tolist() == [3, 4]
     # of those who look alike the last who vanished is back
@@ -222,7 +222,7 @@ def test_whoever_departed_is_remembered_up_to_the_memory() -> None:
 
 
 def test_a_target_of_particles_counts_from_its_last_confirmation_on() -> None:
-    tracks = Tracks(particle_targets([0, 0, 0, 4], hits=[1, 2, 3, 9]), Departed.nobody(), 8)
+    tracks = Tracks(particle_targets([0, 0, 0, 4], hits=[1, 2, 3, 9]), Departed.none(), 8)
     after, events = step(tracks, [0, 1, 3])  # the third was found often enough, but not now
     assert after.targets.labels.tolist() == [0, 8, 0, 4]
     assert after.targets.hits.tolist() == [2, 3, 3, 10]

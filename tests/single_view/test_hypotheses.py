@@ -12,7 +12,7 @@ from numpy import ndarray
 
 from tracker.single_view.protocol import ViewEvent
 from tracker.single_view.pseudo_particle import hypotheses
-from tracker.single_view.pseudo_particle.hypotheses import best_hypothesis, somebody
+from tracker.single_view.pseudo_particle.hypotheses import best_hypothesis, target_probabilities
 from tracker.single_view.pseudo_particle.track_management import Targets, Tracks, manage
 
 LIKELY, UNLIKELY = 0.2, 0.9
@@ -83,9 +83,9 @@ def test_the_best_hypothesis_is_the_best_of_all(modes: int, columns: int, seed: 
 
 def test_the_probability_of_somebody() -> None:
     logs = np.log(np.array([[0.2, 0.3, 0.5], [1e-300, 1e-300, 1.0]]))
-    np.testing.assert_allclose(somebody(logs), [0.5, 0.0], atol=1e-12)
-    assert somebody(np.zeros((3, 1))).max() == 0.0
-    assert somebody(np.zeros((0, 4))).shape == (0,)
+    np.testing.assert_allclose(target_probabilities(logs), [0.5, 0.0], atol=1e-12)
+    assert target_probabilities(np.zeros((3, 1))).max() == 0.0
+    assert target_probabilities(np.zeros((0, 4))).shape == (0,)
     assert best_hypothesis(np.zeros((0, 4))).shape == (0,)
 
 
@@ -93,7 +93,7 @@ def test_vacancies_are_what_each_person_has_left() -> None:
     there = targets([LEFT, RIGHT, LEFT], [1, 1, 2])
     np.testing.assert_array_equal(hypotheses.vacancies(there, 3, 2), [0, 0, 2])
     np.testing.assert_array_equal(hypotheses.vacancies(there, 3, 1), [0])
-    np.testing.assert_array_equal(hypotheses.vacancies(Targets.nobody(), 2, 1), [0, 1])
+    np.testing.assert_array_equal(hypotheses.vacancies(Targets.none(), 2, 1), [0, 1])
 
 
 def test_a_newcomer_stands_apart_and_the_surer_of_two_stays() -> None:
@@ -136,7 +136,7 @@ class Story:
             self.tracks,
             expected,
             boxes,
-            somebody(logs),
+            target_probabilities(logs),
             best_hypothesis(logs),
             vacant,
             **self.numbers,

@@ -17,7 +17,7 @@ from tracker.sequences.library import open_sequence
 from tracker.sequences.pictures.frames import FrameReader, Picture
 from tracker.single_view.working.sequence import Working
 from tracker.single_view.working.shaking import check_shake
-from tracker.single_view.working.stabilisation import Steadying, agreed
+from tracker.single_view.working.stabilisation import StaticScene, agreed
 
 
 def test_a_shake_is_the_deviation_of_what_moved_and_is_undone() -> None:
@@ -28,24 +28,24 @@ def test_a_shake_is_the_deviation_of_what_moved_and_is_undone() -> None:
         [-1.5, -1.5, 0], [1, -1.5, 0.001], [-1, 1.5, -0.001], [0, 0, 0],
     ])  # fmt: skip
     pictures = [taken(room, one, rng) for one in moved]
-    found = Steadying.learn(pictures, None, 0.2)
+    found = StaticScene.learn(pictures, None, 0.2)
     assert found is not None
     square = np.median((moved[:, :2] ** 2).sum(axis=1))
     assert found.shake == pytest.approx(np.sqrt(square / np.log(4.0)), rel=0.25)
     # what is left of it, measured in the same way on the pictures that are held still
-    left = Steadying.learn([found.still(picture) for picture in pictures], None, 0.0)
+    left = StaticScene.learn([found.still(picture) for picture in pictures], None, 0.0)
     assert left is not None
     assert left.shake < 0.15 * found.shake
     # a picture of three times the size shakes by three times as many pixels
     larger = [cv2.resize(one, None, fx=3.0, fy=3.0) for one in pictures]
-    wider = Steadying.learn(larger, None, 0.2)
+    wider = StaticScene.learn(larger, None, 0.2)
     assert wider is not None
     assert wider.reduction == pytest.approx(320.0 / 720.0)
     assert wider.shake == pytest.approx(3.0 * found.shake, rel=0.2)
 
 
 def test_people_light_and_noise_are_no_shake() -> None:
-    found = Steadying.learn(shaken(np.random.default_rng(4), 0.0), None, 0.2)
+    found = StaticScene.learn(shaken(np.random.default_rng(4), 0.0), None, 0.2)
     assert found is not None
     assert found.shake < 0.06
 
@@ -74,11 +74,11 @@ def test_what_nobody_agrees_on_or_lies_too_far_is_no_shake() -> None:
 
 def test_a_plain_wall_tells_nothing() -> None:
     walls = [np.full((240, 320, 3), 90, dtype=np.uint8) for _ in range(8)]
-    found = Steadying.learn(walls, None, 0.2)
+    found = StaticScene.learn(walls, None, 0.2)
     assert found is not None
     assert found.shake == 0.0
     assert found.still(walls[0]) is walls[0]
-    assert Steadying.learn([], None, 0.2) is None
+    assert StaticScene.learn([], None, 0.2) is None
 
 
 class _Shaking(FrameReader):

@@ -150,10 +150,10 @@ class DetectionPhd:
             sigmas = np.sqrt(np.diagonal(mixture.covariances[chosen], axis1=1, axis2=2))
         else:
             believed = updated.measurement_weights > BELIEVED
-            taken = good[believed]
-            boxes, sigmas = found.boxes[taken], found.sigmas[taken]
+            passed = good[believed]
+            boxes, sigmas = found.boxes[passed], found.sigmas[passed]
             box_weights = updated.measurement_weights[believed]
-            embeddings = found.embeddings_of(taken)
+            embeddings = found.embeddings_of(passed)
             box_labels = _labels_of_boxes(updated, len(good))[believed]
         return ViewResult(
             boxes=boxes,

@@ -70,7 +70,8 @@ class DetectorBoxes:
         if embeddings.shape[1]:
             embeddings = embeddings[above]
         self._found = replace(found, embeddings=embeddings)
-        """The boxes of all steps, for the consistency of a box does not depend on others."""
+        """The boxes of all steps, computed at once: the consistency of a box depends on no
+        other."""
 
     def at(self, frame: int) -> Detected:
         """The boxes of one step."""

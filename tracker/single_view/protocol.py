@@ -20,7 +20,7 @@ TRUST, UNCERTAINTY = "trust in the foreground", "doubt in the background"
 uncertainty of the background, 0 … 1."""
 
 SHAKE = "shake, pixels"
-"""Name in a result's information: standard deviation of the camera's shake that is compensated."""
+"""Name in a result's information: standard deviation of the shake that is compensated, pixels."""
 
 EventKind = Literal["new", "vanished", "returned", "occluded", "merged", "split"]
 
@@ -37,7 +37,7 @@ class ViewEvent:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ViewResult:
-    """The result of stage 1 in one camera at one step: the boxes for the fusion, and their origin.
+    """The result of stage 1 in one camera at one step: boxes for the fusion, and data for display.
 
     All boxes are ``centre_x, centre_y, half_width, half_height`` in pixels.
     """
@@ -49,7 +49,7 @@ class ViewResult:
     labels: Int[ndarray, " N"]
     """Ids within this camera, -1 where the method has none."""
     sigmas: Float[ndarray, "N 4"]
-    """Measurement noise: standard deviations of the same four numbers, pixels."""
+    """Measurement noise: standard deviations of the four numbers of each box, pixels."""
     estimates: Float[ndarray, "E 4"]
     """The method's own 2D estimates, which need not be the boxes for the fusion."""
     estimate_weights: Float[ndarray, " E"]
@@ -59,15 +59,15 @@ class ViewResult:
     measurements: Float[ndarray, "M 4"]
     """The measurements of the method's filter: peaks, foreground boxes or detections."""
     measurement_scores: Float[ndarray, " M"]
-    """Likelihood or detector's score, 0 … 1."""
+    """Likelihood, or detector's score, of each measurement, 0 … 1."""
     samples: Float[ndarray, "S 4"]
     """Samples of the weighted intensity, float32; empty where the method has none."""
     sample_weights: Float[ndarray, " S"]
-    """Their weights relative to the largest, float32."""
+    """Weight of each sample relative to the largest, 0 … 1, float32."""
     information: dict[str, float]
     """Numbers about this step for display, by name."""
     dropped: Dropped = field(default_factory=Dropped.none)
-    """Candidates that were rejected."""
+    """Candidates that the method rejected, by gate."""
     events: tuple[ViewEvent, ...] = ()
     """Events of the tracks at this step, where the method reports any."""
     gates: Float[ndarray, "G 5"] = field(default_factory=lambda: np.zeros((0, 5)))

@@ -15,13 +15,13 @@ def plain(level: int = 100) -> ndarray:
     return np.full((60, 80, 3), level, dtype=np.uint8)
 
 
-def model(restlessness: float) -> BackgroundModel:
-    return BackgroundModel(plain(), np.zeros((60, 80), dtype=np.uint8), restlessness)
+def model(changing_share: float) -> BackgroundModel:
+    return BackgroundModel(plain(), np.zeros((60, 80), dtype=np.uint8), changing_share)
 
 
 def test_doubt_rises_smoothly_with_the_restlessness() -> None:
     p = ForegroundParams(restless_from=0.2, restless_to=0.6)
-    found = [model(r).doubt(p) for r in (0.0, 0.2, 0.3, 0.4, 0.5, 0.6, 1.0)]
+    found = [model(r).uncertainty(p) for r in (0.0, 0.2, 0.3, 0.4, 0.5, 0.6, 1.0)]
     np.testing.assert_allclose(found, [0.0, 0.0, 0.15625, 0.5, 0.84375, 1.0, 1.0])
 
 
@@ -33,25 +33,25 @@ def test_restless_are_pixels_that_are_away_in_more_than_three_of_ten_pictures() 
             pictures[(2 * k + row) % 10][10 * row : 10 * row + 4, 20:30] = 170
     learnt = BackgroundModel.learn(pictures)
     assert learnt is not None
-    assert learnt.restlessness == pytest.approx(1 / 3)
+    assert learnt.changing_share == pytest.approx(1 / 3)
     # a single pixel of thousands says nothing
     few = [plain() for _ in range(10)]
     for k in range(5):
         few[2 * k][30, 40] = 170
     learnt = BackgroundModel.learn(few)
     assert learnt is not None
-    assert learnt.restlessness == 0.0
+    assert learnt.changing_share == 0.0
 
 
 @pytest.mark.parametrize(
-    ("memory", "restlessness", "time", "lasting"),
+    ("memory", "changing_share", "time", "lasting"),
     [(0.4, 1.0, 0.1, 4), (0.4, 0.5, 0.1, 2), (0.5, 1.0, 0.1, 5), (4.0, 1.0, 0.01, 254)],
 )
 def test_a_change_counts_for_the_length_of_the_memory(
-    memory: float, restlessness: float, time: float, lasting: int
+    memory: float, changing_share: float, time: float, lasting: int
 ) -> None:
     p = ForegroundParams(motion_memory=memory, restless_from=0.0, restless_to=1.0, threshold=128.0)
-    moving = MovingForeground(model(restlessness), p, time)
+    moving = MovingForeground(model(changing_share), p, time)
     assert moving.memory == lasting
     if lasting > 10:
         return

@@ -74,9 +74,9 @@ def advance(
         elif not rows:
             work.unknown += columns
         else:
-            work.hand_over(rows, columns)
-    work.take_back()
-    work.name_newcomers()
+            work.transfer(rows, columns)
+    work.resume_interrupted()
+    work.begin_tracks()
     return work.result()
 
 
@@ -97,39 +97,47 @@ class _Step:
         self.decision, self.shared = decide(situation, seen, parameters)
         self.labels: list[list[int]] = [[] for _ in range(seen.size)]
         self.sources: list[set[int]] = [set() for _ in range(seen.size)]
-        """For each object the objects before from which its tracks come."""
+        """Indices of the objects of the step before from which the tracks of each object come."""
         self.lost: list[MovingObject] = list(situation.lost)
         self.unknown: list[int] = []
         self.next_label = situation.next_label
         self.events: list[ViewEvent] = []
-        self.partings: list[list[int]] = []
-        """For each object that split the objects that it became."""
+        self.splits: list[list[int]] = []
+        """Indices of the present objects into which each object of the step before split."""
 
-    def tell(self, kind: str, labels: Iterable[int]) -> None:
+    def add_event(self, kind: str, labels: Iterable[int]) -> None:
+        """Record an event of some tracks."""
         self.events.append(ViewEvent(kind, tuple(sorted(set(labels)))))  # type: ignore[arg-type]
 
-    def hand_over(self, rows: list[int], columns: list[int]) -> None:
+    def transfer(self, rows: list[int], columns: list[int]) -> None:
         """Transfer the tracks of a family: all to one object, or each to the one it fits best."""
         owners = [(label, row) for row in rows for label in self.before.objects[row].labels]
         if len(columns) == 1:
             for label, row in owners:
-                self.give(label, row, columns[0])
+                self.assign(label, row, columns[0])
             return
         benefit = np.array([self.benefit(label, row, columns) for label, row in owners])
         first, own = linear_sum_assignment(benefit, maximize=True)
         chosen = dict(zip(first.tolist(), own.tolist(), strict=True))
         for index, (label, row) in enumerate(owners):
-            self.give(label, row, columns[chosen.get(index, int(benefit[index].argmax()))])
+            self.assign(label, row, columns[chosen.get(index, int(benefit[index].argmax()))])
         self.unknown += [column for column in columns if not self.labels[column]]
         for row in rows:
             if decision_matrices.row_case(self.decision, row) == "splits":
-                self.partings.append(np.flatnonzero(self.decision[row]).tolist())
+                self.splits.append(np.flatnonzero(self.decision[row]).tolist())
 
     def benefit(self, label: int, row: int, columns: list[int]) -> Float[ndarray, " J"]:
-        """How well each object now fits a track, 0 … 1: by place if it was alone, else by colour.
+        """Compute how well each of some present objects fits a track, 0 … 1.
 
-        [CMQ07]: after a split an object belongs to the track whose histogram before the merge
-        is most similar to its own.
+        For a track that was alone in its object it is the share of the pixels that both objects
+        have in common; for others the Bhattacharyya coefficient of the histograms, since after a
+        split an object belongs to the track whose histogram before the merge is most similar to
+        that of the object ([CMQ07]).
+
+        Args:
+            label: The track.
+            row: Index of the track's object at the step before.
+            columns: Indices of the present objects.
         """
         if len(self.before.objects[row].labels) == 1:
             pixels = self.shared[row, columns]
@@ -137,11 +145,12 @@ class _Step:
         own = self.before.tracks[label].histogram[None, :]
         return np.asarray(coefficients(own, self.histograms[columns])[0])
 
-    def give(self, label: int, row: int, column: int) -> None:
+    def assign(self, label: int, row: int, column: int) -> None:
+        """Add a track of the object ``row`` of the step before to the present object ``column``."""
         self.labels[column].append(label)
         self.sources[column].add(row)
 
-    def take_back(self) -> None:
+    def resume_interrupted(self) -> None:
         """Continue interrupted tracks with free objects nearby of similar colours."""
         if not self.unknown or not self.lost:
             return
@@ -167,56 +176,58 @@ class _Step:
             back = self.lost[row]
             self.labels[self.unknown[column]] += back.labels
             if back.missing:
-                self.tell("returned", back.labels)
+                self.add_event("returned", back.labels)
         self.lost = [one for row, one in enumerate(self.lost) if row not in {r for r, _ in found}]
-        taken = {column for _, column in found}
-        self.unknown = [one for index, one in enumerate(self.unknown) if index not in taken]
+        resumed = {column for _, column in found}
+        self.unknown = [one for index, one in enumerate(self.unknown) if index not in resumed]
 
-    def name_newcomers(self) -> None:
-        """Begin a track at every object that is left."""
+    def begin_tracks(self) -> None:
+        """Begin a track at every present object without a track."""
         for column in self.unknown:
             self.labels[column] = [self.next_label]
             self.next_label += 1
 
     def result(self) -> tuple[Situation, list[ViewEvent]]:
-        """Objects and tracks after this step, without those interrupted for too long."""
+        """Make the objects and tracks after this step, without those interrupted for too long."""
         objects: list[MovingObject] = []
         tracks: dict[int, Track] = {}
         for column in range(self.seen.size):
-            self.labels[column] = self._settled(self.labels[column])
+            self.labels[column] = self._confirmed_tracks(self.labels[column])
             objects.append(self._object(column))
             tracks.update((track.label, track) for track in self._tracks(column, objects[-1]))
-        for became in self.partings:
-            held = [[one for one in self.labels[c] if self._sure(tracks[one])] for c in became]
+        for became in self.splits:
+            held = [
+                [one for one in self.labels[c] if self._is_confirmed(tracks[one])] for c in became
+            ]
             if sum(len(labels) > 0 for labels in held) > 1:
-                self.tell("split", [label for labels in held for label in labels])
+                self.add_event("split", [label for labels in held for label in labels])
         lost = []
         for gone in self.lost:
             known = [self.before.tracks[label] for label in gone.labels]
-            if not any(self._sure(track) for track in known):
+            if not any(self._is_confirmed(track) for track in known):
                 continue
             if gone.missing >= self.parameters.interrupted_steps:
-                self.tell("vanished", gone.labels)
+                self.add_event("vanished", gone.labels)
                 continue
             lost.append(replace(gone, missing=gone.missing + 1, followed=False))
             tracks.update((track.label, track) for track in known)
         after = Situation(tracks, tuple(objects), tuple(lost), self.seen.owners, self.next_label)
         return after, self.events
 
-    def _sure(self, track: Track) -> bool:
+    def _is_confirmed(self, track: Track) -> bool:
         """Whether a track was alone in its object for enough steps to be confirmed."""
         return track.age >= self.parameters.confirmation_steps
 
-    def _settled(self, labels: list[int]) -> list[int]:
-        """The confirmed ones of tracks that merge; without any, the oldest one alone.
+    def _confirmed_tracks(self, labels: list[int]) -> list[int]:
+        """Select the confirmed ones of tracks that merge; if none is, the oldest one alone.
 
-        A component that splits off a person for a moment is not a second person once it has
-        merged again.
+        So a component that splits off a person for a moment does not remain as a second person
+        after it has merged again.
         """
         if len(labels) < 2:
             return labels
         known = [self.before.tracks[label] for label in sorted(labels)]
-        sure = [track.label for track in known if self._sure(track)]
+        sure = [track.label for track in known if self._is_confirmed(track)]
         return sure or [max(known, key=lambda track: track.age).label]
 
     def _object(self, column: int) -> MovingObject:
@@ -229,12 +240,12 @@ class _Step:
             velocity = 0.5 * (sources[0].velocity + box[:2] - sources[0].box[:2])
             followed = sources[0].followed
         elif len(sources) > 1:
-            self.tell("merged", labels)
+            self.add_event("merged", labels)
             alone = len(labels) == 2 and all(len(source.labels) == 1 for source in sources)
             both = sum(self.before.tracks[label].area for label in labels)
             followed = p.follow_mild and alone and area > p.mild_share * both
             if not followed:
-                self.tell("occluded", labels)
+                self.add_event("occluded", labels)
         return MovingObject(labels, box, area, velocity, followed=followed)
 
     def _tracks(self, column: int, one: MovingObject) -> list[Track]:
@@ -247,7 +258,7 @@ class _Step:
                 histogram = known[0].histogram + rate * (histogram - known[0].histogram)
                 area = known[0].area + rate * (area - known[0].area)
             if age == self.parameters.confirmation_steps:
-                self.tell("new", one.labels)
+                self.add_event("new", one.labels)
             return [Track(one.labels[0], one.box, area, histogram, age)]
         there = [track for track in known if track is not None]
         return there if one.followed else [replace(track, box=one.box) for track in there]

@@ -15,16 +15,16 @@ from numpy import ndarray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Track:
-    """A person, with the appearance when the person was last alone in a component."""
+    """The track of a person, with the appearance when last alone in a foreground component."""
 
     label: int
     """Id of the track."""
     box: Float[ndarray, " 4"]
-    """Present box: the object's, or that of the mean shift; centre and half sizes, pixels."""
+    """Present box, that of the object or of the mean shift: centre and half sizes, pixels."""
     area: float
-    """Area when alone, pixels."""
+    """Smoothed area of the object while the track was alone in it, square pixels."""
     histogram: Float[ndarray, " bins"]
-    """Colour histogram when alone."""
+    """Smoothed colour histogram of the object while the track was alone in it, with sum 1."""
     age: int = 1
     """Number of steps alone in an object."""
 
@@ -34,17 +34,17 @@ class MovingObject:
     """A foreground component and its tracks."""
 
     labels: tuple[int, ...]
-    """Its tracks, ascending; several where people merged."""
+    """Labels of the object's tracks, ascending; several where people merged."""
     box: Float[ndarray, " 4"]
-    """Centre and half sizes, pixels."""
+    """Centre and half sizes of the component's box, pixels."""
     area: int
-    """Number of pixels."""
+    """Number of pixels of the component."""
     velocity: Float[ndarray, " 2"]
-    """Pixels per step."""
+    """Smoothed displacement of the centre, pixels per step."""
     missing: int = 0
     """Number of steps since the object was interrupted."""
     followed: bool = False
-    """Whether its two tracks are followed separately."""
+    """Whether the two tracks of the object are tracked separately by mean shift."""
 
     @property
     def size(self) -> float:

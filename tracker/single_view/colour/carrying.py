@@ -159,7 +159,7 @@ def _carry(
 ) -> dict[int, Float[ndarray, " 4"]]:
     """The box of a template's person in each other camera, where it is certain."""
     half_extents = sequence.target_half_extents
-    nobody = float(_cost(np.array(LARGEST_DISTANCE)))
+    cost_elsewhere = float(_cost(np.array(LARGEST_DISTANCE)))
     positions, score = _along_ray(sequence.cameras[own], sequence, box)
     boxes: dict[int, Float[ndarray, "D 4"]] = {}
     for camera in pictures:
@@ -169,7 +169,7 @@ def _carry(
             near = _around(boxes[camera][visible])
             each = pictures[camera].distances(near.reshape(-1, 4))
             unlikely[visible] = (_cost(each.reshape(near.shape[:2])) + _SHIFT_COST).min(axis=1)
-        score = score - np.minimum(unlikely, nobody)
+        score = score - np.minimum(unlikely, cost_elsewhere)
     if not len(positions):
         return {}
     best = int(score.argmax())

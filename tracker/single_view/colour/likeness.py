@@ -67,13 +67,13 @@ class Likeness:
         from scipy.special import softmax  # a server starts without it
 
         people = len(self._model.names)
-        told = np.full((len(boxes), people), 1.0 / people)
+        likenesses = np.full((len(boxes), people), 1.0 / people)
         inside, bins, corner = _covered(picture, boxes, self._model.space)
         if not len(inside):
-            return told
+            return likenesses
         distances = self._model.distances(bins, boxes[inside] - corner)
-        told[inside] = softmax(-0.5 * (distances / _NUMBERS.likelihood_sigma) ** 2, axis=1)
-        return told
+        likenesses[inside] = softmax(-0.5 * (distances / _NUMBERS.likelihood_sigma) ** 2, axis=1)
+        return likenesses
 
 
 def appearance_of(

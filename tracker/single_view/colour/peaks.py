@@ -48,15 +48,16 @@ PEAK_EVEN = 0.45
 else: at a peak colours are most similar, so those of plants, screens and walls are near as well."""
 
 SHAPE_EVEN = 0.56
-"""The same for the colours in a shape's own box, without a peak at its place."""
+"""Distance to a template at which a shape without a peak at its place is equally likely of a person
+and of something else, by the colours in the shape's own box."""
 
 LARGEST = 2.0
-"""Bound of the log likelihood ratio of a peak at a shape: the effects of light, and of a side
-without a template, are as large."""
+"""Bound of the log likelihood ratio of a peak at a shape. Changes of light, and sides of a person
+without a template, change it by as much."""
 
 UNLIKE = 1.0
-"""Bound of the log likelihood ratio against a shape with other colours: strangers have none of the
-templates'."""
+"""Bound of the log likelihood ratio against a shape with other colours than the templates, which
+people without a template have."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,16 +76,16 @@ class Passed:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Peaks:
-    """The M peaks of one image, and the samples from which they are."""
+    """The M peaks of one image, and the samples of which they are the modes."""
 
     boxes: Float[ndarray, "M 4"]
     """Centre and half sizes, pixels."""
     scores: Float[ndarray, " M"]
     """Likelihood of each relative to that of a template's own colours, 0 … 1."""
     samples: Float[ndarray, "S 4"]
-    """Sampled boxes."""
+    """Sampled boxes, pixels."""
     sample_weights: Float[ndarray, " S"]
-    """Their weights relative to the largest."""
+    """Weight of each sample relative to the largest, 0 … 1."""
     mask: UInt8[ndarray, "h w"] | None
     """The foreground mask, where it is used."""
     information: dict[str, float]
@@ -148,7 +149,7 @@ class PeakFinder:
             wanted = wanted or self._fits
         self._shapes = ShapeFinder.of(sequence, camera_index, reader) if wanted else None
         self._instead = np.zeros(len(self._appearance.model.names))
-        """How far the shape replaces the foreground at each person, 0 … 1."""
+        """Weight with which the shape replaces the foreground at each person, 0 … 1."""
         self._shape_numbers = shapes
         self._by_shape = np.zeros(len(self._appearance.model.names))
         """Trust in the shapes at each person, 0 … 1."""
@@ -249,8 +250,8 @@ class PeakFinder:
         ratios = log_ratios(found.log_odds, s.even_odds, s.odds_weight, s.largest_ratio)
         ratios += colour_ratios(vouched, distances, own, self._parameters.likelihood_sigma)
         least = log_ratios(np.array(s.passed_odds), s.even_odds, s.odds_weight, s.largest_ratio)
-        told = self._by_shape[person[alone]]
-        of_alone = np.log(told * np.exp(least) + 1.0 - told)
+        trust = self._by_shape[person[alone]]
+        of_alone = np.log(trust * np.exp(least) + 1.0 - trust)
         # the foreground replaces the shape for a person occluded by another one's shape
         seen = np.where(behind[alone], self._trusted(person[alone]), 0.0)
         return Passed(

@@ -15,7 +15,7 @@ from numpy import ndarray
 from tracker.geometry.assignment import linear_sum_assignment
 
 UNREACHED = 1e6
-"""Cost of a pair in place of −ln β where β is 0: more than all other costs together."""
+"""Cost of a pair with β = 0, instead of −ln β: more than the sum of all finite costs."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,9 +29,9 @@ class Cases:
     split: Bool[ndarray, " n"]
     """Whether a target has several measurements that no other target has."""
     missed: Bool[ndarray, " n"]
-    """Whether its column is zero: it vanishes if that lasts."""
+    """Whether a target has no measurement; a target that is missed for long has vanished."""
     new: Bool[ndarray, " M"]
-    """Whether its row is zero: it is of a new or a returned target."""
+    """Whether a measurement has no target, so that it is of a new or a returned one."""
 
 
 def tell_apart(
@@ -66,8 +66,8 @@ def tell_apart(
     new = np.asarray(~positive.any(axis=0))
     own = np.where(missed, -1, own)
     if not targets or not count:
-        nobody = np.full(targets, -1)
-        return Cases(own, nobody, nobody >= 0, missed, new)
+        none = np.full(targets, -1)
+        return Cases(own, none, none >= 0, missed, new)
     wanted = np.where(own >= 0, own, matrix.argmax(axis=1))
     wanted[missed] = -1
     if every_shared_row:

@@ -48,13 +48,13 @@ class Measured:
     pieces: Float[ndarray, "M 4"]
     """Box of the foreground component of each; targets that it occludes are inside."""
     shown: Float[ndarray, "S 4"] | None = None
-    """Rejected boxes for display; None for none."""
+    """Rejected boxes for display, pixels; None for none."""
     shown_scores: Float[ndarray, " S"] | None = None
-    """Their scores."""
+    """Score of each rejected box, 0 … 1."""
     samples: Float[ndarray, "S 4"] = field(default_factory=lambda: np.zeros((0, 4)))
-    """Samples of the intensity, where the source has any."""
+    """Sampled boxes of the intensity, pixels, where the source has any."""
     sample_weights: Float[ndarray, " S"] = field(default_factory=lambda: np.zeros(0))
-    """Their weights relative to the largest."""
+    """Weight of each sample relative to the largest, 0 … 1."""
     mask: UInt8[ndarray, "h w"] | None = None
     """The foreground mask, where the source has one."""
     information: dict[str, float] = field(default_factory=dict)
@@ -161,7 +161,9 @@ class _Foreground:
         state, found = self._model.step(state, picture)
         information = {
             "foreground share": float(found.mask.mean()),
-            UNCERTAINTY: self._model.doubt if isinstance(self._model, MovingForeground) else 0.0,
+            UNCERTAINTY: self._model.uncertainty
+            if isinstance(self._model, MovingForeground)
+            else 0.0,
         }
         dropped = Dropped.none()
         if self._sizes is None:

@@ -137,8 +137,8 @@ class Jpda:
         p = self._parameters
         if not p.five_cases:
             cases = tell_apart(matrix, own, 0.0, every_shared_row=False)
-            nobody = np.full(expected.size, -1)
-            return replace(cases, shared=nobody, split=nobody >= 0), matrix
+            none = np.full(expected.size, -1)
+            return replace(cases, shared=none, split=none >= 0), matrix
         inside = p.occlusion == "inside"
         cases = tell_apart(matrix, own, p.least_probability, every_shared_row=not inside)
         if inside:
@@ -195,11 +195,16 @@ class Jpda:
         matrix = matrix[managed.targets.labels > 0]
         labels = managed.targets.labels[managed.targets.labels > 0]
         explained = matrix.sum(axis=0)
-        taken = np.flatnonzero(explained > BELIEVED)
-        if not len(taken):
+        believed = np.flatnonzero(explained > BELIEVED)
+        if not len(believed):
             return seen.boxes[:0], seen.sigmas[:0], np.zeros(0), np.zeros(0, dtype=np.int64)
-        whose = labels[matrix[:, taken].argmax(axis=0)]
-        return seen.boxes[taken], seen.sigmas[taken], np.minimum(explained[taken], 1.0), whose
+        whose = labels[matrix[:, believed].argmax(axis=0)]
+        return (
+            seen.boxes[believed],
+            seen.sigmas[believed],
+            np.minimum(explained[believed], 1.0),
+            whose,
+        )
 
     def _gates(self, expected: Targets) -> ndarray:
         """The gates of measurements with the targets' own sizes."""

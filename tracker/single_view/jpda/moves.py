@@ -17,14 +17,14 @@ from tracker.single_view.jpda.targets import Innovations, Targets, X, Y, innovat
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Moved:
-    """The targets after one step, in the order of before."""
+    """The n targets after the update of one step, in the same order as before."""
 
     targets: Targets
     """The updated targets."""
     matrix: Float[ndarray, "n M"]
-    """β_tj as it was used."""
+    """β_tj as used for the update: 0 in the rows of occluded and missed targets."""
     hidden: Bool[ndarray, " n"]
-    """Whether a target is occluded, and not the one in front."""
+    """Whether a target is occluded by another one."""
 
 
 def move(
@@ -78,7 +78,14 @@ def move(
 
 
 def _alike(targets: Targets, cases: Cases, seen: Measured, factor: float) -> Bool[ndarray, " n"]:
-    """Whether each target's own measurement is of similar size; false for a target without one."""
+    """Whether each target's own measurement has a similar size; False for a target without one.
+
+    Args:
+        targets: n targets.
+        cases: The case of each target.
+        seen: The measurements.
+        factor: Largest ratio of the half sizes of both, or its inverse, exclusive.
+    """
     alike = np.zeros(targets.size, dtype=bool)
     there = np.flatnonzero(cases.own >= 0)
     ratios = np.log(seen.boxes[cases.own[there], 2:] / targets.half_sizes[there])
@@ -142,7 +149,15 @@ def _behind(
     """Predict one occluded target inside its foreground component.
 
     Where the boxes measured in a component leave one of its edges free, and only one target is
-    occluded there, that edge is taken as the target's.
+    occluded there, the target is placed at that edge.
+
+    Args:
+        targets: The predicted targets.
+        t: Index of the occluded target.
+        j: Index of a measurement in the foreground component.
+        seen: The measurements.
+        one_side: As in :func:`_left_over`.
+        alone: Whether no other target is occluded in the component.
     """
     one = targets.take(np.array([t]))
     piece, half_sizes = seen.pieces[j], one.half_sizes[0]
@@ -155,9 +170,9 @@ def _behind(
         edges = _left_over(
             piece, seen.boxes[(seen.pieces == piece).all(axis=1)], half_sizes, one_side
         )
-        told = edges != 0
-        place = np.where(told, np.where(edges < 0, low, high), place)
-        unsure = np.where(told, seen.sigmas[j, :2], unsure)
+        known = edges != 0
+        place = np.where(known, np.where(edges < 0, low, high), place)
+        unsure = np.where(known, seen.sigmas[j, :2], unsure)
     moved = kalman.update(one, innovations(one, place[None], unsure[None]), np.ones((1, 1)))
     means = moved.means.copy()
     means[0, [X, Y]] = np.clip(moved.positions[0], low, high)
@@ -170,7 +185,13 @@ def _left_over(
     half_sizes: Float[ndarray, " 2"],
     one_side: float,
 ) -> Int[ndarray, " 2"]:
-    """The edges of a component that the boxes measured in it leave free for an occluded target.
+    """Find the edges of a component that the boxes measured in it leave free for a target.
+
+    Args:
+        piece: Box of the component, pixels.
+        shown: Boxes of the S measurements in the component, pixels.
+        half_sizes: Half width and half height of the occluded target, pixels.
+        one_side: Factor by which the margin at one edge must exceed that at the opposite edge.
 
     Returns:
         For x and y: −1 the lower edge, 1 the upper one; 0 neither, since one target explains

@@ -95,11 +95,11 @@ class Targets:
         return Targets(**{f.name: getattr(self, f.name)[indices] for f in fields(self)})
 
     def predict(self, step_time: float, acceleration_sigma: float) -> Targets:
-        """Predict one step at constant velocity, under white acceleration:
+        """Predict one step at constant velocity with white acceleration.
 
             F = [[1, T], [0, 1]],  Q = q [[T³/3, T²/2], [T²/2, T]]
 
-        for either axis, with q = (σ_a × size)².
+        for either axis, with q = (σ_a size)² and the size of :func:`scale_of`.
 
         Args:
             step_time: T, seconds.
@@ -119,7 +119,12 @@ class Targets:
         )
 
     def as_boxes(self, sigmas: Float[ndarray, "n 4"]) -> GaussianMixture:
-        """The targets as an intensity over boxes, with weight 1 and the sizes' sigmas, pixels."""
+        """Convert the targets to an intensity over boxes, with the weight 1 each.
+
+        Args:
+            sigmas: Standard deviations of the n boxes, of which those of the half sizes are used,
+                pixels.
+        """
         covariances = np.zeros((self.size, 4, 4))
         covariances[:, :2, :2] = self.place_covariances
         covariances[:, [2, 3], [2, 3]] = sigmas[:, 2:] ** 2
@@ -143,13 +148,13 @@ class Innovations:
     """The innovations of n targets and M measurements."""
 
     offsets: Float[ndarray, "n M 2"]
-    """ν_tj = z_j − H x_t, pixels."""
+    """Innovations ν_tj = z_j − H x_t, pixels."""
     covariances: Float[ndarray, "n M 2 2"]
-    """S_tj = H P_t Hᵀ + R_j."""
+    """Innovation covariances S_tj = H P_t Hᵀ + R_j, square pixels."""
     precisions: Float[ndarray, "n M 2 2"]
     """S_tj⁻¹."""
     squared: Float[ndarray, "n M"]
-    """ν_tjᵀ S_tj⁻¹ ν_tj, squared Mahalanobis distances."""
+    """Squared Mahalanobis distances ν_tjᵀ S_tj⁻¹ ν_tj."""
     densities: Float[ndarray, "n M"]
     """Λ_tj = N(ν_tj; 0, S_tj), per square pixel."""
 
@@ -177,9 +182,9 @@ def innovations(
 def update(targets: Targets, found: Innovations, detected: Float[ndarray, "n M"]) -> Targets:
     """Update by the mean over all associations, with the covariance around it ([FBS83]_).
 
-    A target's posterior is a mixture: with probability β_t0 it has no measurement and
-    the prediction remains, with β_tj it has the Kalman update by measurement j, with gain
-    W = P Hᵀ S⁻¹. Its first two moments are, for measurements of equal noise,
+    The posterior of a target is a mixture: with probability β_t0 it has no measurement and
+    remains as predicted, with β_tj it is updated by measurement j, with the Kalman gain
+    W = P Hᵀ S⁻¹. The first two moments of the mixture are, for measurements of equal noise,
 
         x ← x + W Σ_j β_tj ν_tj
         P ← β_t0 P + (1 − β_t0) (P − W S Wᵀ) + W (Σ_j β_tj ν_tj ν_tjᵀ − ν_t ν_tᵀ) Wᵀ
@@ -189,7 +194,7 @@ def update(targets: Targets, found: Innovations, detected: Float[ndarray, "n M"]
     Args:
         targets: n predicted targets.
         found: Innovations of the same targets.
-        detected: β_tj; β_t0 is the difference of a row's sum to 1.
+        detected: β_tj, association probabilities; β_t0 is 1 less the sum of a row.
     """
     gains = targets.covariances[:, None][..., [X, Y]] @ found.precisions
     moves = np.einsum("nmab,nmb->nma", gains, found.offsets)

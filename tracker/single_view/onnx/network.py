@@ -83,12 +83,12 @@ class Network:
                 f"the detector {path} cannot be read ({error.strerror}); name an ONNX file"
             ) from error
         except ValueError as error:
-            told = self._told(
+            message = self._message(
                 f"cannot be used: {error}", "name a network that was exported to ONNX"
             )
-            raise ValueError(told) from error
+            raise ValueError(message) from error
         except cv2.error as error:
-            raise ValueError(self._told(f"cannot be used: {_words(error)}")) from error
+            raise ValueError(self._message(f"cannot be used: {_words(error)}")) from error
         self._picture = self._picture_port(ports.inputs)
         self._sizes = [p for p in ports.inputs if p is not self._picture]
         self._names = [port.name for port in ports.outputs]
@@ -123,18 +123,21 @@ class Network:
     def _channels_last(self) -> bool:
         return self._picture.shape[1] != 3 and self._picture.shape[3] == 3
 
-    def _told(self, words: str, remedy: str = _REMEDY) -> str:
+    def _message(self, words: str, remedy: str = _REMEDY) -> str:
+        """Make the message of an error: the file, what is wrong with it, and the remedy."""
         return f"the detector {self._path.name} {words}; {remedy}"
 
     def _picture_port(self, inputs: tuple[Port, ...]) -> Port:
         for port in inputs:
             if len(port.shape) == 4 and 3 in (port.shape[1], port.shape[3]):
                 if port.shape[0] > 1:
-                    raise ValueError(self._told(f"takes {port.shape[0]} pictures at a time"))
+                    raise ValueError(self._message(f"takes {port.shape[0]} pictures at a time"))
                 return port
         shapes = ", ".join(f"{p.name} {p.shape}" for p in inputs)
         raise ValueError(
-            self._told(f"takes no picture: expected an input (1, 3, height, width), found {shapes}")
+            self._message(
+                f"takes no picture: expected an input (1, 3, height, width), found {shapes}"
+            )
         )
 
     def look(self, picture: UInt8[ndarray, "h w 3"]) -> Found:
@@ -208,7 +211,7 @@ class Network:
                 outputs = self._net.forward(self._names)
                 return {n: np.array(o) for n, o in zip(self._names, outputs, strict=True)}
         except cv2.error as error:
-            raise ValueError(self._told(f"cannot be run: {_words(error)}")) from error
+            raise ValueError(self._message(f"cannot be run: {_words(error)}")) from error
 
 
 def _content(path: Path) -> bytes:

@@ -15,9 +15,15 @@ from tracker.single_view.pseudo_particle.track_management import Targets
 
 
 def vacancies(targets: Targets, persons: int, per_person: int) -> Int[ndarray, " A"]:
-    """The persons of possible new targets, each as often as further targets may look like it."""
-    taken = np.bincount(targets.persons, minlength=persons)
-    return np.repeat(np.arange(persons), np.maximum(per_person - taken, 0))
+    """List the persons of possible new targets, each once for every further target of that person.
+
+    Args:
+        targets: The present targets.
+        persons: Number of persons with templates.
+        per_person: Largest number of targets with the colours of one person.
+    """
+    used = np.bincount(targets.persons, minlength=persons)
+    return np.repeat(np.arange(persons), np.maximum(per_person - used, 0))
 
 
 def hypothesis_matrix(
@@ -114,8 +120,8 @@ def apart(
     return result
 
 
-def somebody(matrix: Float[ndarray, "M columns"]) -> Float[ndarray, " M"]:
-    """The probability that each mode is not background: 1 - h(m, 0) / Σ h(m, ·)."""
+def target_probabilities(matrix: Float[ndarray, "M columns"]) -> Float[ndarray, " M"]:
+    """Compute the probability that each mode is a target: 1 − h(m, 0) / Σ h(m, ·)."""
     if not len(matrix):
         return np.zeros(0)
     return np.asarray(-np.expm1(matrix[:, -1] - logsumexp(matrix, axis=1)))

@@ -152,7 +152,7 @@ class PseudoParticle:
             position_sigma=p.position_sigma,
             position_gate=p.position_gate,
         )
-        existences = hypotheses.somebody(matrix)
+        existences = hypotheses.target_probabilities(matrix)
         background = matrix.shape[1] - 1
         columns = hypotheses.apart(
             modes,
@@ -176,12 +176,12 @@ class PseudoParticle:
             velocity_memory=p.velocity_memory,
         )
         particles = self._around(after.targets, np.repeat(samples, counts, axis=0), rng)
-        taken = columns < background
-        labels = np.concatenate([expected.labels, np.full(len(vacant), -1)])[columns[taken]]
+        detected = columns < background
+        labels = np.concatenate([expected.labels, np.full(len(vacant), -1)])[columns[detected]]
         result = self._result(
             after.targets,
-            modes=modes[taken],
-            scores=existences[taken],
+            modes=modes[detected],
+            scores=existences[detected],
             labels=np.where(labels == UNCONFIRMED, -1, labels),
             samples=samples,
             sample_weights=_relative(weights),

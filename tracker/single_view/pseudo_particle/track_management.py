@@ -34,8 +34,8 @@ class Targets:
     """Existence probability, which decreases without modes."""
 
     @staticmethod
-    def nobody() -> Targets:
-        """No targets."""
+    def none() -> Targets:
+        """Make an empty set of targets."""
         none = np.zeros(0, dtype=np.int64)
         return Targets(none, none, np.zeros((0, 4)), np.zeros((0, 2)), none, none, np.zeros(0))
 
@@ -83,8 +83,8 @@ class Departed:
     """Number of steps since each vanished."""
 
     @staticmethod
-    def nobody() -> Departed:
-        """No vanished targets."""
+    def none() -> Departed:
+        """Make an empty set of vanished targets."""
         none = np.zeros(0, dtype=np.int64)
         return Departed(none, none, none)
 
@@ -107,7 +107,7 @@ class Tracks:
     @staticmethod
     def empty() -> Tracks:
         """The tracks before the first step."""
-        return Tracks(Targets.nobody(), Departed.nobody(), next_label=1)
+        return Tracks(Targets.none(), Departed.none(), next_label=1)
 
 
 def manage(
@@ -137,10 +137,10 @@ def manage(
         modes: Boxes of this step's modes, pixels.
         existences: Existence probability of each mode.
         columns: Column of each mode in the hypothesis matrix.
-        vacant: Persons of the new targets' columns.
-        confirmation: Number of steps, at least 1.
-        patience: Number of steps.
-        memory: Number of steps.
+        vacant: Person of each column of a new target.
+        confirmation: Number of steps with a mode after which a target is confirmed, at least 1.
+        patience: Number of steps without a mode after which a confirmed target has vanished.
+        memory: Number of steps after which a vanished target cannot return.
         newcomer_misses: Steps without a mode after which an unconfirmed target ends.
         velocity_memory: Weight of the old mean displacement, 0 … 1.
     """

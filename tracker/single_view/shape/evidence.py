@@ -30,7 +30,7 @@ def log_ratios(
 def shape_sigmas(
     boxes: Float[ndarray, "N 4"], half_extents: Float[ndarray, " 3"], parameters: ShapesParams
 ) -> Float[ndarray, "N 4"]:
-    """Measurement noise: standard deviations that are constant in metres, and some pixels.
+    """Compute the measurement noise of people by shape, constant in metres, plus some pixels.
 
     Args:
         boxes: Centre and half sizes of N boxes, pixels.

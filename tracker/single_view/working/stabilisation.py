@@ -55,7 +55,7 @@ _MEDIAN_OF_SQUARE = 2.0 * np.log(2.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Steadying:
+class StaticScene:
     """The static scene of one camera, and the deviation of its images from it."""
 
     scene: UInt8[ndarray, "h w"]
@@ -73,7 +73,7 @@ class Steadying:
         shown: UInt8[ndarray, "h w"] | None,
         least: float,
         check: Callable[[], None] = lambda: None,
-    ) -> Steadying | None:
+    ) -> StaticScene | None:
         """Learn the static scene of a camera; None without images.
 
         Args:
@@ -87,7 +87,7 @@ class Steadying:
             return None
         reduction = min(1.0, LINES / min(whole[0].shape[:2]))
         some = [_evened(picture, reduction) for picture in whole[::_STILL]]
-        first = _looked_at(some, shown, reduction, check=check)
+        first = _scene_and_shake(some, shown, reduction, check=check)
         if first.shake < least:
             return first
         # the median of aligned images is sharp
@@ -96,7 +96,7 @@ class Steadying:
         for picture in every:
             check()
             calm.append(first._undone(picture))
-        return _looked_at(calm, shown, reduction, every, check)
+        return _scene_and_shake(calm, shown, reduction, every, check)
 
     def still(self, picture: UInt8[ndarray, "h w 3"]) -> UInt8[ndarray, "h w 3"]:
         """Align an image with the scene; an image whose shift is unknown is not changed."""
@@ -125,14 +125,22 @@ class Steadying:
         return agreed(places, (found - self.corners)[followed, 0].astype(float), min(height, width))
 
 
-def _looked_at(
+def _scene_and_shake(
     pictures: list[UInt8[ndarray, "h w"]],
     shown: UInt8[ndarray, "h w"] | None,
     reduction: float,
     measured: list[UInt8[ndarray, "h w"]] | None = None,
     check: Callable[[], None] = lambda: None,
-) -> Steadying:
-    """The scene of images, and the shifts of these, or of others, from it."""
+) -> StaticScene:
+    """Compute the static scene of images, and the shake of these, or of others, against it.
+
+    Args:
+        pictures: Reduced and normalised images, aligned as far as known.
+        shown: Not 0 where an image shows the camera's view; None for everywhere.
+        reduction: Reduced pixels per pixel.
+        measured: Images whose shake is measured; None for ``pictures``.
+        check: A function that is called now and then; an exception of it ends the work.
+    """
     scene = median(pictures, check)
     height, width = scene.shape
     mask = None
@@ -142,7 +150,7 @@ def _looked_at(
     corners = cv2.goodFeaturesToTrack(scene, CORNERS, 0.05, APART * min(height, width), mask=mask)
     if corners is None:
         corners = np.zeros((0, 1, 2))
-    found = Steadying(scene, corners.astype(np.float32), reduction, 0.0)
+    found = StaticScene(scene, corners.astype(np.float32), reduction, 0.0)
     shifts = []
     for picture in pictures if measured is None else measured:
         check()
@@ -153,7 +161,7 @@ def _looked_at(
         return found
     square = float(np.median((np.array(shifts) ** 2).sum(axis=1)))
     shake = float(np.sqrt(square / _MEDIAN_OF_SQUARE)) / reduction
-    return Steadying(scene, found.corners, reduction, shake)
+    return StaticScene(scene, found.corners, reduction, shake)
 
 
 def agreed(
@@ -247,24 +255,24 @@ class SteadyReader:
 
     def shake(self, camera: int) -> float:
         """Standard deviation of the shake that is compensated, pixels, else 0."""
-        steadying = self._steadying(camera)
-        return 0.0 if steadying is None else steadying.shake
+        scene = self._scene_of(camera)
+        return 0.0 if scene is None else scene.shake
 
     def picture(self, camera: int, step: int) -> Picture | None:
-        steadying = self._steadying(camera)
+        scene = self._scene_of(camera)
         known = (camera, step) in self._read
         picture = self._read.pop((camera, step)) if known else self._reader.picture(camera, step)
-        return _held(steadying, picture)
+        return _aligned(scene, picture)
 
     def iterate(self, camera: int, first: int = 0) -> Iterator[Picture | None]:
-        steadying = self._steadying(camera)
+        scene = self._scene_of(camera)
         for key in [key for key in self._read if key[0] == camera]:
             self._read.pop(key, None)
         for picture in self._reader.iterate(camera, first):
-            yield _held(steadying, picture)
+            yield _aligned(scene, picture)
 
     def empty(self, camera: int) -> Picture | None:
-        return _held(self._steadying(camera), self._reader.empty(camera))
+        return _aligned(self._scene_of(camera), self._reader.empty(camera))
 
     def once(self, name: Hashable, make: Callable[[], _Made]) -> _Made:
         return self._reader.once(("steady", self._least, name), make)
@@ -272,13 +280,13 @@ class SteadyReader:
     def check(self) -> None:
         self._reader.check()
 
-    def _steadying(self, camera: int) -> Steadying | None:
+    def _scene_of(self, camera: int) -> StaticScene | None:
         """The static scene of a camera that shakes, else None."""
 
-        def made() -> Steadying | None:
+        def made() -> StaticScene | None:
             view = self._views[camera]
             shown = None if view is None else view.shown
-            return Steadying.learn(self._spread(camera), shown, self._least, self.check)
+            return StaticScene.learn(self._spread(camera), shown, self._least, self.check)
 
         found = self._reader.once(("steadying", camera, self._least), made)
         return None if found is None or found.shake < self._least else found
@@ -290,5 +298,5 @@ class SteadyReader:
                 yield picture
 
 
-def _held(steadying: Steadying | None, picture: Picture | None) -> Picture | None:
-    return picture if steadying is None or picture is None else steadying.still(picture)
+def _aligned(scene: StaticScene | None, picture: Picture | None) -> Picture | None:
+    return picture if scene is None or picture is None else scene.still(picture)

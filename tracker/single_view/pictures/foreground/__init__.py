@@ -122,7 +122,7 @@ def learn_background(
         empty = BackgroundModel.learn(_empty(sequence, camera_index, reader), reader.check)
         if learnt is None or empty is None:
             return learnt
-        return replace(learnt, picture=empty.picture, restlessness=0.0)
+        return replace(learnt, picture=empty.picture, changing_share=0.0)
 
     return reader.once(("background", camera_index), made)
 
@@ -131,9 +131,9 @@ def _empty(
     sequence: Sequence, camera_index: int, reader: Pictures
 ) -> list[UInt8[ndarray, "h w 3"]]:
     """The images without people, where the recording names any."""
-    stated = sequence.views[camera_index].background
-    if isinstance(stated, range):
-        return _spread(sequence, camera_index, reader, stated)
+    empty_scene = sequence.views[camera_index].background
+    if isinstance(empty_scene, range):
+        return _spread(sequence, camera_index, reader, empty_scene)
     picture = reader.empty(camera_index)
     return [] if picture is None else [picture]
 

@@ -32,13 +32,14 @@ MEDIAN_VALUES = 50_000
 """Number of values of an image for which medians are computed between two calls of ``check``."""
 
 OFTEN = 0.3
-"""Share of the images in which a pixel of a passage seldom shows a person."""
+"""Share of the images above which a pixel is often away from its median: where people pass through,
+a pixel shows a person in fewer images."""
 
 AWAY = 24
-"""Difference from the median, on the scale 16 √level, above which a pixel shows something else."""
+"""Difference from the median, on the scale 16 √level, above which a pixel is away from it."""
 
 LEAST_CHANGING = 0.005
-"""Least share of changing pixels in the image for an estimate of :attr:`restlessness`."""
+"""Least share of changing pixels in the image for an estimate of :attr:`changing_share`."""
 
 _ROOTS = np.rint(16.0 * np.sqrt(np.arange(256))).clip(0, 255).astype(np.uint8)
 
@@ -52,14 +53,15 @@ class BackgroundModel:
     spread: UInt8[ndarray, "h w"]
     """Typical (median) deviation of a background pixel once exposures are aligned, on the
     scale of 16 √level."""
-    restlessness: float = 0.0
-    """Share of the pixels that change at all which are away from their median in more than
-    :data:`OFTEN` of the pictures."""
+    changing_share: float = 0.0
+    """Share, among the pixels that ever change, of those away from their median in more than
+    :data:`OFTEN` of the images."""
 
-    def doubt(self, parameters: ForegroundParams) -> float:
-        """The uncertainty of the median, 0 … 1, which is large if people stay in one place."""
+    def uncertainty(self, parameters: ForegroundParams) -> float:
+        """Compute the uncertainty of the median, 0 … 1, which is large if people stay in one
+        place."""
         low, high = parameters.restless_from, parameters.restless_to
-        u = float(np.clip((self.restlessness - low) / max(high - low, 1e-6), 0.0, 1.0))
+        u = float(np.clip((self.changing_share - low) / max(high - low, 1e-6), 0.0, 1.0))
         return u * u * (3.0 - 2.0 * u)
 
     @staticmethod
@@ -87,7 +89,7 @@ class BackgroundModel:
         reference = median(aligned, check)
         roots = cv2.LUT(reference, _ROOTS)
         deviations = [_largest(cv2.absdiff(cv2.LUT(picture, _ROOTS), roots)) for picture in aligned]
-        return BackgroundModel(reference, median(deviations, check), _restlessness(deviations))
+        return BackgroundModel(reference, median(deviations, check), _changing_share(deviations))
 
     def foreground(
         self, picture: UInt8[ndarray, "h w 3"], parameters: ForegroundParams
@@ -156,8 +158,8 @@ def square_roots(picture: UInt8[ndarray, "h w 3"]) -> UInt8[ndarray, "h w 3"]:
     return np.asarray(cv2.LUT(picture, _ROOTS), dtype=np.uint8)
 
 
-def _restlessness(deviations: list[UInt8[ndarray, "h w"]]) -> float:
-    """The share of the changing pixels that are often away from their median.
+def _changing_share(deviations: list[UInt8[ndarray, "h w"]]) -> float:
+    """Compute :attr:`BackgroundModel.changing_share`.
 
     Args:
         deviations: Deviation of each image from the median, on the scale 16 √level.

@@ -60,9 +60,9 @@ class MovingForeground:
         self._background = background
         self._parameters = parameters
         self._lag = max(1, round(LAG / step_time))
-        self.doubt = background.doubt(parameters)
+        self.uncertainty = background.uncertainty(parameters)
         """The uncertainty of the background, 0 … 1."""
-        lasting = parameters.motion_memory * self.doubt
+        lasting = parameters.motion_memory * self.uncertainty
         self.memory = min(254, round(lasting / step_time))
         """Number of images for which a change counts; with 0 this is the background alone."""
 
