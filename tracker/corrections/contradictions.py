@@ -20,8 +20,8 @@ def refuse_contradiction(before: Many[Correction], new: Correction) -> None:
 
     Two places of one step within :data:`NEAR` are of one person. Places that *same* and
     *exchanged* attribute to one person must not be attributed to two by *different*, and must not
-    be apart at one step; and no target may be where *nobody* states that none is. A person who
-    left may return.
+    be apart at one step; and no place of a person may be in the area that *nobody* states to be
+    empty. A person who left may return.
 
     Args:
         before: The corrections so far.
@@ -32,7 +32,7 @@ def refuse_contradiction(before: Many[Correction], new: Correction) -> None:
     """
     known = [one for one in before if one.id != new.id]
     try:
-        _check([*known, new])
+        _check_all([*known, new])
     except _Contradiction as found:
         other = next((one for one in found.others if one is not new), None)
         against = f'"{other.words}"' if other is not None else "itself"
@@ -50,7 +50,7 @@ def refuse_two_names(first: Many[Correction], second: Many[Correction]) -> None:
     Raises:
         CorrectionError: If a person has two names; the message names both corrections.
     """
-    people = _People.tied((*first, *second))
+    people = _People.from_corrections((*first, *second))
     numbers = [[(people.of(one.places[0], one), one) for one in log if one.kind == "name"]
                for log in (first, second)]  # fmt: skip
     ones, others = ({people.root(number): one for number, one in log} for log in numbers)
@@ -88,6 +88,8 @@ def find_repeated(
 
 
 class _Contradiction(Exception):
+    """Corrections contradict each other."""
+
     def __init__(self, why: str, *others: Correction) -> None:
         super().__init__(why)
         self.why, self.others = why, others
@@ -101,16 +103,19 @@ class _People:
         self._parents: list[int] = []
 
     @classmethod
-    def tied(cls, corrections: Many[Correction]) -> _People:
-        """Group the places of corrections by their pairs of one person."""
+    def from_corrections(cls, corrections: Many[Correction]) -> _People:
+        """Group the places of corrections by person: the two places of each pair are of one."""
         people = cls()
         for one in corrections:
             for earlier, later in one.pairs:
-                people.tie(people.of(earlier, one), people.of(later, one))
+                people.unite(people.of(earlier, one), people.of(later, one))
         return people
 
     def of(self, place: Place, correction: Correction) -> int:
-        """The index of a place, or of one within :data:`NEAR` at its step; a new one is added."""
+        """Return the index of a place, or of one within :data:`NEAR` of it at the same step.
+
+        If there is neither, the place is added.
+        """
         for number, (other, _) in enumerate(self.places):
             if other.step == place.step and _distance(other, place) <= NEAR:
                 return number
@@ -124,49 +129,53 @@ class _People:
             number = self._parents[number]
         return number
 
-    def tie(self, one: int, other: int) -> None:
+    def unite(self, one: int, other: int) -> None:
         """Unite the groups of two places."""
         self._parents[self.root(one)] = self.root(other)
 
 
 def _distance(one: Place, other: Place) -> float:
+    """The distance of two places on the ground, metres."""
     return float(np.hypot(one.x - other.x, one.y - other.y))
 
 
-def _check(corrections: list[Correction]) -> None:
-    people = _People.tied(corrections)
+def _check_all(corrections: list[Correction]) -> None:
+    """Raise :class:`_Contradiction` if corrections cannot be true together."""
+    people = _People.from_corrections(corrections)
     for one in corrections:
         for earlier, later in one.apart:
             a, b = people.of(earlier, one), people.of(later, one)
             if people.root(a) == people.root(b):
-                tying = next(
+                uniting = next(
                     (
                         other
                         for other in reversed(corrections)
                         if other is not one
                         and other.pairs
-                        and any(_touches(other, p) for p in (earlier, later))
+                        and any(_has_place_at(other, p) for p in (earlier, later))
                     ),
                     one,
                 )
                 raise _Contradiction(
-                    "the same person and not the same person", tying, corrections[-1], one
+                    "the same person and not the same person", uniting, corrections[-1], one
                 )
-    tied: dict[int, list[tuple[Place, Correction]]] = {}
+    groups: dict[int, list[tuple[Place, Correction]]] = {}
     for number, place in enumerate(people.places):
-        tied.setdefault(people.root(number), []).append(place)
-    for group in tied.values():
-        _check_one_place(group)
+        groups.setdefault(people.root(number), []).append(place)
+    for group in groups.values():
+        _check_places_of_person(group)
     for one in corrections:
         if one.kind == "nobody":
-            _check_empty(one, corrections)
+            _check_empty_place(one, corrections)
 
 
-def _touches(one: Correction, place: Place) -> bool:
+def _has_place_at(one: Correction, place: Place) -> bool:
+    """Whether a correction has a place within :data:`NEAR` of another one at its step."""
     return any(p.step == place.step and _distance(p, place) <= NEAR for p in one.places)
 
 
-def _check_one_place(group: list[tuple[Place, Correction]]) -> None:
+def _check_places_of_person(group: list[tuple[Place, Correction]]) -> None:
+    """Raise :class:`_Contradiction` if places of one person are far apart at one step."""
     by_step: dict[int, tuple[Place, Correction]] = {}
     for place, one in group:
         other = by_step.setdefault(place.step, (place, one))
@@ -179,7 +188,8 @@ def _check_one_place(group: list[tuple[Place, Correction]]) -> None:
             )
 
 
-def _check_empty(one: Correction, corrections: list[Correction]) -> None:
+def _check_empty_place(one: Correction, corrections: list[Correction]) -> None:
+    """Raise :class:`_Contradiction` if a person is stated to be in the area of a *nobody*."""
     for other in corrections:
         if other.kind not in ("here", "name", "came", "left"):
             continue

@@ -10,7 +10,7 @@ from numpy import ndarray
 def inflation(
     offset: Float[ndarray, " 3"], covariance: Float[ndarray, "3 3"], sigma: float
 ) -> Float[ndarray, "3 3"]:
-    """Compute the covariance that is added to an estimate which contradicts a given place.
+    """Compute the covariance that is added to an estimate that contradicts a given place.
 
     The place of a correction is trusted more than the estimate. With the innovation ν from the
     estimate, of covariance P, to the place, of standard deviation σ, the covariance is inflated
@@ -24,9 +24,9 @@ def inflation(
     17(5), 1972) for one innovation, as for an unmodelled manoeuvre.
 
     Args:
-        offset: ν, metres.
-        covariance: P, square metres.
-        sigma: σ, metres.
+        offset: ν, from the estimate to the place, metres.
+        covariance: P, covariance of the estimated position, square metres.
+        sigma: σ, standard deviation of the place along every axis, metres.
 
     Returns:
         W, square metres; zero where the estimate does not contradict the place.

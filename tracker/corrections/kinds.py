@@ -54,7 +54,7 @@ class Place(NamedTuple):
 
     @property
     def words(self) -> str:
-        """The place as messages name it."""
+        """The place in the form of messages."""
         return f"({self.x:.2f}, {self.y:.2f}) at step {self.step}"
 
 
@@ -65,7 +65,7 @@ class KindOf:
     word: str
     """Name of the kind as the page shows it."""
     places: tuple[int, int | None]
-    """Smallest and largest number of places; None for any number."""
+    """Smallest and largest number of places; None for no upper bound."""
     means: str
     """Meaning of the kind, as the manual shows it."""
     accuracy: float | None = None
@@ -116,10 +116,10 @@ class Correction(BaseModel):
     note: str = Field(default="", max_length=1000)
     """Free text of the user."""
     places: tuple[Place, ...] = ()
-    """Each ``[step, x, y, z]``: a step from 0 on, and world metres."""
+    """Places ``[step, x, y, z]``: the step, from 0, and the position, world metres."""
     accuracy: Annotated[float, Field(ge=0.01, le=5.0)] | None = None
-    """Metres. For *here* the standard deviation of the place; for *nobody* the radius around its
-    places in which nobody is."""
+    """Accuracy, metres: for *here* the standard deviation of the place, for *nobody* the radius
+    around the places within which there is no person."""
     name: str | None = Field(default=None, min_length=1, max_length=80)
     """Name of the person, for *name*."""
     first: int | None = Field(default=None, ge=0)
@@ -223,16 +223,17 @@ _ONLY = {
 }  # fmt: skip
 
 IN_THE_FUSION: tuple[Kind, ...] = ("here", "nobody")
-"""The kinds that the fusion filter takes into account; the others are about identity."""
+"""The kinds that the fusion applies; the others are about identity."""
 
 OF_PEOPLE: tuple[Kind, ...] = (
     "same", "different", "exchanged", "here", "nobody", "came", "left", "name",
 )  # fmt: skip
-"""The kinds about people, which a run may meet or not."""
+"""The kinds that a run can meet or not: all but *checked*."""
 
 
 def _rounded(places: Any) -> Any:
-    """Round places as the log writes them, so that a log that is read again gives the same run."""
+    """Round places to the decimals of the log, so that a log that is read again gives the same
+    run."""
     if not isinstance(places, list | tuple):
         return places
     return tuple(

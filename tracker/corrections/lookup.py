@@ -35,12 +35,12 @@ class TrackIndex:
             self._before, self._after = _ways(self._steps, self._ground, owners[self._order])
 
     def at(self, step: int) -> slice:
-        """The slice of one step, in the order of steps."""
+        """Return the slice of one step among the rows sorted by step."""
         low, high = np.searchsorted(self._steps, [step, step + 1])
         return slice(int(low), int(high))
 
     def nearest(self, place: Place, *, leeway: int = 0, reach: float = REACH) -> int | None:
-        """The row that a place refers to: the nearest on the ground within reach, None for none.
+        """Return the row that a place refers to, the nearest on the ground within reach; else None.
 
         Args:
             place: Step and position.
@@ -61,10 +61,10 @@ class TrackIndex:
         return int(self._order[low + best]) if cost[best] <= reach else None
 
     def row_of(self, here: Correction) -> int | None:
-        """The row that an *is here* correction refers to, None for none.
+        """Return the row that a correction of kind ``here`` refers to, None for none.
 
-        It is that at the place itself; where no track is there, that at the second place, at
-        which a run had the track.
+        It is the row at the place itself or, if there is no track, the row at the second place, at
+        which the run had the track when the correction was made.
         """
         place, *meant = here.places
         if not meant:
@@ -89,7 +89,10 @@ class TrackIndex:
 def _ways(
     steps: Int[ndarray, " N"], ground: Float[ndarray, "N 2"], owners: Int[ndarray, " N"]
 ) -> tuple[Float[ndarray, "N 2"], Float[ndarray, "N 2"]]:
-    """The velocity of each row's track before and after it, metres per step; 0 at an end."""
+    """Compute the velocity of each row's track before and after the row, metres per step.
+
+    It is 0 at an end of the track.
+    """
     before, after = np.zeros_like(ground), np.zeros_like(ground)
     order = np.lexsort((steps, owners))
     one, other = order[:-1], order[1:]
@@ -106,9 +109,9 @@ def mostly_inside(
     inside: Bool[ndarray, " N"],
     one: Correction,
 ) -> set[int]:
-    """The tracks that a *nobody* correction refers to, with most of their rows inside it.
+    """Select the tracks that a *nobody* correction refers to: those with most of their rows inside.
 
-    A track that only passes is not among them, nor a longer one with a single row inside: it may
+    A track that only passes is left out, and so is a longer one with a single row inside, which may
     be born at the last step of the correction, after which births are allowed again.
 
     Args:

@@ -13,10 +13,11 @@ from tracker.corrections.kinds import Correction, Place
 from tracker.corrections.lookup import TrackIndex, mostly_inside
 
 _GATE = 3.0
-"""Distance within which a track is at the place of a correction, in its standard deviations."""
+"""Distance within which a track is at the place of a correction, in standard deviations of the
+place."""
 
 
-_WHO = ("same", "different", "exchanged")
+_IDENTITY_KINDS = ("same", "different", "exchanged")
 """The kinds about identity, which may contradict an unmet correction."""
 
 
@@ -29,9 +30,10 @@ class Outcome:
     met: bool
     """Whether the tracks meet the correction."""
     why: str = ""
-    """Why it is not met, in one sentence; empty where it is."""
+    """Why the correction is not met, in one sentence; empty if it is met."""
     tracks: tuple[int, ...] = ()
-    """Ids of the tracks that it refers to, in the order of its places; empty if one is missing."""
+    """Ids of the tracks that the correction refers to, in the order of its places; empty if one of
+    them is missing."""
 
 
 class _NotFound(Exception):
@@ -39,17 +41,21 @@ class _NotFound(Exception):
 
 
 class _Tracks:
+    """The tracks of a run with an index of their rows, for corrections whose tracks must exist."""
+
     def __init__(self, frames: ndarray, ids: ndarray, positions: ndarray, leeway: int) -> None:
         self.frames, self.ids, self.leeway = frames, ids, leeway
-        self.whereabouts = TrackIndex(frames, positions, ids)
+        self.index = TrackIndex(frames, positions, ids)
         self.positions = positions
 
-    def who(self, place: Place) -> int:
-        row = self.row(place)
+    def track_at(self, place: Place) -> int:
+        """Return the id of the track that a place refers to, or raise :class:`_NotFound`."""
+        row = self.row_at(place)
         return int(self.ids[row])
 
-    def row(self, place: Place) -> int:
-        row = self.whereabouts.nearest(place, leeway=self.leeway)
+    def row_at(self, place: Place) -> int:
+        """Return the row that a place refers to, or raise :class:`_NotFound`."""
+        row = self.index.nearest(place, leeway=self.leeway)
         if row is None:
             raise _NotFound(f"found nobody near {place.words}")
         return row
@@ -77,18 +83,22 @@ def outcomes(
     found = []
     for one in corrections:
         try:
-            who, why = _looked(tracks, one)
+            concerned, why = _check(tracks, one)
         except _NotFound as error:
             found.append(Outcome(one.id, False, str(error)))
         else:
-            found.append(Outcome(one.id, not why, why, who))
+            found.append(Outcome(one.id, not why, why, concerned))
     both = list(zip(corrections, found, strict=True))
-    holds = [pair for pair in both if pair[1].met and pair[0].kind in _WHO]
-    return tuple(outcome if outcome.met else _against(one, outcome, holds) for one, outcome in both)
+    holds = [pair for pair in both if pair[1].met and pair[0].kind in _IDENTITY_KINDS]
+    return tuple(
+        outcome if outcome.met else _with_reason(one, outcome, holds) for one, outcome in both
+    )
 
 
-def _against(own: Correction, unmet: Outcome, holds: Many[tuple[Correction, Outcome]]) -> Outcome:
-    """Add to an unmet outcome the last met correction about the same tracks and steps.
+def _with_reason(
+    own: Correction, unmet: Outcome, holds: Many[tuple[Correction, Outcome]]
+) -> Outcome:
+    """Add to the reason of an unmet correction the last met one about the same tracks and steps.
 
     Args:
         own: The unmet correction.
@@ -105,42 +115,43 @@ def _against(own: Correction, unmet: Outcome, holds: Many[tuple[Correction, Outc
     return unmet
 
 
-def _looked(tracks: _Tracks, one: Correction) -> tuple[tuple[int, ...], str]:
-    """The tracks that a correction refers to, and why it is not met; empty where it is."""
+def _check(tracks: _Tracks, one: Correction) -> tuple[tuple[int, ...], str]:
+    """Return the tracks that a correction refers to, and the reason why it is not met, else ""."""
     if one.kind == "checked":
         return (), ""
     if one.kind == "nobody":
-        inside = tracks.whereabouts.inside(one)
+        inside = tracks.index.inside(one)
         rest = mostly_inside(tracks.ids, tracks.frames, inside, one)
         return tuple(rest), "somebody is still tracked there" if rest else ""
     if one.kind == "here":
         return _here(tracks, one)
-    who = tuple(tracks.who(place) for place in one.places)
-    if one.kind == "same" and who[0] != who[1]:
-        return who, f"they are two tracks, {who[0]} and {who[1]}"
-    if one.kind == "different" and who[0] == who[1]:
-        return who, f"they are one track, {who[0]}"
-    if one.kind == "exchanged" and who[:2] != who[2:]:
-        if len(set(who[:2])) < 2 or len(set(who[2:])) < 2:
-            return who, "only one of the two is there"
-        return who, f"{who[0]} and {who[1]} go on as {who[2]} and {who[3]}"
+    ids = tuple(tracks.track_at(place) for place in one.places)
+    if one.kind == "same" and ids[0] != ids[1]:
+        return ids, f"they are two tracks, {ids[0]} and {ids[1]}"
+    if one.kind == "different" and ids[0] == ids[1]:
+        return ids, f"they are one track, {ids[0]}"
+    if one.kind == "exchanged" and ids[:2] != ids[2:]:
+        if len(set(ids[:2])) < 2 or len(set(ids[2:])) < 2:
+            return ids, "only one of the two is there"
+        return ids, f"{ids[0]} and {ids[1]} go on as {ids[2]} and {ids[3]}"
     if one.kind in ("came", "left"):
-        row = tracks.row(one.places[0])
+        row = tracks.row_at(one.places[0])
         before = one.kind == "came"
         step = one.places[0].step + (-1 if before else 1) * (tracks.leeway + 1)
         # a track up to the end of the recording, or from its beginning, has not left or come
         step = min(max(step, 0), int(tracks.frames.max()))
-        own = tracks.frames[tracks.ids == who[0]]
+        own = tracks.frames[tracks.ids == ids[0]]
         between = own[(own - step) * (own - tracks.frames[row]) <= 0]
         long = min(abs(one.places[0].step - step), tracks.leeway)
         if long and step in own and len(between) > long:
-            return who, f"track {who[0]} is there {'before' if before else 'after'} it"
-    return who, ""
+            return ids, f"track {ids[0]} is there {'before' if before else 'after'} it"
+    return ids, ""
 
 
 def _here(tracks: _Tracks, one: Correction) -> tuple[tuple[int, ...], str]:
+    """Check a correction of kind ``here``, as :func:`_check`."""
     place = one.places[0]
-    row = tracks.whereabouts.nearest(place)
+    row = tracks.index.nearest(place)
     if row is None:
         return (), f"found nobody near {place.words}"
     apart = float(np.hypot(*(tracks.positions[row, :2] - [place.x, place.y])))
@@ -171,25 +182,25 @@ def supporting_corrections(
     ids: Int[ndarray, " N"],
     positions: Float[ndarray, "N 3"],
     corrections: Many[Correction],
-    found_outcomes: Many[Outcome],
+    outcomes: Many[Outcome],
 ) -> list[str]:
-    """The id of the correction that each row of tracks depends on, empty for none.
+    """Return the id of the correction that each row of tracks depends on, empty for none.
 
-    The identity of a track depends on a correction of identity from the later place on, up to the
-    next correction; where the track has a gap before that place, from the end of the gap. A row
-    at the place of *is here* depends on that correction. Unmet corrections are left out.
+    The identity of a track depends on a correction of identity from its later place on, or from the
+    end of the gap before that place, up to the next correction. A row at the place of a correction
+    of kind ``here`` depends on that correction. Unmet corrections are left out.
 
     Args:
         frames: Step of each of N rows.
         ids: Track of each row.
         positions: Position of each row, world metres.
         corrections: The corrections in the order in which they were made.
-        found_outcomes: Their outcomes in these tracks.
+        outcomes: The outcomes of the corrections in these tracks.
     """
     by_id = {one.id: one for one in corrections}
     found = [""] * len(frames)
     begins: list[tuple[int, int, str]] = []
-    for outcome in found_outcomes:
+    for outcome in outcomes:
         one = by_id.get(outcome.id)
         if one is None or not outcome.met:
             continue
@@ -202,7 +213,7 @@ def supporting_corrections(
             pairs = zip(one.places, one.places[later:], outcome.tracks[later:], strict=False)
             for earlier, place, track in pairs:
                 between = (ids == track) & (frames > earlier.step) & (frames <= place.step)
-                begins.append((track, _back(frames[between], place.step), one.id))
+                begins.append((track, _after_last_gap(frames[between], place.step), one.id))
     begins.sort(key=lambda begin: begin[1])
     for track, step, name in begins:
         for row in np.flatnonzero((ids == track) & (frames >= step)).tolist():
@@ -210,7 +221,7 @@ def supporting_corrections(
     return found
 
 
-def _back(own: Int[ndarray, " K"], step: int) -> int:
+def _after_last_gap(own: Int[ndarray, " K"], step: int) -> int:
     """The first step after the last gap among some steps; ``step`` where there is no gap."""
     own = np.unique(own)
     gaps = np.flatnonzero(np.diff(own) > 1)

@@ -19,7 +19,7 @@ _MISS = 0.5
 
 
 _OFF_FLOOR = 0.3
-"""Height below which a target of a person's size stands on the floor, metres."""
+"""Largest height above the floor of the lower end of a target that stands on the floor, metres."""
 
 
 def ground_under(feet: float | None, *, floor: float, half_height: float) -> float:
@@ -99,7 +99,7 @@ def triangulated(points: Many[tuple[Camera, tuple[float, float]]]) -> Float[ndar
             "clicks: the two pictures look from the same side; click in another one"
         )
     place: Float[ndarray, " 3"] = np.linalg.solve(total, np.einsum("cij,cj->i", across, centres))
-    # the point lies between two rays, at half their distance from each
+    # the point nearest to two rays is at half their distance from each
     away = np.linalg.norm(np.einsum("cij,cj->ci", across, place - centres), axis=1)
     miss = 2.0 * float(away.max())
     ahead = np.einsum("ci,ci->c", rays, place - centres)

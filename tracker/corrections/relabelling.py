@@ -1,6 +1,6 @@
-"""Corrections applied to finished tracks by splitting, joining and removing them.
+"""Application of corrections to finished tracks, which are split, linked and removed.
 
-They are used for methods that do not take corrections, and as a preview while a run is computed.
+It serves methods that do not apply corrections themselves, and the preview while a run is computed.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ class _Segments:
 
     def __init__(self, frames: ndarray, ids: ndarray, positions: ndarray, leeway: int) -> None:
         self.frames, self.positions = frames, positions
-        self.whereabouts = TrackIndex(frames, positions, ids)
+        self.index = TrackIndex(frames, positions, ids)
         self.leeway = leeway
         order = np.lexsort((frames, ids))
         _names, begins = np.unique(ids[order], return_index=True)
@@ -32,9 +32,9 @@ class _Segments:
         for number, rows in enumerate(self.rows):
             self.of_row[rows] = number
 
-    def find(self, place: Place) -> int | None:
-        """The row that a place refers to, None for none."""
-        return self.whereabouts.nearest(place, leeway=self.leeway)
+    def row_at(self, place: Place) -> int | None:
+        """Return the row that a place refers to, None for none."""
+        return self.index.nearest(place, leeway=self.leeway)
 
     def cut(self, row: int) -> None:
         """Split the segment of a row before it; the second part follows the first."""
@@ -51,7 +51,7 @@ class _Segments:
         self.of_row[rows[place:]] = new
 
     def nearest(self, one: int, other: int, after: int, until: int) -> int | None:
-        """The step at which two segments are nearest to each other.
+        """Find the step at which two segments are nearest to each other on the ground.
 
         Args:
             one: Index of the first segment.
@@ -76,7 +76,7 @@ class _Segments:
         return int(steps[np.argmin(apart)])
 
     def longest_way(self, earlier: int, later: int) -> int:
-        """The row with the longest way from the row before, between two rows of a segment.
+        """Find the row with the longest way from the row before, between two rows of a segment.
 
         Args:
             earlier: The first row.
@@ -91,29 +91,29 @@ class _Segments:
         return int(own[1 + np.argmax(way)])
 
     def cut_from(self, number: int, step: int) -> int:
-        """The segment that begins at a step, split there from its first part."""
+        """Split a segment at a step, and return the index of the second part."""
         rows = self.rows[number]
         row = int(rows[np.searchsorted(self.frames[rows], step)])
         self.cut(row)
         return int(self.of_row[row])
 
     def before(self, number: int) -> int:
-        """The segment that a segment follows, -1 for none."""
+        """Return the segment that a segment follows, -1 for none."""
         return self.following.index(number) if number in self.following else -1
 
-    def part(self, number: int) -> None:
+    def separate(self, number: int) -> None:
         """Separate a segment from the one that it follows."""
         earlier = self.before(number)
         if earlier >= 0:
             self.following[earlier] = -1
 
-    def tie(self, earlier: int, later: int) -> None:
-        """Let a segment follow another, instead of the one that followed that."""
-        self.part(later)
+    def link(self, earlier: int, later: int) -> None:
+        """Let the segment ``later`` follow ``earlier``, instead of the one that did before."""
+        self.separate(later)
         self.following[earlier] = later
 
     def chain(self, number: int) -> list[int]:
-        """The segments of the track that a segment is in, in the order of time."""
+        """Return the segments of the track that a segment is in, in the order of time."""
         while (earlier := self.before(number)) >= 0:
             number = earlier
         found = [number]
@@ -147,13 +147,13 @@ def relabelled(
     gone: set[int] = set()
     for one in corrections:
         if one.kind in ("same", "exchanged"):
-            _tie(segments, one)
+            _link(segments, one)
         elif one.kind == "different":
-            _part(segments, one)
+            _separate(segments, one)
         elif one.kind in ("came", "left"):
-            _end(segments, one)
+            _cut_ends(segments, one)
         elif one.kind == "nobody":
-            inside = segments.whereabouts.inside(one)
+            inside = segments.index.inside(one)
             for number in mostly_inside(segments.of_row, frames, inside, one):
                 rows = segments.rows[number]
                 within = rows[inside[rows]]
@@ -169,8 +169,12 @@ def relabelled(
     return result, kept
 
 
-def _tie(segments: _Segments, one: Correction) -> None:
-    found = [(segments.find(a), segments.find(b)) for a, b in one.pairs]
+def _link(segments: _Segments, one: Correction) -> None:
+    """Link the tracks at the places of one person, for a correction *same* or *exchanged*.
+
+    Tracks that exist at the same time are split at the step at which they are nearest.
+    """
+    found = [(segments.row_at(a), segments.row_at(b)) for a, b in one.pairs]
     if any(a is None or b is None for a, b in found):
         return
     pairs: list[tuple[int, int]] = [(a, b) for a, b in found if a is not None and b is not None]
@@ -199,27 +203,32 @@ def _tie(segments: _Segments, one: Correction) -> None:
     for a, b, _ in joins:
         earlier, later = int(segments.of_row[a]), int(segments.of_row[b])
         if later not in segments.chain(earlier):
-            segments.tie(earlier, later)
+            segments.link(earlier, later)
 
 
-def _part(segments: _Segments, one: Correction) -> None:
-    earlier, later = (segments.find(place) for place in one.places)
+def _separate(segments: _Segments, one: Correction) -> None:
+    """Separate the track of two people, for a correction *different*.
+
+    A single segment is split where it moves farthest from one row to the next.
+    """
+    earlier, later = (segments.row_at(place) for place in one.places)
     if earlier is None or later is None:
         return
     if segments.of_row[later] not in segments.chain(int(segments.of_row[earlier])):
         return
     if segments.of_row[earlier] == segments.of_row[later]:
         segments.cut(segments.longest_way(earlier, later))
-    segments.part(int(segments.of_row[later]))
+    segments.separate(int(segments.of_row[later]))
 
 
-def _end(segments: _Segments, one: Correction) -> None:
-    row = segments.find(one.places[0])
+def _cut_ends(segments: _Segments, one: Correction) -> None:
+    """Separate a track from what is before it, for *came*, or from what is after it, for *left*."""
+    row = segments.row_at(one.places[0])
     if row is None:
         return
     if one.kind == "came":
         segments.cut(row)
-        segments.part(int(segments.of_row[row]))
+        segments.separate(int(segments.of_row[row]))
         return
     rows = segments.rows[segments.of_row[row]]
     later = rows[segments.frames[rows] > segments.frames[row]]
