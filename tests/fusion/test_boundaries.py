@@ -293,29 +293,29 @@ def test_the_last_frame_of_a_blind_camera_counts_the_less_the_older_it_is(age: i
 def test_only_a_newcomer_with_a_box_of_this_step_begins_and_old_boxes_are_no_sources() -> None:
     blind = np.array([True, False, True, False])
     sources = np.array([[0, 0, 1], [-1, 2, 0], [3, 0, 1], [-1, -1, 4]])
-    found = missing_frames.of_this_step(
+    found = missing_frames.with_present_boxes(
         Newborns(np.eye(3), np.tile(np.eye(3), (3, 1, 1)), np.ones(3), sources), blind
     )
     assert found.sources.T.tolist() == [[-1, 2, -1, -1], [-1, 0, -1, 4]]
     assert_allclose(found.positions, np.eye(3)[1:])
     views = (NO_FRAME, NO_BOXES, NO_FRAME, NO_BOXES)
-    cameras = missing_frames.seeing(views)
+    cameras = missing_frames.cameras_with_frame(views)
     assert cameras is not None
     assert cameras.tolist() == [1, 3]
-    assert missing_frames.seeing((NO_BOXES,)) is None
+    assert missing_frames.cameras_with_frame((NO_BOXES,)) is None
     part = Record(
         np.array([[0.1], [0.2]]),
         np.array([[4], [5]]),
         np.array([[0.3], [0.4]]),
         np.array([[6], [7]]),
     )
-    whole = missing_frames.spread(part, cameras, 4)
+    whole = missing_frames.extend_record(part, cameras, 4)
     assert whole.detection_probabilities.T.tolist() == [[0.0, 0.1, 0.0, 0.2]]
     assert whole.sources.T.tolist() == [[-1, 4, -1, 5]]
     assert whole.source_weights.T.tolist() == [[0.0, 0.3, 0.0, 0.4]]
     assert whole.hidden_by.T.tolist() == [[-1, 6, -1, 7]]
     seen = all_boxes((NO_FRAME, of_boxes(np.ones((2, 4))), NO_FRAME, of_boxes(np.ones((3, 4)))))
-    assert missing_frames.boxes_of(seen, cameras).starts.tolist() == [0, 2, 5]
+    assert missing_frames.boxes_of_cameras(seen, cameras).starts.tolist() == [0, 2, 5]
 
 
 # ── what is recorded

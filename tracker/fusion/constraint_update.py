@@ -31,9 +31,10 @@ def apply_constraints(
     Components born in this step within an area that is stated to be empty are removed. A
     place z of standard deviation σ is a measurement with p_D = 1 and without clutter: it
     updates the component j of the largest w_j N(z; m_j, P_j + σ²I) within the gate, or so near
-    that two people could not both stand there. The covariance of that component is inflated as
-    far as the place requires (see :func:`tracker.corrections.inflation.inflation`) and its label's
-    existence raised to 0.999. Where there is no such component, a new one begins at the place.
+    that two people cannot both stand there (:attr:`FusionModel.near`). The covariance of that
+    component is inflated as far as the place requires (see
+    :func:`tracker.corrections.inflation.inflation`) and its label's existence raised to 0.999.
+    Where there is no such component, a new one begins at the place.
 
     Args:
         mixture: J components of this step.
@@ -56,7 +57,7 @@ def apply_constraints(
     ):
         noise = sigma**2 * np.eye(3)
         best = None
-        if reference[0] == reference[0]:
+        if reference[0] == reference[0]:  # NaN stands for any track
             best = _component_at(mixture, reference, NEAR**2 * np.eye(3), model)
         if best is None:
             best = _component_at(mixture, place, noise, model)
@@ -75,7 +76,14 @@ def apply_constraints(
 def _component_at(
     mixture: GaussianMixture, place: ndarray, noise: ndarray, model: FusionModel
 ) -> int | None:
-    """The component that a place belongs to, as an index; None where it belongs to none."""
+    """Return the index of the component that a place belongs to, None for none.
+
+    Args:
+        mixture: J components.
+        place: z (3,), world metres.
+        noise: σ² I (3, 3), square metres.
+        model: Gate and size of a target.
+    """
     if not mixture.size:
         return None
     offsets = place - mixture.means[:, :3]
@@ -104,7 +112,7 @@ def _updated(
     weights = mixture.weights.copy()
     means[component] = mean + gain @ (place - mean[:3])
     covariances[component] = rest @ covariance @ rest.T + gain @ noise @ gain.T
-    # the boxes of the next step err as those of this one do and must stay within the gate
+    # boxes of the next step have similar errors, and must still lie in the gate of the component
     covariances[component, :3, :3] += extra
     own = mixture.labels == mixture.labels[component]
     weights[component] += max(_EXISTENCE - float(weights[own].sum()), 0.0)

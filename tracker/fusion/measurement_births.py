@@ -15,10 +15,10 @@ from tracker.kernels.births import Refinement
 from tracker.kernels.gating import Measurements
 from tracker.sequences.sequence import Room
 
-_REFINEMENTS = 3  # Gauss-Newton steps: the third hardly changes the position
-_MOST_SEEDS = 1000  # of a crowd of unexplained boxes, those whose rays pass closest
-_LEAST_VOLUME = 1e-250  # m³: keeps the density finite in a room without height
-_START_SIGMA = 1.0  # metres: prior of the refinement around the meeting point of two rays
+_REFINEMENTS = 3  # number of Gauss-Newton steps; the third hardly changes the position
+_MOST_SEEDS = 1000  # largest number of seeds, those whose rays pass closest to each other
+_LEAST_VOLUME = 1e-250  # m³; it keeps the density finite in a room without height
+_START_SIGMA = 1.0  # prior deviation of the refinement around the midpoint of two rays, metres
 _UNEXPLAINED = 0.5  # probability of having no target above which a box may begin a track
 
 
@@ -116,7 +116,7 @@ class MeasurementBirths:
         volume = max(float(np.prod(room.maximum - room.minimum)), _LEAST_VOLUME)
         self._log_density = np.log(model.birth_rate / volume)
         self._log_hit = float(np.log(p_d))
-        # at p_D = 1 no newcomer is ever missed
+        # at p_D = 1 a miss has probability 0
         self._log_miss = float(np.log1p(-p_d)) if p_d < 1.0 else -np.inf
         self._log_clutter = np.log(model.clutter)
         self._centres = np.array([camera.centre for camera in cameras])
@@ -141,7 +141,7 @@ class MeasurementBirths:
         return found.take(np.array(chosen)) if chosen else None
 
     def _meeting_points(self, evidence: Evidence) -> Float[ndarray, "N 3"]:
-        """The points where rays of unexplained boxes of two cameras pass close by each other."""
+        """Find midpoints between nearby rays of unexplained boxes of two cameras, world metres."""
         free = births.free_boxes(evidence.unexplained, evidence.starts, _UNEXPLAINED)
         if free.cameras < 2:
             return np.zeros((0, 3))

@@ -18,10 +18,11 @@ from tracker.geometry.assignment import linear_sum_assignment
 class Memory:
     """The confirmed tracks of a step, and the predictions of those lost a short while ago.
 
-    A filter drops a target that no camera detects within a step or two, which is right for the
-    estimate and wrong for the label. So the last state of a confirmed track that ended
-    inside the room is predicted further for a while, and the first new track that is confirmed
-    within its gate takes over its label. The estimates of the filter do not change.
+    The filter drops a target that no camera detects within a few steps, which is right for the
+    estimate of existence and loses the label. So the last state of a confirmed track that ended
+    inside the room is predicted further for ``FusionParams.memory`` seconds, and the first new
+    track that is confirmed in its gate takes over its label. The estimates of the filter do not
+    change.
     """
 
     known: GaussianMixture
@@ -29,13 +30,14 @@ class Memory:
     lost: GaussianMixture
     """The predicted states of L lost tracks."""
     ages: Float[ndarray, " L"]
-    """Seconds since each track was lost."""
+    """Time since each track was lost, seconds."""
     newer: Int[ndarray, " L"]
-    """The first label that was given only after each track was lost."""
+    """The least label that was given after each track was lost: only tracks from it on may take
+    over the label of the lost track."""
 
     @staticmethod
     def start(dimension: int) -> Memory:
-        """The memory without tracks, for states of the given dimension."""
+        """Make the memory without tracks, for states of the given dimension."""
         empty = GaussianMixture.empty(dimension)
         return Memory(empty, empty, np.zeros(0), np.zeros(0, dtype=np.int64))
 
@@ -86,7 +88,12 @@ def recall(
 
 
 def _first_of_each(labels: Int[ndarray, " J"], among: Int[ndarray, " K"]) -> Int[ndarray, " L"]:
-    """The first component of each label among some, by ascending label."""
+    """Return the index of the first component of each label, by ascending label.
+
+    Args:
+        labels: Label of each of J components.
+        among: Indices of the K components that are considered.
+    """
     first: dict[int, int] = {}
     for index, label in zip(among.tolist(), labels.take(among).tolist(), strict=True):
         first.setdefault(label, index)
@@ -96,7 +103,18 @@ def _first_of_each(labels: Int[ndarray, " J"], among: Int[ndarray, " K"]) -> Int
 def _missing(
     memory: Memory, present: Int[ndarray, " L"], model: FusionModel, first_label: int
 ) -> Memory:
-    """Predict the lost and known tracks whose labels are not present: those lost at this step."""
+    """Predict the lost tracks to this step, with the known tracks that are lost at this step.
+
+    Args:
+        memory: The memory after the step before.
+        present: Labels of the confirmed tracks of this step.
+        model: The motion and the room.
+        first_label: The first label that was given in this step.
+
+    Returns:
+        The memory with the lost tracks that have no label among ``present``, are inside the room,
+        and have not been lost for too long.
+    """
     there = set(present.tolist())
     known = memory.known
     away = [i for i, label in enumerate(known.labels.tolist()) if label not in there]
@@ -145,7 +163,7 @@ def _returned(
     labels = labels.copy()
     for old, newcomer in zip(*linear_sum_assignment(np.where(may, distances, 1e6)), strict=True):
         if may[old, newcomer]:
-            # components that still bear the old label get the new track's
+            # other components with the lost label get the label of the new track
             name, other = lost.labels[old], people.labels[newcomer]
             was_old, was_new = labels == name, labels == other
             labels[was_old], labels[was_new] = other, name

@@ -1,8 +1,8 @@
 """Asynchronous cameras: one without a frame at a step gives neither detections nor a miss there.
 
 Such a camera has p_D = 0, so that the existence of a target does not decrease. The unexplained
-boxes of its last frame are stored for a moment, so that cameras whose frames fall on different
-steps can still begin a track together.
+boxes of its last frame are stored for :data:`LONGEST` seconds, so that cameras whose frames fall on
+different steps can begin a track together.
 """
 
 from __future__ import annotations
@@ -21,28 +21,30 @@ from tracker.kernels.labelled.step import CameraBoxes
 from tracker.single_view.protocol import ViewResult
 
 LONGEST = 0.2
-"""Largest time between boxes of two cameras that begin one track, seconds."""
+"""Largest time between the boxes of two cameras that begin a track together, seconds."""
 
-WALKING = 1.0
-"""Standard deviation of a person's speed between these frames, metres per second."""
+SPEED_SIGMA = 1.0
+"""Standard deviation of a person's displacement per time between these frames, metres per
+second."""
 
 _UNEXPLAINED = 0.5
+"""Probability of having no target above which a box is stored for later steps."""
 
 
-def seeing(views: Many[ViewResult]) -> Int[ndarray, " S"] | None:
+def cameras_with_frame(views: Many[ViewResult]) -> Int[ndarray, " S"] | None:
     """The indices of the S cameras that have a frame at this step; None where all have."""
     if not any(view.blind for view in views):
         return None
     return np.array([c for c, view in enumerate(views) if not view.blind], dtype=np.int64)
 
 
-def boxes_of(seen: CameraBoxes, cameras: Int[ndarray, " S"]) -> CameraBoxes:
+def boxes_of_cameras(seen: CameraBoxes, cameras: Int[ndarray, " S"]) -> CameraBoxes:
     """Restrict the boxes of all C cameras to the S cameras that have a frame."""
     return seen._replace(starts=np.append(seen.starts[:-1][cameras], seen.starts[-1]))
 
 
-def spread(record: Record, cameras: Int[ndarray, " S"], count: int) -> Record:
-    """Extend the record of S cameras to all C: the others have no sources and p_D = 0.
+def extend_record(record: Record, cameras: Int[ndarray, " S"], count: int) -> Record:
+    """Extend the record of S cameras to all C; the others have no sources, and p_D = 0.
 
     Args:
         record: Evidence of the S cameras that have a frame.
@@ -70,13 +72,13 @@ class StepEvidence:
     """Which cameras have no frame at this step."""
 
     def of(self, camera: int) -> slice:
-        """The rows of the boxes of one camera."""
+        """Return the slice of the rows of one camera's boxes."""
         starts = self.evidence.starts
         return slice(int(starts[camera]), int(starts[camera + 1]))
 
 
 Recent = tuple[StepEvidence, ...]
-"""The evidence of the last steps, the latest first, as far back as it may still begin a track."""
+"""The evidence of the last steps, the latest first, of at most :data:`LONGEST` seconds."""
 
 
 def remember(recent: Recent, latest: StepEvidence, step_time: float) -> Recent:
@@ -87,7 +89,7 @@ def remember(recent: Recent, latest: StepEvidence, step_time: float) -> Recent:
 def with_recent(
     now: StepEvidence, recent: Recent, step_time: float, half_height: float
 ) -> Evidence:
-    """The evidence of a step, with the last frames of the cameras that have no frame now.
+    """Combine the evidence of a step with the last frames of the cameras that have none now.
 
     Args:
         now: The evidence of this step.
@@ -113,7 +115,17 @@ def with_recent(
 def _last(
     camera: int, now: StepEvidence, recent: Recent, step_time: float, half_height: float
 ) -> Evidence:
-    """One camera's evidence, of this step or of its last frame, with noise that grows with age."""
+    """Return one camera's evidence, of this step or else of its last frame.
+
+    The noise of earlier boxes is increased by the displacement of a person since then.
+
+    Args:
+        camera: Index of the camera.
+        now: The evidence of this step.
+        recent: The evidence of the steps before, the latest first.
+        step_time: Time between two steps, seconds.
+        half_height: Half height of a target, metres, which converts metres to pixels.
+    """
     age, seen = 0, now
     if now.blind[camera]:
         found = ((n, g) for n, g in enumerate(recent, 1) if not g.blind[camera])
@@ -122,7 +134,7 @@ def _last(
     rows = np.arange(own.start, own.stop)
     if age:
         rows = rows[evidence.unexplained[rows] > _UNEXPLAINED]
-    walked = WALKING * age * step_time / half_height * seen.boxes[rows, 3]
+    walked = SPEED_SIGMA * age * step_time / half_height * seen.boxes[rows, 3]
     values, noises = evidence.measurements
     looser = walked[:, None, None] ** 2 * np.eye(values.shape[1])
     return Evidence(
@@ -134,8 +146,8 @@ def _last(
     )
 
 
-def of_this_step(found: Newborns, blind: Bool[ndarray, " C"]) -> Newborns:
-    """Select the newborn targets with a box of this step; boxes of earlier frames are no sources.
+def with_present_boxes(found: Newborns, blind: Bool[ndarray, " C"]) -> Newborns:
+    """Select the newborn targets with a box of this step, and remove earlier boxes as sources.
 
     Args:
         found: N targets proposed from the boxes of this step and of earlier frames.

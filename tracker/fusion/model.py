@@ -56,9 +56,10 @@ class FusionModel:
         self.gate_of_places = gaussian_mixture.gate_distance(p.gate_probability, 3)
         """Squared Mahalanobis distance within which a place constraint belongs to a target."""
         self.near = p.duplicate_distance * 2.0 * float(np.mean(sequence.target_half_extents[:2]))
-        """Distance within which two components may be one person, metres."""
+        """Distance within which two tracks may be duplicates of one person, metres."""
         self.height = 2.0 * float(sequence.target_half_extents[2])
-        """Height of a target, and the vertical distance from which two are above each other."""
+        """Height of a target, metres: from this vertical distance on, two targets are one above the
+        other and no duplicates."""
         margin = p.followed_margin
         self.followed = (self.room.minimum - margin, self.room.maximum + margin)
         """Minimum and maximum of the volume in which targets are tracked, world metres."""
@@ -77,13 +78,13 @@ class FusionModel:
         )
 
     def expected(self, index: int, mixture: GaussianMixture) -> ExpectedBoxes:
-        """Predict the box of every component in one camera."""
+        """Predict the box of each of J components in the camera ``index``."""
         return self.target.expected(self.cameras[index], mixture.means, mixture.covariances)
 
     def detection_probabilities(
         self, index: int, expected: ExpectedBoxes, mixture: GaussianMixture
     ) -> Float[ndarray, " J"]:
-        """The p_D of every component in one camera without occlusion."""
+        """Compute p_D of each of J components in the camera ``index``, without occlusion."""
         return self.parameters.detection_probability * visibility.inside_probability(
             self.cameras[index],
             expected,
@@ -98,7 +99,7 @@ class FusionModel:
         mixture: GaussianMixture,
         occluders: Float[ndarray, " J"],
     ) -> Visibility:
-        """The p_D of every component in one camera, with occlusion.
+        """Compute p_D of every component in one camera, with occlusion.
 
         Args:
             index: Index of the camera.
@@ -118,7 +119,7 @@ class FusionModel:
         )
 
     def camera_rule(self, reporting_threshold: float) -> CameraRule:
-        """The parameters of one camera's update, in the form that the kernels take.
+        """Make the parameters of a camera's update, in the form that the kernels take.
 
         Args:
             reporting_threshold: Association probability from which a pair is reported, 0 … 1.
@@ -174,7 +175,7 @@ class FusionModel:
         proposed = self._newborns.propose(joined)
         if proposed is None:
             return None, later
-        found = missing_frames.of_this_step(proposed, blind)
+        found = missing_frames.with_present_boxes(proposed, blind)
         return (self._at_rest(found) if len(found.existences) else None), later
 
     def _at_rest(self, found: Newborns) -> tuple[GaussianMixture, Newborns]:
@@ -183,7 +184,7 @@ class FusionModel:
         return self.motion.at_rest(born), found
 
     def stays(self, mixture: GaussianMixture) -> Int[ndarray, " K"]:
-        """The indices of the components that lie in the tracked volume."""
+        """Return the indices of the components whose means lie in the tracked volume."""
         inside: ndarray = linear_algebra.inside_bounds(mixture.means, *self.followed)
         return inside
 
@@ -194,13 +195,13 @@ class FusionModel:
         labels: Int[ndarray, " n"],
         sources: Int[ndarray, "C n"],
     ) -> Bool[ndarray, " n"]:
-        """Which of n tracks are duplicates of a heavier or older one at the same place.
+        """Find which of n tracks are duplicates of a heavier or older one at the same place.
 
-        Two tracks nearer than ``near`` are one person, unless some camera has a box for each;
-        two on the floor within half of it are one in any case, for a detector may draw two
-        boxes around one person, one above the other, and two people cannot stand in one
-        place. Among confirmed tracks the older label remains; an unconfirmed one never
-        displaces a confirmed one.
+        Two tracks nearer than :attr:`near` are one person, unless some camera has a box for each.
+        Two that are nearer than half of it on the floor, and not one above the other, are one
+        person in any case: a detector may give two boxes for a person, and two people cannot stand
+        in one place. Of two confirmed tracks the older label remains; an unconfirmed track never
+        replaces a confirmed one.
 
         Args:
             means: State of each track, position first, world metres.

@@ -132,13 +132,13 @@ class MultiBernoulli:
         if p.recognition:
             alike = reidentification.resemblance(state.identities, before.labels, views)
             seen = seen._replace(resemblance=alike)
-        cameras = missing_frames.seeing(views)
+        cameras = missing_frames.cameras_with_frame(views)
         step_model, calibrations = self._with_frame(cameras)
         found = step_kernels.predict_and_update(
             Tracks(before.weights, before.means, before.covariances, before.labels),
             state.next_label,
             state.undetected.gaussians,
-            seen if cameras is None else missing_frames.boxes_of(seen, cameras),
+            seen if cameras is None else missing_frames.boxes_of_cameras(seen, cameras),
             step_model,
             self._target,
             calibrations,
@@ -149,7 +149,7 @@ class MultiBernoulli:
         record = Record(found.detection_probabilities, found.sources, found.shares, found.hidden_by)
         pair_cameras = found.pair_cameras
         if cameras is not None:
-            record = missing_frames.spread(record, cameras, len(views))
+            record = missing_frames.extend_record(record, cameras, len(views))
             pair_cameras = cameras[pair_cameras]
         if p.birth != "entrances":
             evidence = Evidence(

@@ -67,7 +67,8 @@ class Record:
 
 
 class Ledger:
-    """The association probabilities of one step, by label, while the components still change."""
+    """A collection of one step's association probabilities by label, while components still
+    change."""
 
     def __init__(self) -> None:
         self._cameras: list[ndarray] = []

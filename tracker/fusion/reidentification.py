@@ -1,4 +1,5 @@
-"""Re-identification by appearance: each person with a template has one label in the whole run."""
+"""Re-identification by appearance: each person with a template has one label during the whole
+run."""
 
 from __future__ import annotations
 
@@ -20,8 +21,8 @@ _NEVER = -1e3
 """Log score of an inadmissible pair; its exponential is 0 beside any other."""
 
 _UNINFORMATIVE = 0.5
-"""Probability that the colours of a box are uninformative at its step. Misleading colours, as in
-other light, mislead for many steps in a row."""
+"""ε of :func:`resemblance`: probability that the colours of a box are uninformative at its step. It
+is large, since the effect of light on colours lasts for many steps in a row."""
 
 _DEFAULTS = FusionParams()
 
@@ -110,12 +111,13 @@ def reidentify(
 def resemblance(
     identities: Identities, labels: Int[ndarray, " n"], views: Many[ViewResult]
 ) -> Float[ndarray, "k B"]:
-    """The likelihood ratio of each box's appearance, of each track's person against any person:
+    """Compute the likelihood ratio of each box's appearance, of a track's person against any
+    person.
 
-        ε + (1 − ε) G Σ_g π_g p_g(z)
+        ε + (1 − ε) G Σ_g π_g p_g(z),   ε = 0.5
 
-    with ε = 0.5. It prevents that boxes of two people whose rays meet are associated with one
-    track there.
+    By it, boxes of two people whose rays nearly intersect are not associated with one track at the
+    intersection.
 
     Args:
         identities: The beliefs after the step before.
@@ -189,13 +191,16 @@ def _agrees(
     owners: Int[ndarray, " G"],
     own: float,
 ) -> bool:
-    """Whether every track with clear odds owns its best person already, the usual case.
+    """Whether every track with clear odds has the label of its likeliest person already.
+
+    This is the usual case, in which no assignment is needed.
 
     Args:
         beliefs: log π of n tracks.
         labels: Label of each track.
         owners: The label of each person, -1 for none.
-        own: Log odds of the best person against the second from which a track is clear.
+        own: Log odds of the likeliest person against the second from which a track's odds are
+            clear.
     """
     ordered = np.sort(beliefs, axis=1)
     clear = ordered[:, -1] - ordered[:, -2] >= own
@@ -203,20 +208,20 @@ def _agrees(
 
 
 def _recognised(beliefs: Float[ndarray, "n G"], own: float, odds: float) -> list[tuple[int, int]]:
-    """The pairs of track and person, one to one, whose odds against any alternative are clear.
+    """Find the pairs of track and person, one to one, with clear odds against any alternative.
 
     Args:
         beliefs: log π of n tracks.
         own: Least log odds of a track's person against every other person.
-        odds: Log odds of the best assignment against the best without the pair that a pair
-            must exceed.
+        odds: Least log odds, for each pair, of the best assignment against the best one without
+            that pair.
     """
     count = len(beliefs)
     if not count:
         return []
     people = beliefs.shape[1]
     scores = beliefs - beliefs.max(axis=1, keepdims=True)
-    # further columns: one dummy for each track that is none of the people
+    # further columns: a dummy for each track, which then is none of the people
     table = np.concatenate([scores, np.full((count, count), _NEVER)], axis=1)
     rows, columns = linear_sum_assignment(-table)
     best = table[rows, columns].sum()

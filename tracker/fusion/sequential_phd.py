@@ -37,7 +37,7 @@ from tracker.single_view.protocol import ViewResult
 if TYPE_CHECKING:
     from tracker.parameters import RunParameters
 
-_LARGEST_LOG_ODDS = 600.0  # exp of it is far below the largest float
+_LARGEST_LOG_ODDS = 600.0  # bound at which log odds are clipped, so that exp does not overflow
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,8 +66,8 @@ class _Work:
     """The first label that is free."""
     births: range
     """Labels of this step's births."""
-    sure: dict[int, float]
-    """Predicted weight of each confirmed label, which may occlude others."""
+    confirmed: dict[int, float]
+    """Predicted weight by label, of the confirmed labels, which may occlude others."""
     measured: list[Measurements]
     """The boxes of each camera as measurements."""
     unexplained: list[ndarray]
@@ -109,9 +109,9 @@ class SequentialPhd:
         """Predict one step ahead and update with every camera's boxes, in the cameras' order."""
         p = self._parameters
         mixture = self._model.motion.predict(state.mixture, p.survival_probability)
-        # components are heaviest first; read from the end, a label gets its heaviest one's place
+        # components are heaviest first: in reverse order the last entry of a label is its heaviest
         previous = dict(zip(mixture.labels[::-1].tolist(), mixture.means[::-1, :3], strict=True))
-        sure = _confirmed_labels(mixture)
+        confirmed = _confirmed_labels(mixture)
         next_label = state.next_label
         if p.birth != "measurements":
             births = models.label_births(self._model.births, next_label)
@@ -122,7 +122,7 @@ class SequentialPhd:
             Record.blank(len(views), mixture.size),
             next_label,
             range(state.next_label, next_label),
-            sure,
+            confirmed,
             measured=[],
             unexplained=[],
             ledger=Ledger(),
@@ -161,7 +161,7 @@ class SequentialPhd:
             work.unexplained.append(np.zeros(0))
             return
         expected = model.expected(index, mixture)
-        seen = model.visible(index, expected, mixture, _occluders(mixture, work.sure))
+        seen = model.visible(index, expected, mixture, _occluders(mixture, work.confirmed))
         updated = phd.update(
             mixture,
             measurements.values,
@@ -227,17 +227,17 @@ class SequentialPhd:
         work.record = work.record.extended(born.size)
         work.record.sources[:, first:] = newborns.sources
         work.record.source_weights[:, first:] = newborns.sources >= 0
-        cameras = missing_frames.seeing(views)
+        cameras = missing_frames.cameras_with_frame(views)
         seeing = slice(None) if cameras is None else cameras
         work.record.detection_probabilities[seeing, first:] = self._parameters.detection_probability
         return later
 
     def _without_duplicates(self, mixture: GaussianMixture, record: Record) -> Int[ndarray, " K"]:
-        """The indices of the components whose labels are no duplicates of another."""
+        """Return the indices of the components whose labels are no duplicates of another label."""
         grouped = linear_algebra.group_labels(mixture.labels)
         labels, label = grouped.labels, grouped.places
         held = np.bincount(label, mixture.weights, len(labels))
-        # the heaviest component of a label stands for its position
+        # the position of a label is that of its heaviest component
         heaviest = mixture_kernels.heaviest_of_groups(mixture.weights, label, len(labels))
         duplicate = self._model.duplicates(
             mixture.means[heaviest], held, labels, record.sources[:, heaviest]
@@ -246,23 +246,25 @@ class SequentialPhd:
 
 
 def _relabelled(mixture: GaussianMixture, labels: Int[ndarray, " J"]) -> GaussianMixture:
-    """The same components under other labels."""
+    """Return the components with other labels."""
     return GaussianMixture(mixture.weights, mixture.means, mixture.covariances, labels)
 
 
 def _confirmed_labels(mixture: GaussianMixture) -> dict[int, float]:
     """The weight of each confirmed label."""
-    sure = np.flatnonzero(mixture.weights > CONFIRMED)
-    return dict(zip(mixture.labels[sure].tolist(), mixture.weights[sure].tolist(), strict=True))
+    confirmed = np.flatnonzero(mixture.weights > CONFIRMED)
+    return dict(
+        zip(mixture.labels[confirmed].tolist(), mixture.weights[confirmed].tolist(), strict=True)
+    )
 
 
-def _occluders(mixture: GaussianMixture, sure: dict[int, float]) -> Float[ndarray, " J"]:
-    """The weight with which each component occludes others, 0 for most.
+def _occluders(mixture: GaussianMixture, confirmed: dict[int, float]) -> Float[ndarray, " J"]:
+    """Return the weight with which each component occludes others, 0 for most.
 
-    A track occludes others by the heaviest component of its label alone, which comes first.
+    Of each confirmed label only the heaviest component, which comes first, occludes others.
     """
     weights = np.zeros(mixture.size)
-    left = dict(sure)
+    left = dict(confirmed)
     for component, label in enumerate(mixture.labels.tolist()):
         weights[component] = left.pop(label, 0.0)
     return weights
@@ -271,10 +273,10 @@ def _occluders(mixture: GaussianMixture, sure: dict[int, float]) -> Float[ndarra
 def _one_person_a_label(
     mixture: GaussianMixture, previous: dict[int, ndarray], next_label: int
 ) -> tuple[Int[ndarray, " J"], int]:
-    """Give a new label to every confirmed component but one that shares a label.
+    """Give new labels to all but one of the confirmed components that share a label.
 
-    The one nearest to the predicted position of the label retains it: two people
-    born as one component become two tracks at the step at which they part.
+    The component nearest to the predicted position of the label retains it: two people born as one
+    component become two tracks at the step at which they separate.
 
     Args:
         mixture: J components, the heaviest first.
@@ -306,7 +308,7 @@ def share_boxes(
     births: range,
     next_label: int,
 ) -> PhdUpdate:
-    """Weight the update anew: each label makes at most one box, each box has at most one label.
+    """Recompute the weights so that each label makes at most one box, and each box has one label.
 
     With o_l(z) = Σ_{j∈l} p_j w_j q_j(z) / κ the odds of label l for box z, the
     association probabilities P(l ← z) and P(l misses) are the marginals of the
@@ -358,7 +360,7 @@ def share_boxes(
 
 
 def merging_owners(mixture: GaussianMixture) -> Int[ndarray, " J"]:
-    """The owner of each component in merging: the label of a confirmed track, else -1."""
+    """Return the owner of each component for merging: its label if that is confirmed, else -1."""
     label = linear_algebra.group_labels(mixture.labels).places
-    sure = np.bincount(label, mixture.weights) > CONFIRMED
-    return np.asarray(np.where(sure[label], mixture.labels, -1))
+    confirmed = np.bincount(label, mixture.weights) > CONFIRMED
+    return np.asarray(np.where(confirmed[label], mixture.labels, -1))

@@ -74,8 +74,8 @@ def visibility(
         p_j ← p_j Π_l (1 − ρ w_l a(j, l))
         a(j, l) = [l is nearer to the lens than j] · area(box_j ∩ box_l) / area(box_j)
 
-    over the occluders with another label: the probability that none hides j, for
-    independent occluders that exist with probability w_l.
+    where l runs over the occluders with another label than j. It is the probability that no
+    occluder hides j, if occluders l exist independently with probability w_l.
 
     Args:
         detection_probabilities: p_j without occlusion.
