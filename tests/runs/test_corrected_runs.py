@@ -290,14 +290,14 @@ def test_what_was_settled_before_is_not_settled_again(monkeypatch: pytest.Monkey
         return settled(*given)
 
     looked: list[object] = []
-    cuts = splitting.cuts
+    cuts = splitting.find_splits
 
     def looked_at(*given: Any) -> Any:
         looked.append(given)
         return cuts(*given)
 
     monkeypatch.setattr(identities, "_linked", counted)
-    monkeypatch.setattr(splitting, "cuts", looked_at)
+    monkeypatch.setattr(splitting, "find_splits", looked_at)
     cache = StageCache()
     same, parted = _CHOICES[0], _CHOICES[1]
     as_it_is = make(kind="same", places=[place(_BEFORE, 5, -0.7), place(_BEFORE, 9, -0.7)])

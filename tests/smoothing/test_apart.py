@@ -14,7 +14,7 @@ from tracker.parameters import METHODS, RunParameters, method_of, with_values
 from tracker.smoothing import create
 from tracker.smoothing.lifetimes import lifetimes, shown_apart
 from tracker.smoothing.paths import Paths
-from tracker.smoothing.smoother import Shared, Smoother
+from tracker.smoothing.smoother import BoxAssociations, Smoother
 
 WIDTH = 2.0 * float(world.PERSON[0])
 STEPS, BEGIN, END = 30, 8, 24
@@ -41,13 +41,13 @@ def doubtful(scene: Known) -> list[Step]:
 
 def tracked(
     other: ndarray, *, swapped: bool = False, several: bool = True, embeddings: bool = True
-) -> tuple[Smoother, Paths, Shared]:
+) -> tuple[Smoother, Paths, BoxAssociations]:
     """Both as they were, and whose box each is."""
     scene = known(world.together(*([other, ALONE] if swapped else [ALONE, other])))
     views = doubtful(scene) if embeddings else scene.views
     smoother = Smoother(scene.whole, PLAIN.fusion, views, several_boxes=several)
     paths, _ = scene.paths(sigma=0.03)
-    return smoother, paths, smoother.share(paths)
+    return smoother, paths, smoother.associate(paths)
 
 
 def everywhere(paths: Paths) -> ndarray:

@@ -13,7 +13,7 @@ from tests import world
 from tests.smoothing.known import Known, known
 from tracker.parameters import SmoothingParams
 from tracker.smoothing.identity.constraints import ConstraintResolver
-from tracker.smoothing.identity.splitting import Cuts, Tracked, cut, cuts
+from tracker.smoothing.identity.splitting import Splits, Tracked, find_splits, split_tracks
 
 STEPS = 30
 P = SmoothingParams(change=20.0, gap=0.5)
@@ -30,7 +30,7 @@ def tracked(scene: Known, **known_of: ndarray) -> Tracked:
         **known_of,
     }  # fmt: skip
     fitted = smoother.fit(paths, links, 2)
-    return Tracked(smoother, fitted, smoother.share(fitted.paths), **values)
+    return Tracked(smoother, fitted, smoother.associate(fitted.paths), **values)
 
 
 def standing(*hidden: int) -> Known:
@@ -39,13 +39,13 @@ def standing(*hidden: int) -> Known:
     return known(path, hidden=lambda camera, person, step: step in hidden)
 
 
-def left_out(found: Cuts) -> list[int]:
+def left_out(found: Splits) -> list[int]:
     """The rows that are in no piece."""
     return np.flatnonzero(~found.clear).tolist()
 
 
 def test_who_is_seen_at_every_step_is_not_cut() -> None:
-    found = cuts(tracked(standing()), P)
+    found = find_splits(tracked(standing()), P)
     assert found.clear.all()
     assert not found.reasons.any()
     assert not found.breaks.any()
@@ -54,7 +54,7 @@ def test_who_is_seen_at_every_step_is_not_cut() -> None:
 def test_rows_whose_boxes_are_as_well_anothers_are_left_out_from_the_doubt_on() -> None:
     contested = np.zeros(STEPS)
     contested[[10, 15]] = P.doubt, P.doubt - 1e-9
-    found = cuts(tracked(standing(), contested=contested), P)
+    found = find_splits(tracked(standing(), contested=contested), P)
     assert left_out(found) == [10]
     assert np.flatnonzero(found.reasons).tolist() == [10]
     assert found.reasons[10] == 1
@@ -63,26 +63,26 @@ def test_rows_whose_boxes_are_as_well_anothers_are_left_out_from_the_doubt_on() 
 @pytest.mark.parametrize(("length", "cut_out"), [(5, False), (6, True)])
 def test_a_gap_is_left_out_if_it_is_longer_than_the_longest(length: int, cut_out: bool) -> None:
     gap = list(range(12, 12 + length))
-    found = cuts(tracked(standing(*gap)), P)
+    found = find_splits(tracked(standing(*gap)), P)
     assert left_out(found) == (gap if cut_out else [])
     assert found.reasons[gap].tolist() == [3 if cut_out else 0] * length
 
 
 def test_a_piece_reaches_from_the_first_box_to_the_last() -> None:
-    found = cuts(tracked(standing(0, 1, 28, 29)), P)
+    found = find_splits(tracked(standing(0, 1, 28, 29)), P)
     assert left_out(found) == [0, 1, 28, 29]
 
 
 def test_where_a_path_goes_on_under_another_name_it_is_cut() -> None:
     names = np.full(STEPS, 7)
     names[10:13], names[13:20], names[20:] = -1, 9, 7
-    found = cuts(tracked(standing(), names=names), P)
+    found = find_splits(tracked(standing(), names=names), P)
     assert left_out(found) == [10, 11, 12]
     assert np.flatnonzero(found.breaks).tolist() == [13, 20]
     # a gap after which it has the same name is none, nor is one at either end
     names = np.full(STEPS, 7)
     names[:2], names[10:13], names[27:] = -1, -1, -1
-    found = cuts(tracked(standing(), names=names), P)
+    found = find_splits(tracked(standing(), names=names), P)
     assert found.clear.all()
     assert not found.breaks.any()
 
@@ -95,7 +95,7 @@ def test_what_the_filter_lost_for_long_holds_if_boxes_lead_through(
     had = np.ones(STEPS, dtype=bool)
     had[11:19] = False
     gap = [] if seen else list(range(12, 12 + length))
-    found = cuts(tracked(standing(*gap), had=had), P)
+    found = find_splits(tracked(standing(*gap), had=had), P)
     assert left_out(found) == (list(range(11, 19)) if cut_out else [])
 
 
@@ -104,13 +104,13 @@ def test_before_and_after_a_jump_rows_belong_to_neither_side() -> None:
     and both sides are pieces of their own."""
     path = world.stand((0.3, 0.2), STEPS)
     path[15:, 0] -= 2.0
-    found = cuts(tracked(known(path[:, None])), replace_p(jump=40.0))
+    found = find_splits(tracked(known(path[:, None])), replace_p(jump=40.0))
     assert found.breaks[15]
     assert {13, 14, 15, 16} <= set(left_out(found))
     assert set(found.reasons[[13, 14, 15, 16]].tolist()) == {2}
     assert found.clear[:10].all()
     assert found.clear[20:].all()
-    calm = cuts(tracked(known(path[:, None])), replace_p(jump=1000.0, memory=10.0))
+    calm = find_splits(tracked(known(path[:, None])), replace_p(jump=1000.0, memory=10.0))
     assert not calm.breaks.any()
 
 
@@ -124,25 +124,25 @@ def test_short_pieces_beside_longer_ones_are_left_out_and_names_are_the_filters(
     one = tracked(standing(), names=np.repeat([7, 9, -1], 10))
     clear = np.ones(STEPS, dtype=bool)
     clear[[10, 14, 18, 29]] = False
-    plain = Cuts(np.zeros(STEPS, dtype=np.int64), clear, np.zeros(STEPS, dtype=bool))
+    plain = Splits(np.zeros(STEPS, dtype=np.int64), clear, np.zeros(STEPS, dtype=bool))
     nobody = ConstraintResolver(one.fitted, (), 10)
-    pieces, kept = cut(one, plain, nobody)
+    pieces, kept = split_tracks(one, plain, nobody)
     assert pieces.firsts.tolist() == [0, 19]
     assert pieces.lasts.tolist() == [9, 28]
     short = np.zeros(STEPS, dtype=bool)
     short[11:14] = short[15:18] = True
-    pieces, kept = cut(one, replace(plain, clear=short), nobody)
+    pieces, kept = split_tracks(one, replace(plain, clear=short), nobody)
     assert pieces.firsts.tolist() == [11, 15], "where they are all there is they stay"
     assert_array_equal(kept, [11, 12, 13, 15, 16, 17])
     some = clear.copy()
     some[18] = True
-    pieces, _ = cut(one, replace(plain, clear=some), nobody)
+    pieces, _ = split_tracks(one, replace(plain, clear=some), nobody)
     assert pieces.firsts.tolist() == [0, 15]
     assert pieces.labels.tolist() == [7, 9]
     four = clear.copy()
     four[10] = True
     four[9] = False
-    pieces, _ = cut(one, replace(plain, clear=four), nobody)
+    pieces, _ = split_tracks(one, replace(plain, clear=four), nobody)
     assert pieces.firsts.tolist() == [0, 10, 19]
     assert pieces.lasts.tolist() == [8, 13, 28]
     assert pieces.labels.tolist() == [7, 9, 9]

@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 
 from tracker.kernels.smoothing.presence import Habits, presence
 from tracker.smoothing.identity.association import chains, join
-from tracker.smoothing.identity.tracklets import contested, cut
+from tracker.smoothing.identity.tracklets import contested, split_paths
 from tracker.smoothing.paths import Links, Paths
 
 
@@ -144,7 +144,7 @@ def test_a_cut_leaves_the_clear_rows_where_they_were() -> None:
     clear = np.array([True, True, False, True, True, True, True, True, True])
     breaks = np.zeros(9, dtype=bool)
     breaks[5] = True
-    pieces, kept = cut(paths, clear, breaks)
+    pieces, kept = split_paths(paths, clear, breaks)
     assert pieces.labels.tolist() == [1, 1, 1, 2]
     assert pieces.firsts.tolist() == [3, 6, 8, 0]
     assert np.diff(pieces.starts).tolist() == [2, 2, 1, 3]

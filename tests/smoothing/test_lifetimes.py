@@ -13,7 +13,7 @@ from tests.smoothing.known import PLAIN, backwards, known
 from tests.smoothing.test_boundaries import standing
 from tracker.smoothing.lifetimes import UNSURE, extended, independence, lifetimes, misses
 from tracker.smoothing.paths import Links
-from tracker.smoothing.smoother import Shared, Smoother
+from tracker.smoothing.smoother import BoxAssociations, Smoother
 
 STEPS = 12
 HIT = -np.log(0.05)
@@ -32,7 +32,7 @@ def odds_of(cameras: int, log_ratio: float | None) -> float:
     smoother = Smoother(scene.whole, PLAIN.fusion, views)
     paths, links = scene.paths()
     nothing = np.zeros((cameras, STEPS))
-    shared = Shared(links, nothing, nothing, nothing.astype(np.int64))
+    shared = BoxAssociations(links, nothing, nothing, nothing.astype(np.int64))
     return float(lifetimes(smoother, paths, shared, PLAIN.smoothing)[1][0])
 
 
@@ -66,7 +66,7 @@ def test_a_miss_says_as_much_against_somebody_as_the_camera_should_have_seen() -
     nothing = Links(*(np.zeros(0, dtype=np.int64) for _ in range(3)), np.zeros(0))
     chances = np.array([[0.5, 1.0], [0.9, 0.0]])
     missed = np.array([[1.0, 0.5], [0.2, 1.0]])
-    found = misses(Shared(nothing, chances, missed, np.zeros((2, 2), dtype=np.int64)))
+    found = misses(BoxAssociations(nothing, chances, missed, np.zeros((2, 2), dtype=np.int64)))
     assert found == pytest.approx([np.log(0.5) + 0.2 * np.log(0.1), 0.5 * np.log(1e-6)])
 
 

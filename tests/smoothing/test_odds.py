@@ -17,7 +17,7 @@ from tracker.smoothing.identity.appearance import Appearance
 from tracker.smoothing.identity.ends import Ends
 from tracker.smoothing.identity.tracklets import Pairs, motion_gains
 from tracker.smoothing.paths import Links
-from tracker.smoothing.smoother import Shared
+from tracker.smoothing.smoother import BoxAssociations
 
 STEP, FRAMES, SURVIVAL, BIRTH = 0.1, 20, 0.9, 0.4
 
@@ -47,8 +47,8 @@ def test_a_piece_is_worth_its_boxes_less_its_misses_and_comes_and_goes_inside_th
     own.odds[:] = np.arange(rows) / 10.0
     chances, missed = np.full((2, rows), 0.5), np.zeros((2, rows))
     chances[1], missed[0, 0], missed[1, 20] = 1.0, 1.0, 0.5
-    shared = Shared(NOBODYS, chances, missed, np.full((2, rows), -1))
-    worths, births, deaths = odds.of_tracklets(smoother(), own, shared, P)
+    shared = BoxAssociations(NOBODYS, chances, missed, np.full((2, rows), -1))
+    worths, births, deaths = odds.tracklet_odds(smoother(), own, shared, P)
     bounds = ((0, 19), (19, 38), (38, 41))
     expected = [own.odds[a:b].sum() + (b - a) * np.log(SURVIVAL) + 1.5 for a, b in bounds]
     expected[0] += 0.4 * np.log(0.5)
@@ -56,13 +56,13 @@ def test_a_piece_is_worth_its_boxes_less_its_misses_and_comes_and_goes_inside_th
     assert_allclose(worths, expected)
     assert_allclose(births, [0.0, *[np.log(BIRTH * STEP)] * 2])
     assert_allclose(deaths, [np.log(1.0 - SURVIVAL), 0.0, np.log(1.0 - SURVIVAL)])
-    assert odds.anew(smoother()) == pytest.approx(np.log(BIRTH * STEP * (1.0 - SURVIVAL)))
+    assert odds.log_restart(smoother()) == pytest.approx(np.log(BIRTH * STEP * (1.0 - SURVIVAL)))
 
 
 def test_a_link_survives_its_gap_and_its_motion_tells_as_much_as_is_new() -> None:
     paths = standing((1, 0, 4, 0.0), (2, 5, 9, 0.1), (3, 8, 12, 0.2), (4, 26, 28, 0.2))
     known = Ends.alone(fitted(paths), PRIOR)
-    found = odds.GoesOn(smoother(), paths, NOBODYS, P, None).by(known)
+    found = odds.ShortGapOdds(smoother(), paths, NOBODYS, P, None).pairs(known)
     pairs = Pairs(np.array([0, 0, 1, 2]), np.array([1, 2, 3, 3]), np.array([1, 4, 17, 14]),
                   np.zeros(4))  # fmt: skip
     for name in ("earlier", "later", "gaps"):
@@ -76,7 +76,9 @@ def test_a_link_survives_its_gap_and_its_motion_tells_as_much_as_is_new() -> Non
 def test_the_longest_gap_is_two_seconds_and_the_fastest_goes_three_metres_in_one() -> None:
     p = SmoothingParams(longest=0.6)
     paths = standing((1, 0, 4, 0.0), (2, 10, 12, 2.8), (3, 10, 12, 2.8001), (4, 11, 12, 0.0))
-    found = odds.GoesOn(smoother(), paths, NOBODYS, p, None).by(Ends.alone(fitted(paths), PRIOR))
+    found = odds.ShortGapOdds(smoother(), paths, NOBODYS, p, None).pairs(
+        Ends.alone(fitted(paths), PRIOR)
+    )
     assert list(zip(found.earlier.tolist(), found.later.tolist(), strict=True)) == [(0, 1)]
 
 
@@ -84,13 +86,13 @@ def test_who_comes_back_is_one_of_those_who_left() -> None:
     """By the label of the filter alone; by looks as likely as one of all who were gone."""
     paths = standing((5, 0, 2, 0.0), (6, 0, 3, 3.0), (5, 8, 9, 0.0), (7, 3, 4, 0.0))
     chains = [[0], [1], [2], [3]]
-    found = odds.comes_back(smoother(), paths, NOBODYS, chains, P, None)
+    found = odds.long_gap_odds(smoother(), paths, NOBODYS, chains, P, None)
     newcomer = np.log(BIRTH * STEP * (1.0 - SURVIVAL))
     assert list(zip(found.earlier.tolist(), found.later.tolist(), strict=True)) == [(0, 2)]
     assert found.gains == pytest.approx([newcomer + P.keeping])
     assert found.gaps.tolist() == [6]
     # of one chain already, or overlapping, nothing is said
-    assert len(odds.comes_back(smoother(), paths, NOBODYS, [[0, 2], [1]], P, None).gains) == 0
+    assert len(odds.long_gap_odds(smoother(), paths, NOBODYS, [[0, 2], [1]], P, None).gains) == 0
 
 
 @pytest.mark.parametrize("weight", [1.0, 0.5])
@@ -103,7 +105,7 @@ def test_looks_weigh_in_a_link_and_in_a_return(weight: float) -> None:
     ratio, known = alike.log_ratio(np.array([0, 1]), np.array([2, 2]))
     assert known.all()
     assert ratio[0] > ratio[1]
-    found = odds.comes_back(smoother(camera), later, links, [[0], [1], [2]], p, [embeddings])
+    found = odds.long_gap_odds(smoother(camera), later, links, [[0], [1], [2]], p, [embeddings])
     newcomer = np.log(BIRTH * STEP * (1.0 - SURVIVAL))
     assert_allclose(found.gains, newcomer - np.log(2.0) + weight * ratio)
     assert list(zip(found.earlier.tolist(), found.later.tolist(), strict=True)) == [(0, 2), (1, 2)]

@@ -1,4 +1,5 @@
-"""Stated places among the rows of paths: information added, obeyed, and the way there and back."""
+"""Stated places among the rows of paths: information added, enforced, and the way there and
+back."""
 
 from __future__ import annotations
 
@@ -31,7 +32,7 @@ def test_a_place_adds_its_precision_to_its_row_alone() -> None:
 
 
 def with_place(place: PlaceMeasurements, rest: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The state at the origin, of covariance ``rest``, with a place as it is weighed."""
+    """The state at the origin, of covariance ``rest``, with a place as it is inflated."""
     mean, origin = np.zeros(6), np.array([0.0, 0.0, 0.85, 0.0, 0.0, 0.0])
     gain = rest[:, :3] @ np.linalg.inv(rest[:3, :3] + place.noises[0])
     mean = origin + gain @ (place.points[0] - origin[:3])
@@ -42,11 +43,11 @@ def with_place(place: PlaceMeasurements, rest: np.ndarray) -> tuple[np.ndarray, 
 def test_what_all_else_contradicts_is_obeyed_to_within_its_sigma(x: float, against: bool) -> None:
     """Along x all else is known to 0.1 m and the place to 0.1 m: one sigma is √0.02 m."""
     plain = stated(x)
-    weighed = plain.weighed(*with_place(plain, SPREAD))
-    assert weighed.contradicted is against
+    inflated = plain.inflate(*with_place(plain, SPREAD))
+    assert inflated.contradicted is against
     assert not plain.contradicted
-    states, spread = with_place(weighed, SPREAD)
-    found, after, covariances = weighed.obeyed(states, spread)
+    states, spread = with_place(inflated, SPREAD)
+    found, after, covariances = inflated.enforce(states, spread)
     if not against:
         assert_array_equal(after, states)
         assert_array_equal(covariances, spread)
@@ -70,7 +71,7 @@ def test_who_is_somewhere_else_leaves_the_way_and_finds_back_as_fast_as_one_walk
     paths = standing((1, 0, 7, 0.0), (2, 0, 3, 5.0))
     one = stated(2.0, row=6)
     aside = np.array([[0.0, 2.0, 0.0]])
-    led = PlaceMeasurements(one.rows, one.points, one.sigmas, one.noises, aside).led_to(paths, 0.4)
+    led = PlaceMeasurements(one.rows, one.points, one.sigmas, one.noises, aside).lead(paths, 0.4)
     assert ASIDE == 1.5
     expected = np.zeros(12)
     expected[[3, 4, 5, 7]] = 0.2, 0.8, 1.4, 1.4
@@ -84,13 +85,13 @@ def test_the_way_to_a_place_ends_at_the_next_one() -> None:
     said = [make(kind="here", places=[[row, 0.0, 0.0, 0.85]]) for row in (3, 5)]
     both = PlaceMeasurements.of(np.array([3, 5]), said)
     asides = np.array([[0.0, 0.0, 0.0], [0.0, 2.0, 0.0]])
-    led = PlaceMeasurements(both.rows, both.points, both.sigmas, both.noises, asides).led_to(
+    led = PlaceMeasurements(both.rows, both.points, both.sigmas, both.noises, asides).lead(
         paths, 0.4
     )
     assert_allclose(led.states[:, 1], [0, 0, 0, 0, 1.4, 0, 1.4, 0.8], atol=1e-12)
     # six steps of a third of the way: at exactly nothing left it ends
     third = np.array([[0.0, 0.0, 0.0], [0.0, 0.6, 0.0]])
-    led = PlaceMeasurements(both.rows, both.points, both.sigmas, both.noises, third).led_to(
+    led = PlaceMeasurements(both.rows, both.points, both.sigmas, both.noises, third).lead(
         paths, 0.4
     )
     assert not led.states[:, 1].any()

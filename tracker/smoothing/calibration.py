@@ -1,8 +1,8 @@
 """Self-calibration of boxes: people's sizes, each camera's offset and noise, hand-marked boxes.
 
-Stage 1's boxes of a person lie a little too high or too low, each person by other clothes, and
-alike in every camera: the filter takes that for the person's height above the floor. Only a box
-that was marked by hand shows where the centre is.
+The boxes of stage 1 of a person are a little too high or too low, by the person's clothes, and
+equally in every camera, so that the filter estimates another height of the person above the floor.
+Only a box that was marked by hand shows where the centre is.
 """
 
 from __future__ import annotations
@@ -25,7 +25,8 @@ _BOX_SIGMA = 0.1
 """Standard deviation of an edge of one box, half heights."""
 
 _ALIKE = 20.0
-"""Number of boxes of neighbouring steps and cameras that count as one: their errors correlate."""
+"""Number of boxes of neighbouring steps and cameras that count as one, since their errors
+correlate."""
 
 _SIZE_SIGMA = 0.1
 """Standard deviation of people's heights, relative to the target's."""
@@ -43,7 +44,7 @@ NARROWEST, WIDEST = 0.15, 1.0
 """Bounds of the estimated noise, as factors of the standard deviation that stage 1 gives."""
 
 ODD = 0.4
-"""Residual of a box, in half heights, from which the person is not standing upright."""
+"""Residual of a box from which the person is not standing upright, half heights."""
 
 FEWEST = 50
 """Number of boxes of a camera below which its noise is not estimated."""
@@ -125,7 +126,7 @@ def free(expected: ExpectedBoxes) -> Bool[ndarray, "L m"]:
 
 
 def upright(size: int) -> Float[ndarray, " m"]:
-    """The vector u: the change of a measurement with the person's height."""
+    """Return the vector u (m,): the change of a measurement with the person's height."""
     return {
         2: np.zeros(2),
         3: np.array([0.0, -1.0, 1.0]),
@@ -134,7 +135,7 @@ def upright(size: int) -> Float[ndarray, " m"]:
 
 
 def lower(size: int) -> Float[ndarray, " m"]:
-    """The vector w: the change of a measurement as the box is shifted down."""
+    """Return the vector w (m,): the change of a measurement as the box is shifted down."""
     return {
         2: np.array([0.0, 1.0]),
         3: np.array([0.0, 1.0, 1.0]),
@@ -197,10 +198,10 @@ def shifts(
         own, half_axes = _bounds(cameras[index], paths.states[rows, :3], half_extents)
         off = (own.centres - box[:2]) / own.half_sizes
         taller = np.abs(box[3] / own.half_sizes[:, 1] - 1.0)
-        # a person lying, bent or stretched out does not show the centre of an upright target
+        # the box of a person who lies, bends or stretches is not centred on an upright target
         odd = np.abs(off).max(axis=1)
         standing = (odd < ODD) & (taller < ODD)
-        # nor is a camera that sees people from above, or is turned on its side
+        # cameras that view people from above, or are rolled by a quarter, are not used either
         half_heights = half_axes[:, 1]
         standing &= (half_heights > half_axes[:, 0]) & (half_heights > own.half_sizes[:, 1] / 2.0)
         nearest = int(odd.argmin()) if len(rows) else -1

@@ -12,16 +12,18 @@ from tracker.geometry.boxes import Boxes, paired_overlaps
 from tracker.kernels.smoothing.presence import Habits, presence
 from tracker.parameters import SmoothingParams
 from tracker.smoothing.paths import Paths
-from tracker.smoothing.smoother import Shared, Smoother
+from tracker.smoothing.smoother import BoxAssociations, Smoother
 
 UNSURE = 0.3
-"""Existence with which a row beyond a path's ends, or within its gaps, competes for boxes."""
+"""Prior existence probability, for the association of boxes, of a row beyond a path's ends or in a
+gap."""
 
 _MEETING = 2
-"""Number of cameras whose false boxes always have rays that meet somewhere."""
+"""Number of cameras whose false boxes always have rays that nearly intersect somewhere."""
 
 _CONSTRAINT_VOTES = 1e4
-"""Log odds for existence where a correction states a position: more than any camera against it."""
+"""Log odds for existence where a correction states a position, more than all cameras can
+contradict."""
 
 ONE_PERSON = 0.3
 """Intersection over union above which two boxes of one camera may be of one person, as in the
@@ -35,7 +37,7 @@ _HARDLY_EVER = 0.1
 
 
 def independence(step_time: float, memory: float) -> float:
-    """The share of a step's evidence that is independent of the steps before, 0 … 1.
+    """Compute the share of a step's evidence that is independent of the steps before, 0 … 1.
 
     Args:
         step_time: Time between two steps, seconds.
@@ -44,24 +46,25 @@ def independence(step_time: float, memory: float) -> float:
     return min(step_time / memory, 1.0)
 
 
-def misses(shared: Shared) -> Float[ndarray, " N"]:
-    """The log likelihood of the misses at each row, Σ_c P(c missed it) log(1 − p_D), at most 0."""
+def misses(shared: BoxAssociations) -> Float[ndarray, " N"]:
+    """Compute the log likelihood of the misses at each row, Σ_c P(c misses) log(1 − p_D), at most
+    0."""
     blind = np.log1p(-np.minimum(shared.chances, 1.0 - 1e-6))
     return np.asarray((shared.missed * blind).sum(axis=0))
 
 
 def lifetimes(
-    smoother: Smoother, paths: Paths, shared: Shared, parameters: SmoothingParams
+    smoother: Smoother, paths: Paths, shared: BoxAssociations, parameters: SmoothingParams
 ) -> tuple[Float[ndarray, " N"], Float[ndarray, " n"]]:
     """Estimate the existence probability at each row, and the log odds of each path as a whole.
 
-    A detection by a camera counts log 1/(1 − p_D) for existence, as much as a miss counts
+    A detection by a camera has log odds of log 1/(1 − p_D) for existence, as much as a miss has
     against it: a persistent false box is no better evidence than persistent misses.
 
-    Where stage 1 gives a likelihood ratio Λ of a box's appearance, log Λ is added; its boxes are
-    many, and most are false. One box alone is at some place on its ray whatever it is, so only
-    its appearance counts. The rays of two false boxes meet somewhere in the room, those of three
-    hardly ever do: each box beyond the second outweighs log 1/(1 − p_D) of negative log Λ.
+    Where stage 1 gives a likelihood ratio Λ of a box's appearance, log Λ is added; most of these
+    boxes are false. A single false box always has a place on its ray, so only its appearance
+    counts. The rays of two false boxes nearly intersect somewhere in the room, those of three
+    rarely do: each box beyond the second offsets up to log 1/(1 − p_D) of a negative log Λ.
 
     Where stage 1 may give several boxes of a person, the detections count only for boxes apart
     from tracks of greater odds (:func:`shown_apart`), for other boxes may be of these tracks.
@@ -86,21 +89,22 @@ def lifetimes(
     shown = np.bincount(links.rows, links.shares, rows)
     weight = independence(smoother.model.step_time, parameters.memory)
     survival = min(p.survival_probability, 1.0 - 1e-9)
-    # within the time of independent evidence; the same for a recording played backwards
+    # probabilities within the time of independent evidence, symmetric under reversal of time
     steps = 1.0 / weight
     come = float(np.log(min(p.birth_rate * steps * smoother.model.step_time, 1.0)))
     leave = float(np.log1p(-(survival**steps)))
     habits = Habits(float(np.log(survival)), (come + leave) / 4.0, -parameters.change)
-    pinned, against = smoother.pinned(paths)[0], misses(shared)
+    with_place, against = smoother.rows_with_places(paths)[0], misses(shared)
 
     def by(votes: Float[ndarray, " N"]) -> tuple[Float[ndarray, " N"], Float[ndarray, " n"]]:
-        votes[pinned] += _CONSTRAINT_VOTES
+        votes[with_place] += _CONSTRAINT_VOTES
         found = presence(
             paths.starts, paths.firsts, weight * (votes + against), habits, smoother.frames - 1
         )
         return found.probabilities, found.odds
 
     def voted(shown: Float[ndarray, " N"]) -> Float[ndarray, " N"]:
+        """The log odds of the detections, given the number of cameras with one at each row."""
         return _votes(hit, shown, appearance) if log_ratios.any() else hit * shown
 
     appearance = np.bincount(links.rows, links.shares * log_ratios, rows)
@@ -116,7 +120,7 @@ def lifetimes(
 def _votes(
     hit: float, shown: Float[ndarray, " N"], appearance: Float[ndarray, " N"]
 ) -> Float[ndarray, " N"]:
-    """The log odds of the detections of each row.
+    """Compute the log odds for existence by the detections of each row.
 
     Args:
         hit: log 1/(1 − p_D).
@@ -166,7 +170,7 @@ def extended(smoother: Smoother, paths: Paths, steps: int) -> tuple[Paths, Float
 def _carried(
     state: ndarray, covariance: ndarray, transition: ndarray, noise: ndarray, steps: int
 ) -> tuple[ndarray, ndarray]:
-    """Predict a state: (steps, d) states and (steps, d, d) covariances."""
+    """Predict a state over some steps; returns (steps, d) states and (steps, d, d) covariances."""
     states = np.empty((steps, len(state)))
     covariances = np.empty((steps, len(state), len(state)))
     for k in range(steps):
@@ -179,16 +183,16 @@ def _carried(
 def shown_apart(
     smoother: Smoother,
     paths: Paths,
-    shared: Shared,
+    shared: BoxAssociations,
     there: Float[ndarray, " N"],
     odds: Float[ndarray, " n"],
 ) -> Bool[ndarray, " L"]:
     """Select the links to boxes that are apart from every track of greater odds.
 
-    A detector gives further boxes around a person: of limbs, one too high, one with a load. Those
-    of several cameras meet beside the person, or where the rays to two people cross. So a box
-    that overlaps that of a track of greater odds is no evidence, and neither is any box of a
-    track that is always within a body's width of tracks of greater odds.
+    A detector gives further boxes around a person: of limbs, one too high, one with a load. The
+    rays of such boxes of several cameras intersect beside the person, or where rays to two people
+    cross. So a box that overlaps that of a track of greater odds is no evidence, and neither is any
+    box of a track that is always within a body's width of tracks of greater odds.
 
     Args:
         smoother: The models and the boxes.

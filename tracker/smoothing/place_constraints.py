@@ -1,5 +1,8 @@
-"""Position constraints on rows of paths: measurements where they agree with the boxes, and enforced
-where they do not."""
+"""Position constraints on rows of paths, from corrections.
+
+A place is a measurement where it agrees with the boxes. Where the boxes contradict it, its noise is
+inflated for the fit, and the path is led to it afterwards.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +18,7 @@ from tracker.corrections.inflation import inflation
 from tracker.smoothing.paths import Paths
 
 ASIDE = 1.5
-"""Speed at which a path leaves the estimate from boxes towards an enforced place, that of walking,
+"""Speed at which a path is led from the estimate from boxes to an enforced place: a walking pace,
 metres per second."""
 
 _LEAST = 1e-12
@@ -61,8 +64,8 @@ class PlaceMeasurements:
         vectors[self.rows] += np.einsum("kab,kb->ka", precisions, self.points)
         return matrices, vectors
 
-    def _against(self, k: int, mean: ndarray, covariance: ndarray) -> tuple[ndarray, ndarray]:
-        """The innovation ν of place k, and the covariance P⁻ of its row without that place.
+    def _innovation(self, k: int, mean: ndarray, covariance: ndarray) -> tuple[ndarray, ndarray]:
+        """Compute the innovation ν of place k, and the covariance P⁻ of its row without that place.
 
         With the smoothed m and P, which include the place, R − P = R (P⁻ + R)⁻¹ R and
         z − m = R (P⁻ + R)⁻¹ ν.
@@ -72,7 +75,7 @@ class PlaceMeasurements:
         gain = noise @ np.linalg.inv(lost)
         return gain @ (self.points[k] - mean[:3]), gain @ noise - noise
 
-    def weighed(
+    def inflate(
         self, means: Float[ndarray, "N d"], covariances: Float[ndarray, "N d d"]
     ) -> PlaceMeasurements:
         """Inflate the noise of the places by how far they contradict the boxes.
@@ -83,7 +86,7 @@ class PlaceMeasurements:
         """
         noises = self.noises.copy()
         for k, row in enumerate(self.rows.tolist()):
-            offset, rest = self._against(k, means[row], covariances[row])
+            offset, rest = self._innovation(k, means[row], covariances[row])
             sigma = float(self.sigmas[k])
             noises[k] = sigma**2 * np.eye(3) + inflation(offset, rest, sigma)
         return replace(self, noises=noises)
@@ -94,7 +97,7 @@ class PlaceMeasurements:
         traces = np.trace(self.noises, axis1=1, axis2=2)
         return bool((traces > 3.0 * self.sigmas**2 * (1.0 + 1e-9)).any())
 
-    def obeyed(
+    def enforce(
         self, states: Float[ndarray, "N d"], covariances: Float[ndarray, "N d d"]
     ) -> tuple[PlaceMeasurements, Float[ndarray, "N d"], Float[ndarray, "N d d"]]:
         """Move the rows whose places the boxes contradict to these places, to within their σ.
@@ -113,7 +116,7 @@ class PlaceMeasurements:
             return replace(self, asides=asides), states, covariances
         states, covariances = states.copy(), covariances.copy()
         for k, row in enumerate(self.rows.tolist()):
-            offset, rest = self._against(k, states[row], covariances[row])
+            offset, rest = self._innovation(k, states[row], covariances[row])
             widened = inflation(offset, rest, float(self.sigmas[k]))
             if not widened.any():
                 continue
@@ -124,7 +127,7 @@ class PlaceMeasurements:
             covariances[row, :3, :3] = variance * (gain + gain.T) / 2.0
         return replace(self, asides=asides), states, covariances
 
-    def led_to(self, paths: Paths, step_time: float) -> Paths:
+    def lead(self, paths: Paths, step_time: float) -> Paths:
         """Lead the paths to their enforced places and back, at walking speed.
 
         Args:

@@ -14,14 +14,14 @@ from tracker.single_view.protocol import ViewResult
 from tracker.smoothing.result import Smoothed
 
 
-class Earlier(Protocol):
+class ResultStore(Protocol):
     """Intermediate results of runs that differ from this one only in corrections of identity.
 
     A stored result is never changed, and equals bit for bit that of computing it again.
     """
 
     def get(self, what: str) -> Any:
-        """The result stored under a name, None where there is none."""
+        """Return the result stored under a name, None if there is none."""
         ...
 
     def put(self, what: str, found: object) -> None:
@@ -29,11 +29,11 @@ class Earlier(Protocol):
         ...
 
 
-class Nothing:
+class EmptyStore:
     """A store that is always empty."""
 
     def get(self, what: str) -> Any:
-        """No result is ever stored: None."""
+        """Return None, since no result is stored."""
         return None
 
     def put(self, what: str, found: object) -> None:
@@ -49,17 +49,17 @@ class SmoothingMethod(Protocol):
         fused: Many[FusionResult],
         check: Callable[[], None] = lambda: None,
         corrections: Many[Correction] = (),
-        earlier: Earlier | None = None,
+        earlier: ResultStore | None = None,
     ) -> Smoothed | None:
         """Estimate the tracks of some steps from step 0 on, each from the boxes of all steps.
 
         Args:
             views: The results of stage 1 for each step.
             fused: The result of stage 2 for each step.
-            check: A function that is called now and then and raises an exception to stop.
-            corrections: The user's corrections; passed only where there are any.
-            earlier: Results of runs with the same boxes, tracks of the filter and constraints of
-                places; passed only to methods that have this argument.
+            check: A function that is called repeatedly, and raises an exception to stop the work.
+            corrections: The user's corrections; passed only if there are any.
+            earlier: The store of intermediate results of runs with the same boxes, tracks of the
+                filter and constraints of places; passed only to methods that have this argument.
 
         Returns:
             The tracks; None where those of the filter do not change.
@@ -79,6 +79,6 @@ class NoSmoothing:
         fused: Many[FusionResult],
         check: Callable[[], None] = lambda: None,
         corrections: Many[Correction] = (),
-        earlier: Earlier | None = None,
+        earlier: ResultStore | None = None,
     ) -> None:
         """Return None: the filter's tracks do not change."""

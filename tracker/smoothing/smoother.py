@@ -51,18 +51,18 @@ START_SIGMA = 10.0
 
 _MOST_THREADS = 4
 _LEAST = 0.01  # association probability below which a pair is left out
-_SURE = 0.9  # association probability of a box that is used for the self-calibration
-_MEDIAN = 0.4549  # of a squared standard normal
+_SURE = 0.9  # least association probability of a box that is used for the self-calibration
+_MEDIAN = 0.4549  # median of χ² with one degree of freedom
 
 _HABIT = 8.0
-"""Time constant of the process-noise scale, seconds."""
+"""Time constant with which the process-noise scale of a path changes, seconds."""
 
 _PRIOR = 0.5
-"""Weight of the prior s = 1, in seconds of a path."""
+"""Weight of the prior s = 1 of the process-noise scale, seconds of a path."""
 
 _WILD = 2.0
-"""Factor on the previous scale at which the contribution of one step is clipped, so that a single
-turn or a wrong association does not raise the scale."""
+"""Bound of the contribution of one step, as a factor on the previous scale, so that a single turn
+or a wrong association does not raise the scale."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -88,7 +88,8 @@ class Fitted:
 
     @property
     def jumps(self) -> Float[ndarray, " N"]:
-        """Squared Mahalanobis distance of the estimates from the rows before and from then on."""
+        """Squared Mahalanobis distance between the estimates from the rows before and from then
+        on."""
         paths = self.paths
         found: ndarray = passes.jumps(
             paths.starts, paths.states, paths.covariances, self.ahead, self.ahead_covariances
@@ -97,21 +98,26 @@ class Fitted:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Shared:
-    """Associations of the boxes of all steps and C cameras with the N rows of paths."""
+class BoxAssociations:
+    """The association of the boxes of all steps and C cameras with the N rows of paths."""
 
     links: Links
     """Association probabilities of rows and boxes."""
     chances: Float[ndarray, "C N"]
     """p_D of each row in each camera."""
     missed: Float[ndarray, "C N"]
-    """Probability that the camera missed the row."""
+    """Probability that the camera has no box of the path at the row."""
     hidden_by: Int[ndarray, "C N"]
     """Label of the track that occludes the row, -1 for none."""
 
 
 class Smoother:
-    """Batch estimation over a recording with the fusion's motion, measurement and visibility."""
+    """Batch estimation of paths over a recording, with the models of the fusion.
+
+    :meth:`fit` estimates the states of paths given the association of boxes (a Kalman smoother),
+    :meth:`associate` the association given the states (belief propagation), and :meth:`learn` the
+    self-calibration of the boxes. Alternating them is coordinate ascent, as EM [SS82].
+    """
 
     def __init__(
         self,
@@ -187,12 +193,12 @@ class Smoother:
             )
             begins = paths.states[paths.starts[:-1]].copy()
             begins[:, 3:] = 0.0
-            places = PlaceMeasurements.of(*self.pinned(paths))
+            places = PlaceMeasurements.of(*self.rows_with_places(paths))
             smooth = partial(_smoothed, paths, begins, information, rule)
             found = smooth(places, scales)
-            weighed = places.weighed(found.means, found.covariances)
-            if weighed.contradicted:
-                places = weighed
+            inflated = places.inflate(found.means, found.covariances)
+            if inflated.contradicted:
+                places = inflated
                 found = smooth(places, scales)
             if self._learning:
                 scales = process_noise_scales(
@@ -200,8 +206,8 @@ class Smoother:
                 )
                 found = smooth(places, scales)
             paths = paths.with_states(found.means, found.covariances)
-        places, states, covariances = places.obeyed(found.means, found.covariances)
-        # an enforced place is no jump: predictions move along with their rows
+        places, states, covariances = places.enforce(found.means, found.covariances)
+        # an enforced place is no jump, so predictions are moved together with their rows
         return Fitted(
             paths.with_states(states, covariances),
             found.fits + information.constants,
@@ -254,8 +260,9 @@ class Smoother:
         found.constants[:] += np.bincount(own.rows, own.shares * log_hit, rows)
         return found
 
-    def pinned(self, paths: Paths) -> tuple[Int[ndarray, " K"], list[Correction]]:
-        """The rows of paths whose place a correction states, and the last correction of each."""
+    def rows_with_places(self, paths: Paths) -> tuple[Int[ndarray, " K"], list[Correction]]:
+        """Find the rows of paths whose position a correction states, and the last correction of
+        each."""
         if not self._here:
             return np.zeros(0, dtype=np.int64), []
         whereabouts = TrackIndex(paths.steps, paths.states[:, :3])
@@ -267,15 +274,15 @@ class Smoother:
         return np.array(list(rows), dtype=np.int64), list(rows.values())
 
     def uncalibrated(self, paths: Paths) -> Calibration:
-        """The calibration that does not change the boxes of stage 1, for some paths."""
+        """Make the calibration that does not change the boxes of stage 1, for some paths."""
         return Calibration.none(len(paths.labels), len(self.cameras), self.model.target.size)
 
-    def share(
+    def associate(
         self,
         paths: Paths,
         existences: Float[ndarray, " N"] | None = None,
         learnt: Calibration | None = None,
-    ) -> Shared:
+    ) -> BoxAssociations:
         """Associate the boxes of every step with the paths, given their states.
 
         The result has association marginals by belief propagation, with the fusion's detection
@@ -315,7 +322,7 @@ class Smoother:
             return found
 
         shared = self._each_camera(of_camera)
-        return Shared(
+        return BoxAssociations(
             Links.joined(
                 [
                     Links(np.full(len(one.links.rows), c, dtype=np.int64), *one.links)
@@ -365,7 +372,7 @@ class Smoother:
         u, w = upright(size), lower(size)
         people = len(paths.labels)
         witness = np.ones(len(paths.states), dtype=bool)
-        witness[self.pinned(paths)[0]] = False  # a correction replaces the boxes there
+        witness[self.rows_with_places(paths)[0]] = False  # a correction replaces the boxes there
         size_sums, count = np.zeros(people), np.zeros(people)
         offsets, noises = np.zeros_like(learnt.offsets), learnt.noises.copy()
         for c, camera in enumerate(self.cameras):
@@ -405,8 +412,13 @@ class Smoother:
                 )
         return Calibration(size_sums / (count + SIZE_RIDGE), offsets, noises, learnt.shifts)
 
-    def placed(self, paths: Paths, learnt: Calibration) -> Calibration:
-        """Add the shifts that hand-marked boxes show of paths fitted with ``learnt``."""
+    def with_shifts(self, paths: Paths, learnt: Calibration) -> Calibration:
+        """Add to a calibration the shifts that hand-marked boxes show.
+
+        Args:
+            paths: n paths, fitted with ``learnt``.
+            learnt: The calibration.
+        """
         half_extents = self._sequence.target_half_extents
         found = shifts(self._marks, self.model.cameras, half_extents, paths)
         return replace(learnt, shifts=learnt.shifts + found)
@@ -431,7 +443,7 @@ def _smoothed(
 def _alike(
     rows: Int[ndarray, " L"], owners: Int[ndarray, " N"], residuals: Float[ndarray, "L m"]
 ) -> float:
-    """The correlation ρ of the errors of a path's boxes in consecutive steps, 0 … 0.95.
+    """Estimate the correlation ρ of the errors of a path's boxes in consecutive steps, 0 … 0.95.
 
     The variance of a mean of errors that follow e' = ρ e + v is (1 + ρ)/(1 − ρ) times that of
     independent errors of the same size: with this factor on R a filter that takes errors as

@@ -25,16 +25,16 @@ from tracker.smoothing.identity import identities, tracklets
 from tracker.smoothing.identity.people import Seen
 from tracker.smoothing.identity.splitting import Tracked
 from tracker.smoothing.paths import Links, Paths
-from tracker.smoothing.protocol import Earlier, Nothing
+from tracker.smoothing.protocol import EmptyStore, ResultStore
 from tracker.smoothing.recording import CameraBoxes
 from tracker.smoothing.result import Decision, Joined, Smoothed
-from tracker.smoothing.smoother import Fitted, Shared, Smoother
+from tracker.smoothing.smoother import BoxAssociations, Fitted, Smoother
 
 _SEEN = 0.5
 """Association probability above which a camera counts as detecting a track."""
 
 _WIDE = 1.0
-"""Initial variance of a state within a gap, m² and (m/s)²."""
+"""Initial variance of a state in a gap of the filter's track, m² and (m/s)²."""
 
 
 class _Decided(NamedTuple):
@@ -54,22 +54,23 @@ class _First(NamedTuple):
     """The filter's tracks, and the association probabilities of their rows."""
 
     paths: Paths
-    shared: Shared
+    shared: BoxAssociations
 
 
 class _Start(NamedTuple):
-    """The input of the last resolution of identities, which no correction of identity affects."""
+    """The input of the last resolution of identities, which does not depend on corrections of
+    identity."""
 
     fitted: Fitted
     """The tracks of the round before, fitted to their boxes."""
-    shared: Shared
+    shared: BoxAssociations
     """Association probabilities of their rows."""
     learnt: Calibration
     """The self-calibration of the boxes."""
     contested: Float[ndarray, " N"]
     """Share of each row's boxes that may belong to another track as well, 0 … 1."""
     had: Bool[ndarray, " N"]
-    """Whether a row had a track before; the other rows fill gaps."""
+    """Whether the filter, or the round before, had a track at each row; other rows fill gaps."""
     names: Int[ndarray, " N"]
     """The filter's label of each row, -1 where it had no track."""
     first: _First
@@ -100,10 +101,10 @@ class Positions:
         fused: Many[FusionResult],
         check: Callable[[], None] = lambda: None,
         corrections: Many[Correction] = (),
-        earlier: Earlier | None = None,
+        earlier: ResultStore | None = None,
     ) -> Smoothed:
         """Estimate the tracks of some steps from step 0 on, each from the boxes of all steps."""
-        p, earlier = self._parameters.smoothing, earlier or Nothing()
+        p, earlier = self._parameters.smoothing, earlier or EmptyStore()
         used = self._parameters.method("single_view").used(self._parameters)
         smoother = Smoother(
             self._sequence,
@@ -145,7 +146,7 @@ class Positions:
         views: Many[tuple[ViewResult, ...]],
         check: Callable[[], None],
         corrections: Many[Correction],
-        earlier: Earlier,
+        earlier: ResultStore,
     ) -> tuple[Paths, Float[ndarray, " N"], Links, Calibration | None, _Decided]:
         """Resolve the identities; here the filter's own tracks remain.
 
@@ -168,7 +169,7 @@ class Identities(Positions):
         views: Many[tuple[ViewResult, ...]],
         check: Callable[[], None],
         corrections: Many[Correction],
-        earlier: Earlier,
+        earlier: ResultStore,
     ) -> tuple[Paths, Float[ndarray, " N"], Links, Calibration | None, _Decided]:
         p = self._parameters.smoothing
         seen = Seen.of(views) if p.appearance > 0.0 else Seen()
@@ -214,7 +215,7 @@ class Identities(Positions):
             check()
             existences, names = np.where(found.had, 1.0, lifetimes.UNSURE), found.names
             learnt = learnt.of_people(found.origins)
-            # identities improve the association of boxes, and that again the identities
+            # resolved identities improve the association of boxes, and the association identities
             fitted, shared, learnt = _fit_and_share(
                 smoother, found.paths, existences, found.links, p, learnt, check, turns=1
             )
@@ -231,7 +232,7 @@ def _fit_and_share(
     learnt: Calibration | None,
     check: Callable[[], None],
     turns: int,
-) -> tuple[Fitted, Shared, Calibration]:
+) -> tuple[Fitted, BoxAssociations, Calibration]:
     """Alternate fitting tracks to their boxes and associating boxes with the tracks.
 
     Args:
@@ -246,21 +247,21 @@ def _fit_and_share(
     """
     learnt = learnt or smoother.uncalibrated(paths)
     fitted = smoother.fit(paths, links, 2, learnt)
-    shared = smoother.share(fitted.paths, existences, learnt)
+    shared = smoother.associate(fitted.paths, existences, learnt)
     for _ in range(turns):
         check()
         existences, _ = lifetimes.lifetimes(smoother, fitted.paths, shared, p)
         if p.learning:
             learnt = smoother.learn(fitted.paths, shared.links, learnt)
         fitted = smoother.fit(fitted.paths, shared.links, 1, learnt)
-        shared = smoother.share(fitted.paths, existences, learnt)
+        shared = smoother.associate(fitted.paths, existences, learnt)
     return fitted, shared, learnt
 
 
 def _finished(
     smoother: Smoother,
     fitted: Fitted,
-    shared: Shared,
+    shared: BoxAssociations,
     learnt: Calibration,
     p: SmoothingParams,
     decided: _Decided,
@@ -271,16 +272,16 @@ def _finished(
     )
     away = _outside(longer, decided.limits)
     existences = np.where(away, 0.0, existences)
-    shared = smoother.share(longer, existences, learnt)
+    shared = smoother.associate(longer, existences, learnt)
     fitted = smoother.fit(longer, shared.links, 1, learnt)
     if p.learning:
-        learnt = smoother.placed(fitted.paths, learnt)
+        learnt = smoother.with_shifts(fitted.paths, learnt)
         if learnt.shifts.any():
             fitted = smoother.fit(fitted.paths, shared.links, 1, learnt)
-    shared = smoother.share(fitted.paths, existences, learnt)
+    shared = smoother.associate(fitted.paths, existences, learnt)
     there, odds = lifetimes.lifetimes(smoother, fitted.paths, shared, p)
     there[away] = 0.0
-    paths = fitted.places.led_to(fitted.paths, smoother.model.step_time)
+    paths = fitted.places.lead(fitted.paths, smoother.model.step_time)
     owners = paths.owners
     present = odds > 0.0
     removed = [_removed(paths, path, odds[path]) for path in np.flatnonzero(~present).tolist()]
@@ -304,7 +305,8 @@ def _finished(
 
 
 def _removed(paths: Paths, path: int, odds: float) -> Decision:
-    """The decision to remove a track, for its log odds or because none of its tracklets is left."""
+    """Make the decision to remove a track, for its log odds or since none of its tracklets is
+    left."""
     absence = float(1.0 / (1.0 + np.exp(np.clip(odds, -600.0, 600.0))))
     reason = (
         "over its whole life it is likelier nobody"
@@ -318,7 +320,7 @@ def _removed(paths: Paths, path: int, odds: float) -> Decision:
 
 
 def _outside(paths: Paths, limits: Mapping[int, tuple[int, int]]) -> Bool[ndarray, " N"]:
-    """The rows at which corrections do not let a track exist."""
+    """Find the rows at which corrections state that a track does not exist."""
     away = np.zeros(len(paths.states), dtype=bool)
     for path, label in enumerate(paths.labels.tolist()):
         if label in limits:
@@ -379,7 +381,8 @@ def read_paths(
 def _before_their_report(
     fused: Many[FusionResult], reported: dict[int, int]
 ) -> dict[int, list[tuple[int, int]]]:
-    """The steps before each label's first report at which a box updated it, and its component."""
+    """List the steps before each label's first report at which a box updated it, with its
+    component."""
     found: dict[int, list[tuple[int, int]]] = {}
     for step, result in enumerate(fused):
         fed = np.flatnonzero((result.sources >= 0).any(axis=0))

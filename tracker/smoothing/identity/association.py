@@ -19,8 +19,8 @@ from tracker.smoothing.identity.constraints import LinkConstraints
 _FREE = LinkConstraints()
 
 _LITTLE = 1.0
-"""Loss by colours, in log odds, below which the best chains without colours are accepted: they are
-worth at most so much less than the best with colours."""
+"""Loss by colours, in log odds, below which the best chains without colours are accepted. It bounds
+how much less they are worth than the best chains with colours."""
 
 
 def join(
@@ -48,7 +48,7 @@ def join(
 
     Constraints, and the condition that each chain has the colours of one of the people with
     templates, make it an integer program:
-    :func:`tracker.smoothing.identity.integer_program.solved`.
+    :func:`tracker.smoothing.identity.integer_program.solve`.
 
     Args:
         worths: Log odds of each tracklet's evidence against clutter.
@@ -103,9 +103,9 @@ def join(
         table[size:, size:] = 0.0
         known = [(kind, place[some].tolist()) for kind, some in cuts if (group[some] == g).all()]
         before = len(known)
-        goes_on = _solved(table, _within(constraints, own, place), people[own], known)
+        successors = _solved(table, _within(constraints, own, place), people[own], known)
         cuts += [(kind, own[some].tolist()) for kind, some in known[before:]]
-        for row, column in enumerate(goes_on):
+        for row, column in enumerate(successors):
             used[own[row]] = column != row
             if column < size and column != row:
                 following[own[row]] = own[column]
@@ -149,7 +149,7 @@ def _with_required_pairs(
 def _ways(
     earlier: Int[ndarray, " P"], later: Int[ndarray, " P"], constraints: LinkConstraints, count: int
 ) -> csr_array:
-    """The directed graph of the possible pairs and of those that must be linked."""
+    """Make the directed graph of the possible pairs and of those that must be linked."""
     ends, begins = np.array(constraints.must_link, dtype=np.int64).reshape(-1, 2).T
     rows, columns = np.concatenate([earlier, ends]), np.concatenate([later, begins])
     return coo_array((np.ones(len(rows)), (rows, columns)), shape=(count, count)).tocsr()
@@ -190,8 +190,9 @@ def _within(
     )
 
 
-def _goes_on(constraints: LinkConstraints, table: Float[ndarray, "m m"], size: int) -> None:
-    """Forbid the end of a tracklet with a later partner, and the beginning of that partner."""
+def _forbid_ends(constraints: LinkConstraints, table: Float[ndarray, "m m"], size: int) -> None:
+    """Forbid the end of a tracklet that must be linked to a later one, and the beginning of the
+    latter."""
     for i, j in constraints.must_link:
         table[i, size + i] = -np.inf
         table[size + j, j] = -np.inf
@@ -221,23 +222,28 @@ def _solved(
         unused = table[tracklet, tracklet]
         table[tracklet, :] = table[:, tracklet] = -np.inf
         table[tracklet, tracklet] = unused
-    _goes_on(constraints, table, size)
+    _forbid_ends(constraints, table, size)
     possible = np.isfinite(table)
     never = -1e3 - 4.0 * size * np.abs(table[possible]).max()
     _, columns = linear_sum_assignment(np.where(possible, table, never), True)
-    goes_on: list[int] = columns[:size].tolist()
+    successors: list[int] = columns[:size].tolist()
     if (
-        not integer_program.broken(goes_on, constraints, size)
-        and _to_gain(goes_on, people) < _LITTLE
+        not integer_program.violated(successors, constraints, size)
+        and _loss_by_colours(successors, people) < _LITTLE
     ):
-        return goes_on
-    return integer_program.solved(table, possible, constraints, people, columns, cuts)
+        return successors
+    return integer_program.solve(table, possible, constraints, people, columns, cuts)
 
 
-def _to_gain(goes_on: list[int], people: Float[ndarray, "k G"]) -> float:
-    """The loss of these chains by colours, which bounds what other chains can gain."""
+def _loss_by_colours(successors: list[int], people: Float[ndarray, "k G"]) -> float:
+    """Compute the loss of chains by colours, an upper bound of what other chains can gain.
+
+    Args:
+        successors: The tracklet that follows each of k tracklets, or another number for none.
+        people: Log likelihood of the colours of each tracklet under each of G people.
+    """
     loss = 0.0
-    following = np.array([column if column < len(people) else -1 for column in goes_on])
+    following = np.array([column if column < len(people) else -1 for column in successors])
     used = following != np.arange(len(people))
     for chain in chains(np.where(used, following, -1), used):
         loss -= float(people[chain].sum(axis=0).max())
@@ -245,7 +251,7 @@ def _to_gain(goes_on: list[int], people: Float[ndarray, "k G"]) -> float:
 
 
 def chains(following: Int[ndarray, " n"], used: Bool[ndarray, " n"]) -> list[list[int]]:
-    """The tracklets of each chain, in the order of time.
+    """List the tracklets of each chain, in the order of time.
 
     Args:
         following: The tracklet that follows each of n tracklets, -1 for none.

@@ -43,25 +43,27 @@ class LinkConstraints:
         return bool(self.must_link or self.cannot_link or self.targets or self.clutter
                     or self.firsts or self.lasts)  # fmt: skip
 
-    def parted(self, cut: Paths, longest: int) -> tuple[LinkConstraints, LinkConstraints]:
+    def parted(self, tracklets: Paths, longest: int) -> tuple[LinkConstraints, LinkConstraints]:
         """Split the constraints into those for links over short gaps and those over long ones.
 
         Args:
-            cut: The tracklets.
+            tracklets: The tracklets.
             longest: Longest gap, in steps, over which tracklets are linked by motion alone.
         """
-        near = tuple((i, j) for i, j in self.must_link if cut.firsts[j] - cut.lasts[i] <= longest)
+        near = tuple(
+            (i, j) for i, j in self.must_link if tracklets.firsts[j] - tracklets.lasts[i] <= longest
+        )
         far = tuple(pair for pair in self.must_link if pair not in near)
         return replace(self, must_link=near), replace(self, must_link=far)
 
-    def limits(self, chains: Many[Many[int]], cut: Paths) -> dict[int, tuple[int, int]]:
+    def limits(self, chains: Many[Many[int]], tracklets: Paths) -> dict[int, tuple[int, int]]:
         """The first and the last step at which the tracks of some chains may exist.
 
         A track ends before the tracklet that it must not be linked to begins.
 
         Args:
             chains: The tracklets of each track, in the order of time.
-            cut: The tracklets.
+            tracklets: The tracklets.
 
         Returns:
             First and last step by the index of the chain, for the chains that are limited.
@@ -77,17 +79,19 @@ class LinkConstraints:
                 found[k] = max(low, first if begins else 0), min(high, last if ends else high)
 
         for one, other in self.cannot_link:
-            i, j = (one, other) if cut.firsts[one] <= cut.firsts[other] else (other, one)
-            if cut.lasts[i] < cut.firsts[j]:
-                limit(i, 0, int(cut.firsts[j]) - 1)
-                limit(j, int(cut.lasts[i]) + 1, _EVER)
+            i, j = (
+                (one, other) if tracklets.firsts[one] <= tracklets.firsts[other] else (other, one)
+            )
+            if tracklets.lasts[i] < tracklets.firsts[j]:
+                limit(i, 0, int(tracklets.firsts[j]) - 1)
+                limit(j, int(tracklets.lasts[i]) + 1, _EVER)
         for tracklet in self.firsts:
-            limit(tracklet, int(cut.firsts[tracklet]), _EVER)
+            limit(tracklet, int(tracklets.firsts[tracklet]), _EVER)
         for tracklet in self.lasts:
-            limit(tracklet, 0, int(cut.lasts[tracklet]))
+            limit(tracklet, 0, int(tracklets.lasts[tracklet]))
         return found
 
-    def of_chains(self, chains: Many[Many[int]], cut: Paths) -> LinkConstraints | None:
+    def of_chains(self, chains: Many[Many[int]], tracklets: Paths) -> LinkConstraints | None:
         """The same constraints on chains of tracklets, by their indices.
 
         Returns:
@@ -108,8 +112,8 @@ class LinkConstraints:
             for tracklet in sorted(self.lasts)
             if tracklet in number
         ]
-        firsts = np.array([cut.firsts[chain[0]] for chain in chains], dtype=np.int64)
-        lasts = np.array([cut.lasts[chain[-1]] for chain in chains], dtype=np.int64)
+        firsts = np.array([tracklets.firsts[chain[0]] for chain in chains], dtype=np.int64)
+        lasts = np.array([tracklets.lasts[chain[-1]] for chain in chains], dtype=np.int64)
         return possible(firsts, lasts, [pairs, *ends], strict=True)
 
 
@@ -217,43 +221,53 @@ class ConstraintResolver:
                 found.append(earlier + 1 + int(np.argmax(self._jumps[between])))
         return found
 
-    def meant(self, cut: Paths, kept: Int[ndarray, " M"]) -> set[int]:
+    def meant(self, tracklets: Paths, source_rows: Int[ndarray, " M"]) -> set[int]:
         """The tracklets that a correction refers to.
 
         Args:
-            cut: The tracklets, with M rows.
-            kept: The row of the unsplit paths that each of the M rows was.
+            tracklets: The tracklets, with M rows.
+            source_rows: Index of each of the M rows in the paths before the splits.
         """
-        return {tracklet for one in self._constraints(cut, kept) for tracklet in one.meant}
+        return {
+            tracklet for one in self._constraints(tracklets, source_rows) for tracklet in one.meant
+        }
 
-    def constraints(self, cut: Paths, kept: Int[ndarray, " M"]) -> LinkConstraints:
+    def constraints(self, tracklets: Paths, source_rows: Int[ndarray, " M"]) -> LinkConstraints:
         """The constraints of all corrections on the tracklets, as far as they are consistent.
 
         Args:
-            cut: The tracklets, with M rows.
-            kept: The row of the unsplit paths that each of the M rows was.
+            tracklets: The tracklets, with M rows.
+            source_rows: Index of each of the M rows in the paths before the splits.
         """
-        found = possible(cut.firsts, cut.lasts, self._constraints(cut, kept))
+        found = possible(
+            tracklets.firsts, tracklets.lasts, self._constraints(tracklets, source_rows)
+        )
         assert found is not None
         return found
 
-    def _constraints(self, cut: Paths, kept: Int[ndarray, " M"]) -> Iterator[Constraint]:
+    def _constraints(
+        self, tracklets: Paths, source_rows: Int[ndarray, " M"]
+    ) -> Iterator[Constraint]:
         """The constraint of each correction, in their order."""
         for one in self._corrections:
             if one.kind == "nobody":
-                inside = self._inside[one.id][kept]
-                gone = mostly_inside(cut.owners, cut.steps, inside, one)
+                inside = self._inside[one.id][source_rows]
+                gone = mostly_inside(tracklets.owners, tracklets.steps, inside, one)
                 yield Constraint(clutter=gone, meant=gone)
             elif one.kind == "here":
-                tracklet = self._tracklet(one.places[0], cut, kept, before=True)
+                tracklet = self._tracklet(one.places[0], tracklets, source_rows, before=True)
                 yield Constraint(meant={tracklet} - {-1}, targets={tracklet} - {-1})
             elif one.kind != "checked":
-                yield self._of_people(one, cut, kept)
+                yield self._of_people(one, tracklets, source_rows)
 
-    def _of_people(self, one: Correction, cut: Paths, kept: Int[ndarray, " M"]) -> Constraint:
+    def _of_people(
+        self, one: Correction, tracklets: Paths, source_rows: Int[ndarray, " M"]
+    ) -> Constraint:
         later = {"same": 1, "different": 1, "exchanged": 2}.get(one.kind, 0)
         own = {
-            place: self._tracklet(place, cut, kept, before=number < later or one.kind == "left")
+            place: self._tracklet(
+                place, tracklets, source_rows, before=number < later or one.kind == "left"
+            )
             for number, place in enumerate(one.places)
         }
         meant = {tracklet for tracklet in own.values() if tracklet >= 0}
@@ -269,30 +283,35 @@ class ConstraintResolver:
         )
 
     def _tracklet(
-        self, place: Place, cut: Paths, kept: Int[ndarray, " M"], *, before: bool = False
+        self,
+        place: Place,
+        tracklets: Paths,
+        source_rows: Int[ndarray, " M"],
+        *,
+        before: bool = False,
     ) -> int:
         """The tracklet that a place refers to: of the path there, the one at or next to the place.
 
         Args:
             place: A place of a correction.
-            cut: The tracklets, with M rows.
-            kept: The row of the unsplit paths that each of the M rows was.
+            tracklets: The tracklets, with M rows.
+            source_rows: Index of each of the M rows in the paths before the splits.
             before: Whether the tracklet before the place is preferred to the one after it.
 
         Returns:
             The index of the tracklet, -1 for none.
         """
         row = self._rows[place]
-        if row is None or not len(kept):
+        if row is None or not len(source_rows):
             return -1
-        path, owners = self._owners[row], self._owners[kept]
+        path, owners = self._owners[row], self._owners[source_rows]
         own = np.flatnonzero(owners == path)
         if not len(own):
             return -1
-        rows = kept[own]
+        rows = source_rows[own]
         here = int(np.searchsorted(rows, row, side="right" if before else "left")) - before
         here = min(max(here, 0), len(own) - 1)
-        return int(cut.owners[own[here]])
+        return int(tracklets.owners[own[here]])
 
 
 def possible(

@@ -21,28 +21,35 @@ from tracker.corrections.kinds import leeway as corrections_leeway
 from tracker.corrections.outcomes import outcomes
 from tracker.geometry.assignment import names_by_majority
 from tracker.parameters import SmoothingParams
-from tracker.smoothing.identity import association, odds, splitting, tracklets
+from tracker.smoothing.identity import association, odds, splitting
 from tracker.smoothing.identity.constraints import ConstraintResolver, LinkConstraints
 from tracker.smoothing.identity.ends import Ends
 from tracker.smoothing.identity.integer_program import Cut
 from tracker.smoothing.identity.people import Seen, template_log_odds
 from tracker.smoothing.identity.people import of_chains as people_of_chains
 from tracker.smoothing.identity.splitting import Tracked
-from tracker.smoothing.identity.tracklets import Pairs, same_label
+from tracker.smoothing.identity.tracklets import (
+    Pairs,
+    join_chains,
+    renumber_rows,
+    same_label,
+    select_rows,
+)
 from tracker.smoothing.paths import Links, Paths
-from tracker.smoothing.protocol import Earlier, Nothing
+from tracker.smoothing.protocol import EmptyStore, ResultStore
 from tracker.smoothing.result import Decision, Joined
-from tracker.smoothing.smoother import Shared
+from tracker.smoothing.smoother import BoxAssociations
 
 _SURE = 1e6
 """Log odds of chains that were accepted in the first linking."""
 
 _CAREFUL = 3
-"""Number of rounds that enforce unmet corrections only where no earlier one refers to the same
-people. Later rounds enforce all: dozens that depend on each other would take as many rounds."""
+"""Number of rounds in which an unmet correction is enforced only if no earlier unmet one refers to
+the same tracks. Later rounds enforce all unmet ones, since dozens of corrections that depend on
+each other would take as many rounds."""
 
 _TURNS = 2
-"""Largest number of repetitions of the linking with ends estimated from whole chains."""
+"""Largest number of times that the linking is repeated with ends estimated from whole chains."""
 
 _REASONS = {
     0: "past and future do not fit",
@@ -67,7 +74,7 @@ class LinkedTracks:
     origins: Int[ndarray, " n"]
     """Index of the path before the splits of which each track has most rows."""
     had: Bool[ndarray, " N"]
-    """The rows of tracklets: the others fill the gaps between them."""
+    """Whether each row is one of a tracklet; the others fill the gaps between tracklets."""
     names: Int[ndarray, " N"]
     """The filter's label of each row, -1 where it had no track."""
     decisions: list[Decision]
@@ -85,7 +92,7 @@ def link_tracklets(
     parameters: SmoothingParams,
     seen: Seen,
     corrections: Many[Correction] = (),
-    earlier: Earlier | None = None,
+    earlier: ResultStore | None = None,
 ) -> tuple[LinkedTracks, str]:
     """Split tracks into tracklets and link these, so that all corrections of identity are met.
 
@@ -104,10 +111,10 @@ def link_tracklets(
     Returns:
         The tracks, and a hash of the corrections that were enforced.
     """
-    earlier = earlier or Nothing()
+    earlier = earlier or EmptyStore()
     leeway = corrections_leeway(tracked.smoother.model.step_time)
     waiting = [one for one in corrections if one.pairs or one.apart]
-    plain: splitting.Cuts | None = None
+    plain: splitting.Splits | None = None
     prior_links = PriorLinks()
     turn = 0
     while True:
@@ -115,7 +122,7 @@ def link_tracklets(
         key = f"settled-{digest(obeyed, OF_PEOPLE)}"
         found: LinkedTracks | None = earlier.get(key)
         if found is None:
-            plain = plain or earlier.get("cuts") or splitting.cuts(tracked, parameters)
+            plain = plain or earlier.get("cuts") or splitting.find_splits(tracked, parameters)
             earlier.put("cuts", plain)
             found = _linked(tracked, parameters, seen, obeyed, leeway, plain, prior_links)
             earlier.put(key, found)
@@ -130,7 +137,7 @@ def link_tracklets(
 def _unmet(
     paths: Paths, waiting: Many[Correction], leeway: int, *, careful: bool
 ) -> list[Correction]:
-    """The corrections that paths do not meet.
+    """Find the corrections that paths do not meet.
 
     Args:
         paths: The linked tracks.
@@ -163,10 +170,10 @@ def _linked(
     seen: Seen,
     corrections: Many[Correction],
     leeway: int,
-    plain: splitting.Cuts,
+    plain: splitting.Splits,
     prior_links: PriorLinks,
 ) -> LinkedTracks:
-    """Split and link under all of some corrections.
+    """Split tracks and link the tracklets under the constraints of some corrections.
 
     Args:
         tracked: Tracks of the filter, or of the previous round.
@@ -179,48 +186,55 @@ def _linked(
     """
     smoother, fitted, shared = tracked.smoother, tracked.fitted, tracked.shared
     resolver = ConstraintResolver(fitted, corrections, leeway)
-    cut, kept = splitting.cut(tracked, plain, resolver)
-    constraints = resolver.constraints(cut, kept)
-    links = tracklets.moved(shared.links, kept, len(fitted.paths.states))
-    refitted = smoother.fit(cut, links)
-    own = Shared(links, shared.chances[:, kept], shared.missed[:, kept], shared.hidden_by[:, kept])
-    worths, births, deaths = odds.of_tracklets(smoother, refitted, own, parameters)
+    tracklets, source_rows = splitting.split_tracks(tracked, plain, resolver)
+    constraints = resolver.constraints(tracklets, source_rows)
+    links = select_rows(shared.links, source_rows, len(fitted.paths.states))
+    refitted = smoother.fit(tracklets, links)
+    own = BoxAssociations(
+        links,
+        shared.chances[:, source_rows],
+        shared.missed[:, source_rows],
+        shared.hidden_by[:, source_rows],
+    )
+    worths, births, deaths = odds.tracklet_odds(smoother, refitted, own, parameters)
     alone = Ends.alone(refitted, smoother.prior)
-    goes_on = odds.GoesOn(smoother, refitted.paths, links, parameters, seen.embeddings)
-    pairs = goes_on.by(alone)
+    short_gap_odds = odds.ShortGapOdds(smoother, refitted.paths, links, parameters, seen.embeddings)
+    pairs = short_gap_odds.pairs(alone)
     people = template_log_odds(refitted.paths, links, smoother, seen, parameters.appearance)
     longest = max(round(parameters.longest / smoother.model.step_time), 1)
-    now, later = constraints.parted(cut, longest)
+    now, later = constraints.parted(tracklets, longest)
     cuts: list[Cut] = []
 
-    def chained(pairs: tracklets.Pairs, constraints: LinkConstraints) -> list[list[int]]:
-        """The best chains of tracklets under some constraints."""
-        gains = prior_links.gains(pairs, cut, kept)
+    def best_chains(pairs: Pairs, constraints: LinkConstraints) -> list[list[int]]:
+        """Find the most likely chains of tracklets under some constraints."""
+        gains = prior_links.gains(pairs, tracklets, source_rows)
         following, used = association.join(
             worths, births, deaths, pairs.earlier, pairs.later, gains, constraints, people, cuts
         )
         return association.chains(following, used)
 
-    first = chained(pairs, now)
+    first = best_chains(pairs, now)
     for _ in range(_TURNS):  # the links improve the estimates at the ends of the tracklets
         several = [chain for chain in first if len(chain) > 1]
         if not several:
             break
-        whole, rows = tracklets.chained(refitted.paths, several, list(range(len(several))))
+        whole, rows = join_chains(refitted.paths, several, list(range(len(several))))
         ends = alone.in_chains(
-            cut, smoother.fit(whole, tracklets.moved_to(links, rows)), rows, smoother.model.motion
+            tracklets, smoother.fit(whole, renumber_rows(links, rows)), rows, smoother.model.motion
         )
-        pairs = goes_on.by(ends)
-        again = chained(pairs, now)
+        pairs = short_gap_odds.pairs(ends)
+        again = best_chains(pairs, now)
         if again == first:
             break
         first = again
-    of_chains = later.of_chains(first, cut)
-    if of_chains is None:  # a far partner excludes links to others in between
-        first = chained(pairs, constraints)
-        of_chains = replace(constraints, must_link=()).of_chains(first, cut) or LinkConstraints()
+    of_chains = later.of_chains(first, tracklets)
+    if of_chains is None:  # the chains cannot be linked so, since tracklets lie between
+        first = best_chains(pairs, constraints)
+        of_chains = (
+            replace(constraints, must_link=()).of_chains(first, tracklets) or LinkConstraints()
+        )
     # chains linked by motion have better embeddings than single tracklets
-    back = odds.comes_back(smoother, refitted.paths, links, first, parameters, seen.embeddings)
+    back = odds.long_gap_odds(smoother, refitted.paths, links, first, parameters, seen.embeddings)
     following, _ = association.join(
         np.full(len(first), _SURE), births[[c[0] for c in first]], deaths[[c[-1] for c in first]],
         back.earlier, back.later, back.gains, of_chains,
@@ -231,59 +245,62 @@ def _linked(
         for numbers in association.chains(following, np.ones(len(first), dtype=bool))
     ]
     pairs = pairs.with_more(back.of_ends(first))
-    labels = _labels(cut, chains)
-    decisions = split_decisions(cut, fitted.paths, kept, plain.reasons, chains, labels)
+    labels = _labels(tracklets, chains)
+    decisions = split_decisions(tracklets, fitted.paths, source_rows, plain.reasons, chains, labels)
     decisions += join_decisions(
-        cut, pairs, chains, labels, odds.anew(smoother), set(constraints.must_link)
+        tracklets, pairs, chains, labels, odds.log_restart(smoother), set(constraints.must_link)
     )
-    paths, rows = tracklets.chained(refitted.paths, chains, labels)
-    lengths = np.diff(cut.starts)
+    paths, rows = join_chains(refitted.paths, chains, labels)
+    lengths = np.diff(tracklets.starts)
     origins = [
-        _most(fitted.paths.owners[kept[cut.starts[chain]]], lengths[chain]) for chain in chains
+        _most(fitted.paths.owners[source_rows[tracklets.starts[chain]]], lengths[chain])
+        for chain in chains
     ]
-    links = tracklets.moved_to(links, rows)
+    links = renumber_rows(links, rows)
     of_tracklet = np.zeros(len(paths.states), dtype=bool)
     of_tracklet[rows[rows >= 0]] = True
     names_of = np.full(len(paths.states), -1, dtype=np.int64)
-    names_of[rows[rows >= 0]] = tracked.names[kept[rows >= 0]]
-    of_tracklets = np.full(len(cut.labels), -1, dtype=np.int64)
+    names_of[rows[rows >= 0]] = tracked.names[source_rows[rows >= 0]]
+    of_tracklets = np.full(len(tracklets.labels), -1, dtype=np.int64)
     for chain, label in zip(chains, labels, strict=True):
         of_tracklets[chain] = label
     places = refitted.paths.states[:, :3]
     joined = Joined(
-        of_tracklets, cut.firsts, cut.lasts, places[cut.starts[:-1]], places[cut.starts[1:] - 1],
+        of_tracklets, tracklets.firsts, tracklets.lasts,
+        places[tracklets.starts[:-1]], places[tracklets.starts[1:] - 1],
         worths, births, deaths, pairs.earlier, pairs.later, pairs.gains,
     )  # fmt: skip
-    limits = {labels[k]: span for k, span in constraints.limits(chains, cut).items()}
+    limits = {labels[k]: span for k, span in constraints.limits(chains, tracklets).items()}
     origins_of = np.array(origins, dtype=np.int64)
     whose = np.full(len(fitted.paths.states), -1, dtype=np.int64)
-    whose[kept] = of_tracklets[cut.owners]
+    whose[source_rows] = of_tracklets[tracklets.owners]
     return LinkedTracks(
         paths, links, origins_of, of_tracklet, names_of, decisions, joined, limits, whose
     )
 
 
 def _most(names: ndarray, weights: ndarray) -> int:
-    """The value with the largest total weight, the smallest of equal ones."""
+    """Return the value with the largest total weight, the smallest of equal ones."""
     values, which = np.unique(names, return_inverse=True)
     return int(values[np.argmax(np.bincount(which, weights))])
 
 
-def _labels(cut: Paths, chains: list[list[int]]) -> list[int]:
-    """The label of each chain: that of most of its rows, unless another chain has more of it."""
-    lengths = np.diff(cut.starts)
+def _labels(tracklets: Paths, chains: list[list[int]]) -> list[int]:
+    """Choose the label of each chain: that of most of its rows, unless another chain has more of
+    it."""
+    lengths = np.diff(tracklets.starts)
     counts = []
     for chain in chains:
-        names, which = np.unique(cut.labels[chain], return_inverse=True)
+        names, which = np.unique(tracklets.labels[chain], return_inverse=True)
         rows = np.bincount(which, lengths[chain]).astype(np.int64)
         counts.append(dict(zip(names.tolist(), rows.tolist(), strict=True)))
-    return names_by_majority(counts, int(cut.labels.max(initial=0)))
+    return names_by_majority(counts, int(tracklets.labels.max(initial=0)))
 
 
 def split_decisions(
-    cut: Paths,
+    tracklets: Paths,
     before: Paths,
-    kept: Int[ndarray, " M"],
+    source_rows: Int[ndarray, " M"],
     reasons: Int[ndarray, " N"],
     chains: list[list[int]],
     labels: list[int],
@@ -291,32 +308,37 @@ def split_decisions(
     """List the splits after which a track does not continue as the filter's.
 
     Args:
-        cut: The tracklets, with M rows.
+        tracklets: The tracklets, with M rows.
         before: The paths before the splits, with N rows.
-        kept: The row of ``before`` that each of the M rows was.
-        reasons: Why each of the N rows was left out, as in :class:`Cuts`.
-        chains: The tracklets of each track.
+        source_rows: Index of each of the M rows in ``before``.
+        reasons: Why each of the N rows was left out, as in
+        :class:`tracker.smoothing.identity.splitting.Splits`. chains: The tracklets of each track.
         labels: Label of each track.
     """
     chain_of = {tracklet: number for number, chain in enumerate(chains) for tracklet in chain}
     found = []
-    for tracklet, after in same_label(cut):
+    for tracklet, after in same_label(tracklets):
         one, other = chain_of.get(tracklet), chain_of.get(after)
         if one is None or one == other:
             continue
-        last, first = kept[cut.starts[tracklet + 1] - 1], kept[cut.starts[after]]
+        last, first = (
+            source_rows[tracklets.starts[tracklet + 1] - 1],
+            source_rows[tracklets.starts[after]],
+        )
         why = int(np.max(reasons[last + 1 : first], initial=0))
         if (reasons[last + 1 : first] == 1).any():
             why = 1
         step = int(before.steps[first])
         found.append(
-            Decision("cut", step, labels[one], int(cut.labels[tracklet]), 1.0, 0.0, _REASONS[why])
+            Decision(
+                "cut", step, labels[one], int(tracklets.labels[tracklet]), 1.0, 0.0, _REASONS[why]
+            )
         )
     return found
 
 
 def join_decisions(
-    cut: Paths,
+    tracklets: Paths,
     pairs: Pairs,
     chains: list[list[int]],
     labels: list[int],
@@ -326,7 +348,7 @@ def join_decisions(
     """List the links between tracks of the filter, with the odds against the best alternative.
 
     Args:
-        cut: The tracklets.
+        tracklets: The tracklets.
         pairs: The possible pairs with their log odds.
         chains: The tracklets of each track.
         labels: Label of each track.
@@ -345,11 +367,13 @@ def join_decisions(
     found = []
     for chain, label in zip(chains, labels, strict=True):
         for i, j in pairwise(chain):
-            if cut.labels[i] == cut.labels[j]:
+            if tracklets.labels[i] == tracklets.labels[j]:
                 continue
             if (i, j) in required or (i, j) not in gain:
-                name = int(cut.labels[j] if cut.labels[j] != label else cut.labels[i])
-                step = int(cut.firsts[j])
+                name = int(
+                    tracklets.labels[j] if tracklets.labels[j] != label else tracklets.labels[i]
+                )
+                step = int(tracklets.firsts[j])
                 found.append(Decision("joined", step, label, name, 1.0, 0.0, "a person said so"))
                 continue
             every = np.array([*by_later[j], anew])
@@ -360,12 +384,16 @@ def join_decisions(
             found.append(
                 Decision(
                     "joined",
-                    int(cut.firsts[j]),
+                    int(tracklets.firsts[j]),
                     label,
-                    int(cut.labels[j] if cut.labels[j] != label else cut.labels[i]),
+                    int(
+                        tracklets.labels[j] if tracklets.labels[j] != label else tracklets.labels[i]
+                    ),
                     own,
                     float(rest.max(initial=0.0)),
-                    "one person goes on" if cut.firsts[j] - cut.lasts[i] < 2 else "one person",
+                    "one person goes on"
+                    if tracklets.firsts[j] - tracklets.lasts[i] < 2
+                    else "one person",
                 )
             )
     return found
@@ -375,8 +403,8 @@ def join_decisions(
 class PriorLinks:
     """The tracks of N rows without any correction, whose links are preferred.
 
-    The optimum under a correction may change links that the correction does not refer to; these
-    were the optimum before, and the odds of many are near even. So every link i → j of the
+    The optimum under a correction may differ from that without it also in links that the correction
+    does not refer to, since the odds of many links are near even. So every link i → j of the
     result without corrections gains s more,
 
         gain'_ij = gain_ij + s where one track had the end of i and the beginning of j
@@ -389,17 +417,19 @@ class PriorLinks:
     people: Int[ndarray, " N"] | None = None
     """The label of each row, -1 where no track has it; None before the first linking."""
 
-    def gains(self, pairs: Pairs, cut: Paths, kept: Int[ndarray, " M"]) -> Float[ndarray, " P"]:
-        """The gains of pairs of tracklets, raised for those that were linked.
+    def gains(
+        self, pairs: Pairs, tracklets: Paths, source_rows: Int[ndarray, " M"]
+    ) -> Float[ndarray, " P"]:
+        """Compute the gains of pairs of tracklets, raised for those that were linked.
 
         Args:
             pairs: P pairs of tracklets with their log odds.
-            cut: The tracklets, with M rows.
-            kept: The row of the N rows that each of the M rows was.
+            tracklets: The tracklets, with M rows.
+            source_rows: Index of each of the M rows among the N rows.
         """
         if self.people is None or not len(pairs.gains):
             return pairs.gains
-        first = self.people[kept[cut.starts[:-1]]]
-        last = self.people[kept[cut.starts[1:] - 1]]
+        first = self.people[source_rows[tracklets.starts[:-1]]]
+        last = self.people[source_rows[tracklets.starts[1:] - 1]]
         stays = (last[pairs.earlier] == first[pairs.later]) & (last[pairs.earlier] >= 0)
         return np.asarray(pairs.gains + _STAYS * stays)

@@ -18,12 +18,14 @@ from scipy.sparse import coo_array, csr_array
 from tracker.smoothing.identity.constraints import LinkConstraints
 
 _REACH = 40.0
-"""Bound on the reduced cost of the edges that are considered first: few corrections cost more."""
+"""Bound on the reduced cost of the edges that are considered first, log odds; few corrections cost
+more."""
 
 _ROUNDING = 1e-9
 
 Cut = tuple[str, list[int]]
-"""The kind of a violated constraint, and the tracklets concerned, as :func:`broken` returns it."""
+"""The kind of a violated constraint, and the tracklets concerned, as :func:`violated` returns
+it."""
 
 
 class _Edges(NamedTuple):
@@ -37,7 +39,7 @@ class _Edges(NamedTuple):
     """Index of the person with a template whose colours the edge has."""
 
 
-def solved(
+def solve(
     table: Float[ndarray, "2k 2k"],
     possible: Bool[ndarray, "2k 2k"],
     constraints: LinkConstraints,
@@ -86,9 +88,9 @@ def solved(
     while True:
         found = _within_reach(table, possible & (slack <= reach), constraints, people, best, cuts)
         if found is not None:
-            goes_on, value = found
+            successors, value = found
             if worth - value <= reach:
-                return goes_on
+                return successors
             reach = worth - value + _ROUNDING  # every better solution consists of these edges
         elif np.isinf(reach):
             raise RuntimeError("consistent constraints have no solution")
@@ -159,7 +161,7 @@ def _within_reach(
         on_it = np.isin(rows * (2 * size) + columns, way) & inner
         return LinearConstraint(on_it.astype(float)[None], -np.inf, len(way) - 1.0)
 
-    cuts += [] if cuts else broken(best[:size].tolist(), constraints, size)
+    cuts += [] if cuts else violated(best[:size].tolist(), constraints, size)
     linear += [cut(*one) for one in cuts]
     while True:
         found = milp(
@@ -173,12 +175,12 @@ def _within_reach(
             return None
         selected = found.x > 0.5
         chosen = selected & (rows < size)
-        goes_on = [-1] * size
+        successors = [-1] * size
         for row, column in zip(rows[chosen].tolist(), columns[chosen].tolist(), strict=True):
-            goes_on[row] = column
-        unmet = broken(goes_on, constraints, size)
+            successors[row] = column
+        unmet = violated(successors, constraints, size)
         if not unmet:
-            return goes_on, float(values[selected].sum())
+            return successors, float(values[selected].sum())
         cuts += unmet
         linear += [cut(*one) for one in unmet]
 
@@ -186,7 +188,7 @@ def _within_reach(
 def _leave_out_what_is_worse_than_two(
     table: Float[ndarray, "2k 2k"], possible: Bool[ndarray, "2k 2k"], size: int
 ) -> None:
-    """Remove links that are worth less than an end and a beginning: no optimum contains them."""
+    """Remove links that are worth less than an end and a beginning, which no optimum contains."""
     inner = np.arange(size)
     ends, begins = table[inner, size + inner], table[size + inner, inner]
     worse = table[:size, :size] < ends[:, None] + begins[None, :]
@@ -204,7 +206,7 @@ def _edges(possible: Bool[ndarray, "m m"], kinds: int) -> _Edges:
 
 
 def _once(edges: _Edges, size: int) -> csr_array:
-    """Rows of the program by which each tracklet is left once and entered once."""
+    """Make the equations by which each tracklet is left once and entered once."""
     out, into = np.flatnonzero(edges.rows < size), np.flatnonzero(edges.columns < size)
     return coo_array(
         (
@@ -219,8 +221,10 @@ def _once(edges: _Edges, size: int) -> csr_array:
 
 
 def _one_person(edges: _Edges, size: int, kinds: int) -> csr_array:
-    """Rows by which a tracklet is left as the person that it is entered as, for all but the first
-    person, for whom this follows from the rest."""
+    """Make the equations by which a tracklet is left as the same person as it is entered.
+
+    They are made for all but the first person, for whom the equation follows from the others.
+    """
     named = (edges.people > 0) & (edges.rows != edges.columns)
     out = np.flatnonzero(named & (edges.rows < size))
     into = np.flatnonzero(named & (edges.columns < size))
@@ -241,27 +245,28 @@ def _one_person(edges: _Edges, size: int, kinds: int) -> csr_array:
     ).tocsr()
 
 
-def broken(goes_on: list[int], constraints: LinkConstraints, size: int) -> list[Cut]:
-    """The constraints that a solution violates.
+def violated(successors: list[int], constraints: LinkConstraints, size: int) -> list[Cut]:
+    """Find the constraints that a solution violates.
 
     Returns:
-        For a pair that must be linked, the chain of the first tracklet, which lacks the second;
-        for a pair that cannot be linked, the path between the two.
+        For a pair that must be linked, ``together`` and the chain of the first tracklet, which does
+        not contain the second; for a pair that cannot be linked, ``apart`` and the path between
+        them.
     """
 
     def chain(tracklet: int) -> list[int]:
         found = [tracklet]
-        while goes_on[found[-1]] < size and goes_on[found[-1]] != found[-1]:
-            found.append(goes_on[found[-1]])
+        while successors[found[-1]] < size and successors[found[-1]] != found[-1]:
+            found.append(successors[found[-1]])
         return found
 
-    broken: list[Cut] = []
+    found_cuts: list[Cut] = []
     for i, j in constraints.must_link:
         if j not in (own := chain(i)):
-            broken.append(("together", own))
+            found_cuts.append(("together", own))
     for i, j in constraints.cannot_link:
         for one, other in ((i, j), (j, i)):
             own = chain(one)
             if other in own[1:]:
-                broken.append(("apart", own[: own.index(other) + 1]))
-    return broken
+                found_cuts.append(("apart", own[: own.index(other) + 1]))
+    return found_cuts

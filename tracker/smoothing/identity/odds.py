@@ -14,19 +14,20 @@ from tracker.parameters import SmoothingParams
 from tracker.smoothing.identity import tracklets
 from tracker.smoothing.identity.appearance import Appearance
 from tracker.smoothing.identity.ends import Ends
-from tracker.smoothing.identity.tracklets import Pairs, chained, same_label
+from tracker.smoothing.identity.tracklets import Pairs, join_chains, same_label
 from tracker.smoothing.lifetimes import independence, misses
 from tracker.smoothing.paths import Links, Paths
-from tracker.smoothing.smoother import Fitted, Shared, Smoother
+from tracker.smoothing.smoother import BoxAssociations, Fitted, Smoother
 
 FASTEST = 3.0
 """Largest speed of a person in a room over several steps, metres per second."""
 
 
-def of_tracklets(
-    smoother: Smoother, fitted: Fitted, shared: Shared, parameters: SmoothingParams
+def tracklet_odds(
+    smoother: Smoother, fitted: Fitted, shared: BoxAssociations, parameters: SmoothingParams
 ) -> tuple[Float[ndarray, " n"], Float[ndarray, " n"], Float[ndarray, " n"]]:
-    """The log odds of each tracklet's boxes against clutter, and of its birth and death.
+    """Compute the log odds of each tracklet against clutter, and log probabilities of birth and
+    death.
 
     Args:
         smoother: The models and the boxes.
@@ -43,24 +44,24 @@ def of_tracklets(
     survival, death = _survival(smoother)
     rows = fitted.odds + independence(step_time, parameters.memory) * misses(shared) + survival
     worths = np.bincount(paths.owners, rows, count) + smoother.log_place
-    births = np.where(paths.firsts <= 0, 0.0, anew(smoother) - death)
+    births = np.where(paths.firsts <= 0, 0.0, log_restart(smoother) - death)
     deaths = np.where(paths.lasts >= smoother.frames - 1, 0.0, death)
     return worths, births, deaths
 
 
 def _survival(smoother: Smoother) -> tuple[float, float]:
-    """The values of log p_S and log(1 − p_S)."""
+    """Return log p_S and log(1 − p_S) of one step."""
     survival = min(smoother.parameters.survival_probability, 1.0 - 1e-6)
     return float(np.log(survival)), float(np.log1p(-survival))
 
 
-def anew(smoother: Smoother) -> float:
-    """The log probability of a death and a birth at one step."""
+def log_restart(smoother: Smoother) -> float:
+    """Return the log probability of a death and a birth at one step, which compete with a link."""
     rate = smoother.parameters.birth_rate * smoother.model.step_time
     return float(np.log(rate)) + _survival(smoother)[1]
 
 
-class GoesOn:
+class ShortGapOdds:
     """Log odds of links over short gaps, from motion, appearance and misses in the gap.
 
     The filter's labels are not used: they came from the same boxes. Only the odds of the motion
@@ -97,8 +98,9 @@ class GoesOn:
             alike = Appearance(paths, links, smoother.cameras, embeddings, smoother.model.step_time)
             self._alike = p.appearance * alike.log_ratio(near.earlier, near.later)[0]
 
-    def by(self, known: Ends) -> Pairs:
-        """The possible pairs with their log odds, given the estimates at the tracklets' ends."""
+    def pairs(self, known: Ends) -> Pairs:
+        """Return the possible pairs with their log odds, given the estimates at the tracklets'
+        ends."""
         smoother, near = self._smoother, self._near
         motion = tracklets.motion_gains(
             self._paths,
@@ -114,7 +116,7 @@ class GoesOn:
         return _of_table(gains, self._paths)
 
 
-def comes_back(
+def long_gap_odds(
     smoother: Smoother,
     paths: Paths,
     links: Links,
@@ -124,7 +126,8 @@ def comes_back(
 ) -> Pairs:
     """Compute the log odds of links over long gaps, from appearance and from the filter's labels.
 
-    The person of the later chain is as likely any of those that ended before as a new one.
+    The prior probabilities that the later chain continues each of the chains that ended before it,
+    and that it is of a new person, are equal.
 
     Args:
         smoother: The models and the boxes.
@@ -137,8 +140,8 @@ def comes_back(
     Returns:
         Pairs of chains with their log odds.
     """
-    whole, rows = chained(paths, chains, list(range(len(chains))))
-    newcomer = anew(smoother)
+    whole, rows = join_chains(paths, chains, list(range(len(chains))))
+    newcomer = log_restart(smoother)
     before = whole.lasts[:, None] < whole.firsts[None, :]
     gains = np.full(before.shape, -np.inf)
     if embeddings is not None:
@@ -167,10 +170,11 @@ def _of_table(gains: Float[ndarray, "n n"], paths: Paths) -> Pairs:
 def _seen_empty(
     smoother: Smoother, paths: Paths, pairs: Pairs, memory: float
 ) -> Float[ndarray, " P"]:
-    """Log likelihood of the cameras' misses on the straight line between each pair, at most 0.
+    """Compute the log likelihood of the cameras' misses in the gap of each pair, at most 0.
 
-    A camera that views a point of the line and has no box there counts as a miss; one that has a
-    box there, of this person or of an occluder, has no effect.
+    The person is assumed to move on a straight line. A camera that views a point of the line and
+    has no box there counts as a miss; one with a box there, of the person or of an occluder, has no
+    effect.
     """
     inner = pairs.gaps - 1
     total = np.zeros(len(inner))

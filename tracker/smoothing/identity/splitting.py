@@ -9,13 +9,13 @@ from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
 from tracker.parameters import SmoothingParams
-from tracker.smoothing.identity import tracklets
 from tracker.smoothing.identity.constraints import ConstraintResolver
 from tracker.smoothing.identity.exchanges import exchange_breaks
 from tracker.smoothing.identity.odds import FASTEST
+from tracker.smoothing.identity.tracklets import split_paths
 from tracker.smoothing.lifetimes import independence, lifetimes
 from tracker.smoothing.paths import Paths
-from tracker.smoothing.smoother import Fitted, Shared, Smoother
+from tracker.smoothing.smoother import BoxAssociations, Fitted, Smoother
 
 _FED = 0.3
 """Sum of association probabilities over all cameras above which a row counts as detected."""
@@ -35,42 +35,49 @@ class Tracked:
     """The models and the boxes."""
     fitted: Fitted
     """The filter's tracks, or those of the previous round, fitted to their boxes."""
-    shared: Shared
+    shared: BoxAssociations
     """Association probabilities of the rows and boxes."""
     contested: Float[ndarray, " N"]
     """Share of each row's boxes that may belong to another track as well, 0 … 1."""
     had: Bool[ndarray, " N"]
-    """Whether a row had a track before; the other rows fill gaps."""
+    """Whether the filter, or the previous round, had a track at each row; other rows fill gaps."""
     names: Int[ndarray, " N"]
     """The filter's label of each row, -1 where it had no track."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Cuts:
+class Splits:
     """The splits of paths of N rows without any correction."""
 
     reasons: Int[ndarray, " N"]
-    """Why each row is left out: 0 for not, 1 ambiguous boxes, 2 jump, 3 absent or not detected."""
+    """Reason why each row is left out of tracklets: 0 none, 1 ambiguous boxes, 2 jump, 3 absent or
+    not detected."""
     clear: Bool[ndarray, " N"]
     """The rows that remain in tracklets."""
     breaks: Bool[ndarray, " N"]
-    """The rows before which a path is split even where both sides remain."""
+    """The rows before which a path is split though both sides remain."""
 
 
-def cuts(tracked: Tracked, p: SmoothingParams) -> Cuts:
-    """Compute the splits of tracks without any correction."""
+def find_splits(tracked: Tracked, p: SmoothingParams) -> Splits:
+    """Find where tracks are split without any correction.
+
+    Rows are left out where a share of ``p.doubt`` of the boxes may belong to another track, around
+    a jump (the squared Mahalanobis distance between the estimates from the past and from the future
+    exceeds ``p.jump``), and where no camera detected the track for longer than ``p.gap``. Tracks
+    are also split where a swap with another track has log odds of at least ``p.exchange``.
+    """
     smoother, fitted, shared = tracked.smoother, tracked.fitted, tracked.shared
     step_time, paths = smoother.model.step_time, fitted.paths
     rows = len(paths.states)
     there, _ = lifetimes(smoother, paths, shared, p)
     reasons = np.zeros(rows, dtype=np.int64)
     fed = np.bincount(shared.links.rows, shared.links.shares, rows) > _FED
-    fed[smoother.pinned(paths)[0]] = True
+    fed[smoother.rows_with_places(paths)[0]] = True
     too_long = round(p.gap / step_time)
     away = _long_gaps(paths, fed, too_long) | (there < 0.5)
     reasons[away | _not_bridged(paths, tracked.had, away, too_long)] = 3
     around = round(_AROUND / step_time)
-    # errors of boxes are correlated, so past and future contradict each other less than it seems
+    # errors of boxes are correlated: the distance is reduced to that of independent evidence
     jumps = np.flatnonzero(fitted.jumps * independence(step_time, p.memory) > p.jump)
     owners = paths.owners
     for offset in range(-around, around):
@@ -85,11 +92,11 @@ def cuts(tracked: Tracked, p: SmoothingParams) -> Cuts:
     )
     clear = _between(paths, fed & (reasons == 0)) & (reasons == 0)
     begins, between = _of_two(paths, tracked.names)
-    return Cuts(reasons, clear & ~between, breaks | begins)
+    return Splits(reasons, clear & ~between, breaks | begins)
 
 
-def cut(
-    tracked: Tracked, plain: Cuts, resolver: ConstraintResolver
+def split_tracks(
+    tracked: Tracked, plain: Splits, resolver: ConstraintResolver
 ) -> tuple[Paths, Int[ndarray, " M"]]:
     """Split tracks into tracklets with the filter's labels.
 
@@ -99,29 +106,33 @@ def cut(
         resolver: The splits of the corrections.
 
     Returns:
-        The tracklets with M rows, and the row of the tracks that each of these was.
+        The tracklets, with M rows, and the index of each of these rows in the tracks.
     """
     paths, owners = tracked.fitted.paths, tracked.fitted.paths.owners
     clear, breaks = plain.clear.copy(), plain.breaks | resolver.breaks()
-    cut, kept = tracklets.cut(paths, clear, breaks)
-    # a short tracklet has little information about identity; where it is the only one it remains
-    lengths = np.diff(cut.starts)
-    of = owners[kept[cut.starts[:-1]]]
+    tracklets, source_rows = split_paths(paths, clear, breaks)
+    # a short tracklet tells little about identity; it remains only if its path has no longer one
+    lengths = np.diff(tracklets.starts)
+    of = owners[source_rows[tracklets.starts[:-1]]]
     longest = np.zeros(len(paths.labels), dtype=np.int64)
     np.maximum.at(longest, of, lengths)
     shortest = round(_SHORTEST / tracked.smoother.model.step_time)
     short = (lengths < shortest) & (longest[of] >= shortest)
-    short[list(resolver.meant(cut, kept))] = False
-    clear[kept[np.repeat(short, lengths)]] = False
-    cut, kept = tracklets.cut(paths, clear, breaks)
-    return replace(cut, labels=_named(cut, tracked.names[kept])), kept
+    short[list(resolver.meant(tracklets, source_rows))] = False
+    clear[source_rows[np.repeat(short, lengths)]] = False
+    tracklets, source_rows = split_paths(paths, clear, breaks)
+    return replace(tracklets, labels=_named(tracklets, tracked.names[source_rows])), source_rows
 
 
 def _of_two(
     paths: Paths, names: Int[ndarray, " N"]
 ) -> tuple[Bool[ndarray, " N"], Bool[ndarray, " N"]]:
-    """The rows at which a path continues under another label of the filter, and the rows without a
-    label in between."""
+    """Find the rows at which the filter's label of a path changes.
+
+    Returns:
+        Whether each row is the first with another label than before, and whether each row is one
+        without a label between two different labels.
+    """
     begins = np.zeros(len(names), dtype=bool)
     between = begins.copy()
     rows = np.flatnonzero(names >= 0)
@@ -134,24 +145,24 @@ def _of_two(
     return begins, between
 
 
-def _named(cut: Paths, names: Int[ndarray, " M"]) -> Int[ndarray, " n"]:
-    """The filter's label of each tracklet; one without such a label retains its own."""
-    labels = cut.labels.copy()
+def _named(tracklets: Paths, names: Int[ndarray, " M"]) -> Int[ndarray, " n"]:
+    """Return the filter's label of each tracklet; one without such a label retains its own."""
+    labels = tracklets.labels.copy()
     known = np.flatnonzero(names >= 0)
-    owners, first = np.unique(cut.owners[known], return_index=True)
+    owners, first = np.unique(tracklets.owners[known], return_index=True)
     labels[owners] = names[known[first]]
     return labels
 
 
 def _runs(paths: Paths, flags: Bool[ndarray, " N"]) -> Int[ndarray, " N"]:
-    """The index of the run of equal flags of one path that each row is in."""
+    """Return the index of the run of consecutive equal flags, within one path, of each row."""
     change = np.ones(len(flags), dtype=bool)
     change[1:] = (flags[1:] != flags[:-1]) | (np.diff(paths.owners) != 0)
     return np.asarray(np.cumsum(change) - 1)
 
 
 def _long_gaps(paths: Paths, fed: Bool[ndarray, " N"], longest: int) -> Bool[ndarray, " N"]:
-    """The rows in runs without a box that are longer than ``longest`` steps."""
+    """Find the rows in runs of more than ``longest`` rows that are not ``fed``."""
     run = _runs(paths, fed)
     return np.asarray(~fed & (np.bincount(run)[run] > longest)) if len(fed) else fed
 
@@ -159,15 +170,18 @@ def _long_gaps(paths: Paths, fed: Bool[ndarray, " N"], longest: int) -> Bool[nda
 def _not_bridged(
     paths: Paths, had: Bool[ndarray, " N"], away: Bool[ndarray, " N"], longest: int
 ) -> Bool[ndarray, " N"]:
-    """The rows of the filter's long gaps that boxes do not bridge from end to end: the person may
-    have continued as another track meanwhile."""
+    """Find the rows of the filter's long gaps of which a part is ``away``, without boxes for long.
+
+    Boxes do not connect the two sides of such a gap, so the person may have continued as another
+    track of the filter.
+    """
     gaps = _long_gaps(paths, had, longest)
     run = _runs(paths, had)
     return np.asarray(gaps & (np.bincount(run, away & gaps)[run] > 0.0)) if len(had) else gaps
 
 
 def _between(paths: Paths, seen: Bool[ndarray, " N"]) -> Bool[ndarray, " N"]:
-    """The rows from the first to the last detected one of each path."""
+    """Find the rows from the first to the last detected one of each path."""
     rows, owners = np.arange(len(seen)), paths.owners
     first = np.full(len(paths.labels), len(seen))
     last = np.full(len(paths.labels), -1)

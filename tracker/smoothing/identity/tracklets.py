@@ -42,7 +42,7 @@ def contested(paths: Paths, links: Links) -> Float[ndarray, " N"]:
     return np.asarray(np.where(own > 0.0, lost / np.maximum(own, 1e-12), 0.0))
 
 
-def cut(
+def split_paths(
     paths: Paths, clear: Bool[ndarray, " N"], breaks: Bool[ndarray, " N"]
 ) -> tuple[Paths, Int[ndarray, " M"]]:
     """Split paths into the runs of clear rows.
@@ -53,34 +53,40 @@ def cut(
         breaks: The rows before which a path is split even where both sides are clear.
 
     Returns:
-        The runs as paths with M rows, and the row of ``paths`` that each of these was.
+        The runs as paths with M rows, and the index of each of these rows in ``paths``.
     """
-    kept = np.flatnonzero(clear)
-    owners = paths.owners[kept]
-    begins = np.ones(len(kept), dtype=bool)
-    begins[1:] = (np.diff(kept) > 1) | (np.diff(owners) != 0) | breaks[kept[1:]]
+    source_rows = np.flatnonzero(clear)
+    owners = paths.owners[source_rows]
+    begins = np.ones(len(source_rows), dtype=bool)
+    begins[1:] = (np.diff(source_rows) > 1) | (np.diff(owners) != 0) | breaks[source_rows[1:]]
     firsts = np.flatnonzero(begins)
-    starts = np.append(firsts, len(kept)).astype(np.int64)
+    starts = np.append(firsts, len(source_rows)).astype(np.int64)
     return (
         Paths(
             paths.labels[owners[firsts]],
-            paths.steps[kept[firsts]],
+            paths.steps[source_rows[firsts]],
             starts,
-            paths.states[kept],
-            paths.covariances[kept],
+            paths.states[source_rows],
+            paths.covariances[source_rows],
         ),
-        kept,
+        source_rows,
     )
 
 
-def moved(links: Links, kept: Int[ndarray, " M"], rows: int) -> Links:
-    """Renumber the links after M of N rows were selected; links of other rows are removed."""
+def select_rows(links: Links, source_rows: Int[ndarray, " M"], rows: int) -> Links:
+    """Select the links of M of N rows, and renumber the rows.
+
+    Args:
+        links: Links of N rows.
+        source_rows: Index of each of the M rows among the N.
+        rows: N.
+    """
     place = np.full(rows, -1, dtype=np.int64)
-    place[kept] = np.arange(len(kept))
-    return moved_to(links, place)
+    place[source_rows] = np.arange(len(source_rows))
+    return renumber_rows(links, place)
 
 
-def moved_to(links: Links, place: Int[ndarray, " N"]) -> Links:
+def renumber_rows(links: Links, place: Int[ndarray, " N"]) -> Links:
     """Renumber the links by the new index of each row, -1 for rows whose links are removed."""
     new = place[links.rows]
     chosen = links.take(new >= 0)
@@ -223,38 +229,43 @@ def log_integral(
 
 
 def same_label(paths: Paths) -> list[tuple[int, int]]:
-    """The pairs of each tracklet and the next one with the same label of the filter."""
+    """List the pairs of each tracklet and the next one in time with the same label of the
+    filter."""
     order = np.lexsort((paths.firsts, paths.labels))
     one, other = order[:-1], order[1:]
     same = (paths.labels[one] == paths.labels[other]) & (paths.lasts[one] < paths.firsts[other])
     return list(zip(one[same].tolist(), other[same].tolist(), strict=True))
 
 
-def chained(
-    cut: Paths, chains: list[list[int]], labels: list[int]
+def join_chains(
+    tracklets: Paths, chains: list[list[int]], labels: list[int]
 ) -> tuple[Paths, Int[ndarray, " M"]]:
     """Join the tracklets of each chain to one path, by linear interpolation in the gaps.
 
     Args:
-        cut: The tracklets, with M rows.
+        tracklets: The tracklets, with M rows.
         chains: The tracklets of each chain, in the order of time.
         labels: Label of each chain.
 
     Returns:
-        The paths, and the row of these for each of the M rows, -1 for tracklets in no chain.
+        The paths, and the index of each of the M rows in these, -1 for tracklets in no chain.
     """
-    dimension = cut.states.shape[1]
-    steps, place = cut.steps, np.full(len(cut.states), -1, dtype=np.int64)
+    dimension = tracklets.states.shape[1]
+    steps, place = tracklets.steps, np.full(len(tracklets.states), -1, dtype=np.int64)
     firsts, states, covariances, begin = [], [], [], 0
     for chain in chains:
-        rows = np.concatenate([np.arange(cut.starts[k], cut.starts[k + 1]) for k in chain])
+        rows = np.concatenate(
+            [np.arange(tracklets.starts[k], tracklets.starts[k + 1]) for k in chain]
+        )
         own = steps[rows]
         every = np.arange(own[0], own[-1] + 1)
         states.append(
-            np.stack([np.interp(every, own, cut.states[rows, a]) for a in range(dimension)], axis=1)
+            np.stack(
+                [np.interp(every, own, tracklets.states[rows, a]) for a in range(dimension)], axis=1
+            )
         )
         spread = np.tile(np.eye(dimension), (len(every), 1, 1))
-        spread[own - own[0]] = cut.covariances[rows]
+        spread[own - own[0]] = tracklets.covariances[rows]
         covariances.append(spread)
         firsts.append(int(own[0]))
         place[rows] = begin + own - own[0]
