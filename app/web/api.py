@@ -29,7 +29,7 @@ from app.web.views import results, steps
 from app.web.views.timeline import Timelines
 from tracker.export import tracks_csv
 from tracker.runs import gaps
-from tracker.runs.run import given_names, resting_of
+from tracker.runs.run import given_names, row_corrections
 from tracker.sequences import library
 
 router = APIRouter(prefix="/api", responses=ERRORS)
@@ -285,7 +285,7 @@ def export_tracks(bench: Bench) -> Response:
         run.seed,
         done=done,
         remarks=remarks,
-        resting=resting_of(run),
+        row_corrections=row_corrections(run),
         names=given_names(run),
     )
     return Response(

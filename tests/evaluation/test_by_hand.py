@@ -10,7 +10,7 @@ from tracker.evaluation.measures.clear import clear
 from tracker.evaluation.measures.gospa import gospa
 from tracker.evaluation.measures.hota import hota
 from tracker.evaluation.measures.identity import identity
-from tracker.evaluation.measures.matching import Measure
+from tracker.evaluation.measures.matching import GatedDistance
 from tracker.evaluation.measures.ospa import ospa, ospa2, ospa2_whole
 from tracker.evaluation.pixels import pixels
 from tracker.evaluation.positions import cardinality_error, positions
@@ -132,7 +132,7 @@ def test_positions():
 def test_box_distance():
     # boxes of 2 × 2 × 2 m, one metre apart along x: shared 4, union 12, hull 3 · 2 · 2 = 12;
     # three metres apart: shared 0, union 16, hull 20
-    measure = Measure("box", 0.5, np.ones(3))
+    measure = GatedDistance("box", 0.5, np.ones(3))
     zero = np.zeros((4, 3))
     apart = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0]], dtype=float)
     expected = [(1 - g) / 2 for g in (1, 4 / 12, 0, -4 / 20)]

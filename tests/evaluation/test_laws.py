@@ -23,7 +23,7 @@ from tests.evaluation.scenes import (
 )
 from tracker.evaluation import Evaluation, EvaluationSettings, evaluate
 from tracker.evaluation.measures.gospa import gospa_parts
-from tracker.evaluation.measures.matching import Measure, assign, match
+from tracker.evaluation.measures.matching import GatedDistance, assign, match
 from tracker.evaluation.measures.ospa import ospa, ospa2, ospa2_whole, ospa_parts
 
 ORDERS = st.sampled_from([1.0, 1.5, 2.0, 4.0])
@@ -207,7 +207,7 @@ def test_truth_itself_is_perfect(seed: int, settings: EvaluationSettings):
 def test_box_distance_is_symmetric_and_bounded(seed: int):
     rng = np.random.default_rng(seed)
     x, y = rng.uniform(-3, 3, (2, 20, 3))
-    measure = Measure("box", 0.5, rng.uniform(0.1, 1.0, 3))
+    measure = GatedDistance("box", 0.5, rng.uniform(0.1, 1.0, 3))
     assert measure.between(x, y) == pytest.approx(measure.between(y, x), abs=1e-12)
     assert measure.between(x, x) == pytest.approx(np.zeros(20), abs=1e-12)
     assert np.all((measure.between(x, y) >= 0.0) & (measure.between(x, y) <= 1.0))

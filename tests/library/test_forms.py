@@ -88,8 +88,8 @@ def test_parquet(tmp_path: Path) -> None:
 
 def test_what_a_person_said_stands_in_json_and_parquet(tmp_path: Path) -> None:
     one = int(TRACKS.ids[0])
-    resting = ["a1b2" if track == one else "" for track in TRACKS.ids.tolist()]
-    named = replace(WRITTEN, names={one: "Änne, 3"}, resting=resting)
+    row_corrections = ["a1b2" if track == one else "" for track in TRACKS.ids.tolist()]
+    named = replace(WRITTEN, names={one: "Änne, 3"}, row_corrections=row_corrections)
     save(tmp_path / "tracks.json", FORMATS["json"], named)
     told = json.loads((tmp_path / "tracks.json").read_text(encoding="utf-8"))
     jsonschema.Draft202012Validator(json_file.schema()).validate(told)
@@ -99,7 +99,7 @@ def test_what_a_person_said_stands_in_json_and_parquet(tmp_path: Path) -> None:
     table = pq.read_table(tmp_path / "tracks.parquet")
     expected = ["Änne, 3" if track == one else "" for track in TRACKS.ids.tolist()]
     assert table["name"].to_pylist() == expected
-    assert table["correction"].to_pylist() == resting
+    assert table["correction"].to_pylist() == row_corrections
     assert "name" not in pq.read_schema(saved(tmp_path, "parquet")).names
 
 

@@ -10,8 +10,8 @@ from numpy import ndarray
 
 from tracker.evaluation.measures.matching import (
     Comparison,
+    GatedDistance,
     Matches,
-    Measure,
     assign,
     distances_by_step,
     gather,
@@ -29,7 +29,8 @@ class Positions:
     by_person: Float[ndarray, "K S"]
     """The error of each person at each step; NaN where there is no pair."""
     found: Int[ndarray, " K"]
-    """The number of steps at which each person is paired with an estimate in the near distance."""
+    """The number of steps at which each person is paired with an estimate within the near
+    distance."""
     present: Int[ndarray, " K"]
     """The number of steps at which each person is present."""
     stray: Int[ndarray, " S"]
@@ -61,7 +62,7 @@ def positions(comparison: Comparison, *, near: float) -> Positions:
             estimates that it leaves unpaired are stray.
     """
     truth, tracks, measure = comparison.truth, comparison.tracks, comparison.measure
-    metres = Measure(
+    metres = GatedDistance(
         "ground" if measure.distance == "ground" else "position", near, measure.half_extents
     )
     distances = (

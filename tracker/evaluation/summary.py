@@ -13,7 +13,7 @@ from tracker.evaluation.measures.clear import clear
 from tracker.evaluation.measures.gospa import gospa
 from tracker.evaluation.measures.hota import hota
 from tracker.evaluation.measures.identity import identity
-from tracker.evaluation.measures.matching import Comparison, Measure, Tracks, prepare
+from tracker.evaluation.measures.matching import Comparison, GatedDistance, Tracks, prepare
 from tracker.evaluation.measures.ospa import ospa, ospa2, ospa2_whole
 from tracker.evaluation.pixels import CameraScore, pixels
 from tracker.evaluation.positions import cardinality_error, positions
@@ -62,7 +62,7 @@ def evaluate(
         ends = [int(rows.frames.max()) for rows in (truth, tracks) if rows and len(rows.frames)]
         steps = max([-1, *ends]) + 1
     size = np.zeros(3) if half_extents is None else np.asarray(half_extents, dtype=float)
-    measure = Measure(settings.distance, settings.effective_gate, size)
+    measure = GatedDistance(settings.distance, settings.effective_gate, size)
     comparison = prepare(truth, tracks, measure, steps=steps)
     return _score(comparison, settings, size, cameras)
 

@@ -19,7 +19,7 @@ def write(path: Path, written: Written, options: Options) -> None:
             written.seed,
             done=written.done,
             remarks=written.remarks,
-            resting=written.resting,
+            row_corrections=written.row_corrections,
             names=written.names,
         )
     options.at(written.steps, written.steps)

@@ -146,7 +146,9 @@ def _track(written: Written, number: int) -> TrackOfFile:
         existences=tracks.existences[rows].tolist(),
         sigmas=tracks.sigmas[rows].tolist(),
         seen={c.name: tracks.seen[rows, k].tolist() for k, c in enumerate(cameras)},
-        correction=[written.resting[k] for k in rows.tolist()] if written.resting else None,
+        correction=[written.row_corrections[k] for k in rows.tolist()]
+        if written.row_corrections
+        else None,
         boxes={
             camera.name: [
                 box if there else None

@@ -37,8 +37,8 @@ def write(path: Path, written: Written, options: Options) -> None:
     if written.names:
         called = [written.names.get(track, "") for track in tracks.ids.tolist()]
         columns["name"] = np.array(called, dtype=object)
-    if written.resting:
-        columns["correction"] = np.array(written.resting, dtype=object)
+    if written.row_corrections:
+        columns["correction"] = np.array(written.row_corrections, dtype=object)
     for index, camera in enumerate(sequence.cameras):
         boxes, visible = written.boxes[index]
         columns[f"{camera.name}_seen"] = tracks.seen[:, index]

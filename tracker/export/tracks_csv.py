@@ -75,7 +75,7 @@ def write_tracks_csv(
     *,
     done: int | None = None,
     remarks: Iterable[str] = (),
-    resting: Many[str] = (),
+    row_corrections: Many[str] = (),
     names: Mapping[int, str] = MappingProxyType({}),
 ) -> None:
     """Write the track file.
@@ -90,8 +90,8 @@ def write_tracks_csv(
         seed: The seed of the run.
         done: The number of steps computed; a comment states it if the sequence has more.
         remarks: Further sentences for the comments, for instance that pictures were missing.
-        resting: For a corrected run, the id of the correction that each row depends on, "" for
-            none; the ids become the column :data:`CORRECTION`.
+        row_corrections: For a corrected run, the id of the correction that each row depends on, ""
+            for none; the ids become the column :data:`CORRECTION`.
         names: The names that people were given by hand, by track id; they become the column
             :data:`NAME`.
     """
@@ -102,7 +102,7 @@ def write_tracks_csv(
     head = [
         *COLUMNS,
         *([NAME] if names else []),
-        *([CORRECTION] if resting else []),
+        *([CORRECTION] if row_corrections else []),
         *map(guarded, boxes),
     ]
     csv.writer(stream, lineterminator="\n").writerow(head)
@@ -115,7 +115,7 @@ def write_tracks_csv(
         *_fixed(tracks.existences[:, None], 4),
         *_fixed(tracks.sigmas, 4),
         *([[called.get(track, "") for track in tracks.ids.tolist()]] if names else []),
-        *([list(resting)] if resting else []),
+        *([list(row_corrections)] if row_corrections else []),
     ]
     for camera in cameras:
         pixels, visible = camera.project_boxes(tracks.positions, sequence.target_half_extents)

@@ -65,7 +65,7 @@ class Written:
     """The number of steps computed; None for all."""
     remarks: tuple[str, ...] = ()
     """Sentences that must accompany the result, for instance that pictures were missing."""
-    resting: Many[str] = ()
+    row_corrections: Many[str] = ()
     """For a corrected run, the id of the correction that each row depends on; "" for none."""
     names: Mapping[int, str] = field(default_factory=dict)
     """The names that people were given by hand, by track id."""

@@ -1,8 +1,8 @@
-"""Missing pictures of a run: how many, of which camera, and whether that was to be expected.
+"""Missing pictures of a run: how many, of which camera, and whether they were expected to exist.
 
-A video that is shorter than the recording is known when the sequence is opened. One that vanishes,
-is truncated or cannot be decoded while a run reads it would give a result that looks like any
-other; this module detects it, and its columns are not cached for later runs.
+That a video is shorter than the recording is known when the sequence is opened. A video that
+vanishes, is truncated or cannot be decoded while a run reads it would give a result that looks like
+any other. This module detects it, and the columns of such a run are not cached for later runs.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class Gap:
     missing: int
     """The number of these steps without a picture."""
     unexpected: tuple[int, ...]
-    """The steps without a picture that should have one by what was known at the opening."""
+    """The steps without a picture for which a picture existed when the sequence was opened."""
 
     def __str__(self) -> str:
         return f'{self.missing} of {self.asked} pictures of camera "{self.camera}" are missing'

@@ -31,11 +31,11 @@ class Gates:
     pictures: int
     """The number of pictures that were processed."""
     candidates: float
-    """Candidates in a picture."""
+    """Number of candidates in a picture."""
     dropped: dict[str, float]
-    """Candidates that each gate rejected in a picture, by gate."""
+    """Number of candidates in a picture that each gate rejected, by gate."""
     passed: float
-    """Boxes passed on to the fusion in a picture."""
+    """Boxes in a picture that were passed on to the fusion."""
     trust: float
     """Trust in the foreground at the people with templates, 0 … 1; 1 if the method reports
     none."""

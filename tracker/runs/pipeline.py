@@ -17,7 +17,7 @@ from tracker.fusion.trajectories import Bounds, Trajectories, corrected
 from tracker.parameters import RunParameters, Stage
 from tracker.runs.fitting import default_parameters
 from tracker.runs.gaps import where_to_keep
-from tracker.runs.run import Cancelled, Progress, Run, key_without_names, stage_keys
+from tracker.runs.run import Cancelled, Progress, Run, key_without_identities, stage_keys
 from tracker.runs.single_views import Cancel, SingleViews
 from tracker.runs.stage_cache import FusionColumn, StageCache, TrackColumn, ViewColumn
 from tracker.sequences.pictures.frames import FrameReader
@@ -68,8 +68,8 @@ def compute(
             of this run are added to it at the end, or when it is cancelled.
         meanwhile: The tracks that ``on_progress`` gets, if all steps are fused already, until the
             smoothing is done; if None, it gets the filter's.
-        wanted: A callback that returns the step that is displayed; its result is reported as soon
-            as it is computed.
+        wanted: A callback that returns the step that is displayed; progress is reported as soon as
+            that step is computed.
         on_progress: A callback that is called from this thread at intervals, and at the end, with
             the run so far: its steps below ``done`` may be read.
         cancelled: A callback that is asked between steps and pictures whether to stop, also by the
@@ -160,7 +160,7 @@ class _Reporter:
             self._on_progress(run, progress)
 
     def forget_meanwhile(self) -> None:
-        """Put the filter's tracks back in the place of those that were reported meanwhile."""
+        """Replace the tracks that were reported meanwhile by the filter's."""
         if self._meanwhile is not None and self._run.tracks is self._meanwhile:
             self._run.tracks = self._run.filtered
         self._meanwhile = None
@@ -219,7 +219,7 @@ def _fuse(
 
 
 def _last_stage(run: Run) -> Stage:
-    """Return the stage that a fused run has yet to compute: the smoothing, or the tracks alone."""
+    """Return the stage that a run without new fusion has to compute: smoothing, or tracks alone."""
     there = run.parameters.smoothing_method == "none" or run.smoothed is not None
     return "tracks" if there else "smoothing"
 
@@ -243,7 +243,7 @@ def _smooth(
         if run.corrections and _accepts(method.smooth, "corrections"):
             more = {}
             if cache and total == run.sequence.frames and _accepts(method.smooth, "earlier"):
-                more["earlier"] = cache.intermediate(key_without_names(run))
+                more["earlier"] = cache.intermediate(key_without_identities(run))
             run.smoothed = method.smooth(views, fused, check, run.corrections, **more)
         else:
             run.smoothed = method.smooth(views, fused, check)

@@ -21,7 +21,7 @@ from tracker.smoothing import Smoothed
 
 
 class Cancelled(Exception):
-    """The run was superseded or stopped; the steps that were computed stay usable."""
+    """The run was superseded or stopped; the steps that were computed remain usable."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,10 +37,11 @@ class Progress:
     seconds: float
     """Time since the run began, seconds."""
     fresh: int
-    """The number of steps that this run computed itself rather than took from an earlier one."""
+    """The number of steps that this run computed itself, rather than re-used from an earlier
+    one."""
     preparing: float = 0.0
-    """Time until the first of them was ready, for learning the background or loading kernels,
-    seconds."""
+    """Time until the first of these steps was ready, seconds: the background is learnt, and kernels
+    are loaded."""
 
     @property
     def steps_per_second(self) -> float:
@@ -120,9 +121,9 @@ class Run:
         """Whether all steps of the sequence have tracks."""
         return self.done == self.sequence.frames
 
-    def still(self) -> Run:
-        """Return a shallow copy whose tracks stay the same, for readers that use them repeatedly:
-        the thread that computes the run may replace its tracks at any time."""
+    def snapshot(self) -> Run:
+        """Return a shallow copy whose tracks do not change, for readers in other threads: the
+        thread that computes the run may replace the tracks at any time."""
         return copy.copy(self)
 
 
@@ -132,9 +133,9 @@ _APPLIED_BY: dict[Stage, tuple[Kind, ...]] = {
 """The kinds of corrections that a stage applies."""
 
 
-def resting_of(run: Run) -> list[str]:
-    """Return the id of the correction that each row of a run's tracks depends on, "" for none; an
-    empty list if the run has no corrections."""
+def row_corrections(run: Run) -> list[str]:
+    """Return, for each row of a run's tracks, the id of the correction that it depends on, "" for
+    none; an empty list if the run has no corrections."""
     if not run.corrections:
         return []
     tracks = run.tracks
@@ -148,9 +149,9 @@ def given_names(run: Run) -> dict[int, str]:
     return names_by_track(run.outcomes, run.corrections)
 
 
-def key_without_names(run: Run) -> str:
-    """Return the key of stage 3 without corrections of identity: it is the same for all runs that
-    differ in these alone."""
+def key_without_identities(run: Run) -> str:
+    """Return the key of stage 3 without corrections of identity, by which runs that differ in these
+    alone share intermediate results."""
     others = tuple(one for one in run.corrections if one.kind in IN_THE_FUSION)
     return stage_keys(run.sequence, run.parameters, run.seed, others)["smoothing"]
 

@@ -159,7 +159,7 @@ def _uses_pictures(run: Run) -> bool:
 
 
 def without_boxes(result: ViewResult) -> ViewResult:
-    """Return the result for a missing picture: the method's estimates, without boxes for the
+    """Return the result of a step without a picture: the method's estimates, without boxes for the
     fusion."""
     nothing = ViewResult.of_no_frame()
     return replace(

@@ -45,7 +45,7 @@ LIMIT_BYTES = 2 << 30
 """Disk space of all files together, bytes."""
 
 ABANDONED_SECONDS = 3600.0
-"""A temporary file that was not written to for so many seconds was left by a dead process."""
+"""Time without a write after which a temporary file counts as left by a dead process, seconds."""
 
 _UNREADABLE = (
     OSError, ValueError, KeyError, EOFError, NotImplementedError, RuntimeError,

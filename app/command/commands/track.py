@@ -37,7 +37,7 @@ def track(command: Track) -> int:
     from tracker.runs import gaps, pipeline
     from tracker.runs.gates import notices
     from tracker.runs.outcome import why_no_tracks
-    from tracker.runs.run import given_names, resting_of
+    from tracker.runs.run import given_names, row_corrections
     from tracker.runs.stage_cache import StageCache
     from tracker.sequences import library
 
@@ -89,7 +89,7 @@ def track(command: Track) -> int:
             parameters,
             command.seed,
             remarks=tuple(missing),
-            resting=resting_of(run),
+            row_corrections=row_corrections(run),
             names=given_names(run),
         )
         save(output, form, written, Options(progress=writing.at))

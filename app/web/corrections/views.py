@@ -123,7 +123,7 @@ def _sights(one: ReviewItem, run: Run) -> list[Sight]:
 def preview_of(snapshot: Snapshot, doubt: ReviewItem, alternative: int) -> AlternativePreview:
     """The tracks as they would be if an alternative were true: at once, by their rows alone."""
     assert snapshot.run is not None
-    run = snapshot.run.still()
+    run = snapshot.run.snapshot()
     after = _after(run, doubt, alternative)
     first, last = _around(run, doubt)
     spans = _spans(run.tracks, after)
@@ -136,7 +136,7 @@ def preview_of(snapshot: Snapshot, doubt: ReviewItem, alternative: int) -> Alter
 def ghosts_of(snapshot: Snapshot, doubt: ReviewItem, alternative: int) -> Ghosts:
     """The same for the 3D view."""
     assert snapshot.run is not None
-    run = snapshot.run.still()
+    run = snapshot.run.snapshot()
     after = _after(run, doubt, alternative)
     first, last = _around(run, doubt)
     touched = _touched(doubt, _spans(run.tracks, after))

@@ -22,7 +22,7 @@ from tracker.library.errors import LibraryError
 from tracker.library.keeping import remarks_of
 from tracker.runs import gaps
 from tracker.runs.fitting import default_parameters
-from tracker.runs.run import given_names, resting_of
+from tracker.runs.run import given_names, row_corrections
 from tracker.sequences import library as sequences
 
 router = APIRouter(prefix="/api/exports", responses=ERRORS)
@@ -132,7 +132,7 @@ def begin(
             run.seed,
             done,
             tuple(gaps.sentences(run)),
-            resting_of(run)[rows],
+            row_corrections(run)[rows],
             given_names(run),
             address_of(base, now.opened_as, run.parameters, now.defaults),
         )

@@ -153,7 +153,7 @@ def courses_of(
         names: Of :data:`KINDS`; others are left out.
         window: The part that somebody looks at.
     """
-    run = run.still()
+    run = run.snapshot()
     done = run.tracks.at(run.done).start
     rows = np.flatnonzero(run.tracks.ids[:done] == track)
     same = scored is not None and scored.key == run.key and scored.tracks is run.tracks

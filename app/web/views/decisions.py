@@ -31,7 +31,7 @@ class Named:
 def decided(run: Run) -> list[Named]:
     """What was decided of every track that has an id; those of the filter alone are named by the
     filter's."""
-    run = run.still()
+    run = run.snapshot()
     if run.smoothed is None or run.tracks is run.filtered:
         return []
     names = dict(zip(run.filtered.labels.tolist(), run.filtered.ids.tolist(), strict=True))

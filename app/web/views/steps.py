@@ -46,7 +46,7 @@ def step_of(
         trails: How many seconds back to tell where tracks come from in each picture, and where
             they go to; 0 for not at all.
     """
-    run = run.still() if run is not None else None
+    run = run.snapshot() if run is not None else None
     computed = run is not None and step < run.done
     likelihood = None
     if run is not None and sequence.templates:

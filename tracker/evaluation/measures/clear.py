@@ -18,7 +18,8 @@ from tracker.evaluation.measures.matching import Comparison, Matches, gather
 from tracker.geometry.assignment import linear_sum_assignment
 
 CONTINUATION = 1000.0
-"""The bonus for keeping a pair of the last step, far above the score of a pair, at most 1."""
+"""The bonus on the score of a pair of the step before, as in TrackEval: far above the score of a
+pair, which is at most 1."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,12 +27,15 @@ class Clear:
     """The CLEAR MOT counts of the whole sequence, by step, and by person."""
 
     matches: Matches
-    """The pairs; those of the step before are kept where they stay within the gate."""
+    """The pairs of all steps; a pair of the step before remains one while it is within the gate."""
     switch: Bool[ndarray, " M"]
     """Whether the person of each pair had another id when last paired."""
     misses: Int[ndarray, " S"]
+    """The number of people without a pair at each step."""
     false_positives: Int[ndarray, " S"]
+    """The number of estimates without a pair at each step."""
     id_switches: Int[ndarray, " S"]
+    """The number of identity switches at each step."""
     present: Int[ndarray, " K"]
     """The number of steps at which each person is present."""
     tracked: Int[ndarray, " K"]
@@ -71,12 +75,12 @@ class Clear:
 
 
 def clear(comparison: Comparison) -> Clear:
-    """Pair people and estimates step after step, keeping the pairs of the last step, and count.
+    """Pair people and estimates step after step, preferring pairs of the step before, and count.
 
     The pairs of a step are those of the matching protocol, but a person and an
-    estimate that were a pair at the step before stay one while the gate allows.
-    A switch is counted when a person is paired with another id than when last
-    paired, however long ago; an id that returns to its person is not a switch.
+    estimate that were a pair at the step before remain one while they are within the gate.
+    A switch is counted when a person is paired with another id than at the last pair, however long
+    ago; a person who is paired with the same id again after a gap has no switch.
     The counts equal TrackEval's: a person who leaves and comes back counts as fragmented too,
     and steps without any people or without any estimates are skipped, so that they cause no
     fragmentation.

@@ -21,11 +21,17 @@ class Gospa:
     """GOSPA of every step. The three parts are p-th powers: they sum to distance^p."""
 
     distance: Float[ndarray, " S"]
+    """GOSPA at each step, in the unit of the distance."""
     localisation: Float[ndarray, " S"]
+    """Σ d^p over the pairs."""
     missed: Float[ndarray, " S"]
+    """c^p/2 for each missed target."""
     false: Float[ndarray, " S"]
+    """c^p/2 for each false target."""
     missed_count: Int[ndarray, " S"]
+    """The number of missed targets."""
     false_count: Int[ndarray, " S"]
+    """The number of false targets."""
 
 
 def gospa_parts(

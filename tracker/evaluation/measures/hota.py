@@ -41,9 +41,10 @@ class Hota:
 def hota(comparison: Comparison) -> Hota | None:
     """Compute HOTA with the similarity 1 − distance / gate, which is 0 from the gate on.
 
-    With a gate of 1 m, α = 0.05 requires a distance below 0.95 m and α = 0.95 one below 0.05 m.
-    At each step the pairs maximise similarity times the alignment of their whole tracks;
-    a pair counts at every α up to its similarity [LODTGLL21].
+    With a gate of 1 m, α = 0.05 requires a distance of at most 0.95 m, and α = 0.95 one of at most
+    0.05 m. At each step people and estimates are paired so that the sum of similarity times
+    alignment is largest; the alignment of a person and a track is the Jaccard index of their steps,
+    weighted by similarity. A pair counts at every α up to its similarity [LODTGLL21].
 
     The result is None where there are neither people nor estimates; its scores are zeros (LocA 1)
     where there are only people or only estimates.
@@ -68,44 +69,52 @@ def hota(comparison: Comparison) -> Hota | None:
             aligned[np.ix_(truth.indices[truth.at(step)], tracks.indices[tracks.at(step)])] += share
     alignment = aligned / np.maximum(present + reported - aligned, _TINY)
 
-    who, which, close = [np.zeros(0, int)], [np.zeros(0, int)], [np.zeros(0)]
+    people_of, tracks_of, similarity_of = [np.zeros(0, int)], [np.zeros(0, int)], [np.zeros(0)]
     for step, similarity in enumerate(similarities):
         if similarity.size:
             persons = truth.indices[truth.at(step)]
             ids = tracks.indices[tracks.at(step)]
             score = alignment[np.ix_(persons, ids)] * similarity
             rows, columns = linear_sum_assignment(score, maximize=True)
-            who.append(persons[rows])
-            which.append(ids[columns])
-            close.append(similarity[rows, columns])
+            people_of.append(persons[rows])
+            tracks_of.append(ids[columns])
+            similarity_of.append(similarity[rows, columns])
     return _scores(
-        np.concatenate(who), np.concatenate(which), np.concatenate(close), present, reported
+        np.concatenate(people_of),
+        np.concatenate(tracks_of),
+        np.concatenate(similarity_of),
+        present,
+        reported,
     )
 
 
 def _scores(
-    who: ndarray, which: ndarray, close: ndarray, present: ndarray, reported: ndarray
+    people_of: ndarray,
+    tracks_of: ndarray,
+    similarity_of: ndarray,
+    present: ndarray,
+    reported: ndarray,
 ) -> Hota:
     """Compute DetA, AssA and LocA at each α.
 
     Args:
-        who: The index of the person of each pair, over all steps.
-        which: The index of the track of each pair.
-        close: The similarity of each pair.
-        present: The number of steps of each person, as a column.
+        people_of: The index of the person of each of M pairs, over all steps.
+        tracks_of: The index of the track of each pair.
+        similarity_of: The similarity of each pair, 0 … 1.
+        present: The number of steps of each of K people, as a column (K, 1).
         reported: The number of steps of each track.
     """
     people, estimates = int(present.sum()), int(reported.sum())
     detection, association, localisation = np.zeros(19), np.zeros(19), np.ones(19)
     shape = (len(present), len(reported))
     for a, alpha in enumerate(ALPHAS):
-        counted = close >= alpha - _TINY
+        counted = similarity_of >= alpha - _TINY
         pairs = int(counted.sum())
         detection[a] = pairs / (people + estimates - pairs)
         if pairs:
-            flat = np.ravel_multi_index((who[counted], which[counted]), shape)
+            flat = np.ravel_multi_index((people_of[counted], tracks_of[counted]), shape)
             together = np.bincount(flat, minlength=shape[0] * shape[1]).reshape(shape)
             overlap = together / np.maximum(present + reported - together, 1)
             association[a] = float((together * overlap).sum()) / pairs
-            localisation[a] = float(close[counted].mean())
+            localisation[a] = float(similarity_of[counted].mean())
     return Hota(detection, association, localisation)

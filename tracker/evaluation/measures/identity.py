@@ -30,7 +30,7 @@ class Identity:
     false_negatives: int
     """IDFN: the number of the other people-steps."""
     track_of: Int[ndarray, " K"]
-    """For each person the index of the assigned track in the tracks' names; −1 without one."""
+    """Index, in the tracks' names, of the track that is assigned to each person; −1 for none."""
 
     @property
     def precision(self) -> float | None:

@@ -15,11 +15,11 @@ Rows of the truth with ``valid = 0`` are "don't care". At each step, before any 
 2. an estimate paired with a don't-care row is removed: it is neither correct nor false;
 3. all don't-care rows are removed: missing one is not a miss.
 
-So an uncertain position takes an estimate away from a certain one only where it is
-less than half as far. Without that handicap it would often take an estimate that belongs
-to the certain one. If certain rows were paired first throughout, a person whose own estimate
-is missing would be paired with that of an uncertain neighbour, which adds two identity
-switches. All figures are computed from the remaining rows, and pair them by their own
+So an uncertain position is paired with an estimate instead of a certain one only if it is less than
+half as far from the estimate. If its distance did not count double, it would often be paired with
+an estimate that belongs to a certain position. If certain rows were always paired first, a person
+without an estimate would be paired with that of an uncertain neighbour, which would add two
+identity switches. All figures are computed from the remaining rows, and pair them by their own
 definitions.
 
 Distances: Euclidean in 3D (metres, the default); Euclidean on the ground plane
@@ -64,8 +64,11 @@ class Rows:
     """Labelled positions sorted by step and then id, each id at most once a step."""
 
     frames: Int[ndarray, " N"]
+    """The step of each row."""
     ids: Int[ndarray, " N"]
+    """The track or person of each row."""
     positions: Float[ndarray, "N 3"]
+    """The position of each row, world metres."""
     offsets: Int[ndarray, " S+1"]
     """Rows ``offsets[t]`` up to ``offsets[t + 1]`` are those of step t."""
     names: Int[ndarray, " K"]
@@ -134,11 +137,13 @@ def to_rows(
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Measure:
+class GatedDistance:
     """A distance between positions, and its gate."""
 
     distance: Distance
+    """The kind of distance."""
     gate: float
+    """The largest distance of a pair, in the unit of the distance."""
     half_extents: Float[ndarray, " 3"]
     """Half width, depth and height of the upright boxes, metres, for the box distance."""
 
@@ -158,7 +163,7 @@ class Measure:
 
 
 def distances_by_step(
-    truth: Rows, tracks: Rows, measure: Measure
+    truth: Rows, tracks: Rows, measure: GatedDistance
 ) -> tuple[Float[ndarray, "G E"], ...]:
     """Compute the distance of every person to every estimate, a matrix for each step."""
     rows, columns = truth.counts, tracks.counts
@@ -224,7 +229,7 @@ class Comparison:
     """The estimates that count."""
     distances: tuple[Float[ndarray, "G E"], ...]
     """The distance of every person (rows) to every estimate (columns), a matrix for each step."""
-    measure: Measure
+    measure: GatedDistance
     ignored: Rows
     """The estimates that matched a don't-care row."""
     dont_care: Rows
@@ -243,7 +248,7 @@ class Comparison:
 def prepare(
     truth: GroundTruth | None,
     tracks: Tracks,
-    measure: Measure,
+    measure: GatedDistance,
     *,
     steps: int,
 ) -> Comparison:

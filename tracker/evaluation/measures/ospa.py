@@ -23,8 +23,11 @@ class Ospa:
     """OSPA of every step with its two parts."""
 
     distance: Float[ndarray, " S"]
+    """OSPA at each step, in the unit of the distance."""
     localisation: Float[ndarray, " S"]
+    """The localisation part at each step; the p-th powers of the parts sum to that of OSPA."""
     cardinality: Float[ndarray, " S"]
+    """The cardinality part at each step."""
 
 
 def ospa_parts(

@@ -73,7 +73,7 @@ def queue(
         corrections: The corrections that answer items; the run's own if None.
     """
     made = run.corrections if corrections is None else corrections
-    run = run.still()
+    run = run.snapshot()
     track_rows = TrackRows(run.tracks)
     if not len(run.tracks):
         return Queue((), 0, "nobody is tracked")

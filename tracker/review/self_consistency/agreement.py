@@ -15,7 +15,7 @@ from numpy import ndarray
 
 from tracker.evaluation.measures.clear import clear
 from tracker.evaluation.measures.identity import identity
-from tracker.evaluation.measures.matching import Comparison, Measure, Tracks, prepare
+from tracker.evaluation.measures.matching import Comparison, GatedDistance, Tracks, prepare
 from tracker.evaluation.settings import EvaluationSettings
 from tracker.sequences.sequence import GroundTruth
 
@@ -68,7 +68,7 @@ def compared(
         half_extents: Half width, depth and height of a target, metres.
     """
     settings = EvaluationSettings()
-    measure = Measure(settings.distance, settings.effective_gate, half_extents)
+    measure = GatedDistance(settings.distance, settings.effective_gate, half_extents)
     valid = np.ones(len(here.frames), dtype=bool)
     return prepare(
         GroundTruth(here.frames, here.ids, here.positions, valid), there, measure, steps=steps
