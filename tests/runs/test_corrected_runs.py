@@ -196,7 +196,7 @@ def test_who_turns_often_is_left_out_along_his_whole_course() -> None:
         lanes.ids.tolist(), key=lambda one: before.tracks.positions[lanes.rows[one], 1].mean()
     )
     rows = lanes.rows[track]
-    places = lanes.course(rows, 0.25)
+    places = lanes.simplified_path(rows, 0.25)
     assert len(places) < len(rows) // 2
     known, x, y = np.array(places)[:, :3].T
     frames, ground = before.tracks.frames[rows], before.tracks.positions[rows, :2]

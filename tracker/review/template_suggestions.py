@@ -1,6 +1,6 @@
-"""Suggested templates: boxes of people that several cameras agree about.
+"""Suggested templates: boxes of people on whose places several cameras agree.
 
-Nothing here changes a run: a person accepts or rejects each suggestion.
+No function of this module changes a run: the user accepts or rejects each suggestion.
 """
 
 from __future__ import annotations
@@ -24,41 +24,45 @@ from tracker.single_view.colour.templates import read_templates, template_pictur
 from tracker.single_view.pictures import colour
 
 STEPS = 200
-"""Most steps that are considered, spread over the recording, since neighbouring ones look alike."""
+"""Largest number of steps that are considered; they are spread over the recording, since
+neighbouring pictures look alike."""
 
 AGREE = 2
-"""Least number of cameras with a box of the person."""
+"""Least number of cameras that have a box of the person."""
 
 LEAST_EXISTENCE = 0.95
-
 """Least existence probability of a track."""
 
 LEAST_LIFE = 1.0
 """Least length of a track, seconds; false tracks are short."""
 
 LARGEST_COVER = 0.05
-"""Largest share of a box that another person's box may cover."""
+"""Largest share of the area of a box that another person's box may cover."""
 
 SMALLEST = 12.0
-"""Least width and height of a box, pixels; a smaller one has too few colours."""
+"""Least width and height of a box, pixels; the colour histogram of a smaller box has too few
+pixels."""
 
 EACH = 3
-"""Most moments of a track that are considered in each camera."""
+"""Largest number of moments of a track that are considered in each camera."""
 
 ALIKE = 0.25
-"""Bhattacharyya distance below which a box adds nothing to a template of the same person in the
-same camera."""
+"""Bhattacharyya distance from a template of the same person in the same camera below which no box
+is suggested."""
 
 CLEARER = 0.05
-"""Least difference of a track's distances to the nearest person's templates and the next one's."""
+"""Least difference between a track's Bhattacharyya distances to the templates of the nearest person
+and to those of the next one, if the track is assigned to the nearest."""
 
 MOST = 2
-"""Most templates of a person in a camera, those that exist included."""
+"""Largest number of templates of a person in a camera, including those that exist."""
 
 ON_TEMPLATE = 0.4
-"""Least intersection over union of a template with a track's box if the track is its person."""
+"""Least intersection over union of a template and a track's box if the track is assigned to the
+template's person."""
 
 _NUMBERS = ColourPhdParams()
+"""The colour space, the kernel of histograms and the acceptance distance by default."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,6 +75,7 @@ class Moments:
     cameras: Int[ndarray, " M"]
     """The index of the camera."""
     steps: Int[ndarray, " M"]
+    """The step, counted from 0."""
     boxes: Float[ndarray, "M 4"]
     """Left, top, width, height in pixels, of a box drawn around an upright target."""
     own: Bool[ndarray, " M"]
@@ -101,9 +106,9 @@ def drawn_boxes(
 ) -> Float[ndarray, "N 4"]:
     """Return the bounding boxes of upright targets, as a person would draw them.
 
-    The outline of a person is closer to an ellipse than to a rectangle. With its half axes a
-    (across the person) and b (along the person) in pixels, half width W and half height H of its
-    bounds are
+    The outline of a person is closer to an ellipse than to the box of a target. With the half axes
+    a (across the person) and b (along the person) of the ellipse in pixels, half width W and half
+    height H of its bounding box are
 
         W² = a_x² + b_x²,  H² = a_y² + b_y²
 
@@ -134,10 +139,11 @@ def drawn_boxes(
 def moments(run: Run) -> Moments:
     """Return the best moments of every track in every camera, the best of each first.
 
-    At a moment that counts the track is long enough and has a high existence probability, its place
-    is known to half a target's width, :data:`AGREE` cameras have a box of the person, and the
-    upright box is whole in the picture and not covered by another one. Moments at which the camera
-    has a box of its own come first, then those with more agreeing cameras, then larger boxes.
+    The moments are those at which the track is long enough and has a high existence probability,
+    the standard deviation of its place is at most half a target's width, at least :data:`AGREE`
+    cameras have a box of the person, and the upright box lies within the picture and is not covered
+    by another box. Moments at which the camera itself has a box come first, then those with more
+    agreeing cameras, then larger boxes.
 
     Args:
         run: A complete run.
@@ -174,11 +180,13 @@ def _considered(run: Run) -> Trajectories:
 
 
 def _long_lived(run: Run) -> Int[ndarray, " n"]:
+    """Return the ids of the tracks that are long enough."""
     ids, counts = np.unique(run.tracks.ids, return_counts=True)
     return np.asarray(ids[counts >= min(LEAST_LIFE * run.sequence.fps, run.done)])
 
 
 def _whole(camera: Camera, boxes: Float[ndarray, "N 4"]) -> Bool[ndarray, " N"]:
+    """Whether each box lies within the picture and is large enough."""
     with np.errstate(invalid="ignore"):
         inside = (boxes[:, :2] >= -0.5).all(axis=1)
         inside &= (boxes[:, :2] + boxes[:, 2:] <= np.array(camera.image_size) - 0.5).all(axis=1)
@@ -186,7 +194,8 @@ def _whole(camera: Camera, boxes: Float[ndarray, "N 4"]) -> Bool[ndarray, " N"]:
 
 
 def _apart(frames: Int[ndarray, " N"], boxes: Float[ndarray, "N 4"]) -> Bool[ndarray, " N"]:
-    """Whether no other box of the same step covers much of each."""
+    """Whether each box is covered by at most :data:`LARGEST_COVER` by each other box of its
+    step."""
     apart = np.ones(len(frames), dtype=bool)
     for rows in np.split(np.arange(len(frames)), np.flatnonzero(np.diff(frames)) + 1):
         own = boxes[rows]
@@ -221,13 +230,13 @@ class Suggestion:
 
     template: Template
     track: int
-    """The id of the track that the box is of."""
+    """The id of the person's track."""
     cameras: tuple[str, ...]
     """The names of the cameras that have a box of the person at the moment."""
     deviation: float
-    """Standard deviation of the place on the floor, metres."""
+    """Standard deviation of the place of the person on the floor, metres."""
     difference: float | None
-    """Bhattacharyya distance to the nearest template of the person; None where there is none."""
+    """Bhattacharyya distance to the nearest template of the person; None if the person has none."""
     known_here: bool
     """Whether the person has a template in this camera already."""
     own: bool
@@ -248,13 +257,14 @@ class Suggestion:
 
 
 def suggest_templates(run: Run, pictures: Pictures) -> tuple[Suggestion, ...]:
-    """Suggest templates where a person has none in a camera, or none of this appearance.
+    """Suggest templates where a person has no template in a camera, or none of a similar
+    appearance.
 
-    A track is the person whose template overlaps its box, or else the person whose templates are
-    nearest to its boxes, by the median over its moments of the Bhattacharyya distance. If none is
-    nearer than :attr:`ColourPhdParams.acceptance_distance`, it is a new person; if two are about
-    equally near, it is left out. A box that is nearer to another person's templates is left out,
-    and so is one that is near to a template that the person has in that camera.
+    A track is assigned to the person whose template overlaps its box, or else to the person whose
+    templates have the least median Bhattacharyya distance to its boxes over its moments. If no
+    distance is below :attr:`ColourPhdParams.acceptance_distance`, the track is a new person; if two
+    people are about equally near, it is left out. A box is left out if it is nearer to another
+    person's templates, or near a template of the person in the same camera.
 
     Args:
         run: A complete run.
@@ -320,7 +330,8 @@ def without_templates(suggestions: Iterable[Suggestion], sequence: Sequence) -> 
 
 
 def _appearances(found: Moments, pictures: Pictures) -> tuple[Moments, Float[ndarray, "M bins"]]:
-    """Return the moments whose picture can be read, and the square roots of their histograms."""
+    """Return the moments whose picture can be read, and the element-wise square roots of their
+    colour histograms."""
     kept, roots = [], []
     order = np.lexsort((found.steps, found.cameras))  # videos are read forwards
     for row in order.tolist():
@@ -335,6 +346,12 @@ def _appearances(found: Moments, pictures: Pictures) -> tuple[Moments, Float[nda
 
 
 def _root(picture: ndarray, box: Float[ndarray, " 4"]) -> Float[ndarray, " bins"]:
+    """Return the element-wise square root of the colour histogram of a box of a picture.
+
+    Args:
+        picture: The picture.
+        box: Left, top, width, height in pixels.
+    """
     space, kernel = _NUMBERS.colour_space, _NUMBERS.histogram_kernel
     place = Boxes.from_left_top(box[None]).centred
     (histogram,) = colour.histograms(colour.bin_map(picture, space), place, space, kernel)
@@ -342,7 +359,7 @@ def _root(picture: ndarray, box: Float[ndarray, " 4"]) -> Float[ndarray, " bins"
 
 
 def _known(sequence: Sequence, pictures: Pictures) -> list[Float[ndarray, " bins"]]:
-    """Return the square root of each template's histogram."""
+    """Return the element-wise square root of each template's histogram."""
     if not sequence.templates:
         return []
     model = read_templates(sequence, _NUMBERS.colour_space, _NUMBERS.histogram_kernel, pictures)
@@ -350,7 +367,8 @@ def _known(sequence: Sequence, pictures: Pictures) -> list[Float[ndarray, " bins
 
 
 def _distances(root: Float[ndarray, " bins"], known: Many[ndarray]) -> Float[ndarray, " n"]:
-    """Compute the Bhattacharyya distance between square roots of histograms, one and n others."""
+    """Compute the Bhattacharyya distance of a histogram from n others, all given by their
+    element-wise square roots."""
     roots = np.array(known).reshape(-1, len(root))
     return np.asarray(np.sqrt(np.clip(1.0 - roots @ root, 0.0, 1.0)))
 
@@ -363,8 +381,8 @@ def _names(
     Args:
         run: The run.
         found: The moments of all tracks.
-        appearances: The square root of the histogram at each moment.
-        known: The square root of each template's histogram.
+        appearances: The element-wise square root of the histogram at each moment.
+        known: The element-wise square root of each template's histogram.
     """
     people = list(dict.fromkeys(one.name for one in run.sequence.templates))
     owners = [people.index(one.name) for one in run.sequence.templates]

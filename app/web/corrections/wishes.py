@@ -122,7 +122,7 @@ def _nobody(lanes: TrackRows, track: int, wish: CorrectionWish, note: str) -> Co
     if not len(own):
         raise CorrectionError(f"first, last: track {track} is not there between them")
     around = KINDS["nobody"].accuracy if wish.accuracy is None else wish.accuracy
-    places = lanes.course(own, WITHIN * (around or 0.0))
+    places = lanes.simplified_path(own, WITHIN * (around or 0.0))
     return make(kind="nobody", places=places, accuracy=wish.accuracy, note=note)
 
 

@@ -13,9 +13,9 @@ from tracker.fusion.trajectories import Trajectories, corrected
 from tracker.review.queue import queue
 from tracker.review.queue.clear_places import ClearPlaces
 from tracker.review.queue.item import Alternative, TrackRows, confirmed, proposed
-from tracker.review.queue.linking import Move, Piece
+from tracker.review.queue.linking import Move, Tracklet
 from tracker.review.queue.other_run import OtherRun
-from tracker.review.queue.ranking import Trust, _with_none_of_them
+from tracker.review.queue.ranking import IdentityReach, _with_none_of_them
 
 
 @pytest.mark.parametrize("smoothing", ["identities", "positions", "none"])
@@ -59,12 +59,12 @@ def test_the_other_run_weighs_a_move_by_who_is_who_there() -> None:
     places = [lanes.place(one, 29), lanes.place(other, 29), lanes.place(other, 30),
               lanes.place(one, 30)]  # fmt: skip
     swapped: Trajectories = corrected(tracks, proposed("exchanged", places), 1.0 / 25.0)
-    pieces = [
-        Piece(track, lanes.place(track, 30), lanes.place(track, 29)) for track in (one, other)
+    tracklets = [
+        Tracklet(track, lanes.place(track, 30), lanes.place(track, 29)) for track in (one, other)
     ]
-    move = Move((pieces[0], pieces[1]), (pieces[0], pieces[1]), "exchange", 0.0)
-    assert OtherRun(tracks, swapped, 1.0 / 25.0).weighed(move).odds > 0.0
-    assert OtherRun(tracks, tracks, 1.0 / 25.0).weighed(move).odds < 0.0
+    move = Move((tracklets[0], tracklets[1]), (tracklets[0], tracklets[1]), "exchange", 0.0)
+    assert OtherRun(tracks, swapped, 1.0 / 25.0).with_evidence(move).log_odds > 0.0
+    assert OtherRun(tracks, tracks, 1.0 / 25.0).with_evidence(move).log_odds < 0.0
     told = [m for m in OtherRun(tracks, swapped, 1.0 / 25.0).moves() if m.kind == "exchange"]
     assert told, "it sees the exchange itself"
     assert abs(told[0].earlier[0].end.step - 29) <= 1
@@ -100,9 +100,9 @@ def test_what_hangs_on_a_moment_ends_where_the_next_mistake_may_be() -> None:
     lanes = TrackRows(run.tracks)
     track = int(lanes.ids[0])
     first, last = lanes.span(track)
-    whole = Trust(lanes, [])
+    whole = IdentityReach(lanes, [])
     assert whole.before(track, last) == whole.after(track, first) == last - first + 1
-    half = Trust(lanes, [(track, 19, 20, 0.5)])
+    half = IdentityReach(lanes, [(track, 19, 20, 0.5)])
     assert half.before(track, 39) == pytest.approx(20 + 0.5 * (20 - first))
     assert half.after(track, 10) == pytest.approx(10 + 0.5 * (last - 19))
     assert half.after(track, 20) == last - 19
@@ -144,8 +144,8 @@ def test_none_of_those_who_are_told_parts_from_all_of_them() -> None:
             "d": (22, 2.2),
         }.items()
     }
-    one, other = (Piece(k, places[end], places[end]) for k, end in ((1, "a"), (2, "b")))
-    after, begins = (Piece(k, places[at], places[at]) for k, at in ((1, "c"), (3, "d")))
+    one, other = (Tracklet(k, places[end], places[end]) for k, end in ((1, "a"), (2, "b")))
+    after, begins = (Tracklet(k, places[at], places[at]) for k, at in ((1, "c"), (3, "d")))
     move = Move((one,), (after, begins), "exchange", 0.0)
     now = Alternative("as it is", 0.5, proposed("same", (one.end, after.begin)))
     goes_on = Alternative("1 goes on as 3", 0.3, proposed("same", (one.end, begins.begin)))

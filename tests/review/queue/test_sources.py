@@ -13,7 +13,7 @@ from tracker.corrections import Place
 from tracker.fusion.trajectories import Trajectories
 from tracker.review.queue import queue
 from tracker.review.queue.item import Alternative, ReviewItem, TrackRows, confirmed, proposed
-from tracker.review.queue.meetings import draws, meetings
+from tracker.review.queue.meetings import ambiguous_shares, meetings
 from tracker.review.queue.ranking import is_answered, once_each
 from tracker.review.queue.unclaimed import unclaimed
 from tracker.runs.run import Run
@@ -52,16 +52,18 @@ def exchanged(tracks: Trajectories, step: int) -> Trajectories:
 
 def test_who_goes_straight_on_is_himself_and_who_turns_back_was_exchanged() -> None:
     run = near()
-    straight = [one.odds for one in meetings(run, TrackRows(run.tracks)) if len(one.earlier) == 2]
+    straight = [
+        one.log_odds for one in meetings(run, TrackRows(run.tracks)) if len(one.earlier) == 2
+    ]
     assert straight
     run.tracks = exchanged(run.tracks, 30)
-    turned = [one.odds for one in meetings(run, TrackRows(run.tracks)) if len(one.earlier) == 2]
+    turned = [one.log_odds for one in meetings(run, TrackRows(run.tracks)) if len(one.earlier) == 2]
     assert min(turned) > max(straight) + 2.0
 
 
 def test_boxes_are_drawn_between_people_no_more_than_they_are() -> None:
     run = near()
-    shares = draws(run)
+    shares = ambiguous_shares(run)
     assert all(0.0 < share <= 1.0 for share in shares.values())
     assert all(one < other for one, other, _ in shares)
 

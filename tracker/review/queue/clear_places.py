@@ -9,29 +9,30 @@ from numpy import ndarray
 from tracker.corrections import Place
 from tracker.corrections.kinds import REACH
 from tracker.review.queue.item import TrackRows
-from tracker.review.queue.linking import Move, Piece
+from tracker.review.queue.linking import Move, Tracklet
 
 _WIDTHS = 4.0
 """Least distance of a clear place from the nearest other track, in target widths: a correction
 that is made a little beside the place is then still nearest to its track."""
 
 _FARTHEST = 2.0 * REACH
-"""Distance from the nearest other track beyond which every place is clear, metres."""
+"""Largest value of this least distance, metres."""
 
 _ASIDE, _FEWEST = 0.4, 2
 """Time, in seconds, and least number of steps around the moment of a move at which the track may
-be on its way from one person to another."""
+lie between two persons."""
 
 _LONGEST = 5.0
-"""Time before and after the moment within which a clear place is searched, seconds."""
+"""Time before and after the moment of a move within which a clear place is searched, seconds."""
 
 
 class ClearPlaces:
     """The places of a run's tracks that a correction can refer to without ambiguity.
 
-    While people are close, a place between them may belong to either, and in a run with other
-    parameters to a third. Before they meet and after they part their identity is evident to a
-    person who sees the pictures, and a correction there has the same meaning for every run.
+    While two people are close, a place between them may be of either, and in a run with other
+    parameters of a third person. Before they meet and after they part their identities are evident
+    in the pictures, and a correction there has the same meaning for every run. Places at which no
+    camera has a box are not clear.
     """
 
     def __init__(self, track_rows: TrackRows, step_time: float, width: float) -> None:
@@ -56,7 +57,7 @@ class ClearPlaces:
         self._apart[~tracks.seen.any(axis=1)] = 0.0
 
     def before(self, track: int, step: int) -> Place:
-        """Return the last clear place of a track up to a step, or else the clearest one."""
+        """Return the last clear place of a track up to a step, or else the farthest from others."""
         rows = self._track_rows.rows[track]
         frames = self._track_rows.tracks.frames[rows]
         own = rows[(frames <= step) & (frames >= step - self._longest)]
@@ -70,7 +71,8 @@ class ClearPlaces:
         return self._track_rows.of_row(int(own[best]))
 
     def after(self, track: int, step: int) -> Place:
-        """Return the first clear place of a track from a step on, or else the clearest one."""
+        """Return the first clear place of a track from a step on, or else the farthest from
+        others."""
         rows = self._track_rows.rows[track]
         frames = self._track_rows.tracks.frames[rows]
         own = rows[(frames >= step) & (frames <= step + self._longest)]
@@ -83,17 +85,17 @@ class ClearPlaces:
         return self._track_rows.of_row(int(own[clear[0] if len(clear) else np.argmax(apart)]))
 
     def move(self, move: Move) -> Move:
-        """Return a move with clear places in the place of its own."""
+        """Return a move whose begins and ends are replaced by clear places."""
         return Move(
             tuple(
-                Piece(one.track, one.begin, self.before(one.track, one.last), one.last)
+                Tracklet(one.track, one.begin, self.before(one.track, one.last), one.last)
                 for one in move.earlier
             ),
             tuple(
-                Piece(one.track, self.after(one.track, one.first), one.end, one.first)
+                Tracklet(one.track, self.after(one.track, one.first), one.end, one.first)
                 for one in move.later
             ),
             move.kind,
-            move.odds,
+            move.log_odds,
             move.why,
         )

@@ -21,8 +21,8 @@ ItemKind = Literal[
 ]
 
 WITHIN = 0.5
-"""How close the places of a correction "nobody" follow the track that is removed, as a share of
-the correction's radius."""
+"""Largest distance between the removed track and the path through the places of a correction
+"nobody", as a share of the correction's radius."""
 
 _UNMADE = datetime(2000, 1, 1, tzinfo=UTC)
 """The time of a correction that is proposed and not made yet."""
@@ -30,10 +30,12 @@ _UNMADE = datetime(2000, 1, 1, tzinfo=UTC)
 
 @dataclass(frozen=True, slots=True)
 class Alternative:
-    """What may be true where a run may be wrong."""
+    """An answer to a review item: what may be true where a run may be wrong."""
 
     words: str
+    """The answer, in a few words."""
     probability: float
+    """The probability that this answer is true, 0 … 1."""
     corrections: tuple[Correction, ...]
     """The corrections that a person makes by choosing this alternative."""
 
@@ -43,22 +45,25 @@ class ReviewItem:
     """One item of the queue: a place and time at which the run may be wrong."""
 
     kind: ItemKind
+    """The kind of mistake that is possible."""
     title: str
+    """The possible mistake, in a few words."""
     why: str
     """The reason, in one sentence without a full stop."""
     first: int
-    """The first step that it concerns."""
+    """The first step that the item concerns."""
     last: int
-    """The last step that it concerns, included."""
+    """The last step that the item concerns, included."""
     tracks: tuple[int, ...]
-    """The ids of the run's tracks that it concerns."""
+    """The ids of the run's tracks that the item concerns."""
     places: tuple[Place, ...]
+    """The places of these tracks at which the run may be wrong."""
     probability: float
     """The probability that the run is wrong here."""
     stake: int
     """The number of steps of tracks that are wrong if the run is wrong here."""
     alternatives: tuple[Alternative, ...]
-    """What may be true: the run's own answer, then all others, the most probable first."""
+    """The answers: that of the run itself, then all others, the most probable first."""
 
     @property
     def id(self) -> str:
@@ -68,12 +73,13 @@ class ReviewItem:
 
     @property
     def weight(self) -> float:
-        """The expected number of wrong steps, by which the queue is ordered."""
+        """The expected number of wrong steps, probability × stake, by which the queue is
+        ordered."""
         return self.probability * self.stake
 
 
 def proposed(kind: str, places: Iterable[Place], **values: Any) -> tuple[Correction, ...]:
-    """Return the correction with these values as a tuple of one; empty if it is not valid."""
+    """Return the correction with these values as a tuple of one; empty if they are invalid."""
     try:
         return (make(kind=kind, places=[tuple(p) for p in places], time=_UNMADE, **values),)
     except CorrectionError:
@@ -81,11 +87,11 @@ def proposed(kind: str, places: Iterable[Place], **values: Any) -> tuple[Correct
 
 
 def confirmed(corrections: Iterable[Correction], note: str = "") -> tuple[Correction, ...]:
-    """Return proposed corrections as ones that are made now.
+    """Return proposed corrections with the present time as the time they were made.
 
     Args:
         corrections: The proposed corrections.
-        note: The user's note; if empty, each keeps its own.
+        note: The user's note; if empty, each correction keeps the note it has.
     """
     now = datetime.now(UTC).replace(microsecond=0)
     return tuple(
@@ -131,12 +137,14 @@ class TrackRows:
         at = int(np.searchsorted(frames, step, side="left" if after else "right")) - (not after)
         return self.of_row(int(rows[min(max(at, 0), len(rows) - 1)]))
 
-    def course(self, rows: Int[ndarray, " K"], within: float) -> tuple[Place, ...]:
+    def simplified_path(self, rows: Int[ndarray, " K"], within: float) -> tuple[Place, ...]:
         """Simplify a track to a few places, between which linear interpolation stays near it.
 
-        This is the algorithm of Ramer, Douglas and Peucker in time: the place with the largest
-        distance from the interpolation between the first and the last, at its own step, is kept,
-        and both parts are simplified in the same way.
+        This is the algorithm of Ramer (Computer Graphics and Image Processing 1, 1972) and of
+        Douglas and Peucker (Cartographica 10, 1973), with the distance at the same step instead of
+        that from the line: if the interpolation between the first and the last place is too far
+        from the track, the place where it is farthest is kept, and both parts are simplified in
+        the same way.
 
         Args:
             rows: The rows of the track, at least one, in the order of steps.

@@ -1,4 +1,4 @@
-"""Moves: changes of the run's links between pieces of tracks, at one place."""
+"""Moves: changes of the run's links between tracklets, at one place."""
 
 from __future__ import annotations
 
@@ -10,45 +10,49 @@ from tracker.review.queue.item import Alternative, ItemKind, proposed
 
 
 @dataclass(frozen=True, slots=True)
-class Piece:
+class Tracklet:
     """A part of a track that follows one person (a tracklet)."""
 
     track: int
     begin: Place
     end: Place
     moment: int = -1
-    """The step at which the piece is linked, if its begin or end was moved to a clear place; −1
-    if it was not."""
+    """The step of the link, if the begin or the end of the tracklet was replaced by a clear place
+    (see :mod:`tracker.review.queue.clear_places`); −1 if it was not."""
 
     @property
     def last(self) -> int:
-        """The last step of the piece, for one that is linked to a later piece."""
+        """The last step before the link to a later tracklet."""
         return self.end.step if self.moment < 0 else self.moment
 
     @property
     def first(self) -> int:
-        """The first step of the piece, for one that is linked to an earlier piece."""
+        """The first step after the link to an earlier tracklet."""
         return self.begin.step if self.moment < 0 else self.moment
 
 
 @dataclass(frozen=True, slots=True)
 class Move:
-    """A change of links at one place: instead of i → j and i' → j', i → j' and i' → j; or the
-    removal or addition of one link."""
+    """A change of links at one place.
 
-    earlier: tuple[Piece, ...]
+    An exchange replaces i → j and i' → j' by i → j' and i' → j; the other moves remove or add one
+    link. If only one of the two links of an exchange is there, ``earlier`` or ``later`` has one
+    tracklet.
+    """
+
+    earlier: tuple[Tracklet, ...]
     """i, then i' if there is one."""
-    later: tuple[Piece, ...]
-    """j, then j' if there is one: the pieces that i and i' are linked to in the run. For a join, j
-    is a piece that has no link to an earlier one."""
+    later: tuple[Tracklet, ...]
+    """j, then j' if there is one: the tracklets that i and i' are linked to in the run. For a join,
+    j is a tracklet that has no link to an earlier one."""
     kind: ItemKind
-    """The kind of change: an exchange crosses both links over, a cut removes i → j, a join adds
-    i → j where both ends were free."""
-    odds: float
-    """The log odds of the changed links against the run's."""
+    """The kind of change: "exchange" and "crossing" exchange the links, "cut", "gap" and "fast"
+    remove i → j, and "join" adds i → j where both ends were free."""
+    log_odds: float
+    """The natural logarithm of the odds of the changed links against the run's."""
 
     why: str = ""
-    """The reason, in one sentence, if it is not the odds of the links."""
+    """The reason for the move, in words; empty if the odds of the links are the reason."""
 
     @property
     def joins(self) -> bool:
@@ -56,17 +60,20 @@ class Move:
         return self.kind == "join"
 
     def stake(self, heads: Many[float], tails: Many[float]) -> float:
-        """Return the number of steps that get another identity by the move.
+        """Return the number of steps whose identity the move changes.
+
+        Either the earlier or the later tracklets keep their identity; the smaller number counts.
 
         Args:
-            heads: The number of steps that depend on each of the earlier pieces.
-            tails: The number of steps that depend on each of the later pieces.
+            heads: The expected number of steps that have the identity of each earlier tracklet.
+            tails: The expected number of steps that have the identity of each later tracklet.
         """
         return min(sum(heads), sum(tails))
 
     @property
     def alternative(self) -> Alternative:
-        """The alternative that makes this move, with its probability still at 0."""
+        """The alternative whose corrections make this move; its probability is 0, to be
+        replaced."""
         if len(self.earlier) == 1 and len(self.later) == 1:
             i, j = self.earlier[0], self.later[0]
             if self.joins:
@@ -82,7 +89,7 @@ class Move:
                 )
             words = f"exchanged with {other.track if other.track != i.track else after.track}"
             return Alternative(words, 0.0, exchange)
-        if len(self.earlier) == 2:  # i' is linked to j, and i ends
+        if len(self.earlier) == 2:  # instead of i → j, i' → j; i ends
             (_, other), (j,) = self.earlier, self.later
             return Alternative(_joined(other, j), 0.0, proposed("same", (other.end, j.begin)))
         (i,), (_, after) = self.earlier, self.later
@@ -100,5 +107,6 @@ class Move:
         )
 
 
-def _joined(i: Piece, j: Piece) -> str:
+def _joined(i: Tracklet, j: Tracklet) -> str:
+    """Describe the link of two tracklets."""
     return f"{i.track} goes on as {j.track}" if i.track != j.track else f"{i.track} goes on"

@@ -1,5 +1,5 @@
-"""Moves at meetings: two people are so close, or their boxes so ambiguous, that their tracks may
-have been exchanged."""
+"""Moves at meetings: where two people are so close, or their boxes so ambiguous, that their tracks
+may have been exchanged."""
 
 from __future__ import annotations
 
@@ -10,17 +10,18 @@ from jaxtyping import Float, Int
 from numpy import ndarray
 
 from tracker.review.queue.item import TrackRows
-from tracker.review.queue.linking import Move, Piece
+from tracker.review.queue.linking import Move, Tracklet
 from tracker.runs.run import Run
 
 _CLOSE = 2.0
 """Distance within which two people are close, in target widths."""
 
 _EXCHANGED = 0.12
-"""Prior probability that the tracks of two people who touch are exchanged."""
+"""Prior probability that the tracks of two people at the same place are exchanged; it falls with
+their distance d as exp(−d / w), with w the width of a target."""
 
 _ALONE = 1.5
-"""Log odds against the half of an exchange, by which one track goes on as the other's person and
+"""Log odds of an exchange against its half, after which one track follows the other's person and
 the other track ends."""
 
 _TURN = 0.6
@@ -30,28 +31,28 @@ _STRIDE = 0.5
 """Time before and after a meeting over which velocities are measured, seconds."""
 
 _MOST = 3.0
-"""Largest log odds that velocities contribute, since their model is a rough one."""
+"""Largest log odds that the velocities contribute, since their model is approximate."""
 
 _EVEN = 0.3
-"""Ambiguous share of two people's boxes (see :func:`draws`) from which they may be exchanged
-though they are not close."""
+"""Ambiguous share of two people's boxes (see :func:`ambiguous_shares`) from which
+their tracks may have been exchanged though they are not close."""
 
 
 def meetings(run: Run, track_rows: TrackRows) -> Iterator[Move]:
     """Yield the exchange, and its halves, for each time that two people meet.
 
-    The odds are a prior that depends on the distance, times the likelihood ratio of the velocities
-    before and after: with u and v the velocity of the one relative to the other before and
-    after, and changes of each one's velocity distributed as N(0, σ² I),
+    The odds are a prior that depends on the distance, times the likelihood ratio of the velocities.
+    With u and v the velocity of the one person relative to the other before and after the meeting,
+    and changes of each person's velocity distributed as N(0, σ² I),
 
         log odds = −u · v / σ²
 
-    so people who go straight on keep their identity, and two who seem to turn back at a meeting
-    were probably exchanged.
+    so two tracks that go straight on have probably kept their persons, and two that turn back at a
+    meeting were probably exchanged.
     """
     step_time = run.sequence.step_time
     width = 2.0 * float(run.sequence.target_half_extents[:2].mean())
-    drawn = draws(run)
+    drawn = ambiguous_shares(run)
     pause = max(round(1.0 / step_time), 2)
     for (one, other), met in _near(run, _CLOSE * width, drawn).items():
         steps = np.array([step for step, _ in met])
@@ -59,33 +60,33 @@ def meetings(run: Run, track_rows: TrackRows) -> Iterator[Move]:
             nearest, apart = min((met[k] for k in part.tolist()), key=lambda at: at[1])
             first, last = int(steps[part[0]]) - 1, int(steps[part[-1]]) + 1
             mine, its = (
-                Piece(
+                Tracklet(
                     track, track_rows.place(track, last, after=True), track_rows.place(track, first)
                 )
                 for track in (one, other)
             )
             draw = max(drawn.get((one, other, int(steps[k])), 0.0) for k in part.tolist())
             wrong = max(_EXCHANGED * float(np.exp(-apart / width)), 0.1 * (draw > _EVEN))
-            odds = float(np.log(wrong) - np.log1p(-wrong))
-            odds += _straight_on(track_rows, one, other, nearest, step_time)
+            log_odds = float(np.log(wrong) - np.log1p(-wrong))
+            log_odds += _straight_on(track_rows, one, other, nearest, step_time)
             why = f"{apart:.2f} m apart at step {nearest}"
             if draw > _EVEN:
                 why += f", and {100 * draw:.0f} % of their boxes fit either"
             for i, j in ((mine, its), (its, mine)):
-                yield Move((i, j), (i, j), "crossing", odds, why)
-                yield Move((i,), (i, j), "crossing", odds - _ALONE, why)
+                yield Move((i, j), (i, j), "crossing", log_odds, why)
+                yield Move((i,), (i, j), "crossing", log_odds - _ALONE, why)
 
 
 def _near(
     run: Run, reach: float, drawn: dict[tuple[int, int, int], float]
 ) -> dict[tuple[int, int], list[tuple[int, float]]]:
-    """Return for each pair of tracks the steps at which they are near, or their boxes ambiguous,
-    each with their distance in metres.
+    """Return the steps at which two tracks are near, or their boxes ambiguous, for each pair of
+    ids, each step with their distance in metres on the ground.
 
     Args:
         run: The run.
         reach: Distance within which two tracks are near, metres.
-        drawn: The ambiguous shares, as returned by :func:`draws`.
+        drawn: The ambiguous shares, as returned by :func:`ambiguous_shares`.
     """
     tracks = run.tracks
     found: dict[tuple[int, int], list[tuple[int, float]]] = {}
@@ -101,8 +102,8 @@ def _near(
 
 
 def _straight_on(track_rows: TrackRows, one: int, other: int, step: int, step_time: float) -> float:
-    """Return the log odds of an exchange at a step by the velocities around it; 0 if a track is
-    too short for a velocity."""
+    """Return the log odds of an exchange at a step by the velocities before and after it; 0 if a
+    track has no place at one of the three steps."""
     stride = max(round(_STRIDE / step_time), 1)
     relative: Float[ndarray, "3 2"] = np.zeros((3, 2))
     for k, at in enumerate((step - stride, step, step + stride)):
@@ -114,15 +115,16 @@ def _straight_on(track_rows: TrackRows, one: int, other: int, step: int, step_ti
     return float(np.clip(-(before @ after) / _TURN**2, -_MOST, _MOST))
 
 
-def draws(run: Run) -> dict[tuple[int, int, int], float]:
+def ambiguous_shares(run: Run) -> dict[tuple[int, int, int], float]:
     """Return the ambiguous share of the boxes of two tracks.
 
-    It is Σ_c Σ_z min(p_c(z | i), p_c(z | j)) over the cameras c that have boxes of i or j, divided
-    by the number of these cameras, with the association probabilities p of the fusion.
+    With p_c(z | i) the probability of the fusion that box z of camera c is of track i, the share of
+    tracks i and j is Σ_c Σ_z min(p_c(z | i), p_c(z | j)), divided by the number of cameras that
+    have boxes of i or j.
 
     Returns:
-        The share by the ids of the two tracks, the smaller first, and the step; pairs that share
-        no box are left out.
+        The share, 0 … 1, by the ids of the two tracks, the smaller first, and the step; pairs
+        without a common box are left out.
     """
     steps, labels, cameras, boxes, shares = _associated(run)
     if not len(steps):
@@ -160,7 +162,8 @@ def draws(run: Run) -> dict[tuple[int, int, int], float]:
 
 
 def _associated(run: Run) -> tuple[ndarray, ndarray, ndarray, ndarray, ndarray]:
-    """Return step, label, camera, box and probability of every association, as columns."""
+    """Return step, label, index of the camera, index of the box and probability of each
+    association."""
     each = [
         (step, result) for step, result in enumerate(run.fused) if len(result.associations.boxes)
     ]

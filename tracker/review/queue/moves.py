@@ -8,16 +8,18 @@ import numpy as np
 
 from tracker.corrections import Place
 from tracker.review.queue.item import TrackRows
-from tracker.review.queue.linking import Move, Piece
+from tracker.review.queue.linking import Move, Tracklet
 from tracker.runs.run import Run
 from tracker.smoothing import names_of
 from tracker.smoothing.result import Joined
 
 _TEMPERED = 3.0
-"""Divisor of the log odds of the association, whose model takes dependent boxes as independent."""
+"""Divisor of the log odds of the association, whose model takes dependent boxes as independent and
+is therefore too certain."""
 
 _LONGEST = 20.0
-"""Longest time that a lost person is expected to come back after, seconds."""
+"""Longest time after which a lost person may come back, and time constant of the probability of it,
+seconds."""
 
 _SPEED = 0.6
 """Standard deviation of the velocity of a lost person, metres per second."""
@@ -29,19 +31,19 @@ _EDGE = 0.5
 """Distance from the room's sides within which people leave and come, metres."""
 
 _LEAVES_AT_AN_EDGE, _LEAVES_INSIDE = 0.9, 0.2
-"""Prior probability that the person of a track has left where it ends, at a side or entrance of the
-room and inside."""
+"""Prior probability that the person of a track has left the room where the track ends: at a side or
+an entrance of the room, and elsewhere."""
 
-_WORTH = -7.0
-"""Least log odds of a move that is considered."""
+_LEAST_LOG_ODDS = -7.0
+"""Least log odds of a move that is considered; half of it for joins of lost people."""
 
 
-def pieces_of(run: Run, track_rows: TrackRows) -> tuple[list[Piece | None], Joined | None]:
-    """Return the pieces that the smoothing linked to the run's tracks, and its link costs.
+def tracklets_of(run: Run, track_rows: TrackRows) -> tuple[list[Tracklet | None], Joined | None]:
+    """Return the tracklets that the smoothing linked to tracks, and the gains of its links.
 
     If no smoothing linked the tracks that the run has now (they may be the filter's, or those of
-    another run that are displayed until this one is computed), each track is one piece, and there
-    are no link costs. A piece whose track is not reported is None.
+    another run that are displayed until this one is computed), each track is one tracklet, and
+    there are no gains. A tracklet whose track is not reported is None.
     """
     joined = None if run.smoothed is None else run.smoothed.joined
     if joined is None or run.smoothed is None:
@@ -49,7 +51,7 @@ def pieces_of(run: Run, track_rows: TrackRows) -> tuple[list[Piece | None], Join
     names = names_of(run.smoothed, run.tracks)
     if not names:
         return [_whole(track_rows, int(track)) for track in track_rows.ids], None
-    found: list[Piece | None] = []
+    found: list[Tracklet | None] = []
     for k, label in enumerate(joined.labels.tolist()):
         track = names.get(label)
         if track is None:
@@ -58,22 +60,28 @@ def pieces_of(run: Run, track_rows: TrackRows) -> tuple[list[Piece | None], Join
         first, last = int(joined.firsts[k]), int(joined.lasts[k])
         begin = Place(first, *joined.begins[k].tolist())
         end = Place(last, *joined.ends[k].tolist())
-        found.append(Piece(track, begin, end))
+        found.append(Tracklet(track, begin, end))
     return found, joined
 
 
-def _whole(track_rows: TrackRows, track: int) -> Piece:
+def _whole(track_rows: TrackRows, track: int) -> Tracklet:
+    """Return a track as one tracklet."""
     rows = track_rows.rows[track]
     begin, end = track_rows.of_row(int(rows[0])), track_rows.of_row(int(rows[-1]))
-    return Piece(track, begin, end)
+    return Tracklet(track, begin, end)
 
 
-def of_joining(pieces: list[Piece | None], joined: Joined) -> Iterator[Move]:
+def moves_of_links(tracklets: list[Tracklet | None], joined: Joined) -> Iterator[Move]:
     """Yield all changes of one or two links, by the gains of the tracklet association.
 
-    The run has the assignment of the largest gain. Its neighbours are the exchange of two links,
-    the cut of a link, a link between a free end and a free begin, and a link that goes to a free
-    begin or end instead.
+    The run has the assignment with the largest sum of gains. The assignments next to it exchange
+    two links, cut a link, link a free end with a free begin, or replace a link by one to a free
+    begin or end. The log odds of each are the difference of its sum of gains from the run's,
+    divided by :data:`_TEMPERED`.
+
+    Args:
+        tracklets: The tracklets, as returned by :func:`tracklets_of`.
+        joined: The gains of their links.
     """
     gains = {
         (i, j): g
@@ -81,55 +89,60 @@ def of_joining(pieces: list[Piece | None], joined: Joined) -> Iterator[Move]:
             joined.earlier.tolist(), joined.later.tolist(), joined.gains.tolist(), strict=True
         )
     }
-    following, before = _links(pieces, joined)
+    following, before = _links(tracklets, joined)
     births, deaths = joined.births, joined.deaths
 
-    def has(i: int) -> float:
-        """Return the gain of how a piece is continued in the run."""
+    def gain_in_run(i: int) -> float:
+        """Return the gain of a tracklet's link to a later one in the run, or of its end."""
         j = following.get(i, -1)
         return float(deaths[i]) if j < 0 else gains.get((i, j), float(deaths[i] + births[j]))
 
     for (i, j), gain in gains.items():
-        one, other = pieces[i], pieces[j]
+        one, other = tracklets[i], tracklets[j]
         if one is None or other is None or following.get(i) == j:
             continue
         now, pred = following.get(i, -1), before.get(j, -1)
-        odds = gain - has(i)
-        odds -= float(births[j]) if pred < 0 else has(pred)
-        after = pieces[now] if now >= 0 else None
-        earlier = pieces[pred] if pred >= 0 else None
+        log_odds = gain - gain_in_run(i)
+        log_odds -= float(births[j]) if pred < 0 else gain_in_run(pred)
+        after = tracklets[now] if now >= 0 else None
+        earlier = tracklets[pred] if pred >= 0 else None
         if after is not None and earlier is not None:
             if (pred, now) not in gains:
-                odds += float(deaths[pred] + births[now])
-                # the two pieces that remain end and begin
+                log_odds += float(deaths[pred] + births[now])
+                # the other two tracklets cannot be linked: one ends, the other begins
             else:
-                odds += gains[pred, now]
-            move = Move((one, earlier), (after, other), "exchange", odds / _TEMPERED)
+                log_odds += gains[pred, now]
+            move = Move((one, earlier), (after, other), "exchange", log_odds / _TEMPERED)
         elif after is not None:
-            move = Move((one,), (after, other), "exchange", (odds + float(births[now])) / _TEMPERED)
+            move = Move(
+                (one,), (after, other), "exchange", (log_odds + float(births[now])) / _TEMPERED
+            )
         elif earlier is not None:
             move = Move(
-                (earlier, one), (other,), "exchange", (odds + float(deaths[pred])) / _TEMPERED
+                (earlier, one), (other,), "exchange", (log_odds + float(deaths[pred])) / _TEMPERED
             )
         else:
-            move = Move((one,), (other,), "join", odds / _TEMPERED)
-        if move.odds > _WORTH:
+            move = Move((one,), (other,), "join", log_odds / _TEMPERED)
+        if move.log_odds > _LEAST_LOG_ODDS:
             yield move
     for i, j in following.items():
-        one, other = pieces[i], pieces[j]
+        one, other = tracklets[i], tracklets[j]
         if one is None or other is None:
             continue
-        odds = (float(deaths[i] + births[j]) - has(i)) / _TEMPERED
-        if odds > _WORTH:
-            yield Move((one,), (other,), "cut", odds)
+        log_odds = (float(deaths[i] + births[j]) - gain_in_run(i)) / _TEMPERED
+        if log_odds > _LEAST_LOG_ODDS:
+            yield Move((one,), (other,), "cut", log_odds)
 
 
-def _links(pieces: list[Piece | None], joined: Joined) -> tuple[dict[int, int], dict[int, int]]:
-    """Return the index of the next piece of each piece in its track, and of the previous one."""
+def _links(
+    tracklets: list[Tracklet | None], joined: Joined
+) -> tuple[dict[int, int], dict[int, int]]:
+    """Return the index of the next tracklet of each tracklet in its track, and of the previous
+    one."""
     following: dict[int, int] = {}
     latest: dict[int, int] = {}
     for k in np.argsort(joined.firsts, kind="stable").tolist():
-        if pieces[k] is None:
+        if tracklets[k] is None:
             continue
         label = int(joined.labels[k])
         if label in latest:
@@ -138,20 +151,26 @@ def _links(pieces: list[Piece | None], joined: Joined) -> tuple[dict[int, int], 
     return following, {j: i for i, j in following.items()}
 
 
-def of_the_lost(run: Run, track_rows: TrackRows, known: set[tuple[Place, Place]]) -> Iterator[Move]:
-    """Yield joins of tracks that end with tracks that begin later near by.
+def joins_of_lost_people(
+    run: Run, track_rows: TrackRows, known: set[tuple[Place, Place]]
+) -> Iterator[Move]:
+    """Yield joins of tracks that end, each with a track that begins near by at a later step.
 
     Let p_i be the probability that the person of track i has left where it ends, A the area of the
-    room, and N(x; x_i, S) the density of the place of a lost person after the gap. The odds that j
-    is the continuation of i are
+    room on the ground, and f_ij = N(x_j; x_i, σ_ij² I) exp(−t_ij / T) the density of the place of
+    a lost person after the gap of t_ij ≤ T seconds, with σ_ij² = s² + v² t_ij min(t_ij, 4 s), where
+    s, v and T are :data:`_NEAR`, :data:`_SPEED` and :data:`_LONGEST`. The odds that j is the
+    continuation of i are
 
-        (1 − p_i) N(x_j; x_i, S) / [p_i / A + Σ_{k≠j} (1 − p_i) N(x_k; x_i, S)]
+        (1 − p_i) f_ij / [p_i / A + Σ_{k≠j} (1 − p_i) f_ik]
 
-    and likewise with i and j exchanged; the smaller of both counts.
+    The odds that j continues i and no other track are the same with the probability that the person
+    of track j has come in where it begins instead of p_i, and with the sum over the other tracks
+    that end. The smaller odds count.
 
     Args:
         run: The run.
-        track_rows: Its tracks.
+        track_rows: The run's tracks.
         known: Pairs of end and begin for which there is a move already.
     """
     sequence = run.sequence
@@ -172,19 +191,19 @@ def of_the_lost(run: Run, track_rows: TrackRows, known: set[tuple[Place, Place]]
     density = np.exp(-0.5 * apart**2 / spread) / (2.0 * np.pi * spread)
     density = np.where(possible, density, 0.0)
     density *= np.exp(-np.maximum(seconds, 0.0) / _LONGEST)
-    leaves = np.array([ends_there(one.end, run) for one in ends])[:, None]
-    comes = np.array([ends_there(one.begin, run) for one in begins])[None, :]
+    leaves = np.array([leaving_probability(one.end, run) for one in ends])[:, None]
+    comes = np.array([leaving_probability(one.begin, run) for one in begins])[None, :]
     left = (1.0 - leaves) * density
     forward = left / (leaves / area + left.sum(axis=1, keepdims=True) - left + 1e-12)
     came = (1.0 - comes) * density
     backward = came / (comes / area + came.sum(axis=0, keepdims=True) - came + 1e-12)
-    odds = np.log(np.maximum(np.minimum(forward, backward), 1e-12))
-    for i, j in np.argwhere(odds > _WORTH / 2.0).tolist():
+    log_odds = np.log(np.maximum(np.minimum(forward, backward), 1e-12))
+    for i, j in np.argwhere(log_odds > _LEAST_LOG_ODDS / 2.0).tolist():
         if (ends[i].end, begins[j].begin) not in known:
-            yield Move((ends[i],), (begins[j],), "join", float(odds[i, j]))
+            yield Move((ends[i],), (begins[j],), "join", float(log_odds[i, j]))
 
 
-def ends_there(place: Place, run: Run) -> float:
+def leaving_probability(place: Place, run: Run) -> float:
     """Return the prior probability that people leave, or come, at a place."""
     point, low, high = place.point, run.sequence.room.minimum, run.sequence.room.maximum
     margin = float(np.minimum(point - low, high - point)[:2].min())

@@ -1,4 +1,4 @@
-"""Evidence on identities from another run of the recording, for instance backwards in time."""
+"""Evidence on identities from another run of the recording, for instance one backwards in time."""
 
 from __future__ import annotations
 
@@ -14,26 +14,27 @@ from tracker.corrections import Place
 from tracker.fusion.trajectories import Trajectories
 from tracker.geometry.assignment import pairs_within
 from tracker.review.queue.item import TrackRows
-from tracker.review.queue.linking import Move, Piece
+from tracker.review.queue.linking import Move, Tracklet
 
 _REACH = 0.7
-"""Largest distance of tracks of the two runs that follow one person, metres on the ground."""
+"""Largest distance at which two tracks of the two runs may follow one person, metres on the
+ground."""
 
 _LASTING = 0.6
-"""Least time for which a track must be paired with one of the other run, seconds; shorter pairings
-are of people who pass by."""
+"""Least time for which a track must be paired with a track of the other run, seconds; shorter
+pairings occur where another person passes by."""
 
 _FOR, _AGAINST = 2.5, -2.5
-"""What the other run adds to the log odds of a move that it agrees, or disagrees, with."""
+"""Addend to the log odds of a move with which the other run agrees, or disagrees."""
 
 
 def _same(pairs: list[tuple[int, int]]) -> list[bool]:
-    """Whether each pair is one track of the other run; pairs with an unknown id are left out."""
+    """Whether each pair of ids is one track of the other run; pairs with an id −1 are left out."""
     return [one == other for one, other in pairs if min(one, other) >= 0]
 
 
 class OtherRun:
-    """The id in another run at each row of a run's tracks, and what follows for moves."""
+    """The id of the track in another run at each row of a run's tracks, as evidence on moves."""
 
     def __init__(self, tracks: Trajectories, other: Trajectories, step_time: float) -> None:
         """Pair the tracks of the two runs at each step, the nearest first.
@@ -57,8 +58,8 @@ class OtherRun:
             self.ids[own.start + rows] = other.ids[others][columns]
 
     def at(self, track: int, place: Place, *, before: bool) -> int:
-        """Return the most frequent id of a track in the other run, in the steps up to a place or
-        from it on; −1 for none."""
+        """Return the most frequent id in the other run over a few steps of a track, up to a place
+        or from it on; −1 if the other run has no track there."""
         rows = self._track_rows.rows[track]
         frames = self._tracks.frames[rows]
         if before:
@@ -72,8 +73,8 @@ class OtherRun:
         names, counts = np.unique(ids, return_counts=True)
         return int(names[np.argmax(counts)])
 
-    def weighed(self, move: Move) -> Move:
-        """Return a move with the other run's evidence added to its odds."""
+    def with_evidence(self, move: Move) -> Move:
+        """Return a move with the other run's evidence added to its log odds."""
         earlier = [self.at(one.track, one.end, before=True) for one in move.earlier]
         later = [self.at(one.track, one.begin, before=False) for one in move.later]
         added = 0.0
@@ -93,25 +94,25 @@ class OtherRun:
                 added += _FOR
             if differs and all(differs):
                 added += _AGAINST
-        return replace(move, odds=move.odds + added)
+        return replace(move, log_odds=move.log_odds + added)
 
     def moves(self) -> Iterator[Move]:
-        """Yield moves to the links of the other run, where they differ.
+        """Yield moves that replace links by the links of the other run, where they differ.
 
-        With the other run's evidence, which :meth:`weighed` adds, each has even odds: either run
-        is right as often as the other.
+        Their log odds are −2.5, so that they are 0 once :meth:`with_evidence` has added 2.5:
+        either run is right as often as the other.
         """
         stretches = sorted(self._stretches(), key=lambda one: one[1].begin.step)
-        by_other: dict[int, list[tuple[int, Piece]]] = {}
-        for name, piece in stretches:
-            by_other.setdefault(name, []).append((piece.begin.step, piece))
-        next_own: dict[Place, Piece] = {}
-        before_own: dict[Place, Piece] = {}
-        by_track: dict[int, list[Piece]] = {}
-        for _, piece in stretches:
-            by_track.setdefault(piece.track, []).append(piece)
-        for pieces in by_track.values():
-            for one, after in itertools.pairwise(pieces):
+        by_other: dict[int, list[tuple[int, Tracklet]]] = {}
+        for name, tracklet in stretches:
+            by_other.setdefault(name, []).append((tracklet.begin.step, tracklet))
+        next_own: dict[Place, Tracklet] = {}
+        before_own: dict[Place, Tracklet] = {}
+        by_track: dict[int, list[Tracklet]] = {}
+        for _, tracklet in stretches:
+            by_track.setdefault(tracklet.track, []).append(tracklet)
+        for tracklets in by_track.values():
+            for one, after in itertools.pairwise(tracklets):
                 next_own[one.end], before_own[after.begin] = after, one
         for of_one in by_other.values():
             for (_, one), (_, after) in itertools.pairwise(of_one):
@@ -127,8 +128,8 @@ class OtherRun:
                 elif precedes is not None:
                     yield Move((precedes, one), (after,), "exchange", -_FOR)
 
-    def _stretches(self) -> Iterable[tuple[int, Piece]]:
-        """Yield the parts of tracks that have one id in the other run throughout, each with it."""
+    def _stretches(self) -> Iterable[tuple[int, Tracklet]]:
+        """Yield the parts of tracks that have one id in the other run throughout, after that id."""
         for track, rows in self._track_rows.rows.items():
             known = rows[self.ids[rows] >= 0]
             if not len(known):
@@ -144,4 +145,4 @@ class OtherRun:
                     merged.append(part.tolist())
             for own in merged:
                 begin, end = self._track_rows.of_row(own[0]), self._track_rows.of_row(own[-1])
-                yield int(self.ids[own[0]]), Piece(track, begin, end)
+                yield int(self.ids[own[0]]), Tracklet(track, begin, end)

@@ -23,10 +23,11 @@ from tracker.review.queue.track_ends import track_ends
 from tracker.runs.run import Run
 
 MOST = 200
-"""Most items of a queue; after so many answers it is computed again."""
+"""Largest number of items of a queue; after so many answers it is computed again."""
 
 _ALTERNATIVES = 4
-"""Most alternatives of an item, beside the run's own answer and those that are always added."""
+"""Largest number of alternatives of an item, beside the run's own answer, the halves of an exchange
+and "none of these"."""
 
 _HALF = 0.1
 """Probability of each half of an exchange, as a share of that of the exchange."""
@@ -35,17 +36,17 @@ LEAST = 1.0
 """Least expected number of wrong steps of an item that is worth a review."""
 
 _SAME_MOMENT = 1.0
-"""Time within which items on the same two tracks are one, seconds."""
+"""Time within which two items on the same two tracks count as one, seconds."""
 
 _NEAR = 0.5
-"""Distance within which an item's place and that of a correction are the same, metres on the
-ground."""
+"""Distance within which a place of an item and a place of a correction count as the same, metres on
+the ground."""
 
 _ROUNDED = 1e-3
-"""Difference between a place and the same one as a correction states it (rounded), metres."""
+"""Largest difference between a place and its rounded coordinates in a correction, metres."""
 
 _CERTAIN = 0.95
-"""Largest probability of a mistake that counts, so that no step is without any dependence."""
+"""Largest probability of a mistake in :class:`IdentityReach`, so that its logarithm is finite."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +54,7 @@ class Queue:
     """The items to review."""
 
     items: tuple[ReviewItem, ...]
-    """The items, by the expected number of wrong steps."""
+    """The items, in descending order of the expected number of wrong steps."""
     answered: int
     """The number of items that corrections have answered already."""
     how: str
@@ -100,8 +101,9 @@ def queue(
 
 
 def _parted_by(run: Run) -> Callable[[int, int], bool]:
-    """Return a function that tells whether corrections rule out a join of two tracks: that they
-    are different people, or that the one left or the other came in."""
+    """Return a function that gets the ids of two tracks and returns whether corrections rule out
+    their join: they state that these are different people, that the first left, or that the second
+    came in."""
     applied = _applied(run)
     parted = {frozenset(tracks) for kind, tracks in applied if kind == "different"}
     left = {track for kind, tracks in applied if kind == "left" for track in tracks}
@@ -110,24 +112,24 @@ def _parted_by(run: Run) -> Callable[[int, int], bool]:
 
 
 def _people(run: Run) -> set[int]:
-    """Return the tracks that corrections declare to be people."""
+    """Return the ids of the tracks that corrections declare to be people."""
     kinds = ("here", "name", "came", "left", "same")
     return {track for kind, tracks in _applied(run) if kind in kinds for track in tracks}
 
 
 def _applied(run: Run) -> list[tuple[Kind | None, tuple[int, ...]]]:
-    """Return kind and tracks of each correction that is met."""
+    """Return the kind and the ids of the tracks of each correction that the run satisfies."""
     kinds = {one.id: one.kind for one in run.corrections}
     return [(kinds.get(one.id), one.tracks) for one in run.outcomes if one.met]
 
 
 def once_each(ordered: Iterable[ReviewItem], pause: int) -> Iterable[ReviewItem]:
-    """Yield the items that are worth a review, without duplicates: an exchange is found for
-    either track.
+    """Yield the items that are worth a review, without duplicates (an exchange is found for each of
+    its two tracks).
 
     Args:
-        ordered: The items, by the expected number of wrong steps.
-        pause: The number of steps within which two items on the same two tracks are one.
+        ordered: The items, in descending order of the expected number of wrong steps.
+        pause: The number of steps within which two items on the same two tracks count as one.
     """
     known: set[object] = set()
     moments: dict[frozenset[int], list[tuple[int, int]]] = {}
@@ -146,17 +148,18 @@ def once_each(ordered: Iterable[ReviewItem], pause: int) -> Iterable[ReviewItem]
 
 
 def _joins(run: Run) -> bool:
+    """Whether the smoothing linked the tracklets of the run."""
     return run.smoothed is not None and run.smoothed.joined is not None
 
 
 def _linked(
     run: Run, track_rows: TrackRows, backwards: Trajectories | None
 ) -> Iterable[ReviewItem]:
-    """Return items on identities: all moves, grouped by the place that they change."""
-    pieces, joined = moves.pieces_of(run, track_rows)
-    every: list[Move] = [] if joined is None else list(moves.of_joining(pieces, joined))
+    """Yield the items on identities: all moves, grouped by the track and place that they change."""
+    tracklets, joined = moves.tracklets_of(run, track_rows)
+    every: list[Move] = [] if joined is None else list(moves.moves_of_links(tracklets, joined))
     known = {(move.earlier[0].end, move.later[-1].begin) for move in every}
-    every += moves.of_the_lost(run, track_rows, known)
+    every += moves.joins_of_lost_people(run, track_rows, known)
     every += single_tracks.moves(run, track_rows)
     every += meetings(run, track_rows)
     step_time = run.sequence.step_time
@@ -167,12 +170,12 @@ def _linked(
     clear = ClearPlaces(track_rows, step_time, width)
     every = [clear.move(move) for move in every]
     if other is not None:
-        every = [other.weighed(move) for move in every]
+        every = [other.with_evidence(move) for move in every]
     by_site: dict[tuple[int, Place], list[Move]] = {}
     for move in every:
         by_site.setdefault((move.earlier[0].track, move.earlier[0].end), []).append(move)
     sites = [_Site.of(moves) for moves in by_site.values()]
-    trust = Trust(
+    reach = IdentityReach(
         track_rows,
         (
             (one.move.earlier[0].track, one.move.earlier[0].last,
@@ -182,7 +185,7 @@ def _linked(
         ),
     )  # fmt: skip
     for one in sites:
-        item = _item_of(run, one, trust)
+        item = _item_of(run, one, reach)
         if item is not None:
             yield item
 
@@ -200,8 +203,8 @@ class _Site:
 
     @property
     def move(self) -> Move:
-        """The move that describes the item: the most probable one; if that is a cut, the exchange
-        that would explain it, if any."""
+        """The move that describes the item: the most probable one, or, if that is a cut, the most
+        probable exchange if there is one, since it explains the cut."""
         best = self.moves[0]
         if best.kind != "cut":
             return best
@@ -209,13 +212,16 @@ class _Site:
 
     @staticmethod
     def of(moves: list[Move]) -> _Site:
-        """Combine the moves of several sources at one moment: of those with the same corrections
-        the most probable one counts."""
+        """Combine the moves of several sources at one moment.
+
+        Of the moves with the same corrections the most probable one counts. With the log odds l_k
+        of the remaining moves, the probability of each is exp(l_k) / (1 + Σ exp(l)).
+        """
         chosen: dict[object, Move] = {}
-        for move in sorted(moves, key=lambda move: -move.odds):
+        for move in sorted(moves, key=lambda move: -move.log_odds):
             chosen.setdefault(move.alternative.corrections, move)
         kept = tuple(chosen.values())
-        weights = np.exp(np.minimum([move.odds for move in kept], 50.0))
+        weights = np.exp(np.minimum([move.log_odds for move in kept], 50.0))
         total = 1.0 + float(weights.sum())
         alternatives = tuple(
             replace(move.alternative, probability=weight / total)
@@ -224,8 +230,8 @@ class _Site:
         return _Site(kept, alternatives, float(weights.sum()) / total)
 
 
-def _item_of(run: Run, site: _Site, trust: Trust) -> ReviewItem | None:
-    """Return the item of a moment; None if no move can be expressed by corrections."""
+def _item_of(run: Run, site: _Site, reach: IdentityReach) -> ReviewItem | None:
+    """Return the item of a moment; None if no correction expresses any of its moves."""
     best = site.move
     now = Alternative("as it is", 1.0 - site.wrong, _as_it_is(best))
     others = [one for one in site.alternatives if one.corrections][:_ALTERNATIVES]
@@ -236,8 +242,8 @@ def _item_of(run: Run, site: _Site, trust: Trust) -> ReviewItem | None:
     shares = np.array([one.probability for one in site.alternatives])
     stakes = [
         move.stake(
-            [trust.before(one.track, one.last) for one in move.earlier],
-            [trust.after(one.track, one.first) for one in move.later],
+            [reach.before(one.track, one.last) for one in move.earlier],
+            [reach.after(one.track, one.first) for one in move.later],
         )
         for move in site.moves
     ]
@@ -253,7 +259,8 @@ def _item_of(run: Run, site: _Site, trust: Trust) -> ReviewItem | None:
 
 
 def _with_halves(moves: Iterable[Move], others: list[Alternative]) -> list[Alternative]:
-    """Add the halves of the most probable exchange: one of two people who met may have left."""
+    """Add the halves of the most probable exchange, since one of two people who met may have
+    left."""
     words = {move.alternative.corrections: move.halves for move in moves}
     for place, one in enumerate(others):
         if one.corrections[0].kind == "exchanged":
@@ -271,9 +278,9 @@ def _with_halves(moves: Iterable[Move], others: list[Alternative]) -> list[Alter
 def _with_none_of_them(
     move: Move, now: Alternative, others: list[Alternative]
 ) -> list[Alternative]:
-    """Add the alternative that the person is continued by none of the tracks in question.
+    """Add the alternative that none of the tracks in question continues the person.
 
-    Its corrections state that the person is different from each of these.
+    The corrections of this alternative state that the person is different from each of them.
     """
     first, last = move.earlier[0].end, move.later[0].begin
     pairs = dict.fromkeys(
@@ -295,7 +302,7 @@ def _with_none_of_them(
 
 
 def _is(rounded: Place, place: Place) -> bool:
-    """Whether the place in a correction, which is rounded, is a certain place."""
+    """Whether the place of a correction, which is rounded, is the given place."""
     return rounded.step == place.step and bool(
         np.allclose(rounded.point, place.point, atol=_ROUNDED)
     )
@@ -320,7 +327,7 @@ def is_answered(item: ReviewItem, corrections: Many[Correction], steps: int) -> 
     Args:
         item: The item.
         corrections: The corrections that were made.
-        steps: Largest difference between steps that are the same, as a number of steps.
+        steps: Largest difference at which two steps count as the same, as a number of steps.
     """
 
     def near(one: Place, other: Place) -> bool:
@@ -352,12 +359,12 @@ def is_answered(item: ReviewItem, corrections: Many[Correction], steps: int) -> 
     return False
 
 
-class Trust:
+class IdentityReach:
     """The expected number of steps of a track that have the same identity as a given step.
 
-    With p_m the probability of a mistake at moment m, the expected number of rows r before step s
-    that have its identity is Σ_r Π_{m between r and s} (1 − p_m); likewise after it. So a mistake
-    costs little right after another probable mistake.
+    With p_m the probability of a mistake at moment m, the expected number of steps r ≤ s that have
+    the identity of step s is Σ_r Π_{m between r and s} (1 − p_m); the sum over r ≥ s holds for the
+    steps after it. So the stake of a mistake is small right after another probable mistake.
     """
 
     def __init__(
@@ -367,8 +374,8 @@ class Trust:
 
         Args:
             track_rows: The tracks of the run.
-            mistakes: Track, last step before and first step after a possible mistake, and its
-                probability.
+            mistakes: The id of the track, the last step before and the first step after each
+                possible mistake, and the probability of the mistake.
         """
         self._track_rows = track_rows
         self._logs: dict[int, Float[ndarray, " K"]] = {}
@@ -381,7 +388,7 @@ class Trust:
                 logs[at] += np.log1p(-min(probability, _CERTAIN))
 
     def before(self, track: int, step: int) -> float:
-        """Return the expected number of steps up to a step, which is included."""
+        """Return the expected number of steps up to and including a step."""
         frames = self._track_rows.tracks.frames[self._track_rows.rows[track]]
         count = int(np.searchsorted(frames, step, side="right"))
         logs = self._logs.get(track)
@@ -391,7 +398,7 @@ class Trust:
         return 1.0 + float(np.exp(between).sum())
 
     def after(self, track: int, step: int) -> float:
-        """Return the expected number of steps from a step on, which is included."""
+        """Return the expected number of steps from a step on, including it."""
         frames = self._track_rows.tracks.frames[self._track_rows.rows[track]]
         first = int(np.searchsorted(frames, step))
         logs = self._logs.get(track)
@@ -431,14 +438,14 @@ def words_of(run: Run, move: Move) -> tuple[str, str]:
 
 
 def _far(run: Run, one: int, other: int, last: int, first: int) -> str:
-    """Describe the distance of two pieces in space and time.
+    """Describe the distance of two tracklets in space and time.
 
     Args:
         run: The run.
         one: The id of the earlier track.
         other: The id of the later track.
-        last: The last step of the earlier piece.
-        first: The first step of the later piece.
+        last: The last step of the earlier tracklet.
+        first: The first step of the later tracklet.
     """
     tracks, ground = run.tracks, []
     for track, step in ((one, last), (other, first)):

@@ -1,4 +1,4 @@
-"""Review items and moves that concern a single track: it may be clutter, or two people."""
+"""Review items and moves that concern a single track: it may be clutter, or follow two people."""
 
 from __future__ import annotations
 
@@ -9,21 +9,21 @@ import numpy as np
 
 from tracker.corrections.kinds import KINDS
 from tracker.review.queue.item import WITHIN, Alternative, ReviewItem, TrackRows, proposed
-from tracker.review.queue.linking import Move, Piece
+from tracker.review.queue.linking import Move, Tracklet
 from tracker.runs.run import Run
 
 _SHORT = 1.0
-"""Time constant with which the probability that a track is clutter falls with its length,
+"""Time constant with which the probability that a track is clutter falls with the track's length,
 seconds."""
 
 _LONG = 5.0
 """Time constant of the part of this probability that is due to few boxes, seconds."""
 
 _UNSEEN = 1.0
-"""Longest gap without a box of any camera after which a track surely goes on, seconds."""
+"""Longest gap without a box of any camera for which no item is made, seconds."""
 
 _FASTEST = 3.0
-"""Speed that people in a room do not exceed for long, metres per second."""
+"""Speed above which a track may jump to another person, metres per second."""
 
 
 def items(run: Run, track_rows: TrackRows) -> Iterator[ReviewItem]:
@@ -33,14 +33,22 @@ def items(run: Run, track_rows: TrackRows) -> Iterator[ReviewItem]:
 
 
 def moves(run: Run, track_rows: TrackRows) -> Iterator[Move]:
-    """Yield moves that cut a track where it may change the person: after a gap, or at a jump."""
+    """Yield moves that cut a track where it may change to another person: at a gap or a jump."""
     for track in track_rows.ids.tolist():
         yield from _unseen(run, track_rows, track)
         yield from _fast(run, track_rows, track)
 
 
 def _clutter(run: Run, track_rows: TrackRows, track: int) -> Iterator[ReviewItem]:
-    """Yield an item if a track is short, or has few boxes."""
+    """Yield an item if a track is short, or has few boxes.
+
+    With its length t in seconds, its mean existence probability e and the share s of its steps with
+    a box of any camera, the probability of clutter is
+
+        0.6 (1 − e s) exp(−t / 5 s) + 0.3 exp(−t / 1 s) + 0.2 [boxes of one camera alone]
+
+    of which the coefficients are estimates.
+    """
     rows, tracks = track_rows.rows[track], run.tracks
     life = len(rows) * run.sequence.step_time
     boxes = tracks.seen[rows].sum(axis=1)
@@ -53,7 +61,7 @@ def _clutter(run: Run, track_rows: TrackRows, track: int) -> Iterator[ReviewItem
     if wrong < 0.05:
         return
     first, last = track_rows.span(track)
-    places = track_rows.course(rows, WITHIN * (KINDS["nobody"].accuracy or 0.0))
+    places = track_rows.simplified_path(rows, WITHIN * (KINDS["nobody"].accuracy or 0.0))
     wrong = float(min(wrong, 0.95))
     how = f"{life:.1f} s long, seen at {100 * seen:.0f} % of its steps"
     if one_alone:
@@ -69,7 +77,10 @@ def _clutter(run: Run, track_rows: TrackRows, track: int) -> Iterator[ReviewItem
 
 
 def _unseen(run: Run, track_rows: TrackRows, track: int) -> Iterator[Move]:
-    """Yield moves at long gaps of a track, after which it may follow another person."""
+    """Yield moves at long gaps of a track, after which it may follow another person.
+
+    After a gap of t seconds the probability of this is taken as 0.4 (1 − exp(−t / 5 s)).
+    """
     rows, tracks = track_rows.rows[track], run.tracks
     seen = np.flatnonzero(tracks.seen[rows].any(axis=1))
     for a, b in itertools.pairwise(seen):
@@ -79,12 +90,17 @@ def _unseen(run: Run, track_rows: TrackRows, track: int) -> Iterator[Move]:
             continue
         why = f"no camera has it from step {before.step + 1} to {after.step - 1}"
         wrong = 0.4 * (1.0 - np.exp(-seconds / 5.0))
-        piece = Piece(track, after, before)
-        yield Move((piece,), (piece,), "gap", _odds(wrong), why)
+        # stands for both tracklets: the earlier one ends before the cut, the later begins after it
+        tracklet = Tracklet(track, begin=after, end=before)
+        yield Move((tracklet,), (tracklet,), "gap", _log_odds(wrong), why)
 
 
 def _fast(run: Run, track_rows: TrackRows, track: int) -> Iterator[Move]:
-    """Yield moves where a track is faster than people are."""
+    """Yield moves where a track is faster than people walk.
+
+    The probability of a jump is taken as 0.3 times the ratio of the speed to :data:`_FASTEST`, and
+    at most 0.9.
+    """
     rows, tracks = track_rows.rows[track], run.tracks
     frames, ground = tracks.frames[rows], tracks.positions[rows, :2]
     seconds = np.diff(frames) * run.sequence.step_time
@@ -92,10 +108,14 @@ def _fast(run: Run, track_rows: TrackRows, track: int) -> Iterator[Move]:
     fast = np.flatnonzero(speed > _FASTEST)
     for k in fast[np.diff(fast, prepend=-9) > 1].tolist():
         before, after = track_rows.of_row(int(rows[k])), track_rows.of_row(int(rows[k + 1]))
-        piece = Piece(track, after, before)
+        # stands for both tracklets: the earlier one ends before the cut, the later begins after it
+        tracklet = Tracklet(track, begin=after, end=before)
         why = f"{speed[k]:.1f} m/s at step {after.step}"
-        yield Move((piece,), (piece,), "fast", _odds(min(0.3 * speed[k] / _FASTEST, 0.9)), why)
+        yield Move(
+            (tracklet,), (tracklet,), "fast", _log_odds(min(0.3 * speed[k] / _FASTEST, 0.9)), why
+        )
 
 
-def _odds(probability: float) -> float:
+def _log_odds(probability: float) -> float:
+    """Return log(p / (1 − p))."""
     return float(np.log(probability) - np.log1p(-probability))

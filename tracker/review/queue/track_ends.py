@@ -11,7 +11,7 @@ from numpy import ndarray
 from tracker.corrections import Correction, Place
 from tracker.corrections.kinds import leeway
 from tracker.review.queue.item import Alternative, ReviewItem, TrackRows, proposed
-from tracker.review.queue.moves import ends_there
+from tracker.review.queue.moves import leaving_probability
 from tracker.review.queue.unclaimed import Unclaimed, unclaimed
 from tracker.runs.run import Run
 
@@ -23,36 +23,36 @@ _WALK = 1.0
 per second."""
 
 _ASIDE = 0.5
-"""Time before a track begins, or after it ends, at which the person may have been missed,
-seconds."""
+"""Time before a track begins, or after it ends, at which the person may have been there without a
+track, seconds."""
 
 _ACCURACY = 0.3
-"""Standard deviation of the place of a missed person, metres."""
+"""Standard deviation of the place of a missing person in the proposed corrections, metres."""
 
 _APART = 1.0
 """Least time between two places of a proposed path of a missing person, seconds."""
 
 _MOST_PLACES = 12
-"""Most places of such a path."""
+"""Largest number of places of a proposed path."""
 
 _NEAR, _WHILE = 1.0, 1.0
-"""Distance, in metres, and time, in seconds, between the end of a track and unclaimed boxes that
-may be of the same person."""
+"""Largest distance, in metres, and time, in seconds, between the begin or end of a track and
+unclaimed boxes that may be of the same person."""
 
 
 def track_ends(run: Run, track_rows: TrackRows, asked: Collection[Place]) -> Iterator[ReviewItem]:
     """Yield items for missing people, then for tracks that begin or end in the middle of the room.
 
     Let q be the prior probability that people neither come nor leave at a place, n the number of
-    cameras that see the place a little earlier (or later) and have no box there, and m the
-    probability that one camera misses a person. Then the odds that the person was there are
-    q m^n / (1 − q).
+    cameras in whose pictures the person would have been a little earlier (or later), at the place
+    extrapolated from the track, and m the probability that one camera misses a person. Then the
+    odds that the person was there are q m^n / (1 − q).
 
     Args:
         run: The run.
-        track_rows: Its tracks.
-        asked: First and last places of tracks for which there are items of other sources, since
-            other tracks end or begin near there.
+        track_rows: The run's tracks.
+        asked: The first and last places of tracks that items of other sources concern, for which
+            no item is made here.
     """
     free = unclaimed(run)
     yield from (_missing(run, track_rows, one) for one in free)
@@ -72,7 +72,7 @@ def track_ends(run: Run, track_rows: TrackRows, asked: Collection[Place]) -> Ite
 
 
 def _shown(place: Place, free: list[Unclaimed], run: Run, *, before: bool) -> bool:
-    """Whether unclaimed boxes show already where the person was before, or after."""
+    """Whether unclaimed boxes show where the person of a track was before a place, or after it."""
     for one in free:
         end = one.places[-1 if before else 0]
         seconds = (place.step - end.step) * run.sequence.step_time * (1 if before else -1)
@@ -123,7 +123,7 @@ def _edge(run: Run, track_rows: TrackRows, track: int, *, before: bool) -> Itera
     cameras = sum(bool(camera.sees(beyond[None])[0]) for camera in sequence.cameras)
     if not cameras:
         return  # no camera sees the place
-    comes = ends_there(place, run)
+    comes = leaving_probability(place, run)
     odds = (1.0 - comes) / comes * _MISSED**cameras
     wrong = odds / (1.0 + odds)
     metres = _way_out(run, point)

@@ -20,20 +20,21 @@ _MISS = 0.3
 """Largest distance between the rays through the centres of two boxes of one person, metres."""
 
 _SIZE = 1.6
-"""Largest ratio between the height of a box and that of a target at the place, or its inverse."""
+"""Largest ratio of the height of a box to that of a target's box at the place; its inverse is the
+smallest."""
 
 _REACH, _FASTEST = 0.5, 2.0
-"""Largest distance between consecutive places of one person: so many metres, plus so many metres
-per second."""
+"""Largest distance between consecutive places of one person: a constant in metres, plus a speed in
+metres per second times the time between them."""
 
 _PAUSE = 0.5
 """Longest gap between consecutive places of one person, seconds."""
 
 _LASTS = 1.0
-"""Least time for which boxes must agree on a person, seconds."""
+"""Least time between the first and the last step at which boxes agree on a person, seconds."""
 
 _SHARE = 0.5
-"""Least share of the steps of this time at which they must agree."""
+"""Least share of the steps between the first and the last one at which boxes agree."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +42,7 @@ class Unclaimed:
     """A person that boxes of several cameras show and that has no track."""
 
     places: tuple[Place, ...]
-    """The place at each step at which boxes agree."""
+    """The place at each step at which boxes agree, world metres."""
     cameras: tuple[int, ...]
     """The indices of the cameras whose boxes agree."""
     share: float
@@ -53,6 +54,7 @@ class _Free:
     """The B boxes of one camera that no track explains."""
 
     steps: Int[ndarray, " B"]
+    """The step of each box."""
     rays: Float[ndarray, "B 3"]
     """Unit vectors from the camera through the centre of each box, world frame."""
     heights: Float[ndarray, " B"]
@@ -64,8 +66,8 @@ def unclaimed(run: Run) -> list[Unclaimed]:
 
     A box is explained by a track if its centre lies in the track's reprojected box. Unexplained
     boxes of two cameras agree if the rays through their centres pass within 0.3 m of each other at
-    a place in the room that is out of the reach of a correction from any track, and if both are as
-    high as a target there.
+    a place in the room, if no track is within the reach of a correction (:data:`REACH`) from this
+    place, and if both boxes are about as high as a target's box there.
     """
     free = [_free(run, number) for number in range(len(run.sequence.cameras))]
     found = [
@@ -78,6 +80,7 @@ def unclaimed(run: Run) -> list[Unclaimed]:
 
 
 def _free(run: Run, number: int) -> _Free:
+    """Return the boxes of the camera with an index that no track explains."""
     camera, views = run.sequence.cameras[number], run.views[: run.done]
     boxes = [step[number].boxes for step in views]
     counts = np.array([len(one) for one in boxes], dtype=np.int64)
@@ -120,23 +123,24 @@ def _at_one_step(
 
 
 def _meet(run: Run, one: int, other: int, first: _Free, second: _Free) -> Float[ndarray, "M 6"]:
-    """Return the places on which boxes of two cameras agree, each box with each.
+    """Return the places on which boxes of two cameras agree, of all pairs of boxes.
 
     Args:
         run: The run.
         one: The index of the first camera.
         other: The index of the second camera.
         first: The unexplained boxes of the first camera.
-        second: Those of the second camera.
+        second: The unexplained boxes of the second camera.
 
     Returns:
-        Step, x, y and z in world metres, and the indices of the two cameras, a row for each pair.
+        Step, x, y and z in world metres, and the indices of the two cameras, in a row for each
+        pair of boxes that agrees.
     """
     cameras, sequence = run.sequence.cameras, run.sequence
     i, j = _at_one_step(first.steps, second.steps)
     if not len(i):
         return np.zeros((0, 6))
-    # the points of the two rays that are nearest to each other
+    # a and b: the points of the two rays that are nearest to each other
     between = cameras[other].centre - cameras[one].centre
     r, s = first.rays[i], second.rays[j]
     across = np.einsum("nk,nk->n", r, s)
@@ -172,10 +176,10 @@ def _track_near(run: Run, steps: ndarray, places: Float[ndarray, "M 3"]) -> Bool
 
 
 def _chains(points: Float[ndarray, "M 6"], step_time: float) -> Iterator[Unclaimed]:
-    """Chain places that follow each other to people, and yield those that last long enough.
+    """Chain places that follow each other, and yield each chain that is long enough as a person.
 
     Args:
-        points: The rows of :func:`_meet`, by step.
+        points: The rows of :func:`_meet` of all pairs of cameras, in the order of steps.
         step_time: Duration of a step, seconds.
     """
     going: list[list[ndarray]] = []

@@ -20,26 +20,28 @@ from tracker.evaluation.settings import EvaluationSettings
 from tracker.sequences.sequence import GroundTruth
 
 _BRIEF = 0.4
-"""Length up to which a difference is ignored, since tracks may begin a little earlier or later,
-seconds."""
+"""Length up to which a difference is ignored, seconds, since tracks may begin a little earlier or
+later."""
 
 _TOGETHER = 1.0
-"""Time between the beginnings of differences that are one moment, seconds."""
+"""Largest time between the beginnings of differences that count as one moment, seconds."""
 
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """A stretch of a track during which the other run has another identity, or no track."""
+    """A part of a track during which the other run has another identity, or no track."""
 
     first: int
+    """The first step of the part."""
     last: int
+    """The last step of the part, included."""
     person: int
     """The id of the track in this run."""
     other: int | None
-    """The id in this run of the identity in the other run; None if that has no track in this run,
-    or if the other run has no track at all."""
+    """The id in this run of the identity in the other run; None if this identity has no track in
+    this run, or if the other run has no track during the part."""
     missing: bool
-    """Whether the other run has no track."""
+    """Whether the other run has no track during the part."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +49,7 @@ class Disagreement:
     """A moment at which other runs disagree with this one."""
 
     step: int
-    """The first step."""
+    """The first step of the moment."""
     ids: tuple[int, ...]
     """The ids of the tracks concerned, in this run."""
     variants: tuple[str, ...]
@@ -76,34 +78,42 @@ def compared(
 
 
 def agreement(comparison: Comparison) -> float:
-    """Return IDF1 of one run by the other ([RT16]), which is symmetric; 1 if neither has tracks."""
+    """Return IDF1 ([RT16]) of one run with the other in the place of the truth, which is symmetric
+    in the two runs; 1 if neither has tracks."""
     found = identity(comparison).f1
     return 1.0 if found is None else found
 
 
 def differences(comparison: Comparison, step_time: float) -> list[Difference]:
-    """Return the stretches of tracks, longer than a moment, on which the two runs differ."""
+    """Return the parts of tracks, longer than :data:`_BRIEF`, on which the two runs differ.
+
+    Identities of the two runs are matched as for IDF1, rows as for CLEAR MOT.
+
+    Args:
+        comparison: The comparison, as returned by :func:`compared`.
+        step_time: Duration of a step, seconds.
+    """
     truth, tracks = comparison.truth, comparison.tracks
     partner = identity(comparison).track_of
     of_track = np.full(len(tracks.names), -1)
     of_track[partner[partner >= 0]] = np.flatnonzero(partner >= 0)
     matches = clear(comparison).matches
     # −1: the other run has no track; −2: its track has no partner in this run
-    is_who = np.full(len(truth), -1)
+    identities = np.full(len(truth), -1)
     found = of_track[tracks.indices[matches.track_rows]]
-    is_who[matches.truth_rows] = np.where(found >= 0, found, -2)
+    identities[matches.truth_rows] = np.where(found >= 0, found, -2)
     result = []
     for person in range(len(truth.names)):
         rows = np.flatnonzero(truth.indices == person)
         result += _stretches(
-            truth.frames[rows], is_who[rows], person, truth.names, max(_BRIEF / step_time, 1.0)
+            truth.frames[rows], identities[rows], person, truth.names, max(_BRIEF / step_time, 1.0)
         )
     return result
 
 
 def _stretches(
     frames: Int[ndarray, " K"],
-    is_who: Int[ndarray, " K"],
+    identities: Int[ndarray, " K"],
     person: int,
     names: Int[ndarray, " n"],
     brief: float,
@@ -112,15 +122,16 @@ def _stretches(
 
     Args:
         frames: The K steps of the track.
-        is_who: The index of the identity in the other run at each step, or −1 or −2.
+        identities: The index of the identity in the other run at each step; −1 if the other run has
+            no track, −2 if the identity of its track has no track in this run.
         person: The index of the track.
         names: The ids of all tracks, by index.
         brief: The number of steps up to which a difference is ignored.
     """
-    change = np.flatnonzero((np.diff(is_who) != 0) | (np.diff(frames) > brief)) + 1
+    change = np.flatnonzero((np.diff(identities) != 0) | (np.diff(frames) > brief)) + 1
     found = []
     for rows in np.split(np.arange(len(frames)), change):
-        who = int(is_who[rows[0]])
+        who = int(identities[rows[0]])
         first, last = int(frames[rows[0]]), int(frames[rows[-1]])
         if who == person or last - first < brief:
             continue
@@ -132,10 +143,10 @@ def _stretches(
 def disagreements(
     found: Items[tuple[str, Items[Difference]]], step_time: float
 ) -> tuple[Disagreement, ...]:
-    """Group the differences of several runs to moments, in the order of importance.
+    """Group the differences of several runs into moments, the most important first.
 
-    Moments with more runs that disagree come first; of as many, other identities before missing
-    tracks, and longer before shorter ones.
+    Moments at which more runs disagree come first; among those with the same number of runs, other
+    identities come before missing tracks, and longer differences before shorter ones.
 
     Args:
         found: The name and the differences of each other run.

@@ -41,10 +41,11 @@ FILE = Path(__file__).with_name("calibration.json")
 recording."""
 
 _WITHIN = 0.9
-"""Share of these runs whose error lies in the interval."""
+"""Share of the nearest runs of the calibration whose error lies in the interval."""
 
 _ALIKE = 60
-"""The number of runs with the nearest estimates from which the interval is made."""
+"""The number of runs of the calibration, those with the nearest estimates, that give the
+interval."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,12 +55,13 @@ class Estimate:
     score: float
     """J = IDF1(forward, backwards) × mean over cameras of IDF1(all, all but one), 0 … 1."""
     backwards: float
-    """IDF1 of the run backwards in time, with the run as it is in the place of the truth."""
+    """IDF1 of the run backwards in time, with the run itself in the place of the truth."""
     without: tuple[float, ...]
-    """IDF1 of the run without each camera; empty where there is only one camera."""
+    """IDF1 of the run without each camera, with the run itself in the place of the truth; empty if
+    there is only one camera."""
     overlaps: tuple[float | None, ...]
     """The overlap of each camera's boxes with the tracks of the run without it (see
-    :func:`overlap`); a low one is a veto."""
+    :func:`overlap`), 0 … 1; if one is low, the estimate is not to be trusted."""
     disagreements: tuple[Disagreement, ...]
     """The moments at which the runs disagree, the most important first."""
 
@@ -76,14 +78,14 @@ def estimate(
     on_progress: Callable[[int, int], None] = lambda done, total: None,
     cancelled: Callable[[], bool] = lambda: False,
 ) -> Estimate:
-    """Track a run's recording in all variants, and measure how far they agree.
+    """Track a run's recording in all variants, and measure how well they agree with the run.
 
     Args:
         run: The run, whose results of stage 1 are used as they are; only the steps that it has
             computed are tracked.
         processes: Largest number of processes.
-        on_progress: A callback that gets the number of steps done in all variants and of all.
-        cancelled: A callback that is asked now and then whether to stop.
+        on_progress: A callback that gets the number of steps done in all variants, and the total
+        number. cancelled: A callback that returns whether to stop; it is called every few steps.
 
     Raises:
         tracker.runs.pipeline.Cancelled: If ``cancelled`` returned true.
@@ -124,13 +126,14 @@ def estimate(
 
 
 def _work(item: tuple[Common, Variant], control: WorkerControl) -> Trajectories:
+    """Track one variant in a worker process."""
     common, variant = item
     return track_variant(common, variant, control.advance, control.cancelled)
 
 
 @dataclass(frozen=True, slots=True)
 class Variant:
-    """One variant of a run. Stage 1, by far the costliest, is the same for all of them."""
+    """A variant of a run. Stage 1, which takes the most time, is not computed again."""
 
     backwards: bool = False
     """Whether the steps are tracked in reverse order."""
@@ -149,14 +152,18 @@ class Common:
     """The input that all variants of a run have in common."""
 
     sequence: Sequence
+    """The recording."""
     parameters: RunParameters
+    """The parameters of the run."""
     seed: int
+    """The seed of the run's random numbers."""
     views: tuple[tuple[ViewResult, ...], ...]
     """The results of stage 1 of each step, one for each camera."""
 
 
 def variants(cameras: int) -> tuple[Variant, ...]:
-    """Return the variants for a number of cameras; a single camera is not left out."""
+    """Return the variants of a run with a number of cameras: backwards in time, and without each
+    camera unless it is the only one."""
     left_out = [Variant(without=camera) for camera in range(cameras)] if cameras > 1 else []
     return (Variant(backwards=True), *left_out)
 
@@ -173,7 +180,7 @@ def track_variant(
         common: The input that all variants have in common.
         variant: The variant.
         advance: A callback that gets the number of steps done since the last call.
-        cancelled: A callback that is asked now and then whether to stop.
+        cancelled: A callback that returns whether to stop; it is called every few steps.
 
     Raises:
         tracker.runs.pipeline.Cancelled: If ``cancelled`` returned true.
@@ -222,14 +229,15 @@ def overlap(
     half_extents: Float[ndarray, " 3"],
     views: Many[ViewResult],
 ) -> float | None:
-    """Return the mean overlap of a camera's boxes with tracks that were made without the camera.
+    """Return the mean overlap of a camera's boxes with the tracks of a run without this camera.
 
-    With the best pairs of box and track at each step it is
+    With the pairs of boxes and reprojected boxes at each step that maximize the sum of their
+    intersections over unions (IoU), it is
 
-        2 Σ_pairs IoU / (boxes + tracks in the picture)
+        2 Σ_pairs IoU / (number of boxes + number of tracks in the picture)
 
-    which is 1 if every box coincides with a track's reprojected box and the other way round. It
-    is None without any boxes and tracks. Steps at which the camera had no frame are skipped.
+    with both numbers summed over all steps. It is 1 if boxes and reprojected boxes coincide one to
+    one, and None without any boxes and tracks. Steps at which the camera had no frame are skipped.
 
     Args:
         tracks: The tracks of the run without this camera.
@@ -260,15 +268,19 @@ def overlap(
 
 @cache
 def _measured() -> Float[ndarray, "K 2"]:
-    """Return estimate and true IDF1 of the calibration, as many runs of each recording."""
+    """Return the estimate and the true IDF1 of K runs of the calibration, equally many of each
+    recording."""
     kept = json.loads(FILE.read_text(encoding="utf-8"))
     fewest = min(len(pairs) for pairs in kept.values())
     return np.concatenate([np.array(pairs)[:fewest] for pairs in kept.values()])
 
 
 def interval(score: float) -> tuple[float, float]:
-    """Return the 90 % interval of IDF1 for an estimate, from the errors of the calibration's runs
-    with the nearest estimates."""
+    """Return the bounds of the 90 % interval of IDF1 for an estimate.
+
+    They are the estimate plus the 5 % and the 95 % quantile of the error (true IDF1 − estimate) of
+    the :data:`_ALIKE` runs of the calibration with the nearest estimates.
+    """
     measured = _measured()
     near = measured[np.argsort(np.abs(measured[:, 0] - score), kind="stable")[:_ALIKE]]
     errors = near[:, 1] - near[:, 0]

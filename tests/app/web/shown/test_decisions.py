@@ -10,7 +10,7 @@ from tests.engine.synthetic import crossing, sequence
 from tracker.parameters import RunParameters
 from tracker.review.queue import queue
 from tracker.review.queue.item import TrackRows
-from tracker.review.queue.moves import pieces_of
+from tracker.review.queue.moves import tracklets_of
 from tracker.runs import pipeline
 from tracker.smoothing import Decision, names_of
 
@@ -49,9 +49,9 @@ def test_tracks_that_are_not_the_smoothed_ones_yet_have_no_names() -> None:
     assert names_of(run.smoothed, run.tracks)
     run.tracks = run.filtered
     assert names_of(run.smoothed, run.tracks) == {}
-    pieces, joined = pieces_of(run, TrackRows(run.tracks))
+    tracklets, joined = tracklets_of(run, TrackRows(run.tracks))
     assert joined is None
-    assert {piece.track for piece in pieces if piece} == set(run.tracks.ids.tolist())
+    assert {tracklet.track for tracklet in tracklets if tracklet} == set(run.tracks.ids.tolist())
     queue(run)
     # or those of another run, until its own are there
     run.tracks = run.filtered.take(run.filtered.frames < STEPS // 2)
