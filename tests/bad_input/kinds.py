@@ -32,7 +32,7 @@ from tracker.io.importing.gathering import gather
 from tracker.io.read.pieces import FormatError
 from tracker.library.bundle import unpack_bundle, write_bundle
 from tracker.library.errors import LibraryError
-from tracker.library.keeping import recording_of
+from tracker.library.keeping import record_of_recording
 from tracker.library.store import Library
 from tracker.sequences.errors import SequenceError
 from tracker.sequences.reader import read_sequence
@@ -103,7 +103,7 @@ def bundle(folder: Path) -> None:
     sequence = read_sequence(folder)
     kept = kept_run(1, kept=tracks(FRAMES, 2, cameras=2))
     with Library(folder / "library.sqlite3") as opened:
-        number = opened.keep(recording_of(sequence, str(folder)), kept)
+        number = opened.keep(record_of_recording(sequence, str(folder)), kept)
         write_bundle(folder / "run.zip", opened.result(number), sequence)
 
 

@@ -19,7 +19,7 @@ from tests.library.runs import run as made
 from tests.library.runs import tracks
 from tests.synthetic import write_sequence
 from tracker.library.bundle import unpack_bundle, write_bundle
-from tracker.library.keeping import recording_of
+from tracker.library.keeping import record_of_recording
 from tracker.library.records import Result
 from tracker.library.store import Library
 from tracker.sequences.pictures.frames import FrameReader
@@ -32,7 +32,7 @@ def kept(folder: Path, library: Path) -> Result:
     sequence = read_sequence(folder)
     result = tracks(sequence.frames, 2, cameras=len(sequence.views))
     with Library(library) as opened:
-        number = opened.keep(recording_of(sequence, str(folder)), made(1, kept=result))
+        number = opened.keep(record_of_recording(sequence, str(folder)), made(1, kept=result))
         return opened.result(number)
 
 

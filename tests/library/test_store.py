@@ -69,11 +69,11 @@ def test_deleted_runs_can_be_taken_back_until_their_space_is_freed(path: Path) -
     with filled(path, 3) as library:
         assert library.delete([1, 2]) > 1000
         assert [r.id for r in library.runs()] == [3]
-        library.take_back([1])
+        library.restore([1])
         assert [r.id for r in library.runs()] == [3, 1]
         assert library.collect(budget=100)[0] == 1
         with pytest.raises(LibraryError, match="run 2 cannot be taken back"):
-            library.take_back([2])
+            library.restore([2])
 
 
 def test_a_run_that_is_not_there_is_told(path: Path) -> None:

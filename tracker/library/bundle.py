@@ -2,7 +2,8 @@
 
 ``run.json`` describes the run; ``tracks.bin`` has the tracks as the library stores them, and
 ``tracks.csv`` has them for other programs; ``sequence/`` is an ordinary sequence folder. Its
-videos, if they are included, show step k in frame k, in full size and at a low bit rate.
+videos, if they are included, have the picture of step k as frame k, in full size and at a low bit
+rate.
 """
 
 from __future__ import annotations
@@ -32,25 +33,31 @@ from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 
 FORMAT = 1
+"""The version of the format of a bundle."""
+
 MANIFEST, TRACKS, FOLDER = "run.json", "tracks.bin", "sequence"
+"""The names of the description, the tracks and the sequence folder in a bundle."""
 
 MOST_FILES = 10_000
+"""Largest number of files of a bundle."""
+
 MOST_BYTES = 8 << 30
-"""Largest size of an unpacked archive, bytes: a small file can claim to contain more than any
-disk holds."""
+"""Largest size of an unpacked archive, bytes, since the contents of a small archive may be larger
+than any disk."""
 
 _UNREADABLE = (
     OSError, ValueError, KeyError, TypeError, AttributeError, EOFError, NotImplementedError,
     RuntimeError, zipfile.BadZipFile, zlib.error,
 )  # fmt: skip
-"""What the libraries raise for a file that is no archive, or for a damaged or encrypted one."""
+"""The exceptions that reading raises for a file that is no archive, or is damaged or encrypted."""
 
 _EXPECTED = "expected a bundle as `multiview-phd bundle` writes it"
 _QUALITY = {"preset": "veryfast", "crf": "32"}
-_ANEW = ("video", "images", "first_frame", "background", "detections",
+"""The options of the encoder libx264."""
+_REPLACED = ("video", "images", "first_frame", "background", "detections",
          "detections_first_frame", "detected_steps", "appearance", *CLOCK)  # fmt: skip
-"""Fields of a camera that are replaced, since files are indexed by step in a bundle; all others,
-such as the calibration, are copied."""
+"""The fields of a camera that are written anew, since the files of a bundle are indexed by step;
+all others, such as the calibration, are copied."""
 
 
 def write_bundle(path: Path, result: Result, sequence: Sequence, *, videos: bool = False) -> None:
@@ -63,7 +70,7 @@ def write_bundle(path: Path, result: Result, sequence: Sequence, *, videos: bool
         videos: Whether the videos are included.
 
     Raises:
-        OSError: With a sentence, if the file cannot be written.
+        OSError: If the file cannot be written; the message says why.
     """
     with replacing(path) as temporary, tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -72,6 +79,7 @@ def write_bundle(path: Path, result: Result, sequence: Sequence, *, videos: bool
 
 
 def _fill(folder: Path, result: Result, sequence: Sequence, videos: bool) -> None:
+    """Write the files of a bundle into a folder."""
     evaluation = None
     if sequence.ground_truth is not None:
         from tracker.evaluation import evaluate_sequence
@@ -102,7 +110,7 @@ def _fill(folder: Path, result: Result, sequence: Sequence, videos: bool) -> Non
             stream, sequence, tracks, result.parameters, run.seed, remarks=remarks_of(result)
         )
     if evaluation is not None:
-        from tracker.evaluation.report.page import report_html  # brings plotly
+        from tracker.evaluation.report.page import report_html  # imports plotly
 
         report = report_html(sequence, tracks, result.parameters, evaluation, seed=run.seed)
         (folder / "report.html").write_text(report, encoding="utf-8")
@@ -128,7 +136,7 @@ def _write_sequence(folder: Path, sequence: Sequence, videos: bool) -> None:
     document["target"] = {"half_extents": sequence.target_half_extents.tolist()}
     cameras: list[dict[str, Any]] = []
     for index, (view, original) in enumerate(zip(sequence.views, document["camera"], strict=True)):
-        camera = {name: value for name, value in original.items() if name not in _ANEW}
+        camera = {name: value for name, value in original.items() if name not in _REPLACED}
         camera["image_size"] = list(view.camera.image_size)
         if view.detections is not None:
             camera["detections"] = f"camera{index + 1}.csv"
@@ -136,7 +144,7 @@ def _write_sequence(folder: Path, sequence: Sequence, videos: bool) -> None:
             rows = np.column_stack([boxes.frames, boxes.boxes, boxes.scores]).tolist()
             vectors = boxes.embeddings
             lines = [f"{int(row[0])}," + ",".join(f"{v:.9g}" for v in row[1:]) for row in rows]
-            # a step without a detector differs from a step without people
+            # steps at which the detector ran and found no box are listed too
             if view.detector_ran is not None:
                 camera["detected_steps"] = "listed"
                 empty = np.setdiff1d(np.flatnonzero(view.detector_ran), boxes.frames)
@@ -174,12 +182,15 @@ def _write_sequence(folder: Path, sequence: Sequence, videos: bool) -> None:
 
 
 def _write_csv(path: Path, head: str, rows: Any) -> None:
+    """Write a table from its first line and all others."""
     with path.open("w", encoding="utf-8", newline="\n") as file:
         file.write(head + "\n")
         file.writelines(row + "\n" for row in rows)
 
 
 def _write_video(path: Path, sequence: Sequence, camera: int) -> None:
+    """Write the pictures of the camera with an index as a video, black where a picture is
+    missing."""
     import av
 
     width, height = sequence.views[camera].camera.image_size
@@ -188,7 +199,7 @@ def _write_video(path: Path, sequence: Sequence, camera: int) -> None:
         rate = Fraction(sequence.fps).limit_denominator(1000)
         stream = file.add_stream("libx264", rate=rate, options=_QUALITY)
         stream.width, stream.height = width, height
-        # colours at half resolution, as players expect them, need even sizes
+        # chroma at half resolution (4:2:0), which players expect, needs even sizes
         stream.pix_fmt = "yuv420p" if even == (width, height) else "yuv444p"
         nothing = np.zeros((height, width, 3), dtype=np.uint8)
         for picture in reader.iterate(camera):
@@ -200,7 +211,7 @@ def _write_video(path: Path, sequence: Sequence, camera: int) -> None:
 def unpack_bundle(path: Path, folder: Path) -> Result:
     """Unpack a bundle into an empty folder, and read its run.
 
-    Nothing is written outside the folder, whatever names the archive contains.
+    No file is written outside the folder, whatever names the archive contains.
 
     Args:
         path: A bundle, as :func:`write_bundle` writes it.
@@ -248,6 +259,11 @@ def unpack_bundle(path: Path, folder: Path) -> Result:
 
 
 def _check_names(path: Path, archive: zipfile.ZipFile) -> None:
+    """Check the number, the size and the names of an archive's files.
+
+    Raises:
+        LibraryError: If they are too many or too large, or a name leads out of the folder.
+    """
     entries = archive.infolist()
     if len(entries) > MOST_FILES or sum(entry.file_size for entry in entries) > MOST_BYTES:
         raise LibraryError(

@@ -1,9 +1,10 @@
-"""The encoding of a run's tracks: each column delta-encoded, byte-shuffled and compressed by zlib.
+"""The encoding of a run's tracks: columns are delta-encoded, byte-shuffled and compressed by zlib.
 
 Rows are sorted by track and then step, so that neighbours differ little; each number is replaced
 by its difference from the previous one (delta encoding), and the bytes of all differences are
 grouped by significance (byte shuffling). zlib's checksum detects damage. Positions are exact;
-existence and standard deviations are rounded to float32, and p_D to a thousandth.
+existence probabilities and standard
+deviations are rounded to float32, and detection probabilities to a thousandth.
 """
 
 from __future__ import annotations
@@ -19,9 +20,16 @@ from numpy import ndarray
 from tracker.fusion.trajectories import Trajectories
 
 _MAGIC = b"MVT1"
+"""The first bytes, which identify format and version."""
+
 _HEAD = struct.Struct("<4sIH")
+"""The header: :data:`_MAGIC`, the number of rows and the number of cameras."""
+
 _LEVEL = 6
+"""Compression level of zlib."""
+
 _MOST_ROWS = 1 << 28
+"""Largest number of rows that is read, so that a damaged header does not exhaust the memory."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,8 +37,9 @@ class KeptTracks:
     """The part of a run's result that the library stores."""
 
     tracks: Trajectories
+    """The N rows of the tracks."""
     detection_probabilities: Float[ndarray, "N C"]
-    """p_D of each camera for each row."""
+    """The detection probability of each row in each of the C cameras."""
 
 
 def pack(kept: KeptTracks) -> bytes:
@@ -53,7 +62,7 @@ def pack(kept: KeptTracks) -> bytes:
 
 
 def unpack(data: bytes) -> KeptTracks:
-    """Decode what :func:`pack` encoded; rows are sorted by step and then id.
+    """Decode the bytes of :func:`pack`; rows are sorted by step and then id.
 
     Raises:
         ValueError: If the bytes are damaged.
@@ -94,27 +103,31 @@ def unpack(data: bytes) -> KeptTracks:
 
 
 def _apart(values: ndarray, kind: type[np.floating]) -> list[ndarray]:
+    """Return the columns of an array, each contiguous and of one type."""
     return [np.ascontiguousarray(column, dtype=kind) for column in values.T]
 
 
 def _together(columns: list[ndarray], order: ndarray) -> ndarray:
+    """Return columns as an array of doubles, with the rows in an order."""
     together: ndarray = np.stack(columns, axis=1)[order].astype(np.float64)
     return together
 
 
 def _beside(columns: list[ndarray], rows: int, kind: type) -> ndarray:
+    """Return columns as an array, which has a number of rows even without columns."""
     return np.stack(columns, axis=1) if columns else np.zeros((rows, 0), dtype=kind)
 
 
 def _planes(values: Shaped[ndarray, " N"]) -> bytes:
-    """Return the differences of neighbours (modulo the integer's size), bytes by significance."""
+    """Return the differences of consecutive values, modulo 2 to the number of bits of their type,
+    with their bytes grouped by significance."""
     difference = values.copy()
     difference[1:] = values[1:] - values[:-1]
     return difference.view(np.uint8).reshape(-1, values.itemsize).T.tobytes()
 
 
 class _Reader:
-    """A reader of the columns, one after the other, from decompressed bytes."""
+    """A reader of one column after another from decompressed bytes."""
 
     def __init__(self, raw: bytes, rows: int) -> None:
         self._raw = raw

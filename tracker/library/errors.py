@@ -1,4 +1,4 @@
-"""The errors of a library, each with a sentence."""
+"""The errors of a library."""
 
 from __future__ import annotations
 
@@ -9,22 +9,22 @@ from pathlib import Path
 
 
 class LibraryError(ValueError):
-    """The library cannot be used; the message says why and what to do."""
+    """The library cannot be used; the message says why, and what the user can do."""
 
 
 class NoSuchRun(LibraryError):
-    """The library does not have the run, or not any more."""
+    """The library has no run of this number; it may have been deleted."""
 
 
 @contextmanager
 def explained(path: Path) -> Iterator[None]:
-    """Turn every exception of the database into a sentence about its file.
+    """Replace every exception of the database by an error that names the file and says what to do.
 
     Args:
         path: The library's file.
 
     Raises:
-        LibraryError: For errors of SQLite and of decoding a damaged row.
+        LibraryError: If SQLite fails, a row is damaged, or the file cannot be reached.
     """
     try:
         yield
@@ -42,6 +42,7 @@ def explained(path: Path) -> Iterator[None]:
 
 
 def _sentence(path: Path, error: sqlite3.Error) -> str:
+    """Return the message for an error of SQLite."""
     words = str(error)
     code = getattr(error, "sqlite_errorcode", 0) & 0xFF
     if code in (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED):

@@ -1,4 +1,6 @@
-"""The conversion of a finished run to a record of the library, and back to a run for display."""
+"""The conversion of recordings and finished runs to records of the library, and of a stored run to
+a run for display.
+"""
 
 from __future__ import annotations
 
@@ -33,9 +35,10 @@ THUMBNAIL = (144, 96)
 """Width and height of a recording's thumbnail, pixels: twice the size on the page."""
 
 _QUALITY = 80
+"""JPEG quality of a thumbnail, 0 … 100."""
 
 MISSING = "missing_pictures"
-"""The figure that counts the missing pictures of a run, over all cameras."""
+"""The key of the figure that is the number of missing pictures of a run in all cameras."""
 
 
 def code_version() -> str:
@@ -43,14 +46,14 @@ def code_version() -> str:
     return hashlib.sha256(numbers_version("tracks").encode()).hexdigest()[:12]
 
 
-def recording_of(
+def record_of_recording(
     sequence: Sequence, opened_as: str, thumbnail: bytes | None = None
 ) -> NewRecording:
-    """Return the record of a recording.
+    """Return the record of a recording, to be inserted into a library.
 
     Args:
         sequence: The recording.
-        opened_as: The name or the folder by which it was opened.
+        opened_as: The name or the folder by which the recording was opened.
         thumbnail: The thumbnail from :func:`thumbnail_of`, if any.
     """
     rendered = opens_by_name(sequence.folder)
@@ -71,13 +74,13 @@ def recording_of(
 
 
 def thumbnail_of(sequence: Sequence, reader: FrameReader | None = None) -> bytes | None:
-    """Return the JPEG thumbnail of a recording, None without pictures.
+    """Return the JPEG thumbnail of a recording; None if no camera has a picture at the middle step.
 
-    It is made from the picture at the middle step, of the first camera that has one.
+    The thumbnail is made from this picture of the first camera that has one.
 
     Args:
         sequence: The recording.
-        reader: The reader of its pictures; if None, one is opened.
+        reader: The reader of the recording's pictures; if None, one is opened.
     """
     if reader is None:
         with FrameReader(sequence) as own:
@@ -98,7 +101,7 @@ def thumbnail_of(sequence: Sequence, reader: FrameReader | None = None) -> bytes
 
 
 CURVE = 300
-"""Most values of a curve that is stored."""
+"""Largest number of values of a stored curve."""
 
 
 def stride(steps: int, values: int) -> int:
@@ -106,25 +109,25 @@ def stride(steps: int, values: int) -> int:
 
     Args:
         steps: The number of steps.
-        values: Most values of the curve.
+        values: Largest number of values of the curve.
     """
     return max(1, -(-steps // values))
 
 
-def kept_of(run: Run) -> KeptTracks:
+def stored_tracks(run: Run) -> KeptTracks:
     """Return the part of a run's result that the library stores."""
     tracks = run.tracks
     probabilities = np.zeros(tracks.seen.shape)
     for step in range(run.done):
         rows = tracks.at(step)
         components = tracks.components[rows]
-        own = components >= 0  # rows that smoothing put into gaps have no component
+        own = components >= 0  # rows by which smoothing fills gaps have no component
         known = run.fused[step].detection_probabilities
         probabilities[rows][own] = known[:, components[own]].T
     return KeptTracks(tracks, probabilities)
 
 
-def run_of(
+def record_of_run(
     run: Run,
     *,
     source: Source,
@@ -132,14 +135,14 @@ def run_of(
     seconds: float,
     evaluation: Evaluation | None = None,
 ) -> NewRun:
-    """Return the record of a finished run.
+    """Return the record of a finished run, to be inserted into a library.
 
     Args:
         run: The finished run.
         source: The command that computed it.
-        began: The time when its computation began, seconds since 1970.
-        seconds: The duration of its computation, seconds.
-        evaluation: The evaluation of its tracks, if there is ground truth.
+        began: The time when the computation began, seconds since 1970.
+        seconds: The duration of the computation, seconds.
+        evaluation: The evaluation of the run's tracks, if there is ground truth.
 
     Raises:
         ValueError: If the run is not finished, or the evaluation does not cover all its steps.
@@ -170,7 +173,7 @@ def run_of(
         source=source,
         targets=len(np.unique(run.tracks.ids)),
         figures=figures,
-        kept=kept_of(run),
+        kept=stored_tracks(run),
         ospa=() if evaluation is None else ospa_of(evaluation),
         corrections=tuple(
             one.model_dump(mode="json", exclude_none=True) for one in run.corrections
@@ -179,14 +182,14 @@ def run_of(
 
 
 def figures_of(evaluation: Evaluation) -> dict[str, float | int | None]:
-    """Return the figures of an evaluation by key; none without ground truth."""
+    """Return the figures of an evaluation by key; empty without ground truth."""
     if not evaluation.has_truth:
         return {}
     return {figure.definition.key: figure.value for figure in evaluation.figures}
 
 
 def rescored(result: Result, evaluation: Evaluation) -> Result:
-    """Return a stored run with the figures of an evaluation in the place of provisional ones."""
+    """Return a stored run whose provisional figures are replaced by those of an evaluation."""
     figures = figures_of(evaluation)
     headlines: dict[str, Any] = {name: figures.get(name) for name in HEADLINES}
     return replace(
@@ -198,7 +201,8 @@ def rescored(result: Result, evaluation: Evaluation) -> Result:
 
 
 def ospa_of(evaluation: Evaluation) -> tuple[float, ...]:
-    """Return the stored curve of OSPA over time: means over :func:`stride` steps each, metres."""
+    """Return the curve of OSPA over time as it is stored: means over :func:`stride` steps,
+    metres."""
     if not evaluation.has_truth:
         return ()
     values = evaluation.series.ospa
@@ -209,26 +213,26 @@ def ospa_of(evaluation: Evaluation) -> tuple[float, ...]:
 
 
 def remarks_of(result: Result) -> tuple[str, ...]:
-    """Return the sentences that must accompany a stored run wherever it is exported."""
+    """Return the sentences that accompany a stored run in every export."""
     missing, corrected = result.figures.get(MISSING), result.run.corrected
     pictures = (f"{missing} pictures were missing",) if missing else ()
     words = "1 correction" if corrected == 1 else f"{corrected} corrections"
     return pictures + ((f"{words} of a person obeyed",) if corrected else ())
 
 
-def run_from(sequence: Sequence, result: Result, *, key: str) -> Run:
-    """Make a run for display from a stored one: it has the tracks, but no results of stage 1.
+def run_for_display(sequence: Sequence, result: Result, *, key: str) -> Run:
+    """Return a run for display with the tracks of a stored run.
 
-    The posterior of each step has one component for each track; there are no boxes,
-    measurements and associations.
+    The run has no results of stage 1 and no associations. The posterior of each step has one
+    component for each track, with a diagonal covariance.
 
     Args:
-        sequence: The recording, as it is now.
+        sequence: The recording as it is now, which may have changed since the run.
         result: The stored run.
         key: The key of the new run.
 
     Raises:
-        ValueError: If the recording has another number of cameras now.
+        ValueError: If the recording has a different number of cameras now.
     """
     # the stages' keys are unique, so that no computation re-uses these incomplete stages
     known = stage_keys(sequence, result.parameters, result.run.seed)
@@ -267,6 +271,14 @@ def _posterior(
     covariances: Float[ndarray, "N 3 3"],
     probabilities: Float[ndarray, "C N"],
 ) -> FusionResult:
+    """Return the result of fusion for one step of a run for display.
+
+    Args:
+        run: The run with its N tracked places.
+        rows: The rows of the step.
+        covariances: The covariance of the place of each row, m².
+        probabilities: The detection probability of each of C cameras for each row.
+    """
     tracks = run.tracks
     shape = (len(probabilities), rows.stop - rows.start)
     return FusionResult(

@@ -1,4 +1,4 @@
-"""The records of the library: recordings and runs, as they are listed, read and inserted."""
+"""The records of the library: recordings and runs as they are inserted, listed and read."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ Source = Literal["track", "page", "bundle", "batch"]
 HEADLINES = (
     "mota", "idf1", "hota", "ospa", "position_error", "misses", "false_positives", "id_switches",
 )  # fmt: skip
-"""Figures that have a column of their own, by which runs are listed and sorted."""
+"""The keys of the figures that have a column of their own, so that runs can be listed and sorted by
+them."""
 
 PROVISIONAL = "made before the run was finished; opening it computes them again"
 """The note on figures that an earlier version computed before the run was finished."""
@@ -25,45 +26,58 @@ class Recording(NamedTuple):
     """A recording that was opened, with or without stored runs."""
 
     id: int
+    """The number of the recording in the library."""
     place: str
     """The name of a built-in recording, or the folder, by which it is opened again."""
     name: str
+    """The name of the recording, for display."""
     kind: str
-    """``rendered`` or ``folder``."""
+    """``rendered`` for a built-in recording, or ``folder``."""
     digest: str
-    """The hash of its content when it was last opened."""
+    """The hash of the recording's content when it was last opened."""
     cameras: int
     """The number of cameras."""
     frames: int
     """The number of steps."""
     fps: float
+    """The number of steps per second."""
     has_pictures: int
+    """Whether every camera has pictures, 0 or 1."""
     has_detections: int
+    """Whether every camera has boxes of an outside detector, 0 or 1."""
     people: int | None
-    """The number of people in the ground truth; None without one."""
+    """The number of people in the ground truth; None without ground truth."""
     opened: float
-    """The time when it was last opened, seconds since 1970."""
+    """The time when the recording was last opened, seconds since 1970."""
     runs: int
-    """The number of its runs."""
+    """The number of stored runs of the recording."""
 
 
 class KeptRun(NamedTuple):
     """A stored run without its tracks, so that thousands can be listed at once."""
 
     id: int
+    """The number of the run in the library."""
     recording: int
+    """The number of the recording, :attr:`Recording.id`."""
     recording_name: str
+    """The name of the recording, for display."""
     began: float
-    """The time when its computation began, seconds since 1970."""
+    """The time when the computation began, seconds since 1970."""
     seconds: float
-    """The duration of its computation, seconds."""
+    """The duration of the computation, seconds."""
     steps: int
+    """The number of steps that were tracked."""
     single_view: str
+    """The key of the single-view method."""
     fusion_method: str
+    """The key of the fusion method."""
     changes_json: str
+    """The values of :attr:`changes`, as JSON."""
     seed: int
+    """The seed of the random numbers."""
     version: str
-    """The version of the program."""
+    """The version of the program that computed the run."""
     code: str
     """The hash of the code that computes results, as in the keys of stages."""
     source: str
@@ -71,8 +85,8 @@ class KeptRun(NamedTuple):
     targets: int
     """The number of tracks."""
     mota: float | None
-    """This and the following figures (OSPA and position error in metres) are None where they are
-    not defined or the recording has no truth."""
+    """This and the following seven figures (OSPA and position error in metres) are None if they are
+    not defined or the recording has no ground truth."""
     idf1: float | None
     hota: float | None
     ospa: float | None
@@ -81,33 +95,37 @@ class KeptRun(NamedTuple):
     false_positives: int | None
     id_switches: int | None
     name: str
+    """The name that the user gave the run, or an empty string."""
     star: int
+    """Whether the user starred the run, 0 or 1."""
     note: str
+    """The user's note, or an empty string."""
     tags_json: str
+    """The values of :attr:`tags`, as JSON."""
     corrected: int = 0
     """The number of corrections of the run."""
     final: int = 0
-    """Whether the figures are those of a finished run's tracks: of all steps, smoothed and
-    corrected. Earlier versions also stored figures of unfinished runs."""
+    """Whether the figures are of the finished run's tracks, 0 or 1: of all steps, after smoothing
+    and corrections. Earlier versions also stored figures of unfinished runs."""
 
     @property
     def provisional(self) -> bool:
-        """Whether the run has figures that have to be computed again."""
+        """Whether the run has figures of an unfinished run, which have to be computed again."""
         return not self.final and self.misses is not None
 
     @property
     def changes(self) -> dict[str, Any]:
-        """The values that differ from the recording's defaults, by key."""
+        """The values of parameters that differ from the recording's defaults, by key."""
         return dict(json.loads(self.changes_json))
 
     @property
     def tags(self) -> list[str]:
-        """The tags that users gave the run."""
+        """The tags that the user gave the run."""
         return list(json.loads(self.tags_json))
 
     @property
     def steps_per_second(self) -> float:
-        """Mean speed of the computation; 0 where nothing was computed."""
+        """The mean number of steps computed per second; 0 if nothing was computed."""
         return self.steps / self.seconds if self.seconds > 0.0 else 0.0
 
     @property
@@ -134,24 +152,30 @@ class Result:
     """A stored run with its tracks, for display, evaluation and export."""
 
     run: KeptRun
+    """The run as it is listed."""
     place: str
     """The name or folder by which the recording is opened again."""
     key: str
-    """The hash of recording, parameters, seed and code."""
+    """The hash of recording, parameters, seed, corrections and code."""
     digest: str
     """The hash of the recording's content when it was tracked."""
     machine: str
+    """The system, the processor and the name of the computer that tracked it."""
     parameters: RunParameters
+    """The parameters as this version reads them."""
     unknown: tuple[str, ...]
-    """The keys of parameters that this version does not accept; they are at their defaults."""
+    """The keys of stored parameters that this version does not accept; :attr:`parameters` has their
+    defaults."""
     values: dict[str, Any]
     """All parameters as they were stored."""
     figures: dict[str, Any]
+    """The figures of the evaluation by key; empty without ground truth."""
     kept: KeptTracks
+    """The tracks."""
     ospa: tuple[float, ...] = ()
-    """OSPA over time, as means over equally many steps each, metres; empty without truth."""
+    """OSPA over time, as means over equally many steps each, metres; empty without ground truth."""
     corrections: tuple[dict[str, Any], ...] = ()
-    """The corrections of the run, in the form of a log of corrections."""
+    """The corrections of the run, each in the form of a line of the log of corrections."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

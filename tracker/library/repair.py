@@ -15,6 +15,7 @@ from tracker.library import columns, schema
 from tracker.library.errors import LibraryError, explained
 
 _MOST_COMPLAINTS = 20
+"""Largest number of problems that are reported."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,7 +23,7 @@ class Checked:
     """The result of checking a library."""
 
     complaints: tuple[str, ...]
-    """A sentence for each problem; none if there is no damage."""
+    """The problems, a sentence for each; empty if there is no damage."""
     runs: int
     """The number of runs that can be read with their tracks."""
 
@@ -48,21 +49,24 @@ def check(path: Path) -> Checked:
             if word != "ok"
         ]
         schema.migrate(memory, path, schema.MIGRATIONS[: max(1, version)])
-        lost = [f"row {row} of {table} {why}" for table, row, why in _save(connection, memory)]
-        # rows that the damage hides are complained of by the integrity check alone
+        lost = [
+            f"row {row} of {table} {why}" for table, row, why in _copy_readable(connection, memory)
+        ]
+        # rows that cannot be found at all are reported by the integrity check alone
         complaints += lost
         (good,) = memory.execute("SELECT count(*) FROM runs").fetchone()
     return Checked(tuple(complaints[:_MOST_COMPLAINTS]), good)
 
 
 def repair(path: Path) -> tuple[Path, int, int]:
-    """Put a copy of the file aside, and replace the file by one of all rows that can be read.
+    """Copy the file, and replace it by a new one with all rows that can be read.
 
     Returns:
-        The copy, the number of runs that were saved, and the number of rows that were lost.
+        The path of the copy, the number of runs in the new file, and the number of rows that could
+        not be read.
 
     Raises:
-        LibraryError: If nothing can be read; the file is then unchanged.
+        LibraryError: If the file cannot be read; it is then unchanged.
     """
     aside = path.with_name(f"{path.stem}-damaged-{time.strftime('%Y%m%d-%H%M%S')}{path.suffix}")
     made = path.with_name(f".{path.name}.repaired")
@@ -78,7 +82,7 @@ def repair(path: Path) -> tuple[Path, int, int]:
                 version = schema.version_of(old, path)
                 schema.migrate(new, made, schema.MIGRATIONS[: max(1, version)])
                 new.execute("BEGIN")
-                lost = len(_save(old, new, with_tracks=True))
+                lost = len(_copy_readable(old, new, with_tracks=True))
                 new.execute("COMMIT")
                 schema.migrate(new, made)
                 (saved,) = new.execute("SELECT count(*) FROM runs").fetchone()
@@ -91,12 +95,13 @@ def repair(path: Path) -> tuple[Path, int, int]:
 
 
 def _reader(path: Path) -> sqlite3.Connection:
+    """Open a library for reading; invalid UTF-8 in texts is replaced."""
     connection = sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True, timeout=5.0)
     connection.text_factory = lambda data: data.decode("utf-8", errors="replace")
     return connection
 
 
-def _save(
+def _copy_readable(
     old: sqlite3.Connection, new: sqlite3.Connection, *, with_tracks: bool = False
 ) -> list[tuple[str, int, str]]:
     """Copy all rows that can be read: runs with their tracks, and their recordings.
@@ -107,7 +112,7 @@ def _save(
         with_tracks: Whether the tracks are copied too, rather than only decoded as a check.
 
     Returns:
-        Table, row number and reason of each row that was not copied.
+        The table, the row number and the reason of each row that was not copied.
     """
     lost: list[tuple[str, int, str]] = []
     tracked: set[int] = set()
@@ -143,11 +148,12 @@ INSERT OR IGNORE INTO recordings
 VALUES (:id, 'lost-' || :id, 'a recording that was lost', 'folder', '', 0, 0, 25.0, 0, 0, NULL,
         NULL, 0.0)
 """
-"""The substitute for a recording whose row cannot be read, so that its runs can be kept."""
+"""The statement that inserts a substitute for a recording whose row cannot be read, so that its
+runs can be kept."""
 
 
 def _numbers(old: sqlite3.Connection, table: str) -> list[int]:
-    """Return the row numbers that can be reached from either end of the table."""
+    """Return the row numbers that can be reached from the first or the last row of a table."""
     found: set[int] = set()
     for order in ("ASC", "DESC"):
         try:

@@ -12,7 +12,7 @@ from pathlib import Path
 from tracker.library.errors import LibraryError
 
 APPLICATION_ID = 0x4D56_5048
-"""``MVPH``, by which ``file`` and SQLite's own tools recognise the file."""
+"""The bytes ``MVPH``, by which the program ``file`` and SQLite's tools recognise the file."""
 
 MIGRATIONS: tuple[tuple[str, ...], ...] = (
     (
@@ -73,20 +73,22 @@ MIGRATIONS: tuple[tuple[str, ...], ...] = (
         f"PRAGMA application_id = {APPLICATION_ID}",
     ),
     (
-        # how many corrections a person made that the run obeys, and what they say: JSON by zlib
+        # the number of corrections of the run, and the corrections as JSON compressed by zlib
         "ALTER TABLE runs ADD COLUMN corrected INTEGER NOT NULL DEFAULT 0",
         "ALTER TABLE results ADD COLUMN corrections BLOB",
     ),
     (
-        # whether the figures were made of all steps and of the tracks that the run ended with: the
-        # page stored earlier ones too, `track` and `batch` never did
+        # whether the figures are of the finished run's tracks: the page also stored figures of
+        # unfinished runs, `track` and `batch` did not
         "ALTER TABLE runs ADD COLUMN final INTEGER NOT NULL DEFAULT 0",
         "UPDATE runs SET final = 1 WHERE source IN ('track', 'batch')",
     ),
 )
-"""The statements that lead from each version to the next, the first from an empty file."""
+"""The statements that migrate a file from each version to the next, the first from an empty
+file."""
 
 VERSION = len(MIGRATIONS)
+"""The current version of the schema."""
 
 
 def version_of(connection: sqlite3.Connection, path: Path) -> int:
@@ -120,7 +122,7 @@ def migrate(
 
     Args:
         connection: The open file.
-        path: Its path, for messages.
+        path: The path of the file, for messages.
         migrations: The migrations up to the wanted version.
     """
     connection.execute("BEGIN IMMEDIATE")

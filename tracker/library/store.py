@@ -1,4 +1,4 @@
-"""The library's file: recordings, their runs, and the runs' tracks.
+"""The library's file, which stores recordings, runs and their tracks.
 
 Several processes may read and write it at once. Every change is one transaction of SQLite in WAL
 mode: if a process ends at any time, all earlier changes are in the file, and a run is stored with
@@ -27,16 +27,17 @@ WAIT_SECONDS = 5.0
 """Longest wait for the transaction of another process, seconds."""
 
 CHECKED_BYTES = 64 << 20
-"""Size up to which a file is checked before the first write, so that a damaged one is not
-written to, bytes."""
+"""Size of the file, bytes, up to which it is checked before the first write, so that a damaged file
+is not changed."""
 
 UNDO_SECONDS = 24 * 3600.0
-"""Time for which a deleted run can be restored, unless the space is freed before, seconds."""
+"""Time for which a deleted run can be restored, seconds, unless :meth:`Library.collect` removes it
+before."""
 
 OSPA = "ospa over time"
-"""The key among a run's figures of its curve of OSPA."""
+"""The key of the curve of OSPA among a run's stored figures."""
 
-_RUN = ", ".join(
+_COLUMNS_OF_RUN = ", ".join(
     {
         "recording_name": "recordings.name",
         "changes_json": "changes",
@@ -44,25 +45,27 @@ _RUN = ", ".join(
     }.get(name, f"runs.{name}")
     for name in KeptRun._fields
 )
-_RUNS = f"SELECT {_RUN} FROM runs JOIN recordings ON recordings.id = runs.recording"
-_UNTOUCHED = "star = 0 AND name = '' AND note = '' AND tags = '[]'"
+_RUNS = f"SELECT {_COLUMNS_OF_RUN} FROM runs JOIN recordings ON recordings.id = runs.recording"
+_UNMARKED = "star = 0 AND name = '' AND note = '' AND tags = '[]'"
+"""The condition of SQL for runs that a user has not marked."""
 
 
 class Library:
-    """One open library file. It is thread-safe; close it, or use ``with``."""
+    """An open library file. It is thread-safe, and closed by :meth:`close` or at the end of
+    ``with``."""
 
     def __init__(
         self, path: Path, *, read_only: bool = False, wait_seconds: float = WAIT_SECONDS
     ) -> None:
-        """Open the file, or make it if there is none; an older one is migrated.
+        """Open the file, or create it if there is none; a file of an older version is migrated.
 
         Args:
             path: The library's file.
-            read_only: Whether the file is neither made nor changed.
+            read_only: Whether the file is only read: it is not created, migrated or changed.
             wait_seconds: Longest wait for the transaction of another process, seconds.
 
         Raises:
-            LibraryError: With a sentence, if the library cannot be opened.
+            LibraryError: If the library cannot be opened; the message says why, and what to do.
         """
         self.path = path
         self.read_only = read_only
@@ -108,7 +111,8 @@ class Library:
             return None if found is None or found[0] is None else bytes(found[0])
 
     def runs(self, recording: int | None = None) -> list[KeptRun]:
-        """Return the runs of one recording, or of all, the newest first, without deleted ones."""
+        """Return the runs of one recording or of all recordings, the newest first, without deleted
+        ones."""
         where, values = "deleted IS NULL", []
         if recording is not None:
             where, values = where + " AND recording = ?", [recording]
@@ -117,7 +121,7 @@ class Library:
             return [KeptRun._make(row) for row in found]
 
     def run(self, number: int) -> KeptRun:
-        """Return the run of this number.
+        """Return the run with a number.
 
         Raises:
             LibraryError: If there is no such run, or it was deleted.
@@ -136,7 +140,7 @@ class Library:
         """Return a run by its number, or by its name.
 
         Raises:
-            LibraryError: If there is no such run, or several have that name.
+            LibraryError: If no run, or more than one run, has this number or name.
         """
         if text.isdecimal():
             return self.run(int(text))
@@ -150,7 +154,7 @@ class Library:
         return named[0]
 
     def with_key(self, key: str) -> KeptRun | None:
-        """Return the run of this key (see :attr:`Result.key`); None if it is not stored."""
+        """Return the run with a key (see :attr:`Result.key`); None if it is not stored."""
         with self._reading() as connection:
             row = connection.execute(
                 f"{_RUNS} WHERE runs.key = ? AND deleted IS NULL ORDER BY runs.id DESC", (key,)
@@ -185,27 +189,28 @@ class Library:
             )  # fmt: skip
 
     def size(self) -> int:
-        """Return the size on disk, bytes."""
+        """Return the size of the file and of its write-ahead log, bytes."""
         beside = (self.path, self.path.with_name(self.path.name + "-wal"))
         return sum(part.stat().st_size for part in beside if part.exists())
 
     # writing
 
     def open_recording(self, new: NewRecording) -> int:
-        """Record that a recording was opened, and return its number."""
+        """Insert a recording, or update it and the time when it was opened, and return its
+        number."""
         with self._writing() as connection:
             return self._recording(connection, new)
 
     def keep(self, recording: NewRecording, new: NewRun, budget: int = KEEP) -> int:
         """Store a run, and delete the oldest unmarked runs beyond the budget.
 
-        A run is unmarked if it has no star, name, note or tag. The same run computed again (with
-        the same key) replaces the stored one; a deleted one is restored.
+        A run is unmarked if it has no star, name, note or tag. If a run with the same key is
+        stored, its tracks and figures are replaced; if it was deleted, it is restored.
 
         Args:
             recording: The run's recording.
             new: The run.
-            budget: Most unmarked runs that are kept, this one included.
+            budget: Largest number of unmarked runs that are kept, including this one.
 
         Returns:
             The run's number.
@@ -224,7 +229,7 @@ class Library:
                 connection.execute(
                     "UPDATE runs SET began = ?, deleted = NULL WHERE id = ?", (new.began, number)
                 )
-                if new.figures:  # they may be of other settings than those in the list of runs
+                if new.figures:  # other settings of the evaluation give other figures
                     self._list_figures(connection, number, new.figures)
             connection.execute(
                 "INSERT OR REPLACE INTO results (run, parameters, figures, columns, corrections) "
@@ -233,7 +238,7 @@ class Library:
             )
             connection.execute(
                 # this run is kept even if the clock was set back
-                f"DELETE FROM runs WHERE id IN (SELECT id FROM runs WHERE {_UNTOUCHED} "
+                f"DELETE FROM runs WHERE id IN (SELECT id FROM runs WHERE {_UNMARKED} "
                 "AND deleted IS NULL ORDER BY id = ? DESC, began DESC LIMIT -1 OFFSET ?)",
                 (number, max(budget, 1)),
             )
@@ -243,11 +248,11 @@ class Library:
     def score(
         self, number: int, figures: dict[str, float | int | None], ospa: Sequence[float]
     ) -> None:
-        """Replace the figures of a run by those of the tracks that are stored with it.
+        """Replace the figures of a run by those computed from its stored tracks.
 
         Args:
             number: The run's number.
-            figures: The new figures by name; other figures of the run are kept.
+            figures: The new figures by key; other figures of the run are kept.
             ospa: OSPA over time, in the form of :attr:`Result.ospa`.
 
         Raises:
@@ -260,7 +265,7 @@ class Library:
             self._list_figures(connection, number, figures)
 
     def move(self, recording: int, place: str) -> None:
-        """Change the place from which a recording is opened.
+        """Change the name or folder from which a recording is opened (see :attr:`Recording.place`).
 
         Raises:
             LibraryError: If there is no such recording, or another one has that place.
@@ -278,11 +283,11 @@ class Library:
                 raise LibraryError(f"{self.path}: there is no recording {recording}")
 
     def rename(self, number: int, name: str) -> None:
-        """Name a run; an empty name removes it."""
+        """Set the name of a run; an empty one removes the name."""
         self._set(number, "name", " ".join(name.split()))
 
     def star(self, number: int, on: bool = True) -> None:
-        """Star a run, so that it is kept whatever the budget, or remove the star."""
+        """Star a run, so that it is kept independently of the budget, or remove the star."""
         self._set(number, "star", int(on))
 
     def note(self, number: int, text: str) -> None:
@@ -311,11 +316,11 @@ class Library:
                 )
             return size
 
-    def take_back(self, numbers: Sequence[int]) -> None:
+    def restore(self, numbers: Sequence[int]) -> None:
         """Restore deleted runs.
 
         Raises:
-            LibraryError: If a run cannot be restored any more.
+            LibraryError: If a run does not exist any more.
         """
         with self._writing() as connection:
             for number in numbers:
@@ -333,7 +338,7 @@ class Library:
         with self._writing() as connection:
             gone = connection.execute("DELETE FROM runs WHERE deleted IS NOT NULL").rowcount
             gone += connection.execute(
-                f"DELETE FROM runs WHERE id IN (SELECT id FROM runs WHERE {_UNTOUCHED} "
+                f"DELETE FROM runs WHERE id IN (SELECT id FROM runs WHERE {_UNMARKED} "
                 "ORDER BY began DESC LIMIT -1 OFFSET ?)",
                 (max(budget, 0),),
             ).rowcount
@@ -357,6 +362,8 @@ class Library:
         )
 
     def _prepare(self) -> None:
+        """Set the options of the connection, and check and migrate the file unless it is only
+        read."""
         connection = self._connection
         connection.execute("PRAGMA trusted_schema = OFF")
         connection.execute("PRAGMA cell_size_check = ON")
@@ -399,6 +406,7 @@ class Library:
                 raise
 
     def _recording(self, connection: sqlite3.Connection, new: NewRecording) -> int:
+        """Insert or update a recording, and return its number."""
         values = {
             "place": new.place,
             "name": new.name,
@@ -441,6 +449,7 @@ class Library:
         connection.execute(f"UPDATE runs SET {columns}, final = 1 WHERE id = ?", (*values, number))
 
     def _insert(self, connection: sqlite3.Connection, recording: int, new: NewRun) -> int:
+        """Insert a run into the list of runs, and return its number."""
         values: dict[str, Any] = {
             "recording": recording,
             **{
@@ -463,16 +472,19 @@ class Library:
         return done.lastrowid
 
     def _set(self, number: int, column: str, value: str | int) -> None:
+        """Set one column of a run."""
         with self._writing() as connection:
             self.run(number)
             connection.execute(f"UPDATE runs SET {column} = ? WHERE id = ?", (value, number))
 
 
 def _deflated(value: dict[str, Any]) -> bytes:
+    """Return values as JSON that is compressed by zlib."""
     return zlib.compress(json.dumps(value, ensure_ascii=False).encode())
 
 
 def _inflated(data: bytes) -> dict[str, Any]:
+    """Return the values of :func:`_deflated`."""
     try:
         return dict(json.loads(zlib.decompress(data)))
     except zlib.error as error:
@@ -480,7 +492,7 @@ def _inflated(data: bytes) -> dict[str, Any]:
 
 
 def parameters_of(values: dict[str, Any]) -> tuple[RunParameters, tuple[str, ...]]:
-    """Return stored parameters, and the keys that this version does not accept."""
+    """Return parameters from stored values, and the keys that this version does not accept."""
     try:
         return RunParameters.model_validate(values), ()
     except ValueError:
@@ -504,7 +516,7 @@ def open_library(path: Path, *, wait_seconds: float = WAIT_SECONDS) -> Library:
     """Open a library for writing, or for reading alone if its file is write-protected.
 
     Raises:
-        LibraryError: If it cannot be read either.
+        LibraryError: If the library cannot be opened.
     """
     read_only = path.exists() and not (os.access(path, os.W_OK) and os.access(path.parent, os.W_OK))
     return Library(path, read_only=read_only, wait_seconds=wait_seconds)

@@ -14,7 +14,7 @@ from typing import Any
 
 from tracker.corrections import Correction
 from tracker.corrections.log import place_of, read_log
-from tracker.library.keeping import recording_of
+from tracker.library.keeping import record_of_recording
 from tracker.library.records import KeptRun
 from tracker.library.store import Library
 from tracker.parameters import changed, with_values
@@ -155,7 +155,7 @@ def run_batch(
                     recording, new = outcome.kept
                     here, _ = wanted[outcome.key][0]
                     # the worker may have the recording in another folder than this machine
-                    recording = recording_of(open_sequence(here), here, recording.thumbnail)
+                    recording = record_of_recording(open_sequence(here), here, recording.thumbnail)
                     new = replace(
                         new, digest=recording.digest, key=_key(here, new, by_hand[outcome.key])
                     )

@@ -243,7 +243,7 @@ def _delete(library: Library, command: DeleteRuns) -> None:
         if unknown:
             raise CommandError(f"--undo: expected the numbers of runs, got {unknown[0]!r}")
         numbers = [int(text) for text in command.runs]
-        library.take_back(numbers)
+        library.restore(numbers)
         _tell(command, [library.run(number) for number in numbers])
         return
     numbers = [library.find(text).id for text in command.runs]

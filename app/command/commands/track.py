@@ -122,7 +122,7 @@ def _keep(command: Track, run: Run, began: float, seconds: float) -> None:
     """Put a finished run into the library; where that cannot be used, say so and go on."""
     from tracker.evaluation import evaluate_sequence
     from tracker.library.errors import LibraryError
-    from tracker.library.keeping import recording_of, run_of, thumbnail_of
+    from tracker.library.keeping import record_of_recording, record_of_run, thumbnail_of
     from tracker.library.store import open_library
 
     sequence = run.sequence
@@ -131,8 +131,10 @@ def _keep(command: Track, run: Run, began: float, seconds: float) -> None:
             evaluation = None
             if sequence.ground_truth is not None:
                 evaluation = evaluate_sequence(sequence, run.tracks)
-            new = run_of(run, source="track", began=began, seconds=seconds, evaluation=evaluation)
-            recording = recording_of(sequence, command.sequence, thumbnail_of(sequence))
+            new = record_of_run(
+                run, source="track", began=began, seconds=seconds, evaluation=evaluation
+            )
+            recording = record_of_recording(sequence, command.sequence, thumbnail_of(sequence))
             library.keep(recording, new, command.keep)
     except LibraryError as error:
         say(f"the run was not kept: {error}")

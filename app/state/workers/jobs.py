@@ -25,7 +25,7 @@ from app.state.workers.opening import Opener
 from app.state.workers.threads import CLOSING_SECONDS, be_nice
 from app.state.workers.watchdog import Watchdog
 from tracker.fusion.trajectories import Trajectories, corrected
-from tracker.library.keeping import run_from
+from tracker.library.keeping import run_for_display
 from tracker.library.records import Result
 from tracker.parameters import RunParameters, changed, with_values
 from tracker.runs import gaps, pipeline
@@ -191,7 +191,9 @@ class Jobs:
         """
         wanted = self.key_of(sequence, result)
         same = wanted == result.key
-        return run_from(sequence, result, key=wanted if same else f"{wanted}-kept-{result.run.id}")
+        return run_for_display(
+            sequence, result, key=wanted if same else f"{wanted}-kept-{result.run.id}"
+        )
 
     def key_of(self, sequence: Sequence, result: Result) -> str:
         """The key that a computation with a kept run's values would have now."""

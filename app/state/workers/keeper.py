@@ -22,7 +22,13 @@ from app.state.workbench import Workbench
 from app.state.workers.threads import CLOSING_SECONDS, be_nice
 from tracker.library import KEEP
 from tracker.library.errors import LibraryError
-from tracker.library.keeping import figures_of, ospa_of, recording_of, run_of, thumbnail_of
+from tracker.library.keeping import (
+    figures_of,
+    ospa_of,
+    record_of_recording,
+    record_of_run,
+    thumbnail_of,
+)
 from tracker.library.store import Library, open_library
 from tracker.runs.gaps import gaps
 from tracker.sequences.sequence import Sequence
@@ -147,7 +153,7 @@ class Keeper:
             library = self.library()
             if not library.read_only:
                 picture = thumbnail_of(sequence, reader)
-                library.open_recording(recording_of(sequence, now.opened_as, picture))
+                library.open_recording(record_of_recording(sequence, now.opened_as, picture))
             self._opened = sequence
         if not is_settled(now):
             return
@@ -174,14 +180,14 @@ class Keeper:
             return
         speed = now.run_state.steps_per_second
         began = self._begun[1] if self._begun[0] == key else time.time()
-        new = run_of(
+        new = record_of_run(
             run,
             source="page",
             began=began,
             seconds=run.done / speed if speed > 0.0 else 0.0,
             evaluation=None if scored is None else scored.evaluation,
         )
-        library.keep(recording_of(now.named(run.sequence), now.opened_as), new, self._keep)
+        library.keep(record_of_recording(now.named(run.sequence), now.opened_as), new, self._keep)
         self._kept.add(key)
 
     def _score_again(self, now: Snapshot, number: int) -> None:

@@ -21,7 +21,7 @@ from app.web.opening import begun, told_in_the_answer
 from app.web.views import results
 from tracker import parameters as table
 from tracker.library.errors import LibraryError, NoSuchRun
-from tracker.library.keeping import code_version, recording_of
+from tracker.library.keeping import code_version, record_of_recording
 from tracker.library.records import KeptRun, Recording, Result
 from tracker.library.store import Library
 from tracker.sequences import library as sequences
@@ -177,7 +177,10 @@ def drawn(number: RowNumber, opened: Opened, bench: Bench) -> str:
     """One kept run in small, as a part of the page."""
     result, now = _result(opened, number), bench.snapshot()
     told, room = _small(opened, result), None
-    if now.saved is not None and recording_of(now.saved, now.opened_as).place == result.place:
+    if (
+        now.saved is not None
+        and record_of_recording(now.saved, now.opened_as).place == result.place
+    ):
         room = now.saved.room
     return drawing.preview(
         told.run, told.frames, told.tracks, told.people, told.courses, told.ospa, room
@@ -226,7 +229,7 @@ def delete(wish: models.RunNumbers, opened: Opened) -> models.Deleted:
 def take_back(wish: models.RunNumbers, opened: Opened) -> models.Deleted:
     """Have deleted runs again."""
     try:
-        opened.take_back(wish.runs)
+        opened.restore(wish.runs)
     except LibraryError as error:
         raise no_library(error) from None
     return models.Deleted(runs=wish.runs, bytes=0)
@@ -237,7 +240,7 @@ async def open_run(number: RowNumber, opened: Opened, bench: Bench, jobs: Work) 
     """Show a run as it was: its tracks at once; its recording is opened first where it is not."""
     result = await asyncio.to_thread(_result, opened, number)
     now = bench.snapshot()
-    place = "" if now.saved is None else recording_of(now.saved, now.opened_as).place
+    place = "" if now.saved is None else record_of_recording(now.saved, now.opened_as).place
     with told_in_the_answer(
         result.run.title,
         field="number",
@@ -257,7 +260,7 @@ def pin(number: RowNumber, opened: Opened, bench: Bench, jobs: Work) -> State:
     now = bench.snapshot()
     if now.sequence is None or now.saved is None:
         raise nothing_open()
-    if recording_of(now.saved, now.opened_as).place != result.place:
+    if record_of_recording(now.saved, now.opened_as).place != result.place:
         raise ApiError(
             409,
             "another_recording",

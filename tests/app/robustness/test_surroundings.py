@@ -121,7 +121,7 @@ def test_a_run_that_was_kept_stays_though_the_clock_went_back(tmp_path: Path) ->
         assert [one.id for one in library.runs() if one.id == kept[-1]] == [kept[-1]]
         assert len(library.runs()) == 3
         library.delete([kept[-1]])
-        library.take_back([kept[-1]])
+        library.restore([kept[-1]])
         assert library.result(kept[-1]).run.id == kept[-1]
 
 

@@ -26,7 +26,7 @@ import cv2
 from tracker.evaluation import evaluate_sequence
 from tracker.files.folders import cache_folder
 from tracker.kernels import compilation
-from tracker.library.keeping import recording_of, run_of, thumbnail_of
+from tracker.library.keeping import record_of_recording, record_of_run, thumbnail_of
 from tracker.parameters import with_values
 from tracker.review.self_consistency import estimate
 from tracker.runs import pipeline
@@ -189,10 +189,10 @@ def _done(job: Job, sequence: Sequence, reader: FrameReader) -> dict[str, Any]:
         figures["identity"] = estimated.score if len(run.tracks) else 0.0
     kept = None
     if job.keep:
-        recording = recording_of(sequence, job.place, thumbnail_of(sequence, reader))
+        recording = record_of_recording(sequence, job.place, thumbnail_of(sequence, reader))
         kept = (
             recording,
-            run_of(run, source="batch", began=began, seconds=took, evaluation=evaluation),
+            record_of_run(run, source="batch", began=began, seconds=took, evaluation=evaluation),
         )
     return {
         "figures": figures,
