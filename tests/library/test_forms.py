@@ -21,9 +21,9 @@ from app.command.arguments.library import FormatName
 from tests.library.written import STEPS, written
 from tracker.evaluation import EvaluationSettings, evaluate
 from tracker.export import json_file, tracks_csv
+from tracker.export.exported_run import Options, Stopped
 from tracker.export.palette import rgb
 from tracker.export.registry import FORMATS, format_of, save
-from tracker.export.written import Options, Stopped
 
 WRITTEN = written()
 TRACKS = WRITTEN.tracks

@@ -13,10 +13,10 @@ import pytest
 
 from tests.library.written import written
 from tests.synthetic import number_in, write_sequence
+from tracker.export.exported_run import ExportedRun, Options, Stopped
 from tracker.export.palette import rgb
 from tracker.export.registry import FORMATS, save
 from tracker.export.video import Mosaic
-from tracker.export.written import Options, Stopped, Written
 from tracker.fusion.trajectories import Trajectories
 from tracker.parameters import RunParameters
 from tracker.sequences.reader import read_sequence
@@ -25,11 +25,11 @@ MP4 = FORMATS["mp4"]
 
 
 @pytest.fixture(scope="module")
-def numbers(tmp_path_factory: pytest.TempPathFactory) -> Written:
+def numbers(tmp_path_factory: pytest.TempPathFactory) -> ExportedRun:
     """Pictures that say which step they are, and nobody in them."""
     folder = tmp_path_factory.mktemp("numbers")
     sequence = read_sequence(write_sequence(folder, frames=40, first_frame=2))
-    return Written(sequence, Trajectories.empty(len(sequence.views)), RunParameters())
+    return ExportedRun(sequence, Trajectories.empty(len(sequence.views)), RunParameters())
 
 
 def numbers_of(path: Path) -> tuple[list[list[int]], float]:
@@ -46,7 +46,7 @@ def numbers_of(path: Path) -> tuple[list[list[int]], float]:
         return found, float(stream.average_rate)
 
 
-def test_frame_k_shows_step_k_of_every_camera(numbers: Written, tmp_path: Path) -> None:
+def test_frame_k_shows_step_k_of_every_camera(numbers: ExportedRun, tmp_path: Path) -> None:
     told: list[tuple[int, int]] = []
     path = tmp_path / "film.mp4"
     save(path, MP4, numbers, Options(progress=lambda *at: told.append(at)))
@@ -57,7 +57,7 @@ def test_frame_k_shows_step_k_of_every_camera(numbers: Written, tmp_path: Path) 
     assert told[-1] == (40, 40)
 
 
-def test_a_range_at_half_the_speed(numbers: Written, tmp_path: Path) -> None:
+def test_a_range_at_half_the_speed(numbers: ExportedRun, tmp_path: Path) -> None:
     path = tmp_path / "film.mp4"
     save(path, MP4, numbers, Options(first=7, last=11, speed=0.5))
     found, rate = numbers_of(path)
@@ -65,7 +65,7 @@ def test_a_range_at_half_the_speed(numbers: Written, tmp_path: Path) -> None:
     assert rate == numbers.sequence.fps / 2.0
 
 
-def test_what_makes_no_film_is_told(numbers: Written, tmp_path: Path) -> None:
+def test_what_makes_no_film_is_told(numbers: ExportedRun, tmp_path: Path) -> None:
     path = tmp_path / "film.mp4"
     with pytest.raises(ValueError, match=r"from step 9 to 3: expected two of 0 … 39"):
         save(path, MP4, numbers, Options(first=9, last=3))
@@ -76,7 +76,7 @@ def test_what_makes_no_film_is_told(numbers: Written, tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_stopped_in_the_middle_it_leaves_nothing(numbers: Written, tmp_path: Path) -> None:
+def test_stopped_in_the_middle_it_leaves_nothing(numbers: ExportedRun, tmp_path: Path) -> None:
     seen: list[int] = []
 
     def stopped() -> bool:
@@ -126,7 +126,7 @@ def test_memory_is_flat(tmp_path: Path) -> None:
     peaks = []
     for frames in (30, 120):
         sequence = read_sequence(write_sequence(tmp_path / str(frames), frames=frames))
-        run = Written(sequence, Trajectories.empty(2), RunParameters())
+        run = ExportedRun(sequence, Trajectories.empty(2), RunParameters())
         tracemalloc.start()
         save(tmp_path / f"{frames}.mp4", MP4, run)
         peaks.append(tracemalloc.get_traced_memory()[1])

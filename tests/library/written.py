@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 
 from tests.engine import synthetic
-from tracker.export.written import Written
+from tracker.export.exported_run import ExportedRun
 from tracker.fusion.trajectories import Trajectories
 from tracker.parameters import RunParameters, with_values
 from tracker.sequences.sequence import GroundTruth, Sequence
@@ -24,7 +24,7 @@ def sequence(steps: int = STEPS) -> Sequence:
     return dataclasses.replace(made, ground_truth=doubtful)
 
 
-def written(steps: int = STEPS) -> Written:
+def written(steps: int = STEPS) -> ExportedRun:
     """Tracks with errors, a gap, a switch and a false one."""
     of = sequence(steps)
     truth = of.ground_truth
@@ -49,4 +49,4 @@ def written(steps: int = STEPS) -> Written:
         labels=ids[order] + 40,
     )
     parameters = with_values(RunParameters(), {"fusion.survival_probability": 0.97})
-    return Written(of, tracks, parameters, seed=5)
+    return ExportedRun(of, tracks, parameters, seed=5)

@@ -12,8 +12,8 @@ import pytest
 
 from tests.studies.processes import cluster, finish, kill, outcomes, start, wait, workers_of
 from tests.studies.small import definition, recording
+from tracker.export.exported_run import ExportedRun, Options
 from tracker.export.registry import format_of, save
-from tracker.export.written import Options, Written
 from tracker.parameters import with_values
 from tracker.runs import pipeline
 from tracker.sequences.library import open_sequence
@@ -145,6 +145,6 @@ def test_the_command_of_a_trial_gives_the_same_tracks(tmp_path: Path) -> None:
         assert tracks_hash(again) == kept.tracks
         file = tmp_path / words[words.index("--output") + 1]
         expected = tmp_path / "expected.csv"
-        written = Written(sequence, again.tracks, parameters, row.seed)
+        written = ExportedRun(sequence, again.tracks, parameters, row.seed)
         save(expected, format_of(expected, None), written, Options())
         assert file.read_bytes() == expected.read_bytes()

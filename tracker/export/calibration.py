@@ -21,19 +21,21 @@ from tracker.geometry.camera import Camera
 Form = Literal["opencv", "pose2sim"]
 
 WRITTEN = ("OpenCV FileStorage (calibration)", "Pose2Sim TOML (calibration)")
+"""The names of the forms, which the command line lists."""
 
 
 def save_calibration(path: Path, cameras: Sequence[Camera], form: Form) -> None:
     """Write all cameras into one file.
 
-    In OpenCV's form there are ``K_NAME``, ``D_NAME``, ``R_NAME``, ``T_NAME`` and ``size_NAME``, as
-    YAML, or as XML or JSON where the file's suffix is one of these. In Pose2Sim's form there is a
-    table for each camera.
+    In OpenCV's form each camera has the entries ``size_NAME`` (pixels), ``K_NAME`` (intrinsics),
+    ``D_NAME`` (distortion), ``fisheye_NAME``, ``R_NAME`` (rotation) and ``T_NAME`` (translation);
+    the file is XML or JSON if its suffix says so, and else YAML. In Pose2Sim's form each camera has
+    a table.
 
     Args:
         path: The file to write; an existing one is replaced.
-        cameras: The cameras, each with a name of its own.
-        form: The program that is to read the file.
+        cameras: The cameras, with different names.
+        form: The form of the file, by the program that reads it.
 
     Raises:
         ValueError: If two cameras would have the same name in the file.
@@ -52,9 +54,11 @@ def save_calibration(path: Path, cameras: Sequence[Camera], form: Form) -> None:
 
 
 _END = "\n[metadata]\nadjusted = false\nerror = 0.0\n"
+"""The last table of Pose2Sim's form."""
 
 
 def _save_opencv(path: Path, cameras: Sequence[Camera], keys: Sequence[str]) -> None:
+    """Write the cameras in OpenCV's form, each under its key."""
     suffix = path.suffix.lower() if path.suffix.lower() in (".xml", ".json") else ".yml"
     storage = cv2.FileStorage(suffix, cv2.FILE_STORAGE_WRITE | cv2.FILE_STORAGE_MEMORY)
     try:
@@ -71,7 +75,8 @@ def _save_opencv(path: Path, cameras: Sequence[Camera], keys: Sequence[str]) -> 
 
 
 def _table(key: str, camera: Camera) -> str:
-    from scipy.spatial.transform import Rotation  # a server starts without it
+    """Return the table of a camera in Pose2Sim's form."""
+    from scipy.spatial.transform import Rotation  # imported late, so that a server starts faster
 
     vector = Rotation.from_matrix(camera.rotation).as_rotvec()
     return "\n".join(

@@ -5,21 +5,21 @@ from __future__ import annotations
 from pathlib import Path
 
 from tracker.export import tracks_csv
-from tracker.export.written import Options, Written
+from tracker.export.exported_run import ExportedRun, Options
 
 
-def write(path: Path, written: Written, options: Options) -> None:
+def write(path: Path, run: ExportedRun, options: Options) -> None:
     """Write a run as a track file."""
     with path.open("w", encoding="utf-8", newline="") as stream:
         tracks_csv.write_tracks_csv(
             stream,
-            written.sequence,
-            written.tracks,
-            written.parameters,
-            written.seed,
-            done=written.done,
-            remarks=written.remarks,
-            row_corrections=written.row_corrections,
-            names=written.names,
+            run.sequence,
+            run.tracks,
+            run.parameters,
+            run.seed,
+            done=run.done,
+            remarks=run.remarks,
+            row_corrections=run.row_corrections,
+            names=run.names,
         )
-    options.at(written.steps, written.steps)
+    options.at(run.steps, run.steps)

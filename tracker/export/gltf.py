@@ -17,13 +17,18 @@ import numpy as np
 from numpy import ndarray
 
 from tracker import __version__
+from tracker.export.exported_run import ExportedRun, Options
 from tracker.export.palette import rgb
-from tracker.export.written import Options, Written
 
 _FLOAT, _UINT = 5126, 5125
+"""The types float32 and uint32 of an accessor's numbers."""
+
 _ARRAY, _ELEMENTS = 34962, 34963
+"""The kinds of buffers: attributes of vertices, and indices of vertices."""
+
 _TURN = [-(0.5**0.5), 0.0, 0.0, 0.5**0.5]
-"""The rotation by −90° about x, as the quaternion x, y, z, w."""
+"""The rotation by −90° about x, which maps the world's z axis onto y, as the quaternion x, y, z,
+w."""
 
 
 class _Buffer:
@@ -39,8 +44,9 @@ class _Buffer:
 
         Args:
             values: Numbers of shape (N,), or vectors of shape (N, 3).
-            target: The kind of buffer for the graphics card, or None.
-            bounds: Whether the accessor has the least and largest value.
+            target: The kind of buffer for the graphics card, :data:`_ARRAY` or :data:`_ELEMENTS`;
+                None for animations.
+            bounds: Whether the accessor states the least and the largest value of each column.
         """
         floats = values.dtype.kind == "f"
         data = values.astype(np.float32 if floats else np.uint32)
@@ -61,9 +67,9 @@ class _Buffer:
         return len(self.accessors) - 1
 
 
-def write(path: Path, written: Written, options: Options) -> None:
+def write(path: Path, run: ExportedRun, options: Options) -> None:
     """Write a run as binary glTF, track by track."""
-    sequence, ids = written.sequence, written.ids
+    sequence, ids = run.sequence, run.ids
     buffer = _Buffer()
     box = _box(buffer, sequence.target_half_extents)
     room = sequence.room
@@ -93,8 +99,8 @@ def write(path: Path, written: Written, options: Options) -> None:
         document["materials"].append(_material(f"track {number}", rgb(number)))
         primitive = {**box, "material": len(document["materials"]) - 1}
         document["meshes"].append({"name": f"track {number}", "primitives": [primitive]})
-        rows = np.flatnonzero(written.tracks.ids == number)
-        places = written.tracks.positions[rows]
+        rows = np.flatnonzero(run.tracks.ids == number)
+        places = run.tracks.positions[rows]
         document["nodes"].append(
             {
                 "name": f"track {number}",
@@ -103,8 +109,8 @@ def write(path: Path, written: Written, options: Options) -> None:
             }
         )
         node = len(document["nodes"]) - 1
-        frames = written.tracks.frames[rows]
-        shown, there = _presence(frames, written.steps)
+        frames = run.tracks.frames[rows]
+        shown, there = _presence(frames, run.steps)
         for name, times, values, way in (
             ("translation", frames, places, "LINEAR"),
             ("scale", shown, np.repeat(there[:, None], 3, axis=1), "STEP"),
@@ -136,6 +142,12 @@ def _presence(frames: ndarray, steps: int) -> tuple[ndarray, ndarray]:
 
 
 def _material(name: str, colour: tuple[int, int, int]) -> dict[str, Any]:
+    """Return a dull material.
+
+    Args:
+        name: The name of the material.
+        colour: Red, green and blue in 0 … 255, with a gamma of about 2.2; glTF has linear colours.
+    """
     linear = [(value / 255.0) ** 2.2 for value in colour]
     return {
         "name": name,
@@ -149,7 +161,12 @@ def _material(name: str, colour: tuple[int, int, int]) -> dict[str, Any]:
 
 
 def _box(buffer: _Buffer, half: ndarray) -> dict[str, Any]:
-    """Return the primitive of a box around the origin, each face with its own normal."""
+    """Return the primitive of a box around the origin with constant normals on each face.
+
+    Args:
+        buffer: The buffer to which the vertices are added.
+        half: Half width, depth and height of the box, metres.
+    """
     points: list[ndarray] = []
     normals: list[ndarray] = []
     faces: list[int] = []

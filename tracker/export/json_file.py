@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from tracker import __version__
-from tracker.export.written import Options, Written
+from tracker.export.exported_run import ExportedRun, Options
 
 SCHEMA_PLACE = "tracks.schema.json"
 """The name of the published schema's file in the manual."""
@@ -21,70 +21,84 @@ class _Model(BaseModel):
 
 
 class CameraOfFile(_Model):
-    """A camera that the boxes are of."""
+    """A camera."""
 
     name: str
+    """The name of the camera, by which tracks refer to it."""
     width: int = Field(ge=1)
-    """Pixels."""
+    """Width of the picture, pixels."""
     height: int = Field(ge=1)
+    """Height of the picture, pixels."""
 
 
 class SequenceOfFile(_Model):
-    """What was tracked."""
+    """The recording that was tracked."""
 
     name: str
+    """The name of the recording."""
     fps: float = Field(gt=0)
-    """Steps a second."""
+    """The number of steps per second."""
     frames: int = Field(ge=1)
-    """The number of steps."""
+    """The number of steps of the recording."""
     half_extents: tuple[float, float, float]
     """Half width, depth and height of a target, metres."""
     cameras: list[CameraOfFile]
+    """The cameras, in the order of the recording."""
 
 
 class RunOfFile(_Model):
-    """How it was tracked."""
+    """The run that computed the tracks."""
 
     seed: int
+    """The seed of the random numbers."""
     steps: int
-    """Computed; fewer than the sequence has where the run was not finished."""
+    """The number of steps that were computed; fewer than those of the recording if the run was not
+    finished."""
     parameters: dict[str, str | int | float | bool]
-    """Methods and every value, by key."""
+    """The chosen methods and the values of all parameters, by key."""
     remarks: list[str]
-    """What must be said of it: a sentence for each camera of which pictures were missing."""
+    """Sentences on the result, for instance that pictures of a camera were missing."""
 
 
 class TrackOfFile(_Model):
-    """One track: columns of equal length, one row a step that it is there."""
+    """A track: columns of equal length, with a row for each step at which the track exists."""
 
     id: int
+    """The id of the track."""
     name: str | None = None
-    """What the person was called by hand."""
+    """The name that the user gave to the person; left out if there is none."""
     frames: list[int]
-    """Steps, from 0 on, ascending."""
+    """The step of each row, counted from 0, ascending."""
     positions: list[tuple[float, float, float]]
-    """World metres, z up."""
+    """The centre of the target in world coordinates x, y, z (z up), metres."""
     existences: list[float]
-    """Weight or probability of existence."""
+    """The probability that the target exists; the weight of its component in methods that
+    estimate weights, which may exceed 1."""
     sigmas: list[tuple[float, float, float]]
-    """Standard deviations of the position, metres."""
+    """The standard deviations of the position along x, y and z, metres."""
     seen: dict[str, list[bool]]
-    """By camera: whether a box of it fed the track at this step."""
+    """For each camera by name: whether a box of the camera updated the track at this step."""
     correction: list[str] | None = None
-    """Of a corrected run the id of the correction that each row rests on, empty for none."""
+    """For a corrected run, the id of the correction that each row depends on, or an empty string;
+    left out for other runs."""
     boxes: dict[str, list[tuple[float, float, float, float] | None]]
-    """By camera: left, top, width, height in pixels, origin at the centre of the top-left pixel;
-    null where the picture has none."""
+    """For each camera by name: the reprojected box as left, top, width, height in pixels, with the
+    origin at the centre of the top-left pixel; null if it does not lie in the picture."""
 
 
 class TracksFile(_Model):
     """Tracks of several people in 3D, as multiview-phd writes them."""
 
     format: Literal[1] = 1
+    """The version of this format."""
     program: str
+    """The name and the version of the program."""
     sequence: SequenceOfFile
+    """The recording that was tracked."""
     run: RunOfFile
+    """The run that computed the tracks."""
     tracks: list[TrackOfFile]
+    """The tracks, by ascending id."""
 
 
 def schema() -> dict[str, Any]:
@@ -95,9 +109,9 @@ def schema() -> dict[str, Any]:
     }
 
 
-def write(path: Path, written: Written, options: Options) -> None:
+def write(path: Path, run: ExportedRun, options: Options) -> None:
     """Write a run as JSON, track by track."""
-    sequence = written.sequence
+    sequence = run.sequence
     head = TracksFile(
         program=f"multiview-phd {__version__}",
         sequence=SequenceOfFile(
@@ -111,16 +125,16 @@ def write(path: Path, written: Written, options: Options) -> None:
             ],
         ),
         run=RunOfFile(
-            seed=written.seed,
-            steps=written.steps,
-            parameters=written.settings,
-            remarks=list(written.remarks),
+            seed=run.seed,
+            steps=run.steps,
+            parameters=run.settings,
+            remarks=list(run.remarks),
         ),
         tracks=[],
     )
     text = head.model_dump_json()
     beginning, end = text[: -len("]}")], "]}"
-    ids = written.ids
+    ids = run.ids
     with path.open("w", encoding="utf-8") as file:
         file.write(beginning)
         for done, number in enumerate(ids):
@@ -128,33 +142,32 @@ def write(path: Path, written: Written, options: Options) -> None:
             file.write(
                 ("," if done else "")
                 + "\n"
-                + _track(written, number).model_dump_json(exclude_none=True)
+                + _track(run, number).model_dump_json(exclude_none=True)
             )
         file.write(("\n" if ids else "") + end + "\n")
     options.at(len(ids), len(ids))
 
 
-def _track(written: Written, number: int) -> TrackOfFile:
-    tracks = written.tracks
+def _track(run: ExportedRun, number: int) -> TrackOfFile:
+    """Return the track with an id."""
+    tracks = run.tracks
     rows = np.flatnonzero(tracks.ids == number)
-    cameras = written.sequence.cameras
+    cameras = run.sequence.cameras
     return TrackOfFile(
         id=number,
-        name=written.names.get(number),
+        name=run.names.get(number),
         frames=tracks.frames[rows].tolist(),
         positions=tracks.positions[rows].tolist(),
         existences=tracks.existences[rows].tolist(),
         sigmas=tracks.sigmas[rows].tolist(),
         seen={c.name: tracks.seen[rows, k].tolist() for k, c in enumerate(cameras)},
-        correction=[written.row_corrections[k] for k in rows.tolist()]
-        if written.row_corrections
-        else None,
+        correction=[run.row_corrections[k] for k in rows.tolist()] if run.row_corrections else None,
         boxes={
             camera.name: [
                 box if there else None
                 for box, there in zip(
-                    written.boxes[k][0][rows].round(3).tolist(),
-                    written.boxes[k][1][rows].tolist(),
+                    run.boxes[k][0][rows].round(3).tolist(),
+                    run.boxes[k][1][rows].tolist(),
                     strict=True,
                 )
             ]
@@ -164,6 +177,7 @@ def _track(written: Written, number: int) -> TrackOfFile:
 
 
 def _triple(values: Any) -> tuple[float, float, float]:
+    """Return three numbers as a tuple of floats."""
     x, y, z = (float(value) for value in values)
     return x, y, z
 

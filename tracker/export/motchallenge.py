@@ -2,9 +2,9 @@
 
 A row is ``frame, id, left, top, width, height, confidence, x, y, z``; frames and ids start at 1.
 In a camera's file the box is the reprojected one in pixels, which also start at 1
-[MOT16, sec. 4.2]; in that of the ground plane it is the target's outline on the floor in metres.
-x, y, z are metres in both. A person of the truth with an uncertain position (``valid = 0``) is
-written as a distractor: a track that matches it counts neither as correct nor as false.
+[MOT16, sec. 4.2]; in the file of the ground plane it is the target's outline on the floor in
+metres. In both, x, y, z are world metres. A person of the truth with an uncertain position (``valid
+= 0``) is written as a distractor: a track that matches it counts neither as correct nor as false.
 
 [MOT16] Milan, Leal-Taixé, Reid, Roth, Schindler, "MOT16: a benchmark for multi-object
 tracking", arXiv 1603.00831, 2016. Folders: TrackEval, docs/MOTChallenge-Official/Readme.md.
@@ -19,22 +19,28 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
-from tracker.export.written import Options, Written
+from tracker.export.exported_run import ExportedRun, Options
 from tracker.files.atomic import file_names
 
 BENCHMARK, SPLIT, TRACKER = "multiview", "train", "multiview-phd"
+"""The names of the benchmark, of its part and of the tracker in TrackEval's folders."""
+
 GROUND = "ground-plane"
+"""The name of the ground plane in the place of a camera's."""
+
 PERSON, DISTRACTOR = 1, 8
-"""Class numbers of the challenge."""
+"""The class numbers of the challenge for people, and for people whose position is uncertain."""
 
 _FROM_1 = np.array([1.0, 1.0, 0.0, 0.0])
+"""Addend to left, top, width, height, so that pixels start at 1."""
+
 _CLOSE = 10
-"""Decimals of coordinates in metres: so many that metrics agree to the precision of a double."""
+"""Number of decimals of coordinates, so that metrics agree to about the precision of a double."""
 
 
-def write(folder: Path, written: Written, options: Options) -> None:
+def write(folder: Path, run: ExportedRun, options: Options) -> None:
     """Write a run into a folder: ``gt`` (if there is ground truth) and ``trackers``."""
-    sequence, tracks = written.sequence, written.tracks
+    sequence, tracks = run.sequence, run.tracks
     name = "".join(c if c.isalnum() or c in "-_" else "-" for c in sequence.name)
     half = sequence.target_half_extents
     truth = sequence.ground_truth
@@ -46,7 +52,7 @@ def write(folder: Path, written: Written, options: Options) -> None:
         if index < 0:
             boxes, visible = _outlines(tracks.positions, half), np.ones(len(tracks), dtype=bool)
         else:
-            boxes, visible = written.boxes[index]
+            boxes, visible = run.boxes[index]
             boxes = boxes + _FROM_1
         rows = _rows(
             tracks.frames, tracks.ids, boxes, np.minimum(tracks.existences, 1.0), tracks.positions
@@ -62,7 +68,7 @@ def write(folder: Path, written: Written, options: Options) -> None:
             camera = sequence.cameras[index]
             boxes, visible = camera.project_boxes(truth.positions, half)
             boxes = boxes + _FROM_1
-        visible = visible & (truth.frames < written.steps)
+        visible = visible & (truth.frames < run.steps)
         kinds = np.where(truth.valid, PERSON, DISTRACTOR)
         numbers = np.unique(truth.ids, return_inverse=True)[1] + 1
         _save(
@@ -76,7 +82,7 @@ def write(folder: Path, written: Written, options: Options) -> None:
             home / "seqinfo.ini",
             [
                 f"[Sequence]\nname={one}\nimDir=img1\nframeRate={sequence.fps:g}\n"
-                f"seqLength={written.steps}\nimWidth={width}\nimHeight={height}\nimExt=.jpg\n"
+                f"seqLength={run.steps}\nimWidth={width}\nimHeight={height}\nimExt=.jpg\n"
             ],
         )
     if truth is not None:

@@ -9,8 +9,9 @@ Rgb = tuple[int, int, int]
 
 @cache
 def rgb(number: int) -> Rgb:
-    """Return the colour of a track id for dark backgrounds, red, green and blue in 0 … 255."""
-    from tracker.evaluation.report.figures import DARK_IDS  # brings plotly
+    """Return the colour of the track with an id on a dark background: red, green, blue in 0 …
+    255."""
+    from tracker.evaluation.report.figures import DARK_IDS  # imports plotly
 
     text = DARK_IDS[(number - 1) % len(DARK_IDS)]
     return int(text[1:3], 16), int(text[3:5], 16), int(text[5:7], 16)

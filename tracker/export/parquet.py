@@ -8,21 +8,21 @@ from pathlib import Path
 import numpy as np
 
 from tracker import __version__
+from tracker.export.exported_run import ExportedRun, Options
 from tracker.export.tracks_csv import BOX
-from tracker.export.written import Options, Written
 
 _ROWS = 1 << 17
-"""Rows of a row group, which is held in memory."""
+"""Number of rows of a row group, which is held in memory."""
 
 
-def write(path: Path, written: Written, options: Options) -> None:
+def write(path: Path, run: ExportedRun, options: Options) -> None:
     """Write a run as a Parquet table, a row group at a time."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    sequence, tracks = written.sequence, written.tracks
-    settings = {key: str(value) for key, value in written.settings.items()}
-    facts = {"sequence": sequence.name, "fps": sequence.fps, "seed": written.seed}
+    sequence, tracks = run.sequence, run.tracks
+    settings = {key: str(value) for key, value in run.settings.items()}
+    facts = {"sequence": sequence.name, "fps": sequence.fps, "seed": run.seed}
     metadata = {
         "multiview-phd": json.dumps({"version": __version__, **facts, "parameters": settings})
     }
@@ -34,13 +34,13 @@ def write(path: Path, written: Written, options: Options) -> None:
         "existence": tracks.existences,
         **{f"sigma_{axis}": tracks.sigmas[:, k] for k, axis in enumerate("xyz")},
     }
-    if written.names:
-        called = [written.names.get(track, "") for track in tracks.ids.tolist()]
+    if run.names:
+        called = [run.names.get(track, "") for track in tracks.ids.tolist()]
         columns["name"] = np.array(called, dtype=object)
-    if written.row_corrections:
-        columns["correction"] = np.array(written.row_corrections, dtype=object)
+    if run.row_corrections:
+        columns["correction"] = np.array(run.row_corrections, dtype=object)
     for index, camera in enumerate(sequence.cameras):
-        boxes, visible = written.boxes[index]
+        boxes, visible = run.boxes[index]
         columns[f"{camera.name}_seen"] = tracks.seen[:, index]
         for k, side in enumerate(BOX):
             columns[f"{camera.name}_{side}"] = np.where(visible, boxes[:, k], np.nan)

@@ -1,4 +1,4 @@
-"""All export formats: the command line, the page and the manual list these."""
+"""The table of all export formats, which the command line, the page and the manual list."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tracker.export import csv_file, gltf, json_file, motchallenge, parquet, rerun_file, trc
-from tracker.export.written import Options, Written
+from tracker.export.exported_run import ExportedRun, Options
 from tracker.files.atomic import new_folder, replacing, zip_folder
 from tracker.sequences.sequence import Sequence
 
@@ -23,18 +23,22 @@ class Format:
     word: str
     """The name that is displayed."""
     suffix: str
-    """The suffix of files by which the format is chosen; empty for a folder."""
+    """The suffix of a file, by which the format is chosen; empty if the format is a folder."""
     help: str
-    write: Callable[[Path, Written, Options], None]
+    """The content of the file, in a few words."""
+    write: Callable[[Path, ExportedRun, Options], None]
     """The function that writes a run to a new file, or into an empty folder."""
     media: str
-    """The media type."""
+    """The media type (MIME type) of the file."""
     needs_package: str = ""
-    """A package that the format needs and that is not installed with the program."""
+    """A package that the format needs and that is not installed with the program; empty for
+    none."""
     extra: str = ""
-    """The optional dependency (extra) that installs this package."""
+    """The extra of the program's package that installs this package; empty for none."""
     needs_truth: bool = False
+    """Whether the sequence must have ground truth."""
     needs_pictures: bool = False
+    """Whether a camera of the sequence must have pictures."""
 
     def check(self, sequence: Sequence) -> None:
         """Check that runs of a sequence can be written in this format, before any work is done.
@@ -64,16 +68,16 @@ class Format:
         return not self.suffix
 
 
-def _write_report(path: Path, written: Written, options: Options) -> None:
-    from tracker.export import report  # brings the evaluation
+def _write_report(path: Path, run: ExportedRun, options: Options) -> None:
+    from tracker.export import report  # imports the evaluation
 
-    report.write(path, written, options)
+    report.write(path, run, options)
 
 
-def _write_video(path: Path, written: Written, options: Options) -> None:
-    from tracker.export import video  # brings OpenCV and the reading of videos
+def _write_video(path: Path, run: ExportedRun, options: Options) -> None:
+    from tracker.export import video  # imports OpenCV and the reading of videos
 
-    video.write(path, written, options)
+    video.write(path, run, options)
 
 
 FORMATS: dict[str, Format] = {
@@ -123,13 +127,13 @@ def format_of(path: Path, name: str | None = None) -> Format:
     """Choose the format of a file.
 
     Args:
-        path: The file; its suffix chooses the format where no name is given, and CSV is taken
-            where the suffix is unknown.
-        name: The format's name; None if it is to be chosen by the suffix.
+        path: The file. If no name is given, its suffix chooses the format, and an unknown suffix
+            chooses CSV.
+        name: The name of the format; None if the suffix chooses it.
 
     Raises:
-        ValueError: If there is no such format, or the suffix is the name of a format whose files
-            have another suffix (``.gltf``).
+        ValueError: If there is no format of this name, or the suffix is the name of a format whose
+            files have another suffix (``.gltf``).
     """
     if name is not None:
         if name not in FORMATS:
@@ -149,7 +153,7 @@ def format_of(path: Path, name: str | None = None) -> Format:
 def save(
     path: Path,
     form: Format,
-    written: Written,
+    run: ExportedRun,
     options: Options | None = None,
     *,
     zipped: bool = False,
@@ -160,32 +164,32 @@ def save(
         path: The file to write, which is replaced if it exists; or the folder, which must be new or
             empty.
         form: The format, one of :data:`FORMATS`.
-        written: The run to write.
-        options: The range and the callbacks; the whole run if None.
+        run: The run to write.
+        options: The range of steps and the callbacks; if None, the whole run without callbacks.
         zipped: Whether a format that is a folder is written as one ZIP file.
 
     Raises:
         ValueError: If the run lacks what the format needs, or a package is not installed.
-        OSError: With a sentence, if the file cannot be written.
+        OSError: If the file cannot be written; the message says why.
         Stopped: If the caller cancelled the export.
     """
     options = options or Options()
-    form.check(written.sequence)
+    form.check(run.sequence)
     if not form.folder:
         if not path.is_dir() and path.exists() and not path.is_file():
-            form.write(path, written, options)  # a pipe or device
+            form.write(path, run, options)  # a pipe or device
             return
         with replacing(path) as temporary:
-            form.write(temporary, written, options)
+            form.write(temporary, run, options)
     elif zipped:
         with replacing(path) as temporary:
             folder = temporary.with_name(temporary.name + ".folder")
             folder.mkdir()
             try:
-                form.write(folder, written, options)
+                form.write(folder, run, options)
                 zip_folder(folder, temporary)
             finally:
                 shutil.rmtree(folder, ignore_errors=True)
     else:
         with new_folder(path) as temporary:
-            form.write(temporary, written, options)
+            form.write(temporary, run, options)

@@ -5,22 +5,22 @@ from __future__ import annotations
 from pathlib import Path
 
 from tracker.evaluation import evaluate_sequence
-from tracker.export.written import Options, Written
+from tracker.export.exported_run import ExportedRun, Options
 
 
-def write(path: Path, written: Written, options: Options) -> None:
-    """Evaluate the tracks and write the report."""
-    from tracker.evaluation.report.page import report_html  # brings plotly
+def write(path: Path, run: ExportedRun, options: Options) -> None:
+    """Evaluate the tracks, and write the report."""
+    from tracker.evaluation.report.page import report_html  # imports plotly
 
-    sequence = written.sequence
-    evaluation = evaluate_sequence(sequence, written.tracks, steps=written.steps)
+    sequence = run.sequence
+    evaluation = evaluate_sequence(sequence, run.tracks, steps=run.steps)
     text = report_html(
         sequence,
-        written.tracks,
-        written.parameters,
+        run.tracks,
+        run.parameters,
         evaluation,
-        seed=written.seed,
-        back=written.back,
+        seed=run.seed,
+        back=run.back,
     )
     path.write_text(text, encoding="utf-8")
-    options.at(written.steps, written.steps)
+    options.at(run.steps, run.steps)

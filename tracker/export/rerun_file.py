@@ -11,17 +11,18 @@ from pathlib import Path
 
 import numpy as np
 
+from tracker.export.exported_run import ExportedRun, Options
 from tracker.export.palette import rgb
-from tracker.export.written import Options, Written
 
 APPLICATION = "multiview-phd"
+"""The name of the application in Rerun's viewer."""
 
 
-def write(path: Path, written: Written, options: Options) -> None:
+def write(path: Path, run: ExportedRun, options: Options) -> None:
     """Write a run as a Rerun recording, step by step."""
     import rerun as rr
 
-    sequence, tracks = written.sequence, written.tracks
+    sequence, tracks = run.sequence, run.tracks
     half = sequence.target_half_extents
     recording = rr.RecordingStream(APPLICATION)
     try:
@@ -39,13 +40,13 @@ def write(path: Path, written: Written, options: Options) -> None:
             recording.log(place, turned, static=True)
             lens = rr.Pinhole(image_from_camera=camera.intrinsics, resolution=camera.image_size)
             recording.log(place, lens, static=True)
-        for number in written.ids:
+        for number in run.ids:
             way = tracks.positions[tracks.ids == number]
             recording.log(
                 f"world/ways/{number}", rr.LineStrips3D([way], colors=[rgb(number)]), static=True
             )
-        for step in range(written.steps):
-            options.at(step, written.steps)
+        for step in range(run.steps):
+            options.at(step, run.steps)
             recording.set_time("step", sequence=step)
             recording.set_time("time", duration=step * sequence.step_time)
             rows = tracks.at(step)
@@ -59,7 +60,7 @@ def write(path: Path, written: Written, options: Options) -> None:
             )
             recording.log("world/tracks", boxes)
             for index, camera in enumerate(sequence.cameras):
-                pixels, visible = written.boxes[index]
+                pixels, visible = run.boxes[index]
                 there = np.flatnonzero(visible[rows])
                 shown = rr.Boxes2D(
                     array=pixels[rows][there],
@@ -71,4 +72,4 @@ def write(path: Path, written: Written, options: Options) -> None:
     finally:
         recording.flush()
         recording.disconnect()
-    options.at(written.steps, written.steps)
+    options.at(run.steps, run.steps)

@@ -1,7 +1,7 @@
 """The track file: one row for each target and step, with its reprojected box in every picture.
 
-The comment lines at the top state how it was made: version, sequence, seed, methods and the
-value of every parameter, in the form that ``multiview-phd track --set`` accepts.
+The comment lines at the top state the version of the program, the sequence, the seed, the methods
+and the value of every parameter, in the form that ``multiview-phd track --set`` accepts.
 """
 
 from __future__ import annotations
@@ -30,14 +30,20 @@ from tracker.sequences.errors import SequenceError
 from tracker.sequences.sequence import Sequence
 
 PROGRAM = "multiview-phd"
+"""The name of the program in the first comment line."""
+
 BOX = ("left", "top", "width", "height")
+"""The parts of a box, which follow the camera's name in the name of a column."""
+
 COLUMNS = ("frame", "time", "id", "x", "y", "z", "existence", "sigma_x", "sigma_y", "sigma_z")
+"""The columns of every track file before those of boxes."""
 
 CORRECTION = "correction"
-"""The column of a corrected run: the id of the correction that a row depends on, or empty."""
+"""The name of the column of a corrected run: the id of the correction that a row depends on, or
+empty."""
 
 NAME = "name"
-"""The column of a run in which people were named: the name of a row's track, or empty."""
+"""The name of the column of a run with named people: the name of the row's track, or empty."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,22 +51,27 @@ class TrackFile:
     """The content of a track file: N rows, sorted by step and then id."""
 
     frames: Int[ndarray, " N"]
+    """The step of each row, counted from 0."""
     times: Float[ndarray, " N"]
-    """Seconds."""
+    """The time of each step since step 0, seconds."""
     ids: Int[ndarray, " N"]
+    """The id of the track of each row."""
     positions: Float[ndarray, "N 3"]
-    """World metres."""
+    """The centre of the target, world metres."""
     existences: Float[ndarray, " N"]
+    """The existence probability, or the weight of the target's component, which may exceed 1."""
     sigmas: Float[ndarray, "N 3"]
     """Standard deviation of the position along x, y and z, metres."""
     boxes: Mapping[str, Float[ndarray, "N 4"]]
-    """For each camera left, top, width, height in pixels; NaN where its picture has no box."""
+    """For each camera by name: left, top, width, height of the reprojected box in pixels; NaN if it
+    does not lie in the picture."""
     settings: Mapping[str, str]
-    """The comment lines ``# key = value``: sequence, seed, methods and parameters."""
+    """The values of the comment lines ``# key = value`` (sequence, seed, methods, parameters), by
+    key."""
     done: int | None = None
-    """The number of steps computed, if the file states that it is not all of them; else None."""
+    """The number of steps computed, if the file states that these are not all; else None."""
     remarks: tuple[str, ...] = ()
-    """The sentences in which the file states what is missing."""
+    """The sentences of the comment lines ``# incomplete: …``."""
 
     def __len__(self) -> int:
         return len(self.frames)
@@ -90,10 +101,10 @@ def write_tracks_csv(
         seed: The seed of the run.
         done: The number of steps computed; a comment states it if the sequence has more.
         remarks: Further sentences for the comments, for instance that pictures were missing.
-        row_corrections: For a corrected run, the id of the correction that each row depends on, ""
-            for none; the ids become the column :data:`CORRECTION`.
-        names: The names that people were given by hand, by track id; they become the column
-            :data:`NAME`.
+        row_corrections: For a corrected run, the id of the correction that each row depends on, or
+            an empty string, for the column :data:`CORRECTION`; if empty, there is no such column.
+        names: The names that the user gave to people, by track id, for the column :data:`NAME`; if
+            empty, there is no such column.
     """
     for line in _comments(sequence, parameters, seed, done, remarks):
         stream.write(f"# {line}\n")
@@ -124,14 +135,16 @@ def write_tracks_csv(
 
 
 def _cell(text: str) -> str:
-    """Return text that a user wrote as one quoted cell that no spreadsheet reads as a formula."""
+    """Return a user's text as one cell, quoted if necessary, that no spreadsheet reads as a
+    formula."""
     cell = io.StringIO()
     csv.writer(cell, lineterminator="").writerow([guarded(" ".join(text.split()))])
     return cell.getvalue()
 
 
 def _fixed(values: Float[ndarray, "N C"], decimals: int) -> Iterator[list[str]]:
-    """Yield columns as text with a fixed number of decimals; NaN is empty, and zero has no sign."""
+    """Yield the C columns as text with a fixed number of decimals; NaN gives an empty cell, and −0
+    gives 0."""
     rounded = np.round(values, decimals) + 0.0  # turns −0.0 into 0.0
     for column in rounded.T:
         yield [f"{number:.{decimals}f}" if number == number else "" for number in column.tolist()]
@@ -144,6 +157,7 @@ def _comments(
     done: int | None,
     remarks: Iterable[str],
 ) -> Iterator[str]:
+    """Yield the comment lines without the sign #."""
     yield f"{PROGRAM} {__version__}"
     yield from (f"incomplete: {guarded(' '.join(remark.split()))}" for remark in remarks)
     if done is not None and done < sequence.frames:
@@ -155,6 +169,7 @@ def _comments(
 
 
 def _as_text(setting: Any) -> str:
+    """Return a value of a parameter as text; Boolean values are in lower case, as in TOML."""
     return str(setting).lower() if isinstance(setting, bool) else str(setting)
 
 
@@ -168,14 +183,16 @@ def save_tracks_csv(
     done: int | None = None,
     remarks: Iterable[str] = (),
 ) -> None:
-    """Write the track file to disk: wholly or not at all, whatever interrupts it.
+    """Write the track file to disk, atomically.
 
     Args:
-        path: Replaced if it is there. A pipe or device is written to directly.
-        sequence, tracks, parameters, seed, done, remarks: As for :func:`write_tracks_csv`.
+        path: The file to write, which is replaced if it exists. A pipe or device is written to
+            directly.
+        sequence, tracks, parameters, seed, done, remarks: The arguments of
+            :func:`write_tracks_csv`.
 
     Raises:
-        OSError: With a sentence, if the file cannot be written.
+        OSError: If the file cannot be written; the message says why.
     """
     path = Path(path)
     if not path.is_dir() and path.exists() and not path.is_file():
@@ -190,7 +207,8 @@ def read_tracks_csv(path: Path | str) -> TrackFile:
     """Read a track file.
 
     Raises:
-        SequenceError: In one sentence: file, line and column, expected, found.
+        SequenceError: If the file is not a valid track file; the message names the file, the line
+            and the column, and states what was expected and found.
     """
     path = Path(path)
     header = _header(path)
@@ -224,6 +242,7 @@ def read_tracks_csv(path: Path | str) -> TrackFile:
 
 
 def _header(path: Path) -> list[str]:
+    """Return the names of the columns."""
     for line in _beginning(path):
         if line.strip() and not line.startswith("#"):
             return [unguarded(cell.strip()) for cell in next(csv.reader([line]))]
@@ -231,6 +250,7 @@ def _header(path: Path) -> list[str]:
 
 
 def _settings(path: Path) -> dict[str, str]:
+    """Return the values of the comment lines ``# key = value``, by key."""
     settings = {}
     for line in _beginning(path):
         if not line.startswith("#"):
@@ -242,6 +262,7 @@ def _settings(path: Path) -> dict[str, str]:
 
 
 def _done(path: Path) -> int | None:
+    """Return the number of steps that the comment line ``# partial: …`` states; None without it."""
     for line in _beginning(path):
         if not line.startswith("#"):
             break
@@ -251,12 +272,14 @@ def _done(path: Path) -> int | None:
 
 
 def _remarks(path: Path) -> tuple[str, ...]:
+    """Return the sentences of the comment lines ``# incomplete: …``."""
     head = itertools.takewhile(lambda line: line.startswith("#"), _beginning(path))
     found = (re.match(r"# incomplete: (.*)", line) for line in head)
     return tuple(unguarded(one[1].strip()) for one in found if one)
 
 
 def _beginning(path: Path) -> Iterator[str]:
+    """Yield the lines of a file, which is closed once the caller stops."""
     try:
         with path.open(encoding="utf-8-sig", errors="replace") as stream:
             yield from stream

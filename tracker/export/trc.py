@@ -11,14 +11,14 @@ from pathlib import Path
 
 import numpy as np
 
-from tracker.export.written import Options, Written
+from tracker.export.exported_run import ExportedRun, Options
 
 
-def write(path: Path, written: Written, options: Options) -> None:
+def write(path: Path, run: ExportedRun, options: Options) -> None:
     """Write a run as markers, step by step."""
-    sequence, tracks, ids = written.sequence, written.tracks, written.ids
+    sequence, tracks, ids = run.sequence, run.tracks, run.ids
     place = {number: k for k, number in enumerate(ids)}
-    fps, steps = f"{sequence.fps:g}", written.steps
+    fps, steps = f"{sequence.fps:g}", run.steps
     facts = {
         "DataRate": fps, "CameraRate": fps, "NumFrames": steps, "NumMarkers": len(ids),
         "Units": "m", "OrigDataRate": fps, "OrigDataStartFrame": 1, "OrigNumFrames": steps,
@@ -42,3 +42,4 @@ def write(path: Path, written: Written, options: Options) -> None:
 
 
 _Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+"""The rotation from world axes (z up) to those of the file (y up)."""

@@ -211,8 +211,8 @@ def _show(library: Library, command: ShowRun) -> None:
 
 
 def _export(library: Library, command: ExportRun) -> None:
+    from tracker.export.exported_run import ExportedRun, Options
     from tracker.export.registry import format_of, save
-    from tracker.export.written import Options, Written
     from tracker.library.keeping import remarks_of
     from tracker.sequences import library as sequences
 
@@ -220,7 +220,7 @@ def _export(library: Library, command: ExportRun) -> None:
     result = library.result(library.find(command.run).id)
     sequence = sequences.open_sequence(result.place)
     done = None if result.run.steps >= sequence.frames else result.run.steps
-    written = Written(
+    written = ExportedRun(
         sequence,
         result.kept.tracks,
         result.parameters,

@@ -22,8 +22,8 @@ def track(command: Track) -> int:
     check_seed(command.seed)
     check_keep(command.keep)
     output = command.output
+    from tracker.export.exported_run import ExportedRun, Options
     from tracker.export.registry import format_of, save
-    from tracker.export.written import Options, Written
 
     form = format_of(output, command.format)
     if output.is_dir() and not form.folder:
@@ -83,7 +83,7 @@ def track(command: Track) -> int:
     seconds = time.perf_counter() - begin
     with Bar("writing", "step") as writing:
         missing = gaps.sentences(run)
-        written = Written(
+        written = ExportedRun(
             sequence,
             run.tracks,
             parameters,

@@ -14,8 +14,8 @@ from typing import Literal
 
 from app.errors import sentence
 from app.state.workers.threads import CLOSING_SECONDS, be_nice
+from tracker.export.exported_run import ExportedRun, Options, Stopped
 from tracker.export.registry import Format, save
-from tracker.export.written import Options, Stopped, Written
 
 logger = logging.getLogger("app")
 
@@ -61,7 +61,7 @@ class Exporter:
             return self._folder / self._now.name
 
     def start(
-        self, form: Format, make: Callable[[], Written], name: str, options: Options
+        self, form: Format, make: Callable[[], ExportedRun], name: str, options: Options
     ) -> Exporting:
         """Begin to write, instead of what is under way.
 

@@ -16,8 +16,8 @@ from app.state.workers.exporter import Exporter
 from app.web.dependencies import ERRORS, Bench, not_finished
 from app.web.library.routes import Kept, no_library
 from app.web.views.link import address_of
+from tracker.export.exported_run import ExportedRun, Options
 from tracker.export.registry import FORMATS
-from tracker.export.written import Options, Written
 from tracker.library.errors import LibraryError
 from tracker.library.keeping import remarks_of
 from tracker.runs import gaps
@@ -125,7 +125,7 @@ def begin(
         rows = slice(0, run.tracks.at(done).start)
         columns = (getattr(run.tracks, name)[rows] for name in type(run.tracks).__slots__)
         named = now.named(run.sequence)
-        written = Written(
+        written = ExportedRun(
             named,
             type(run.tracks)(*columns),
             run.parameters,
@@ -146,9 +146,9 @@ def begin(
     except LibraryError as error:
         raise no_library(error) from None
 
-    def make() -> Written:
+    def make() -> ExportedRun:
         sequence = sequences.open_sequence(result.place)
-        return Written(
+        return ExportedRun(
             sequence,
             result.kept.tracks,
             result.parameters,

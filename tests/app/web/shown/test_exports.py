@@ -16,8 +16,8 @@ from app.state.workers.exporter import Exporter
 from app.web.server import Settings, create_app
 from tests.app.conftest import ADDRESS, run_is, wait_until
 from tests.library.written import written
+from tracker.export.exported_run import ExportedRun, Options
 from tracker.export.registry import FORMATS
-from tracker.export.written import Options, Written
 
 
 def fetched(client: TestClient, **wish: object) -> bytes:
@@ -66,7 +66,7 @@ def test_what_cannot_be_written_is_a_sentence(client: TestClient) -> None:
 def test_one_that_is_stopped_leaves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     exporter, waiting, go = Exporter(), threading.Event(), threading.Event()
 
-    def slowly() -> Written:
+    def slowly() -> ExportedRun:
         waiting.set()
         go.wait(10.0)
         return written()

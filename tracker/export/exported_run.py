@@ -34,16 +34,16 @@ class Options:
     speed: float = 1.0
     """The speed of playback relative to the recording: at 0.5 the video takes twice as long."""
     progress: Callable[[int, int], None] = _ignore_progress
-    """A callback that gets the number of steps written and of all steps."""
+    """A callback that gets the number of steps (or tracks) written, and the number of all."""
     stopped: Callable[[], bool] = lambda: False
-    """A callback that is asked between steps whether to cancel."""
+    """A callback that returns whether to cancel; it is called before each step (or track)."""
 
     def at(self, done: int, total: int) -> None:
-        """Report progress, and stop if the caller cancelled.
+        """Report progress, or raise an exception if the caller cancelled.
 
         Args:
             done: The number of steps (or tracks) written.
-            total: The number of all of them.
+            total: The number of all steps (or tracks).
 
         Raises:
             Stopped: If the caller cancelled the export.
@@ -54,23 +54,28 @@ class Options:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Written:
-    """A run's result, as it is written."""
+class ExportedRun:
+    """A run's result with all that an export states of it."""
 
     sequence: Sequence
+    """The sequence that was tracked."""
     tracks: Trajectories
+    """The N rows of the tracks, sorted by step and then id."""
     parameters: RunParameters
+    """The parameters of the run."""
     seed: int = 0
+    """The seed of the run's random numbers."""
     done: int | None = None
     """The number of steps computed; None for all."""
     remarks: tuple[str, ...] = ()
-    """Sentences that must accompany the result, for instance that pictures were missing."""
+    """The sentences that accompany the result, for instance that pictures were missing."""
     row_corrections: Many[str] = ()
-    """For a corrected run, the id of the correction that each row depends on; "" for none."""
+    """For a corrected run, the id of the correction that each row depends on, or an empty string;
+    else empty."""
     names: Mapping[int, str] = field(default_factory=dict)
-    """The names that people were given by hand, by track id."""
+    """The names that the user gave to people, by track id."""
     back: str = ""
-    """The URL of the page that shows the run; empty if there is none."""
+    """The URL of the page that shows the run, to which a report links; empty if there is none."""
     boxes: list[tuple[Float[ndarray, "N 4"], Bool[ndarray, " N"]]] = field(init=False)
     """For each camera the reprojected boxes of all rows (left, top, width, height in pixels), and
     whether each lies in the picture."""
