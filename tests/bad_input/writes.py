@@ -36,11 +36,11 @@ from tracker.sequences.sequence import Sequence
 from tracker.sequences.writing import saving
 from tracker.sequences.writing.teaching import Values, taught_values, with_taught
 from tracker.single_view.protocol import ViewResult
-from tracker.studies.kept.records import Status, Trial
-from tracker.studies.kept.store import Store, create
-from tracker.studies.kept.writer import Writer
 from tracker.studies.sampling import Journal
-from tracker.studies.work.jobs import Outcome
+from tracker.studies.storage.records import Status, Trial
+from tracker.studies.storage.store import Store, create
+from tracker.studies.storage.writer import Writer
+from tracker.studies.workers.jobs import Outcome
 
 STEP = 2.0**-12
 """Of a number in which the number of a write is told: it is the same when it is read back."""
@@ -203,7 +203,7 @@ def ended_trials(folder: Path) -> int:
 
 def note_trial(folder: Path, number: int) -> None:
     journal = Journal(folder / "journal.log")
-    with journal.together():
+    with journal.transaction():
         for part in range(4):
             journal.append_logs([{"number": number, "part": part}])
     journal.close()

@@ -19,15 +19,15 @@ import psutil
 from tests.benchmarks.measure import Measurement
 from tests.conftest import DATA
 from tests.synthetic import write_sequence
-from tracker.studies.defined.defining import definition_of
-from tracker.studies.defined.definition import Definition
-from tracker.studies.kept.store import Store, create
-from tracker.studies.kept.writer import RESULTS
+from tracker.studies.definition.definition import Definition
+from tracker.studies.definition.parsing import definition_of
 from tracker.studies.opened import open_recordings
 from tracker.studies.running import run_study
-from tracker.studies.work import working
-from tracker.studies.work.cluster import DaskCrew
-from tracker.studies.work.jobs import Job, Outcome
+from tracker.studies.storage.store import Store, create
+from tracker.studies.storage.writer import RESULTS
+from tracker.studies.workers import working
+from tracker.studies.workers.cluster import DaskCrew
+from tracker.studies.workers.jobs import Job, Outcome
 
 RECORDINGS = ("cmc1", "cmc2", "av163-seq45-3p-1111-points")
 WORKERS = 2

@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from tests.synthetic import write_sequence
-from tracker.studies.defined.defining import definition_of
-from tracker.studies.defined.definition import Definition
-from tracker.studies.kept.store import Store
-from tracker.studies.work import working
-from tracker.studies.work.cluster import WorkerState
-from tracker.studies.work.jobs import Job, Outcome
+from tracker.studies.definition.definition import Definition
+from tracker.studies.definition.parsing import definition_of
+from tracker.studies.storage.store import Store
+from tracker.studies.workers import working
+from tracker.studies.workers.cluster import WorkerState
+from tracker.studies.workers.jobs import Job, Outcome
 
 PARAMETERS: dict[str, Any] = {
     "fusion.detection_probability": {"low": 0.6, "high": 0.98},

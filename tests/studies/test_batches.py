@@ -15,7 +15,7 @@ from tracker.library.store import open_library
 from tracker.runs import pipeline
 from tracker.sequences.library import open_sequence
 from tracker.studies.batches import BatchRun, places_of, run_batch
-from tracker.studies.work.working import tracks_hash
+from tracker.studies.workers.working import tracks_hash
 
 FRAMES = 60
 

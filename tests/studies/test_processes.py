@@ -17,11 +17,11 @@ from tracker.export.registry import format_of, save
 from tracker.parameters import with_values
 from tracker.runs import pipeline
 from tracker.sequences.library import open_sequence
-from tracker.studies.kept.store import Store, create
 from tracker.studies.opened import open_recordings
 from tracker.studies.reporting.commands import changes_of, track_commands
-from tracker.studies.work import recordings, working
-from tracker.studies.work.working import tracks_hash
+from tracker.studies.storage.store import Store, create
+from tracker.studies.workers import recordings, working
+from tracker.studies.workers.working import tracks_hash
 
 pytestmark = [
     pytest.mark.full,

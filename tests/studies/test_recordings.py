@@ -8,7 +8,7 @@ import pytest
 
 from tests.synthetic import write_sequence
 from tracker.sequences.reader import FILE
-from tracker.studies.work.recordings import files_of
+from tracker.studies.workers.recordings import files_of
 
 
 @pytest.mark.parametrize("words", [".", "./", "/", "", "**", "[", "..", "a**", "\\u0000"])

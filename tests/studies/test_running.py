@@ -13,17 +13,17 @@ import pytest
 from tests.studies.small import Serial, definition, made_up, recording, run
 from tracker.parameters import with_values
 from tracker.runs.run import stage_keys
+from tracker.studies.analysis.importance import ImportanceEstimator
 from tracker.studies.errors import StudyError
-from tracker.studies.found.importance import Weighing
-from tracker.studies.kept.records import Trial
-from tracker.studies.kept.store import JOURNAL, Store, create
-from tracker.studies.kept.writer import RESULTS
 from tracker.studies.opened import open_recordings
 from tracker.studies.reporting.report import report_html
 from tracker.studies.reporting.summary import summary_of
 from tracker.studies.sampling import Sampler
-from tracker.studies.work import working
-from tracker.studies.work.jobs import Job, Outcome
+from tracker.studies.storage.records import Trial
+from tracker.studies.storage.store import JOURNAL, Store, create
+from tracker.studies.storage.writer import RESULTS
+from tracker.studies.workers import working
+from tracker.studies.workers.jobs import Job, Outcome
 
 
 def near(values: dict[str, Any]) -> float:
@@ -349,9 +349,9 @@ def test_what_matters_is_told_by_all_trials_at_the_end() -> None:
 
             return found
 
-    weighing, crew = Weighing((), {}), Slow()
-    assert weighing.news(trials[:13], crew, worked=9.0) is None
-    assert weighing.news(trials, crew, worked=9.0, last=True) == {"trials": 40}
+    weighing, crew = ImportanceEstimator((), {}), Slow()
+    assert weighing.update(trials[:13], crew, worked=9.0) is None
+    assert weighing.update(trials, crew, worked=9.0, last=True) == {"trials": 40}
     assert asked == [13, 40]
-    assert weighing.news(trials, crew, worked=9.0, last=True) is None
+    assert weighing.update(trials, crew, worked=9.0, last=True) is None
     assert asked == [13, 40]

@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tracker.parameters import METHODS, PARAMETERS, RunParameters, shown_keys, with_values
-from tracker.studies.defined import space
-from tracker.studies.defined.definition import Varied
+from tracker.studies.definition import space
+from tracker.studies.definition.definition import Varied
 
 BASE = RunParameters(single_view="none")
 

@@ -17,13 +17,13 @@ from app.command.terminal import CommandError
 from tests.studies.small import Serial, definition, made_up, run
 from tracker.files.atomic import write_whole
 from tracker.studies.errors import StudyError
-from tracker.studies.kept import writer
-from tracker.studies.kept.records import Status
-from tracker.studies.kept.store import JOURNAL, Store, create, find
-from tracker.studies.kept.writer import RESULTS, STATUS, Writer
 from tracker.studies.reporting.summary import summary_of
-from tracker.studies.work.jobs import Job, Outcome
-from tracker.studies.work.recordings import packed
+from tracker.studies.storage import writer
+from tracker.studies.storage.records import Status
+from tracker.studies.storage.store import JOURNAL, Store, create, find
+from tracker.studies.storage.writer import RESULTS, STATUS, Writer
+from tracker.studies.workers.jobs import Job, Outcome
+from tracker.studies.workers.recordings import packed
 
 
 def study(folder: Path, **fields: object) -> Store:
@@ -165,7 +165,7 @@ def test_a_worker_with_other_code_does_nothing(tmp_path: Path) -> None:
     from dataclasses import replace
 
     from tracker.studies.opened import open_recordings
-    from tracker.studies.work.working import work
+    from tracker.studies.workers.working import work
 
     (_, job), *_ = open_recordings(definition(tmp_path)).jobs({})
     outcome = work(replace(job, code="another"))

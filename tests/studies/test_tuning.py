@@ -11,10 +11,10 @@ import pytest
 from tests.studies.small import Serial, definition, recording, run
 from tracker.parameters import PARAMETERS, table
 from tracker.studies.errors import StudyError
-from tracker.studies.kept.store import Store, create
 from tracker.studies.reporting.report import report_html
+from tracker.studies.storage.store import Store, create
 from tracker.studies.tuning import tuning
-from tracker.studies.work.jobs import Job, Outcome
+from tracker.studies.workers.jobs import Job, Outcome
 
 
 def study(folder: Path, **fields: Any) -> Store:

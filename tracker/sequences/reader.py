@@ -61,7 +61,8 @@ def read_sequence(folder: Path | str) -> Sequence:
         folder: The folder, or the ``sequence.toml`` in it.
 
     Raises:
-        SequenceError: With a sentence that names the file and the line or field.
+        SequenceError: If the folder is not a valid sequence; the message names the file and the
+            line or field.
     """
     folder, text = _find(Path(folder))
     fields = _parse(folder, text)

@@ -1,4 +1,4 @@
-"""Batches: many recordings tracked with the same parameters, and every run stored in the library.
+"""Batches: many recordings are tracked with the same parameters, and the library stores every run.
 
 Runs that the library has already are not computed again. Each recording's corrections are applied,
 as in a single run.
@@ -24,9 +24,9 @@ from tracker.sequences.library import open_sequence
 from tracker.sequences.reader import FILE
 from tracker.sequences.sequence import Sequence as Recording
 from tracker.studies.errors import StudyError
-from tracker.studies.work.cluster import Crew
-from tracker.studies.work.jobs import job_of
-from tracker.studies.work.recordings import content_of
+from tracker.studies.workers.cluster import Crew
+from tracker.studies.workers.jobs import job_of
+from tracker.studies.workers.recordings import content_of
 
 WAIT_SECONDS = 0.5
 """Longest wait for an outcome before cancellation is checked, seconds."""
@@ -39,6 +39,7 @@ class BatchRun:
     recording: str
     """The name or folder of the recording."""
     seed: int
+    """The seed of the run."""
     run: KeptRun | None
     """The stored run; None if it failed."""
     words: str = ""
@@ -48,7 +49,12 @@ class BatchRun:
 
 
 def places_of(names: Sequence[str]) -> list[str]:
-    """Resolve names of recordings: built-in ones, folders, patterns of folders, files of names.
+    """Return the built-in recordings and the absolute folders that names refer to, without
+    duplicates.
+
+    Args:
+        names: Names of built-in recordings, folders, patterns of folders, or ``@FILE`` for a file
+            with one of these on each line.
 
     Raises:
         StudyError: If a name matches nothing.
@@ -75,6 +81,8 @@ def places_of(names: Sequence[str]) -> list[str]:
 
 
 def _listed(file: Path) -> list[str]:
+    """Return the names in a file, without empty lines and comments; relative folders refer to the
+    folder of the file."""
     try:
         lines = file.read_text(encoding="utf-8").splitlines()
     except OSError as error:
@@ -107,11 +115,11 @@ def run_batch(
         seeds: The number of runs of each recording.
         library: The library that stores the runs; runs that it has already, with final figures,
             are not computed again.
-        budget: Most unmarked runs that the library keeps.
+        budget: Largest number of unmarked runs that the library keeps.
         crew: A function that starts the workers; it is called once there is something to compute.
-        on_progress: A callback that gets the number of runs done and of all.
-        stopped: A callback that is asked now and then whether to stop; the runs so far are then
-            returned.
+        on_progress: A callback that gets the number of runs done, and the number of all.
+        stopped: A callback that returns whether to stop; it is called every half second, and the
+            runs so far are then returned.
         corrected: Whether each recording's corrections are applied.
 
     Raises:
@@ -182,6 +190,7 @@ def _job(
     seed: int,
     corrections: tuple[Correction, ...],
 ) -> Any:
+    """Return the job of a run, whose outcome includes the records for the library."""
     job = job_of(
         sequence,
         place,

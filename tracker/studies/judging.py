@@ -1,4 +1,4 @@
-"""The judgement of trials: objectives over recordings and seeds, vetoes, and pruning."""
+"""The judgement of trials: means of objectives over recordings and seeds, vetoes, and pruning."""
 
 from __future__ import annotations
 
@@ -6,22 +6,22 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from tracker.studies.defined.objectives import HELD_OUT, VETO, Objective, front, mean_over
-from tracker.studies.kept.records import JobRow, Trial
-from tracker.studies.work.jobs import Outcome
+from tracker.studies.definition.objectives import HELD_OUT, VETO, Objective, front, mean_over
+from tracker.studies.storage.records import JobRow, Trial
+from tracker.studies.workers.jobs import Outcome
 
 FIRST_SHARE = 1.0 / 3.0
-"""Share of a trial's runs after which it may be pruned."""
+"""Share of a trial's runs that are computed before it may be pruned."""
 
 FEWEST = 10
-"""Least number of complete trials before one is pruned."""
+"""Least number of complete trials with which a trial is compared before it may be pruned."""
 
 Place = tuple[str, int]
 """A recording and a seed."""
 
 
 class Judge:
-    """Judges trials by the trials that ended before."""
+    """The judge of trials, which compares them with the trials that ended before."""
 
     def __init__(
         self,
@@ -33,8 +33,9 @@ class Judge:
 
         Args:
             objectives: The objectives of the study.
-            ended: Its trials so far.
-            outcome: A function that returns the outcome of a run by its key.
+            ended: The trials of the study that have ended.
+            outcome: A function that gets the key of a run and returns its outcome; None if it is
+                not stored.
         """
         self._objectives = tuple(objectives)
         self.complete: list[Trial] = []
@@ -46,6 +47,12 @@ class Judge:
             self._add(trial, {key: one for key, one in found.items() if one is not None})
 
     def _add(self, trial: Trial, outcomes: Mapping[str, Outcome]) -> None:
+        """Store the objectives of a complete trial, and the held-out overlaps of the defaults.
+
+        Args:
+            trial: A trial that ended.
+            outcomes: The outcomes of its runs, by key.
+        """
         rows = [row for row in trial.jobs if row.key in outcomes]
         if trial.number == 0:
             for row in rows:
@@ -59,17 +66,28 @@ class Judge:
             )
 
     def _of(self, outcome: Outcome) -> tuple[float, ...] | None:
+        """Return the objectives of a run; None if one of them is not defined."""
         found = [outcome.figures.get(one.key) for one in self._objectives]
         return tuple(float(v) for v in found if v is not None) if None not in found else None
 
     def first_runs(self, runs: int, prune: bool) -> int:
-        """Return the number of a trial's runs after which it may be pruned."""
+        """Return the number of a trial's runs that are computed first; then it may be pruned.
+
+        Args:
+            runs: The number of all runs of the trial.
+            prune: Whether trials are pruned.
+        """
         return max(1, round(runs * FIRST_SHARE)) if prune and runs > 1 else runs
 
     def is_hopeless(self, rows: Sequence[JobRow], outcomes: Mapping[str, Outcome]) -> bool:
         """Whether a trial is worse in every objective than the median of the complete trials.
 
-        The means over the same recordings and seeds are compared.
+        Means over the same recordings and seeds are compared. A trial with an undefined objective
+        is hopeless, too.
+
+        Args:
+            rows: The runs of the trial that have ended.
+            outcomes: Their outcomes, by key.
         """
         if len(self.complete) < FEWEST:
             return False
@@ -86,8 +104,8 @@ class Judge:
             return False
         middle = np.median(others, axis=0)
         here = np.mean([v for v in own if v is not None], axis=0)
-        return not any(
-            not one.better(float(middle[index]), float(here[index]))
+        return all(
+            one.better(float(middle[index]), float(here[index]))
             for index, one in enumerate(self._objectives)
         )
 
@@ -102,14 +120,14 @@ class Judge:
         words: str,
         failed: bool,
     ) -> Trial:
-        """Make the record of a trial that ended, and judge the next trials by it as well.
+        """Return the record of a trial that ended, and compare the next trials with it, too.
 
         Args:
             number: The trial's number.
             values: The parameters that were tried, by key.
             rows: The trial's runs.
             outcomes: The outcomes of the runs, by key.
-            pruned: Whether further runs were left out.
+            pruned: Whether the trial was pruned, so that its further runs were left out.
             words: The reason of a failure, or a remark on the trial.
             failed: Whether a run failed.
         """
@@ -152,10 +170,12 @@ class Judge:
         return trial
 
     def _lacks(self, one: Objective, done: Sequence[tuple[JobRow, Outcome]]) -> bool:
+        """Whether an objective is not defined for one of the runs."""
         return any(outcome.figures.get(one.key) is None for _, outcome in done)
 
     def _is_vetoed(self, done: Sequence[tuple[JobRow, Outcome]]) -> bool:
-        """Whether the tracks overlap clearly less with left-out cameras than the defaults' do."""
+        """Whether the held-out overlap of a run is less than that of the defaults by more than
+        :data:`VETO`."""
         for row, outcome in done:
             usual = self._overlaps.get((row.recording, row.seed))
             if usual is not None and (outcome.overlap or 0.0) < usual - VETO:
@@ -163,7 +183,7 @@ class Judge:
         return False
 
     def for_sampler(self, trial: Trial) -> tuple[float, ...]:
-        """Return the objectives for the sampler: the identity of a vetoed trial is 0."""
+        """Return the objectives that the sampler gets: identity is 0 if the trial is vetoed."""
         assert trial.objectives is not None
         return tuple(
             0.0 if trial.vetoed and one.of == "agreement" else value
@@ -172,8 +192,9 @@ class Judge:
 
 
 def best_of(trials: Sequence[Trial], objectives: Sequence[Objective]) -> Trial | None:
-    """Return the trial that is best in the first objective, then in the next ones; None if none
-    ended. If no trial is better than the defaults, it is the trial of the defaults."""
+    """Return the trial that is best in the first objective, among equal ones in the next ones, and
+    among equal ones the earliest; None if there is none. So if no trial is better than the
+    defaults, it is the trial of the defaults."""
     good = usable(trials)
     if not good:
         return None

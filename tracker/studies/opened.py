@@ -12,33 +12,35 @@ from tracker.runs.fitting import unfit_methods
 from tracker.sequences.errors import SequenceError
 from tracker.sequences.library import open_sequence
 from tracker.sequences.sequence import Sequence
-from tracker.studies.defined import objectives
-from tracker.studies.defined.definition import Definition
-from tracker.studies.defined.objectives import Objective
+from tracker.studies.definition import objectives
+from tracker.studies.definition.definition import Definition
+from tracker.studies.definition.objectives import Objective
 from tracker.studies.errors import StudyError
-from tracker.studies.kept.records import JobRow
-from tracker.studies.kept.store import Store
-from tracker.studies.kept.writer import Writer
-from tracker.studies.work.jobs import Job, code_version, job_of
-from tracker.studies.work.recordings import content_of
+from tracker.studies.storage.records import JobRow
+from tracker.studies.storage.store import Store
+from tracker.studies.storage.writer import Writer
+from tracker.studies.workers.jobs import Job, code_version, job_of
+from tracker.studies.workers.recordings import content_of
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Opened:
-    """One recording."""
+    """An opened recording of a study."""
 
     place: str
-    """The name or folder by which it is opened."""
+    """The name or folder by which the recording is opened."""
     sequence: Sequence
+    """The recording."""
     content: str
-    """The hash of its files."""
+    """The hash of the recording's files."""
     defaults: RunParameters
+    """The default parameters for the recording."""
     base: RunParameters
-    """The parameters of all trials, apart from those that are varied."""
+    """The default parameters with the fixed values of the study; trials change the varied ones."""
 
     @property
     def has_truth(self) -> bool:
-        """Whether it has ground truth."""
+        """Whether the recording has ground truth."""
         return self.sequence.ground_truth is not None
 
     def to_json(self) -> dict[str, Any]:
@@ -58,12 +60,15 @@ class Recordings:
     """All recordings of a study, with the objectives and seeds of their runs."""
 
     every: tuple[Opened, ...]
+    """The recordings."""
     objectives: tuple[Objective, ...]
+    """The objectives, the most important first."""
     seeds: tuple[int, ...]
+    """The seeds of the runs on each recording."""
 
     @property
     def bases(self) -> list[RunParameters]:
-        """The parameters of all trials on each recording, apart from those that are varied."""
+        """The parameters on each recording with the fixed values of the study."""
         return [one.base for one in self.every]
 
     def jobs(self, values: Mapping[str, Any]) -> list[tuple[JobRow, Job]]:
@@ -104,7 +109,7 @@ class Recordings:
         """Return all parameters of a trial on a recording.
 
         Args:
-            place: The recording's place.
+            place: The name or folder by which the recording is opened.
             values: The varied parameters, by key.
         """
         one = next(each for each in self.every if each.place == place)
@@ -122,7 +127,7 @@ def open_recordings(
         tell: A callback that gets a sentence on what is being done.
 
     Raises:
-        StudyError: If a recording cannot be read, a method cannot work on it, or an objective needs
+        StudyError: If a recording cannot be read, a method cannot track it, or an objective needs
             ground truth that it does not have.
     """
     every = []
@@ -144,6 +149,11 @@ def open_recordings(
 
 
 def _check_methods(definition: Definition, sequence: Sequence, base: RunParameters) -> None:
+    """Check that all methods of the trials can track a recording.
+
+    Raises:
+        StudyError: If one of them cannot.
+    """
     unfit = unfit_methods(sequence, base)
     choices = {one.key: one.choices for one in definition.varied if one.key in METHODS}
     for key in METHODS:
@@ -153,9 +163,9 @@ def _check_methods(definition: Definition, sequence: Sequence, base: RunParamete
 
 
 def check_same(store: Store, writer: Writer, recordings: Recordings) -> None:
-    """Check that recordings and code are those of the earlier trials, so that these are comparable.
+    """Check that recordings and code are those of the earlier trials, so that all are comparable.
 
-    When a study begins, the facts on recordings and code are stored.
+    At the first start of a study, the facts on its recordings, code and objectives are stored.
 
     Raises:
         StudyError: If a recording or the code has changed since the study began.

@@ -1,7 +1,7 @@
-"""The run of a study: trials are asked for, their runs computed, and their results stored.
+"""The run of a study: the sampler draws trials, workers compute their runs, results are stored.
 
-Every result is on disk before the sampler gets it, so that the process may be killed at any time:
-the next start continues the trials that were active, with the runs that ended from disk.
+Every result is on disk before it is reported to the sampler, so that the process may be killed at
+any time: the next start continues the open trials, and reads the runs that ended from disk.
 """
 
 from __future__ import annotations
@@ -13,26 +13,27 @@ from contextlib import nullcontext
 from dataclasses import dataclass, field
 from typing import Any
 
-from tracker.studies.defined.definition import Definition
-from tracker.studies.defined.space import defaults_of
+from tracker.studies.analysis.importance import ImportanceEstimator
+from tracker.studies.analysis.proposing import SEARCH_SHARE, Proposer
+from tracker.studies.definition.definition import Definition
+from tracker.studies.definition.space import defaults_of
 from tracker.studies.errors import StudyError
-from tracker.studies.found.importance import Weighing
-from tracker.studies.found.proposing import SEARCH_SHARE, Proposer
 from tracker.studies.judging import Judge
-from tracker.studies.kept.records import JobRow, Status, Trial
-from tracker.studies.kept.store import JOURNAL, Store
-from tracker.studies.kept.writer import Writer
 from tracker.studies.opened import Recordings, check_same, open_recordings
 from tracker.studies.sampling import Sampler, first_values
+from tracker.studies.storage.records import JobRow, Status, Trial
+from tracker.studies.storage.store import JOURNAL, Store
+from tracker.studies.storage.writer import Writer
 from tracker.studies.turn import turn
-from tracker.studies.work.cluster import Crew, WorkerState
-from tracker.studies.work.jobs import Job, Outcome
+from tracker.studies.workers.cluster import Crew, WorkerState
+from tracker.studies.workers.jobs import Job, Outcome
 
 SECONDS_BETWEEN = 0.5
 """Interval at which the status is written and a request to stop is checked, seconds."""
 
 AHEAD = 1
-"""The number of queued runs for each active one, so that no worker waits for the sampler."""
+"""The number of queued runs for each run that is being computed, so that no worker waits for the
+sampler."""
 
 
 def run_study(
@@ -48,19 +49,19 @@ def run_study(
 
     Args:
         store: The folder of the study.
-        writer: The writer from :meth:`~tracker.studies.kept.store.Store.running`.
-        crew: A function that starts the workers; it gets a callback for sentences on what is being
-            done.
+        writer: The writer from :meth:`~tracker.studies.storage.store.Store.running`.
+        crew: A function that starts the workers; its argument is a callback that gets sentences on
+            the progress.
         on_status: A callback that gets the status at intervals.
-        stopped: A callback that is asked at the same intervals whether to stop.
-        beside: Whether the study runs beside others, since its workers are on other machines;
-            otherwise it waits until no other study runs on this machine.
+        stopped: A callback that returns whether to stop; it is called at the same intervals.
+        beside: Whether the study does not wait until no other study runs on this machine, since its
+            workers are on other machines.
 
     Returns:
         The status at the end: ``done``, or ``stopped`` if that was requested.
 
     Raises:
-        StudyError: If the study cannot continue; the status has the same sentence.
+        StudyError: If the study cannot continue; the status has the same message.
     """
     study = _Running(store, writer, on_status, stopped)
     try:
@@ -71,14 +72,14 @@ def run_study(
                 study.work()
             else:
                 study.end_early()
-            study.say()
+            study.write_status()
     except StudyError as error:
         study.state, study.words = "failed", str(error)
-        study.say()
+        study.write_status()
         raise
     except BaseException:
         study.state, study.words = "stopped", "interrupted; nothing that ended before is lost"
-        study.say()
+        study.write_status()
         raise
     finally:
         study.close()
@@ -86,7 +87,7 @@ def run_study(
 
 
 class _Running:
-    """One session of a study."""
+    """One session of a study: the time from a start to the next end or interruption."""
 
     crew: Crew
 
@@ -113,7 +114,7 @@ class _Running:
         self.status = Status("running")
 
     def prepare(self) -> None:
-        """Open the recordings and the sampler, and load earlier results."""
+        """Open the recordings and the sampler, and read the results of earlier sessions."""
         self.wait_for("opening the recordings")
         definition = self._definition
         self._recordings: Recordings = open_recordings(definition, self.wait_for)
@@ -130,18 +131,18 @@ class _Running:
         self._asked = self._sampler.asked
         by_number = {trial.number: trial for trial in ended}
         for number in self._sampler.open_trials():
-            values = self._sampler.again(number)
+            values = self._sampler.resume(number)
             if number in by_number:  # its result was stored but not reported to the sampler
-                self._sampler_hears(by_number[number])
+                self._report_to_sampler(by_number[number])
             else:
-                self._take_up(number, values)
+                self._activate(number, values)
         defaults = defaults_of(definition.varied, self._recordings.bases[0])
         first = first_values(definition, defaults)
         self._fixed = len(first)
         grid = self._sampler.grid() if definition.search == "grid" else None
         self._trials = definition.trials if grid is None else len(first) + len(grid)
         self._queue = [*first, *(grid or [])][self._asked :]
-        self._weighing = Weighing(definition.varied, defaults)
+        self._estimator = ImportanceEstimator(definition.varied, defaults)
 
     def close(self) -> None:
         """Close the sampler's files."""
@@ -161,13 +162,13 @@ class _Running:
             self._fill()
             if not self._active:
                 words = self._why_done()
-                self._weigh(last=True)
+                self._update_importance(last=True)
                 if self._definition.propose and not self._propose():
                     break
                 self.state, self.words = "done", words
                 return
             self._receive(self.crew.finished(SECONDS_BETWEEN))
-            self._now_and_then()
+            self._at_intervals()
         self.end_early()
 
     def end_early(self) -> None:
@@ -176,24 +177,30 @@ class _Running:
         self.words = "stopped; nothing that ended before is lost"
 
     def _fill(self) -> None:
-        """Ask for trials until enough runs are queued for all workers."""
+        """Ask the sampler for trials until enough runs are queued for all workers."""
         while len(self._waiting) < self._slots * (1 + AHEAD) and self._may_ask():
             values = self._queue.pop(0) if self._queue else None
             number, drawn = self._sampler.ask(values)
             self._asked = number + 1
             if number < self._fixed and values is not None:
                 drawn = values if number == 0 else drawn | values
-            active = self._take_up(number, drawn)
+            active = self._activate(number, drawn)
             self._send(active)
-            if active.is_back:  # all its runs were computed for other trials
+            if active.all_ended:  # all runs of the trial are stored already
                 self._receive()
 
     def _may_ask(self) -> bool:
+        """Whether another trial may begin; the trial of the defaults may at any time."""
         if self._asked >= self._trials or self._stopped():
             return False
         return self._asked < 1 or self._minutes_left() > 0.0
 
     def _minutes_left(self, share: float | None = None) -> float:
+        """Return the remaining time, minutes; infinity if it is not limited.
+
+        Args:
+            share: The share of the study's time that may be used; None for that of the search.
+        """
         if self._definition.minutes is None:
             return float("inf")
         if share is None:
@@ -201,18 +208,20 @@ class _Running:
         return share * self._definition.minutes - (self._spent + self._seconds()) / 60.0
 
     def _seconds(self) -> float:
+        """Return the duration of this session, seconds."""
         return time.monotonic() - self._begin
 
-    def _take_up(self, number: int, values: dict[str, Any]) -> Active:
+    def _activate(self, number: int, values: dict[str, Any]) -> Active:
+        """Return an open trial with a number and values, which is active from now on."""
         if number == 0:
             values = defaults_of(self._definition.varied, self._recordings.bases[0])
-        # the first trial has the defaults of each recording
+        # trial 0 has the defaults of each recording, which may differ; the values are of the first
         jobs = self._recordings.jobs({} if number == 0 else values)
         active = self._active[number] = Active(number, values, jobs)
         return active
 
     def _send(self, active: Active) -> None:
-        """Submit the next runs of a trial; outcomes that are stored already are taken at once."""
+        """Submit the next runs of a trial, without those whose outcomes are stored already."""
         first = self._judge.first_runs(len(active.jobs), self._definition.prune)
         upto = first if active.sent == 0 else len(active.jobs)
         for _, job in active.jobs[active.sent : upto]:
@@ -228,7 +237,7 @@ class _Running:
         active.wanted = len({row.key for row, _ in active.jobs[:upto]})
 
     def _propose(self) -> bool:
-        """Measure the best trials again and store the proposal; False if the study was stopped."""
+        """Evaluate the best trials again and store the proposal; False if the study was stopped."""
         if self._store.fact("tuned") is not None:
             return True
         definition = self._definition
@@ -249,7 +258,8 @@ class _Running:
         return True
 
     def _measure(self, jobs: Sequence[Job]) -> dict[str, Outcome]:
-        """Have jobs done that belong to no trial, as far as the time allows."""
+        """Have workers do jobs of no trial, as far as the time allows, and return the outcomes by
+        key."""
         found: dict[str, Outcome] = {}
         wanted = {job.key: job for job in jobs}
         for key, job in wanted.items():
@@ -260,45 +270,47 @@ class _Running:
                 self.crew.submit(job)
         while self._waiting and not self._is_stopped():
             for outcome in self.crew.finished(SECONDS_BETWEEN):
-                self._came(outcome)
+                self._record_outcome(outcome)
                 found[outcome.key] = outcome
             if time.monotonic() - self._last_status >= SECONDS_BETWEEN:
-                self.say()
+                self.write_status()
         return found
 
     def _is_stopped(self) -> bool:
+        """Whether the caller or another process requested the study to stop."""
         return self._stopped() or self._store.asked_to_stop()
 
-    def _came(self, outcome: Outcome) -> None:
+    def _record_outcome(self, outcome: Outcome) -> None:
+        """Store the outcome of a run, and add it to the trials that wait for it."""
         if outcome.became == "done":
             self._writer.keep(outcome)
-        self._pace.came(outcome.seconds)
+        self._pace.count(outcome.seconds)
         for active in self._waiting.pop(outcome.key, ()):
             active.outcomes[outcome.key] = outcome
 
     def _receive(self, outcomes: Sequence[Outcome] = ()) -> None:
         """Store outcomes, and end the trials whose runs have all ended.
 
-        Everything is on disk before the sampler gets it.
+        All results are on disk before they are reported to the sampler.
         """
         ended = []
-        with self._writer.together():
+        with self._writer.transaction():
             for outcome in outcomes:
-                self._came(outcome)
+                self._record_outcome(outcome)
             for number in sorted(self._active):
                 if (trial := self._continued(self._active[number])) is not None:
                     ended.append(trial)
         for trial in ended:
-            self._sampler_hears(trial)
+            self._report_to_sampler(trial)
 
     def _continued(self, active: Active) -> Trial | None:
         """Submit the next runs of a trial, or end it.
 
         Returns:
-            The trial if it ended; None otherwise. No trial ends before that of the defaults, by
-            which it is judged.
+            The trial if it ended; None otherwise. No trial ends before that of the defaults, with
+            which it is compared.
         """
-        while active.is_back:
+        while active.all_ended:
             failed = next((o for o in active.outcomes.values() if o.became != "done"), None)
             if failed is not None and active.number == 0:
                 raise StudyError(
@@ -317,6 +329,12 @@ class _Running:
         return None
 
     def _end(self, active: Active, failed: Outcome | None) -> Trial:
+        """Judge and store a trial.
+
+        Args:
+            active: The trial.
+            failed: The outcome of a run that failed; None if none did.
+        """
         rows = tuple(row for row, _ in active.jobs[: active.sent])
         words = "the defaults" if active.number == 0 else ""
         if active.number == 1 and self._fixed > 1:
@@ -335,31 +353,34 @@ class _Running:
         del self._active[active.number]
         return trial
 
-    def _sampler_hears(self, trial: Trial) -> None:
+    def _report_to_sampler(self, trial: Trial) -> None:
+        """Report the result of a trial to the sampler."""
         values = None if trial.state == "failed" else self._judge.for_sampler(trial)
         self._sampler.tell(trial.number, values, pruned=trial.state == "pruned")
 
     # the status
 
     def wait_for(self, words: str) -> None:
-        """Write a status that says what is being waited for."""
+        """Write a status that says what the study waits for."""
         self.words = words
-        self.say()
+        self.write_status()
 
     def waits(self, words: str) -> bool:
-        """Write what is being waited for, and restart the clock; False if the study is stopped."""
+        """Write what the study waits for, and restart the session's clock; False if it is
+        stopped."""
         self._begin = time.monotonic()
         self.wait_for(words)
         return not self._is_stopped()
 
-    def _now_and_then(self) -> None:
+    def _at_intervals(self) -> None:
+        """Write the status and the importance, if the last status is old enough."""
         if time.monotonic() - self._last_status >= SECONDS_BETWEEN:
             self._slots = self.crew.slots
             self.words = "" if self.crew.workers() else "waits for a worker"
-            self._weigh()
-            self.say()
+            self._update_importance()
+            self.write_status()
 
-    def say(self) -> None:
+    def write_status(self) -> None:
         """Write the current status."""
         seconds = self._seconds()
         done = len(getattr(self, "_ended", ()))
@@ -373,7 +394,7 @@ class _Running:
             seconds=seconds,
             seconds_left=self._seconds_left(done),
             busy=self._pace.busy(self._slots),
-            workers=at_work(self.crew.workers(), self._waiting) if at_it else [],
+            workers=worker_rows(self.crew.workers(), self._waiting) if at_it else [],
             all_runs=self._writer.runs,
             all_seconds=self._spent + seconds,
             process=os.getpid(),
@@ -386,21 +407,23 @@ class _Running:
         self._last_status = time.monotonic()
 
     def _seconds_left(self, done: int) -> float | None:
+        """Return the estimated time to the end, seconds; None if it is not known."""
         if self.state != "running" or not hasattr(self, "_trials"):
             return None
         left = self._pace.seconds_left(done, self._trials)
         return None if left is None else max(0.0, min(left, 60.0 * self._minutes_left()))
 
     def _why_done(self) -> str:
+        """Return why there are no more trials, in words; empty if all have ended."""
         if len(self._ended) >= self._trials:
             return ""
         if self._definition.minutes is None:
             return "some of its trials are not among the results any more"
         return f"the {self._definition.minutes:g} minutes are over"
 
-    def _weigh(self, *, last: bool = False) -> None:
+    def _update_importance(self, *, last: bool = False) -> None:
         """Store the importance of the parameters if there is a new estimate."""
-        found = self._weighing.news(
+        found = self._estimator.update(
             self._judge.complete, self.crew, worked=self._pace.worked, last=last
         )
         if found is not None:
@@ -412,29 +435,32 @@ class Active:
     """A trial whose runs are being computed."""
 
     number: int
+    """The number of the trial."""
     values: dict[str, Any]
+    """The varied parameters, by key."""
     jobs: list[tuple[JobRow, Job]]
+    """All runs of the trial."""
     sent: int = 0
-    """The number of jobs that were submitted."""
+    """The number of runs that were submitted, the first ones of :attr:`jobs`."""
     wanted: int = 0
-    """The number of different runs among these."""
+    """The number of different runs among those that were submitted."""
     outcomes: dict[str, Outcome] = field(default_factory=dict)
     """The outcomes of the runs that ended, by key."""
 
     @property
-    def is_back(self) -> bool:
+    def all_ended(self) -> bool:
         """Whether all runs that were submitted have ended."""
         return len(self.outcomes) >= self.wanted
 
 
-def at_work(
+def worker_rows(
     workers: Iterable[WorkerState], waiting: Mapping[str, Sequence[Active]]
 ) -> list[dict[str, Any]]:
-    """Return for each worker what it does, as plain values.
+    """Return the activity of each worker, as plain values.
 
     Args:
         workers: The states of the workers.
-        waiting: The trials that wait for each run, by the key of its job.
+        waiting: The trials that wait for each run, by the key of the run's job.
     """
     found = []
     for one in workers:
@@ -456,13 +482,16 @@ class Pace:
         self.runs = 0
         """The number of runs that ended."""
         self.worked = 0.0
-        """The time that workers spent on them, seconds."""
+        """The time that workers spent on these runs, seconds."""
         self._warm: float | None = None
+        """The time when the first run ended, on the monotonic clock, seconds."""
         self._since_warm = 0.0
+        """The time that workers spent on runs that ended later, seconds."""
         self._first: tuple[float, int] | None = None
+        """The time of the first estimate, and the number of trials that had ended then."""
 
-    def came(self, seconds: float) -> None:
-        """Count a run that ended after so many seconds of a worker's time."""
+    def count(self, seconds: float) -> None:
+        """Count a run that ended, and on which a worker spent so many seconds."""
         self.runs += 1
         self.worked += seconds
         if self._warm is None:
@@ -471,16 +500,25 @@ class Pace:
             self._since_warm += seconds
 
     def busy(self, slots: int) -> float | None:
-        """Return the share of the workers' time in which they worked, since the first run ended;
-        None before there are two runs for each worker."""
+        """Return the share of the workers' time in which they worked, 0 … 1, since the first run
+        ended; None before two runs for each worker have ended.
+
+        Args:
+            slots: The number of runs that are computed at a time.
+        """
         if self._warm is None or self.runs < 2 * slots:
             return None
         elapsed = time.monotonic() - self._warm
         return min(1.0, self._since_warm / (elapsed * slots)) if elapsed > 0.0 else None
 
     def seconds_left(self, done: int, trials: int) -> float | None:
-        """Estimate the remaining time from the mean time of a trial, seconds; None before two
-        trials ended."""
+        """Estimate the remaining time, seconds, from the mean time between ends of trials; None
+        before two trials have ended since the first call.
+
+        Args:
+            done: The number of trials that have ended.
+            trials: The number of all trials.
+        """
         if self._first is None:
             self._first = time.monotonic(), done
         begin, before = self._first

@@ -17,9 +17,9 @@ from pathlib import Path
 from typing import Any
 
 from tracker.parameters import RunParameters
-from tracker.studies.defined import space
-from tracker.studies.defined.definition import Definition, Varied
-from tracker.studies.defined.objectives import Objective
+from tracker.studies.definition import space
+from tracker.studies.definition.definition import Definition, Varied
+from tracker.studies.definition.objectives import Objective
 from tracker.studies.errors import StudyError
 
 STARTUP = 12
@@ -27,14 +27,14 @@ STARTUP = 12
 
 BEST = 100
 LAST = 400
-"""The numbers of best and of last trials that TPE uses in a long search. TPE compares at most 25
-good trials with all others, among which old ones have little weight: so the good ones are the
-same, and the time for a new trial does not grow with the number of trials."""
+"""The numbers of best and of last trials that TPE uses in a long search, so that the time for a new
+trial does not grow with the number of trials. TPE compares at most 25 good trials with all others,
+among which old ones have little weight; the good ones are still the best of all trials."""
 
 
 def first_values(definition: Definition, defaults: dict[str, Any]) -> list[dict[str, Any]]:
-    """Return the values of the first trials: the defaults, and the user's own values if they
-    differ."""
+    """Return the values of the first trials: the defaults, and the defaults with the user's own
+    values if these differ."""
     first, start = [defaults], dict(definition.start or {})
     if start and start != {key: defaults[key] for key in start}:
         first.append({**defaults, **start})
@@ -42,10 +42,10 @@ def first_values(definition: Definition, defaults: dict[str, Any]) -> list[dict[
 
 
 class Sampler:
-    """Asks Optuna for the values of each trial and reports the results to it.
+    """The sampler, which asks Optuna for the values of each trial and reports the results to it.
 
-    A trial that was asked for and has no result yet is still open when the file is opened again,
-    with the same number and values.
+    Trials without a result are in the journal: when it is opened again, they are still open, with
+    the same numbers and values.
     """
 
     def __init__(
@@ -61,7 +61,7 @@ class Sampler:
             path: The file of Optuna's journal.
             definition: The study's definition.
             objectives: The objectives whose values are reported.
-            bases: The parameters on each recording, apart from those that are varied.
+            bases: The parameters on each recording with the fixed values of the study.
 
         Raises:
             StudyError: If the file cannot be read.
@@ -83,7 +83,9 @@ class Sampler:
                 sampler=self._sampler(),
                 load_if_exists=True,
             )
-            self._study.get_trials(deepcopy=False)  # here, where exceptions are handled
+            self._study.get_trials(
+                deepcopy=False
+            )  # reads the file here, where exceptions are handled
         except (ValueError, LookupError, TypeError, AttributeError, AssertionError,
                 RecursionError) as error:  # fmt: skip
             self.close()
@@ -99,6 +101,7 @@ class Sampler:
             self._journal.close()
 
     def _sampler(self) -> Any:
+        """Return Optuna's sampler for the search method of the study."""
         samplers, seed = self._optuna.samplers, self._definition.seed
         search = self._definition.search
         if search == "auto":
@@ -119,7 +122,7 @@ class Sampler:
 
     @property
     def asked(self) -> int:
-        """The number of all trials that were ever asked for."""
+        """The number of trials that were asked for, in all sessions."""
         return len(self._study.get_trials(deepcopy=False))
 
     def open_trials(self) -> list[int]:
@@ -128,8 +131,8 @@ class Sampler:
         found = self._study.get_trials(deepcopy=False, states=(state.RUNNING,))
         return [trial.number for trial in found]
 
-    def again(self, number: int) -> dict[str, Any]:
-        """Return the values of a trial that was asked for before."""
+    def resume(self, number: int) -> dict[str, Any]:
+        """Continue an open trial, and return its values by key."""
         trials = self._study.get_trials(deepcopy=False)
         identity = trials[number]._trial_id
         self._trials[number] = self._optuna.trial.Trial(self._study, identity)
@@ -139,10 +142,10 @@ class Sampler:
         """Ask for a trial, and return its number and values.
 
         Args:
-            values: The values to try, if they are not the sampler's choice.
+            values: The values to try; None if the sampler chooses them.
         """
         assert self._journal is not None
-        with self._journal.together():
+        with self._journal.transaction():
             if values is not None:
                 fit = {k: v for k, v in values.items() if self._varied[k].contains(v)}
                 self._study.enqueue_trial(fit)
@@ -151,6 +154,7 @@ class Sampler:
             return trial.number, self._drawn(trial.number)
 
     def _drawn(self, number: int) -> dict[str, Any]:
+        """Return the values that the sampler draws for an open trial, by key."""
         trial = self._trials[number]
 
         def draw(one: Varied) -> Any:
@@ -174,7 +178,7 @@ class Sampler:
         """
         trial, state = self._trials.pop(number), self._optuna.trial.TrialState
         assert self._journal is not None
-        with self._journal.together():
+        with self._journal.transaction():
             if values is None:
                 self._study.tell(trial, state=state.FAIL)
             elif pruned:
@@ -203,9 +207,9 @@ class Sampler:
 class Journal:
     """A journal backend of Optuna without a lock, written by one process.
 
-    A last line that a killed process left incomplete is cut off. Lines are written at once but
-    not forced to disk: if the machine loses power, the last trials' values may be lost, but not
-    their results, which are stored elsewhere.
+    An incomplete last line, which a killed process may leave, is removed. Lines are written at once
+    but not forced to disk: if the machine loses power, the values of the last trials may be lost,
+    but not their results, which the file of results has.
     """
 
     def __init__(self, path: Path) -> None:
@@ -231,8 +235,8 @@ class Journal:
         self._file.close()
 
     def read_logs(self, log_number_from: int) -> Iterator[dict[str, Any]]:
-        """Yield the lines from a number on; earlier ones are dropped, since Optuna reads a line
-        only once."""
+        """Yield the lines from a number on; earlier lines are removed from memory, since Optuna
+        reads each line only once."""
         del self._lines[: log_number_from - self._first]
         self._first = max(self._first, log_number_from)
         yield from list(self._lines)
@@ -251,7 +255,7 @@ class Journal:
         self._lines += [json.loads(one) for one in texts]
 
     @contextmanager
-    def together(self) -> Iterator[None]:
+    def transaction(self) -> Iterator[None]:
         """Collect the lines of the block, and write them at its end, all or none."""
         self._waiting = []
         try:
@@ -261,6 +265,7 @@ class Journal:
             self._write(b"".join(waiting))
 
     def _write(self, data: bytes) -> None:
+        """Write bytes at the end of the file, or restore its size if that fails."""
         try:
             if data and self._file.write(data) != len(data):
                 raise OSError(28, "No space left on device")
@@ -285,7 +290,8 @@ def storage(journal: Any, *, minimized: bool | None) -> Any:
     from optuna.trial import TrialState
 
     class Storage(JournalStorage):
-        """A storage that does not search all trials for waiting ones, and gives TPE a few alone."""
+        """A storage that does not search all trials for waiting ones, and that gives TPE only the
+        best and the last trials."""
 
         _waits = True  # an earlier process may have left waiting trials
 

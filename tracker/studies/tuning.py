@@ -1,4 +1,4 @@
-"""Tuning: the study of the most important parameters on given recordings."""
+"""Tuning: a study of the most important parameters on given recordings."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from tracker.parameters import PARAMETERS, RunParameters, with_values
 from tracker.runs.fitting import default_parameters
 from tracker.sequences.errors import SequenceError
 from tracker.sequences.library import open_sequence
-from tracker.studies.defined.definition import MOST_TRIALS, Definition
-from tracker.studies.defined.space import around
+from tracker.studies.definition.definition import MOST_TRIALS, Definition
+from tracker.studies.definition.space import around
 from tracker.studies.errors import StudyError
 
 MORE = (
@@ -21,14 +21,14 @@ MORE = (
     "fusion.start_velocity",
     "smoothing.doubt",
 )
-"""Parameters that are varied beside the essential ones."""
+"""Keys of parameters that are varied besides the essential ones."""
 
 PICTURES_MINUTES = 30.0
-"""Least duration of a study that varies parameters of stage 1 on pictures, minutes. In a shorter
-one stage 1 is computed once for all trials, so that there are more of them."""
+"""Least duration, minutes, of a study that varies parameters of stage 1 if this processes pictures.
+In a shorter study stage 1 is computed once for all trials, so that there are more trials."""
 
 OTHER_SEEDS = 3
-"""The number of further seeds with which the best trials are measured again."""
+"""The number of further seeds on which the best trials are evaluated again."""
 
 
 def tuning(
@@ -45,8 +45,9 @@ def tuning(
         name: The name of the study.
         recordings: Names of built-in recordings, and folders.
         minutes: The duration of the study, minutes.
-        changes: The user's current values by key, where they differ from the recordings' defaults.
-        ignore_truth: Whether ground truth is not used even if the recordings have it.
+        changes: The user's current values by key that differ from the recordings' defaults.
+        ignore_truth: Whether the objective does not use ground truth even if all recordings have
+            it.
 
     Raises:
         StudyError: If a recording cannot be read.
@@ -79,10 +80,12 @@ def tuning(
 
 
 def _place(name: str) -> str:
+    """Return the absolute path of a folder, or the name of a built-in recording."""
     return str(Path(name).absolute()) if Path(name).exists() else name
 
 
 def _is_varied(key: str, now: RunParameters, minutes: float) -> bool:
+    """Whether a parameter is varied in a study with a duration in minutes."""
     if key not in PARAMETERS or not (PARAMETERS[key].essential or key in MORE):
         return False
     pictures = now.method("single_view").used(now).pictures

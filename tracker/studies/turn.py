@@ -1,4 +1,4 @@
-"""The lock of a machine's cores: one study at a time runs on a machine, and others wait."""
+"""The lock of a machine's cores: one study at a time runs on a machine, and the others wait."""
 
 from __future__ import annotations
 
@@ -9,12 +9,13 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from tracker.studies.kept.store import studies_folder
+from tracker.studies.storage.store import studies_folder
 
 _LOCK, _WHOSE = "turn.lock", "turn.txt"
+"""The names of the lock's file, and of the file with the name of the study that holds the lock."""
 
 SECONDS_BETWEEN = 0.5
-"""Interval at which a waiting study tries again, seconds."""
+"""Interval at which a waiting study tries to get the lock, seconds."""
 
 
 @contextmanager
@@ -23,8 +24,8 @@ def turn(name: str, waits: Callable[[str], bool], folder: Path | None = None) ->
 
     Args:
         name: The name of the study.
-        waits: A callback that gets a sentence on what is waited for at each attempt, and returns
-            False to wait no longer.
+        waits: A callback that gets a sentence on the reason of the wait at each attempt, and
+            returns False to end the wait.
         folder: The folder of the lock; None for the folder of all studies.
 
     Yields:
@@ -53,6 +54,7 @@ def turn(name: str, waits: Callable[[str], bool], folder: Path | None = None) ->
 
 
 def _take(lock: sqlite3.Connection) -> bool:
+    """Try to get the lock; False if another process holds it."""
     try:
         lock.execute("PRAGMA journal_mode = MEMORY")
         lock.execute("BEGIN EXCLUSIVE")
@@ -63,6 +65,7 @@ def _take(lock: sqlite3.Connection) -> bool:
 
 
 def _whose(place: Path) -> str:
+    """Return which study holds the lock, in words."""
     try:
         return f'the study "{(place / _WHOSE).read_text(encoding="utf-8")}"'
     except OSError:

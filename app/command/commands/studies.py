@@ -29,11 +29,11 @@ from app.command.arguments.studies import (
 )
 from app.command.terminal import Bar, CommandError, print_table, say
 from tracker.studies.errors import StudyError
-from tracker.studies.kept.records import Status, Trial
-from tracker.studies.kept.store import Store, create, find, stores, studies_folder
+from tracker.studies.storage.records import Status, Trial
+from tracker.studies.storage.store import Store, create, find, stores, studies_folder
 
 if TYPE_CHECKING:
-    from tracker.studies.work.cluster import DaskCrew
+    from tracker.studies.workers.cluster import DaskCrew
 
 INTERRUPTED = 130
 
@@ -54,7 +54,7 @@ def study(command: Study) -> int:
     folder = action.studies or studies_folder()
     match action:
         case RunStudy():
-            from tracker.studies.defined.defining import read_definition
+            from tracker.studies.definition.parsing import read_definition
 
             return run(create(read_definition(action.file), folder), action, as_json=action.json)
         case ResumeStudy():
@@ -76,7 +76,7 @@ def study(command: Study) -> int:
 
 def _new(command: NewStudy) -> None:
     from tracker.files.atomic import replacing
-    from tracker.studies.defined.example import example
+    from tracker.studies.definition.example import example
 
     file = command.file
     if file.exists():
@@ -112,7 +112,7 @@ def to_be_stopped() -> Iterator[threading.Event]:
 @contextmanager
 def crew_of(where: Where) -> Iterator[Any]:
     """What makes the workers that the flags name; they end with this."""
-    from tracker.studies.work.cluster import ADDRESS, DaskCrew, check_address
+    from tracker.studies.workers.cluster import ADDRESS, DaskCrew, check_address
 
     scheduler = where.scheduler or os.environ.get(ADDRESS) or None
     if scheduler is not None:
@@ -146,7 +146,7 @@ def run(store: Store, where: Where, *, as_json: bool = False, quiet: bool = Fals
         quiet: Tell nothing at the end.
     """
     from tracker.studies.running import run_study
-    from tracker.studies.work.cluster import ADDRESS
+    from tracker.studies.workers.cluster import ADDRESS
 
     before: list[str] = []
     by_time_alone = store.definition().by_time_alone
@@ -348,9 +348,9 @@ def _export(store: Store, command: ExportStudy) -> None:
 
 
 def _everything(store: Store) -> dict[str, Any]:
-    from tracker.studies.reporting.report import everything
+    from tracker.studies.reporting.report import study_values
 
-    return everything(store)
+    return study_values(store)
 
 
 def shown_value(value: Any) -> str:

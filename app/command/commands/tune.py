@@ -15,7 +15,7 @@ from tracker import parameters as table
 from tracker.parameters import ParameterError
 from tracker.review.self_consistency.estimate import WARNING
 from tracker.studies.errors import StudyError
-from tracker.studies.kept.store import create, studies_folder
+from tracker.studies.storage.store import create, studies_folder
 from tracker.studies.tuning import tuning
 
 

@@ -20,13 +20,13 @@ from typing import Any
 
 from app.state.workbench import Workbench
 from tracker.files.atomic import write_whole
-from tracker.studies.defined.definition import Definition
+from tracker.studies.definition.definition import Definition
 from tracker.studies.errors import StudyError
-from tracker.studies.kept.reading import read_as
-from tracker.studies.kept.records import Trial
-from tracker.studies.kept.store import FILE, Store, create, find, stores
 from tracker.studies.reporting.summary import Summary, summary_of
-from tracker.studies.work.local import how_many
+from tracker.studies.storage.reading import read_as
+from tracker.studies.storage.records import Trial
+from tracker.studies.storage.store import FILE, Store, create, find, stores
+from tracker.studies.workers.local import worker_count
 
 logger = logging.getLogger("app")
 
@@ -115,9 +115,9 @@ class StudyDesk:
                 to be a scheduler's address is none.
         """
         if scheduler is None:
-            how_many(workers)
+            worker_count(workers)
         else:
-            from tracker.studies.work.cluster import check_address
+            from tracker.studies.workers.cluster import check_address
 
             check_address(scheduler)
 

@@ -17,8 +17,8 @@ from app.web.views import results
 from tracker import parameters as table
 from tracker.sequences.errors import SequenceError
 from tracker.studies.errors import StudyError
-from tracker.studies.kept.store import Store
 from tracker.studies.reporting.commands import track_commands
+from tracker.studies.storage.store import Store
 
 router = APIRouter(prefix="/api/studies", responses=ERRORS)
 

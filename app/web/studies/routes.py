@@ -15,11 +15,11 @@ from app.web.studies import models, views
 from app.web.studies.dependencies import Desk, Named, no_study
 from tracker import parameters as table
 from tracker.runs.processes import available_cores
-from tracker.studies.defined.defining import definition_of
-from tracker.studies.defined.definition import Definition
-from tracker.studies.defined.objectives import OBJECTIVES, SELF_CONSISTENCY, WITH_TRUTH, chosen
+from tracker.studies.definition.definition import Definition
+from tracker.studies.definition.objectives import OBJECTIVES, SELF_CONSISTENCY, WITH_TRUTH, chosen
+from tracker.studies.definition.parsing import definition_of
 from tracker.studies.errors import StudyError
-from tracker.studies.kept.store import Store
+from tracker.studies.storage.store import Store
 from tracker.studies.tuning import tuning
 
 router = APIRouter(prefix="/api/studies", responses=ERRORS)
@@ -191,10 +191,10 @@ def define(wish: models.StudyWish, desk: Desk, bench: Bench) -> models.Study:
 @router.post("/scheduler")
 def scheduler(wish: models.SchedulerWish) -> models.SchedulerInfo:
     """Whether a Dask scheduler answers at an address, and who works for it."""
-    from tracker.studies.work.cluster import look_at
+    from tracker.studies.workers.cluster import scheduler_numbers
 
     try:
-        found = look_at(wish.address, SECONDS_FOR_A_SCHEDULER)
+        found = scheduler_numbers(wish.address, SECONDS_FOR_A_SCHEDULER)
     except StudyError as error:
         return models.SchedulerInfo(
             address=wish.address, workers=0, threads=0, machines=[], error=sentence(error)

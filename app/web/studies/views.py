@@ -11,11 +11,11 @@ from app.web.studies import models
 from tracker import parameters as table
 from tracker.files.folders import cache_folder
 from tracker.parameters import METHODS, PARAMETERS
-from tracker.studies.defined.definition import Varied
-from tracker.studies.defined.objectives import Objective
-from tracker.studies.defined.space import around
-from tracker.studies.kept.records import Trial
-from tracker.studies.kept.store import Store
+from tracker.studies.definition.definition import Varied
+from tracker.studies.definition.objectives import Objective
+from tracker.studies.definition.space import around
+from tracker.studies.storage.records import Trial
+from tracker.studies.storage.store import Store
 
 _METHOD_HELP = {
     "single_view": "Method of stage 1.",

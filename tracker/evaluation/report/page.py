@@ -51,7 +51,7 @@ def write_report(
         seed: The seed of the run.
 
     Raises:
-        OSError: With a sentence, if the file cannot be written.
+        OSError: If the file cannot be written; the message says why.
     """
     text = report_html(sequence, tracks, parameters, evaluation, reference=reference, seed=seed)
     with replacing(Path(path)) as temporary:

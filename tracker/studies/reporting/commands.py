@@ -10,8 +10,8 @@ from typing import Any
 from tracker.parameters import changed, with_values
 from tracker.runs import pipeline
 from tracker.sequences.library import open_sequence
-from tracker.studies.defined.definition import Definition
-from tracker.studies.kept.records import JobRow, Trial
+from tracker.studies.definition.definition import Definition
+from tracker.studies.storage.records import JobRow, Trial
 
 
 def track_commands(definition: Definition, trial: Trial) -> list[str]:
@@ -22,7 +22,7 @@ def track_commands(definition: Definition, trial: Trial) -> list[str]:
         trial: The trial.
 
     Raises:
-        SequenceError: If a recording cannot be read any more.
+        SequenceError: If a recording cannot be read.
     """
     return [_command(definition, trial, row) for row in trial.jobs]
 
@@ -41,6 +41,7 @@ def changes_of(definition: Definition, trial: Trial, recording: str) -> dict[str
 
 
 def _command(definition: Definition, trial: Trial, row: JobRow) -> str:
+    """Return the ``track`` command of one run of a trial."""
     words = ["multiview-phd", "track", row.recording, "--no-corrections", "--seed", str(row.seed)]
     for key, value in changes_of(definition, trial, row.recording).items():
         text = json.dumps(value) if not isinstance(value, str) else value

@@ -15,10 +15,10 @@ from tracker.files.atomic import replacing
 from tracker.parameters import PARAMETERS
 from tracker.sequences.errors import SequenceError
 from tracker.studies.judging import usable
-from tracker.studies.kept.records import Trial
-from tracker.studies.kept.store import Store
 from tracker.studies.reporting.commands import track_commands
 from tracker.studies.reporting.summary import Summary, summary_of
+from tracker.studies.storage.records import Trial
+from tracker.studies.storage.store import Store
 
 _STYLE = """
 :root { color-scheme: light dark; --line: #8884; }
@@ -38,19 +38,21 @@ pre.command { white-space: pre-wrap; } summary { cursor: pointer; }
 """
 
 _BEST = 40
-"""Most trials in the report's table."""
+"""Largest number of trials in the report's table."""
 
 _HEIGHT = 340
+"""Height of a figure, pixels."""
+
 _FAINT, _ACCENT, _DEFAULT = "#6b7a90", "#d9480f", "#1971c2"
-_CALM = 1.5
-"""Range of the plotted values below the best, as a multiple of the lower quartile's distance from
-the best; a few failures would else leave no room to tell the good ones apart."""
+_RANGE = 1.5
+"""Range of a plot's axis below the best value, as a multiple of the distance between the best value
+and the lower quartile, so that a few bad trials do not hide differences between good ones."""
 
 _MOST = 12
-"""Most parameters with a plot, which are the most important ones."""
+"""Largest number of parameters with a plot, the most important ones."""
 
 
-def everything(store: Store) -> dict[str, Any]:
+def study_values(store: Store) -> dict[str, Any]:
     """Return a study as plain values, with its definition, status, trials and best trial."""
     summary = summary_of(store)
     return {
@@ -73,10 +75,10 @@ def write_json(path: Path, store: Store) -> None:
     """Write a study as JSON.
 
     Raises:
-        OSError: With a sentence, if the file cannot be written.
+        OSError: If the file cannot be written; the message says why.
     """
     with replacing(path) as begun:
-        text = json.dumps(everything(store), ensure_ascii=False, allow_nan=False, indent=1)
+        text = json.dumps(study_values(store), ensure_ascii=False, allow_nan=False, indent=1)
         begun.write_text(text, encoding="utf-8")
 
 
@@ -84,7 +86,7 @@ def write_csv(path: Path, store: Store) -> None:
     """Write a table with a row for each trial: number, state, values and figures.
 
     Raises:
-        OSError: With a sentence, if the file cannot be written.
+        OSError: If the file cannot be written; the message says why.
     """
     with replacing(path) as begun, begun.open("w", newline="", encoding="utf-8") as file:
         file.write(csv_text(store))
@@ -114,7 +116,7 @@ def write_report(path: Path, store: Store) -> None:
     """Write the HTML report.
 
     Raises:
-        OSError: With a sentence, if the file cannot be written.
+        OSError: If the file cannot be written; the message says why.
     """
     with replacing(path) as begun:
         begun.write_text(report_html(store), encoding="utf-8")
@@ -172,7 +174,7 @@ def report_html(store: Store) -> str:
 
 
 def _proposed(found: dict[str, Any] | None) -> str:
-    """Return the section on the proposal."""
+    """Return the section on the proposal; empty if there is none."""
     if found is None:
         return ""
     parts = ["<h2>Proposed</h2>", f"<p>{escaped(found['words'])}.</p>"]
@@ -198,6 +200,7 @@ def _proposed(found: dict[str, Any] | None) -> str:
 
 
 def _commands(summary: Summary) -> str:
+    """Return the commands that reproduce the best trial."""
     if summary.best is None:
         return "no trial has ended"
     try:
@@ -207,6 +210,7 @@ def _commands(summary: Summary) -> str:
 
 
 def _trials(summary: Summary) -> str:
+    """Return the table of the best trials."""
     keys = [one.key for one in summary.definition.varied]
     beside = summary.beside
     named = [one.name for one in (*summary.objectives, *beside)]
@@ -230,6 +234,7 @@ def _trials(summary: Summary) -> str:
 
 
 def _measured(summary: Summary, trial: Trial) -> list[str]:
+    """Return the objectives of a trial as text."""
     assert trial.objectives is not None
     pairs = zip(summary.objectives, trial.objectives, trial.spreads, strict=True)
     return [one.words(value, spread) for one, value, spread in pairs]
@@ -244,13 +249,15 @@ def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def _value(value: Any) -> str:
+    """Return a value as text; a dash for None."""
     if value is None:
         return "–"
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
 def objective_figure(summary: Summary) -> Any | None:
-    """Plot two objectives against each other with the Pareto front, or one over the trials."""
+    """Plot the first over the last objective with the Pareto front, or a single objective over the
+    number of the trial; None without complete trials."""
     import plotly.graph_objects as go
 
     trials = usable(summary.trials)
@@ -289,12 +296,12 @@ def objective_figure(summary: Summary) -> Any | None:
         )
         figure.add_trace(best)
     figure.update_xaxes(title=_axis(across) if across is not None else "trial")
-    _calm(figure, summary)
+    _limit_range(figure, summary)
     return figure
 
 
 def importance_figure(summary: Summary) -> Any | None:
-    """Plot the importance of parameters with standard deviations."""
+    """Plot the importance of parameters with standard deviations; None without an estimate."""
     import plotly.graph_objects as go
 
     if not summary.importance:
@@ -313,7 +320,7 @@ def importance_figure(summary: Summary) -> Any | None:
 
 
 def parameter_figures(summary: Summary) -> list[Any]:
-    """Plot the first objective over each parameter."""
+    """Plot the first objective over each of the most important parameters."""
     import plotly.graph_objects as go
 
     trials = usable(summary.trials)
@@ -350,18 +357,18 @@ def parameter_figures(summary: Summary) -> list[Any]:
         figure.update_xaxes(
             title=f"{key}{f' [{unit}]' if unit else ''}", type="log" if logs.get(key) else None
         )
-        _calm(figure, summary)
+        _limit_range(figure, summary)
         found.append(figure)
     return found
 
 
-def _calm(figure: Any, summary: Summary) -> None:
-    """Set the title of the first objective's axis, and limit its range (see :data:`_CALM`)."""
+def _limit_range(figure: Any, summary: Summary) -> None:
+    """Set the title of the first objective's axis, and limit its range (see :data:`_RANGE`)."""
     lead = summary.objectives[0]
     sign = 1.0 if lead.higher else -1.0
     values = sorted(sign * one.objectives[0] for one in usable(summary.trials) if one.objectives)
     best, quartile = values[-1], values[len(values) // 4]
-    least = best - max(_CALM * (best - quartile), 1e-6 * abs(best), 1e-9)
+    least = best - max(_RANGE * (best - quartile), 1e-6 * abs(best), 1e-9)
     if summary.default is not None and summary.default.objectives is not None:
         least = min(least, sign * summary.default.objectives[0])
     beyond = sum(value < least for value in values)
@@ -375,6 +382,7 @@ def _calm(figure: Any, summary: Summary) -> None:
 
 
 def _axis(objective: Any) -> str:
+    """Return the title of an objective's axis."""
     return f"{objective.name}{f' [{objective.unit}]' if objective.unit else ''}"
 
 

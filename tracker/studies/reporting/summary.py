@@ -8,16 +8,23 @@ from typing import Any
 
 from tracker.files.text import shown
 from tracker.review.self_consistency.estimate import WARNING
-from tracker.studies.defined.definition import Definition
-from tracker.studies.defined.objectives import BESIDE, IDENTITY, OBJECTIVES, WITH_TRUTH, Objective
+from tracker.studies.definition.definition import Definition
+from tracker.studies.definition.objectives import (
+    BESIDE,
+    IDENTITY,
+    OBJECTIVES,
+    WITH_TRUTH,
+    Objective,
+)
 from tracker.studies.errors import StudyError
 from tracker.studies.judging import best_of, front_of, usable
-from tracker.studies.kept.records import Status, Trial
-from tracker.studies.kept.store import Store
-from tracker.studies.kept.writer import RESULTS
+from tracker.studies.storage.records import Status, Trial
+from tracker.studies.storage.store import Store
+from tracker.studies.storage.writer import RESULTS
 
 BETTER_SIGMAS = 2.0
-"""A difference below so many standard deviations over the seeds is described as uncertain."""
+"""Number of standard deviations over the seeds below which a difference is described as
+uncertain."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -25,12 +32,18 @@ class Summary:
     """The summary of a study."""
 
     name: str
+    """The name of the study."""
     definition: Definition
+    """The definition of the study."""
     status: Status
+    """The status of the study."""
     objectives: tuple[Objective, ...]
+    """The objectives, the most important first."""
     trials: tuple[Trial, ...]
+    """The trials that have ended, by number."""
     best: Trial | None
-    """The best trial, which is that of the defaults if none is better; None if none ended."""
+    """The best trial, which is that of the defaults if none is better; None if none is complete and
+    not vetoed."""
     front: list[int]
     """The numbers of the trials on the Pareto front."""
     importance: list[tuple[str, tuple[float, float]]]
@@ -41,7 +54,7 @@ class Summary:
 
     @property
     def default(self) -> Trial | None:
-        """The trial of the defaults."""
+        """The trial of the defaults; None if it has not ended."""
         return next((one for one in self.trials if one.number == 0), None)
 
     @property
@@ -51,8 +64,8 @@ class Summary:
 
     @property
     def beside(self) -> list[Objective]:
-        """Other figures that are shown: those that at least one trial has. Studies of earlier
-        versions may lack some."""
+        """The figures that are shown besides the objectives: those that at least one trial has.
+        Studies of earlier versions may lack some."""
         known = {key for trial in self.trials for key in trial.figures}
         return [one for key, one in BESIDE.items() if key in known and one not in self.objectives]
 
@@ -118,11 +131,11 @@ def summary_of(store: Store, before: Summary | None = None) -> Summary:
             study repeatedly is fast.
 
     Raises:
-        StudyError: If its files are not valid.
+        StudyError: If the study's files are not valid.
     """
     definition, status = store.definition(), store.status()
     if before is not None and (before.definition != definition or status.done < len(before.trials)):
-        before = None  # it is of another study with the same name
+        before = None  # the study was replaced by another one of the same name
     known = {} if before is None else {one.number: one for one in before.trials}
     news = store.trials(max((one.ended for one in known.values()), default=0.0))
     known |= {one.number: one for one in news}
@@ -150,7 +163,8 @@ def summary_of(store: Store, before: Summary | None = None) -> Summary:
 
 
 def objectives_of(store: Store, definition: Definition) -> tuple[Objective, ...]:
-    """Return the objectives that were stored when the study began, or else its definition's."""
+    """Return the objectives that were stored when the study began, or else those of its
+    definition."""
     stored: Sequence[dict[str, Any]] | None = store.fact("objectives")
     if stored is not None:
         for one in stored:

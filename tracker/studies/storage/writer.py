@@ -13,12 +13,15 @@ from typing import Any
 
 from tracker.files.atomic import replacing
 from tracker.studies.errors import StudyError
-from tracker.studies.kept.reading import read_as
-from tracker.studies.kept.records import Status, StoredOutcome, Trial
-from tracker.studies.work.jobs import Outcome
+from tracker.studies.storage.reading import read_as
+from tracker.studies.storage.records import Status, StoredOutcome, Trial
+from tracker.studies.workers.jobs import Outcome
 
 RESULTS = "results.sqlite3"
+"""The name of the file of results."""
+
 STATUS = "status.json"
+"""The name of the file with the status."""
 
 _TABLES = (
     """
@@ -41,10 +44,10 @@ _TABLES = (
 
 
 class Writer:
-    """Writes the results of a study; each one is stored completely or not at all."""
+    """The writer of a study's results; each is stored completely or not at all."""
 
     def __init__(self, folder: Path) -> None:
-        """Open the file of results, or make it.
+        """Open the file of results, or create it.
 
         Raises:
             StudyError: If the file cannot be written to.
@@ -55,7 +58,7 @@ class Writer:
             self._connection = sqlite3.connect(self._path, timeout=10.0, isolation_level=None)
             self._connection.execute("PRAGMA journal_mode = WAL")
             self._connection.execute("PRAGMA synchronous = NORMAL")
-            self._connection.execute("BEGIN IMMEDIATE")  # a reader finds all tables, or none
+            self._connection.execute("BEGIN IMMEDIATE")  # so that a reader sees all tables or none
             for table in _TABLES:
                 self._connection.execute(table)
             self._connection.execute("COMMIT")
@@ -76,7 +79,7 @@ class Writer:
         return len(self._outcomes)
 
     def outcome(self, key: str) -> Outcome | None:
-        """Return the outcome of a run that ended before; None if there is none."""
+        """Return the stored outcome of a run by the key of its job; None if there is none."""
         text = self._outcomes.get(key)
         return (
             None
@@ -95,7 +98,7 @@ class Writer:
 
     def end(self, trial: Trial) -> None:
         """Store a trial that ended."""
-        # times increase even if the clock is set back, so that readers of new trials miss none
+        # times increase even if the clock is set back, since readers ask for trials after a time
         self._ended = max(time.time(), self._ended + 1e-5)
         row = {**trial.to_json(), "ended": self._ended}
         with self._explained():
@@ -105,7 +108,8 @@ class Writer:
             )
 
     def put_fact(self, name: str, value: Any) -> None:
-        """Store a fact beside the trials, by name."""
+        """Store a fact beside the trials, under a name (see
+        :data:`~tracker.studies.storage.records.STORED`)."""
         with self._explained():
             self._connection.execute(
                 "INSERT OR REPLACE INTO told VALUES (?, ?)",
@@ -116,7 +120,7 @@ class Writer:
         """Write the status for other processes.
 
         Raises:
-            StudyError: If it cannot be written.
+            StudyError: If the status cannot be written.
         """
         try:
             with replacing(self._status, transient=True) as begun:
@@ -128,7 +132,7 @@ class Writer:
             ) from None
 
     @contextmanager
-    def together(self) -> Iterator[None]:
+    def transaction(self) -> Iterator[None]:
         """Store all outcomes and trials of the block in one transaction.
 
         The transaction is also committed if the block raises an exception.
@@ -144,6 +148,7 @@ class Writer:
 
     @contextmanager
     def _explained(self) -> Iterator[None]:
+        """Replace an exception of SQLite by an error that says what the user can do."""
         try:
             yield
         except sqlite3.Error as error:

@@ -1,4 +1,4 @@
-"""The search space: parameters of a trial are drawn where they have an effect."""
+"""The search space: a trial's parameters, of which those with an effect are drawn."""
 
 from __future__ import annotations
 
@@ -16,25 +16,27 @@ from tracker.parameters import (
     value,
     with_values,
 )
-from tracker.studies.defined.definition import Varied
+from tracker.studies.definition.definition import Varied
 
 Draw = Callable[[Varied], Any]
 """A function that draws a value of one varied parameter."""
 
 FACTOR = 4.0
-"""Reach of a range around a value of a logarithmic parameter, as a factor."""
+"""Ratio of the largest value of a range around a value to this value, and of this value to the
+smallest one, for a logarithmic parameter."""
 
 SHARE = 0.25
-"""Reach of a range around another value to either side, as a share of the definition's range."""
+"""Distance of either end of a range around a value from this value, as a share of the parameter's
+whole range, for a parameter that is not logarithmic."""
 
 
 def drawn(varied: Sequence[Varied], bases: Sequence[RunParameters], draw: Draw) -> dict[str, Any]:
-    """Draw values of the parameters that have an effect with the values drawn before.
+    """Draw values of the parameters that have an effect given the values drawn before.
 
     Args:
         varied: The varied parameters.
-        bases: The other parameters on each recording; a varied parameter is drawn if it has an
-            effect on one recording.
+        bases: The parameters on each recording; a varied parameter is drawn if it has an effect on
+            at least one recording.
         draw: A function that draws a value. It is called for methods first, and for a parameter
             before those whose effect depends on it.
 
@@ -56,7 +58,8 @@ def drawn(varied: Sequence[Varied], bases: Sequence[RunParameters], draw: Draw) 
 
 
 def ordered(varied: Sequence[Varied]) -> list[Varied]:
-    """Sort parameters so that each comes after those that its effect depends on, methods first."""
+    """Sort parameters: methods first, and each parameter after those on which its effect
+    depends."""
     left, done = sorted(varied, key=lambda one: one.key not in METHODS), []
     while left:
         keys = {one.key for one in left}
@@ -67,15 +70,22 @@ def ordered(varied: Sequence[Varied]) -> list[Varied]:
 
 
 def _conditions(one: Varied) -> Sequence[str]:
+    """Return the keys of the parameters on which the effect of a parameter depends."""
     return tuple(PARAMETERS[one.key].when) if one.key in PARAMETERS else ()
 
 
 def _shown(bases: Sequence[RunParameters]) -> set[str]:
+    """Return the keys of the parameters that have an effect on at least one recording."""
     return {key for base in bases for key in shown_keys(base)}
 
 
 def grid(varied: Sequence[Varied], bases: Sequence[RunParameters]) -> Iterator[dict[str, Any]]:
-    """Yield the combinations of a grid, without those that differ only in values without effect."""
+    """Yield the combinations of a grid, one of those that differ only in values without effect.
+
+    Args:
+        varied: The varied parameters.
+        bases: The parameters on each recording.
+    """
     order = ordered(varied)
     seen: set[tuple[tuple[str, Any], ...]] = set()
     for combination in itertools.product(*(points(one) for one in order)):
@@ -126,6 +136,7 @@ def around(key: str, *values: Any) -> Varied:
 
 
 def _around(parameter: Parameter, now: float) -> tuple[float, float]:
+    """Return the smallest and the largest value of a range around a value."""
     assert parameter.minimum is not None
     assert parameter.maximum is not None
     if parameter.log:
@@ -137,5 +148,5 @@ def _around(parameter: Parameter, now: float) -> tuple[float, float]:
 
 
 def defaults_of(varied: Sequence[Varied], base: RunParameters) -> dict[str, Any]:
-    """Return the values of the varied parameters in ``base``, by key."""
+    """Return the values that the varied parameters have in ``base``, by key."""
     return {one.key: value(base, one.key) for one in varied}

@@ -16,18 +16,25 @@ from typing import Any
 
 from tracker.files.atomic import new_folder
 from tracker.files.folders import data_folder
-from tracker.studies.defined.defining import read_definition
-from tracker.studies.defined.definition import Definition
+from tracker.studies.definition.definition import Definition
+from tracker.studies.definition.parsing import read_definition
 from tracker.studies.errors import StudyError
-from tracker.studies.kept.reading import read_as
-from tracker.studies.kept.records import STORED, Status, StoredOutcome, Trial
-from tracker.studies.kept.writer import RESULTS, STATUS, Writer
-from tracker.studies.work.jobs import Outcome
+from tracker.studies.storage.reading import read_as
+from tracker.studies.storage.records import STORED, Status, StoredOutcome, Trial
+from tracker.studies.storage.writer import RESULTS, STATUS, Writer
+from tracker.studies.workers.jobs import Outcome
 
 FILE = "study.toml"
+"""The name of the file with the definition."""
+
 JOURNAL = "journal.log"
+"""The name of the sampler's journal."""
+
 _LOCK = "running.lock"
+"""The name of the file that the process running the study locks."""
+
 STOP = "stop"
+"""The name of the file whose existence requests the process to stop."""
 
 
 def studies_folder() -> Path:
@@ -39,14 +46,14 @@ def studies_folder() -> Path:
 
 
 def create(definition: Definition, folder: Path) -> Store:
-    """Make the folder of a study, or open it if it has the same definition.
+    """Create the folder of a study, or open it if it exists with the same definition.
 
     Args:
         definition: The study's definition.
         folder: The folder of all studies.
 
     Raises:
-        StudyError: If there is another study of that name, or nothing can be written.
+        StudyError: If there is a different study of that name, or the folder cannot be written to.
     """
     place = folder / definition.name
     if place.exists():
@@ -113,12 +120,12 @@ class Store:
         """Read the study's definition.
 
         Raises:
-            StudyError: If its file is not valid any more.
+            StudyError: If the file of the definition is not valid.
         """
         return read_definition(self.folder / FILE)
 
     def touched(self) -> float:
-        """Return the time of the last change of any file, seconds since 1970."""
+        """Return the time when a file of the study last changed, seconds since 1970."""
         times = [
             (self.folder / name).stat().st_mtime
             for name in (FILE, RESULTS, STATUS)
@@ -135,7 +142,7 @@ class Store:
             after: Only trials that ended after this time are returned, seconds since 1970.
 
         Raises:
-            StudyError: If a trial cannot be read any more, with the field.
+            StudyError: If the record of a trial is not valid; the message names the field.
         """
         with self._reading() as connection:
             if connection is None:
@@ -160,7 +167,7 @@ class Store:
         raise StudyError(f"study {self.name}: no trial {number} has ended; `study show` lists them")
 
     def outcome(self, key: str) -> Outcome | None:
-        """Return the outcome of a run, by the key of its job; None if there is none."""
+        """Return the outcome of a run by the key of its job; None if it is not stored."""
         with self._reading() as connection:
             if connection is None:
                 return None
@@ -180,7 +187,8 @@ class Store:
         return read_as(STORED.get(name, object), row[0], f"{self.folder / RESULTS}, {name}")
 
     def status(self) -> Status:
-        """Return the status; if the process was killed, the state is ``stopped``."""
+        """Return the status that was last written; its state is ``stopped`` if the process was
+        killed."""
         try:
             status = read_as(Status, (self.folder / STATUS).read_bytes(), STATUS)
         except (OSError, StudyError):  # the status is written again soon
@@ -221,11 +229,11 @@ class Store:
             yield writer
 
     def ask_to_stop(self) -> None:
-        """Ask the process that runs the study to stop; its results are kept."""
+        """Request the process that runs the study to stop; its results remain stored."""
         (self.folder / STOP).touch()
 
     def asked_to_stop(self) -> bool:
-        """Whether the process that runs the study was asked to stop."""
+        """Whether the process that runs the study was requested to stop."""
         return (self.folder / STOP).exists()
 
     @contextmanager
@@ -254,6 +262,7 @@ class Store:
 
     @contextmanager
     def _reading(self) -> Iterator[sqlite3.Connection | None]:
+        """Yield a connection to the file of results; None if there are no results yet."""
         path = self.folder / RESULTS
         if not path.exists():
             yield None

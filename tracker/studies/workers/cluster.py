@@ -1,7 +1,7 @@
-"""Workers by Dask: a cluster of processes on this machine, or an existing one.
+"""Workers by Dask: a cluster of processes on this machine, or an existing cluster.
 
-Dask distributes the jobs, and restarts and counts the workers. This module submits jobs under
-their keys, sends recordings to workers that cannot read them, and collects what workers report.
+Dask distributes the jobs, and restarts and counts the workers. This module submits the jobs, sends
+recordings to workers that cannot read them, and collects the reports of workers.
 """
 
 from __future__ import annotations
@@ -24,19 +24,19 @@ from tracker.files.text import visible
 from tracker.kernels import compilation
 from tracker.runs.processes import available_cores
 from tracker.studies.errors import StudyError
-from tracker.studies.work import recordings, working
-from tracker.studies.work.jobs import Job, Outcome
-from tracker.studies.work.local import how_many
-from tracker.studies.work.working import Tell
+from tracker.studies.workers import recordings, working
+from tracker.studies.workers.jobs import Job, Outcome
+from tracker.studies.workers.local import worker_count
+from tracker.studies.workers.working import Tell
 
 ADDRESS = "DASK_SCHEDULER_ADDRESS"
 """The environment variable with the scheduler's address, if none is named."""
 
 TOPIC = "multiview-phd"
-"""The topic of the events in which workers report what they do."""
+"""The topic of Dask's events by which workers report their progress."""
 
 LOOK_SECONDS = 2.0
-"""Least interval between two queries of the scheduler's workers, seconds."""
+"""Least interval between two queries of the scheduler for its workers, seconds."""
 
 CONNECT_SECONDS = 10.0
 """Longest wait for a connection, seconds."""
@@ -46,7 +46,7 @@ SENDING_SECONDS = 600.0
 
 _QUIET = {
     "distributed.worker.profile.enabled": False,  # samples every worker a hundred times a second
-    "distributed.admin.tick.interval": "1 s",  # is fifty times a second by default
+    "distributed.admin.tick.interval": "1 s",  # by default fifty times a second
     "distributed.admin.tick.limit": "1 minute",
     "distributed.admin.system-monitor.interval": "10 s",
 }
@@ -56,14 +56,16 @@ workers it would take much of the scheduler's time."""
 
 @dataclass(frozen=True, slots=True)
 class WorkerState:
-    """The state of one worker, as it last reported it."""
+    """The state of a worker by its last report."""
 
     name: str
+    """The address of the worker, as its name."""
     machine: str
+    """The name of the worker's machine."""
     words: str
-    """What the worker does or waits for."""
+    """The activity that is not a job, or what the worker waits for; empty while it does a job."""
     job: str | None
-    """The key of its job; None if it has none."""
+    """The key of the worker's job; None if it has none."""
     since: float
     """The time of the report, seconds since 1970."""
 
@@ -82,15 +84,15 @@ class Crew(Protocol):
         """Return the outcomes of jobs that ended since the last call.
 
         Args:
-            seconds: Longest wait for the first of them, seconds.
+            seconds: Longest wait for the first outcome, seconds.
 
         Raises:
             StudyError: If the crew cannot continue; earlier outcomes are not lost.
         """
 
     def call(self, function: Callable[..., Any], *arguments: Any) -> Callable[[], Any | None]:
-        """Have a function computed by a worker, and return a getter of its result, which returns
-        None until it is computed."""
+        """Have a worker call a function, and return a getter of the result, which returns None
+        until there is one."""
 
     def workers(self) -> list[WorkerState]:
         """Return the states of all workers."""
@@ -100,7 +102,7 @@ def compile_first(tell: Tell) -> None:
     """Compile this machine's kernels before its workers start.
 
     Args:
-        tell: A callback that gets a sentence on what is being done.
+        tell: A callback that gets a sentence on the progress.
     """
     if not compilation.is_compiled():
         tell(working.COMPILING)
@@ -123,8 +125,9 @@ def _do(job: Job) -> Outcome:
     return working.work(job, tell, name)
 
 
-def look_at(address: str, seconds: float) -> dict[str, Any]:
-    """Return the numbers of ``workers`` and ``threads`` of a scheduler, and its ``machines``.
+def scheduler_numbers(address: str, seconds: float) -> dict[str, Any]:
+    """Return the numbers of ``workers`` and ``threads`` of a scheduler, and the names of its
+    ``machines``.
 
     Args:
         address: The scheduler's address.
@@ -149,10 +152,11 @@ def look_at(address: str, seconds: float) -> dict[str, Any]:
 
 
 def check_address(address: str) -> None:
-    """Check that a text may be a scheduler's address; for others Dask raises various exceptions.
+    """Check that a text has the form of a scheduler's address, since Dask raises various exceptions
+    for other texts.
 
     Raises:
-        StudyError: If the text cannot be an address.
+        StudyError: If the text does not have this form.
     """
     found = re.fullmatch(
         r"(?:[a-z]+://)?(?:[A-Za-z0-9._-]+|\[[0-9A-Fa-f:.]+\]):(\d{1,5})/?", address
@@ -164,6 +168,7 @@ def check_address(address: str) -> None:
 
 
 def _no_scheduler(address: str | None, error: Exception) -> StudyError:
+    """Return the error that there is no scheduler at an address."""
     return StudyError(
         f"there is no Dask scheduler at {address} ({_words(error)}); start one by "
         "`dask scheduler`, or name another address; to work on this machine, leave out "
@@ -172,7 +177,8 @@ def _no_scheduler(address: str | None, error: Exception) -> StudyError:
 
 
 class DaskCrew:
-    """A crew whose jobs are tasks of a Dask cluster; close it, or use ``with``."""
+    """A crew whose jobs are tasks of a Dask cluster; closed by :meth:`close` or at the end of
+    ``with``."""
 
     def __init__(
         self,
@@ -189,7 +195,7 @@ class DaskCrew:
         Args:
             scheduler: The address of an existing scheduler; None for workers on this machine.
             workers: The number of workers on this machine; one for each core if None.
-            tell: A callback that gets a sentence on what is being done.
+            tell: A callback that gets a sentence on the progress.
             do: The function with which a worker does a job.
             processes: Whether the workers of this machine are processes rather than threads.
             sent_bytes: Largest size of a recording that is sent to a worker that cannot read it,
@@ -214,7 +220,9 @@ class DaskCrew:
         self._closed = False
         if scheduler is None:
             self._cluster = self._start(
-                how_many(workers) if processes else workers or available_cores(), processes, tell
+                worker_count(workers) if processes else workers or available_cores(),
+                processes,
+                tell,
             )
         else:
             check_address(scheduler)
@@ -230,15 +238,22 @@ class DaskCrew:
         self._ended: Any = distributed.as_completed(
             loop=self._client.loop, with_results=True, raise_errors=False
         )
-        self._client.subscribe_topic(TOPIC, self._heard)
+        self._client.subscribe_topic(TOPIC, self._on_report)
 
     def _start(self, count: int, processes: bool, tell: Tell) -> Any:
+        """Start the workers of this machine, and return their cluster.
+
+        Args:
+            count: The number of workers.
+            processes: Whether the workers are processes rather than threads.
+            tell: A callback that gets a sentence on the progress.
+        """
         distributed: Any = importlib.import_module("distributed")  # slow, and without types
         dask: Any = importlib.import_module("dask")
         if processes:
             compile_first(tell)
         tell(f"starting {count} worker{'s' if count > 1 else ''}")
-        own = {"preload": ["tracker.studies.work.local"]} if processes else {}
+        own = {"preload": ["tracker.studies.workers.local"]} if processes else {}
         environment = {"NUMBA_NUM_THREADS": "1"}
         with dask.config.set(_QUIET):
             return distributed.LocalCluster(
@@ -273,9 +288,10 @@ class DaskCrew:
         return max(1, sum(self._threads().values()))
 
     def _threads(self) -> Mapping[str, int]:
-        """Return the number of threads of each worker; the slow query is repeated seldom."""
+        """Return the number of threads of each worker by address, which is at most
+        :data:`LOOK_SECONDS` old, since the query is slow."""
         if time.monotonic() - self._looked >= LOOK_SECONDS:
-            with self._asking():
+            with self._explained():
                 workers = self._client.scheduler_info(n_workers=-1).get("workers", {})
             self._there = {one: int(about.get("nthreads", 1)) for one, about in workers.items()}
             self._looked = time.monotonic()
@@ -283,7 +299,7 @@ class DaskCrew:
 
     def submit(self, job: Job, priority: int = 0) -> None:
         """Submit a job; jobs of higher priority are done first."""
-        with self._asking():
+        with self._explained():
             future = self._client.submit(
                 self._do, job, key=f"{TOPIC}-{job.key}-{time.monotonic_ns()}",
                 pure=False, priority=priority, retries=0,
@@ -295,7 +311,7 @@ class DaskCrew:
         """Return the outcomes of jobs that ended since the last call.
 
         Args:
-            seconds: Longest wait for the first of them, seconds.
+            seconds: Longest wait for the first outcome, seconds.
 
         Raises:
             StudyError: If the scheduler is gone, or if a worker has another version of the program
@@ -314,21 +330,28 @@ class DaskCrew:
                 found.append(outcome)
 
     def _gone(self) -> StudyError:
+        """Return the error that the scheduler is gone."""
         return StudyError(
             f"the scheduler at {self._address or 'this machine'} is gone; every run that ended is "
             "kept: start it again and go on by `multiview-phd study resume`"
         )
 
     @contextmanager
-    def _asking(self) -> Iterator[None]:
-        """Turn the exceptions that Dask raises if its scheduler is gone into one sentence."""
+    def _explained(self) -> Iterator[None]:
+        """Replace the exceptions that Dask raises if its scheduler is gone by one error."""
         try:
             yield
         except (OSError, TimeoutError, RuntimeError, CancelledError) as error:
             raise self._gone() from error
 
     def _outcome(self, job: Job, status: str, result: Any) -> Outcome | None:
-        """Return the outcome of a job; None if the job is submitted again."""
+        """Return the outcome of a job; None if the job is submitted again.
+
+        Args:
+            job: The job.
+            status: The status of Dask's future.
+            result: The outcome, or the exception as Dask returns it.
+        """
         if status == "error":
             error = result[1]
             words = _words(error)
@@ -372,27 +395,28 @@ class DaskCrew:
                 f"worker {outcome.worker} on {outcome.machine} cannot read {job.place} "
                 f"({outcome.words}), and {_words(error)}"
             ) from None
-        with self._asking():
+        with self._explained():
             sent = self._client.submit(
                 recordings.unpack, job.content, data, workers=[outcome.worker], pure=False
             )
             sent.result(timeout=SENDING_SECONDS)
 
     def call(self, function: Callable[..., Any], *arguments: Any) -> Callable[[], Any | None]:
-        """Have a function computed by a worker, and return a getter of its result, which returns
-        None until it is computed.
+        """Have a worker call a function, and return a getter of the result, which returns None
+        until there is one.
 
-        The same worker is used each time if possible, so that others need not import the packages.
+        The same worker is used each time if possible, since it has to import further packages.
         """
         first = sorted(self._threads())[:1]
-        with self._asking():
+        with self._explained():
             future = self._client.submit(
                 function, *arguments, pure=False, priority=10,
                 workers=first or None, allow_other_workers=bool(first),
             )  # fmt: skip
         return lambda: future.result() if future.status == "finished" else None
 
-    def _heard(self, event: tuple[float, Any]) -> None:
+    def _on_report(self, event: tuple[float, Any]) -> None:
+        """Store the report of a worker, which Dask passes with its time."""
         _, report = event
         with self._lock:
             self._states[report["worker"]] = WorkerState(
@@ -413,4 +437,5 @@ class DaskCrew:
 
 
 def _words(error: BaseException | None) -> str:
+    """Return the message of an exception on one line, or else the name of its type."""
     return " ".join(str(error).split()) or type(error).__name__

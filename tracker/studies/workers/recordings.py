@@ -1,4 +1,4 @@
-"""Recordings identified by content, so that each machine may have them in another folder."""
+"""Recordings identified by their content, so that each machine may have them in another folder."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from tracker.sequences.sequence import Sequence
 from tracker.studies.errors import StudyError
 
 SENT_BYTES = 256 << 20
-"""Largest size of a recording that is sent to a worker that cannot read it, bytes."""
+"""Largest size of a recording that is sent to a worker which cannot read it, bytes."""
 
 
 def files_of(folder: Path) -> list[Path]:
-    """Return ``sequence.toml`` and every file below the folder that it names, sorted.
+    """Return ``sequence.toml`` and all files below its folder that it names, sorted.
 
-    A file counts if the text of any field is its path, or a pattern that matches it.
+    A file is named if the text of any field is its path, or a pattern that matches it.
     """
     found = {folder / FILE}
     text = (folder / FILE).read_text(encoding="utf-8")
@@ -38,6 +38,7 @@ def files_of(folder: Path) -> list[Path]:
 
 
 def _words(value: Any) -> list[str]:
+    """Return all texts in nested values."""
     if isinstance(value, dict):
         return [word for one in value.values() for word in _words(one)]
     if isinstance(value, list):
@@ -46,7 +47,10 @@ def _words(value: Any) -> list[str]:
 
 
 def content_of(sequence: Sequence) -> str:
-    """Return the hash of all files of a recording, which is cached by their sizes and times."""
+    """Return the hash of all files of a recording.
+
+    It is cached under the recording's digest, which depends on the sizes and times of the files.
+    """
     known = cache_folder() / "contents" / sequence.digest
     try:
         return known.read_text(encoding="ascii")
@@ -58,7 +62,7 @@ def content_of(sequence: Sequence) -> str:
         with path.open("rb") as file:
             digest.update(hashlib.file_digest(file, "sha256").digest())
     content = digest.hexdigest()[:24]
-    with contextlib.suppress(OSError):  # without the cache it is computed again
+    with contextlib.suppress(OSError):  # without the cache the hash is computed again
         known.parent.mkdir(parents=True, exist_ok=True)
         write_whole(known, content.encode("ascii"))
     return content
@@ -69,10 +73,10 @@ def packed(folder: Path, limit: int = SENT_BYTES) -> bytes:
 
     Args:
         folder: The recording's folder.
-        limit: Largest size of its files together, bytes.
+        limit: Largest total size of its files, bytes.
 
     Raises:
-        StudyError: If the files are larger, with their size.
+        StudyError: If the files are larger; the message names their size.
     """
     files = files_of(folder)
     size = sum(path.stat().st_size for path in files)
@@ -89,12 +93,17 @@ def packed(folder: Path, limit: int = SENT_BYTES) -> bytes:
 
 
 def sent_folder(content: str) -> Path:
-    """Return the folder of a recording that was sent to this machine."""
+    """Return the folder for a recording that is sent to this machine, by its content."""
     return cache_folder() / "recordings" / content
 
 
 def unpack(content: str, data: bytes) -> str:
-    """Unpack a recording that was sent to this machine, and return its folder."""
+    """Unpack a recording that was sent to this machine, and return its folder.
+
+    Args:
+        content: The hash of the recording's content.
+        data: The recording, as returned by :func:`packed`.
+    """
     folder = sent_folder(content)
     folder.parent.mkdir(parents=True, exist_ok=True)
     if not (folder / FILE).is_file():
@@ -102,16 +111,21 @@ def unpack(content: str, data: bytes) -> str:
             with new_folder(folder) as begun, zipfile.ZipFile(io.BytesIO(data)) as archive:
                 archive.extractall(begun)
         except FileExistsError:
-            if not (folder / FILE).is_file():  # if it is, another worker unpacked it meanwhile
+            if not (folder / FILE).is_file():  # otherwise another worker unpacked it meanwhile
                 raise
     return str(folder)
 
 
 def opened(place: str, content: str) -> Sequence:
-    """Open a recording with this content, from its place or as it was sent to this machine.
+    """Open a recording with a given content: from its place, or from the folder of recordings that
+    were sent to this machine.
+
+    Args:
+        place: The name or folder by which the recording is opened.
+        content: The hash of the recording's content.
 
     Raises:
-        SequenceError: If neither has this content.
+        SequenceError: If neither has a recording with this content.
     """
     try:
         found = open_sequence(place)

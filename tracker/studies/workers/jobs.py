@@ -1,4 +1,5 @@
-"""A job, which is one recording tracked with certain parameters and a seed, and its outcome."""
+"""Jobs, each of which tracks one recording with certain parameters and a seed, and their
+outcomes."""
 
 from __future__ import annotations
 
@@ -19,12 +20,16 @@ from tracker.runs.run import stage_keys
 from tracker.sequences.sequence import Sequence
 
 FORMAT = 1
-"""Version of the outcomes; with another number all jobs are computed again."""
+"""Version of the outcomes; if it changes, all jobs are computed again."""
 
 
 @cache
 def code_version() -> str:
-    """Return a text that differs for every version of the code that may change a figure."""
+    """Return a hash of the code that may change a figure of a run.
+
+    It covers the code of the tracks and the modules of :mod:`tracker.evaluation`, without those of
+    its subpackages.
+    """
     digest = hashlib.sha256(f"{FORMAT} {numbers_version('tracks')}".encode())
     for path in sorted(Path(evaluation.__file__).parent.glob("*.py")):
         digest.update(path.read_bytes())
@@ -33,10 +38,11 @@ def code_version() -> str:
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """A job for a worker. Jobs with the same key have the same outcome on every machine."""
+    """A job for a worker; jobs with the same key have the same outcome on every machine."""
 
     key: str
-    """The hash of the recording's content, the parameters that have an effect, seed and code."""
+    """The hash of the recording's content, the parameters that have an effect, the seed, the
+    corrections, the code and the wanted figures."""
     place: str
     """The name or folder by which the recording is opened."""
     content: str
@@ -44,6 +50,7 @@ class Job:
     values: Mapping[str, Any]
     """The values by key that differ from the recording's defaults."""
     seed: int
+    """The seed of the random numbers."""
     code: str
     """The version of the code, see :func:`code_version`."""
     truth: bool
@@ -51,16 +58,16 @@ class Job:
     agreement: bool
     """Whether the run is compared with its variants (self-consistency)."""
     timed: bool
-    """Whether the time of stage 1 must be known, if only from an earlier run."""
+    """Whether the time of stage 1 must be measured, unless it is known from an earlier run."""
     keep: bool = False
-    """Whether the outcome has the run's tracks, for the library."""
+    """Whether the outcome includes the records for the library, with the tracks."""
     corrections: tuple[Correction, ...] = ()
     """The corrections that the run applies."""
 
 
 Became = Literal["done", "failed", "unreadable", "version"]
-"""The state of an outcome: ``unreadable`` if the worker cannot read the recording, ``version`` if
-it has another version of the program."""
+"""The state of a job: ``unreadable`` if the worker cannot read the recording, ``version`` if the
+worker has another version of the program."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,23 +75,28 @@ class Outcome:
     """The outcome of a job."""
 
     key: str
+    """The key of the job."""
     became: Became
+    """The state of the job."""
     words: str = ""
-    """The reason why the job is not done."""
+    """The reason if the job was not done; empty if it was."""
     figures: Mapping[str, float | None] = field(default_factory=dict)
     """The figures, by the keys of the objectives."""
     overlap: float | None = None
-    """Overlap of each camera's boxes with the tracks of the run without it, mean over cameras."""
+    """The mean over cameras of the overlap of a camera's boxes with the tracks of the run without
+    this camera, 0 … 1; None if it was not computed."""
     tracks: str = ""
     """The hash of the tracks."""
     people: int = 0
     """The number of tracks."""
     seconds: float = 0.0
-    """The duration on the worker's clock, with the evaluation, seconds."""
+    """The duration of the job on the worker's clock, including the evaluation, seconds."""
     worker: str = ""
+    """The name of the worker."""
     machine: str = ""
+    """The name of the worker's machine."""
     kept: tuple[NewRecording, NewRun] | None = None
-    """The records for the library, if they were wanted."""
+    """The records for the library; None if the job did not ask for them."""
 
     def to_json(self) -> dict[str, Any]:
         """Return all fields but ``kept`` as plain values."""
@@ -109,13 +121,13 @@ def job_of(
     Args:
         sequence: The recording.
         place: The name or folder by which the recording is opened.
-        content: The hash of its content.
+        content: The hash of the recording's content.
         parameters: All parameters of the run.
-        values: Those that differ from the recording's defaults, by key.
+        values: The values by key that differ from the recording's defaults.
         seed: The seed of the run.
         truth: Whether to evaluate the run against ground truth.
         agreement: Whether to compare the run with its variants.
-        timed: Whether its speed must be known.
+        timed: Whether the time of stage 1 must be known.
         corrections: The corrections that the run applies.
     """
     own = replace(sequence, digest=content)

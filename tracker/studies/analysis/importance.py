@@ -1,4 +1,4 @@
-"""The importance of parameters: shares of the variance that they explain, and their uncertainty.
+"""The importance of parameters: the share of the variance that each explains, with its uncertainty.
 
 [HHL14] Hutter, Hoos, Leyton-Brown, "An efficient approach for assessing hyperparameter
 importance", ICML 2014 (fANOVA), in Optuna's implementation.
@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from tracker.studies.defined.definition import Varied
-from tracker.studies.kept.records import Trial
-from tracker.studies.work.cluster import Crew
+from tracker.studies.definition.definition import Varied
+from tracker.studies.storage.records import Trial
+from tracker.studies.workers.cluster import Crew
 
 FEWEST = 12
 """Least number of complete trials for an estimate."""
@@ -26,16 +26,18 @@ TREES = 8
 """The number of trees of the forest."""
 
 MOST_TRIALS = 200
-"""Most trials of a sample, since the time for the forest grows with their number."""
+"""Largest number of trials of a sample, since the time for the forest grows with it."""
 
 GROWTH = 2.0
-"""The estimate is computed again when the number of trials has grown by this factor."""
+"""Factor by which the number of trials grows between two estimates; the time for the next estimate
+is expected to grow by the same factor."""
 
 SHARE = 0.005
-"""Largest share of the workers' time that is spent on estimates before the end."""
+"""Largest ratio of the time for estimates to the workers' time for runs before the end."""
 
 NEARLY = 0.9
-"""At the end the estimate is not computed again if it is based on this share of the trials."""
+"""Share of the complete trials on which an estimate must be based so that it is not computed again
+at the end."""
 
 LAST_SECONDS = 60.0
 """Longest time that the end of a study waits for the estimate, seconds."""
@@ -48,14 +50,17 @@ def importance(
 ) -> dict[str, Any]:
     """Estimate the share of the variance of the first objective that each parameter explains.
 
+    The shares are those of fANOVA [HHL14], averaged over bootstrap samples of the trials.
+
     Args:
         varied: The varied parameters.
-        rows: The values and the objectives of each complete trial.
-        defaults: The value of each parameter for trials in which it had no effect.
+        rows: The values by key and the objectives of each complete trial.
+        defaults: The value of each parameter, by key, for trials in which it had no effect.
 
     Returns:
-        A mapping with ``trials``, the number of trials; ``shares``, the mean and standard deviation
-        by key, largest first; and ``seconds``, the time of the computation.
+        A mapping with ``trials``, the number of trials; ``shares``, the mean and the standard
+        deviation of the share by key, the largest first; and ``seconds``, the duration of the
+        computation.
     """
     import warnings
 
@@ -100,6 +105,7 @@ def importance(
 
 
 def _distribution(one: Varied) -> Any:
+    """Return Optuna's distribution of a varied parameter."""
     from optuna.distributions import (
         CategoricalDistribution,
         FloatDistribution,
@@ -116,7 +122,8 @@ def _distribution(one: Varied) -> Any:
 
 
 def _inside(varied: Sequence[Varied], values: Mapping[str, Any]) -> dict[str, Any]:
-    """Clip the values to the varied ranges, which may exclude a default."""
+    """Return the values of the varied parameters, clipped to their ranges, which may exclude a
+    default."""
     found = {}
     for one in varied:
         here = values[one.key]
@@ -129,8 +136,8 @@ def _inside(varied: Sequence[Varied], values: Mapping[str, Any]) -> dict[str, An
     return found
 
 
-class Weighing:
-    """Has the importance estimated by a worker of a running study, when it is worth the time."""
+class ImportanceEstimator:
+    """The estimates of importance in a running study, which a worker computes from time to time."""
 
     def __init__(self, varied: Sequence[Varied], defaults: Mapping[str, Any]) -> None:
         """Store the arguments of the estimates.
@@ -140,42 +147,47 @@ class Weighing:
             defaults: Their default values, by key.
         """
         self._varied, self._defaults = tuple(varied), dict(defaults)
-        self._asked: Callable[[], Any | None] | None = None
-        self._weighed = 0
-        self._spent = self._took = 0.0
+        self._poll: Callable[[], Any | None] | None = None
+        """The getter of the estimate that is being computed."""
+        self._trials = 0
+        """The number of trials of the last estimate."""
+        self._spent = self._last_seconds = 0.0
 
-    def news(
+    def update(
         self, complete: Sequence[Trial], crew: Crew, *, worked: float, last: bool = False
     ) -> dict[str, Any] | None:
-        """Return a new estimate if one has been computed, and have the next one computed if due.
+        """Return the newest estimate, or None if there is no new one, and start the next one if
+        due.
 
         Args:
             complete: The trials that ended with all their runs.
             crew: The workers, one of which computes the estimate.
-            worked: The time that the workers spent on runs so far, seconds.
-            last: Whether there are no more trials, so that the estimate is waited for.
+            worked: The time that the workers have spent on runs, seconds.
+            last: Whether there are no more trials; the function then waits for the last estimate.
         """
         found = self._found()
         until = time.monotonic() + LAST_SECONDS
         while True:  # at the end, an earlier estimate may still be computed
             self._ask(complete, crew, worked, last)
-            if not last or self._asked is None or time.monotonic() >= until:
+            if not last or self._poll is None or time.monotonic() >= until:
                 return found
             time.sleep(0.02)
             found = self._found() or found
 
     def _ask(self, complete: Sequence[Trial], crew: Crew, worked: float, last: bool) -> None:
-        needed = self._weighed / NEARLY if last else self._weighed * GROWTH
-        spared = last or self._spent + GROWTH * self._took <= SHARE * worked
-        if self._asked is None and spared and len(complete) >= max(FEWEST, needed):
-            self._weighed = len(complete)
+        """Start an estimate if none is being computed and one is due."""
+        needed = self._trials / NEARLY if last else self._trials * GROWTH
+        spared = last or self._spent + GROWTH * self._last_seconds <= SHARE * worked
+        if self._poll is None and spared and len(complete) >= max(FEWEST, needed):
+            self._trials = len(complete)
             rows = [(one.values, one.objectives) for one in complete if one.objectives]
-            self._asked = crew.call(importance, self._varied, rows, self._defaults)
+            self._poll = crew.call(importance, self._varied, rows, self._defaults)
 
     def _found(self) -> dict[str, Any] | None:
-        found = None if self._asked is None else self._asked()
+        """Return the estimate that was being computed, if it has ended."""
+        found = None if self._poll is None else self._poll()
         if found is not None:
-            self._asked = None
-            self._took = found.pop("seconds")
-            self._spent += self._took
+            self._poll = None
+            self._last_seconds = found.pop("seconds")
+            self._spent += self._last_seconds
         return found

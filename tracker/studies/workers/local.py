@@ -1,4 +1,4 @@
-"""Workers of this machine: their number, and their preparation at the start (a Dask preload)."""
+"""The workers of this machine: their number, and their preparation by Dask's preload."""
 
 from __future__ import annotations
 
@@ -6,14 +6,16 @@ from typing import Any
 
 from tracker.runs.processes import available_cores
 from tracker.studies.errors import StudyError
-from tracker.studies.work import working
+from tracker.studies.workers import working
 
 MOST_A_CORE = 4
-"""Most processes for each core: more would wait for each other, and each takes up to 1 GB."""
+"""Largest number of processes for each core; more would wait for each other, and each takes up to
+1 GB of memory."""
 
 
-def how_many(wanted: int | None) -> int:
-    """Return the number of workers for this machine: as wanted, or one for each core.
+def worker_count(wanted: int | None) -> int:
+    """Return the number of workers for this machine: the number wanted, or one for each core if
+    None.
 
     Raises:
         StudyError: If more are wanted than the machine can run.
@@ -30,5 +32,5 @@ def how_many(wanted: int | None) -> int:
 
 def dask_setup(worker: Any) -> None:
     """Lower the priority of the worker's process, and compile its kernels before the first job."""
-    working.give_way()
+    working.lower_priority()
     working.prepare()

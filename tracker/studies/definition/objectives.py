@@ -12,21 +12,27 @@ from tracker.evaluation import DEFINITIONS
 from tracker.studies.errors import StudyError
 
 Of = Literal["truth", "run", "agreement"]
-"""What a figure is computed from: ground truth, the run alone, or variants of the run."""
+"""The data from which a figure is computed: ground truth, the run alone, or variants of the run."""
 
 
 @dataclass(frozen=True, slots=True)
 class Objective:
-    """A figure that trials are judged by."""
+    """A figure by which trials are judged."""
 
     key: str
+    """The key of the figure."""
     name: str
+    """The name that is displayed."""
     higher: bool
     """Whether larger values are better."""
     of: Of
+    """The data from which the figure is computed."""
     unit: str = ""
+    """The unit that is displayed; empty for a figure without unit."""
     digits: int = 3
+    """The number of decimals that are displayed."""
     help: str = ""
+    """The explanation, in full sentences."""
 
     def better(self, one: float, other: float) -> bool:
         """Whether one value is better than another."""
@@ -79,7 +85,10 @@ BESIDE: dict[str, Objective] = {
 """Figures that are shown beside the objectives of trials that have them."""
 
 WITH_TRUTH = ("hota", "idf1", "speed")
+"""The default objectives if all recordings have ground truth."""
+
 SELF_CONSISTENCY = ("identity",)
+"""The default objectives if a recording has no ground truth."""
 
 VETO = 0.05
 """Largest decrease of the held-out overlap (intersection over union, mean over cameras) below that
@@ -87,10 +96,10 @@ of the defaults with which a trial is not vetoed."""
 
 
 def chosen(objectives: Sequence[str], has_truth: Mapping[str, bool]) -> tuple[Objective, ...]:
-    """Return the objectives of a study; if none is named, those that suit its recordings.
+    """Return the objectives of a study; if none is named, the default ones for its recordings.
 
     Args:
-        objectives: The keys of the objectives, or none.
+        objectives: The keys of the objectives; empty for the default ones.
         has_truth: Whether each recording has ground truth, by name.
 
     Raises:
@@ -114,12 +123,14 @@ class Mean:
     """The mean of a figure over recordings and seeds."""
 
     value: float
+    """The mean, in the unit of the figure."""
     spread: float | None
-    """Standard deviation over the seeds of its mean over the recordings; None for one seed."""
+    """Standard deviation over the seeds of the mean over the recordings; None if fewer than two
+    seeds have values on all recordings."""
 
 
 def mean_over(values: Mapping[tuple[str, int], float]) -> Mean:
-    """Compute the mean over the recordings of the mean over seeds, and its spread over seeds.
+    """Compute the mean over recordings of the mean over seeds, and the spread over seeds.
 
     Args:
         values: The values by recording and seed.
@@ -138,11 +149,11 @@ def mean_over(values: Mapping[tuple[str, int], float]) -> Mean:
 def front(
     rows: Iterable[tuple[int, Sequence[float]]], objectives: Sequence[Objective]
 ) -> list[int]:
-    """Return the Pareto front: the trials that no other one dominates.
+    """Return the numbers of the trials on the Pareto front: those that no other trial dominates.
 
     Args:
         rows: The number and the values of each trial.
-        objectives: The objectives that the values are of.
+        objectives: The objectives, one for each value.
     """
     every = list(rows)
     if not every:

@@ -19,7 +19,8 @@ def read_as(kind: type[T], text: str | bytes, where: str) -> T:
         where: The file and the place in it, for messages.
 
     Raises:
-        StudyError: With the field, what was expected and what was found.
+        StudyError: If the text is not valid; the message names the field, and states what was
+            expected and found.
     """
     try:
         return parse_json(kind, text)

@@ -9,6 +9,7 @@ from pydantic import ConfigDict, Field
 from typing_extensions import TypedDict
 
 TrialState = Literal["complete", "pruned", "failed"]
+"""The state of a trial that ended: with all runs, after its first runs, or because a run failed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,6 +21,7 @@ class JobRow:
     recording: str
     """The name or folder of the recording."""
     seed: int
+    """The seed of the run."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,25 +29,29 @@ class Trial:
     """A trial that ended."""
 
     number: int
+    """The number of the trial; 0 is that of the defaults."""
     state: TrialState
+    """How the trial ended."""
     values: dict[str, Any]
     """The varied parameters, by key."""
     objectives: tuple[float, ...] | None
-    """Means of the objectives over recordings and seeds; None if the trial failed. Those of a
-    pruned trial are means over its first runs."""
+    """The mean of each objective over recordings and seeds, or over the first runs if the trial was
+    pruned; None if it failed."""
     spreads: tuple[float | None, ...]
-    """Standard deviations of the objectives over the seeds."""
+    """The standard deviation of each objective over the seeds; None for a single seed."""
     figures: dict[str, float]
-    """Means of all other figures over recordings and seeds."""
+    """The means of all figures over recordings and seeds, by key."""
     vetoed: bool
-    """Whether the tracks overlap too little with the boxes of cameras that were left out."""
+    """Whether the held-out overlap is clearly less than that of the defaults (see
+    :data:`~tracker.studies.definition.objectives.VETO`)."""
     words: str
     """The reason of a failure or pruning, or a remark on the trial."""
     seconds: float
-    """The time of its runs on the workers' clocks, seconds."""
+    """The duration of all runs of the trial on the workers' clocks, seconds."""
     jobs: tuple[JobRow, ...]
+    """The runs of the trial."""
     ended: float = 0.0
-    """The time when it ended, seconds since 1970."""
+    """The time when the trial ended, seconds since 1970."""
 
     def to_json(self) -> dict[str, Any]:
         """Return all fields as plain values."""
@@ -54,12 +60,13 @@ class Trial:
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """The status of a study, as its process last wrote it.
+    """The status of a study, which its process writes at intervals.
 
     A session is the time from one start of the study to its next end or interruption.
     """
 
     state: Literal["new", "running", "stopped", "done", "failed"] = "new"
+    """The state of the study."""
     words: str = ""
     """What the study waits for, or why it ended."""
     done: int = 0
@@ -73,20 +80,23 @@ class Status:
     seconds_left: float | None = None
     """The estimated time to the end, seconds; None if it is not known."""
     busy: float | None = None
-    """Share of the workers' time in which they worked, since all had started."""
+    """The share of the workers' time in which they worked, 0 … 1, since the first run of the
+    session ended; None before there are enough runs."""
     workers: list[dict[str, Any]] = field(default_factory=list)
+    """The activity of each worker, as plain values."""
     all_runs: int = 0
     """The number of runs computed in all sessions together."""
     all_seconds: float = 0.0
     """The duration of all sessions together, seconds."""
     process: int = 0
-    """The id of the process."""
+    """The id of the process that runs the study."""
     written: float = 0.0
     """The time when the status was written, seconds since 1970."""
 
 
 class StoredOutcome(TypedDict, total=False):
-    """The JSON of an outcome, made by :meth:`tracker.studies.work.jobs.Outcome.to_json`."""
+    """The JSON of an outcome, as returned by
+    :meth:`tracker.studies.workers.jobs.Outcome.to_json`."""
 
     key: Required[str]
     became: Required[Literal["done", "failed", "unreadable", "version"]]

@@ -12,23 +12,24 @@ Search = Literal["auto", "tpe", "nsga2", "random", "grid"]
 """The search method; ``auto`` is TPE for one objective and NSGA-II for several."""
 
 MOST_TRIALS = 1_000_000
-"""Largest number of trials, which stands for as many as the time allows."""
+"""Largest number of trials; with it and a limit of time, the time alone limits a study."""
 
 GRID_STEPS = 5
-"""The number of a parameter's values on a grid by default."""
+"""The default number of a parameter's values on a grid."""
 
 
 @dataclass(frozen=True, slots=True)
 class Varied:
-    """One parameter, or choice of a method, that a study varies."""
+    """A parameter, or the choice of a method, that a study varies."""
 
     key: str
+    """The key of the parameter."""
     low: float | None = None
-    """Smallest value of a number, in its unit; None if there are choices."""
+    """Smallest value in the parameter's unit; None if there are choices."""
     high: float | None = None
-    """Largest value of a number, included; None if there are choices."""
+    """Largest value in the parameter's unit, included; None if there are choices."""
     log: bool = False
-    """Whether a number is drawn uniformly over its logarithm."""
+    """Whether the logarithm of the value is drawn uniformly, rather than the value."""
     steps: int = GRID_STEPS
     """The number of values on a grid."""
     choices: tuple[Any, ...] = ()
@@ -59,24 +60,29 @@ class Definition:
     """A validated definition of a study."""
 
     name: str
+    """The name of the study and of its folder."""
     recordings: tuple[str, ...]
     """Names of built-in recordings, or absolute folders."""
     varied: tuple[Varied, ...]
+    """The varied parameters."""
     trials: int = 100
     """Largest number of trials."""
     minutes: float | None = None
     """Time after which no trial begins, minutes; None for no limit."""
     seeds: tuple[int, ...] = (0,)
+    """The seeds of the runs on each recording."""
     search: Search = "auto"
+    """The search method."""
     objectives: tuple[str, ...] = ()
-    """Keys of :data:`~tracker.studies.defined.objectives.OBJECTIVES`, the most important one first;
-    if empty, they are chosen by whether the recordings have ground truth."""
+    """Keys of :data:`~tracker.studies.definition.objectives.OBJECTIVES`, the most important one
+    first; if empty, they are chosen by whether the recordings have ground truth."""
     prune: bool = True
-    """Whether hopeless trials are pruned after their first runs."""
+    """Whether trials are pruned if they are worse than the median after their first runs."""
     preset: str | None = None
+    """The preset whose values all trials have; None for none."""
     propose: int = 0
-    """The number of further seeds on which the best trials are measured again at the end, to
-    propose the best of them; 0 for no proposal."""
+    """The number of further seeds on which the best trials are evaluated again at the end, so that
+    the best of them can be proposed; 0 for no proposal."""
     seed: int = 0
     """The seed of the sampler."""
     values: Mapping[str, Any] = field(default_factory=dict)
@@ -85,7 +91,8 @@ class Definition:
     """Values of varied parameters that are tried right after the defaults."""
 
     def held(self) -> dict[str, Any]:
-        """Return the fixed values of all trials by key: the preset's, then the study's own."""
+        """Return the fixed values of all trials by key: the preset's, overridden by
+        :attr:`values`."""
         return {**(PRESETS[self.preset] if self.preset else {}), **self.values}
 
     def to_json(self) -> dict[str, Any]:

@@ -1,8 +1,8 @@
-"""The proposal at the end of a study: the best values, measured again on other seeds.
+"""The proposal at the end of a study: the best values, evaluated again on other seeds.
 
-The best of many trials owes part of its lead to chance. So the best few, the defaults and the
-user's own values are run again on seeds that no trial had, and the best of these is proposed,
-without changes that have no effect. What is proposed is never worse than the defaults.
+The maximum over many trials is biased upwards. So the best few trials, the defaults and the user's
+own values are evaluated again on seeds that no trial had, and the best of these is proposed,
+without changes that have no effect. On these seeds the proposal is never worse than the defaults.
 """
 
 from __future__ import annotations
@@ -10,31 +10,32 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from tracker.studies.defined.objectives import OBJECTIVES
+from tracker.studies.definition.objectives import OBJECTIVES
 from tracker.studies.judging import Judge, usable
-from tracker.studies.kept.records import JobRow, Trial
 from tracker.studies.opened import Opened, Recordings
-from tracker.studies.work.jobs import Job, Outcome
+from tracker.studies.storage.records import JobRow, Trial
+from tracker.studies.workers.jobs import Job, Outcome
 
 CANDIDATES = 4
-"""The number of best trials that are measured again."""
+"""The number of best trials that are evaluated again."""
 
 LEAST = 5e-4
-"""Least difference of the first objective that counts as better."""
+"""Least difference of the first objective, in its unit, that counts as better."""
 
 SEARCH_SHARE = 0.6
-"""Share of a study's time for the search, if it makes a proposal; the rest is for measuring
+"""Share of a study's time for the search, if it makes a proposal; the rest is for the evaluation
 again."""
 
 SHOWN = ("score", "hota", "idf1", "mota", "identity", "speed")
 """The keys of the figures that are compared in a proposal."""
 
 Measure = Callable[[Sequence[Job]], Mapping[str, Outcome]]
-"""A function that has jobs done, as far as the time allows, and returns outcomes by key."""
+"""A function that has workers do jobs, as far as the time allows, and returns the outcomes by
+key."""
 
 
 class Proposer:
-    """Measures candidates on other seeds, and proposes the best."""
+    """The evaluation of candidates on other seeds, and the proposal of the best."""
 
     def __init__(
         self,
@@ -45,7 +46,7 @@ class Proposer:
         seeds: Sequence[int],
         measure: Measure,
     ) -> None:
-        """Store the candidates and how they are measured.
+        """Store the candidates and the function that evaluates them.
 
         Args:
             recordings: The recordings of the study.
@@ -53,7 +54,7 @@ class Proposer:
             defaults: The default values of the varied parameters, by key.
             start: The user's own values of the varied parameters; empty if they are the defaults.
             seeds: Seeds that no trial had.
-            measure: A function that has jobs done.
+            measure: A function that has workers do jobs.
         """
         self._recordings, self._trials = recordings, trials
         self._defaults, self._start = dict(defaults), dict(start)
@@ -64,7 +65,7 @@ class Proposer:
         self._judge = Judge(recordings.objectives, (), lambda key: None)
 
     def propose(self) -> dict[str, Any]:
-        """Measure the candidates, and return the proposal as plain values for storage."""
+        """Evaluate the candidates, and return the proposal as plain values for storage."""
         drawn = self._seeds_matter()
         if not drawn:
             self._seeds = [self._trial_seed]
@@ -74,10 +75,10 @@ class Proposer:
         measured = self._measured(lists)
         default = measured[0]
         if default is None:
-            return self._nothing("the time was over before anything was measured again", drawn)
+            return self._no_proposal("the time was over before anything was measured again", drawn)
         now = measured[1] if self._start else default
         if now is None:
-            return self._nothing("the time was over before anything was measured again", drawn)
+            return self._no_proposal("the time was over before anything was measured again", drawn)
         good = [
             (values, trial)
             for values, trial in zip(lists, measured, strict=True)
@@ -85,11 +86,11 @@ class Proposer:
         ]
         values, best = max(good, key=lambda pair: self._value(pair[1]), default=({}, default))
         if not self._gain(best, now) >= LEAST:
-            return self._nothing("nothing better was found", drawn, default, now)
+            return self._no_proposal("nothing better was found", drawn, default, now)
         if best is not default and self._gain(best, default) < LEAST:
-            values, best = {}, default  # as good, and simpler
+            values, best = {}, default  # the defaults are as good, and simpler
         values = {k: v for k, v in values.items() if v != self._defaults.get(k)}
-        values, best, brought = self._without_idle(values, best)
+        values, best, brought = self._without_ineffective(values, best)
         number = next((t.number for t in self._trials if t.values == values), None)
         return {
             "better": True,
@@ -110,12 +111,20 @@ class Proposer:
             **self._facts(default, now, best),
         }
 
-    def _nothing(
+    def _no_proposal(
         self, words: str, drawn: bool, default: Trial | None = None, now: Trial | None = None
     ) -> dict[str, Any]:
+        """Return a result that proposes no change.
+
+        Args:
+            words: The reason, in words.
+            drawn: Whether runs with different seeds differ.
+            default: The evaluation of the defaults, if there is one.
+            now: The evaluation of the user's own values, if there is one.
+        """
         return {
             "better": False,
-            "words": words if drawn else f"{words} ({_NOT_DRAWN})",
+            "words": words if drawn else f"{words} ({_DETERMINISTIC})",
             "trial": None,
             "values": {**self._defaults, **self._start},
             "rows": [],
@@ -125,6 +134,8 @@ class Proposer:
     def _facts(
         self, default: Trial | None, now: Trial | None, after: Trial | None
     ) -> dict[str, Any]:
+        """Return the seeds, and the figures of the defaults, the user's values and the proposal."""
+
         def of(trial: Trial | None, key: str) -> float | None:
             return None if trial is None else trial.figures.get(key)
 
@@ -144,6 +155,8 @@ class Proposer:
         }
 
     def _words(self, best: Trial, now: Trial, default: Trial, drawn: bool) -> str:
+        """Return the sentence that compares the proposal with the user's values and the
+        defaults."""
         lead = self._lead
         here, there = self._value(best), self._value(now)
         sign = 1.0 if lead.higher else -1.0
@@ -154,7 +167,7 @@ class Proposer:
         if self._start:
             words += f", the default {lead.words(sign * self._value(default), None)}"
         seeds = ", ".join(map(str, self._seeds))
-        return f"{words}; " + (f"measured on the seeds {seeds}" if drawn else _NOT_DRAWN)
+        return f"{words}; " + (f"measured on the seeds {seeds}" if drawn else _DETERMINISTIC)
 
     def _seeds_matter(self) -> bool:
         """Whether runs with different seeds have different tracks."""
@@ -167,16 +180,25 @@ class Proposer:
         )
 
     def _best_trials(self) -> list[Trial]:
+        """Return the best trials besides the defaults, the best first."""
         left = [one for one in usable(self._trials) if one.number != 0]
         return sorted(left, key=self._value, reverse=True)[:CANDIDATES]
 
-    def _without_idle(
+    def _without_ineffective(
         self, values: dict[str, Any], best: Trial
     ) -> tuple[dict[str, Any], Trial, dict[str, float | None]]:
-        """Remove the changes that have no effect, and return the effect of each of the others.
+        """Remove the changes that have no effect.
 
-        The effect of a change is how much worse the first objective is without it, or None if it
-        was not measured.
+        The effect of a change is the decrease of the first objective (its increase, if smaller
+        values are better) without this change.
+
+        Args:
+            values: The values that differ from the defaults, by key.
+            best: The evaluation of these values.
+
+        Returns:
+            The remaining values, their evaluation, and the effect of each of them by key; None for
+            an effect that was not measured.
         """
         keys = list(values)
         lists = [{k: v for k, v in values.items() if k != key} for key in keys]
@@ -199,10 +221,10 @@ class Proposer:
         return values, best, brought
 
     def _measured(self, lists: Sequence[Mapping[str, Any]]) -> list[Trial | None]:
-        """Measure each set of values on the other seeds; None where the time was over before.
+        """Evaluate each set of values on the other seeds; None if the time was over before.
 
-        In the first call the first set is the defaults, with which the others are compared for
-        vetoes.
+        In the first call the first set is empty and stands for the defaults, whose held-out overlap
+        decides on the vetoes of all others.
         """
         rows = [self._jobs(values, self._seeds) for values in lists]
         found = self._measure([job for some in rows for _, job in some])
@@ -226,17 +248,20 @@ class Proposer:
         return result
 
     def _jobs(self, values: Mapping[str, Any], seeds: Sequence[int]) -> list[tuple[JobRow, Job]]:
+        """Return the runs of values on all recordings with given seeds."""
         every: Sequence[Opened] = self._recordings.every
         jobs = [(one, self._recordings.job(one, values, seed)) for seed in seeds for one in every]
         return [(JobRow(job.key, one.place, job.seed), job) for one, job in jobs]
 
     def _value(self, trial: Trial) -> float:
+        """Return the first objective of a trial, with a sign such that larger values are better."""
         if trial.objectives is None:
             return float("-inf")
         return trial.objectives[0] if self._lead.higher else -trial.objectives[0]
 
     def _gain(self, one: Trial, other: Trial) -> float:
+        """Return by how much a trial is better than another in the first objective."""
         return self._value(one) - self._value(other)
 
 
-_NOT_DRAWN = "nothing is drawn at random here, so that another seed measures the same again"
+_DETERMINISTIC = "nothing is drawn at random here, so that another seed measures the same again"

@@ -13,24 +13,37 @@ from typing import Any, get_args
 from tracker.files.text import not_utf_8, shown
 from tracker.parameters import METHODS, PARAMETERS, PRESETS, RunParameters, value, with_values
 from tracker.sequences.fields import did_you_mean
-from tracker.studies.defined.definition import GRID_STEPS, MOST_TRIALS, Definition, Search, Varied
-from tracker.studies.defined.objectives import OBJECTIVES
+from tracker.studies.definition.definition import (
+    GRID_STEPS,
+    MOST_TRIALS,
+    Definition,
+    Search,
+    Varied,
+)
+from tracker.studies.definition.objectives import OBJECTIVES
 from tracker.studies.errors import StudyError
 
 _NAME = re.compile(r"[^\W_][\w .+-]{0,59}")
+"""The pattern of a study's name, which is also the name of its folder."""
+
 _TOP = frozenset(
     {"name", "recordings", "trials", "minutes", "seeds", "search", "objectives", "prune", "preset",
      "propose", "seed", "values", "start", "parameters"}
 )  # fmt: skip
+"""The fields of a study's file."""
+
 _MOST_BYTES = 4 << 20
+"""Largest size of a study's file, bytes."""
+
 _RANGE = frozenset({"low", "high", "log", "steps", "choices"})
+"""The fields of a varied parameter."""
 
 
 def read_definition(path: Path) -> Definition:
     """Read a study's file.
 
     Raises:
-        StudyError: If the file cannot be read or a field is not valid, with the field.
+        StudyError: If the file cannot be read or a field is not valid; the message names the field.
     """
     text = _text_of(path)
     try:
@@ -46,6 +59,7 @@ def read_definition(path: Path) -> Definition:
 
 
 def _text_of(path: Path) -> str:
+    """Read the text of a study's file."""
     try:
         size = path.stat().st_size
         if size > _MOST_BYTES:
@@ -71,7 +85,8 @@ def definition_of(found: Mapping[str, Any], *, where: str, folder: Path) -> Defi
         folder: The folder that relative paths refer to.
 
     Raises:
-        StudyError: With the field, what was expected and what was found.
+        StudyError: If a field is not valid; the message names the field, and states what was
+            expected and found.
     """
     fields = _Fields(found, where)
     fields.only(_TOP)
@@ -129,6 +144,12 @@ def definition_of(found: Mapping[str, Any], *, where: str, folder: Path) -> Defi
 
 
 def _recordings(fields: _Fields, folder: Path) -> tuple[str, ...]:
+    """Return the names of built-in recordings and the folders that the field ``recordings`` names.
+
+    Args:
+        fields: The fields of the study.
+        folder: The folder that relative paths refer to.
+    """
     from tracker.sequences.built_in import BUILT_IN
     from tracker.sequences.library import is_room
 
@@ -159,6 +180,7 @@ def _recordings(fields: _Fields, folder: Path) -> tuple[str, ...]:
 
 
 def _seeds(fields: _Fields) -> tuple[int, ...]:
+    """Return the seeds: those that are listed, or as many as the field states, from 0 on."""
     seeds = fields.found.get("seeds", 1)
     if isinstance(seeds, int) and not isinstance(seeds, bool) and 1 <= seeds <= 1000:
         return tuple(range(seeds))
@@ -171,6 +193,7 @@ def _seeds(fields: _Fields) -> tuple[int, ...]:
 
 
 def _values(fields: _Fields, name: str) -> dict[str, Any]:
+    """Return the valid values of parameters in a table, by key."""
     values = dict(fields.table(name))
     for key in values:
         try:
@@ -181,6 +204,8 @@ def _values(fields: _Fields, name: str) -> dict[str, Any]:
 
 
 def _varied(fields: _Fields, key: str, table: Any) -> Varied:
+    """Return a varied parameter from its table; fields that are left out follow from the
+    definition of the parameter."""
     where = f"parameters.{key}"
     if not isinstance(table, Mapping):
         raise fields.error(
@@ -245,6 +270,14 @@ def _varied(fields: _Fields, key: str, table: Any) -> Varied:
 
 
 def _number(fields: _Fields, where: str, key: str, found: Any) -> float:
+    """Return a valid value of a numeric parameter.
+
+    Args:
+        fields: The fields of the study.
+        where: The field, for messages.
+        key: The key of the parameter.
+        found: The value in the file.
+    """
     try:
         return float(value(with_values(RunParameters(), {key: found}), key))
     except ValueError as error:
@@ -312,7 +345,8 @@ class _Fields:
 
 
 def _flat(table: Mapping[str, Any]) -> dict[str, Any]:
-    """Flatten nested tables: ``fusion.clutter_rate = 2`` without quotes is a table in a table."""
+    """Flatten nested tables of values, since TOML reads ``fusion.clutter_rate = 2`` without quotes
+    as a table in a table."""
     flat: dict[str, Any] = {}
     for key, found in table.items():
         if isinstance(found, Mapping):
@@ -323,6 +357,7 @@ def _flat(table: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _flat_ranges(table: Mapping[str, Any]) -> dict[str, Any]:
+    """Flatten nested tables of ranges, each of which is a table itself."""
     flat: dict[str, Any] = {}
     for key, found in table.items():
         groups = isinstance(found, Mapping) and key not in METHODS and "." not in key

@@ -6,7 +6,7 @@ import json
 from collections.abc import Sequence
 
 from tracker.parameters import PARAMETERS
-from tracker.studies.defined.space import around
+from tracker.studies.definition.space import around
 
 _KEYS = ("fusion.detection_probability", "fusion.clutter_rate", "fusion.acceleration_sigma")
 

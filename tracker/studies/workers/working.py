@@ -1,7 +1,7 @@
-"""The work of a worker's process: it prepares itself once, then does one job after the other.
+"""The process of a worker: it is prepared once, and then does one job after another.
 
-This module does not depend on how jobs are distributed. The process keeps the recordings that it
-opened, and caches the columns of its last runs, so that a trial that changes only the fusion
+This module does not depend on how jobs are distributed. The process keeps recordings open,
+and caches the results of stages of its last runs, so that a trial that changes only the fusion
 re-uses stage 1.
 """
 
@@ -36,31 +36,33 @@ from tracker.runs.stage_files import StageFiles
 from tracker.sequences.errors import SequenceError
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
-from tracker.studies.defined.objectives import OBJECTIVES
-from tracker.studies.work import recordings
-from tracker.studies.work.jobs import Job, Outcome, code_version
+from tracker.studies.definition.objectives import OBJECTIVES
+from tracker.studies.workers import recordings
+from tracker.studies.workers.jobs import Job, Outcome, code_version
 
 CACHE_BYTES = 128 << 20
-"""Memory of a worker for columns of runs, bytes: mainly those of stage 1, which all trials use that
-change later stages alone."""
+"""Memory of a worker for cached results of stages, bytes: mainly of stage 1, which is re-used by
+all trials that change later stages alone."""
 
 LATER_BYTES = 16 << 20
-"""Part of this memory for stages after the first, bytes; it is small since other trials seldom use
-these."""
+"""Part of this memory for stages after the first, bytes; it is small since other trials seldom
+re-use their results."""
 
 MOST_OPEN = 16
-"""Most recordings that a worker keeps open."""
+"""Largest number of recordings that a worker keeps open."""
 
 KNOWN_TIMES = 4096
-"""Most times of stage 1 that a worker remembers."""
+"""Largest number of times of stage 1 that a worker stores in memory."""
 
 NICENESS = 5
-"""Niceness of a worker on this machine, so that interactive programs have priority."""
+"""Niceness (priority in POSIX) of a worker on this machine, so that interactive programs come
+first."""
 
 COMPILING = "compiling the kernels, once per machine"
+"""The sentence that is reported while kernels are compiled."""
 
 Tell = Callable[[str], None]
-"""A callback that gets a sentence on what is being done."""
+"""A callback that gets a sentence on the progress."""
 
 
 @dataclass
@@ -68,10 +70,13 @@ class _Process:
     """The state of a worker's process."""
 
     cache: StageCache
+    """The cached results of stages."""
     opened: OrderedDict[str, tuple[Sequence, FrameReader]] = field(default_factory=OrderedDict)
+    """The open recordings with their readers, by the hash of their content, the last used last."""
     stage_seconds: OrderedDict[str, float] = field(default_factory=OrderedDict)
-    """Processor time of stage 1 by its key, seconds."""
+    """Processor time of stage 1, seconds, by the key of the stage."""
     lock: threading.Lock = field(default_factory=threading.Lock)
+    """The lock that the thread of a job holds."""
 
 
 _process: _Process | None = None
@@ -83,17 +88,17 @@ def machine() -> str:
     return platform.node()
 
 
-def give_way() -> None:
+def lower_priority() -> None:
     """Lower the priority of this process to :data:`NICENESS`."""
     if sys.platform != "win32":
         os.nice(max(0, NICENESS - os.nice(0)))
 
 
 def prepare(tell: Tell = lambda words: None) -> None:
-    """Compile the kernels, once for the machine (its other workers wait), and set up the cache.
+    """Compile the kernels, once for the machine while its other workers wait, and set up the cache.
 
     Args:
-        tell: A callback that gets a sentence on what is being done.
+        tell: A callback that gets a sentence on the progress.
     """
     global _process
     with _preparing:
@@ -122,11 +127,11 @@ def _compile() -> None:
 
 
 def work(job: Job, tell: Tell = lambda words: None, worker: str = "") -> Outcome:
-    """Do a job. Its errors are part of the outcome and are not raised.
+    """Do a job; its errors are part of the outcome and are not raised.
 
     Args:
         job: The job.
-        tell: A callback that gets a sentence on what is being done.
+        tell: A callback that gets a sentence on the progress.
         worker: The name of the worker.
     """
     begin = time.perf_counter()
@@ -150,6 +155,7 @@ def work(job: Job, tell: Tell = lambda words: None, worker: str = "") -> Outcome
 
 
 def _opened(job: Job, tell: Tell) -> tuple[Sequence, FrameReader]:
+    """Return the recording of a job and its reader, which remain open."""
     assert _process is not None
     kept = _process.opened
     if job.content in kept:
@@ -165,6 +171,7 @@ def _opened(job: Job, tell: Tell) -> tuple[Sequence, FrameReader]:
 
 
 def _done(job: Job, sequence: Sequence, reader: FrameReader) -> dict[str, Any]:
+    """Track and evaluate a recording, and return the fields of the outcome by name."""
     began, begin = time.time(), time.perf_counter()
     run, seconds = _tracked(job, sequence, reader)
     took = time.perf_counter() - begin
@@ -204,10 +211,10 @@ def _done(job: Job, sequence: Sequence, reader: FrameReader) -> dict[str, Any]:
 
 
 def _tracked(job: Job, sequence: Sequence, reader: FrameReader) -> tuple[Run, float | None]:
-    """Return the run, and the processor time that it takes without any cache, seconds.
+    """Return the run, and the processor time that it takes without a cache, seconds.
 
-    Stage 1 has threads of its own, whose time is that of the process less that of this thread.
-    If stage 1 is in the cache and its time is not known, the time is None; if the job must be
+    Stage 1 has threads of its own, whose time is the time of the process minus that of this thread.
+    The time is None if stage 1 is in the cache and its time is not known; but if the job must be
     timed, stage 1 is computed again.
     """
     assert _process is not None
@@ -232,7 +239,7 @@ def _tracked(job: Job, sequence: Sequence, reader: FrameReader) -> tuple[Run, fl
     if "single_view" in began:
         known = max(0.0, time.process_time() - whole - own)
         _write_seconds(key, known, run)
-        if cache is None:  # put the columns into the cache for the next trials
+        if cache is None:  # put the results of stages into the cache for the next trials
             pipeline.compute(
                 sequence, parameters, seed=job.seed, corrections=job.corrections, previous=run,
                 cache=_process.cache,
@@ -241,6 +248,8 @@ def _tracked(job: Job, sequence: Sequence, reader: FrameReader) -> tuple[Run, fl
 
 
 def _read_seconds(key: str) -> float | None:
+    """Return the processor time of stage 1 that a process of this machine measured, seconds; None
+    if none did."""
     try:
         return float((cache_folder() / "stage-seconds" / key).read_text(encoding="ascii"))
     except (OSError, ValueError):
@@ -248,22 +257,23 @@ def _read_seconds(key: str) -> float | None:
 
 
 def _write_seconds(key: str, seconds: float, run: Run) -> None:
+    """Store the processor time of stage 1, seconds, in memory and for other processes."""
     assert _process is not None
     known = _process.stage_seconds
     known[key] = seconds
     while len(known) > KNOWN_TIMES:
         known.popitem(last=False)
-    if run.costly:  # the column is on disk, where other processes find it
+    if run.costly:  # the results of stage 1 are on disk, so that other processes need the time
         place = cache_folder() / "stage-seconds"
         try:
             place.mkdir(parents=True, exist_ok=True)
             (place / key).write_text(repr(seconds), encoding="ascii")
         except OSError:
-            pass  # other processes measure it again
+            pass  # other processes measure the time again
 
 
 def tracks_hash(run: Run) -> str:
-    """Return the hash of all columns of a run's tracks."""
+    """Return the hash of a run's tracks, without components and labels."""
     digest = hashlib.sha256()
     for name in ("frames", "ids", "positions", "existences", "sigmas", "seen"):
         digest.update(getattr(run.tracks, name).tobytes())
