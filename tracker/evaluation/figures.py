@@ -8,7 +8,7 @@ from typing import Literal
 from tracker.evaluation.settings import EvaluationSettings
 
 Direction = Literal["higher", "lower", "zero", "none"]
-"""Which values are better: higher, lower, nearer to zero, or none in general."""
+"""The values that are better: higher, lower, nearer to zero, or none in general."""
 
 SOURCES = {
     "BS08": "Bernardin, Stiefelhagen, EURASIP JIVP 2008 (CLEAR MOT)",

@@ -35,7 +35,7 @@ class EvaluationSettings(Params):
     """The gate where boxes are compared: (1 − GIoU)/2, which is 0.5 where two boxes touch."""
 
     cutoff: Annotated[float, Field(ge=0.01, le=1000.0), _ui("c", "m", log=True)] = 1.0
-    """What a missed or false target costs in OSPA, OSPA(2) and GOSPA; no unit for boxes."""
+    """The cost of a missed or false target in OSPA, OSPA(2) and GOSPA; without unit for boxes."""
 
     order: Annotated[float, Field(ge=1.0, le=10.0), _ui("p")] = 1.0
     """Order of OSPA, OSPA(2) and GOSPA: the higher, the more outliers count."""

@@ -1,1 +1,1 @@
-"""How files are written, where the user's folders are, and how stored JSON is validated."""
+"""The writing of files, the user's folders, and the validation of stored JSON."""

@@ -78,7 +78,7 @@ def visibility(
     occluder hides j, if occluders l exist independently with probability w_l.
 
     Args:
-        detection_probabilities: p_j without occlusion.
+        detection_probabilities: p_j without occlusion, of J components.
         expected: The predicted boxes of the components in this camera.
         mixture: J components, with their labels.
         occluders: Indices of the components that may occlude others: confirmed ones, one a label.

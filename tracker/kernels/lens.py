@@ -231,7 +231,7 @@ def directions(pixels: ndarray, camera: Calibration, iterations: int) -> ndarray
     """Compute the unit directions of the rays through pixels.
 
     Args:
-        pixels: (N, 2).
+        pixels: (N, 2), x and y, pixels.
         camera: The calibrated camera.
         iterations: Largest number of iterations of :func:`undistort`; 0 for a pinhole.
 

@@ -38,9 +38,11 @@ class SummedPairs(NamedTuple):
     """K pairs of a component and a box, in the order of camera, component and box."""
 
     cameras: ndarray
-    """(K,) int32, as the next two: camera, component and box."""
+    """(K,) int32, index of the camera."""
     components: ndarray
+    """(K,) int32, index of the component."""
     boxes: ndarray
+    """(K,) int32, index of the box among the camera's boxes."""
     probabilities: ndarray
     """(K,) float32, association probabilities, at most 1."""
 

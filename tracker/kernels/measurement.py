@@ -76,7 +76,7 @@ def measured_boxes(
     Args:
         boxes: b (M, 4), centre and half sizes, pixels.
         variances: σ² (M, 4), squared pixels.
-        transform: T (m, 4).
+        transform: T (m, 4), matrix from a box to the components of a measurement.
         products: (4, m²), coefficient of each variance in each entry of the noise.
     """
     count, size = len(boxes), len(transform)
@@ -176,8 +176,8 @@ def _regress(
         Ω = Σ w (h(χ) − ẑ)(h(χ) − ẑ)ᵀ − H P Hᵀ
 
     Args:
-        drawn: h(χ) (6, m).
-        offsets: χ − m (6, 3).
+        drawn: h(χ) (6, m), measurements of the sigma points.
+        offsets: χ − m (6, 3), offsets of the sigma points from the mean, metres.
         covariance: (d, d), of which the part P of the position is used.
         value: ẑ (m,), receives the mean.
         jacobian: H (m, d), receives the regression matrix in its first three columns.

@@ -1,4 +1,4 @@
-"""Which parameters have an effect with the chosen methods: for cache keys, and for display."""
+"""The parameters that have an effect with the chosen methods: for cache keys, and for display."""
 
 from __future__ import annotations
 

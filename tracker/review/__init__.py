@@ -1,1 +1,1 @@
-"""What a person should review: the queue of items, self-consistency, and template suggestions."""
+"""The review of runs by a person: the queue of items, self-consistency, and suggested templates."""

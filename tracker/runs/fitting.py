@@ -1,4 +1,4 @@
-"""Which methods can work on a recording, and the parameters of a run by default."""
+"""The methods that can track a recording, and the default parameters of its runs."""
 
 from __future__ import annotations
 

@@ -24,6 +24,7 @@ class Gap:
     """The missing pictures of one camera."""
 
     camera: str
+    """The name of the camera."""
     asked: int
     """The number of computed steps at which the camera's clock has a frame."""
     missing: int

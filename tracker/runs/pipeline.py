@@ -72,8 +72,8 @@ def compute(
             that step is computed.
         on_progress: A callback that is called from this thread at intervals, and at the end, with
             the run so far: its steps below ``done`` may be read.
-        cancelled: A callback that is asked between steps and pictures whether to stop, also by the
-            threads of the cameras.
+        cancelled: A callback that returns whether to stop; it is called between steps and
+            pictures, also by the threads of the cameras.
         thread_begins: A callback that each of these threads calls first, for instance to set its
             priority.
 

@@ -55,8 +55,8 @@ def map_in_processes(
         items: Values that can be pickled.
         steps: The total number of steps of all items.
         processes: Largest number of processes; with 1 the work is done in this one.
-        on_progress: A callback that gets the number of steps done and ``steps``.
-        cancelled: A callback that is asked now and then whether to stop.
+        on_progress: A callback that gets the number of steps done, and ``steps``.
+        cancelled: A callback that returns whether to stop; it is called at intervals.
 
     Returns:
         The results, in the order of the items.

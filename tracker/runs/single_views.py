@@ -22,7 +22,7 @@ BLOCK = 5
 than one, so that passing work to a thread costs little."""
 
 Cancel = Callable[[], bool]
-"""A callback that is asked whether to stop."""
+"""A callback that returns whether to stop."""
 
 _Made = TypeVar("_Made")
 

@@ -46,7 +46,8 @@ DARK: dict[str, str] = {
 """The dark partner of every colour."""
 
 MOST_LANES = 30
-"""Most people with a lane and a line of errors; more cannot be told apart. The tables have all."""
+"""Largest number of people with a lane and a line of errors, since more colours cannot be
+distinguished; the tables have all people."""
 
 
 def colour(name: int) -> str:

@@ -60,7 +60,8 @@ def figure_table(evaluation: Evaluation, reference: Evaluation | None) -> str:
 
     Args:
         evaluation: The evaluation.
-        reference: An earlier one whose values and differences are shown as well, or None.
+        reference: An earlier evaluation, whose values and differences are shown as well; None for
+            none.
     """
     differences = compare(reference, evaluation) if reference else ()
     by_key = {difference.key: difference for difference in differences}

@@ -1,4 +1,4 @@
-"""Which measurement belongs to which target: joint events and marginal probabilities.
+"""The association of measurements with targets: joint events and marginal probabilities.
 
 A joint event θ gives every target one measurement or none, and every measurement one
 target or none. Its weight, of n targets and M measurements, is

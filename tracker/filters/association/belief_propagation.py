@@ -1,4 +1,4 @@
-"""Which measurement belongs to which target: marginal probabilities by belief propagation.
+"""The association of measurements with targets: marginal probabilities by belief propagation.
 
 [WL14] J. L. Williams, R. Lau, "Approximate evaluation of marginal association
 probabilities with belief propagation", IEEE Transactions on Aerospace and

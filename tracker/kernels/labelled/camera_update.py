@@ -153,7 +153,8 @@ def update_by_camera(
         seen: The predicted boxes of U + n components.
         image_size: (2,) width and height, pixels.
         clutter: κ (M,), per unit of the measurement space.
-        resemblance: As in :func:`tracker.kernels.labelled.marginals.bernoulli_update`.
+        resemblance: (n, M), an argument of
+            :func:`tracker.kernels.labelled.marginals.bernoulli_update`.
         rule: The parameters of the update.
     """
     size, count = len(undetected.weights), len(measurements.values)

@@ -44,12 +44,15 @@ class StepModel(NamedTuple):
     """Q (1, d, d), process noise of one step."""
     survival_probability: float
     birth_weights: ndarray
-    """(G,), as the next two (G, d) and (G, d, d): births, added to the undetected targets."""
+    """(G,), weights of the birth components, which are added to the undetected targets."""
     birth_means: ndarray
+    """(G, d), states of the birth components."""
     birth_covariances: ndarray
+    """(G, d, d), covariances of the birth components."""
     transform: ndarray
-    """As ``products``, an argument of :func:`tracker.kernels.measurement.measured_boxes`."""
+    """T (m, 4), an argument of :func:`tracker.kernels.measurement.measured_boxes`."""
     products: ndarray
+    """(4, m²), an argument of :func:`tracker.kernels.measurement.measured_boxes`."""
     sigma_factor: float
     """Factor on the boxes' standard deviations."""
     clutter: ndarray
@@ -62,30 +65,40 @@ class StepResult(NamedTuple):
     """n tracks, U undetected components, B boxes and A reported pairs after one step."""
 
     existences: ndarray
-    """(n,), as the next (n, d), (n, d, d) and (n,): the tracks."""
+    """(n,), existence probabilities of the tracks."""
     means: ndarray
+    """(n, d), states of the tracks."""
     covariances: ndarray
+    """(n, d, d), covariances of the tracks."""
     labels: ndarray
+    """(n,), labels of the tracks."""
     next_label: int
     """The first label that is free."""
     undetected_weights: ndarray
-    """(U,), as the next two (U, d) and (U, d, d): the undetected targets."""
+    """(U,), weights of the components of undetected targets."""
     undetected_means: ndarray
+    """(U, d), states of the components of undetected targets."""
     undetected_covariances: ndarray
+    """(U, d, d), covariances of the components of undetected targets."""
     detection_probabilities: ndarray
-    """(C, n), as the next three: for each camera the fields of
-    :class:`tracker.kernels.labelled.camera_update.CameraRecord`."""
+    """(C, n), for each camera a field of
+    :class:`tracker.kernels.labelled.camera_update.CameraRecord`; the next three fields have the
+    same shape."""
     hidden_by: ndarray
     sources: ndarray
     shares: ndarray
     pair_cameras: ndarray
-    """(A,), as the next three: camera, label, box and probability of each reported pair."""
+    """(A,), index of the camera of each reported pair."""
     pair_labels: ndarray
+    """(A,), label of the track of each pair."""
     pair_boxes: ndarray
+    """(A,), index of the box of each pair among the camera's boxes."""
     pair_probabilities: ndarray
+    """(A,), association probability of each pair."""
     values: ndarray
-    """(B, m), the boxes as measurements, and (B, m, m) their noises."""
+    """(B, m), the boxes as measurements."""
     noises: ndarray
+    """(B, m, m), covariances of the measurements."""
     unexplained: ndarray
     """(B,), the probability that no track made each box."""
 
@@ -96,13 +109,14 @@ class KeepingRule(NamedTuple):
     least_existence: float
     """Existence probability below which a track is dropped."""
     low: ndarray
-    """(3,), as ``high``, corners of the volume in which tracks are retained, world metres."""
+    """(3,), least coordinates of the volume in which tracks are retained, world metres."""
     high: ndarray
+    """(3,), largest coordinates of the volume in which tracks are retained, world metres."""
     most: int
     """Largest number of tracks."""
     near: float
-    """As ``height`` and ``confirmed``, an argument of
-    :func:`tracker.kernels.linear_algebra.duplicates`."""
+    """An argument of :func:`tracker.kernels.linear_algebra.duplicates`, as are ``height`` and
+    ``confirmed``."""
     height: float
     confirmed: float
 

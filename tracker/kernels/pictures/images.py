@@ -125,8 +125,8 @@ def template_distances(
         boxes: (N, 4), centre x, centre y, half width, half height, pixels.
         template_roots: (n, bins), the square roots of the templates' histograms.
         groups: (n,) the group of each template, 0 … G - 1, each used.
-        epanechnikov: As in :func:`box_histograms`.
-        longest_side: As in :func:`box_histograms`.
+        epanechnikov: An argument of :func:`box_histograms`.
+        longest_side: An argument of :func:`box_histograms`.
 
     Returns:
         (N, G) distances, 1 for a box without pixels.

@@ -41,7 +41,7 @@ class SmoothedRows(NamedTuple):
     ahead: ndarray
     """m⁻ (N, d), prediction of each row from the rows before."""
     ahead_covariances: ndarray
-    """P⁻ (N, d, d)."""
+    """P⁻ (N, d, d), covariances of these predictions."""
 
 
 class _Room(NamedTuple):
@@ -279,10 +279,10 @@ def jumps(
 
     Args:
         starts: (n + 1,), index of each path's first row, and N.
-        means: m (N, d), as the next three fields of :class:`SmoothedRows`.
-        covariances: P (N, d, d).
-        ahead: m⁻ (N, d).
-        ahead_covariances: P⁻ (N, d, d).
+        means: m (N, d), smoothed states; these four arguments are fields of :class:`SmoothedRows`.
+        covariances: P (N, d, d), smoothed covariances.
+        ahead: m⁻ (N, d), prediction of each row from the rows before.
+        ahead_covariances: P⁻ (N, d, d), covariances of these predictions.
 
     Returns:
         (N,), 0 at each path's first row.

@@ -1,1 +1,1 @@
-"""What the colour methods share: templates, likelihood and its peaks."""
+"""The common part of the colour methods: templates, likelihood and its peaks."""

@@ -31,7 +31,7 @@ def log_likelihoods(distances: Float[ndarray, "S G"], sharpness: float) -> Float
 
     Args:
         distances: d of each particle to the colours of each target, 0 … 1; G ≥ 1.
-        sharpness: λ.
+        sharpness: λ, the decrease of the log weight for each unit of distance.
     """
     return np.asarray((-sharpness * distances).max(axis=1))
 

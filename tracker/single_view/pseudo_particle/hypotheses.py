@@ -53,8 +53,8 @@ def hypothesis_matrix(
         evidence: ln ε_m, other log likelihood ratios of each mode being a person.
         expected: The predicted targets.
         vacant: Person of each possible new target.
-        sharpness: λ.
-        background_distance: d_0.
+        sharpness: λ, the decrease of the log likelihood for each unit of distance.
+        background_distance: d_0, the distance that the background is given, 0 … 1.
         position_sigma: σ_a, in half sizes H_t of a target.
         position_gate: k_a, in σ_a, at which an unknown place is as likely as a target.
 

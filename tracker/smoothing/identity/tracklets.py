@@ -79,7 +79,7 @@ def select_rows(links: Links, source_rows: Int[ndarray, " M"], rows: int) -> Lin
     Args:
         links: Links of N rows.
         source_rows: Index of each of the M rows among the N.
-        rows: N.
+        rows: N, the number of rows before the selection.
     """
     place = np.full(rows, -1, dtype=np.int64)
     place[source_rows] = np.arange(len(source_rows))
