@@ -67,36 +67,36 @@ class KindOf:
     places: tuple[int, int | None]
     """Smallest and largest number of places; None for no upper bound."""
     means: str
-    """Meaning of the kind, as the manual shows it."""
+    """Meaning of the kind, in one sentence."""
     accuracy: float | None = None
     """Default accuracy, metres; None for a kind without one."""
 
 
 KINDS: dict[Kind, KindOf] = {
-    "same": KindOf("same person", (2, 2), "who was at the first place is who was at the second"),
+    "same": KindOf("same person", (2, 2), "the tracks at both places are of one person"),
     "different": KindOf(
-        "not the same", (2, 2), "who was at the first place is not who was at the second: cut there"
+        "not the same", (2, 2), "the tracks at the two places are of different people"
     ),
     "exchanged": KindOf(
         "exchanged from here",
         (4, 4),
-        "of two people before (first, second place) each is after where third and fourth are",
+        "the people at the first and the second place are at the third and the fourth one later",
     ),
     "here": KindOf(
         "is here",
         (1, 2),
-        "somebody is at this place; whom a run has at the second, where one is said",
+        "a person is at the first place; if given, the second is where the run has that person",
         0.1,
     ),
-    "nobody": KindOf("was nobody", (1, None), "nobody is along these places", 0.5),
-    "came": KindOf(
-        "came in here", (1, 1), "who is at this place came in then, and was not there just before"
+    "nobody": KindOf(
+        "was nobody", (1, None), "no person is near the path through these places", 0.5
     ),
-    "left": KindOf(
-        "left here", (1, 1), "who is at this place left then, and is not there just after"
+    "came": KindOf("came in here", (1, 1), "the person at this place came in at this step"),
+    "left": KindOf("left here", (1, 1), "the person at this place left at this step"),
+    "name": KindOf("name", (1, 1), "the person at this place has this name"),
+    "checked": KindOf(
+        "checked", (0, 0), "the user has checked these steps, and the tracks are right"
     ),
-    "name": KindOf("name", (1, 1), "who is at this place has this name"),
-    "checked": KindOf("checked", (0, 0), "a person has looked at these steps: they are right"),
 }
 """The kinds by name. The places of a correction are in the order of time."""
 

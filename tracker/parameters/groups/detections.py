@@ -29,8 +29,8 @@ class DetectionBoxParams(Params):
     size_sigma: Annotated[
         float, Field(ge=0.005, le=3.0), ui("σ_h", unit="half heights", step=0.01, log=True)
     ] = 0.12
-    """Standard deviation of a box's half height, as a share of it; the smaller, the more it tells
-    depth."""
+    """Standard deviation of a box's half height, as a share of it; the smaller, the more precise
+    is the estimated depth."""
 
     width_sigma: Annotated[
         float, Field(ge=0.005, le=3.0), ui("σ_b", unit="half widths", step=0.01, log=True)

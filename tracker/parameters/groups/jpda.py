@@ -95,8 +95,8 @@ class JpdaParams(Params):
         Field(ge=0.01, le=3.0),
         ui("σ_h", unit="half sizes", step=0.01, log=True, when=_FOREGROUND),
     ] = 0.2
-    """Standard deviation of the half sizes of a foreground box; the smaller, the more it tells
-    depth."""
+    """Standard deviation of the half sizes of a foreground box; the smaller, the more precise
+    is the estimated depth."""
 
     pixel_sigma: Annotated[
         float, Field(ge=0.0, le=50.0), ui("σ_px", unit="px", step=0.1, when=_FOREGROUND)
@@ -109,7 +109,8 @@ class JpdaParams(Params):
     least_probability: Annotated[
         float, Field(ge=0.0, le=0.9), ui("β_min", step=0.01, published=0.0, when=_FIVE)
     ] = 0.1
-    """Entries of the association matrix up to this count as 0 when the cases are told apart."""
+    """Entries of the association matrix up to this count as 0 in the choice of each target's
+    case."""
 
     occlusion: Annotated[
         Literal["inside", "measurement"], ui("x|z", published="measurement", when=_FIVE)

@@ -50,8 +50,8 @@ class ShapesParams(Params):
     size_sigma: Annotated[
         float, Field(ge=0.01, le=3.0), ui("σ_h", unit="half sizes", step=0.01, log=True)
     ] = 0.2
-    """Standard deviation of the half sizes of a person's box; the smaller, the more it tells
-    depth."""
+    """Standard deviation of the half sizes of a person's box; the smaller, the more precise
+    is the estimated depth."""
 
     pixel_sigma: Annotated[
         float, Field(ge=0.0, le=50.0), ui("σ_px", unit="px", step=0.1, advanced=True)
