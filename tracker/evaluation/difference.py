@@ -16,16 +16,24 @@ class Difference:
     """One figure of two evaluations, A the reference and B the new one."""
 
     key: str
+    """The key of the figure."""
     name: str
+    """The name that is displayed."""
     unit: str
+    """The unit that is displayed; empty for a figure without unit."""
     digits: int
+    """The number of decimals that are displayed."""
     direction: Direction
+    """The values that are better."""
     headline: bool
+    """Whether short tables show the figure."""
     a: float | int | None
+    """The value of A; None if it is undefined."""
     b: float | int | None
+    """The value of B; None if it is undefined."""
     difference: float | int | None
-    """B − A of the displayed (rounded) values, so that it is 0 where they look the same; None
-    where one of them is undefined."""
+    """B − A of the displayed (rounded) values, so that it is 0 if these are equal; None if one of
+    them is undefined."""
     verdict: Verdict
     """Whether B is better than A. ``same`` means that the two agree in all displayed decimals;
     ``different`` that neither direction is better; ``undefined`` that one has no value."""

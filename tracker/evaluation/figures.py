@@ -27,17 +27,22 @@ class Definition:
     """The definition of one figure."""
 
     key: str
+    """The key of the figure."""
     name: str
+    """The name that is displayed."""
     group: str
+    """The name of the group of figures in tables."""
     unit: str
-    """The unit; ``{d}`` stands for that of the distance, ``{d^p}`` for its power in GOSPA's
-    parts."""
+    """The unit; ``{d}`` stands for the unit of the distance, ``{d^p}`` for its p-th power in the
+    parts of GOSPA."""
     direction: Direction
+    """The values that are better."""
     digits: int
     """The number of decimals that are displayed, and in which values are compared."""
     settings: tuple[str, ...]
     """The names of the settings that the value depends on."""
     help: str
+    """The definition in words."""
     source: str = ""
     """The key of the reference in :data:`SOURCES`."""
     headline: bool = False
@@ -208,9 +213,11 @@ class Figure:
     """The value of one figure, and the settings it was measured with."""
 
     definition: Definition
+    """The definition of the figure."""
     value: float | int | None
     """The value; None where it is undefined (see the function that computes it)."""
     unit: str
+    """The unit of the value; empty for a figure without unit."""
     measured_with: str
     """The settings that the value depends on, such as gate, cut-off, order and window, in words."""
 

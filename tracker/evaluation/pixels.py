@@ -25,15 +25,17 @@ class CameraScore:
     """The scores of one camera's boxes."""
 
     camera: str
+    """The name of the camera."""
     errors: Float[ndarray, " M"]
     """Distance of the box centres of each pair, pixels."""
     overlaps: Float[ndarray, " M"]
     """Intersection over union of each pair."""
     people: int
-    """True boxes in the picture, over all steps."""
+    """The number of true boxes in the picture, over all steps."""
     estimates: int
-    """Reprojected boxes in the picture, over all steps."""
+    """The number of reprojected boxes in the picture, over all steps."""
     steps: int
+    """The number of steps that are scored."""
 
     @property
     def error(self) -> float | None:

@@ -17,18 +17,28 @@ from tracker.evaluation.tables import PersonRow, TrackRow
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Series:
-    """Figures over time, one value for each step."""
+    """Figures over time: one value for each of S steps.
+
+    OSPA, OSPA(2), GOSPA and the parts of OSPA are in the unit of the evaluation's distance, the
+    parts of GOSPA in its p-th power.
+    """
 
     ospa: Float[ndarray, " S"]
+    """OSPA."""
     ospa_localisation: Float[ndarray, " S"]
+    """The localisation part of OSPA."""
     ospa_cardinality: Float[ndarray, " S"]
-    """The p-th powers of the two parts sum to that of OSPA."""
+    """The cardinality part of OSPA; the p-th powers of both parts sum to that of OSPA."""
     ospa2: Float[ndarray, " S"]
+    """OSPA(2) over the window that ends at the step."""
     gospa: Float[ndarray, " S"]
+    """GOSPA."""
     gospa_localisation: Float[ndarray, " S"]
+    """The localisation part of GOSPA."""
     gospa_missed: Float[ndarray, " S"]
+    """The part of GOSPA for missed targets."""
     gospa_false: Float[ndarray, " S"]
-    """The three parts are p-th powers and sum to that of GOSPA."""
+    """The part of GOSPA for false targets; the three parts sum to the p-th power of GOSPA."""
     truth: Int[ndarray, " S"]
     """The number of people with a certain position."""
     estimates: Int[ndarray, " S"]
@@ -38,18 +48,25 @@ class Series:
     ignored: Int[ndarray, " S"]
     """The number of estimates that matched an uncertain position."""
     matches: Int[ndarray, " S"]
+    """The number of pairs of a person and an estimate, by CLEAR."""
     misses: Int[ndarray, " S"]
+    """The number of people without an estimate, by CLEAR."""
     false_positives: Int[ndarray, " S"]
+    """The number of estimates without a person, by CLEAR."""
     id_switches: Int[ndarray, " S"]
+    """The number of identity switches, by CLEAR."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pairs:
-    """The pairs of person and track, by CLEAR's pairing, sorted by step."""
+    """The M pairs of a person and a track by CLEAR, sorted by step."""
 
     steps: Int[ndarray, " M"]
+    """The step of each pair."""
     people: Int[ndarray, " M"]
+    """The id of the person."""
     tracks: Int[ndarray, " M"]
+    """The id of the track."""
     distances: Float[ndarray, " M"]
     """The distance of each pair, in the unit of the evaluation's distance."""
     switch: Bool[ndarray, " M"]
@@ -61,17 +78,25 @@ class Evaluation:
     """The evaluation of tracks against ground truth."""
 
     settings: EvaluationSettings
+    """The settings of the evaluation."""
     steps: int
+    """The number of steps that are scored, from step 0 on."""
     has_truth: bool
     """Whether there is any true position; without one most figures are undefined."""
     figures: tuple[Figure, ...]
+    """All figures, in the order of the tables."""
     series: Series
+    """The figures over time."""
     errors: dict[int, Float[ndarray, " S"]]
     """The position error of each person over time, metres; NaN where there is no pair."""
     people: tuple[PersonRow, ...]
+    """The scores of each person, by id."""
     tracks: tuple[TrackRow, ...]
+    """The scores of each track, by id."""
     cameras: tuple[CameraScore, ...]
+    """The scores of the boxes in each camera."""
     pairs: Pairs
+    """The pairs of a person and a track."""
     notes: tuple[str, ...]
     """Sentences that readers of the figures need, for instance on what is not scored."""
 

@@ -19,16 +19,20 @@ TrackKind = Literal["person", "false", "don't care"]
 
 @dataclass(frozen=True, slots=True)
 class PersonRow:
-    """The scores of one person of the truth. Only steps with a certain position count."""
+    """The scores of one person of the truth; only steps with a certain position count."""
 
     id: int
+    """The id of the person."""
     first: int
+    """The first step of the person."""
     last: int
+    """The last step of the person, included."""
     steps: int
     """The number of steps at which the person is present."""
     tracked: int
     """The number of steps at which the person is paired."""
     status: PersonStatus
+    """How much of the person's steps are tracked."""
     found_share: float
     """Share of the steps at which an estimate within the near distance is paired with the
     person."""
@@ -37,18 +41,23 @@ class PersonRow:
     error_95: float | None
     """95th percentile of the position error, metres; None without pairs."""
     switches: int
+    """The number of identity switches."""
     fragmentations: int
+    """The number of interruptions between tracked steps."""
     track: int | None
     """The track that is assigned to the person in the identity figures, if any."""
 
 
 @dataclass(frozen=True, slots=True)
 class TrackRow:
-    """The scores of one track. Steps that matched a don't-care position do not count."""
+    """The scores of one track; steps that matched a don't-care position do not count."""
 
     id: int
+    """The id of the track."""
     first: int
+    """The first step of the track."""
     last: int
+    """The last step of the track, included."""
     steps: int
     """The number of steps at which the track is reported."""
     ignored: int

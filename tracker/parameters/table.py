@@ -21,21 +21,27 @@ class Parameter:
     key: str
     """``group.name``, for instance ``fusion.survival_probability``."""
     group: str
+    """The group of the key."""
     name: str
+    """The name within the group."""
     label: str
     """The name in words."""
     help: str
     """The meaning in one sentence."""
     symbol: str
+    """The symbol in equations."""
     unit: str
     """The unit of the value; empty for numbers without unit, and for choices."""
     stage: Stage
     """The first stage that is computed again after a change."""
     kind: Literal["float", "int", "bool", "choice"]
+    """The type of the value."""
     default: Any
+    """The default value."""
     minimum: float | None
-    """The least value, included; None for a switch or a choice, as :attr:`maximum`."""
+    """The least value, included; None for a switch or a choice."""
     maximum: float | None
+    """The largest value, included; None for a switch or a choice."""
     step: float | None
     """The step of the slider, in the unit of the value; None where it has none of its own."""
     log: bool

@@ -229,6 +229,7 @@ class Suggestion:
     """A template that is suggested to the user."""
 
     template: Template
+    """The template: person, camera, step and box."""
     track: int
     """The id of the person's track."""
     cameras: tuple[str, ...]

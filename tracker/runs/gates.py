@@ -28,6 +28,7 @@ class Gates:
     """The counts of one camera, as means over the pictures that were processed."""
 
     camera: str
+    """The name of the camera."""
     pictures: int
     """The number of pictures that were processed."""
     candidates: float

@@ -64,8 +64,11 @@ class Run:
     """
 
     sequence: Sequence
+    """The recording."""
     parameters: RunParameters
+    """The chosen methods and all parameters."""
     seed: int
+    """The seed of the random numbers."""
     keys: dict[Stage, str]
     """The cache key of each stage."""
     views: list[tuple[ViewResult, ...]] = field(default_factory=list)

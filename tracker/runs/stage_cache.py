@@ -52,6 +52,7 @@ class FusionColumn:
     """The results of stage 2 of a run, from step 0 on."""
 
     steps: Sequence[FusionResult]
+    """The result of each step."""
     state: Any
     """The state of the filter after the last step."""
 
@@ -61,6 +62,7 @@ class TrackColumn:
     """The tracks of a run, of all steps."""
 
     tracks: Trajectories
+    """The tracks of the run."""
     filtered: Trajectories
     """The tracks of the filter alone; the same object where nothing is smoothed."""
 

@@ -19,6 +19,7 @@ class Remedy:
     flag: str
     """The flag, such as ``--pose`` or ``--axes``, or the field, such as ``camera.time_offset``."""
     value: str
+    """The value of the flag or field, as text."""
     camera: str = ""
     """The name of the camera that the field belongs to; empty for other fields."""
 
@@ -35,8 +36,11 @@ class Check:
     """The result of one check."""
 
     name: str
+    """The name of the check."""
     status: Status
+    """The result of the check."""
     sentence: str
+    """The result in one sentence."""
     remedies: tuple[Remedy, ...] = ()
     """The changes that correct the problem together."""
     numbers: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))

@@ -30,6 +30,7 @@ class SequenceEntry:
     name: str
     """The name for :func:`open_sequence`, or the folder's name in the data folder."""
     description: str
+    """The description, in words."""
     kind: Literal["rendered", "folder"]
     """``rendered`` if the sequence can be opened by its name."""
     cameras: int
@@ -37,6 +38,7 @@ class SequenceEntry:
     frames: int
     """The number of steps; 0 if the file does not state it."""
     folder: Path
+    """The folder of the sequence."""
     error: str | None = None
     """The reason why the sequence cannot be opened, in one sentence."""
 

@@ -42,12 +42,15 @@ class SequenceSummary:
     """The summary of a sequence for lists, from its ``sequence.toml`` alone."""
 
     name: str
+    """The name that is displayed."""
     description: str
+    """The description, in words."""
     fps: float | None
     """The rate of the steps, 1/s; None if the file does not state it."""
     frames: int | None
     """The number of steps; None if the file does not state it."""
     cameras: int
+    """The number of cameras."""
 
 
 def read_sequence(folder: Path | str) -> Sequence:

@@ -119,11 +119,15 @@ class View:
     """One camera of a sequence, with its pictures and boxes."""
 
     camera: Camera
+    """The calibrated camera."""
     video: Path | None = None
+    """The video file; None if there is none."""
     images: tuple[Path, ...] = ()
+    """The files of the image list; empty if there is none."""
     first_frame: int = 0
     """The frame of the video or image list at step 0, if the camera has no clock of its own."""
     detections: Detections | None = None
+    """The boxes of an outside detector; None if there are none."""
     clock: Clock | None = None
     """The frame that each step shows; None if it is ``first_frame`` + k at step k."""
     detector_ran: Bool[ndarray, " F"] | None = None
@@ -192,6 +196,7 @@ class FileState:
     """The state of a file when the sequence was opened."""
 
     path: Path
+    """The path of the file."""
     size: int
     """Size, bytes."""
     changed: int
@@ -231,7 +236,9 @@ class Sequence:
     """A recorded multi-view sequence, validated and ready to be tracked."""
 
     name: str
+    """The name that is displayed."""
     folder: Path
+    """The folder of the sequence."""
     fps: float
     """The rate of the steps, 1/s."""
     frames: int
@@ -243,8 +250,11 @@ class Sequence:
     views: tuple[View, ...]
     """The cameras with their files."""
     description: str = ""
+    """The description, in words."""
     templates: tuple[Template, ...] = ()
+    """The templates of people for the colour methods."""
     ground_truth: GroundTruth | None = None
+    """The true positions of people; None if they are not known."""
     digest: str = field(default="")
     """A hash of sequence.toml and of size and time of every file that it names, for cache keys."""
     detector: DetectorFile | None = None

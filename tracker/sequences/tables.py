@@ -40,9 +40,11 @@ class Reading:
     """The files and warnings that are collected while a sequence is read."""
 
     folder: Path
+    """The folder of the sequence."""
     files: list[Path] = field(default_factory=list)
     """Every file that sequence.toml names, in its order."""
     warnings: list[str] = field(default_factory=list)
+    """Sentences on problems that do not prevent tracking."""
 
     def columns(
         self,
@@ -63,6 +65,7 @@ class BoxTable:
     """A file of boxes, before the step of each frame is known."""
 
     columns: Columns
+    """The columns of the file."""
     first: int
     """The number in the column ``frame`` of the first picture."""
     listed: bool

@@ -39,9 +39,13 @@ class Source:
     """One camera's table and files, before the number of steps is known."""
 
     name: str
+    """The name of the camera."""
     fields: Fields
+    """The table of the camera in ``sequence.toml``."""
     video: Path | None
+    """The video file; None if there is none."""
     images: tuple[Path, ...]
+    """The files of the image list; empty if there is none."""
     pictures_exist: Bool[ndarray, " N"]
     """Whether each frame of the video or image list exists: images may be missing in their
     numbering."""

@@ -230,6 +230,7 @@ class Comparison:
     distances: tuple[Float[ndarray, "G E"], ...]
     """The distance of every person (rows) to every estimate (columns), a matrix for each step."""
     measure: GatedDistance
+    """The distance and its gate."""
     ignored: Rows
     """The estimates that matched a don't-care row."""
     dont_care: Rows

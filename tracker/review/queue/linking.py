@@ -14,8 +14,11 @@ class Tracklet:
     """A part of a track that follows one person (a tracklet)."""
 
     track: int
+    """The id of the track."""
     begin: Place
+    """The first place of the tracklet, or a clear place instead."""
     end: Place
+    """The last place of the tracklet, or a clear place instead."""
     moment: int = -1
     """The step of the link, if the begin or the end of the tracklet was replaced by a clear place
     (see :mod:`tracker.review.queue.clear_places`); −1 if it was not."""
