@@ -15,7 +15,7 @@ from tracker.parameters import JpdaParams
 from tracker.single_view.association_matrix import decision_matrices
 from tracker.single_view.association_matrix.handing_over import decide
 from tracker.single_view.dropped import GATES, Dropped
-from tracker.single_view.jpda.cases import look_into_pieces, part_strangers, tell_apart
+from tracker.single_view.jpda.cases import determine_cases, exclude_outside_boxes, search_components
 from tracker.single_view.jpda.measurements import Measured
 from tracker.single_view.jpda.targets import Targets
 from tracker.single_view.jpda.track_management import Managed
@@ -123,7 +123,7 @@ def test_without_the_five_cases_nobody_returns() -> None:
 
 @pytest.mark.parametrize(("least", "counts"), [(0.25, False), (np.nextafter(0.25, 0.0), True)])
 def test_an_entry_of_the_least_probability_counts_as_0(least: float, counts: bool) -> None:
-    cases = tell_apart(np.array([[0.25]]), np.array([0]), least, every_shared_row=False)
+    cases = determine_cases(np.array([[0.25]]), np.array([0]), least, every_shared_row=False)
     assert cases.missed.tolist() == [not counts]
     assert cases.new.tolist() == [not counts]
     assert cases.own.tolist() == [0 if counts else -1]
@@ -132,9 +132,9 @@ def test_an_entry_of_the_least_probability_counts_as_0(least: float, counts: boo
 @pytest.mark.parametrize(("x", "strange"), [(10.0, False), (np.nextafter(10.0, 99.0), True)])
 def test_a_part_at_the_edge_of_its_target_is_a_part(x: float, strange: bool) -> None:
     matrix = np.array([[0.5, 0.25]])
-    cases = tell_apart(matrix, np.array([0]), 0.05, every_shared_row=False)
+    cases = determine_cases(matrix, np.array([0]), 0.05, every_shared_row=False)
     boxes = np.array([[0.0, 0.0, 4.0, 4.0], [x, 0.0, 4.0, 4.0]])
-    parted, shares = part_strangers(cases, matrix, np.array([[0.0, 0.0, 10.0, 9.0]]), boxes)
+    parted, shares = exclude_outside_boxes(cases, matrix, np.array([[0.0, 0.0, 10.0, 9.0]]), boxes)
     assert parted.new.tolist() == [False, strange]
     assert parted.split.tolist() == [not strange]
     assert_array_equal(shares, [[0.75, 0.0]] if strange else matrix)
@@ -151,9 +151,9 @@ def test_a_part_at_the_edge_of_its_target_is_a_part(x: float, strange: bool) -> 
 def test_whoever_is_lost_in_a_piece_leaps_so_far(
     x: float, leap: float, expected: tuple[int, int, bool]
 ) -> None:
-    cases = tell_apart(np.zeros((1, 1)), np.array([-1]), 0.1, every_shared_row=False)
+    cases = determine_cases(np.zeros((1, 1)), np.array([-1]), 0.1, every_shared_row=False)
     boxes = np.array([[x, 0.0, 5.0, 5.0]])
-    found = look_into_pieces(
+    found = search_components(
         cases, np.array([[0.0, 0.0, 10.0, 10.0]]), boxes, np.array([[x, 0.0, 20.0, 20.0]]), leap
     )
     assert (found.own[0], found.shared[0], found.missed[0]) == expected

@@ -8,7 +8,12 @@ from numpy import ndarray
 from numpy.testing import assert_array_equal
 
 from tracker.parameters import JpdaParams
-from tracker.single_view.jpda.cases import Cases, look_into_pieces, part_strangers, tell_apart
+from tracker.single_view.jpda.cases import (
+    Cases,
+    determine_cases,
+    exclude_outside_boxes,
+    search_components,
+)
 
 LEAP = JpdaParams().leap
 
@@ -16,7 +21,7 @@ LEAP = JpdaParams().leap
 def read(rows: list[list[float]], own: list[int], *, every: bool = False) -> Cases:
     """The cases of a matrix of targets (rows) and measurements (columns)."""
     matrix = np.array(rows, dtype=float).reshape(len(own), len(rows[0]) if rows else 0)
-    return tell_apart(matrix, np.array(own), 0.05, every_shared_row=every)
+    return determine_cases(matrix, np.array(own), 0.05, every_shared_row=every)
 
 
 def boxes(*rows: tuple[float, ...]) -> ndarray:
@@ -70,17 +75,17 @@ def test_as_published_two_in_one_place_part_to_two_measurements() -> None:
 
 
 def test_nobody_has_measurements_without_targets() -> None:
-    cases = tell_apart(np.zeros((0, 3)), np.zeros(0, dtype=int), 0.1, every_shared_row=False)
+    cases = determine_cases(np.zeros((0, 3)), np.zeros(0, dtype=int), 0.1, every_shared_row=False)
     assert cases.new.all()
     assert len(cases.shared) == 0
 
 
 def test_of_a_split_target_what_lies_outside_its_box_is_somebody_new() -> None:
     matrix = np.array([[0.5, 0.3, 0.15]])
-    cases = tell_apart(matrix, np.array([0]), 0.05, every_shared_row=False)
+    cases = determine_cases(matrix, np.array([0]), 0.05, every_shared_row=False)
     expected = boxes((100, 100, 10, 20))
     measured = boxes((100, 95, 8, 9), (101, 112, 8, 9), (118, 100, 8, 18))
-    parted, shares = part_strangers(cases, matrix, expected, measured)
+    parted, shares = exclude_outside_boxes(cases, matrix, expected, measured)
     assert_array_equal(parted.new, [False, False, True])
     assert_array_equal(parted.split, [True])
     np.testing.assert_allclose(shares, [[0.65, 0.3, 0.0]])
@@ -89,7 +94,7 @@ def test_of_a_split_target_what_lies_outside_its_box_is_somebody_new() -> None:
 def test_who_is_lost_in_a_piece_is_hidden_behind_its_owner() -> None:
     # the second target's centre lies in the piece that the first one has
     cases = read([[0.9], [0.0]], [0, -1])
-    found = look_into_pieces(
+    found = search_components(
         cases,
         boxes((100, 100, 10, 20), (116, 98, 10, 20)),
         boxes((100, 100, 10, 20)),
@@ -104,7 +109,7 @@ def test_a_free_measurement_near_a_lost_target_is_its_own() -> None:
     cases = read([[0.0, 0.0]], [-1])
     expected = boxes((100, 100, 10, 20))
     measured = boxes((115, 100, 10, 20), (180, 100, 10, 20))
-    found = look_into_pieces(
+    found = search_components(
         cases, expected, measured, boxes((110, 100, 30, 30), (180, 99, 9, 9)), LEAP
     )
     assert_array_equal(found.own, [0])
@@ -112,7 +117,7 @@ def test_a_free_measurement_near_a_lost_target_is_its_own() -> None:
     assert not found.missed.any()
     # one that is too far away stays somebody new, who hides it
     far = boxes((130, 100, 10, 20))
-    found = look_into_pieces(read([[0.0]], [-1]), expected, far, boxes((110, 100, 40, 30)), LEAP)
+    found = search_components(read([[0.0]], [-1]), expected, far, boxes((110, 100, 40, 30)), LEAP)
     assert_array_equal(found.own, [-1])
     assert_array_equal(found.shared, [0])
     assert found.new.all()
@@ -120,7 +125,7 @@ def test_a_free_measurement_near_a_lost_target_is_its_own() -> None:
 
 def test_who_is_nowhere_stays_missed() -> None:
     cases = read([[0.0]], [-1])
-    found = look_into_pieces(
+    found = search_components(
         cases, boxes((10, 10, 5, 5)), boxes((200, 200, 5, 5)), boxes((200, 200, 9, 9)), LEAP
     )
     assert found.missed.all()

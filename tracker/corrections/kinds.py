@@ -142,6 +142,7 @@ class Correction(BaseModel):
 
     @model_validator(mode="after")
     def _complete(self) -> Correction:
+        """Check that the places and fields are those of the kind."""
         known, count = KINDS[self.kind], len(self.places)
         fewest, most = known.places
         if count < fewest or (most is not None and count > most):

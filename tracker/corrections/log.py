@@ -195,6 +195,8 @@ def parse(text: str, where: str) -> tuple[Correction, ...]:
 
 
 def _correction(table: dict[str, Any], text: str, where: str, line: int) -> Correction:
+    """Return the correction of a table of the log, or raise an error that names file, line and
+    field."""
     if "kind" in table and table["kind"] not in list(KINDS):  # a table cannot be looked up
         known = ", ".join(KINDS)
         raise CorrectionError(

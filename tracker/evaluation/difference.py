@@ -81,6 +81,7 @@ def compare(a: Evaluation, b: Evaluation) -> tuple[Difference, ...]:
 
 
 def _difference(a: Figure, b: Figure) -> Difference:
+    """Compare the values of one figure."""
     definition = b.definition
     before, after = (
         None if figure.value is None else round(figure.value, definition.digits)

@@ -98,6 +98,7 @@ def _score(
     half_extents: Float[ndarray, " 3"],
     cameras: Items[Camera],
 ) -> Evaluation:
+    """Compute all figures of a comparison of tracks with the truth."""
     cost = {"cutoff": settings.cutoff, "order": settings.order}
     clr, idt, hta = clear(comparison), identity(comparison), hota(comparison)
     osp, gsp = ospa(comparison, **cost), gospa(comparison, **cost)
@@ -205,6 +206,7 @@ def _all_cameras(scores: Items[CameraScore]) -> CameraScore:
 
 
 def _notes(comparison: Comparison) -> tuple[str, ...]:
+    """Return the sentences that readers of the figures need."""
     notes = []
     if not len(comparison.truth) and not len(comparison.dont_care):
         notes.append("There is no truth for these steps: every estimate counts as false.")

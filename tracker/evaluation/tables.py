@@ -146,6 +146,17 @@ def _track_row(
     distance: float,
     people: ndarray,
 ) -> TrackRow:
+    """Return the scores of one track.
+
+    Args:
+        name: The id of the track.
+        life: The first and the last step of the track.
+        reported: The number of steps at which the track is reported.
+        ignored: The number of these steps that do not count.
+        together: The number of steps at which the track is paired with each person.
+        distance: The sum of the distances of all pairs.
+        people: The ids of the people.
+    """
     counted, matched = reported - ignored, int(together.sum())
     best = int(together.argmax())
     kind: TrackKind = "person" if 2 * matched >= counted else "false"

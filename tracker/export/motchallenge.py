@@ -105,6 +105,7 @@ def _rows(
     confidences: Float[ndarray, " N"],
     positions: Float[ndarray, "N 3"],
 ) -> list[str]:
+    """Return rows of ``frame, id, left, top, width, height, confidence, x, y, z``."""
     return [
         f"{frame + 1},{number},{_numbers(box)},{confidence:.6f},{_numbers(place)}\n"
         for frame, number, box, confidence, place in zip(

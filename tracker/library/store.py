@@ -350,6 +350,7 @@ class Library:
     # inside
 
     def _connect(self, wait_seconds: float) -> sqlite3.Connection:
+        """Open the file by SQLite, and create its folder unless it is only read."""
         if not self.read_only:
             self.path.parent.mkdir(parents=True, exist_ok=True)
         mode = "ro" if self.read_only else "rwc"

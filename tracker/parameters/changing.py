@@ -78,6 +78,7 @@ def _unknown(key: str) -> str:
 
 
 def _checked(parameter: Parameter, new: Any) -> Any:
+    """Return a value in the type of its parameter, or raise an error if it is not valid."""
     if parameter.kind == "choice":
         if not isinstance(new, str) or new not in parameter.choices:
             choices = ", ".join(parameter.choices)

@@ -109,6 +109,7 @@ def _warn(point: EntryPoint, words: str) -> None:
 
 
 def _registered() -> tuple[dict[MethodKey, dict[str, Method]], dict[str, str]]:
+    """Return the methods of each kind by name, and the packages of the methods of plugins."""
     methods: dict[MethodKey, dict[str, Method]] = {}
     origins: dict[str, str] = {}
     for key, built_in in BUILT_IN.items():

@@ -67,6 +67,7 @@ def _group_stage(group: str) -> Stage:
 
 
 def _describe(group: str, name: str, field: FieldInfo) -> Parameter:
+    """Return the parameter that a field of a group defines."""
     assert isinstance(field.json_schema_extra, dict)
     extra: Any = field.json_schema_extra["x-ui"]
     bounds: dict[str, Any] = {}

@@ -166,6 +166,7 @@ class _Reporter:
         self._meanwhile = None
 
     def _extract(self) -> Trajectories:
+        """Return the tracks of the fused steps that have none yet."""
         run = self._run
         p = run.parameters.fusion
         used = run.parameters.method("fusion_method").used(run.parameters)

@@ -67,6 +67,7 @@ class SingleViews:
             pool.shutdown(wait=True, cancel_futures=True)
 
     def _iterate(self) -> Iterator[tuple[tuple[ViewResult, ...], tuple[Any, ...]]]:
+        """Yield the results and the states of all cameras after each step."""
         preparing = [pool.submit(self._prepare, c) for c, pool in enumerate(self._pools)]
         workers = [future.result() for future in preparing]
         blocks: deque[list[Future[list[tuple[ViewResult, Any]]]]] = deque()
@@ -90,6 +91,7 @@ class SingleViews:
         return self._stopped or self._cancelled()
 
     def _prepare(self, camera: int) -> _CameraWorker:
+        """Create the method of one camera, in the camera's thread."""
         run = self._run
         method = single_view.create(
             run.parameters.single_view,

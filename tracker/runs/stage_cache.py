@@ -194,6 +194,7 @@ class StageCache:
             return found[0]
 
     def _put(self, stage: Stage, key: str, column: Any) -> None:
+        """Store a column, and remove older ones until the limits of memory are kept."""
         weight = weigh(column)
         with self._lock:
             self._take_out((stage, key))
@@ -224,6 +225,7 @@ def weigh(column: object) -> int:
 
 
 def _weight(value: Any, seen: set[int]) -> int:
+    """Return the size of a value in memory, bytes, without the objects that are counted already."""
     if id(value) in seen or value is None:
         return 0
     seen.add(id(value))

@@ -76,6 +76,7 @@ def read_camera(name: str, image_size: tuple[int, int], fields: Fields) -> Camer
 
 
 def _intrinsics(fields: Fields) -> Float[ndarray, "3 3"]:
+    """Read and check the matrix of intrinsics, pixels."""
     matrix = fields.matrix("K", 3, 3)
     form = "[[fx, s, cx], [0, fy, cy], [0, 0, 1]] in pixels"
     if matrix[1, 0] or matrix[2, 0] or matrix[2, 1] or matrix[2, 2] != 1.0:
@@ -101,6 +102,7 @@ def _check_size(fields: Fields, field: str, matrix: Float[ndarray, "3 3"]) -> No
 
 
 def _rotation(fields: Fields) -> Float[ndarray, "3 3"]:
+    """Read and check the rotation from world to camera axes."""
     matrix = fields.matrix("R", 3, 3)
     error = float(np.abs(matrix @ matrix.T - np.eye(3)).max())
     with np.errstate(all="ignore"):  # the matrix may be far from a rotation
@@ -122,6 +124,8 @@ def _rotation(fields: Fields) -> Float[ndarray, "3 3"]:
 
 
 def _distortion(fields: Fields, *, fisheye: bool) -> Float[ndarray, " n"]:
+    """Read the coefficients of the lens distortion in OpenCV's order: 4 of a fisheye, else 5 or
+    8."""
     given = fields.numbers("distortion")
     if fisheye:
         if len(given) not in (0, 4):

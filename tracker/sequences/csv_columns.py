@@ -219,6 +219,11 @@ def _check_header(
     needed: tuple[str, ...],
     optional: Mapping[str, float],
 ) -> None:
+    """Check the names of the columns.
+
+    Raises:
+        SequenceError: If a column is missing, occurs twice or is unknown, or there are too many.
+    """
     if len(names) > MOST_COLUMNS:
         raise SequenceError(
             f"{where}, line {line}: expected at most {MOST_COLUMNS:,} columns, found {len(names):,}"

@@ -66,6 +66,7 @@ def _folders(data: Path) -> list[Path]:
 
 
 def _entry(folder: Path, kind: Literal["rendered", "folder"] = "folder") -> SequenceEntry:
+    """Return the entry of a folder, with the reason if it cannot be read."""
     description, cameras, frames, error = "", 0, 0, None
     try:
         summary = read_summary(folder)

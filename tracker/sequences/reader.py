@@ -234,6 +234,7 @@ def _names(folder: Path) -> list[str]:
 
 
 def _parse(folder: Path, text: str) -> Fields:
+    """Return the fields of ``sequence.toml``, or raise an error that names the place."""
     where = f"{folder.name}/{FILE}"
     try:
         values = tomllib.loads(text)

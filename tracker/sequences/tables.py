@@ -306,6 +306,8 @@ def truth_of(path: Path, where: str, frames: int) -> GroundTruth:
 
 
 def _known_steps(path: Path, where: str, frames: int) -> Bool[ndarray, " F"] | None:
+    """Return the steps at which the detector ran, as the comment lines of a file list them; None
+    if they do not."""
     with path.open(encoding="utf-8-sig", errors="replace") as stream:
         for number, line in enumerate(stream, 1):
             if line.strip() and not line.startswith("#"):

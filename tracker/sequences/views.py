@@ -110,6 +110,7 @@ def _check_lengths(sources: Many[Source]) -> None:
 
 
 def _source(name: str, fields: Fields, reading: Reading) -> Source:
+    """Read the files that the table of a camera names."""
     if "image_size" in fields:
         _image_size(fields, None)
     if "video" in fields and "images" in fields:
@@ -142,6 +143,7 @@ def read_views(sources: Many[Source], time: Time, reading: Reading) -> tuple[Vie
 
 
 def _view(source: Source, time: Time, reading: Reading) -> View:
+    """Return a camera with its boxes and pictures on the steps of the sequence."""
     fields, pictures, timing = source.fields, source.pictures, source.timing
     if time.own_rates and timing.fps is None and pictures is not None and pictures.fps:
         timing = Timing(timing.first_frame, pictures.fps, timing.time_offset, timing.stamps)

@@ -135,6 +135,7 @@ class ColourPhd:
         return after, self._result(mixture, peaks)
 
     def _births(self, unexplained: Float[ndarray, "B 4"]) -> GaussianMixture:
+        """Return the birth components: around unexplained peaks, at the entrances, or both."""
         p = self._parameters
         if p.birth == "entrances":
             return self._entrances
@@ -165,6 +166,7 @@ class ColourPhd:
         return reduced
 
     def _result(self, mixture: GaussianMixture, peaks: Peaks | None = None) -> ViewResult:
+        """Return the result of a step."""
         p = self._parameters
         found = np.zeros((0, 4)) if peaks is None else peaks.boxes
         ratios = np.zeros(0)

@@ -140,6 +140,7 @@ class DetectionPhd:
     def _result(
         self, found: Detected, good: ndarray, updated: PhdUpdate, mixture: GaussianMixture
     ) -> ViewResult:
+        """Return the result of a step."""
         p = self._parameters
         chosen = phd.extract(mixture, p.extraction_threshold)
         estimates, weights = mixture.means[chosen], mixture.weights[chosen]

@@ -225,6 +225,7 @@ def top_view(sequence: Sequence, tracks: Tracks, evaluation: Evaluation) -> go.F
 def _path(
     frames: ndarray, positions: ndarray, name: str, tone: str, dash: str | None = None
 ) -> go.Scatter:
+    """Return the line of a path from above, with gaps where steps are missing."""
     order = np.argsort(frames, kind="stable")
     step, x, y = broken(frames[order], positions[order, 0], positions[order, 1])
     trace = _line(x.round(4), y.round(4), name, tone, width=1.8, dash=dash)
@@ -245,6 +246,7 @@ def _line(
     dash: str | None = None,
     shape: str = "linear",
 ) -> go.Scatter:
+    """Return a line with a name and a colour."""
     return go.Scatter(
         x=x,
         y=y if y.dtype.kind != "f" else y.round(5),
@@ -261,6 +263,7 @@ def _area(x: ndarray, y: ndarray, name: str, tone: str, stack: str | None) -> go
 
 
 def _layout() -> dict[str, Any]:
+    """Return the common layout of all figures."""
     axis = {
         "gridcolor": GRID, "zerolinecolor": GRID, "linecolor": GRID, "tickfont": {"color": MUTED},
         "title_font": {"color": MUTED, "size": 11},

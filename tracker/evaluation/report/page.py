@@ -140,6 +140,7 @@ def _plot(figure: str, label: str) -> str:
 
 
 def _head(sequence: Sequence, evaluation: Evaluation, seed: int | None, back: str) -> str:
+    """Return the head of the page: the recording, notes and links."""
     steps = evaluation.steps
     done = f"{steps} steps" if steps == sequence.frames else f"{steps} of {sequence.frames} steps"
     facts = [done, f"{sequence.fps:g} a second", f"{len(sequence.views)} cameras"]

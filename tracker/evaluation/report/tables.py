@@ -211,6 +211,8 @@ def _defaults(sequence: Sequence) -> RunParameters:
 
 
 def _changed_table(parameters: RunParameters, defaults: RunParameters) -> str:
+    """Return the table of all parameters with an effect; those that differ from the defaults are
+    marked."""
     used: dict[str, Any] = {key: table.value(parameters, key) for key in METHODS}
     for stage in ("single_view", "fusion", "smoothing", "tracks"):
         used |= table.stage_values(parameters, stage)

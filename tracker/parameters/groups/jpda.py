@@ -224,6 +224,7 @@ class JpdaParams(Params):
 
 
 def _uses(parameters: RunParameters) -> Uses:
+    """Return what the method uses with the chosen kind of measurements."""
     source = parameters.of(JpdaParams).measurements
     own = Reads("jpda")
     if source == "detections":

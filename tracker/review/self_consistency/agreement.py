@@ -174,6 +174,7 @@ def disagreements(
 
 
 def _disagreement(moment: list[tuple[str, Difference]]) -> Disagreement:
+    """Return the disagreement of all differences of one moment."""
     first = moment[0][1]
     names = tuple(dict.fromkeys(name for name, _ in moment))
     others = sorted({one.other for _, one in moment if one.other is not None})

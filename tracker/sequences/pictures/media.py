@@ -178,6 +178,7 @@ def check_size(view: View, fields: Fields, found: tuple[int, int], what: str) ->
 
 
 def _short(view: View, there: int, frames: int, what: str) -> Iterable[str]:
+    """Yield a sentence if a video or image list has fewer frames than the steps need."""
     if view.clock is not None:
         last = np.flatnonzero(view.clock.frame_of_step >= there)
         if len(last):

@@ -70,6 +70,7 @@ def index_video(path: Path) -> VideoIndex:
 
 @lru_cache(maxsize=64)
 def _index_video(path: Path, bytes_: int, changed: int) -> VideoIndex:
+    """Return the index of a video from its packets and its first pictures."""
     stamps, is_key = _scan(path)
     capture = opened(path)
     try:

@@ -68,6 +68,7 @@ def rewritten(
 
 
 def _write_room(table: Any, before: Values, after: Values) -> None:
+    """Change the sides and entrances of the room in a TOML table, and nothing else."""
     for side, axis in FACES:
         if before[side][axis] != after[side][axis]:
             table[side][axis] = after[side][axis]
@@ -112,6 +113,7 @@ def _insert(entrances: Any, index: int, entrance: Values) -> None:
 
 
 def _write_templates(document: Any, old: list[Values], new: list[Values]) -> None:
+    """Change the templates in a TOML document, and nothing else."""
     if old == new:
         return
     if "template" in document and not new:

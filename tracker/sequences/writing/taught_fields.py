@@ -70,6 +70,7 @@ def read_templates(fields: Fields, views: tuple[View, ...], frames: int) -> tupl
 
 
 def _template(fields: Fields, views: tuple[View, ...], frames: int) -> Template:
+    """Read and check a template."""
     name, camera = fields.text("name"), fields.text("camera")
     by_name = {view.camera.name: view for view in views}
     if camera not in by_name:

@@ -231,6 +231,7 @@ class _Step:
         return sure or [max(known, key=lambda track: track.age).label]
 
     def _object(self, column: int) -> MovingObject:
+        """Return the object of a foreground component, with the labels that were assigned to it."""
         labels, p = tuple(sorted(self.labels[column])), self.parameters
         sources = [self.before.objects[row] for row in sorted(self.sources[column])]
         sources = [source for source in sources if set(source.labels) & set(labels)]

@@ -143,6 +143,7 @@ class AssociationMatrix:
         mask: UInt8[ndarray, "h w"],
         events: list[ViewEvent],
     ) -> ViewResult:
+        """Return the result of a step."""
         objects, p = situation.objects, self._parameters
         wanted = np.array([len(one.labels) for one in objects], dtype=np.int64)
         if p.output == "targets":

@@ -51,6 +51,7 @@ def template_picture(reader: Pictures, camera: int, step: int) -> Picture | None
 def _read(
     sequence: Sequence, space: ColourSpaceName, kernel: KernelName, reader: Pictures
 ) -> ColourModel:
+    """Read the histograms of all templates, or raise an error that names the template."""
     names = [camera.name for camera in sequence.cameras]
     histograms = []
     for template in sequence.templates:

@@ -68,6 +68,14 @@ def _marginals(
     unexplained: Float[ndarray, " M"],
     p: JpdaParams,
 ) -> Marginals:
+    """Compute the association probabilities by the chosen method.
+
+    Args:
+        missed: Factor of the joint probability if a target has no measurement.
+        detected: Factor of the joint probability of each pair of a target and a measurement.
+        unexplained: Factor of the joint probability if a measurement is false.
+        p: The parameters.
+    """
     count = len(unexplained)
     false_counts = np.exp(gammaln(np.arange(count + 1) + 1.0)) if p.clutter == "diffuse" else None
     if p.association == "exact":

@@ -34,7 +34,7 @@ class Cases:
     """Whether a measurement has no target, so that it is of a new or a returned one."""
 
 
-def tell_apart(
+def determine_cases(
     matrix: Float[ndarray, "n M"],
     own: Int[ndarray, " n"],
     least_probability: float,
@@ -93,17 +93,17 @@ def _one_each(shared: Float[ndarray, "n M"], wanted: Int[ndarray, " n"]) -> Int[
     return result
 
 
-def part_strangers(
+def exclude_outside_boxes(
     cases: Cases,
     matrix: Float[ndarray, "n M"],
     expected: Float[ndarray, "n 4"],
     boxes: Float[ndarray, "M 4"],
 ) -> tuple[Cases, Float[ndarray, "n M"]]:
-    """Beyond [WW10]_: for a split target only measurements in its own box belong to it.
+    """Exclude measurements outside a split target's own box, which [WW10]_ does not.
 
-    Between two people who have parted the weighted state would stand still, and its
-    gate would widen with their distance. A measurement outside the target's box is a new
-    target, and its probability is added to that of the target's own measurement.
+    When two people separate, the weighted state would otherwise remain between them, and its gate
+    would widen with their distance. A measurement outside the target's box is of a new target, and
+    its probability is added to that of the target's own measurement.
 
     Args:
         cases: The cases of the matrix.
@@ -112,7 +112,7 @@ def part_strangers(
         boxes: Boxes of the measurements, pixels.
 
     Returns:
-        The cases and the matrix.
+        The cases and the matrix after the change.
     """
     matrix, split, new = matrix.copy(), cases.split.copy(), cases.new.copy()
     for t in np.flatnonzero(cases.split & (cases.own >= 0)):
@@ -128,14 +128,16 @@ def part_strangers(
     return replace(cases, split=split, new=new), matrix
 
 
-def look_into_pieces(
+def search_components(
     cases: Cases,
     expected: Float[ndarray, "n 4"],
     boxes: Float[ndarray, "M 4"],
     pieces: Float[ndarray, "M 4"],
     furthest: float,
 ) -> Cases:
-    """Beyond [WW10]_: people who merge give a measurement outside all gates.
+    """Search foreground components for targets without measurements, which [WW10]_ does not.
+
+    The measurement of people who merge may lie outside all gates.
 
     A target with a zero column, and a predicted centre in the foreground component of a
     measurement, has not vanished. If that measurement has no target and is near, it is the
@@ -146,7 +148,8 @@ def look_into_pieces(
         expected: Predicted boxes of the targets, pixels.
         boxes: Boxes of the measurements, pixels.
         pieces: Box of the foreground component of each measurement, pixels.
-        furthest: Half sizes within which a measurement without target may be such a target's.
+        furthest: Largest distance, half sizes of the box, at which a measurement without target may
+            be of such a target.
     """
     lost = np.flatnonzero(cases.missed)
     if not len(lost) or not len(boxes):

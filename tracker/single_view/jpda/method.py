@@ -19,7 +19,12 @@ from tracker.parameters import JpdaParams
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.jpda.association import associate
-from tracker.single_view.jpda.cases import Cases, look_into_pieces, part_strangers, tell_apart
+from tracker.single_view.jpda.cases import (
+    Cases,
+    determine_cases,
+    exclude_outside_boxes,
+    search_components,
+)
 from tracker.single_view.jpda.measurements import Measured, Source, source_of
 from tracker.single_view.jpda.moves import Moved, move
 from tracker.single_view.jpda.targets import Targets, innovations
@@ -54,7 +59,7 @@ class Jpda:
     State [p_x, v_x, p_y, v_y], constant velocity, measured at the position; the box's
     size is smoothed separately. Per step: the validation matrix has the gated pairs;
     joint events, and Bayes' rule for each, give the association matrix β; its rows and
-    columns determine five cases (:func:`~tracker.single_view.jpda.cases.tell_apart`):
+    columns determine five cases (:func:`~tracker.single_view.jpda.cases.determine_cases`):
 
     * normal and split targets are updated by the mean over all associations;
     * occluded ones are put at the measurement with velocity 0, or, beyond the patent,
@@ -134,21 +139,23 @@ class Jpda:
     def _cases(
         self, expected: Targets, matrix: ndarray, own: ndarray, seen: Measured
     ) -> tuple[Cases, ndarray]:
+        """Determine the case of each target, and the matrix after this."""
         p = self._parameters
         if not p.five_cases:
-            cases = tell_apart(matrix, own, 0.0, every_shared_row=False)
+            cases = determine_cases(matrix, own, 0.0, every_shared_row=False)
             none = np.full(expected.size, -1)
             return replace(cases, shared=none, split=none >= 0), matrix
         inside = p.occlusion == "inside"
-        cases = tell_apart(matrix, own, p.least_probability, every_shared_row=not inside)
+        cases = determine_cases(matrix, own, p.least_probability, every_shared_row=not inside)
         if inside:
-            cases, matrix = part_strangers(cases, matrix, expected.boxes, seen.boxes)
-            cases = look_into_pieces(cases, expected.boxes, seen.boxes, seen.pieces, p.leap)
+            cases, matrix = exclude_outside_boxes(cases, matrix, expected.boxes, seen.boxes)
+            cases = search_components(cases, expected.boxes, seen.boxes, seen.pieces, p.leap)
         return cases, matrix
 
     def _result(
         self, expected: Targets, seen: Measured, cases: Cases, moved: Moved, managed: Managed
     ) -> ViewResult:
+        """Return the result of a step."""
         p, targets = self._parameters, managed.targets
         # returned and new targets are at their measurements
         arrived = np.ones(len(managed.sources))

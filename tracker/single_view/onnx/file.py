@@ -63,6 +63,7 @@ def ports_of(data: bytes) -> Ports:
 
 
 def _fields(message: memoryview) -> Iterator[tuple[int, int | memoryview]]:
+    """Yield number and value of each field of a message in the encoding of Protocol Buffers."""
     place = 0
     while place < len(message):
         tag, place = _varint(message, place)

@@ -128,6 +128,7 @@ class Network:
         return f"the detector {self._path.name} {words}; {remedy}"
 
     def _picture_port(self, inputs: tuple[Port, ...]) -> Port:
+        """Return the input for the picture."""
         for port in inputs:
             if len(port.shape) == 4 and 3 in (port.shape[1], port.shape[3]):
                 if port.shape[0] > 1:
@@ -184,6 +185,7 @@ class Network:
         return Found(boxes, scores)
 
     def _fed(self, framed: UInt8[ndarray, "h w 3"]) -> ndarray:
+        """Return the picture as the input of the network."""
         coloured = framed[:, :, ::-1]
         if self._picture.kind != UINT8:
             match self._settings.values:
@@ -202,6 +204,7 @@ class Network:
         return np.ascontiguousarray(coloured[None])
 
     def _forward(self, fed: ndarray) -> dict[str, ndarray]:
+        """Run the network, and return its outputs by name."""
         try:
             with self._lock:
                 self._net.setInput(fed, self._picture.name)

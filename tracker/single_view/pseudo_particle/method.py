@@ -274,6 +274,7 @@ class PseudoParticle:
         events: tuple[ViewEvent, ...],
         information: dict[str, float],
     ) -> ViewResult:
+        """Return the result of a step."""
         confirmed = targets.take(targets.confirmed)
         boxes, weights, box_labels = modes, scores, labels
         if self._parameters.output == "targets":
