@@ -145,7 +145,7 @@ def long_gap_odds(
     before = whole.lasts[:, None] < whole.firsts[None, :]
     gains = np.full(before.shape, -np.inf)
     if embeddings is not None:
-        own = tracklets.moved_to(links, rows)
+        own = tracklets.renumber_rows(links, rows)
         alike = Appearance(whole, own, smoother.cameras, embeddings, smoother.model.step_time)
         gone = np.maximum(before.sum(axis=0), 1)
         earlier, later = np.nonzero(before)
