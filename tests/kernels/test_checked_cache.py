@@ -127,3 +127,69 @@ def test_of_two_processes_at_once_one_compiles(tmp_path: Path) -> None:
     misses = [process.communicate()[0].split() for process in both]
     assert [process.returncode for process in both] == [0, 0]
     assert sorted(misses) == [["0", "0"], ["1", "1"]]
+
+
+LARGE = """
+from math import sin
+from tracker.kernels.compilation import compiled_later
+
+@compiled_later
+def large(x):
+{lines}
+    return x
+
+@compiled_later
+def caller(x):
+    return large(x) + 1.0
+"""
+
+CALLED = """
+import sys
+sys.path.insert(0, sys.argv[1])
+import many
+print(many.caller(2.0) == many.caller.py_func(2.0) == many.large.py_func(2.0) + 1.0)
+print(*(sum(each.stats.cache_misses.values()) for each in (many.large, many.caller)))
+"""
+
+
+@pytest.fixture
+def called(tmp_path: Path) -> Callable[[], list[str]]:
+    """A new process that calls the caller of a large kernel: whether its result is right, and how
+    often the two were compiled."""
+    lines = "\n".join(f"    x = sin(x * {number}.5) + {number}.25 / x" for number in range(500))
+    (tmp_path / "many.py").write_text(LARGE.format(lines=lines), encoding="utf-8")
+
+    def call() -> list[str]:
+        done = subprocess.run(
+            [sys.executable, "-c", CALLED, str(tmp_path)],
+            env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "kernels")},
+            capture_output=True,
+            text=True,
+        )
+        assert done.returncode == 0, done.stderr
+        return done.stdout.splitlines()
+
+    return call
+
+
+def stored(tmp_path: Path, name: str) -> list[Path]:
+    return sorted((tmp_path / "kernels").rglob(f"many.{name}-*.nbc"))
+
+
+def test_a_large_kernel_is_stored_once_and_its_caller_refers_to_it(
+    called: Callable[[], list[str]], tmp_path: Path
+) -> None:
+    assert called() == ["True", "1 1"]
+    (large,), (caller,) = stored(tmp_path, "large"), stored(tmp_path, "caller")
+    assert caller.stat().st_size < large.stat().st_size / 3
+    assert called() == ["True", "0 0"]
+
+
+def test_a_caller_whose_large_kernel_was_lost_works_and_both_are_whole_again(
+    called: Callable[[], list[str]], tmp_path: Path
+) -> None:
+    called()
+    (large,) = stored(tmp_path, "large")
+    large.write_bytes(b"")
+    assert called() == ["True", "1 1"], "the kernel has another name now"
+    assert called() == ["True", "0 0"]
