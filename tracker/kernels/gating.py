@@ -6,7 +6,6 @@ A pair is inside its gate where (z − h)ᵀ S⁻¹ (z − h) ≤ gate, with S =
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -58,7 +57,7 @@ def _widest_axis(values: ndarray, reach: ndarray) -> int:
 
 @kernel
 def factor_innovation(
-    own: ndarray, j: int, noises: ndarray, n: int, lower: ndarray, place: int, rows: Sequence[int]
+    own: ndarray, j: int, noises: ndarray, n: int, lower: ndarray, place: int
 ) -> float:
     """Write the Cholesky factor of S = own + R to ``lower[place]``; returns log(1 / √det(2π S)).
 
@@ -71,11 +70,11 @@ def factor_innovation(
         n: Index of the measurement noise.
         lower: (K, m, m), receives the factor.
         place: Index at which the factor is written.
-        rows: Components of the measurement: a range, or a tuple of as many for unrolled loops.
     """
-    constant: float = -0.5 * len(rows) * math.log(2.0 * math.pi)
+    order = own.shape[1]
+    constant: float = -0.5 * order * math.log(2.0 * math.pi)
     product = 1.0
-    for p in range(len(rows)):
+    for p in range(order):
         for q in range(p):
             total = own[j, p, q] + noises[n, p, q]
             for r in range(q):
@@ -114,29 +113,10 @@ def gated_pairs(
     if size == 0 or count == 0:
         nothing = np.empty(0, dtype=np.int64)
         return GatedPairs(nothing, nothing, np.empty(0))
-    if order == 2:
-        found = _gated(expected, measurements, own, gate, lower, (0, 1))
-    else:
-        found = _gated(expected, measurements, own, gate, lower, range(order))
-    return _by_measurement(found, count)
-
-
-@kernel
-def _gated(
-    expected: ndarray,
-    measurements: Measurements,
-    own: ndarray,
-    gate: float,
-    lower: ndarray,
-    rows: Sequence[int],
-) -> GatedPairs:
-    """List the pairs as :func:`gated_pairs`, component by component, with its kind of ``rows``."""
-    size, order = expected.shape
     values, noises = measurements.values, measurements.noises
-    count = len(values)
     shared = noises.shape[0] == 1
     reach = np.empty((size, order))
-    for p in range(len(rows)):
+    for p in range(order):
         noise = noises[:, p, p].max()
         for j in range(size):
             if not own[j, p, p] + noise > 0.0:
@@ -149,7 +129,7 @@ def _gated(
     coordinates = np.empty(count)
     for k in range(count):
         coordinates[k] = values[by_axis[k], axis]
-        for p in range(len(rows)):
+        for p in range(order):
             ordered[k, p] = values[by_axis[k], p]
 
     capacity = 4 * (size + count)
@@ -163,25 +143,25 @@ def _gated(
     for j in range(size):
         first = np.searchsorted(coordinates, expected[j, axis] - reach[j, axis])
         last = np.searchsorted(coordinates, expected[j, axis] + reach[j, axis], "right")
-        found = 0
+        inside = 0
         for k in range(first, last):
             # without a branch, which would be unpredictable
             near = True
-            for p in range(len(rows)):
+            for p in range(order):
                 near &= abs(ordered[k, p] - expected[j, p]) <= reach[j, p]
-            hits[found] = k
-            found += int(near)
+            hits[inside] = k
+            inside += int(near)
         if shared:
             place = j
-            constant = factor_innovation(own, j, noises, n, lower, place, rows)
-        for hit in range(found):
+            constant = factor_innovation(own, j, noises, n, lower, place)
+        for hit in range(inside):
             k = hits[hit]
             z = by_axis[k]
             if not shared:
                 n = z
-                constant = factor_innovation(own, j, noises, n, lower, place, rows)
+                constant = factor_innovation(own, j, noises, n, lower, place)
             distance = 0.0
-            for p in range(len(rows)):
+            for p in range(order):
                 total = ordered[k, p] - expected[j, p]
                 for r in range(p):
                     total -= lower[place, p, r] * solved[r]
@@ -198,7 +178,8 @@ def _gated(
             measured[pairs] = z
             likelihood[pairs] = constant - 0.5 * distance
             pairs += 1
-    return GatedPairs(component[:pairs], measured[:pairs], likelihood[:pairs])
+    found = GatedPairs(component[:pairs], measured[:pairs], likelihood[:pairs])
+    return _by_measurement(found, count)
 
 
 @kernel

@@ -6,7 +6,6 @@ Shapes: J components of a state of size d, M measurements of size m, P gated pai
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -79,6 +78,9 @@ class _Innovations(NamedTuple):
     """P Hᵀ (J, d, m)."""
     own: ndarray
     """H P Hᵀ + Ω (J, m, m)."""
+    factors: ndarray
+    """(J, m, m), Cholesky factors of S, where all measurements have one noise; else (1, m, m),
+    working memory."""
 
 
 class _Spot(NamedTuple):
@@ -112,36 +114,33 @@ class _Filtered(NamedTuple):
 
 
 @kernel
-def _innovations(
-    covariances: ndarray, expected: Expected, axes: Sequence[int], rows: Sequence[int]
-) -> _Innovations:
-    """Compute P Hᵀ and H P Hᵀ + Ω of every component.
+def _innovations(covariances: ndarray, expected: Expected, noises: int) -> _Innovations:
+    """Compute P Hᵀ and H P Hᵀ + Ω of every component, and leave the factors to the gating.
 
     Args:
         covariances: P (J, d, d).
         expected: The predictions, with H and Ω.
-        axes: Axes of the state: a range, or a tuple of as many for unrolled loops.
-        rows: Components of the measurement, likewise.
+        noises: The number of covariances of the measurements' noise.
     """
     jacobians, spreads = expected.jacobians, expected.spreads
-    size = len(covariances)
-    ph = np.empty((size, len(axes), len(rows)))
-    own = np.empty((size, len(rows), len(rows)))
+    size, dimension, order = len(covariances), covariances.shape[1], jacobians.shape[1]
+    ph = np.empty((size, dimension, order))
+    own = np.empty((size, order, order))
     for j in range(size):
         h = 0 if len(jacobians) == 1 else j
-        for a in range(len(axes)):
-            for p in range(len(rows)):
+        for a in range(dimension):
+            for p in range(order):
                 total = 0.0
-                for b in range(len(axes)):
+                for b in range(dimension):
                     total += covariances[j, a, b] * jacobians[h, p, b]
                 ph[j, a, p] = total
-        for p in range(len(rows)):
-            for q in range(len(rows)):
+        for p in range(order):
+            for q in range(order):
                 total = spreads[j, p, q] if len(spreads) else 0.0
-                for a in range(len(axes)):
+                for a in range(dimension):
                     total += jacobians[h, p, a] * ph[j, a, q]
                 own[j, p, q] = total
-    return _Innovations(ph, own)
+    return _Innovations(ph, own, np.empty((size if noises == 1 else 1, order, order)))
 
 
 @kernel
@@ -153,7 +152,6 @@ def _filter(
     expected: Expected,
     noises: ndarray,
     filtered: _Filtered,
-    axes_and_rows: tuple[Sequence[int], Sequence[int]],
 ) -> None:
     """Compute gain and covariance of one spot, in place.
 
@@ -165,78 +163,74 @@ def _filter(
         expected: The predictions, with H and Ω.
         noises: R (N, m, m).
         filtered: Receives the result.
-        axes_and_rows: Axes and rows, as in :func:`_innovations`.
     """
-    axes, rows = axes_and_rows
+    dimension, order = filtered.noisy.shape
     j, n, factored, place = spot.component, spot.noise, spot.factored, spot.place
     jacobians, spreads = expected.jacobians, expected.spreads
     gains, updated = filtered.gains, filtered.covariances
     noise, factor, half, noisy = filtered.noise, filtered.factor, filtered.half, filtered.noisy
     h = 0 if len(jacobians) == 1 else j
-    for p in range(len(rows)):
-        for q in range(len(rows)):
+    for p in range(order):
+        for q in range(order):
             noise[p, q] = noises[n, p, q]
             if len(spreads):
                 noise[p, q] += spreads[j, p, q]
     # K = P Hᵀ S⁻¹, row by row through the factor
-    for a in range(len(axes)):
-        for p in range(len(rows)):
+    for a in range(dimension):
+        for p in range(order):
             total = cross[j, a, p]
             for r in range(p):
                 total -= lower[factored, p, r] * gains[place, a, r]
             gains[place, a, p] = total * lower[factored, p, p]
-        for p in range(len(rows) - 1, -1, -1):
+        for p in range(order - 1, -1, -1):
             total = gains[place, a, p]
-            for r in range(p + 1, len(rows)):
+            for r in range(p + 1, order):
                 total -= lower[factored, r, p] * gains[place, a, r]
             gains[place, a, p] = total * lower[factored, p, p]
-    for a in range(len(axes)):
-        for b in range(len(axes)):
+    for a in range(dimension):
+        for b in range(dimension):
             total = 1.0 if a == b else 0.0
-            for p in range(len(rows)):
+            for p in range(order):
                 total -= gains[place, a, p] * jacobians[h, p, b]
             factor[a, b] = total
-        for p in range(len(rows)):
+        for p in range(order):
             total = 0.0
-            for q in range(len(rows)):
+            for q in range(order):
                 total += gains[place, a, q] * noise[q, p]
             noisy[a, p] = total
-    for a in range(len(axes)):
-        for b in range(len(axes)):
+    for a in range(dimension):
+        for b in range(dimension):
             total = 0.0
-            for c in range(len(axes)):
+            for c in range(dimension):
                 total += factor[a, c] * covariances[j, c, b]
             half[a, b] = total
-    for a in range(len(axes)):
+    for a in range(dimension):
         for b in range(a + 1):
             total = 0.0
-            for c in range(len(axes)):
+            for c in range(dimension):
                 total += half[a, c] * factor[b, c]
-            for p in range(len(rows)):
+            for p in range(order):
                 total += noisy[a, p] * gains[place, b, p]
             updated[place, a, b] = total
             updated[place, b, a] = total
 
 
 @kernel
-def _updated(
-    pairs: GatedPairs,
+def _update(
+    gated: GatedPairs,
     means: ndarray,
     covariances: ndarray,
     expected: Expected,
     measurements: Measurements,
     innovations: _Innovations,
-    lower: ndarray,
-    axes_and_rows: tuple[Sequence[int], Sequence[int]],
-) -> Pairs:
-    """Compute means and covariances of the gated pairs."""
-    axes, rows = axes_and_rows
-    component, measured = pairs.components, pairs.measured
-    noises = measurements.noises
+    updated: Pairs,
+    first: int,
+) -> None:
+    """Compute the gated pairs into ``updated`` from the pair ``first`` on."""
+    component, measured = gated.components, gated.measured
+    noises, lower = measurements.noises, innovations.factors
+    dimension, order = innovations.cross.shape[1:]
     count = len(component)
-    dimension, order = len(axes), len(rows)
-    new_means = np.empty((count, dimension))
-    new_covariances = np.empty((count, dimension, dimension))
     # with one noise for all, the pairs of a component share gain and covariance
     shared = len(noises) == 1
     known = np.zeros(len(means), dtype=np.bool_)
@@ -255,61 +249,24 @@ def _updated(
         j = filtered[k]
         spot = _Spot(j, 0, j, j) if shared else _Spot(j, measured[k], 0, k)
         if not shared:
-            factor_innovation(innovations.own, j, noises, spot.noise, lower, 0, rows)
-        _filter(
-            spot, innovations.cross, lower, covariances, expected, noises, result, axes_and_rows
-        )
-    gains, updated = result.gains, result.covariances
+            factor_innovation(innovations.own, j, noises, spot.noise, lower, 0)
+        _filter(spot, innovations.cross, lower, covariances, expected, noises, result)
+    gains, filtered_covariances = result.gains, result.covariances
+    values, expected_values = measurements.values, expected.values
+    log_likelihoods = gated.log_likelihoods
+    components, numbers, likelihoods, new_means, new_covariances = updated
     for pair in range(count):
-        j, z = component[pair], measured[pair]
+        j, z, row = component[pair], measured[pair], first + pair
         place = j if shared else pair
-        for a in range(len(axes)):
+        components[row], numbers[row] = j, z
+        likelihoods[row] = log_likelihoods[pair]
+        for a in range(dimension):
             total = means[j, a]
-            for p in range(len(rows)):
-                total += gains[place, a, p] * (measurements.values[z, p] - expected.values[j, p])
-            new_means[pair, a] = total
-            for b in range(len(axes)):
-                new_covariances[pair, a, b] = updated[place, a, b]
-    return Pairs(component, measured, pairs.log_likelihoods, new_means, new_covariances)
-
-
-@kernel
-def kalman_pairs(
-    means: ndarray,
-    covariances: ndarray,
-    expected: Expected,
-    measurements: Measurements,
-    gate: float,
-) -> Pairs:
-    """Compute the Kalman update of every component by every measurement inside its gate.
-
-    Args:
-        means: (J, d), states.
-        covariances: (J, d, d), covariances.
-        expected: The measurement that each component predicts.
-        measurements: M measurements with their noise.
-        gate: Squared Mahalanobis distance of the innovation; infinity for no gate.
-
-    Returns:
-        The pairs, measurement by measurement.
-
-    Raises:
-        numpy.linalg.LinAlgError: If the covariance of an innovation is not positive definite.
-    """
-    dimension, order = means.shape[1], measurements.values.shape[1]
-    lower = np.empty((len(means) if len(measurements.noises) == 1 else 1, order, order))
-    # positions and velocities in common sizes are so frequent that their loops are unrolled
-    if dimension == 4 and order == 2:
-        axes, rows = (0, 1, 2, 3), (0, 1)
-        innovations = _innovations(covariances, expected, axes, rows)
-        pairs = gated_pairs(expected.values, measurements, innovations.own, gate, lower)
-        return _updated(
-            pairs, means, covariances, expected, measurements, innovations, lower, (axes, rows)
-        )
-    whole = (range(dimension), range(order))
-    innovations = _innovations(covariances, expected, whole[0], whole[1])
-    pairs = gated_pairs(expected.values, measurements, innovations.own, gate, lower)
-    return _updated(pairs, means, covariances, expected, measurements, innovations, lower, whole)
+            for p in range(order):
+                total += gains[place, a, p] * (values[z, p] - expected_values[j, p])
+            new_means[row, a] = total
+            for b in range(dimension):
+                new_covariances[row, a, b] = filtered_covariances[place, a, b]
 
 
 @kernel
@@ -328,37 +285,56 @@ def _in_posture(expected: Expected) -> Expected:
 
 
 @kernel
-def all_pairs(
+def _room_for(count: int, dimension: int) -> Pairs:
+    """Arrays for the number of pairs, to be filled."""
+    return Pairs(
+        np.empty(count, dtype=np.int64),
+        np.empty(count, dtype=np.int64),
+        np.empty(count),
+        np.empty((count, dimension)),
+        np.empty((count, dimension, dimension)),
+    )
+
+
+@kernel
+def kalman_pairs(
     means: ndarray,
     covariances: ndarray,
     expected: Expected,
     measurements: Measurements,
     gate: float,
 ) -> Pairs:
-    """Compute the Kalman update as :func:`kalman_pairs`, of a target in one of two postures.
+    """Compute the Kalman update of every component by every measurement inside its gate.
 
     Args:
-        means: (J, d), states; the other arguments are those of :func:`kalman_pairs`.
+        means: (J, d), states.
+        covariances: (J, d, d), covariances.
+        expected: The measurement that each component predicts, in one posture or two.
+        measurements: M measurements with their noise.
+        gate: Squared Mahalanobis distance of the innovation; infinity for no gate.
 
     Returns:
-        The pairs of the first posture, followed by those of the other.
+        The pairs, measurement by measurement, those of the first posture before those of the
+        other; with two postures each likelihood has the share of its posture as a factor.
+
+    Raises:
+        numpy.linalg.LinAlgError: If the covariance of an innovation is not positive definite.
     """
-    first = kalman_pairs(means, covariances, expected, measurements, gate)
+    dimension, noises = means.shape[1], len(measurements.noises)
+    own = _innovations(covariances, expected, noises)
+    gated = gated_pairs(expected.values, measurements, own.own, gate, own.factors)
+    count = len(gated.components)
     if len(expected.posture_values) == 0:
-        return first
-    more = kalman_pairs(
-        means, covariances + expected.posture_drift, _in_posture(expected), measurements, gate
-    )
+        found = _room_for(count, dimension)
+        _update(gated, means, covariances, expected, measurements, own, found, 0)
+        return found
+    other, drifted = _in_posture(expected), covariances + expected.posture_drift
+    of_other = _innovations(drifted, other, noises)
+    also = gated_pairs(other.values, measurements, of_other.own, gate, of_other.factors)
+    found = _room_for(count + len(also.components), dimension)
+    _update(gated, means, covariances, expected, measurements, own, found, 0)
+    _update(also, means, drifted, other, measurements, of_other, found, count)
     share = expected.posture_share
-    return Pairs(
-        np.concatenate((first.components, more.components)),
-        np.concatenate((first.measured, more.measured)),
-        np.concatenate(
-            (
-                first.log_likelihoods + math.log(1.0 - share),
-                more.log_likelihoods + math.log(share),
-            )
-        ),
-        np.concatenate((first.means, more.means)),
-        np.concatenate((first.covariances, more.covariances)),
-    )
+    found.log_likelihoods[:count] += math.log(1.0 - share)
+    found.log_likelihoods[count:] += math.log(share)
+    return found

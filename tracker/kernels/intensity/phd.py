@@ -10,7 +10,7 @@ from numpy import ndarray
 
 from tracker.kernels.compilation import kernel
 from tracker.kernels.gating import Measurements
-from tracker.kernels.kalman import Expected, all_pairs
+from tracker.kernels.kalman import Expected, kalman_pairs
 from tracker.kernels.linear_algebra import Gaussians
 
 
@@ -140,7 +140,7 @@ def phd_update(
     weights, means, covariances = predicted.weights, predicted.means, predicted.covariances
     size, dimension = means.shape
     detectable = np.flatnonzero(detection_probabilities * weights > 0.0)
-    found = all_pairs(
+    found = kalman_pairs(
         _vectors(means, detectable),
         _matrices(covariances, detectable),
         _picked(expected, detectable, size),

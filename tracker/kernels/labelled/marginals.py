@@ -11,7 +11,7 @@ from numpy import ndarray
 from tracker.kernels.association.belief_propagation import Settling, belief_propagation
 from tracker.kernels.compilation import kernel
 from tracker.kernels.gating import Measurements
-from tracker.kernels.kalman import Expected, all_pairs
+from tracker.kernels.kalman import Expected, kalman_pairs
 from tracker.kernels.linear_algebra import Gaussians, group_labels, merge_moments
 
 
@@ -92,7 +92,7 @@ def bernoulli_update(
     existences, means, covariances = tracks.weights, tracks.means, tracks.covariances
     size, dimension = means.shape
     count = len(measurements.values)
-    found = all_pairs(means, covariances, expected, measurements, gate)
+    found = kalman_pairs(means, covariances, expected, measurements, gate)
     track, measured = found.components, found.measured
     pairs = len(track)
     missed = np.empty(size)
