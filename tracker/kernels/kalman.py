@@ -224,13 +224,14 @@ def _update(
     measurements: Measurements,
     innovations: _Innovations,
     updated: Pairs,
-    first: int,
+    end: int,
 ) -> None:
-    """Compute the gated pairs into ``updated`` from the pair ``first`` on."""
+    """Compute the gated pairs into the rows of ``updated`` before the row ``end``."""
     component, measured = gated.components, gated.measured
     noises, lower = measurements.noises, innovations.factors
     dimension, order = innovations.cross.shape[1:]
     count = len(component)
+    first = end - count
     # with one noise for all, the pairs of a component share gain and covariance
     shared = len(noises) == 1
     known = np.zeros(len(means), dtype=np.bool_)
@@ -326,14 +327,15 @@ def kalman_pairs(
     count = len(gated.components)
     if len(expected.posture_values) == 0:
         found = _room_for(count, dimension)
-        _update(gated, means, covariances, expected, measurements, own, found, 0)
+        _update(gated, means, covariances, expected, measurements, own, found, count)
         return found
     other, drifted = _in_posture(expected), covariances + expected.posture_drift
     of_other = _innovations(drifted, other, noises)
     also = gated_pairs(other.values, measurements, of_other.own, gate, of_other.factors)
-    found = _room_for(count + len(also.components), dimension)
-    _update(gated, means, covariances, expected, measurements, own, found, 0)
-    _update(also, means, drifted, other, measurements, of_other, found, count)
+    both = count + len(also.components)
+    found = _room_for(both, dimension)
+    _update(gated, means, covariances, expected, measurements, own, found, count)
+    _update(also, means, drifted, other, measurements, of_other, found, both)
     share = expected.posture_share
     found.log_likelihoods[:count] += math.log(1.0 - share)
     found.log_likelihoods[count:] += math.log(share)

@@ -111,8 +111,9 @@ class CameraUpdate(NamedTuple):
 
 
 @kernel
-def _part(expected: Expected, first: int, last: int) -> Expected:
-    """Select the predictions of the components from ``first`` to ``last``, exclusive."""
+def _part(expected: Expected, count: int, last: int) -> Expected:
+    """Select the predictions of the ``count`` components before the component ``last``."""
+    first = last - count
     spreads, others = expected.spreads, len(expected.posture_values) > 0
     begin, end = (first, last) if others else (0, 0)
     return Expected(
@@ -163,7 +164,7 @@ def update_by_camera(
     jacobians = expected.jacobians
     new = phd_update(
         undetected,
-        _part(expected, 0, size),
+        _part(expected, size, size),
         measurements,
         rule.detection_probability
         * inside_probability(
@@ -205,7 +206,7 @@ def update_by_camera(
     )
     updated = bernoulli_update(
         Gaussians(tracks.existences, tracks.means, tracks.covariances),
-        _part(expected, size, everybody),
+        _part(expected, everybody - size, everybody),
         measurements,
         hidden.detection_probabilities,
         clutter / (1.0 - newcomer),
