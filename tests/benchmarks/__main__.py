@@ -13,7 +13,16 @@ import time
 from pathlib import Path
 
 from tests.benchmarks import record, studies
-from tests.benchmarks.engine import accuracy, full_hd, growth, jpda, kernels, pipeline, stage_one
+from tests.benchmarks.engine import (
+    accuracy,
+    full_hd,
+    growth,
+    jpda,
+    kernels,
+    memory,
+    pipeline,
+    stage_one,
+)
 from tests.benchmarks.measure import Measurement, machine
 from tests.benchmarks.plane import targets
 from tests.benchmarks.record import chart
@@ -27,6 +36,7 @@ SUITES = {
     "jpda": jpda.run,
     "pipeline": pipeline.run,
     "growth": growth.run,
+    "memory": memory.run,
     "live": live.run,
     "stage_one": stage_one.run,
     "full_hd": full_hd.run,
