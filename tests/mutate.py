@@ -59,6 +59,7 @@ TESTED_BY = {
     "kernels": ("kernels", "filters"),
     "sequences": ("sequences", "bad_input/test_table.py"),
     "geometry/consistency": ("geometry", "io/checks"),
+    "steps": ("runs/test_steps.py", "runs/test_stage_files.py"),
 }
 """Whose tests are not only in the folder of the same name; the first that fits counts."""
 

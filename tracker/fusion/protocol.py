@@ -13,6 +13,7 @@ from numpy import ndarray
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion.place_constraints import PlaceConstraints
 from tracker.single_view.protocol import ViewResult
+from tracker.steps import ROWS_SECOND
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,13 +43,13 @@ class FusionResult:
     posterior: GaussianMixture
     """State: x, y, z in metres, world frame; then, for constant velocity, metres per second.
     Weights are expected targets (PHD) or existence probabilities (multi-Bernoulli)."""
-    detection_probabilities: Float[ndarray, "C J"]
+    detection_probabilities: Float[ndarray, "C J"] = field(metadata=ROWS_SECOND)
     """p_D of each component in each camera; 0 outside its image."""
-    sources: Int[ndarray, "C J"]
+    sources: Int[ndarray, "C J"] = field(metadata=ROWS_SECOND)
     """Index into ``ViewResult.boxes`` of the box associated with each component, -1 for none."""
-    source_weights: Float[ndarray, "C J"]
+    source_weights: Float[ndarray, "C J"] = field(metadata=ROWS_SECOND)
     """Association probability of the component and that box, 0 … 1."""
-    hidden_by: Int[ndarray, "C J"]
+    hidden_by: Int[ndarray, "C J"] = field(metadata=ROWS_SECOND)
     """Label of the target that occludes the component in each camera, -1 for none."""
     associations: Associations = field(default_factory=Associations.none)
     """All association probabilities; ``sources`` holds the box of the greatest."""
