@@ -36,6 +36,7 @@ from tracker.sequences.sequence import Sequence
 from tracker.sequences.writing import saving
 from tracker.sequences.writing.teaching import Values, taught_values, with_taught
 from tracker.single_view.protocol import ViewResult
+from tracker.steps import Steps
 from tracker.studies.sampling import Journal
 from tracker.studies.storage.records import Status, Trial
 from tracker.studies.storage.store import Store, create
@@ -222,9 +223,10 @@ def noted_trials(folder: Path) -> int:
 
 
 @cache
-def _column() -> list[tuple[ViewResult, ...]]:
+def _column() -> Steps[tuple[ViewResult, ...]]:
     boxes, ones = np.ones((50, 4)), np.ones(50)
-    return [(ViewResult.of_boxes(boxes, ones, synthetic.np.ones((50, 4))),)] * 20
+    return Steps.of([(ViewResult.of_boxes(boxes, ones, synthetic.np.ones((50, 4))),)] * 20,
+                    ViewResult, 1)  # fmt: skip
 
 
 def keep_column(folder: Path, number: int) -> None:
@@ -233,7 +235,7 @@ def keep_column(folder: Path, number: int) -> None:
 
 def kept_columns(folder: Path) -> int:
     files = StageFiles(folder / "stages")
-    found = {int(path.stem.split("-")[1]) for path in (folder / "stages").glob("*.npz")}
+    found = {int(path.name.split("-")[1]) for path in (folder / "stages").glob("key-*")}
     for number in sorted(found)[-3:]:
         assert files.read(f"key-{number}", frames=20, cameras=1) is not None
     return _without_gap(found)

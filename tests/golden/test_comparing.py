@@ -39,7 +39,8 @@ def moved(run: Run, share: float) -> Run:
     """One coordinate of the tracks of the middle step a little larger."""
     positions = run.tracks.positions.copy()
     positions[run.tracks.at(STEPS // 2), 0] *= 1.0 + share
-    changed = Run(run.sequence, run.parameters, run.seed, run.keys, run.views, run.fused)
+    changed = Run(run.sequence, run.parameters, run.seed, run.keys)
+    changed.views, changed.fused = run.views, run.fused
     changed.tracks, changed.done = replace(run.tracks, positions=positions), run.done
     return changed
 

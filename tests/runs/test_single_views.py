@@ -44,7 +44,7 @@ def drawn(monkeypatch: pytest.MonkeyPatch, seed: int, first: int = 0) -> ndarray
     monkeypatch.setattr(single_view, "create", lambda *_: Drawing())
     run = Run(WHOLE, PARAMETERS, seed, stage_keys(WHOLE, PARAMETERS, seed))
     nothing = ViewResult.of_boxes(np.zeros((0, 4)), np.zeros(0), np.zeros((0, 4)))
-    run.views += [(nothing,) * len(CAMERAS)] * first
+    run.views = run.views.alike([(nothing,) * len(CAMERAS)] * first)
     run.view_states = (first,) * len(CAMERAS) if first else None
     with FrameReader(WHOLE) as reader, SingleViews(run, reader, lambda: False) as steps:
         taken: list[tuple[tuple[ViewResult, ...], tuple[Any, ...]]] = list(steps)

@@ -13,13 +13,17 @@ from tests.engine.synthetic import crossing, sequence, views_at
 from tests.runs.test_pipeline import assert_same, stopped
 from tests.synthetic import write_sequence
 from tracker import fusion, single_view
+from tracker.filters.gaussian_mixture import GaussianMixture
+from tracker.fusion.protocol import FusionResult
 from tracker.parameters import RunParameters, with_values
 from tracker.runs import numbers_version, pipeline, stage_cache
 from tracker.runs.numbers_version import numbers_version as version_of
 from tracker.runs.pipeline import Cancelled, Run, compute, stage_keys
-from tracker.runs.stage_cache import FusionColumn, StageCache, TrackColumn, ViewColumn, weigh
+from tracker.runs.stage_cache import FusionColumn, StageCache, TrackColumn, ViewColumn, bytes_of
 from tracker.runs.stage_files import StageFiles
 from tracker.sequences.reader import read_sequence
+from tracker.single_view.protocol import ViewResult
+from tracker.steps import Steps
 
 STEPS = 30
 WHOLE = sequence(crossing(STEPS), STEPS, clutter_rate=0.5)
@@ -68,7 +72,7 @@ def test_going_back_to_earlier_values_computes_nothing(steps: dict[str, int]) ->
     for value, run in zip(values, runs, strict=True):
         assert_same(run, compute(WHOLE, changed(survival_probability=value)))
     assert runs[3].tracks is runs[0].tracks
-    runs[3].fused.clear()
+    runs[3].fused.append(runs[3].fused[0])
     assert len(compute(WHOLE, changed(survival_probability=0.9), cache=cache).fused) == STEPS
 
 
@@ -150,14 +154,19 @@ def test_a_failing_fusion_leaves_nothing_of_itself(monkeypatch: pytest.MonkeyPat
 
 def column(count: int, size: int) -> FusionColumn:
     """A column of about ``count`` × ``size`` numbers."""
-    return FusionColumn([np.zeros(size) for _ in range(count)], None)  # type: ignore[arg-type]
+    nothing = np.zeros((0, 0))
+    mixture = GaussianMixture(
+        np.arange(float(size)), np.zeros((size, 0)), np.zeros((size, 0, 0)), np.zeros(size, np.int8)
+    )
+    each = FusionResult(mixture, nothing, nothing, nothing, nothing)
+    return FusionColumn(Steps.of([each] * count, FusionResult), None)
 
 
 def test_memory_stays_within_its_bytes_and_the_newest_stays() -> None:
-    cache = StageCache(memory_bytes=110_000)
+    cache = StageCache(memory_bytes=120_000)
     for name in "abcdef":
         cache.keep_fusion(name, column(10, 300))
-    assert cache.used_bytes <= 110_000
+    assert cache.used_bytes <= 120_000
     assert [name for name in "abcdef" if cache.fusion(name)] == ["c", "d", "e", "f"]
     cache.fusion("c")
     cache.keep_fusion("g", column(10, 300))
@@ -167,12 +176,12 @@ def test_memory_stays_within_its_bytes_and_the_newest_stays() -> None:
     assert cache.fusion("huge") is not None, "a run's own part is always there"
     cache.keep_fusion("h", column(10, 300))
     assert cache.fusion("huge") is None
-    assert 0 < cache.used_bytes <= 110_000
+    assert 0 < cache.used_bytes <= 120_000
 
 
 def test_later_stages_push_out_no_stage_1() -> None:
     cache = StageCache(memory_bytes=1_000_000, later_bytes=60_000)
-    views = [tuple(views_at(WHOLE, 0))] * 20
+    views = Steps.of([tuple(views_at(WHOLE, 0))] * 20, ViewResult, 3)
     cache.keep_views("v", ViewColumn(views, None, costly=False), complete=False)
     alone = cache.used_bytes
     for name in "abcdef":
@@ -181,7 +190,9 @@ def test_later_stages_push_out_no_stage_1() -> None:
     assert [name for name in "abcdef" if cache.fusion(name)] == ["e", "f"]
     assert cache.views("v", frames=20, cameras=3) is not None
     cache.keep_views("w", ViewColumn(views, None, costly=False), complete=False)
-    cache.keep_views("v", ViewColumn([*views, *views], None, costly=False), complete=False)
+    cache.keep_views(
+        "v", ViewColumn(views.alike([*views, *views]), None, costly=False), complete=False
+    )
     assert [name for name in "abcdef" if cache.fusion(name)] == ["e", "f"]
     cache.clear()
     assert cache.used_bytes == 0
@@ -192,7 +203,7 @@ def test_later_stages_push_out_no_stage_1() -> None:
 
 def test_the_newest_of_each_stage_stays() -> None:
     cache = StageCache(memory_bytes=1)
-    views = [tuple(views_at(WHOLE, 0))]
+    views = Steps.of([tuple(views_at(WHOLE, 0))], ViewResult, 3)
     cache.keep_views("v", ViewColumn(views, None, costly=False), complete=False)
     for name in "abc":
         cache.keep_fusion(name, column(2, 10))
@@ -201,7 +212,7 @@ def test_the_newest_of_each_stage_stays() -> None:
     assert cache.fusion("c") is not None
 
 
-def test_weights_are_about_what_the_arrays_take() -> None:
+def test_the_bytes_of_a_column_are_those_of_its_arrays() -> None:
     run = compute(WHOLE, BOXES)
     exact = sum(
         array.nbytes
@@ -209,13 +220,14 @@ def test_weights_are_about_what_the_arrays_take() -> None:
         for array in (
             step.posterior.weights, step.posterior.means, step.posterior.covariances,
             step.posterior.labels, step.detection_probabilities, step.sources,
-            step.source_weights, step.hidden_by,
+            step.source_weights, step.hidden_by, step.associations.cameras,
+            step.associations.components, step.associations.boxes,
+            step.associations.probabilities,
         )
     )  # fmt: skip
-    assert exact < weigh(FusionColumn(run.fused, None)) < 5 * exact
+    assert 0.9 * exact < bytes_of(FusionColumn(run.fused, None)) < 1.1 * exact + 1000
     column = TrackColumn(run.tracks, run.filtered)
-    assert weigh(column) >= run.tracks.positions.nbytes + run.filtered.positions.nbytes
-    assert weigh(FusionColumn([], None)) == 0
+    assert bytes_of(column) >= run.tracks.positions.nbytes + run.filtered.positions.nbytes
 
 
 @pytest.fixture
@@ -239,7 +251,7 @@ def test_stage_1_is_there_after_a_new_start(
     # the values that made it are part of its name
     compute(filmed, with_values(LIGHT, {"colour_phd.samples": 61}), cache=StageCache(files=files))
     assert steps["single_view"] == 32
-    assert len(list((tmp_path / "stages").glob("*.npz"))) == 2
+    assert len(list((tmp_path / "stages").glob("*"))) == 2
     shutil.rmtree(tmp_path / "stages")
     third = compute(filmed, LIGHT, cache=StageCache(files=files))
     assert steps["single_view"] == 48
@@ -256,7 +268,7 @@ def test_only_what_is_complete_and_costly_goes_to_disk(filmed: Any, tmp_path: Pa
     assert len(started) == 1
     assert not (tmp_path / "stages").exists()
     started[0]()
-    assert (tmp_path / "stages" / f"{run.keys['single_view']}.npz").exists()
+    assert (tmp_path / "stages" / run.keys["single_view"]).is_dir()
     compute(filmed, LIGHT, cache=cache)
     assert len(started) == 1
 
@@ -266,7 +278,7 @@ def test_the_cache_folder_is_the_programs(
 ) -> None:
     monkeypatch.setenv("MULTIVIEW_PHD_CACHE", str(tmp_path / "own"))
     compute(filmed, LIGHT, cache=StageCache.on_disk())
-    assert len(list((tmp_path / "own" / "stages").glob("*.npz"))) == 1
+    assert len(list((tmp_path / "own" / "stages").glob("*"))) == 1
 
 
 def test_other_code_has_other_keys(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -331,5 +343,5 @@ def test_nothing_is_kept_without_a_cache(monkeypatch: pytest.MonkeyPatch) -> Non
     def forbidden(*_: object, **__: object) -> None:
         raise AssertionError
 
-    monkeypatch.setattr(stage_cache, "weigh", forbidden)
+    monkeypatch.setattr(stage_cache, "bytes_of", forbidden)
     assert compute(WHOLE, BOXES).complete

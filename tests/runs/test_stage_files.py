@@ -1,10 +1,13 @@
-"""Columns on disk: complete or not there, whoever else writes, whatever happens to the file."""
+"""Columns on disk: complete or not there, whoever else writes, whatever happens to the files."""
 
 from __future__ import annotations
 
 import multiprocessing
 import os
 import pickle
+import shutil
+import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -12,68 +15,84 @@ import numpy as np
 import pytest
 
 from tests.engine.synthetic import crossing, sequence, views_at
-from tests.runs.test_columns import same
-from tracker.runs import stage_files
-from tracker.runs.stage_files import ABANDONED_SECONDS, StageFiles, Views
+from tests.runs.test_steps import same
+from tracker.files.atomic import ABANDONED_SECONDS
+from tracker.runs.stage_files import StageFiles, Views
+from tracker.single_view.protocol import ViewResult
+from tracker.steps import Steps, steps
 
 STEPS = 12
 WHOLE = sequence(crossing(STEPS), STEPS, clutter_rate=0.5)
-VIEWS: Views = [tuple(views_at(WHOLE, frame)) for frame in range(STEPS)]
+VIEWS: Views = Steps.of([tuple(views_at(WHOLE, frame)) for frame in range(STEPS)], ViewResult, 3)
 HOW = {"frames": STEPS, "cameras": 3}
+
+
+def is_whole(found: Views | None) -> bool:
+    """Whether all steps are there as they were written."""
+    return found is not None and same(list(found), list(VIEWS))
 
 
 def test_what_is_written_is_read(tmp_path: Path) -> None:
     files = StageFiles(tmp_path / "not" / "there" / "yet")
     assert files.read("a", **HOW) is None
     assert files.write("a", VIEWS)
-    found = files.read("a", **HOW)
-    assert found is not None
-    assert same(found, VIEWS)
-    assert [path.name for path in (tmp_path / "not" / "there" / "yet").iterdir()] == ["a.npz"]
+    assert is_whole(files.read("a", **HOW))
+    assert [path.name for path in (tmp_path / "not" / "there" / "yet").iterdir()] == ["a"]
 
 
-def test_a_file_cut_short_anywhere_or_spoilt_is_not_used(
+def test_a_file_cut_short_spoilt_or_away_makes_the_column_unused(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     files = StageFiles(tmp_path)
     files.write("a", VIEWS)
-    path = tmp_path / "a.npz"
-    whole = path.read_bytes()
     rng = np.random.default_rng(0)
-    cuts = [0, 1, 30, len(whole) // 2, len(whole) - 1, *rng.integers(0, len(whole), 20).tolist()]
-    spoilt = [whole[:cut] for cut in cuts]
-    # a byte of the content of any array: its checksum tells
-    content = whole.index(b"\x93NUMPY")
-    for place in rng.integers(content, len(whole) * 3 // 4, 20).tolist():
-        spoilt.append(whole[:place] + bytes([whole[place] ^ 0xFF]) + whole[place + 1 :])
-    for data in spoilt:
-        path.write_bytes(data)
-        found = files.read("a", **HOW)
-        assert found is None or same(found, VIEWS)  # a byte that nothing depends on may differ
-        if found is None:
-            assert not path.exists()
-    assert "computed anew" in caplog.text
+    for name in sorted(path.name for path in (tmp_path / "a").iterdir()):
+        assert files.write("a", VIEWS)
+        path = tmp_path / "a" / name
+        whole = path.read_bytes()
+        place = int(rng.integers(len(whole)))
+        changed = whole[:place] + bytes([whole[place] ^ 0xFF]) + whole[place + 1 :]
+        for data in (b"", whole[: len(whole) // 2], changed, None):
+            assert files.write("a", VIEWS)
+            if data is None:
+                path.unlink()
+            else:
+                path.write_bytes(data)
+            caplog.clear()
+            assert files.read("a", **HOW) is None
+            assert "computed anew" in caplog.text
+            assert list(tmp_path.iterdir()) == []
     assert files.write("a", VIEWS)
-    assert files.read("a", **HOW) is not None
+    assert is_whole(files.read("a", **HOW))
 
 
 @pytest.mark.parametrize(
     ("key", "how"), [("b", HOW), ("a", {**HOW, "frames": 11}), ("a", {**HOW, "cameras": 2})]
 )
-def test_a_file_of_something_else_is_not_used(tmp_path: Path, key: str, how: dict) -> None:
+def test_a_column_of_something_else_is_not_used(tmp_path: Path, key: str, how: dict) -> None:
     files = StageFiles(tmp_path)
     files.write("a", VIEWS)
-    (tmp_path / "a.npz").rename(tmp_path / f"{key}.npz")
+    (tmp_path / "a").rename(tmp_path / key)
     assert files.read(key, **how) is None
 
 
-def test_a_file_of_another_format_is_not_used(
+def test_a_column_of_another_format_is_not_used(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     files = StageFiles(tmp_path)
     files.write("a", VIEWS)
-    monkeypatch.setattr(stage_files, "FORMAT", 2)
+    monkeypatch.setattr(steps, "FORMAT", 3)
     assert files.read("a", **HOW) is None
+
+
+def test_a_file_of_an_earlier_version_is_ignored(tmp_path: Path) -> None:
+    np.savez(tmp_path / "a.npz", head=np.zeros(3))
+    files = StageFiles(tmp_path)
+    assert files.read("a", **HOW) is None
+    assert files.write("a", VIEWS)
+    assert is_whole(files.read("a", **HOW))
+    StageFiles(tmp_path, limit_bytes=0).prune()
+    assert list(tmp_path.iterdir()) == []
 
 
 class _Trap:
@@ -82,25 +101,39 @@ class _Trap:
 
 
 def test_objects_are_never_unpickled(tmp_path: Path) -> None:
-    np.savez(tmp_path / "a.npz", head=np.array([_Trap()], dtype=object))
-    assert StageFiles(tmp_path).read("a", **HOW) is None
-    (tmp_path / "a.npz").write_bytes(pickle.dumps(_Trap()))
-    assert StageFiles(tmp_path).read("a", **HOW) is None
-
-
-def test_a_crash_in_the_middle_leaves_nothing_that_is_read(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def crash(*_: object) -> None:
-        raise KeyboardInterrupt  # as if the process ended here: nothing is tidied up
-
     files = StageFiles(tmp_path)
-    monkeypatch.setattr(os, "fsync", crash)
-    with pytest.raises(KeyboardInterrupt):
-        files.write("a", VIEWS)
-    monkeypatch.undo()
+    files.write("a", VIEWS)
+    for path in (tmp_path / "a").glob("*.npy"):
+        np.save(path, np.array([_Trap()], dtype=object), allow_pickle=True)
+    assert files.read("a", **HOW) is None
+    (tmp_path / "a").write_bytes(pickle.dumps(_Trap()))
+    assert files.read("a", **HOW) is None
+
+
+_KILLED = """
+import os, sys
+from pathlib import Path
+from tests.runs.test_stage_files import VIEWS
+from tracker.runs.stage_files import StageFiles
+
+count = 0
+def killed(descriptor):
+    global count
+    count += 1
+    if count == 3:
+        os._exit(0)
+
+os.fsync = killed
+StageFiles(Path(sys.argv[1])).write("a", VIEWS)
+"""
+
+
+@pytest.mark.full
+def test_a_crash_in_the_middle_leaves_nothing_that_is_read(tmp_path: Path) -> None:
+    subprocess.run([sys.executable, "-c", _KILLED, str(tmp_path)], check=True)
+    files = StageFiles(tmp_path)
     (begun,) = tmp_path.iterdir()
-    assert begun.suffix == ".part"
+    assert begun.name != "a"
     assert files.read("a", **HOW) is None
     assert files.write("a", VIEWS)
     assert begun.exists(), "it may be another process's, which is still writing"
@@ -108,6 +141,7 @@ def test_a_crash_in_the_middle_leaves_nothing_that_is_read(
     os.utime(begun, (long_ago, long_ago))
     files.prune()
     assert not begun.exists()
+    assert is_whole(files.read("a", **HOW))
 
 
 def test_a_full_or_read_only_disk_is_no_failure(
@@ -128,16 +162,24 @@ def test_a_full_or_read_only_disk_is_no_failure(
 
 def test_what_was_used_least_recently_goes_first(tmp_path: Path) -> None:
     StageFiles(tmp_path).write("a", VIEWS)
-    size = (tmp_path / "a.npz").stat().st_size
+    size = sum(path.stat().st_size for path in (tmp_path / "a", *(tmp_path / "a").iterdir()))
     files = StageFiles(tmp_path, limit_bytes=3 * size + 10)
     for number, key in enumerate("abc"):
         files.write(key, VIEWS)
-        os.utime(tmp_path / f"{key}.npz", (1000.0 + number,) * 2)
+        os.utime(tmp_path / key, (1000.0 + number,) * 2)
     assert files.read("a", **HOW) is not None  # used again
     files.write("d", VIEWS)
-    assert sorted(path.stem for path in tmp_path.iterdir()) == ["a", "c", "d"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a", "c", "d"]
     StageFiles(tmp_path, limit_bytes=0).prune()
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_column_that_is_deleted_stays_readable_where_it_was_mapped(tmp_path: Path) -> None:
+    files = StageFiles(tmp_path)
+    files.write("a", VIEWS)
+    found = files.read("a", **HOW)
+    shutil.rmtree(tmp_path / "a")
+    assert is_whole(found)
 
 
 def _write_and_read(folder: Path, seed: int) -> int:
@@ -149,10 +191,10 @@ def _write_and_read(folder: Path, seed: int) -> int:
             files.write(key, VIEWS)
         else:
             found = files.read(key, **HOW)
-            assert found is None or same(found, VIEWS)
+            assert found is None or is_whole(found)
             read += found is not None
         if rng.random() < 0.1:
-            (folder / f"{key}.npz").unlink(missing_ok=True)
+            shutil.rmtree(folder / key, ignore_errors=True)
     return read
 
 
@@ -162,4 +204,4 @@ def test_two_processes_share_a_folder(tmp_path: Path) -> None:
     with context.Pool(2) as pool:
         counts = pool.starmap(_write_and_read, [(tmp_path, seed) for seed in (1, 2)])
     assert min(counts) > 0
-    assert not list(tmp_path.glob("*.part"))
+    assert not list(tmp_path.glob(".*"))

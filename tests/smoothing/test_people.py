@@ -16,6 +16,7 @@ from tracker.smoothing.identity.people import Seen, of_chains, template_log_odds
 from tracker.smoothing.paths import Links, Paths
 from tracker.smoothing.recording import CameraBoxes
 from tracker.smoothing.smoother import Smoother
+from tracker.steps import Steps
 
 STEP = 0.2
 FIRST, SECOND = [0.9, 0.1], [0.1, 0.9]
@@ -63,11 +64,11 @@ def test_what_another_box_touches_says_nothing_of_colours() -> None:
 def test_a_camera_without_a_picture_is_not_asked_and_one_person_alone_tells_nothing() -> None:
     view = ViewResult.of_boxes(np.ones((1, 4)), np.ones(1), np.ones((1, 4)))
     of_two = replace(view, likenesses=np.array([FIRST]))
-    seen = Seen.of([(of_two, view), (view, of_two)]).likenesses
+    seen = Seen.of(Steps.of([(of_two, view), (view, of_two)], ViewResult, 2)).likenesses
     assert seen is not None
     assert [one.tolist() for one in seen] == [[FIRST, [0.5, 0.5]], [[0.5, 0.5], FIRST]]
-    assert Seen.of([(replace(view, likenesses=np.ones((1, 1))),)]).likenesses is None
-    assert Seen.of([(view,)]).likenesses is None
+    for one in (replace(view, likenesses=np.ones((1, 1))), view):
+        assert Seen.of(Steps.of([(one,)], ViewResult, 1)).likenesses is None
 
 
 def test_chains_are_the_likeliest_of_all_their_pieces() -> None:

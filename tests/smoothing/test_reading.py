@@ -17,6 +17,7 @@ from tracker.fusion.trajectories import Bounds
 from tracker.smoothing.result import Smoothed
 from tracker.smoothing.stage import read_links, read_paths
 from tracker.smoothing.tracks import names_of, tracks_of
+from tracker.steps import Steps
 
 ROOM = world.volume()
 
@@ -36,6 +37,11 @@ def walkers() -> tuple[list[FusionResult], ndarray]:
     return fused, paths
 
 
+def stored(results: list[FusionResult]) -> Steps[FusionResult]:
+    """The results as a run has them."""
+    return Steps.of(results, FusionResult)
+
+
 def test_a_path_reaches_from_the_first_box_to_the_last_report_and_through_gaps() -> None:
     fused, places = walkers()
     sources = fused[2].sources.copy()
@@ -43,7 +49,7 @@ def test_a_path_reaches_from_the_first_box_to_the_last_report_and_through_gaps()
     nobody = replace(fused[2], sources=sources)  # no box fed the first there
     for results, first in ((fused, 2), ([*fused[:2], nobody, *fused[3:]], 3)):
         tracks = trajectories.extract(results, cameras=3, extraction_threshold=0.5)
-        paths, had = read_paths(results, tracks, 6)
+        paths, had = read_paths(stored(results), tracks, 6)
         assert paths.labels.tolist() == [0, 8]
         assert paths.firsts.tolist() == [first, 1]
         assert paths.lasts.tolist() == [9, 7]
@@ -61,8 +67,8 @@ def test_links_are_the_associations_of_rows_that_there_are() -> None:
     fused, places = walkers()
     scene = known(places)
     tracks = trajectories.extract(fused, cameras=3, extraction_threshold=0.5)
-    paths, _ = read_paths(fused, tracks, 6)
-    links = read_links(fused, paths, scene.smoother().cameras)
+    paths, _ = read_paths(stored(fused), tracks, 6)
+    links = read_links(stored(fused), paths, scene.smoother().cameras)
     whose = np.array([0, 1])[paths.owners[links.rows]]
     for camera, one in enumerate(scene.seen):
         own = links.cameras == camera
@@ -73,11 +79,11 @@ def test_links_are_the_associations_of_rows_that_there_are() -> None:
     # a path that is shorter than the filter's label, or is not there, takes none of its boxes
     short = paths.firsts + np.array([1, 0])
     cut = replace(paths, firsts=short, starts=np.array([0, 6, 13]), labels=np.array([0, 99]))
-    some = read_links(fused, cut, scene.smoother().cameras)
+    some = read_links(stored(fused), cut, scene.smoother().cameras)
     assert set(cut.owners[some.rows].tolist()) == {0}
     assert sorted(set(cut.steps[some.rows].tolist())) == [3, 4, 7, 8]
     none = [replace(one, associations=Associations.none()) for one in fused]
-    assert len(read_links(none, paths, scene.smoother().cameras).rows) == 0
+    assert len(read_links(stored(none), paths, scene.smoother().cameras).rows) == 0
 
 
 def rows(places: list[tuple[int, int, float, float]]) -> Smoothed:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from collections.abc import Sequence as Many
 from dataclasses import dataclass, replace
+from itertools import islice
 from typing import Literal
 
 import numpy as np
@@ -23,6 +24,9 @@ from tracker.sequences.sequence import Room
 
 Rule = Literal["components", "boxes"]
 """Unit of extraction: a component, or all components that one box updated."""
+
+_AT_ONCE = 1024
+"""Number of steps whose results are concatenated at a time."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -116,9 +120,25 @@ def extract(
             extraction, pass the same dictionary again.
     """
     ids = {} if ids is None else ids
-    results = list(results)
-    if not results:
-        return Trajectories.empty(cameras)
+    remaining, parts = iter(results), []
+    while some := list(islice(remaining, _AT_ONCE)):
+        parts.append(
+            _extracted(some, cameras, extraction_threshold, rule, bounds, first_frame, ids)
+        )
+        first_frame += len(some)
+    return parts[0] if len(parts) == 1 else concatenate(parts, cameras)
+
+
+def _extracted(
+    results: list[FusionResult],
+    cameras: int,
+    extraction_threshold: float,
+    rule: Rule,
+    bounds: Bounds | None,
+    first_frame: int,
+    ids: dict[int, int],
+) -> Trajectories:
+    """Extract the targets of some steps, with the arguments of :func:`extract`."""
     if rule == "boxes":
         gathered = [by_boxes(result) for result in results]
     else:
@@ -205,6 +225,38 @@ def by_boxes(result: FusionResult) -> tuple[GaussianMixture, Int[ndarray, " K"]]
         posterior.weights, posterior.means, posterior.covariances, group, count
     )
     return GaussianMixture.of(merged, posterior.labels.take(leaders)), leaders
+
+
+class Growing:
+    """Tracks to which rows are appended without copying the earlier ones each time.
+
+    What was returned before never changes: it consists of the first rows of the same arrays.
+    """
+
+    def __init__(self, tracks: Trajectories) -> None:
+        """Begin with some tracks."""
+        self._tracks = self._room = tracks
+
+    def append(self, more: Trajectories) -> Trajectories:
+        """Append the tracks of later steps, and return all."""
+        count, total = len(self._tracks), len(self._tracks) + len(more)
+        if total > len(self._room):
+            self._room = Trajectories(
+                *(_longer(getattr(self._tracks, name), total) for name in Trajectories.__slots__)
+            )
+        for name in Trajectories.__slots__:
+            getattr(self._room, name)[count:total] = getattr(more, name)
+        self._tracks = Trajectories(
+            *(getattr(self._room, name)[:total] for name in Trajectories.__slots__)
+        )
+        return self._tracks
+
+
+def _longer(rows: ndarray, least: int) -> ndarray:
+    """The rows, and room for more of them."""
+    found = np.empty((max(1024, least + least // 2), *rows.shape[1:]), rows.dtype)
+    found[: len(rows)] = rows
+    return found
 
 
 def concatenate(parts: Iterable[Trajectories], cameras: int) -> Trajectories:

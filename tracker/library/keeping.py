@@ -118,12 +118,12 @@ def stored_tracks(run: Run) -> KeptTracks:
     """Return the part of a run's result that the library stores."""
     tracks = run.tracks
     probabilities = np.zeros(tracks.seen.shape)
-    for step in range(run.done):
-        rows = tracks.at(step)
-        components = tracks.components[rows]
-        own = components >= 0  # rows by which smoothing fills gaps have no component
-        known = run.fused[step].detection_probabilities
-        probabilities[rows][own] = known[:, components[own]].T
+    # rows by which smoothing fills gaps have no component
+    own = np.flatnonzero((tracks.components >= 0) & (tracks.frames < run.done))
+    if len(own):
+        probabilities[own] = run.fused.take(
+            "detection_probabilities", tracks.frames[own], tracks.components[own]
+        )
     return KeptTracks(tracks, probabilities)
 
 
@@ -254,12 +254,10 @@ def run_for_display(sequence: Sequence, result: Result, *, key: str) -> Run:
     covariances = np.zeros((rows.stop, 3, 3))
     covariances[:, [0, 1, 2], [0, 1, 2]] = run.tracks.sigmas**2
     probabilities = result.kept.detection_probabilities[rows].T
-    run.fused = [
-        _posterior(run, slice(first, last), covariances, probabilities)
-        for first, last in itertools.pairwise(ends)
-    ]
     nothing = ViewResult.of_boxes(np.zeros((0, 4)), np.zeros(0), np.zeros((0, 4)))
-    run.views = [(nothing,) * cameras] * steps
+    for first, last in itertools.pairwise(ends):
+        run.fused.append(_posterior(run, slice(first, last), covariances, probabilities))
+        run.views.append((nothing,) * cameras)
     run.done = steps
     run.finished = run.complete
     return run

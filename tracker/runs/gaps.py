@@ -46,7 +46,7 @@ def gaps(run: Run) -> list[Gap]:
         if not view.has_pictures:
             continue
         asked = view.frames_due(steps)
-        blind = np.fromiter((step[number].blind for step in run.views), bool, steps)
+        blind = np.fromiter(run.views.values("blind", number, last=steps), bool, steps)
         missing = asked & blind
         if missing.any():
             lost = tuple(np.flatnonzero(missing & view.pictures_expected(steps)).tolist())

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from tracker.runs.run import Run
 from tracker.single_view.dropped import CANDIDATES, DROPPED
-from tracker.single_view.protocol import SHAKE, TRUST, UNCERTAINTY, ViewResult
+from tracker.single_view.protocol import SHAKE, TRUST, UNCERTAINTY
 
 _HALF = 0.5
 """Trust in the foreground below which people are not detected by it; uncertainty of the
@@ -59,28 +59,34 @@ def count_gates(run: Run) -> list[Gates]:
     """Average the counts of every camera; cameras whose method reports none are left out."""
     gates = []
     for number, view in enumerate(run.sequence.views):
-        counted = [step[number] for step in run.views if CANDIDATES in step[number].information]
+        boxes = run.views.column("boxes", number).counts.tolist()
+        counted = [
+            (information, count)
+            for information, count in zip(
+                run.views.values("information", number), boxes, strict=True
+            )
+            if CANDIDATES in information
+        ]
         if not counted:
             continue
-        names = dict.fromkeys(
-            name for result in counted for name in result.information if name.startswith(DROPPED)
-        )
+        told = [information for information, _ in counted]
+        names = dict.fromkeys(name for one in told for name in one if name.startswith(DROPPED))
         gates.append(
             Gates(
                 camera=view.camera.name,
                 pictures=len(counted),
-                candidates=_mean(counted, CANDIDATES),
-                dropped={name.removeprefix(DROPPED): _mean(counted, name) for name in names},
-                passed=sum(len(result.boxes) for result in counted) / len(counted),
-                trust=_mean(counted, TRUST, 1.0),
-                uncertainty=_mean(counted, UNCERTAINTY),
+                candidates=_mean(told, CANDIDATES),
+                dropped={name.removeprefix(DROPPED): _mean(told, name) for name in names},
+                passed=sum(count for _, count in counted) / len(counted),
+                trust=_mean(told, TRUST, 1.0),
+                uncertainty=_mean(told, UNCERTAINTY),
             )
         )
     return gates
 
 
-def _mean(results: list[ViewResult], name: str, otherwise: float = 0.0) -> float:
-    return sum(result.information.get(name, otherwise) for result in results) / len(results)
+def _mean(told: list[dict[str, float]], name: str, otherwise: float = 0.0) -> float:
+    return sum(one.get(name, otherwise) for one in told) / len(told)
 
 
 def notices(run: Run) -> list[str]:
@@ -115,7 +121,8 @@ def notices(run: Run) -> list[str]:
             f"still is found with a template; {_EMPTY}"
         )
     for number, view in enumerate(run.sequence.views):
-        shake = max((step[number].information.get(SHAKE, 0.0) for step in run.views), default=0.0)
+        every = run.views.values("information", number)
+        shake = max((information.get(SHAKE, 0.0) for information in every), default=0.0)
         if shake > 0.0:
             found.append(
                 f'camera "{view.camera.name}" shakes by {shake:.1f} pixels: its pictures are held '

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from tracker.runs.run import Run
 
 
@@ -30,20 +32,17 @@ class StageCounts:
 
 def count_stages(run: Run) -> StageCounts:
     """Count the output of each stage of a run."""
-    labels: set[int] = set()
-    surest = 0.0
-    for result in run.fused:
-        labels.update(result.posterior.labels.tolist())
-        if result.posterior.size:
-            surest = max(surest, float(result.posterior.weights.max()))
-    steps = run.views
+    cameras = range(len(run.sequence.views))
+    passed = np.zeros((len(cameras), len(run.views)), dtype=np.int64)
+    for camera in cameras:
+        passed[camera] = run.views.column("boxes", camera).counts
     return StageCounts(
-        frames=sum(not view.blind for step in steps for view in step),
-        found=sum(len(view.measurements) for step in steps for view in step),
-        passed=sum(len(view.boxes) for step in steps for view in step),
-        together=sum(sum(len(view.boxes) > 0 for view in step) > 1 for step in steps),
-        begun=len(labels),
-        surest=surest,
+        frames=sum(not blind for camera in cameras for blind in run.views.values("blind", camera)),
+        found=sum(len(run.views.column("measurements", camera).values) for camera in cameras),
+        passed=int(passed.sum()),
+        together=int(((passed > 0).sum(axis=0) > 1).sum()),
+        begun=len(np.unique(run.fused.column("posterior.labels").values)),
+        surest=float(run.fused.column("posterior.weights").values.max(initial=0.0)),
         tracks=len(set(run.tracks.ids.tolist())),
     )
 

@@ -13,7 +13,7 @@ from tracker.corrections.kinds import leeway
 from tracker.corrections.outcomes import outcomes
 from tracker.fusion import trajectories as tracks_stage
 from tracker.fusion.place_constraints import constraints_by_step
-from tracker.fusion.trajectories import Bounds, Trajectories, corrected
+from tracker.fusion.trajectories import Bounds, Growing, Trajectories, corrected
 from tracker.parameters import RunParameters, Stage
 from tracker.runs.fitting import default_parameters
 from tracker.runs.gaps import where_to_keep
@@ -129,6 +129,7 @@ class _Reporter:
         self._first = len(run.fused)
         self._begin = self._last_report = time.perf_counter()
         self._preparing = 0.0
+        self._growing: Growing | None = None
         self.ids: dict[int, int] = {}
         self._stage: Stage = "single_view"
         if len(run.views) >= total:
@@ -147,9 +148,8 @@ class _Reporter:
         """Extract the tracks of all fused steps, and report them."""
         run = self._run
         if run.done < len(run.fused):
-            run.tracks = run.filtered = tracks_stage.concatenate(
-                [run.filtered, self._extract()], len(run.sequence.views)
-            )
+            self._growing = self._growing or Growing(run.filtered)
+            run.tracks = run.filtered = self._growing.append(self._extract())
             run.done = len(run.fused)
         if self._meanwhile is not None and run.tracks is run.filtered:
             run.tracks = self._meanwhile
@@ -240,7 +240,7 @@ def _smooth(
     check()
     if run.smoothed is None:
         method = smoothing.create(run.sequence, run.parameters)
-        views, fused = run.views[:total], run.fused[:total]
+        views, fused = run.views.before(total), run.fused.before(total)
         if run.corrections and _accepts(method.smooth, "corrections"):
             more = {}
             if cache and total == run.sequence.frames and _accepts(method.smooth, "earlier"):
@@ -293,10 +293,10 @@ def _adopt(run: Run, previous: Run | None) -> None:
     if previous is None:
         return
     if previous.keys["single_view"] == run.keys["single_view"]:
-        run.views, run.view_states = list(previous.views), previous.view_states
+        run.views, run.view_states = previous.views.shared(), previous.view_states
         run.costly = previous.costly
     if previous.keys["fusion"] == run.keys["fusion"]:
-        run.fused, run.fusion_state = list(previous.fused), previous.fusion_state
+        run.fused, run.fusion_state = previous.fused.shared(), previous.fusion_state
     if previous.keys["smoothing"] == run.keys["smoothing"] and previous.complete:
         run.smoothed = previous.smoothed
 
@@ -306,11 +306,11 @@ def _take(run: Run, cache: StageCache) -> None:
     frames, cameras = run.sequence.frames, len(run.sequence.views)
     views = cache.views(run.keys["single_view"], frames=frames, cameras=cameras)
     if views is not None and len(views.steps) > len(run.views):
-        run.views, run.view_states = list(views.steps), views.states
+        run.views, run.view_states = views.steps.shared(), views.states
         run.costly = views.costly
     fused = cache.fusion(run.keys["fusion"])
     if fused is not None and len(fused.steps) > len(run.fused):
-        run.fused, run.fusion_state = list(fused.steps), fused.state
+        run.fused, run.fusion_state = fused.steps.shared(), fused.state
     if len(run.fused) < frames:
         return
     run.smoothed = run.smoothed or cache.smoothed(run.keys["smoothing"])

@@ -18,6 +18,7 @@ from tracker.runs.numbers_version import method_version, numbers_version
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult
 from tracker.smoothing import Smoothed
+from tracker.steps import Steps
 
 
 class Cancelled(Exception):
@@ -71,9 +72,9 @@ class Run:
     """The seed of the random numbers."""
     keys: dict[Stage, str]
     """The cache key of each stage."""
-    views: list[tuple[ViewResult, ...]] = field(default_factory=list)
+    views: Steps[tuple[ViewResult, ...]] = field(init=False)
     """The results of stage 1 of each step, one for each camera."""
-    fused: list[FusionResult] = field(default_factory=list)
+    fused: Steps[FusionResult] = field(init=False)
     """The result of stage 2 of each step."""
     tracks: Trajectories = field(init=False)
     """The tracks of the steps below :attr:`done`: those of the filter while it runs, then the
@@ -102,6 +103,8 @@ class Run:
     final and figures computed from them are the run's."""
 
     def __post_init__(self) -> None:
+        self.views = Steps(ViewResult, len(self.sequence.views))
+        self.fused = Steps(FusionResult)
         self.tracks = self.filtered = Trajectories.empty(len(self.sequence.views))
 
     @property

@@ -2,7 +2,7 @@
 
 The most recently used results are in memory, up to a number of bytes; those of stage 1, which
 decodes pictures, are also on disk. A cached column is never modified: a run that takes it over
-copies the list.
+goes on from a copy that shares its blocks.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 import dataclasses
 import threading
 from collections import OrderedDict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,6 +23,7 @@ from tracker.parameters import Stage
 from tracker.runs.stage_files import StageFiles
 from tracker.single_view.protocol import ViewResult
 from tracker.smoothing import Smoothed
+from tracker.steps import Steps
 
 MEMORY_BYTES = 512 << 20
 """Memory for the columns of all runs and sequences together, bytes."""
@@ -30,15 +31,12 @@ MEMORY_BYTES = 512 << 20
 _OBJECT_BYTES = 112
 """Overhead of an array or another object, bytes."""
 
-_SAMPLED = 32
-"""The number of steps of a column whose memory is measured, as a sample of all."""
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ViewColumn:
     """The results of stage 1 of a run, from step 0 on."""
 
-    steps: Sequence[tuple[ViewResult, ...]]
+    steps: Steps[tuple[ViewResult, ...]]
     """The results of each step, one for each camera."""
     states: tuple[Any, ...] | None
     """The state of each camera's method after the last step, from which the stage can be
@@ -51,7 +49,7 @@ class ViewColumn:
 class FusionColumn:
     """The results of stage 2 of a run, from step 0 on."""
 
-    steps: Sequence[FusionResult]
+    steps: Steps[FusionResult]
     """The result of each step."""
     state: Any
     """The state of the filter after the last step."""
@@ -195,7 +193,7 @@ class StageCache:
 
     def _put(self, stage: Stage, key: str, column: Any) -> None:
         """Store a column, and remove older ones until the limits of memory are kept."""
-        weight = weigh(column)
+        weight = bytes_of(column)
         with self._lock:
             self._take_out((stage, key))
             self._kept[stage, key] = column, weight
@@ -215,27 +213,27 @@ class StageCache:
             self._later += weight
 
 
-def weigh(column: object) -> int:
-    """Estimate the memory of a column, bytes; for results of steps from a sample of them."""
-    if not isinstance(column, ViewColumn | FusionColumn):
-        return _weight(column, set())
-    every = max(1, len(column.steps) // _SAMPLED)
-    sampled = [_weight(step, set()) for step in column.steps[::every]]
-    return round(sum(sampled) * len(column.steps) / max(1, len(sampled)))
+def bytes_of(value: object) -> int:
+    """Return the memory of a column: of all its arrays, each once, and about that of its objects.
+
+    Args:
+        value: A column, or another result of arrays, tuples and dataclasses.
+    """
+    return _bytes_of(value, set())
 
 
-def _weight(value: Any, seen: set[int]) -> int:
+def _bytes_of(value: Any, seen: set[int]) -> int:
     """Return the size of a value in memory, bytes, without the objects that are counted already."""
     if id(value) in seen or value is None:
         return 0
     seen.add(id(value))
-    if isinstance(value, ndarray):
+    if isinstance(value, ndarray | Steps):
         return int(value.nbytes) + _OBJECT_BYTES
     if isinstance(value, tuple | list):
-        return _OBJECT_BYTES + sum(_weight(one, seen) for one in value)
+        return _OBJECT_BYTES + sum(_bytes_of(one, seen) for one in value)
     if isinstance(value, dict):
         return _OBJECT_BYTES * (1 + len(value))
     if dataclasses.is_dataclass(value):
         fields = (getattr(value, field.name) for field in dataclasses.fields(value))
-        return _OBJECT_BYTES + sum(_weight(one, seen) for one in fields)
+        return _OBJECT_BYTES + sum(_bytes_of(one, seen) for one in fields)
     return 32

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence as Many
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +11,7 @@ from numpy import ndarray
 from tracker.fusion.target_model import TargetModel
 from tracker.kernels.gating import Measurements
 from tracker.single_view.protocol import ViewResult
+from tracker.steps import Steps
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,21 +30,22 @@ class CameraBoxes:
     """Factor on κ, :attr:`tracker.single_view.protocol.ViewResult.clutter_factors`."""
 
     @staticmethod
-    def of(views: Many[ViewResult], model: TargetModel, factor: float) -> CameraBoxes:
+    def of(
+        views: Steps[tuple[ViewResult, ...]], camera: int, model: TargetModel, factor: float
+    ) -> CameraBoxes:
         """Collect the boxes of all steps of one camera.
 
         Args:
-            views: The result of stage 1 for each step.
+            views: The results of stage 1 for each step.
+            camera: Index of the camera.
             model: The measurement model of a target.
             factor: Factor on the standard deviations of the boxes.
         """
-        counts = [len(view.boxes) for view in views]
-        boxes = np.concatenate([np.zeros((0, 4)), *(view.boxes for view in views)])
-        sigmas = np.concatenate([np.zeros((0, 4)), *(view.sigmas for view in views)])
-        measurements = model.measured_boxes(boxes, sigmas, factor)
-        blind = np.array([view.blind for view in views], dtype=bool)
-        starts = np.concatenate([[0], np.cumsum(counts, dtype=np.int64)])
+        found, sigmas = views.column("boxes", camera), views.column("sigmas", camera)
+        boxes = found.values.reshape(-1, 4)
+        measurements = model.measured_boxes(boxes, sigmas.values.reshape(-1, 4), factor)
+        blind = np.fromiter(views.values("blind", camera), bool, len(views))
         factors = np.ones(len(boxes))
-        if any(len(view.log_ratios) for view in views):
-            factors = np.concatenate([view.clutter_factors for view in views])
-        return CameraBoxes(starts, blind, measurements, boxes, factors)
+        ratios = views.column("log_ratios", camera)
+        factors[np.repeat(ratios.counts > 0, found.counts)] = np.exp(-ratios.values)
+        return CameraBoxes(found.starts, blind, measurements, boxes, factors)

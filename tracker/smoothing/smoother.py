@@ -43,6 +43,7 @@ from tracker.smoothing.calibration import (
 from tracker.smoothing.paths import Links, Paths
 from tracker.smoothing.place_constraints import PlaceMeasurements
 from tracker.smoothing.recording import CameraBoxes
+from tracker.steps import Steps
 
 _T = TypeVar("_T")
 
@@ -146,9 +147,10 @@ class Smoother:
         self.parameters = parameters
         self._here = [one for one in corrections if one.kind == "here"]
         self.model = model = FusionModel(sequence, parameters)
-        self.frames = len(views)
+        seen = Steps.of(views, ViewResult, len(model.cameras))
+        self.frames = len(seen)
         self.cameras = [
-            CameraBoxes.of([step[c] for step in views], model.target, parameters.measurement_sigma)
+            CameraBoxes.of(seen, c, model.target, parameters.measurement_sigma)
             for c in range(len(model.cameras))
         ]
         motion = model.motion

@@ -29,12 +29,16 @@ from tracker.smoothing.protocol import EmptyStore, ResultStore
 from tracker.smoothing.recording import CameraBoxes
 from tracker.smoothing.result import Decision, Joined, Smoothed
 from tracker.smoothing.smoother import BoxAssociations, Fitted, Smoother
+from tracker.steps import Steps
 
 _SEEN = 0.5
 """Association probability above which a camera counts as detecting a track."""
 
 _WIDE = 1.0
 """Initial variance of a state in a gap of the filter's track, m² and (m/s)²."""
+
+_AT_ONCE = 1024
+"""Number of steps whose associations are converted at a time."""
 
 
 class _Decided(NamedTuple):
@@ -106,24 +110,26 @@ class Positions:
         """Estimate the tracks of some steps from step 0 on, each from the boxes of all steps."""
         p, earlier = self._parameters.smoothing, earlier or EmptyStore()
         used = self._parameters.method("single_view").used(self._parameters)
+        seen = Steps.of(views, ViewResult, len(self._sequence.views))
+        results = Steps.of(fused, FusionResult)
         smoother = Smoother(
             self._sequence,
             self._parameters.fusion,
-            views,
+            seen,
             corrections,
             learning=p.learning,
             several_boxes=used.finds_people,
         )
         dimension, cameras = smoother.model.motion.dimension, len(smoother.cameras)
-        tracks = trajectories.extract(fused, cameras=cameras, extraction_threshold=CONFIRMED)
+        tracks = trajectories.extract(results, cameras=cameras, extraction_threshold=CONFIRMED)
         if not len(tracks):
             return Smoothed.empty(dimension, cameras)
-        paths, had = read_paths(fused, tracks, dimension)
+        paths, had = read_paths(results, tracks, dimension)
         existences = np.where(had, 1.0, lifetimes.UNSURE)
-        links = read_links(fused, paths, smoother.cameras)
+        links = read_links(results, paths, smoother.cameras)
         check()
         paths, existences, links, learnt, decided = self._named(
-            smoother, paths, existences, links, views, check, corrections, earlier
+            smoother, paths, existences, links, seen, check, corrections, earlier
         )
         known: Smoothed | None = earlier.get(f"smoothed-{decided.key}") if decided.key else None
         if known is not None:
@@ -143,7 +149,7 @@ class Positions:
         paths: Paths,
         existences: Float[ndarray, " N"],
         links: Links,
-        views: Many[tuple[ViewResult, ...]],
+        views: Steps[tuple[ViewResult, ...]],
         check: Callable[[], None],
         corrections: Many[Correction],
         earlier: ResultStore,
@@ -166,7 +172,7 @@ class Identities(Positions):
         paths: Paths,
         existences: Float[ndarray, " N"],
         links: Links,
-        views: Many[tuple[ViewResult, ...]],
+        views: Steps[tuple[ViewResult, ...]],
         check: Callable[[], None],
         corrections: Many[Correction],
         earlier: ResultStore,
@@ -332,7 +338,7 @@ def _outside(paths: Paths, limits: Mapping[int, tuple[int, int]]) -> Bool[ndarra
 
 
 def read_paths(
-    fused: Many[FusionResult], tracks: Trajectories, dimension: int
+    fused: Steps[FusionResult], tracks: Trajectories, dimension: int
 ) -> tuple[Paths, Bool[ndarray, " N"]]:
     """Convert the fusion's tracks to paths, one a label, from its first box to its last report.
 
@@ -350,24 +356,20 @@ def read_paths(
     of_label, frames = tracks.labels[order], tracks.frames[order]
     labels, begins = np.unique(of_label, return_index=True)
     ends = np.append(begins[1:], len(order))
-    earlier = _before_their_report(fused, dict(zip(labels.tolist(), frames[begins], strict=True)))
+    earlier = _before_their_report(fused, labels, frames[begins])
     firsts, states, covariances, had = [], [], [], []
     for label, begin, end in zip(labels.tolist(), begins, ends, strict=True):
-        known = [*earlier.get(label, ()), *zip(
-            frames[begin:end].tolist(), tracks.components[order[begin:end]].tolist(), strict=True
-        )]  # fmt: skip
-        steps = np.array([step for step, _ in known])
-        means = np.array([fused[step].posterior.means[component] for step, component in known])
-        spread = np.array(
-            [fused[step].posterior.covariances[component] for step, component in known]
-        )
+        before = np.array(earlier.get(label, ()), dtype=np.int64).reshape(-1, 2)
+        steps = np.concatenate([before[:, 0], frames[begin:end]])
+        components = np.concatenate([before[:, 1], tracks.components[order[begin:end]]])
+        means = fused.take("posterior.means", steps, components)
         first, last = steps[0], steps[-1]
         every = np.arange(first, last + 1)
         filled = np.stack(
             [np.interp(every, steps, means[:, axis]) for axis in range(dimension)], axis=1
         )
         wide = np.tile(_WIDE * np.eye(dimension), (len(every), 1, 1))
-        wide[steps - first] = spread
+        wide[steps - first] = fused.take("posterior.covariances", steps, components)
         own = np.zeros(len(every), dtype=bool)
         own[steps - first] = True
         had.append(own)
@@ -379,44 +381,64 @@ def read_paths(
 
 
 def _before_their_report(
-    fused: Many[FusionResult], reported: dict[int, int]
+    fused: Steps[FusionResult], labels: Int[ndarray, " n"], reported: Int[ndarray, " n"]
 ) -> dict[int, list[tuple[int, int]]]:
     """List the steps before each label's first report at which a box updated it, with its
-    component."""
+    component.
+
+    Args:
+        fused: The result of stage 2 for each step.
+        labels: The n labels that are reported, ascending.
+        reported: The step of each label's first report.
+    """
     found: dict[int, list[tuple[int, int]]] = {}
-    for step, result in enumerate(fused):
-        fed = np.flatnonzero((result.sources >= 0).any(axis=0))
-        there: set[int] = set()
-        labels = result.posterior.labels[fed].tolist()
-        for component, label in zip(fed.tolist(), labels, strict=True):
-            if label not in there and step < reported.get(label, -1):
-                there.add(label)
-                found.setdefault(label, []).append((step, component))
+    if not len(labels):
+        return found
+    sources, own = fused.column("sources"), fused.column("posterior.labels")
+    steps = sources.steps
+    index = np.minimum(np.searchsorted(labels, own.values), len(labels) - 1)
+    early = (labels[index] == own.values) & (steps < reported[index])
+    rows = np.flatnonzero(early & (sources.values >= 0).any(axis=1))
+    # of several components with one label the first
+    _, first = np.unique(np.stack([steps[rows], index[rows]]), axis=1, return_index=True)
+    for row in rows[np.sort(first)].tolist():
+        step = int(steps[row])
+        place = step, row - int(sources.starts[step])
+        found.setdefault(int(own.values[row]), []).append(place)
     return found
 
 
-def read_links(fused: Many[FusionResult], paths: Paths, cameras: Many[CameraBoxes]) -> Links:
+def read_links(fused: Steps[FusionResult], paths: Paths, cameras: Many[CameraBoxes]) -> Links:
     """Convert the association probabilities of the fusion to links of the rows of the paths."""
-    row_of = {label: i for i, label in enumerate(paths.labels.tolist())}
-    lasts = paths.lasts
-    found: list[tuple[ndarray, ...]] = []
-    for step, result in enumerate(fused):
-        associations = result.associations
-        if not len(associations.cameras):
-            continue
-        of_component = np.array(
-            [row_of.get(label, -1) for label in result.posterior.labels.tolist()], dtype=np.int64
-        )
-        path = of_component[associations.components]
-        alive = (path >= 0) & (paths.firsts[path] <= step) & (step <= lasts[path])
-        path, which = path[alive], associations.cameras[alive].astype(np.int64)
-        begins = np.array([camera.starts[step] for camera in cameras])
-        found.append(
-            (
-                which,
-                paths.starts[path] + step - paths.firsts[path],
-                begins[which] + associations.boxes[alive],
-                associations.probabilities[alive].astype(float),
-            )
-        )
-    return Links.joined([Links(*part) for part in found])
+    parts = range(0, len(fused), _AT_ONCE)
+    return Links.joined([_links_of(fused, first, paths, cameras) for first in parts])
+
+
+def _links_of(
+    fused: Steps[FusionResult], begin: int, paths: Paths, cameras: Many[CameraBoxes]
+) -> Links:
+    """The links of some steps, from ``begin`` on."""
+    end = begin + _AT_ONCE
+    of_pair, components, boxes, probabilities = (
+        fused.column(f"associations.{name}", first=begin, last=end)
+        for name in ("cameras", "components", "boxes", "probabilities")
+    )
+    labels = fused.column("posterior.labels", first=begin, last=end)
+    if not len(of_pair.values) or not len(paths.labels):
+        return Links.joined([])
+    within = of_pair.steps
+    named = labels.values[labels.starts[within] + components.values]
+    order = np.argsort(paths.labels, kind="stable")
+    place = np.searchsorted(paths.labels, named, side="right", sorter=order) - 1
+    path = order[np.maximum(place, 0)]
+    step = begin + within
+    alive = (paths.labels[path] == named) & (paths.firsts[path] <= step)
+    alive &= step <= paths.lasts[path]
+    path, step, which = path[alive], step[alive], of_pair.values[alive].astype(np.int64)
+    starts = np.stack([camera.starts for camera in cameras])
+    return Links(
+        which,
+        paths.starts[path] + step - paths.firsts[path],
+        starts[which, step] + boxes.values[alive],
+        probabilities.values[alive].astype(float),
+    )

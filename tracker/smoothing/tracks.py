@@ -11,6 +11,7 @@ from numpy import ndarray
 from tracker.fusion.protocol import FusionResult
 from tracker.fusion.trajectories import Bounds, Trajectories
 from tracker.smoothing.result import Smoothed
+from tracker.steps import Steps
 
 
 def tracks_of(
@@ -84,20 +85,23 @@ def _components(
     components = np.full(len(rows), -1, dtype=np.int64)
     labels = np.full(len(rows), -1, dtype=np.int64)
     frames = smoothed.frames[rows]
-    bounds = np.searchsorted(frames, np.arange(len(fused) + 1))
-    for step, result in enumerate(fused):
+    column = Steps.of(fused, FusionResult).column
+    weights, means = column("posterior.weights"), column("posterior.means")
+    own_labels = column("posterior.labels")
+    bounds = np.searchsorted(frames, np.arange(len(weights) + 1))
+    for step in range(len(weights)):
         own = slice(int(bounds[step]), int(bounds[step + 1]))
-        sure = np.flatnonzero(result.posterior.weights > _FAINT)
+        sure = np.flatnonzero(weights[step] > _FAINT)
         if own.stop == own.start or not len(sure):
             continue
-        gaps = smoothed.means[rows[own], None, :3] - result.posterior.means[None, sure, :3]
+        gaps = smoothed.means[rows[own], None, :3] - means[step][None, sure, :3]
         distances = (gaps**2).sum(axis=2)
         best = distances.argmin(axis=1)
         good = distances[np.arange(len(best)), best] <= near * near
         # a component belongs to one track: the nearest of those near it
         closest = distances.argmin(axis=0)[best] == np.arange(len(best))
         components[own] = np.where(good & closest, sure[best], -1)
-        labels[own] = np.where(good & closest, result.posterior.labels[sure[best]], -1)
+        labels[own] = np.where(good & closest, own_labels[step][sure[best]], -1)
     return components, labels
 
 

@@ -54,10 +54,9 @@ def detect(command: Detect) -> None:
     counts = []
     files = file_names([camera.name for camera in sequence.cameras])
     for number, (camera, file) in enumerate(zip(sequence.cameras, files, strict=True)):
-        views = [step[number] for step in run.views]
-        boxes = np.concatenate([Boxes(view.measurements).left_top for view in views])
-        scores = np.concatenate([view.measurement_scores for view in views])
-        frames = np.repeat(np.arange(len(views)), [len(view.measurements) for view in views])
+        found = run.views.column("measurements", number)
+        boxes, frames = Boxes(found.values).left_top, found.steps
+        scores = run.views.column("measurement_scores", number).values
         with replacing(command.output / f"{file}.csv") as begun:
             _write(begun, frames, boxes, scores)
         counts.append(f"{camera.name} {len(boxes)}")

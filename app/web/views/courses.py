@@ -81,9 +81,10 @@ def _detection(life: _Life) -> Float[ndarray, "C K"]:
     run = life.run
     found = np.full((len(run.sequence.views), len(life.rows)), np.nan)
     components = run.tracks.components[life.rows]
-    for k in np.flatnonzero((components >= 0) & (life.frames < len(run.fused))).tolist():
-        result = run.fused[int(life.frames[k])]
-        found[:, k] = result.detection_probabilities[:, components[k]]
+    own = np.flatnonzero((components >= 0) & (life.frames < len(run.fused)))
+    if len(own):
+        rows = run.fused.take("detection_probabilities", life.frames[own], components[own])
+        found[:, own] = rows.T
     return found
 
 

@@ -196,9 +196,9 @@ class Timelines:
         left_out = 0
         if run is not None:
             done = run.done
-            for result in run.fused[len(self._cardinality) : done]:
-                self._cardinality.append(result.posterior.cardinality)
-                weights = result.posterior.weights
+            known = len(self._cardinality)
+            for weights in run.fused.values("posterior.weights", first=known, last=done):
+                self._cardinality.append(float(weights.sum()))
                 self._deviation.append(deviation(weights, run.parameters.fusion_method))
             tracks, counted = run.tracks, self._counted
             # the smoothed tracks take the place of the filter's of as many steps

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,6 +15,12 @@ from tracker.filters.gaussian_mixture import gate_distance
 from tracker.fusion.target_model import SIZES
 from tracker.runs import pipeline
 from tracker.sequences.reader import read_sequence
+from tracker.steps import Steps
+
+
+def changed(results: Steps[Any], step: int, result: Any) -> Steps[Any]:
+    """The results of a stage, of one step another one."""
+    return results.alike([*results[:step], result, *results[step + 1 :]])
 
 
 def test_a_detection_is_the_tracks_that_it_feeds_and_any_other_one_is_nobodys(
@@ -30,14 +37,12 @@ def test_a_detection_is_the_tracks_that_it_feeds_and_any_other_one_is_nobodys(
     # a false one far away from everybody
     view, *others = run.views[step]
     nobody = np.array([[5.0, 5.0, 3.0, 4.0]])
-    run.views[step] = (
-        replace(
-            view,
-            measurements=np.concatenate([view.measurements, nobody]),
-            measurement_scores=np.append(view.measurement_scores, 0.4),
-        ),
-        *others,
+    more = replace(
+        view,
+        measurements=np.concatenate([view.measurements, nobody]),
+        measurement_scores=np.append(view.measurement_scores, 0.4),
     )
+    run.views = changed(run.views, step, (more, *others))
     last = step_of(sequence, run, step).cameras[0].measurements[-1]
     assert last.track is None
     assert last.nearest in {track.id for track in before.tracks}
@@ -55,10 +60,9 @@ def test_a_detection_is_the_tracks_that_it_feeds_and_any_other_one_is_nobodys(
     result = run.fused[step]
     sources = result.sources.copy()
     sources[0] = -1
-    run.fused[step] = replace(result, sources=sources)
-    run.views[step] = (
-        replace(view, measurements=near, measurement_scores=np.ones(1)), *others
-    )  # fmt: skip
+    run.fused = changed(run.fused, step, replace(result, sources=sources))
+    only_near = replace(view, measurements=near, measurement_scores=np.ones(1))
+    run.views = changed(run.views, step, (only_near, *others))
     (only,) = step_of(sequence, run, step).cameras[0].measurements
     assert only.track is None
     assert only.nearest == there.id

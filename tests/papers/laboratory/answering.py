@@ -152,7 +152,7 @@ def session(
     run = pipeline.compute(sequence, parameters, cache=cache)
     other: Trajectories | None = None
     if backwards:
-        given = Common(sequence, parameters, run.seed, tuple(run.views))
+        given = Common(sequence, parameters, run.seed, run.views)
         other = track_variant(given, Variant(backwards=True))
     told: tuple[Correction, ...] = ()
     skipped: set[str] = set()

@@ -145,7 +145,7 @@ def fused_again(
     sequence = with_cameras(run.sequence, cameras)
     keys = pipeline.stage_keys(sequence, parameters, run.seed)
     seen = Run(sequence, parameters, run.seed, keys)
-    seen.views = [tuple(views[c] for c in cameras) for views in run.views]
+    seen.views = run.views.parts(cameras)
     done = pipeline.compute(
         sequence, parameters, seed=run.seed, steps=len(run.views), previous=seen
     )

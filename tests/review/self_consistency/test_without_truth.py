@@ -123,14 +123,15 @@ def test_nobody_anywhere_is_agreement() -> None:
 def test_boxes_elsewhere_are_a_veto() -> None:
     run = pipeline.compute(random_room(5, cameras=3, people=3, steps=40), BOXES)
     camera, half = run.sequence.cameras[0], run.sequence.target_half_extents
-    own = overlap(run.tracks, camera, half, [step[0] for step in run.views])
-    other = overlap(run.tracks, camera, half, [step[0] for step in run.views[::-1]])
+    own = overlap(run.tracks, camera, half, run.views, 0)
+    other = overlap(run.tracks, camera, half, run.views.alike(run.views[::-1]), 0)
     assert own is not None
     assert other is not None
     assert own > other + 0.2
-    assert overlap(Trajectories.empty(3), camera, half, []) is None
+    assert overlap(Trajectories.empty(3), camera, half, run.views.alike([]), 0) is None
     # where it had no frame it contradicts nobody
-    assert overlap(run.tracks, camera, half, [ViewResult.of_no_frame()] * 40) is None
+    blind = run.views.alike([(ViewResult.of_no_frame(),) * 3] * 40)
+    assert overlap(run.tracks, camera, half, blind, 0) is None
 
 
 def test_the_record_is_what_the_interval_is_made_of() -> None:

@@ -164,21 +164,16 @@ def ambiguous_shares(run: Run) -> dict[tuple[int, int, int], float]:
 def _associated(run: Run) -> tuple[ndarray, ndarray, ndarray, ndarray, ndarray]:
     """Return step, label, index of the camera, index of the box and probability of each
     association."""
-    each = [
-        (step, result) for step, result in enumerate(run.fused) if len(result.associations.boxes)
-    ]
-    if not each:
+    cameras, components, boxes, probabilities = (
+        run.fused.column(f"associations.{name}")
+        for name in ("cameras", "components", "boxes", "probabilities")
+    )
+    labels, steps = run.fused.column("posterior.labels"), cameras.steps
+    if not len(steps):
         nothing = np.zeros(0, dtype=np.int64)
         return nothing, nothing, nothing, nothing, np.zeros(0)
-    columns = [result.associations for _, result in each]
-    return (
-        np.repeat([step for step, _ in each], [len(one.boxes) for one in columns]),
-        np.concatenate([result.posterior.labels[result.associations.components]
-                        for _, result in each]),
-        np.concatenate([one.cameras for one in columns]),
-        np.concatenate([one.boxes for one in columns]),
-        np.concatenate([one.probabilities for one in columns]),
-    )  # fmt: skip
+    named = labels.values[labels.starts[steps] + components.values]
+    return steps, named, cameras.values, boxes.values, probabilities.values
 
 
 def _tracks_of(run: Run, steps: Int[ndarray, " A"], labels: Int[ndarray, " A"]) -> ndarray:

@@ -81,11 +81,8 @@ def unclaimed(run: Run) -> list[Unclaimed]:
 
 def _free(run: Run, number: int) -> _Free:
     """Return the boxes of the camera with an index that no track explains."""
-    camera, views = run.sequence.cameras[number], run.views[: run.done]
-    boxes = [step[number].boxes for step in views]
-    counts = np.array([len(one) for one in boxes], dtype=np.int64)
-    steps = np.repeat(np.arange(len(boxes)), counts)
-    all_boxes = np.concatenate([np.zeros((0, 4)), *boxes])
+    camera, boxes = run.sequence.cameras[number], run.views.column("boxes", number, last=run.done)
+    steps, all_boxes = boxes.steps, boxes.values.reshape(-1, 4)
     explained = _explained(run, camera, steps, all_boxes)
     own = all_boxes[~explained]
     return _Free(steps[~explained], camera.back_project(own[:, :2]), 2.0 * own[:, 3])

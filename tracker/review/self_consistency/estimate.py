@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable
-from collections.abc import Sequence as Many
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -30,6 +29,7 @@ from tracker.runs.processes import WorkerControl, map_in_processes
 from tracker.runs.run import Run, stage_keys
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult
+from tracker.steps import Steps
 
 WARNING = (
     "Runs that agree may all be wrong alike: a tracker can be consistently wrong. "
@@ -94,7 +94,7 @@ def estimate(
     if not run.done:
         raise ValueError(f"{run.sequence.name}: the run has no step yet; compute it first")
     sequence, steps = run.sequence, run.done
-    common = Common(sequence, run.parameters, run.seed, tuple(run.views[:steps]))
+    common = Common(sequence, run.parameters, run.seed, run.views.before(steps))
     every = variants(len(sequence.views))
     found = map_in_processes(
         _work,
@@ -118,7 +118,7 @@ def estimate(
         backwards,
         without,
         tuple(
-            overlap(tracks, sequence.cameras[c], half, [step[c] for step in common.views])
+            overlap(tracks, sequence.cameras[c], half, common.views, c)
             for c, tracks in enumerate(found[1:])
         ),
         disagreements(named, sequence.step_time),
@@ -157,7 +157,7 @@ class Common:
     """The parameters of the run."""
     seed: int
     """The seed of the run's random numbers."""
-    views: tuple[tuple[ViewResult, ...], ...]
+    views: Steps[tuple[ViewResult, ...]]
     """The results of stage 1 of each step, one for each camera."""
 
 
@@ -186,9 +186,9 @@ def track_variant(
         tracker.runs.pipeline.Cancelled: If ``cancelled`` returned true.
     """
     kept = [c for c in range(len(common.sequence.views)) if c != variant.without]
-    views = [tuple(step[c] for c in kept) for step in common.views]
+    views = common.views.parts(kept)
     if variant.backwards:
-        views = views[::-1]
+        views = views.alike(reversed(views))
     digest = hashlib.sha256(f"{common.sequence.digest} {variant}".encode()).hexdigest()
     sequence = replace(
         common.sequence, views=tuple(common.sequence.views[c] for c in kept), digest=digest
@@ -227,7 +227,8 @@ def overlap(
     tracks: Trajectories,
     camera: Camera,
     half_extents: Float[ndarray, " 3"],
-    views: Many[ViewResult],
+    views: Steps[tuple[ViewResult, ...]],
+    number: int,
 ) -> float | None:
     """Return the mean overlap of a camera's boxes with the tracks of a run without this camera.
 
@@ -243,13 +244,15 @@ def overlap(
         tracks: The tracks of the run without this camera.
         camera: The camera.
         half_extents: Half width, depth and height of a target, metres.
-        views: The camera's results of stage 1 at each step.
+        views: The results of stage 1 at each step.
+        number: The index of the camera.
     """
     total, count = 0.0, 0
-    for step, view in enumerate(views):
-        if view.blind:
+    every = views.column("boxes", number)
+    for step, blind in enumerate(views.values("blind", number)):
+        if blind:
             continue
-        boxes = view.boxes
+        boxes = every[step]
         drawn, visible = camera.project_boxes(tracks.positions[tracks.at(step)], half_extents)
         drawn = drawn[visible]
         count += len(boxes) + len(drawn)

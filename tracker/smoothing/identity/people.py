@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from collections.abc import Sequence as Many
 from dataclasses import dataclass
 
@@ -14,6 +15,7 @@ from tracker.single_view.protocol import ViewResult
 from tracker.smoothing.identity import appearance
 from tracker.smoothing.paths import Links, Paths
 from tracker.smoothing.smoother import Smoother
+from tracker.steps import Steps
 
 _AS_THE_FILTER = FusionParams()
 """The filter's default parameters, by which colours are weighted whatever the filter is set to."""
@@ -29,39 +31,52 @@ class Seen:
     """Probability of each of G people with templates for each box, 1/G each where it is unknown."""
 
     @staticmethod
-    def of(views: Many[tuple[ViewResult, ...]]) -> Seen:
+    def of(views: Steps[tuple[ViewResult, ...]]) -> Seen:
         """Collect the appearance of boxes from the results of stage 1 for each step."""
         return Seen(_embeddings(views), _likenesses(views))
 
 
-def _embeddings(views: Many[tuple[ViewResult, ...]]) -> list[Float[ndarray, "B A"]] | None:
-    sizes = {
-        view.embeddings.shape[1] for step in views for view in step if view.embeddings.shape[1]
-    }
+def _embeddings(views: Steps[tuple[ViewResult, ...]]) -> list[Float[ndarray, "B A"]] | None:
+    cameras = range(views.width or 0)
+    shapes = {shape for c in cameras for shape in views.shapes("embeddings", c)}
+    sizes = {size for (size,) in shapes if size}
     if len(sizes) != 1:
         return None
     size = sizes.pop()
     return [
         np.concatenate(
             [
-                step[c].embeddings
-                if step[c].embeddings.shape[1]
-                else np.zeros((len(step[c].boxes), size))
-                for step in views
+                own if own.shape[1] else np.zeros((count, size))
+                for own, count in _with_counts(views, "embeddings", c)
             ]
         )
-        for c in range(len(views[0]))
+        for c in cameras
     ]
 
 
-def _likenesses(views: Many[tuple[ViewResult, ...]]) -> list[Float[ndarray, "B G"]] | None:
-    people = max((view.likenesses.shape[1] for step in views for view in step), default=0)
+def _likenesses(views: Steps[tuple[ViewResult, ...]]) -> list[Float[ndarray, "B G"]] | None:
+    cameras = range(views.width or 0)
+    shapes = {shape for c in cameras for shape in views.shapes("likenesses", c)}
+    people = max((size for (size,) in shapes), default=0)
     if people < 2:  # colours do not discriminate one person alone
         return None
     return [
-        np.concatenate([step[c].likenesses_of(people) for step in views])
-        for c in range(len(views[0]))
+        np.concatenate(
+            [
+                own if own.shape[1] == people else np.full((count, people), 1.0 / people)
+                for own, count in _with_counts(views, "likenesses", c)
+            ]
+        )
+        for c in cameras
     ]
+
+
+def _with_counts(
+    views: Steps[tuple[ViewResult, ...]], name: str, camera: int
+) -> Iterator[tuple[ndarray, int]]:
+    """The arrays of a field at each step, and the number of boxes."""
+    counts = views.column("boxes", camera).counts.tolist()
+    return zip(views.values(name, camera), counts, strict=True)
 
 
 def template_log_odds(

@@ -20,7 +20,8 @@ def test_events_and_gates_of_a_camera_are_in_its_step(crossing: Path) -> None:
     plain, *others = run.views[5]
     gates = np.array([[40.0, 50.25, 9.0, -1.5, 4.004]])
     told = (ViewEvent("occluded", (3, 5)), ViewEvent("new", (7,)))
-    run.views[5] = (replace(plain, events=told, gates=gates), *others)
+    last = (replace(plain, events=told, gates=gates), *others)
+    run.views = run.views.alike([*run.views[:5], last])
     first, *rest = step_of(sequence, run, 5).cameras
     assert [(event.kind, event.labels) for event in first.events] == [
         ("occluded", [3, 5]),
