@@ -13,6 +13,9 @@ from tracker.geometry.camera import Camera
 from tracker.parameters import DetectionBoxParams
 from tracker.sequences.sequence import Room, Sequence
 
+_AT_ONCE = 4096
+"""Number of boxes whose places in the room are in memory at a time."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Detected:
@@ -97,13 +100,16 @@ def judged(
     """
     p, centred = parameters, Boxes.from_left_top(boxes).centred
     sigmas = trust(centred, p)
-    nearest, farthest = standing_between(
-        camera,
-        centred,
-        float(sequence.target_half_extents[2]),
-        p.depth_sigmas * sigmas[:, 3] / centred[:, 3],
-    )
-    plausible = meets(sequence.room, nearest, farthest, p.room_tolerance)
+    plausible = np.zeros(len(centred), dtype=bool)
+    for first in range(0, len(centred), _AT_ONCE):
+        some = slice(first, first + _AT_ONCE)
+        nearest, farthest = standing_between(
+            camera,
+            centred[some],
+            float(sequence.target_half_extents[2]),
+            p.depth_sigmas * sigmas[some, 3] / centred[some, 3],
+        )
+        plausible[some] = meets(sequence.room, nearest, farthest, p.room_tolerance)
     return Detected(_within(centred, camera), scores, sigmas, plausible)
 
 

@@ -75,6 +75,11 @@ class Seen:
     four: Float[ndarray, "D 4"]
     """The four numbers of each, as they stand there."""
 
+    def by_step(self, chosen: Int[ndarray, " K"]) -> Seen:
+        """Some of the boxes, by their index once they are sorted by step."""
+        rows = np.argsort(self.frames, kind="stable")[chosen]
+        return Seen(self.frames[rows], self.four[rows])
+
 
 @dataclass(frozen=True, slots=True)
 class Open:
@@ -223,12 +228,26 @@ class Judge:
         count = len(times) * (len(times) - 1) // 2
         most = max(MOST_IN_ALL // max(count, 1), MOST_PAIRS // 4)
         most = min(most, most_pairs)
-        self.pairs: Mapping[tuple[int, int], PairsOfBoxes] = {
+        pairs = {
             (a, b): found
             for a, b in itertools.combinations(range(len(times)), 2)
             if (found := pair_up(times[a], times[b], most)).most
         }
         self._empty = empty
+        # of a long recording most boxes are in no pair, and need no rays
+        kept = [_in_pairs(camera, pairs) for camera in range(len(times))]
+        self._paired = [
+            None if own is None else own.by_step(chosen)
+            for own, chosen in zip(seen, kept, strict=True)
+        ]
+        self.pairs: Mapping[tuple[int, int], PairsOfBoxes] = {
+            (a, b): PairsOfBoxes(
+                np.searchsorted(kept[a], found.first),
+                np.searchsorted(kept[b], found.second),
+                found.most,
+            )
+            for (a, b), found in pairs.items()
+        }
 
     @property
     def possible(self) -> int:
@@ -320,7 +339,7 @@ class Judge:
 
         Heads are at a side of the boxes, or where they are of people who stand this way.
         """
-        own = self._seen[camera]
+        own = self._paired[camera]
         if own is None:
             return self._empty
         told = heads if isinstance(heads, int) else tuple(np.round(heads, 9).tolist())
@@ -343,6 +362,13 @@ class Judge:
         centres = np.array([own.centre for own in self.poses(judged.reading)])
         ways = agreed.feet[:, None, :] - centres[agreed.cameras]
         return float(np.median(np.linalg.norm(ways, axis=2)))
+
+
+def _in_pairs(camera: int, pairs: Mapping[tuple[int, int], PairsOfBoxes]) -> Int[ndarray, " K"]:
+    """The boxes of a camera that are in any pair, ascending."""
+    first = [found.first for (one, _), found in pairs.items() if one == camera]
+    second = [found.second for (_, other), found in pairs.items() if other == camera]
+    return np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *first, *second]))
 
 
 def _with_orders(judge: Judge, judged: list[Judged]) -> list[Judged]:
