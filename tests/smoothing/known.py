@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence as Many
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy import ndarray
@@ -15,6 +15,7 @@ from tracker.parameters import RunParameters, with_values
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult
 from tracker.smoothing.paths import Links, Paths
+from tracker.smoothing.recording import CameraBoxes
 from tracker.smoothing.smoother import Smoother
 
 CAMERAS = world.ring(3)
@@ -120,3 +121,12 @@ def backwards(forward: Known) -> Known:
     places = forward.places[::-1]
     whole = world.sequence(forward.whole.cameras, places, seen, fps=forward.whole.fps)
     return Known(whole, seen, places)
+
+
+def given(camera: CameraBoxes, boxes: ndarray, measured: ndarray) -> CameraBoxes:
+    """The camera with other boxes of some indices: with these centres, tops and bottoms."""
+    found = camera.boxes.copy()
+    found[boxes, 0] = measured[:, 0]
+    found[boxes, 1] = (measured[:, 1] + measured[:, 2]) / 2.0
+    found[boxes, 3] = (measured[:, 2] - measured[:, 1]) / 2.0
+    return replace(camera, boxes=found)

@@ -187,8 +187,13 @@ def looking(angles: list[list[float]], first: int = 0) -> tuple[Paths, Links, Ca
         [[100.0 * k, 50.0, 5.0, 10.0] for _ in range(steps) for k in range(len(angles))]
     )
     starts = np.arange(steps + 1) * len(angles)
-    nothing = Measurements(np.zeros((len(boxes), 3)), np.zeros((len(boxes), 3, 3)))
-    camera = CameraBoxes(starts, np.zeros(steps, bool), nothing, boxes, np.ones(len(boxes)))
+
+    def nothing(*_: ndarray) -> Measurements:
+        return Measurements(np.zeros((0, 3)), np.zeros((0, 3, 3)))
+
+    camera = CameraBoxes(
+        starts, np.zeros(steps, bool), boxes, np.ones_like(boxes), np.ones(len(boxes)), nothing
+    )
     rows = np.arange(len(boxes))
     of = np.array([step * len(angles) + k for k in range(len(angles)) for step in range(steps)])
     links = Links(np.zeros(len(rows), dtype=np.int64), rows, of, np.ones(len(rows)))

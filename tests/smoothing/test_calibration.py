@@ -11,7 +11,7 @@ from numpy import ndarray
 from numpy.testing import assert_allclose
 
 from tests import world
-from tests.smoothing.known import CAMERAS, Known, known
+from tests.smoothing.known import CAMERAS, Known, given, known
 from tracker.smoothing.calibration import (
     FEWEST,
     NARROWEST,
@@ -40,10 +40,8 @@ def planted(scene: Known, shares: list[ndarray]) -> Smoother:
         own = links.take(links.cameras == c)
         seen = smoother.model.target.expected(CAMERAS[c], paths.states[own.rows])
         half = (seen.boxes[:, 3:] - seen.boxes[:, 1:2]) / 2.0
-        values = camera.measurements.values.copy()
-        values[own.boxes] = seen.values + half * np.array(shares)[paths.owners[own.rows]]
-        measurements = camera.measurements._replace(values=values)
-        smoother.cameras[c] = replace(camera, measurements=measurements)
+        values = seen.values + half * np.array(shares)[paths.owners[own.rows]]
+        smoother.cameras[c] = given(camera, own.boxes, values)
     return smoother
 
 
@@ -79,7 +77,7 @@ def test_the_shift_is_a_share_of_the_half_height_but_of_what_the_edge_holds_fast
     assert swapped.sizes.tolist() == [-0.05, 0.1]
     assert swapped.shifts.tolist() == [0.04, 0.02]
     noisy = replace(learnt, noises=np.array([1.0, 2.0, 3.0]))
-    own = smoother.cameras[1].measurements
+    own = smoother.cameras[1].measurements(slice(None))
     assert_allclose(noisy.measured(1, own).noises, 4.0 * own.noises)
 
 

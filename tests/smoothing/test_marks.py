@@ -9,7 +9,7 @@ import pytest
 from numpy import ndarray
 from numpy.testing import assert_allclose
 
-from tests.smoothing.known import CAMERAS, PLAIN, Known
+from tests.smoothing.known import CAMERAS, PLAIN, Known, given
 from tests.smoothing.test_positions_laws import one_walker
 from tests.world import PERSON as HALF_EXTENTS
 from tracker.geometry.boxes import Boxes
@@ -161,10 +161,8 @@ def test_what_is_known_of_the_shift_is_not_learnt_again_as_an_offset() -> None:
     for c, camera in enumerate(smoother.cameras):
         own = links.take(links.cameras == c)
         seen = smoother.model.target.expected(CAMERAS[c], path.states[own.rows])
-        values = camera.measurements.values.copy()
-        values[own.boxes] = seen.values + known.shift(c, np.zeros(len(own.rows), dtype=int), seen)
-        measurements = camera.measurements._replace(values=values)
-        smoother.cameras[c] = replace(camera, measurements=measurements)
+        values = seen.values + known.shift(c, np.zeros(len(own.rows), dtype=int), seen)
+        smoother.cameras[c] = given(camera, own.boxes, values)
     assert smoother.learn(path, links, nothing).offsets[:, 1:].min() > 0.01
     assert_allclose(smoother.learn(path, links, known).offsets, 0.0, atol=1e-12)
 

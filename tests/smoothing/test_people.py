@@ -27,8 +27,13 @@ def told(likenesses: list[list[float]], places: list[list[float]], weight: float
     steps = len(likenesses)
     boxes = np.array([[x, 50.0, 5.0, 10.0] for own in places for x in own])
     starts = np.cumsum([0, *(len(own) for own in places)])
-    nothing = Measurements(np.zeros((len(boxes), 3)), np.zeros((len(boxes), 3, 3)))
-    camera = CameraBoxes(starts, np.zeros(steps, bool), nothing, boxes, np.ones(len(boxes)))
+
+    def nothing(*_: ndarray) -> Measurements:
+        return Measurements(np.zeros((0, 3)), np.zeros((0, 3, 3)))
+
+    camera = CameraBoxes(
+        starts, np.zeros(steps, bool), boxes, np.ones_like(boxes), np.ones(len(boxes)), nothing
+    )
     smoother = cast(
         Smoother, SimpleNamespace(cameras=[camera], model=SimpleNamespace(step_time=STEP))
     )

@@ -42,9 +42,9 @@ def test_a_target_without_clutter_is_where_the_least_squares_over_all_boxes_put_
         for c, camera in enumerate(smoother.cameras):
             own = links.take(links.cameras == c)
             expected = smoother.model.target.expected(smoother.model.cameras[c], states[own.rows])
-            for value, box in zip(expected.expected.values, own.boxes, strict=True):
-                factor = np.linalg.inv(np.linalg.cholesky(camera.measurements.noises[box]))
-                parts.append(factor @ (camera.measurements.values[box] - value))
+            measured = camera.measurements(own.boxes)
+            for value, box, noise in zip(expected.expected.values, *measured, strict=True):
+                parts.append(np.linalg.inv(np.linalg.cholesky(noise)) @ (box - value))
         return np.concatenate(parts)
 
     best = least_squares(residuals, found.ravel() + 0.01, x_scale="jac", xtol=1e-12).x

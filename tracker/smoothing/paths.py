@@ -35,6 +35,10 @@ class Paths:
         """Index of the path of each row."""
         return np.asarray(np.repeat(np.arange(len(self.labels)), np.diff(self.starts)))
 
+    def owners_of(self, rows: Int[ndarray, " K"]) -> Int[ndarray, " K"]:
+        """Index of the path of some rows."""
+        return np.asarray(np.searchsorted(self.starts, rows, side="right") - 1)
+
     @property
     def steps(self) -> Int[ndarray, " N"]:
         """Step of each row."""
@@ -47,6 +51,11 @@ class Paths:
     ) -> Paths:
         """The same paths with other states and covariances."""
         return Paths(self.labels, self.firsts, self.starts, states, covariances)
+
+    def without_states(self) -> Paths:
+        """The same paths without states and covariances, which are estimated anew."""
+        dimension = self.states.shape[1]
+        return self.with_states(np.zeros((0, dimension)), np.zeros((0, dimension, dimension)))
 
     @staticmethod
     def of(
@@ -66,13 +75,33 @@ class Paths:
             dimension: d, the size of the state.
         """
         lengths = [len(one) for one in states]
+        found = Paths.blank(labels, firsts, lengths, dimension)
+        np.concatenate([np.zeros((0, dimension)), *states], out=found.states)
+        np.concatenate([np.zeros((0, dimension, dimension)), *covariances], out=found.covariances)
+        return found
+
+    @staticmethod
+    def blank(labels: Many[int], firsts: Many[int], lengths: Many[int], dimension: int) -> Paths:
+        """Make paths whose states and covariances are to be filled in, path after path.
+
+        Args:
+            labels: Label of each path.
+            firsts: First step of each path.
+            lengths: Number of rows of each path.
+            dimension: d, the size of the state.
+        """
+        starts = np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)
         return Paths(
             np.array(labels, dtype=np.int64),
             np.array(firsts, dtype=np.int64),
-            np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64),
-            np.concatenate([np.zeros((0, dimension)), *states]),
-            np.concatenate([np.zeros((0, dimension, dimension)), *covariances]),
+            starts,
+            np.empty((starts[-1], dimension)),
+            np.empty((starts[-1], dimension, dimension)),
         )
+
+    def rows_of(self, path: int) -> slice:
+        """The rows of one path."""
+        return slice(int(self.starts[path]), int(self.starts[path + 1]))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -100,7 +129,7 @@ class Links:
             np.concatenate([one.shares for one in every]),
         )
 
-    def take(self, chosen: ndarray) -> Links:
+    def take(self, chosen: ndarray | slice) -> Links:
         """Select some of the pairs, by mask or index."""
         return Links(
             self.cameras[chosen], self.rows[chosen], self.boxes[chosen], self.shares[chosen]

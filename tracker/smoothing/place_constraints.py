@@ -58,6 +58,8 @@ class PlaceMeasurements:
             matrices: Information matrix on the position of each row.
             vectors: Information vector on the position of each row.
         """
+        if not len(self.rows):
+            return matrices, vectors
         matrices, vectors = matrices.copy(), vectors.copy()
         precisions = np.linalg.inv(self.noises)
         matrices[self.rows] += precisions

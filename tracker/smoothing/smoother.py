@@ -11,7 +11,7 @@ from collections.abc import Sequence as Many
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -50,6 +50,10 @@ _T = TypeVar("_T")
 START_SIGMA = 10.0
 """Prior standard deviation of a path's first position along each axis, metres."""
 
+_AT_ONCE = 1024
+"""Number of rows, steps or boxes whose expected boxes are in memory at a time, per thread: with
+all their derivatives these take more than the paths."""
+
 _MOST_THREADS = 4
 _LEAST = 0.01  # association probability below which a pair is left out
 _SURE = 0.9  # least association probability of a box that is used for the self-calibration
@@ -87,6 +91,11 @@ class Fitted:
     )
     """The constraints of places, with their inflated noise."""
 
+    def without_predictions(self) -> Fitted:
+        """The same without the predictions, which take as much memory as the paths."""
+        nothing = self.paths.without_states()
+        return replace(self, ahead=nothing.states, ahead_covariances=nothing.covariances)
+
     @property
     def jumps(self) -> Float[ndarray, " N"]:
         """Squared Mahalanobis distance between the estimates from the rows before and from then
@@ -110,6 +119,47 @@ class BoxAssociations:
     """Probability that the camera has no box of the path at the row."""
     hidden_by: Int[ndarray, "C N"]
     """Label of the track that occludes the row, -1 for none."""
+
+
+class _Linearised(NamedTuple):
+    """What boxes and constraints say of n paths, with N rows."""
+
+    begins: Float[ndarray, "n d"]
+    """Prior mean of each path's first state."""
+    information: evidence.BoxInformation
+    """The information of the boxes on each row."""
+    places: PlaceMeasurements
+    """The constraints of places."""
+
+
+class _Iterated(NamedTuple):
+    """One iteration of the fit of paths to their boxes, with N rows."""
+
+    rows: passes.SmoothedRows
+    """The smoothed rows."""
+    constants: Float[ndarray, " N"]
+    """Log likelihood of each row's boxes where they are linearised, against clutter."""
+    places: PlaceMeasurements
+    """The constraints of places, with their inflated noise."""
+    noise_scales: Float[ndarray, " N"]
+    """Factor on the process noise of the step to each row."""
+
+
+class _Residuals(NamedTuple):
+    """L boxes of one camera with a clear association, for the self-calibration."""
+
+    rows: Int[ndarray, " L"]
+    """Row of the paths of each box."""
+    plain: Float[ndarray, "L m"]
+    """Measurement less what is expected without calibration, pixels."""
+    half_heights: Float[ndarray, " L"]
+    """Half height of the expected box, pixels."""
+    left: Float[ndarray, "L m"]
+    """Residual with the calibration before, half heights."""
+    spreads: Float[ndarray, "L m"]
+    """Variance of the expected measurement, H P Hᵀ, squared pixels."""
+    noises: Float[ndarray, "L m"]
+    """Variance of the measurement, R, squared pixels."""
 
 
 class Smoother:
@@ -182,43 +232,97 @@ class Smoother:
             iterations: Number of iterations, at least 1.
             learnt: The self-calibration of the boxes; None for none.
         """
-        motion, owners = self.model.motion, paths.owners
         learnt = learnt or self.uncalibrated(paths)
-        rule = passes.PathMotion(motion.transition, motion.noise, self.prior)
+        by_camera = self._by_row(links)
+        del links
         scales = np.ones(len(paths.states))
-        for _ in range(iterations):
-            by_camera = self._each_camera(
-                partial(self._camera_information, paths, owners, links, learnt)
-            )
-            information = evidence.BoxInformation(
-                *(np.sum(parts, axis=0) for parts in zip(*by_camera, strict=True))
-            )
-            begins = paths.states[paths.starts[:-1]].copy()
-            begins[:, 3:] = 0.0
-            places = PlaceMeasurements.of(*self.rows_with_places(paths))
-            smooth = partial(_smoothed, paths, begins, information, rule)
+        for turn in range(iterations):
+            linear = self._linearised(paths, by_camera, learnt)
+            # there are the states of one iteration at a time, and one forward pass
+            paths = paths.without_states()
+            found = self._iterated(paths.starts, linear, scales)
+            if turn + 1 < iterations:
+                scales = found.noise_scales
+                paths = paths.with_states(found.rows.means, found.rows.covariances)
+                del found
+        return _fitted(paths, found)
+
+    def _linearised(self, paths: Paths, by_camera: list[Links], learnt: Calibration) -> _Linearised:
+        """What the boxes and constraints say of paths, linearised at their states.
+
+        Args:
+            paths: n paths, with N rows.
+            by_camera: The links of each camera in the order of their rows.
+            learnt: The self-calibration of the boxes.
+        """
+        begins = paths.states[paths.starts[:-1]].copy()
+        begins[:, 3:] = 0.0
+        places = PlaceMeasurements.of(*self.rows_with_places(paths))
+        return _Linearised(begins, self._information(paths, by_camera, learnt), places)
+
+    def _iterated(
+        self, starts: Int[ndarray, " n1"], linear: _Linearised, scales: Float[ndarray, " N"]
+    ) -> _Iterated:
+        """Smooth paths given their boxes.
+
+        Args:
+            starts: Index of each path's first row, and N at the end.
+            linear: What boxes and constraints say of them.
+            scales: Factor on the process noise of the step to each row, so far.
+        """
+        motion, places = self.model.motion, linear.places
+        rule = passes.PathMotion(motion.transition, motion.noise, self.prior)
+        smooth = partial(_smoothed, starts, linear.begins, linear.information, rule)
+        found = smooth(places, scales)
+        inflated = places.inflate(found.means, found.covariances)
+        if inflated.contradicted:
+            places = inflated
+            del found
             found = smooth(places, scales)
-            inflated = places.inflate(found.means, found.covariances)
-            if inflated.contradicted:
-                places = inflated
-                found = smooth(places, scales)
-            if self._learning:
-                scales = process_noise_scales(
-                    paths.starts, found, motion.noise, scales, self.model.step_time
+        if self._learning:
+            scales = process_noise_scales(starts, found, motion.noise, scales, self.model.step_time)
+            del found
+            found = smooth(places, scales)
+        return _Iterated(found, linear.information.constants, places, scales)
+
+    def _by_row(self, links: Links) -> list[Links]:
+        """The links of each camera in the order of their rows, those of one row as they were."""
+        found = []
+        for camera in range(len(self.cameras)):
+            own = np.flatnonzero(links.cameras == camera)
+            found.append(links.take(own[np.argsort(links.rows[own], kind="stable")]))
+        return found
+
+    def _information(
+        self, paths: Paths, by_camera: list[Links], learnt: Calibration
+    ) -> evidence.BoxInformation:
+        """Compute the information of all boxes on the rows of paths, some rows at a time.
+
+        Args:
+            paths: The paths, with N rows.
+            by_camera: The links of each camera in the order of their rows.
+            learnt: The self-calibration of the boxes.
+        """
+        rows, owners = len(paths.states), paths.owners
+        found = evidence.BoxInformation(np.empty((rows, 3, 3)), np.empty((rows, 3)), np.empty(rows))
+        bounds = [
+            np.searchsorted(own.rows, range(0, rows + _AT_ONCE, _AT_ONCE)) for own in by_camera
+        ]
+
+        def of_block(block: int) -> None:
+            within = slice(block * _AT_ONCE, min((block + 1) * _AT_ONCE, rows))
+            parts = [
+                self._camera_information(
+                    paths, owners, own.take(slice(*ends[block : block + 2])), learnt, c, within
                 )
-                found = smooth(places, scales)
-            paths = paths.with_states(found.means, found.covariances)
-        places, states, covariances = places.enforce(found.means, found.covariances)
-        # an enforced place is no jump, so predictions are moved together with their rows
-        return Fitted(
-            paths.with_states(states, covariances),
-            found.fits + information.constants,
-            found.ahead + (states - found.means),
-            found.ahead_covariances + (covariances - found.covariances),
-            found.traces,
-            scales,
-            places,
-        )
+                for c, (own, ends) in enumerate(zip(by_camera, bounds, strict=True))
+            ]
+            for whole, each in zip(found, zip(*parts, strict=True), strict=True):
+                whole[within] = np.sum(each, axis=0)
+
+        for _ in self._threads.map(of_block, range(-(-rows // _AT_ONCE))):
+            pass
+        return found
 
     def _each_camera(self, work: Callable[[int], _T]) -> list[_T]:
         """Run a function for each camera in threads: the kernels release the interpreter's lock."""
@@ -228,38 +332,42 @@ class Smoother:
         self,
         paths: Paths,
         owners: Int[ndarray, " N"],
-        links: Links,
+        own: Links,
         learnt: Calibration,
         camera: int,
+        within: slice,
     ) -> evidence.BoxInformation:
-        """Compute the information of one camera's boxes on the rows of paths.
+        """Compute the information of one camera's boxes on some rows of paths.
 
         Args:
             paths: The paths, with N rows.
             owners: Path of each row.
-            links: Association probabilities of rows and boxes.
+            own: The links of these rows to the camera's boxes.
             learnt: The self-calibration of the boxes.
             camera: Index of the camera.
+            within: The rows.
         """
-        rows = len(paths.states)
+        rows, boxes = within.stop - within.start, self.cameras[camera]
         found = evidence.BoxInformation(np.zeros((rows, 3, 3)), np.zeros((rows, 3)), np.zeros(rows))
-        own = links.take(links.cameras == camera)
+        if not len(own.rows):
+            return found
         seen = self._seen(
             camera, paths.states[own.rows], paths.covariances[own.rows], owners[own.rows], learnt
         )
         # a state behind the lens has no box
         shares = np.where(seen.valid, own.shares, 0.0)
+        place = own.rows - within.start
         evidence.add_information(
-            evidence.BoxLinks(own.rows, own.boxes, shares),
-            paths.states,
-            paths.covariances,
+            evidence.BoxLinks(place, np.arange(len(place)), shares),
+            paths.states[within],
+            paths.covariances[within],
             seen.expected,
-            learnt.measured(camera, self.cameras[camera].measurements),
+            learnt.measured(camera, boxes.measurements(own.boxes)),
             found,
         )
-        clutter = self.model.clutter[camera] * self.cameras[camera].clutter_factors[own.boxes]
+        clutter = self.model.clutter[camera] * boxes.clutter_factors[own.boxes]
         log_hit = np.log(self.parameters.detection_probability / clutter)
-        found.constants[:] += np.bincount(own.rows, own.shares * log_hit, rows)
+        found.constants[:] += np.bincount(place, own.shares * log_hit, rows)
         return found
 
     def rows_with_places(self, paths: Paths) -> tuple[Int[ndarray, " K"], list[Correction]]:
@@ -295,46 +403,79 @@ class Smoother:
             existences: Prior existence probability of each row; None for 1.
             learnt: The self-calibration of the boxes; None for none.
         """
-        steps, owners = paths.steps, paths.owners
+        steps = paths.steps
         order = np.argsort(steps, kind="stable")
+        starts = np.searchsorted(steps[order], np.arange(self.frames + 1))
+        del steps
         learnt = learnt or self.uncalibrated(paths)
-        rows = evidence.Rows(
-            paths.states,
-            paths.covariances,
-            np.ones(len(steps)) if existences is None else existences,
-            paths.labels[owners],
-            order,
-            np.searchsorted(steps[order], np.arange(self.frames + 1)),
+        shape = len(self.cameras), len(order)
+        found = BoxAssociations(
+            Links.joined([]), np.zeros(shape), np.ones(shape), np.full(shape, -1, dtype=np.int64)
         )
 
-        def of_camera(c: int) -> evidence.SharedCamera:
-            camera = self.cameras[c]
-            found: evidence.SharedCamera = evidence.share_camera(
-                rows,
-                evidence.CameraSteps(
-                    camera.starts,
-                    camera.blind,
-                    learnt.measured(c, camera.measurements),
-                    self.model.clutter[c] * camera.clutter_factors,
-                ),
-                self._seen(c, paths.states, paths.covariances, owners, learnt),
-                self.model.cameras[c].calibration.image_size,
-                self._rule,
-            )
-            return found
+        def of_camera(c: int) -> Links:
+            parts = []
+            for first in range(0, self.frames, _AT_ONCE):
+                last = min(first + _AT_ONCE, self.frames)
+                rows = order[starts[first] : starts[last]]
+                own = self._share_steps(
+                    c, paths, existences, learnt, rows, starts[first : last + 1], first
+                )
+                found.chances[c, rows] = own.detection_probabilities
+                found.missed[c, rows] = own.missed
+                found.hidden_by[c, rows] = own.hidden_by
+                boxes = own.links.boxes + self.cameras[c].starts[first]
+                of_links = np.full(len(boxes), c, dtype=np.int64)
+                parts.append(Links(of_links, rows[own.links.rows], boxes, own.links.shares))
+            return Links.joined(parts)
 
-        shared = self._each_camera(of_camera)
-        return BoxAssociations(
-            Links.joined(
-                [
-                    Links(np.full(len(one.links.rows), c, dtype=np.int64), *one.links)
-                    for c, one in enumerate(shared)
-                ]
+        return replace(found, links=Links.joined(self._each_camera(of_camera)))
+
+    def _share_steps(
+        self,
+        camera: int,
+        paths: Paths,
+        existences: Float[ndarray, " N"] | None,
+        learnt: Calibration,
+        rows: Int[ndarray, " K"],
+        starts: Int[ndarray, " T1"],
+        first: int,
+    ) -> evidence.SharedCamera:
+        """Associate the boxes of one camera with the paths at some steps.
+
+        Args:
+            camera: Index of the camera.
+            paths: n paths, with N rows.
+            existences: Prior existence probability of each row; None for 1.
+            learnt: The self-calibration of the boxes.
+            rows: The K rows at T steps, step after step.
+            starts: Index of the first row of each step, as of all rows.
+            first: The first of the steps.
+        """
+        own, owners = self.cameras[camera], paths.owners_of(rows)
+        states, covariances = paths.states[rows], paths.covariances[rows]
+        last = first + len(starts) - 1
+        boxes = slice(int(own.starts[first]), int(own.starts[last]))
+        found: evidence.SharedCamera = evidence.share_camera(
+            evidence.Rows(
+                states,
+                covariances,
+                np.ones(len(rows)) if existences is None else existences[rows],
+                paths.labels[owners],
+                np.arange(len(rows)),
+                starts - starts[0],
             ),
-            np.array([one.detection_probabilities for one in shared]),
-            np.array([one.missed for one in shared]),
-            np.array([one.hidden_by for one in shared]),
+            evidence.CameraSteps(
+                own.starts[first : last + 1] - boxes.start,
+                own.blind[first:last],
+                learnt.measured(camera, own.measurements(boxes)),
+                self.model.clutter[camera] * own.clutter_factors[boxes],
+            ),
+            self._seen(camera, states, covariances, owners, learnt),
+            self.model.cameras[camera].calibration.image_size,
+            self._rule,
         )
+        return found
 
     def _seen(
         self,
@@ -377,20 +518,12 @@ class Smoother:
         witness[self.rows_with_places(paths)[0]] = False  # a correction replaces the boxes there
         size_sums, count = np.zeros(people), np.zeros(people)
         offsets, noises = np.zeros_like(learnt.offsets), learnt.noises.copy()
-        for c, camera in enumerate(self.cameras):
+        for c in range(len(self.cameras)):
             own = links.take((links.cameras == c) & (links.shares > _SURE) & witness[links.rows])
-            expected = self.model.target.expected(
-                self.model.cameras[c], paths.states[own.rows], paths.covariances[own.rows]
-            )
-            half = np.maximum((expected.boxes[:, 3] - expected.boxes[:, 1]) / 2.0, 1.0)
-            plain = camera.measurements.values[own.boxes] - expected.expected.values
-            whole = expected.valid & free(expected).all(axis=1)
-            left = (plain - learnt.shift(c, owners[own.rows], expected)) / half[:, None]
-            # a box of another posture does not show the person's height
-            whole &= (np.abs(left) < ODD).all(axis=1)
-            if not whole.any():
+            chosen, plain, half, left, spread, own_noise = self._residuals(c, paths, own, learnt)
+            if not len(chosen):
                 continue
-            rows, plain, half = owners[own.rows[whole]], plain[whole], half[whole]
+            rows = owners[chosen]
             shares = plain / half[:, None]
             shares -= learnt.shifts[rows, None] * w
             rest = shares - learnt.sizes[rows, None] * u
@@ -400,19 +533,42 @@ class Smoother:
                 size_sums += np.bincount(rows, (taller @ u) / (u @ u), people)
                 count += np.bincount(rows, minlength=people)
             if len(rest) >= FEWEST:
-                h = expected.jacobians[whole][:, :, :3]
-                p = paths.covariances[own.rows[whole]][:, :3, :3]
-                spread = np.einsum("lpa,lab,lpb->lp", h, p, h)
-                own_noise = np.diagonal(
-                    camera.measurements.noises[own.boxes[whole]], axis1=1, axis2=2
-                )
-                square = (half[:, None] * left[whole]) ** 2
+                square = (half[:, None] * left) ** 2
                 ratio = np.median(square / own_noise) / _MEDIAN + np.median(spread / own_noise)
-                alike = _alike(own.rows[whole], owners, left[whole])
+                alike = _alike(chosen, owners, left)
                 noises[c] = np.clip(
                     np.sqrt(ratio * (1.0 + alike) / (1.0 - alike)), NARROWEST, WIDEST
                 )
         return Calibration(size_sums / (count + SIZE_RIDGE), offsets, noises, learnt.shifts)
+
+    def _residuals(self, camera: int, paths: Paths, own: Links, learnt: Calibration) -> _Residuals:
+        """Compute the residuals of one camera's boxes of people who stand upright.
+
+        Args:
+            camera: Index of the camera.
+            paths: The paths.
+            own: Their links to the camera's boxes.
+            learnt: The calibration before.
+        """
+        owners, parts = paths.owners, []
+        for first in range(0, max(len(own.rows), 1), _AT_ONCE):
+            rows, boxes = own.rows[first : first + _AT_ONCE], own.boxes[first : first + _AT_ONCE]
+            expected = self.model.target.expected(
+                self.model.cameras[camera], paths.states[rows], paths.covariances[rows]
+            )
+            measured = self.cameras[camera].measurements(boxes)
+            half = np.maximum((expected.boxes[:, 3] - expected.boxes[:, 1]) / 2.0, 1.0)
+            plain = measured.values - expected.expected.values
+            whole = expected.valid & free(expected).all(axis=1)
+            left = (plain - learnt.shift(camera, owners[rows], expected)) / half[:, None]
+            # a box of another posture does not show the person's height
+            whole &= (np.abs(left) < ODD).all(axis=1)
+            h = expected.jacobians[whole][:, :, :3]
+            p = paths.covariances[rows[whole]][:, :3, :3]
+            spread = np.einsum("lpa,lab,lpb->lp", h, p, h)
+            own_noise = np.diagonal(measured.noises[whole], axis1=1, axis2=2)
+            parts.append((rows[whole], plain[whole], half[whole], left[whole], spread, own_noise))
+        return _Residuals(*(np.concatenate(each) for each in zip(*parts, strict=True)))
 
     def with_shifts(self, paths: Paths, learnt: Calibration) -> Calibration:
         """Add to a calibration the shifts that hand-marked boxes show.
@@ -426,8 +582,28 @@ class Smoother:
         return replace(learnt, shifts=learnt.shifts + found)
 
 
+def _fitted(paths: Paths, last: _Iterated) -> Fitted:
+    """The result of the last iteration, with the constraints of places enforced."""
+    found = last.rows
+    places, states, covariances = last.places.enforce(found.means, found.covariances)
+    ahead, ahead_covariances = found.ahead, found.ahead_covariances
+    if states is not found.means:
+        # an enforced place is no jump: predictions move along with their rows
+        ahead = ahead + (states - found.means)
+        ahead_covariances = ahead_covariances + (covariances - found.covariances)
+    return Fitted(
+        paths.with_states(states, covariances),
+        found.fits + last.constants,
+        ahead,
+        ahead_covariances,
+        found.traces,
+        last.noise_scales,
+        places,
+    )
+
+
 def _smoothed(
-    paths: Paths,
+    starts: Int[ndarray, " n1"],
     begins: Float[ndarray, "n d"],
     information: evidence.BoxInformation,
     rule: passes.PathMotion,
@@ -437,7 +613,7 @@ def _smoothed(
     """Smooth paths given the information of their boxes and the constraints of places."""
     matrices, vectors = places.information(information.matrices, information.vectors)
     found: passes.SmoothedRows = passes.smooth_paths(
-        paths.starts, begins, matrices, vectors, rule, scales
+        starts, begins, matrices, vectors, rule, scales
     )
     return found
 

@@ -55,10 +55,11 @@ class _Decided(NamedTuple):
 
 
 class _First(NamedTuple):
-    """The filter's tracks, and the association probabilities of their rows."""
+    """The filter's n tracks as they were in the first round, without their states."""
 
     paths: Paths
-    shared: BoxAssociations
+    odds: Float[ndarray, " n"]
+    """Log odds of each, of existing at any step."""
 
 
 class _Start(NamedTuple):
@@ -124,21 +125,15 @@ class Positions:
         tracks = trajectories.extract(results, cameras=cameras, extraction_threshold=CONFIRMED)
         if not len(tracks):
             return Smoothed.empty(dimension, cameras)
-        paths, had = read_paths(results, tracks, dimension)
-        existences = np.where(had, 1.0, lifetimes.UNSURE)
-        links = read_links(results, paths, smoother.cameras)
+        begin = _read(smoother, results, tracks)
+        del tracks
         check()
-        paths, existences, links, learnt, decided = self._named(
-            smoother, paths, existences, links, seen, check, corrections, earlier
-        )
+        learnt, decided = self._named(smoother, begin, seen, check, corrections, earlier)
         known: Smoothed | None = earlier.get(f"smoothed-{decided.key}") if decided.key else None
         if known is not None:
             return known
         turns = p.iterations if learnt is None else 1  # resolved tracks are near their boxes
-        fitted, shared, learnt = _fit_and_share(
-            smoother, paths, existences, links, p, learnt, check, turns=turns
-        )
-        found = _finished(smoother, fitted, shared, learnt, p, decided)
+        found = _finished(smoother, begin, p, learnt, check, turns, decided)
         if decided.key:
             earlier.put(f"smoothed-{decided.key}", found)
         return found
@@ -146,21 +141,18 @@ class Positions:
     def _named(
         self,
         smoother: Smoother,
-        paths: Paths,
-        existences: Float[ndarray, " N"],
-        links: Links,
+        begin: _Begin,
         views: Steps[tuple[ViewResult, ...]],
         check: Callable[[], None],
         corrections: Many[Correction],
         earlier: ResultStore,
-    ) -> tuple[Paths, Float[ndarray, " N"], Links, Calibration | None, _Decided]:
-        """Resolve the identities; here the filter's own tracks remain.
+    ) -> tuple[Calibration | None, _Decided]:
+        """Resolve the identities in ``begin``; here the filter's own tracks remain.
 
         Returns:
-            The tracks with N rows, the prior existence probability of each row, their links to
-            boxes, the self-calibration, if there is one yet, and the decisions.
+            The self-calibration, if there is one yet, and the decisions.
         """
-        return paths, existences, links, None, _Decided([])
+        return None, _Decided([])
 
 
 class Identities(Positions):
@@ -169,71 +161,105 @@ class Identities(Positions):
     def _named(
         self,
         smoother: Smoother,
-        paths: Paths,
-        existences: Float[ndarray, " N"],
-        links: Links,
+        begin: _Begin,
         views: Steps[tuple[ViewResult, ...]],
         check: Callable[[], None],
         corrections: Many[Correction],
         earlier: ResultStore,
-    ) -> tuple[Paths, Float[ndarray, " N"], Links, Calibration | None, _Decided]:
+    ) -> tuple[Calibration | None, _Decided]:
         p = self._parameters.smoothing
         seen = Seen.of(views) if p.appearance > 0.0 else Seen()
         start: _Start | None = earlier.get("start")
         if start is None:
-            start = self._start(smoother, paths, existences, links, seen, check)
+            start = self._start(smoother, begin, seen, check)
             earlier.put("start", start)
         tracked = Tracked(
             smoother, start.fitted, start.shared, start.contested, start.had, start.names
         )
+        learnt, first = start.learnt, start.first
+        del start
         found, key = identities.link_tracklets(tracked, p, seen, corrections, earlier)
         check()
-        existences = np.where(found.had, 1.0, lifetimes.UNSURE)
-        first = start.first
+        begin.replace(found.paths, np.where(found.had, 1.0, lifetimes.UNSURE), found.links)
         gone = np.flatnonzero(~np.isin(first.paths.labels, found.names)).tolist()
         removed = []
         if gone:
-            _, odds = lifetimes.lifetimes(smoother, first.paths, first.shared, p)
-            removed = [_removed(first.paths, path, odds[path]) for path in gone]
+            removed = [_removed(first.paths, path, first.odds[path]) for path in gone]
         decided = _Decided([*found.decisions, *removed], found.joined, found.limits, key)
-        return found.paths, existences, found.links, start.learnt.of_people(found.origins), decided
+        return learnt.of_people(found.origins), decided
 
     def _start(
         self,
         smoother: Smoother,
-        paths: Paths,
-        existences: Float[ndarray, " N"],
-        links: Links,
+        begin: _Begin,
         seen: Seen,
         check: Callable[[], None],
     ) -> _Start:
         """Run all rounds but the last resolution, the only one with corrections of identity."""
         p = self._parameters.smoothing
-        contested = tracklets.contested(paths, links)
-        fitted, shared, learnt = _fit_and_share(
-            smoother, paths, existences, links, p, None, check, turns=p.iterations
-        )
-        first = _First(fitted.paths, shared)
-        names = np.where(existences == 1.0, paths.labels[paths.owners], -1)
+        contested = tracklets.contested(begin.paths, begin.links)
+        had = begin.existences == 1.0
+        names = np.where(had, begin.paths.labels[begin.paths.owners], -1)
+        fitted, shared, learnt = _fit_and_share(smoother, begin, p, None, check, p.iterations)
+        _, odds = lifetimes.lifetimes(smoother, fitted.paths, shared, p)
+        first = _First(fitted.paths.without_states(), odds)
         for _ in range(p.rounds - 1):
-            tracked = Tracked(smoother, fitted, shared, contested, existences == 1.0, names)
+            tracked = Tracked(smoother, fitted, shared, contested, had, names)
+            del fitted, shared
             found, _key = identities.link_tracklets(tracked, p, seen)
+            del tracked
             check()
-            existences, names = np.where(found.had, 1.0, lifetimes.UNSURE), found.names
+            had, names = found.had, found.names
             learnt = learnt.of_people(found.origins)
+            begin.replace(found.paths, np.where(had, 1.0, lifetimes.UNSURE), found.links)
+            del found
             # resolved identities improve the association of boxes, and the association identities
-            fitted, shared, learnt = _fit_and_share(
-                smoother, found.paths, existences, found.links, p, learnt, check, turns=1
-            )
+            fitted, shared, learnt = _fit_and_share(smoother, begin, p, learnt, check, 1)
             contested = tracklets.contested(fitted.paths, shared.links)
-        return _Start(fitted, shared, learnt, contested, existences == 1.0, names, first)
+        return _Start(fitted, shared, learnt, contested, had, names, first)
+
+
+class _Begin:
+    """Tracks to be fitted to their boxes, with N rows.
+
+    They are given away once, so that nothing holds the states while the fit replaces them.
+    """
+
+    def __init__(self, paths: Paths, existences: Float[ndarray, " N"], links: Links) -> None:
+        """Begin with some tracks, as :meth:`replace` takes them."""
+        self.replace(paths, existences, links)
+
+    def replace(self, paths: Paths, existences: Float[ndarray, " N"], links: Links) -> None:
+        """Begin with other tracks.
+
+        Args:
+            paths: The tracks.
+            existences: Prior existence probability of each row.
+            links: Association probabilities of rows and boxes.
+        """
+        self.paths, self.existences, self.links = paths, existences, links
+
+    def take_paths(self) -> Paths:
+        """The tracks, whose states are forgotten."""
+        found, self.paths = self.paths, self.paths.without_states()
+        return found
+
+    def take_links(self) -> Links:
+        """The links, which are forgotten."""
+        found, self.links = self.links, Links.joined([])
+        return found
+
+
+def _read(smoother: Smoother, results: Steps[FusionResult], tracks: Trajectories) -> _Begin:
+    """The filter's tracks, as they are reported."""
+    paths, had = read_paths(results, tracks, smoother.model.motion.dimension)
+    links = read_links(results, paths, smoother.cameras)
+    return _Begin(paths, np.where(had, 1.0, lifetimes.UNSURE), links)
 
 
 def _fit_and_share(
     smoother: Smoother,
-    paths: Paths,
-    existences: Float[ndarray, " N"],
-    links: Links,
+    begin: _Begin,
     p: SmoothingParams,
     learnt: Calibration | None,
     check: Callable[[], None],
@@ -243,47 +269,67 @@ def _fit_and_share(
 
     Args:
         smoother: The models and the boxes.
-        paths: The tracks, with N rows.
-        existences: Prior existence probability of each row.
-        links: Association probabilities of rows and boxes at the start.
+        begin: The tracks and their links at the start, which are taken.
         p: The parameters of the smoothing.
         learnt: The self-calibration so far, None for none.
         check: A function that is called in every turn and raises an exception to stop.
         turns: Number of turns.
     """
-    learnt = learnt or smoother.uncalibrated(paths)
-    fitted = smoother.fit(paths, links, 2, learnt)
+    existences = begin.existences
+    learnt = learnt or smoother.uncalibrated(begin.paths)
+    fitted = smoother.fit(begin.take_paths(), begin.take_links(), 2, learnt)
     shared = smoother.associate(fitted.paths, existences, learnt)
     for _ in range(turns):
         check()
-        existences, _ = lifetimes.lifetimes(smoother, fitted.paths, shared, p)
+        paths = fitted.paths
+        del fitted
+        existences, _ = lifetimes.lifetimes(smoother, paths, shared, p)
         if p.learning:
-            learnt = smoother.learn(fitted.paths, shared.links, learnt)
-        fitted = smoother.fit(fitted.paths, shared.links, 1, learnt)
+            learnt = smoother.learn(paths, shared.links, learnt)
+        begin.replace(paths, existences, shared.links)
+        del paths, shared
+        fitted = smoother.fit(begin.take_paths(), begin.take_links(), 1, learnt)
         shared = smoother.associate(fitted.paths, existences, learnt)
     return fitted, shared, learnt
 
 
 def _finished(
     smoother: Smoother,
-    fitted: Fitted,
-    shared: BoxAssociations,
-    learnt: Calibration,
+    begin: _Begin,
     p: SmoothingParams,
+    learnt: Calibration | None,
+    check: Callable[[], None],
+    turns: int,
     decided: _Decided,
 ) -> Smoothed:
-    """Estimate the ends of the tracks, and remove false tracks."""
+    """Fit tracks with settled identities, estimate their ends, and remove false tracks.
+
+    Args:
+        smoother: The models and the boxes.
+        begin: The tracks and their links at the start, which are taken.
+        p: The parameters of the smoothing.
+        learnt: The self-calibration so far, None for none.
+        check: A function that is called in every turn and raises an exception to stop.
+        turns: Number of turns of fitting and associating.
+        decided: The resolution of identities.
+    """
+    fitted, shared, learnt = _fit_and_share(smoother, begin, p, learnt, check, turns)
+    del shared
     longer, existences = lifetimes.extended(
         smoother, fitted.paths, round(p.reach / smoother.model.step_time)
     )
+    del fitted
     away = _outside(longer, decided.limits)
     existences = np.where(away, 0.0, existences)
     shared = smoother.associate(longer, existences, learnt)
-    fitted = smoother.fit(longer, shared.links, 1, learnt)
+    begin.replace(longer, existences, shared.links)
+    del longer
+    fitted = smoother.fit(begin.take_paths(), shared.links, 1, learnt).without_predictions()
     if p.learning:
         learnt = smoother.with_shifts(fitted.paths, learnt)
         if learnt.shifts.any():
-            fitted = smoother.fit(fitted.paths, shared.links, 1, learnt)
+            fitted = smoother.fit(fitted.paths, shared.links, 1, learnt).without_predictions()
+    del shared
     shared = smoother.associate(fitted.paths, existences, learnt)
     there, odds = lifetimes.lifetimes(smoother, fitted.paths, shared, p)
     there[away] = 0.0
@@ -357,27 +403,26 @@ def read_paths(
     labels, begins = np.unique(of_label, return_index=True)
     ends = np.append(begins[1:], len(order))
     earlier = _before_their_report(fused, labels, frames[begins])
-    firsts, states, covariances, had = [], [], [], []
+    known = []
     for label, begin, end in zip(labels.tolist(), begins, ends, strict=True):
         before = np.array(earlier.get(label, ()), dtype=np.int64).reshape(-1, 2)
         steps = np.concatenate([before[:, 0], frames[begin:end]])
-        components = np.concatenate([before[:, 1], tracks.components[order[begin:end]]])
+        known.append((steps, np.concatenate([before[:, 1], tracks.components[order[begin:end]]])))
+    firsts = [int(steps[0]) for steps, _ in known]
+    lengths = [int(steps[-1] - steps[0]) + 1 for steps, _ in known]
+    paths = Paths.blank(labels.tolist(), firsts, lengths, dimension)
+    had = np.zeros(len(paths.states), dtype=bool)
+    for path, (steps, components) in enumerate(known):
+        within = paths.rows_of(path)
         means = fused.take("posterior.means", steps, components)
-        first, last = steps[0], steps[-1]
-        every = np.arange(first, last + 1)
-        filled = np.stack(
-            [np.interp(every, steps, means[:, axis]) for axis in range(dimension)], axis=1
-        )
-        wide = np.tile(_WIDE * np.eye(dimension), (len(every), 1, 1))
-        wide[steps - first] = fused.take("posterior.covariances", steps, components)
-        own = np.zeros(len(every), dtype=bool)
-        own[steps - first] = True
-        had.append(own)
-        firsts.append(int(first))
-        states.append(filled)
-        covariances.append(wide)
-    paths = Paths.of(labels.tolist(), firsts, states, covariances, dimension)
-    return paths, np.concatenate([np.zeros(0, dtype=bool), *had])
+        every = np.arange(steps[0], steps[-1] + 1)
+        for axis in range(dimension):
+            paths.states[within, axis] = np.interp(every, steps, means[:, axis])
+        rows = within.start + steps - steps[0]
+        paths.covariances[within] = _WIDE * np.eye(dimension)
+        paths.covariances[rows] = fused.take("posterior.covariances", steps, components)
+        had[rows] = True
+    return paths, had
 
 
 def _before_their_report(

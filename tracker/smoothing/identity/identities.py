@@ -101,7 +101,8 @@ def link_tracklets(
     remain, as far as possible, those of the result without corrections.
 
     Args:
-        tracked: Tracks of the filter, or of the previous round.
+        tracked: Tracks of the filter, or of the previous round; without corrections their states
+            are forgotten.
         parameters: Thresholds of the splits, and weights of the links.
         seen: Appearance of the boxes.
         corrections: The user's corrections, in the order in which they were made.
@@ -124,7 +125,12 @@ def link_tracklets(
         if found is None:
             plain = plain or earlier.get("cuts") or splitting.find_splits(tracked, parameters)
             earlier.put("cuts", plain)
-            found = _linked(tracked, parameters, seen, obeyed, leeway, plain, prior_links)
+            if not corrections:
+                tracked.forget_predictions()
+            found = _linked(
+                tracked, parameters, seen, obeyed, leeway, plain, prior_links,
+                bool(corrections),
+            )  # fmt: skip
             earlier.put(key, found)
         if prior_links.people is None:
             prior_links = PriorLinks(found.people)
@@ -172,6 +178,7 @@ def _linked(
     leeway: int,
     plain: splitting.Splits,
     prior_links: PriorLinks,
+    waits: bool,
 ) -> LinkedTracks:
     """Split tracks and link the tracklets under the constraints of some corrections.
 
@@ -183,13 +190,21 @@ def _linked(
         leeway: Number of steps by which a track may miss the step of a correction.
         plain: The splits without corrections.
         prior_links: The links without corrections, which are preferred.
+        waits: Whether there are corrections, for which the tracks may be split again.
     """
-    smoother, fitted, shared = tracked.smoother, tracked.fitted, tracked.shared
-    resolver = ConstraintResolver(fitted, corrections, leeway)
+    smoother, shared, before = tracked.smoother, tracked.shared, tracked.fitted.paths
+    rows_before = len(before.states)
+    before = before.without_states()
+    resolver = ConstraintResolver(tracked.fitted, corrections, leeway)
     tracklets, source_rows = splitting.split_tracks(tracked, plain, resolver)
     constraints = resolver.constraints(tracklets, source_rows)
-    links = select_rows(shared.links, source_rows, len(fitted.paths.states))
-    refitted = smoother.fit(tracklets, links)
+    del resolver
+    if not waits:
+        tracked.forget_states()
+    links = select_rows(shared.links, source_rows, rows_before)
+    given = [tracklets]  # nothing else holds the states that the fit replaces
+    tracklets = tracklets.without_states()
+    refitted = smoother.fit(given.pop(), links).without_predictions()
     own = BoxAssociations(
         links,
         shared.chances[:, source_rows],
@@ -197,6 +212,7 @@ def _linked(
         shared.hidden_by[:, source_rows],
     )
     worths, births, deaths = odds.tracklet_odds(smoother, refitted, own, parameters)
+    del own, shared
     alone = Ends.alone(refitted, smoother.prior)
     short_gap_odds = odds.ShortGapOdds(smoother, refitted.paths, links, parameters, seen.embeddings)
     pairs = short_gap_odds.pairs(alone)
@@ -219,9 +235,11 @@ def _linked(
         if not several:
             break
         whole, rows = join_chains(refitted.paths, several, list(range(len(several))))
-        ends = alone.in_chains(
-            tracklets, smoother.fit(whole, renumber_rows(links, rows)), rows, smoother.model.motion
-        )
+        given = [whole]
+        del whole
+        of_whole = smoother.fit(given.pop(), renumber_rows(links, rows))
+        ends = alone.in_chains(tracklets, of_whole, rows, smoother.model.motion)
+        del of_whole
         pairs = short_gap_odds.pairs(ends)
         again = best_chains(pairs, now)
         if again == first:
@@ -246,14 +264,14 @@ def _linked(
     ]
     pairs = pairs.with_more(back.of_ends(first))
     labels = _labels(tracklets, chains)
-    decisions = split_decisions(tracklets, fitted.paths, source_rows, plain.reasons, chains, labels)
+    decisions = split_decisions(tracklets, before, source_rows, plain.reasons, chains, labels)
     decisions += join_decisions(
         tracklets, pairs, chains, labels, odds.log_restart(smoother), set(constraints.must_link)
     )
     paths, rows = join_chains(refitted.paths, chains, labels)
     lengths = np.diff(tracklets.starts)
     origins = [
-        _most(fitted.paths.owners[source_rows[tracklets.starts[chain]]], lengths[chain])
+        _most(before.owners[source_rows[tracklets.starts[chain]]], lengths[chain])
         for chain in chains
     ]
     links = renumber_rows(links, rows)
@@ -272,7 +290,7 @@ def _linked(
     )  # fmt: skip
     limits = {labels[k]: span for k, span in constraints.limits(chains, tracklets).items()}
     origins_of = np.array(origins, dtype=np.int64)
-    whose = np.full(len(fitted.paths.states), -1, dtype=np.int64)
+    whose = np.full(rows_before, -1, dtype=np.int64)
     whose[source_rows] = of_tracklets[tracklets.owners]
     return LinkedTracks(
         paths, links, origins_of, of_tracklet, names_of, decisions, joined, limits, whose

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence as Many
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from numpy import ndarray
 
 from tracker.fusion import visibility
@@ -21,6 +21,9 @@ from tracker.smoothing.smoother import BoxAssociations, Fitted, Smoother
 
 FASTEST = 3.0
 """Largest speed of a person in a room over several steps, metres per second."""
+
+_POINTS = 4096
+"""Number of points on the lines between tracklets whose expected boxes are in memory at a time."""
 
 
 def tracklet_odds(
@@ -111,9 +114,9 @@ class ShortGapOdds:
             smoother.log_place,
         )
         survival, _ = _survival(smoother)
-        gains = np.full((len(self._paths.labels),) * 2, -np.inf)
-        gains[near.earlier, near.later] = motion + near.gaps * survival + self._empty + self._alike
-        return _of_table(gains, self._paths)
+        gains = motion + near.gaps * survival + self._empty + self._alike
+        paths = self._paths
+        return _finite(near.earlier, near.later, gains, paths.firsts, paths.lasts)
 
 
 def long_gap_odds(
@@ -140,31 +143,59 @@ def long_gap_odds(
     Returns:
         Pairs of chains with their log odds.
     """
-    whole, rows = join_chains(paths, chains, list(range(len(chains))))
-    newcomer = log_restart(smoother)
-    before = whole.lasts[:, None] < whole.firsts[None, :]
-    gains = np.full(before.shape, -np.inf)
+    newcomer, count = log_restart(smoother), len(chains)
+    keys, gains = np.zeros(0, dtype=np.int64), np.zeros(0)
+    firsts = np.array([paths.firsts[chain[0]] for chain in chains], dtype=np.int64)
+    lasts = np.array([paths.lasts[chain[-1]] for chain in chains], dtype=np.int64)
     if embeddings is not None:
+        whole, rows = join_chains(paths, chains, list(range(len(chains))))
         own = tracklets.renumber_rows(links, rows)
         alike = Appearance(whole, own, smoother.cameras, embeddings, smoother.model.step_time)
+        before = lasts[:, None] < firsts[None, :]
         gone = np.maximum(before.sum(axis=0), 1)
         earlier, later = np.nonzero(before)
         ratio, known = alike.log_ratio(earlier, later)
         earlier, later, ratio = earlier[known], later[known], ratio[known]
-        gains[earlier, later] = newcomer - np.log(gone[later]) + p.appearance * ratio
+        keys = earlier * count + later
+        gains = newcomer - np.log(gone[later]) + p.appearance * ratio
     chain_of = {tracklet: number for number, chain in enumerate(chains) for tracklet in chain}
+    kept: dict[int, float] = {}
     for one, other in same_label(paths):
         i, j = chain_of.get(one, -1), chain_of.get(other, -1)
-        if min(i, j) >= 0 and before[i, j]:
-            gains[i, j] = max(gains[i, j], newcomer) + p.keeping
-    return _of_table(gains, whole)
+        if min(i, j) >= 0 and lasts[i] < firsts[j]:
+            key = i * count + j
+            place = int(np.searchsorted(keys, key))
+            there = place < len(keys) and keys[place] == key
+            gain = kept.get(key, float(gains[place]) if there else -np.inf)
+            kept[key] = max(gain, newcomer) + p.keeping
+    # of two gains of one pair the first
+    keys, first = np.unique(
+        np.concatenate([np.array(list(kept), dtype=np.int64), keys]), return_index=True
+    )
+    gains = np.concatenate([np.array(list(kept.values())), gains])[first]
+    return _finite(keys // max(count, 1), keys % max(count, 1), gains, firsts, lasts)
 
 
-def _of_table(gains: Float[ndarray, "n n"], paths: Paths) -> Pairs:
-    """List the pairs with finite gains."""
-    earlier, later = np.nonzero(np.isfinite(gains))
-    gaps = paths.firsts[later] - paths.lasts[earlier]
-    return Pairs(earlier, later, gaps, gains[earlier, later])
+def _finite(
+    earlier: Int[ndarray, " P"],
+    later: Int[ndarray, " P"],
+    gains: Float[ndarray, " P"],
+    firsts: Int[ndarray, " n"],
+    lasts: Int[ndarray, " n"],
+) -> Pairs:
+    """List the pairs with finite gains, ordered by the first and then the second.
+
+    Args:
+        earlier: Index of the first of each of P pairs.
+        later: Index of the second.
+        gains: Log odds of the pairs.
+        firsts: First step of each of n tracklets or chains.
+        lasts: Last step of each.
+    """
+    order = np.lexsort((later, earlier))
+    order = order[np.isfinite(gains[order])]
+    earlier, later = earlier[order], later[order]
+    return Pairs(earlier, later, firsts[later] - lasts[earlier], gains[order])
 
 
 def _seen_empty(
@@ -176,6 +207,17 @@ def _seen_empty(
     has no box there counts as a miss; one with a box there, of the person or of an occluder, has no
     effect.
     """
+    inner = pairs.gaps - 1
+    total = np.zeros(len(inner))
+    # so many pairs at a time that their points are about as many
+    part = np.cumsum(inner) // _POINTS
+    for own in np.split(np.arange(len(inner)), np.flatnonzero(np.diff(part)) + 1):
+        total[own] = _seen_empty_at(smoother, paths, pairs.take(own))
+    return total * independence(smoother.model.step_time, memory)
+
+
+def _seen_empty_at(smoother: Smoother, paths: Paths, pairs: Pairs) -> Float[ndarray, " P"]:
+    """Sum of :func:`_seen_empty` of some pairs, as if all misses were independent."""
     inner = pairs.gaps - 1
     total = np.zeros(len(inner))
     pair = np.repeat(np.arange(len(inner)), inner)
@@ -197,4 +239,4 @@ def _seen_empty(
             expected.boxes, expected.valid, chances, steps, camera.starts, camera.boxes
         )
         total += np.bincount(pair, against, len(inner))
-    return total * independence(model.step_time, memory)
+    return total

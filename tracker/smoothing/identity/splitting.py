@@ -27,7 +27,7 @@ _SHORTEST = 0.4
 """Shortest tracklet, seconds; shorter ones are left out where their path has longer ones."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(slots=True, eq=False)
 class Tracked:
     """Tracks whose identities are to be resolved, with data about their N rows."""
 
@@ -43,6 +43,16 @@ class Tracked:
     """Whether the filter, or the previous round, had a track at each row; other rows fill gaps."""
     names: Int[ndarray, " N"]
     """The filter's label of each row, -1 where it had no track."""
+
+    def forget_predictions(self) -> None:
+        """Free the memory of what is read by :func:`cuts` and by corrections alone."""
+        self.fitted = self.fitted.without_predictions()
+
+    def forget_states(self) -> None:
+        """Free the memory of the states, once they are split for the last time."""
+        self.fitted = replace(
+            self.fitted.without_predictions(), paths=self.fitted.paths.without_states()
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -106,6 +106,12 @@ class Pairs:
     gains: Float[ndarray, " P"]
     """Log odds of the second continuing the first against being a new target."""
 
+    def take(self, chosen: ndarray) -> Pairs:
+        """Select some of the pairs, by mask or index."""
+        return Pairs(
+            self.earlier[chosen], self.later[chosen], self.gaps[chosen], self.gains[chosen]
+        )
+
     def of_ends(self, chains: Many[Many[int]]) -> Pairs:
         """Convert pairs of chains to pairs of one's last tracklet and the other's first."""
         first = np.array([chain[0] for chain in chains], dtype=np.int64)
@@ -252,22 +258,19 @@ def join_chains(
     """
     dimension = tracklets.states.shape[1]
     steps, place = tracklets.steps, np.full(len(tracklets.states), -1, dtype=np.int64)
-    firsts, states, covariances, begin = [], [], [], 0
-    for chain in chains:
+    firsts = [int(tracklets.firsts[chain[0]]) for chain in chains]
+    lasts = [int(tracklets.lasts[chain[-1]]) for chain in chains]
+    lengths = [last + 1 - first for first, last in zip(firsts, lasts, strict=True)]
+    found = Paths.blank(labels, firsts, lengths, dimension)
+    for path, chain in enumerate(chains):
         rows = np.concatenate(
             [np.arange(tracklets.starts[k], tracklets.starts[k + 1]) for k in chain]
         )
-        own = steps[rows]
+        own, within = steps[rows], found.rows_of(path)
         every = np.arange(own[0], own[-1] + 1)
-        states.append(
-            np.stack(
-                [np.interp(every, own, tracklets.states[rows, a]) for a in range(dimension)], axis=1
-            )
-        )
-        spread = np.tile(np.eye(dimension), (len(every), 1, 1))
-        spread[own - own[0]] = tracklets.covariances[rows]
-        covariances.append(spread)
-        firsts.append(int(own[0]))
-        place[rows] = begin + own - own[0]
-        begin += len(every)
-    return Paths.of(labels, firsts, states, covariances, dimension), place
+        for axis in range(dimension):
+            found.states[within, axis] = np.interp(every, own, tracklets.states[rows, axis])
+        found.covariances[within] = np.eye(dimension)
+        place[rows] = within.start + own - own[0]
+        found.covariances[place[rows]] = tracklets.covariances[rows]
+    return found, place
