@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from app.command import supervision
+from app.command.allocator import return_large_arrays
 from app.command.arguments.corrections import Corrections
 from app.command.arguments.importing import Check, ExportCalibration, Formats, Import
 from app.command.arguments.library import Bundle, LibraryCommand, OpenRun, Runs
@@ -49,6 +50,7 @@ def main(arguments: list[str] | None = None) -> int:
     """Run one command; returns the exit status."""
     if arguments is None and sys.argv[1:2] == ["serve"]:
         return supervision.keep_up(lambda: main(sys.argv[1:]))
+    return_large_arrays()
     try:
         status = _run(parse(arguments))
         sys.stdout.flush()  # a pipe that is closed raises here, where it is caught, not at exit

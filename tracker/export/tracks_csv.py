@@ -45,6 +45,9 @@ empty."""
 NAME = "name"
 """The name of the column of a run with named people: the name of the row's track, or empty."""
 
+_AT_ONCE = 1024
+"""Number of rows that are text in memory at a time."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrackFile:
@@ -118,20 +121,23 @@ def write_tracks_csv(
     ]
     csv.writer(stream, lineterminator="\n").writerow(head)
     called = {track: _cell(name) for track, name in names.items()}
-    columns = [
-        [f"{frame}" for frame in tracks.frames],
-        [f"{frame * sequence.step_time:.6f}" for frame in tracks.frames],
-        [f"{number}" for number in tracks.ids],
-        *_fixed(tracks.positions, 4),
-        *_fixed(tracks.existences[:, None], 4),
-        *_fixed(tracks.sigmas, 4),
-        *([[called.get(track, "") for track in tracks.ids.tolist()]] if names else []),
-        *([list(row_corrections)] if row_corrections else []),
-    ]
-    for camera in cameras:
-        pixels, visible = camera.project_boxes(tracks.positions, sequence.target_half_extents)
-        columns += _fixed(np.where(visible[:, None], pixels, np.nan), 2)
-    stream.writelines(",".join(row) + "\n" for row in zip(*columns, strict=True))
+    for first in range(0, len(tracks), _AT_ONCE):
+        some = slice(first, first + _AT_ONCE)
+        frames, ids, positions = tracks.frames[some], tracks.ids[some], tracks.positions[some]
+        columns = [
+            [f"{frame}" for frame in frames],
+            [f"{frame * sequence.step_time:.6f}" for frame in frames],
+            [f"{number}" for number in ids],
+            *_fixed(positions, 4),
+            *_fixed(tracks.existences[some, None], 4),
+            *_fixed(tracks.sigmas[some], 4),
+            *([[called.get(track, "") for track in ids.tolist()]] if names else []),
+            *([list(row_corrections[some])] if row_corrections else []),
+        ]
+        for camera in cameras:
+            pixels, visible = camera.project_boxes(positions, sequence.target_half_extents)
+            columns += _fixed(np.where(visible[:, None], pixels, np.nan), 2)
+        stream.writelines(",".join(row) + "\n" for row in zip(*columns, strict=True))
 
 
 def _cell(text: str) -> str:
