@@ -50,7 +50,7 @@ def test_what_all_else_says_is_found_again_from_everything(
     gain = rest @ np.linalg.inv(rest + noise)
     states, spreads = (mean + gain @ way)[None], (gain @ noise)[None]
     said = [make(kind="here", places=[[0, *place.tolist()]], accuracy=sigma)]
-    stated = PlaceMeasurements.of(np.zeros(1, dtype=np.int64), said).weighed(states, spreads)
+    stated = PlaceMeasurements.of(np.zeros(1, dtype=np.int64), said).inflate(states, spreads)
     widened = inflation(way, rest, sigma)
     assert_allclose(stated.noises[0], noise + widened, atol=1e-3 * np.trace(noise + widened))
 

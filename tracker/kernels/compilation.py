@@ -82,7 +82,7 @@ def compiled_later(function: _F) -> _F:
     before = _config.CACHE_DIR
     _config.CACHE_DIR = str(_folder_of(Path(function.__code__.co_filename)))
     try:
-        compiled = numba.njit(cache=True, nogil=True, no_cfunc_wrapper=True)(function)
+        compiled = numba.njit(cache=True, nogil=True)(function)
         if not _config.DISABLE_JIT:
             checked_cache.keep(compiled)
     except RuntimeError:  # no writable folder: it is compiled at every start
