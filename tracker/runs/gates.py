@@ -69,24 +69,24 @@ def count_gates(run: Run) -> list[Gates]:
         ]
         if not counted:
             continue
-        told = [information for information, _ in counted]
-        names = dict.fromkeys(name for one in told for name in one if name.startswith(DROPPED))
+        counts = [information for information, _ in counted]
+        names = dict.fromkeys(name for one in counts for name in one if name.startswith(DROPPED))
         gates.append(
             Gates(
                 camera=view.camera.name,
                 pictures=len(counted),
-                candidates=_mean(told, CANDIDATES),
-                dropped={name.removeprefix(DROPPED): _mean(told, name) for name in names},
+                candidates=_mean(counts, CANDIDATES),
+                dropped={name.removeprefix(DROPPED): _mean(counts, name) for name in names},
                 passed=sum(count for _, count in counted) / len(counted),
-                trust=_mean(told, TRUST, 1.0),
-                uncertainty=_mean(told, UNCERTAINTY),
+                trust=_mean(counts, TRUST, 1.0),
+                uncertainty=_mean(counts, UNCERTAINTY),
             )
         )
     return gates
 
 
-def _mean(told: list[dict[str, float]], name: str, otherwise: float = 0.0) -> float:
-    return sum(one.get(name, otherwise) for one in told) / len(told)
+def _mean(counts: list[dict[str, float]], name: str, otherwise: float = 0.0) -> float:
+    return sum(one.get(name, otherwise) for one in counts) / len(counts)
 
 
 def notices(run: Run) -> list[str]:

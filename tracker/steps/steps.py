@@ -216,9 +216,9 @@ class Steps(Sequence[T]):
                 own = order[low:high]
                 column = self.column(name, part, first=first, last=last)
                 found.append(column.values[column.starts[steps[own] - first] + rows[own]])
-        taken = whole(found or [self.column(name, part, last=0).values])
-        result = np.empty_like(taken)
-        result[order] = taken
+        rows_found = whole(found or [self.column(name, part, last=0).values])
+        result = np.empty_like(rows_found)
+        result[order] = rows_found
         return result
 
     def shapes(self, name: str, part: int = 0) -> set[tuple[int, ...]]:
