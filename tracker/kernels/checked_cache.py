@@ -1,4 +1,4 @@
-"""Storage of machine code with a checksum, of every kernel once, compiled by one process at a time.
+"""Storage of machine code: checksums, large kernels once, compilation by one process at a time.
 
 numba reads stored code without verifying it: an empty file is an exception at every start, a
 flipped bit a crash. Here the SHA-256 of a file's content stands at its end, and a file that was

@@ -41,7 +41,7 @@ class Node(NamedTuple):
     kind: type[Any]
     """The dataclass."""
     names: tuple[str, ...]
-    """Its fields."""
+    """Names of its fields."""
     whole: int
     """Index of the column that has ``...`` where a value is of this dataclass, else the value."""
     inner: tuple[Node | int, ...]
@@ -272,18 +272,14 @@ class Alike:
             key, rows = _key(values[0], second)
             if rows is None:
                 return Column((_form(key, values[0]),), (None,), None, 0, None, second)
-        if not second and set(map(type, values)) == {ndarray} and values[0].ndim:
+        if set(map(type, values)) == {ndarray} and values[0].ndim > second:
             # by far the most columns have one form
             types = map(operator.attrgetter("dtype"), values)
             if len(set(map(id, types))) == 1:
                 with contextlib.suppress(ValueError):  # shapes differ
-                    return self._column(
-                        (_form(_key(values[0], second)[0], values[0]),),
-                        [values],
-                        None,
-                        list(map(len, values)),
-                        second,
-                    )
+                    own = [one.swapaxes(0, 1) for one in values] if second else values
+                    form = _form(_key(values[0], second)[0], values[0])
+                    return self._column((form,), [own], None, list(map(len, own)), second)
         forms: dict[Any, int] = {}
         kinds: list[Form] = []
         parts: list[list[ndarray]] = []

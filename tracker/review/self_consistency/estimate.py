@@ -85,7 +85,8 @@ def estimate(
             computed are tracked.
         processes: Largest number of processes.
         on_progress: A callback that gets the number of steps done in all variants, and the total
-        number. cancelled: A callback that returns whether to stop; it is called every few steps.
+            number.
+        cancelled: A callback that returns whether to stop; it is called every few steps.
 
     Raises:
         tracker.runs.pipeline.Cancelled: If ``cancelled`` returned true.

@@ -156,7 +156,7 @@ def _behind(
         t: Index of the occluded target.
         j: Index of a measurement in the foreground component.
         seen: The measurements.
-        one_side: As in :func:`_left_over`.
+        one_side: Factor by which the margin at a free edge must exceed that at the opposite edge.
         alone: Whether no other target is occluded in the component.
     """
     one = targets.take(np.array([t]))

@@ -330,7 +330,8 @@ def split_decisions(
         before: The paths before the splits, with N rows.
         source_rows: Index of each of the M rows in ``before``.
         reasons: Why each of the N rows was left out, as in
-        :class:`tracker.smoothing.identity.splitting.Splits`. chains: The tracklets of each track.
+            :class:`tracker.smoothing.identity.splitting.Splits`.
+        chains: The tracklets of each track.
         labels: Label of each track.
     """
     chain_of = {tracklet: number for number, chain in enumerate(chains) for tracklet in chain}
