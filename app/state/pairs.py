@@ -10,7 +10,7 @@ from jaxtyping import Float, Int
 from numpy import ndarray
 
 from tracker.evaluation import EvaluationSettings
-from tracker.evaluation.measures.matching import assign
+from tracker.evaluation.matching import assign
 from tracker.fusion.trajectories import Trajectories
 from tracker.sequences.sequence import GroundTruth
 

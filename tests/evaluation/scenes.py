@@ -11,7 +11,7 @@ import pytest
 from hypothesis import strategies as st
 
 from tests import world
-from tracker.evaluation.measures.matching import Comparison, GatedDistance, prepare
+from tracker.evaluation.matching import Comparison, GatedDistance, prepare
 from tracker.sequences.reader import read_sequence
 from tracker.sequences.sequence import GroundTruth, Sequence
 
@@ -122,12 +122,13 @@ def comparison(
     gate: float = 1.0,
     distance: Any = "position",
     steps: int | None = None,
+    half_extents: np.ndarray = HALF_EXTENTS,
 ) -> Comparison:
     """Both sides with "don't care" set aside."""
     if steps is None:
         frames = [t.frames for t in (truth, tracks) if t is not None and len(t.frames)]
         steps = max((int(f.max()) for f in frames), default=-1) + 1
-    return prepare(truth, tracks, GatedDistance(distance, gate, HALF_EXTENTS), steps=steps)
+    return prepare(truth, tracks, GatedDistance(distance, gate, half_extents), steps=steps)
 
 
 def by_hand() -> tuple[GroundTruth, Columns]:

@@ -15,10 +15,9 @@ import pytest
 
 from tests.evaluation.scenes import HALF_EXTENTS, truth_of
 from tests.world import ring
-from tracker.evaluation import EvaluationSettings
+from tracker.evaluation import EvaluationSettings, evaluate_sequence
 from tracker.evaluation.report.page import report_html
 from tracker.evaluation.report.tables import parameter_table
-from tracker.evaluation.summary import evaluate_sequence
 from tracker.fusion.trajectories import Trajectories
 from tracker.parameters import METHODS, PARAMETERS, RunParameters, stage_values, value, with_values
 from tracker.sequences.sequence import Room, Sequence, View

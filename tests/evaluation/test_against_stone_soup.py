@@ -20,8 +20,7 @@ from stonesoup.metricgenerator.ospametric import GOSPAMetric, OSPAMetric
 from stonesoup.types.state import State
 
 from tests.evaluation.scenes import comparison, distances, perturbed, point_sets, walks
-from tracker.evaluation.measures.gospa import gospa, gospa_parts
-from tracker.evaluation.measures.ospa import ospa, ospa_parts
+from tracker.evaluation.ospa import gospa, gospa_parts, ospa, ospa_parts
 
 NOW = datetime(2000, 1, 1)
 

@@ -9,12 +9,11 @@ import pytest
 
 from tests.evaluation.scenes import HALF_EXTENTS, comparison, tracks_of, truth_of
 from tracker.evaluation import EvaluationSettings, evaluate
-from tracker.evaluation.measures.clear import clear
-from tracker.evaluation.measures.gospa import gospa_parts
-from tracker.evaluation.measures.hota import ALPHAS, hota
-from tracker.evaluation.measures.identity import identity
-from tracker.evaluation.measures.matching import assign, match, to_rows
-from tracker.evaluation.measures.ospa import ospa_parts
+from tracker.evaluation.clear import clear
+from tracker.evaluation.hota import ALPHAS, hota
+from tracker.evaluation.identity import identity
+from tracker.evaluation.matching import assign, match, to_rows
+from tracker.evaluation.ospa import gospa_parts, ospa_parts
 from tracker.evaluation.pixels import pixels
 from tracker.evaluation.positions import positions
 from tracker.geometry.camera import Camera
@@ -139,8 +138,8 @@ def test_steps_that_are_set_aside_count_neither_for_nor_against_a_track() -> Non
 def test_near_itself_is_near(distance: float, found: int) -> None:
     scene = at(distance)
     score = positions(scene, near=0.3)
-    assert score.found.tolist() == [found]
-    assert score.stray.tolist() == [1 - found]
+    assert score.found_by_person.tolist() == [found]
+    assert score.false_per_step == 1 - found
     assert score.found_share == found
     assert score.errors.tolist() == [pytest.approx(distance)]
 
@@ -224,13 +223,12 @@ FRONT = Camera(
 def test_boxes_are_paired_from_their_least_overlap_on(overlap: float, pairs: int) -> None:
     # at 10 m boxes of 10 × 20 pixels, 1 aside and 3 below: 9 · 17 of 400 − 9 · 17 overlap
     truth, tracks = truth_of([(0, 1, 0, 10, 0)]), tracks_of([(0, 7, 0.1, 10, -0.3)])
-    half = np.array([0.5, 0.0, 1.0])
-    scene = comparison(truth, tracks)
+    scene = comparison(truth, tracks, half_extents=np.array([0.5, 0.0, 1.0]))
     shared = 9 * 17 / (400 - 9 * 17)
     scale = overlap / 0.6 * shared
-    (score,) = pixels(scene, [FRONT], half, overlap=scale)
+    (score,) = pixels(scene, [FRONT], overlap=scale)
     assert (len(score.errors), score.people, score.estimates, score.steps) == (pairs, 1, 1, 1)
-    assert score.false_per_picture == 1 - pairs
+    assert score.false_per_step == 1 - pairs
     assert score.found_share == pairs
     if pairs:
         assert score.error == score.error_95 == pytest.approx(np.hypot(1.0, 3.0))

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from tests.evaluation.scenes import by_hand, comparison, tracks_of, truth_of
-from tracker.evaluation.measures.clear import clear
-from tracker.evaluation.measures.gospa import gospa
-from tracker.evaluation.measures.hota import hota
-from tracker.evaluation.measures.identity import identity
-from tracker.evaluation.measures.matching import GatedDistance
-from tracker.evaluation.measures.ospa import ospa, ospa2, ospa2_whole
+from tracker.evaluation import evaluate
+from tracker.evaluation.clear import clear
+from tracker.evaluation.hota import hota
+from tracker.evaluation.identity import identity
+from tracker.evaluation.matching import GatedDistance
+from tracker.evaluation.ospa import gospa, ospa, ospa2
 from tracker.evaluation.pixels import pixels
-from tracker.evaluation.positions import cardinality_error, positions
+from tracker.evaluation.positions import positions
 from tracker.geometry.camera import Camera
 
 
@@ -29,7 +29,7 @@ def test_clear():
     # person 2 is lost at step 1 and taken up again; person 1 is lost at the end only
     assert score.fragmentations.tolist() == [0, 1]
     # both are paired at 3 of 4 steps
-    assert (score.mostly_tracked, score.partly_tracked, score.mostly_lost) == (0, 2, 0)
+    assert score.statuses == ["partly tracked"] * 2
 
 
 def test_clear_keeps_the_pair_of_the_step_before():
@@ -92,12 +92,12 @@ def test_ospa2():
     # d(2, 10) = (1 + 1 + 0.2 + 0.2)/4 = 0.6, d(2, 20) = (0.4 + 1 + 1 + 1)/4 = 0.85,
     # d(·, 30) = 1. Best is 1–20 and 2–10 with 1.4, the third track costs 1: 2.4 / 3.
     scene = comparison(*by_hand())
-    assert ospa2_whole(scene, cutoff=1.0, order=1.0) == pytest.approx(0.8)
+    score = ospa2(scene, cutoff=1.0, order=1.0, window=2)
+    assert score.whole == pytest.approx(0.8)
     # window 2 at step 1 holds steps 0 and 1: d(1, 10) = 0.2, d(2, 20) = (0.4 + 1)/2 = 0.7.
     # At step 2 it holds 1 and 2: d(1, 20) = (1 + 0.2)/2, d(2, 10) = (1 + 0.2)/2.
     # At step 3 it holds 2 and 3: d(1, 20) = (0.2 + 1)/2, d(2, 10) = 0.2, track 30 costs 1.
-    window = ospa2(scene, cutoff=1.0, order=1.0, window=2)
-    assert window == pytest.approx([0.25, 0.45, (0.6 + 0.6) / 2, (0.6 + 0.2 + 1) / 3])
+    assert score.over_time == pytest.approx([0.25, 0.45, (0.6 + 0.6) / 2, (0.6 + 0.2 + 1) / 3])
 
 
 def test_gospa():
@@ -113,20 +113,21 @@ def test_gospa():
 
 def test_positions():
     # errors 0.1 0.4 | 0.3 | 0.2 0.2 | 0.2; within 0.3: person 1 three times, person 2 twice
-    scene = comparison(*by_hand())
-    score = positions(scene, near=0.3)
-    assert score.mean == pytest.approx(1.4 / 6)
+    score = positions(comparison(*by_hand()), near=0.3)
+    assert score.error == pytest.approx(1.4 / 6)
     # sorted 0.1 0.2 0.2 0.2 0.3 0.4: 95 % lies 0.75 of the way from the fifth to the sixth
-    assert score.percentile_95 == pytest.approx(0.375)
-    assert score.found.tolist() == [3, 2]
+    assert score.error_95 == pytest.approx(0.375)
+    assert score.found_by_person.tolist() == [3, 2]
     assert score.found_share == pytest.approx(5 / 8)
-    assert score.stray.tolist() == [1, 0, 0, 1]
+    assert score.false_per_step == 2 / 4
     assert np.isnan(score.by_person).tolist() == [
         [False, False, False, True],
         [False, True, False, False],
     ]
     # estimates 2 1 2 2 against 2
-    assert cardinality_error(scene) == (pytest.approx(0.25), pytest.approx(-0.25))
+    assert score.surplus.tolist() == [0, -1, 0, 0]
+    result = evaluate(*by_hand())
+    assert (result["cardinality_error"], result["cardinality_bias"]) == (0.25, -0.25)
 
 
 def test_box_distance():
@@ -153,9 +154,10 @@ def test_pixels():
     )
     truth = truth_of([(0, 1, 0, 10, 0), (0, 2, 0, -10, 0)])
     tracks = tracks_of([(0, 7, 0.2, 10, 0), (0, 8, 3, 10, 0)])
-    (score,) = pixels(comparison(truth, tracks), [camera], np.array([0.5, 0.0, 0.5]), overlap=0.5)
+    scene = comparison(truth, tracks, half_extents=np.array([0.5, 0.0, 0.5]))
+    (score,) = pixels(scene, [camera], overlap=0.5)
     assert score.error == pytest.approx(2.0)
     assert score.overlap == pytest.approx(2 / 3)
     assert (score.people, score.estimates) == (1, 2)
     assert score.found_share == 1.0
-    assert score.false_per_picture == 1.0
+    assert score.false_per_step == 1.0

@@ -9,7 +9,7 @@ import pytest
 
 from tests.evaluation.scenes import HALF_EXTENTS, Columns, tracks_of, truth_of
 from tracker.evaluation import EvaluationSettings, evaluate
-from tracker.evaluation.measures.matching import to_rows
+from tracker.evaluation.matching import to_rows
 from tracker.fusion.trajectories import Trajectories
 from tracker.geometry.camera import Camera
 

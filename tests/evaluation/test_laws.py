@@ -22,9 +22,8 @@ from tests.evaluation.scenes import (
     walks,
 )
 from tracker.evaluation import Evaluation, EvaluationSettings, evaluate
-from tracker.evaluation.measures.gospa import gospa_parts
-from tracker.evaluation.measures.matching import GatedDistance, assign, match
-from tracker.evaluation.measures.ospa import ospa, ospa2, ospa2_whole, ospa_parts
+from tracker.evaluation.matching import GatedDistance, assign, match
+from tracker.evaluation.ospa import gospa_parts, ospa, ospa2, ospa_parts
 
 ORDERS = st.sampled_from([1.0, 1.5, 2.0, 4.0])
 CUTOFFS = st.sampled_from([0.3, 1.0, 2.0])
@@ -60,7 +59,8 @@ def test_ospa_parts(x, y, cutoff: float, order: float):
 
 
 def ospa2_between(x: Columns, y: Columns, cutoff: float, order: float) -> float:
-    value = ospa2_whole(comparison(as_truth(x), y, steps=12), cutoff=cutoff, order=order)
+    scene = comparison(as_truth(x), y, steps=12)
+    value = ospa2(scene, cutoff=cutoff, order=order, window=1).whole
     assert value is not None
     return value
 
@@ -86,7 +86,8 @@ def test_ospa2_from_its_definition(seed: int, window: int, order: float):
     truth = walks(seed, steps=20, people=3)
     tracks = perturbed(truth, seed, noise=0.4, missing=0.3, false=1.0)
     scene = comparison(truth, tracks)
-    values = ospa2(scene, cutoff=1.0, order=order, window=window)
+    score = ospa2(scene, cutoff=1.0, order=order, window=window)
+    values = score.over_time
     if window == 1:
         single = ospa(scene, cutoff=1.0, order=order).distance
         assert values == pytest.approx(single, abs=1e-9)
@@ -94,7 +95,7 @@ def test_ospa2_from_its_definition(seed: int, window: int, order: float):
         expected = naive_ospa2(truth, tracks, range(max(0, step - window + 1), step + 1), order)
         assert values[step] == pytest.approx(expected, abs=1e-9)
     whole = naive_ospa2(truth, tracks, range(scene.steps), order)
-    assert ospa2_whole(scene, cutoff=1.0, order=order) == pytest.approx(whole, abs=1e-9)
+    assert score.whole == pytest.approx(whole, abs=1e-9)
 
 
 def naive_ospa2(truth, tracks, steps: range, order: float) -> float:

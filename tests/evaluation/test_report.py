@@ -11,10 +11,9 @@ import pytest
 from playwright.sync_api import Browser
 
 from tests.evaluation.scenes import HALF_EXTENTS, Columns, perturbed, truth_of, walks
-from tracker.evaluation import EvaluationSettings
+from tracker.evaluation import EvaluationSettings, evaluate_sequence
 from tracker.evaluation.report.figures import DARK, LIGHT_IDS, broken, over_time, top_view
 from tracker.evaluation.report.page import report_html, write_report
-from tracker.evaluation.summary import evaluate_sequence
 from tracker.fusion.trajectories import Trajectories
 from tracker.geometry.camera import Camera
 from tracker.parameters import RunParameters, with_values

@@ -2,12 +2,20 @@
 the report."""
 
 from tracker.evaluation.difference import Difference, compare
-from tracker.evaluation.figures import DEFINITIONS, Definition, Figure
-from tracker.evaluation.result import Evaluation, Pairs, Series
+from tracker.evaluation.evaluation import (
+    BY_KEY,
+    DEFINITIONS,
+    Evaluation,
+    Pairs,
+    Series,
+    evaluate,
+    evaluate_sequence,
+)
+from tracker.evaluation.figures import Definition, Figure
 from tracker.evaluation.settings import EvaluationSettings
-from tracker.evaluation.summary import evaluate, evaluate_sequence
 
 __all__ = [
+    "BY_KEY",
     "DEFINITIONS",
     "Definition",
     "Difference",

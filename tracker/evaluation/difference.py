@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any, Literal
 
-from tracker.evaluation.figures import Direction, Figure
-from tracker.evaluation.result import Evaluation
+from tracker.evaluation.evaluation import Evaluation
+from tracker.evaluation.figures import Definition, Direction, Figure, Value
 
 Verdict = Literal["better", "worse", "same", "different", "undefined"]
 
@@ -15,23 +15,15 @@ Verdict = Literal["better", "worse", "same", "different", "undefined"]
 class Difference:
     """One figure of two evaluations, A the reference and B the new one."""
 
-    key: str
-    """The key of the figure."""
-    name: str
-    """The name that is displayed."""
+    definition: Definition[Any]
+    """The definition of the figure."""
     unit: str
     """The unit that is displayed; empty for a figure without unit."""
-    digits: int
-    """The number of decimals that are displayed."""
-    direction: Direction
-    """The values that are better."""
-    headline: bool
-    """Whether short tables show the figure."""
-    a: float | int | None
+    a: Value
     """The value of A; None if it is undefined."""
-    b: float | int | None
+    b: Value
     """The value of B; None if it is undefined."""
-    difference: float | int | None
+    difference: Value
     """B − A of the displayed (rounded) values, so that it is 0 if these are equal; None if one of
     them is undefined."""
     verdict: Verdict
@@ -41,11 +33,6 @@ class Difference:
     """False where A and B were measured with different settings."""
     measured_with: str
     """The settings that B's value depends on, in words."""
-
-    def to_json(self) -> dict[str, Any]:
-        """Return the fields as a plain mapping; the settings are ``stated`` there."""
-        values = asdict(self)
-        return values | {"stated": values.pop("measured_with")}
 
 
 def verdict(direction: Direction, digits: int, a: float | None, b: float | None) -> Verdict:
@@ -76,30 +63,20 @@ def compare(a: Evaluation, b: Evaluation) -> tuple[Difference, ...]:
         a: The reference, for instance the evaluation of the pinned or the previous run.
         b: The evaluation that is compared with it.
     """
-    before = {figure.definition.key: figure for figure in a.figures}
-    return tuple(_difference(before[figure.definition.key], figure) for figure in b.figures)
+    return tuple(_difference(*pair) for pair in zip(a.figures, b.figures, strict=True))
 
 
 def _difference(a: Figure, b: Figure) -> Difference:
     """Compare the values of one figure."""
-    definition = b.definition
-    before, after = (
-        None if figure.value is None else round(figure.value, definition.digits)
-        for figure in (a, b)
-    )
+    definition, digits = b.definition, b.definition.digits
+    before, after = (None if one.value is None else round(one.value, digits) for one in (a, b))
     return Difference(
-        key=definition.key,
-        name=definition.name,
+        definition=definition,
         unit=b.unit,
-        digits=definition.digits,
-        direction=definition.direction,
-        headline=definition.headline,
         a=a.value,
         b=b.value,
-        difference=None
-        if before is None or after is None
-        else round(after - before, definition.digits),
-        verdict=verdict(definition.direction, definition.digits, a.value, b.value),
+        difference=None if before is None or after is None else round(after - before, digits),
+        verdict=verdict(definition.direction, digits, a.value, b.value),
         comparable=a.measured_with == b.measured_with,
         measured_with=b.measured_with,
     )

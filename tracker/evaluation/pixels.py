@@ -15,52 +15,39 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from tracker.evaluation.measures.matching import Comparison, Rows, assign
+from tracker.evaluation.figures import Definition, mean
+from tracker.evaluation.matching import Comparison, Rows, assign
+from tracker.evaluation.positions import Errors
 from tracker.geometry.boxes import box_overlaps
 from tracker.geometry.camera import Camera
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class CameraScore:
-    """The scores of one camera's boxes."""
+class CameraScore(Errors):
+    """The errors of the boxes in one camera's pictures: distances of centres, pixels."""
 
     camera: str
     """The name of the camera."""
-    errors: Float[ndarray, " M"]
-    """Distance of the box centres of each pair, pixels."""
     overlaps: Float[ndarray, " M"]
     """Intersection over union of each pair."""
-    people: int
-    """The number of true boxes in the picture, over all steps."""
-    estimates: int
-    """The number of reprojected boxes in the picture, over all steps."""
-    steps: int
-    """The number of steps that are scored."""
-
-    @property
-    def error(self) -> float | None:
-        """Mean distance of the centres, pixels; None without pairs."""
-        return float(self.errors.mean()) if len(self.errors) else None
-
-    @property
-    def error_95(self) -> float | None:
-        """95th percentile of the distance of the centres, pixels; None without pairs."""
-        return float(np.percentile(self.errors, 95)) if len(self.errors) else None
 
     @property
     def overlap(self) -> float | None:
         """Mean intersection over union of the pairs; None without pairs."""
-        return float(self.overlaps.mean()) if len(self.overlaps) else None
+        return mean(self.overlaps)
 
-    @property
-    def found_share(self) -> float | None:
-        """Share of the true boxes that have a pair; None without true boxes."""
-        return len(self.errors) / self.people if self.people else None
 
-    @property
-    def false_per_picture(self) -> float | None:
-        """Mean number of reprojected boxes without a pair in a picture; None without steps."""
-        return (self.estimates - len(self.errors)) / self.steps if self.steps else None
+PICTURES: tuple[Definition[CameraScore], ...] = (
+    Definition("pixel_error", "Pixel error", "Pictures", "px", "lower", 2, ("overlap",),
+        "Mean distance of the centres of reprojected and true boxes, all cameras together.",
+        lambda c: c.error),
+    Definition("pixel_overlap", "Box overlap", "Pictures", "", "higher", 3, ("overlap",),
+        "Mean intersection over union of the paired boxes, all cameras together.",
+        lambda c: c.overlap),
+    Definition("pixel_found", "Boxes found", "Pictures", "", "higher", 3, ("overlap",),
+        "Share of the true boxes in the pictures that have a pair, all cameras together.",
+        lambda c: c.found_share),
+)  # fmt: skip
 
 
 def _seen(
@@ -76,26 +63,24 @@ def _seen(
 def pixels(
     comparison: Comparison,
     cameras: Sequence[Camera],
-    half_extents: Float[ndarray, " 3"],
     *,
     overlap: float,
 ) -> tuple[CameraScore, ...]:
     """Score the boxes in every camera's picture.
 
     At each step the boxes of one picture are paired one to one by the protocol of
-    :mod:`tracker.evaluation.measures.matching`, with the distance 1 − IoU and the gate
+    :mod:`tracker.evaluation.matching`, with the distance 1 − IoU and the gate
     1 − ``overlap``. Estimates that matched a don't-care row in space are not in the comparison.
 
     Args:
         comparison: Truth and estimates.
         cameras: The calibrated cameras; without any there are no scores.
-        half_extents: Half width, depth and height of a target, metres.
         overlap: The least intersection over union of a pair, in (0, 1).
     """
-    scores = []
+    scores, size = [], comparison.measure.half_extents
     for camera in cameras:
-        truth, truth_starts = _seen(comparison.truth, camera, half_extents)
-        boxes, box_starts = _seen(comparison.tracks, camera, half_extents)
+        truth, truth_starts = _seen(comparison.truth, camera, size)
+        boxes, box_starts = _seen(comparison.tracks, camera, size)
         errors, overlaps = [np.zeros(0)], [np.zeros(0)]
         for step in range(comparison.steps):
             here = truth[truth_starts[step] : truth_starts[step + 1]]
@@ -114,8 +99,23 @@ def pixels(
                 errors=np.concatenate(errors),
                 overlaps=np.concatenate(overlaps),
                 people=len(truth),
+                found=sum(map(len, errors)),
                 estimates=len(boxes),
                 steps=comparison.steps,
             )
         )
     return tuple(scores)
+
+
+def together(scores: Sequence[CameraScore]) -> CameraScore:
+    """Return the errors of all cameras together."""
+    none = [np.zeros(0)]
+    return CameraScore(
+        camera="all",
+        errors=np.concatenate(none + [score.errors for score in scores]),
+        overlaps=np.concatenate(none + [score.overlaps for score in scores]),
+        people=sum(score.people for score in scores),
+        found=sum(score.found for score in scores),
+        estimates=sum(score.estimates for score in scores),
+        steps=sum(score.steps for score in scores),
+    )

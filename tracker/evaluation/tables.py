@@ -6,14 +6,13 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy import ndarray
 
-from tracker.evaluation.measures.clear import Clear
-from tracker.evaluation.measures.identity import Identity
-from tracker.evaluation.measures.matching import Comparison
+from tracker.evaluation.clear import Clear, PersonStatus
+from tracker.evaluation.figures import mean, percentile_95
+from tracker.evaluation.identity import Identity
+from tracker.evaluation.matching import Comparison
 from tracker.evaluation.positions import Positions
 
-PersonStatus = Literal["mostly tracked", "partly tracked", "mostly lost"]
 TrackKind = Literal["person", "false", "don't care"]
 
 
@@ -78,16 +77,12 @@ def person_rows(
     comparison: Comparison, clear: Clear, identity: Identity, positions: Positions
 ) -> tuple[PersonRow, ...]:
     """Return the scores of all people of the truth, by id."""
-    truth, tracks = comparison.truth, comparison.tracks
+    truth, tracks, statuses = comparison.truth, comparison.tracks, clear.statuses
     rows = []
     for k, name in enumerate(truth.names.tolist()):
         frames = truth.frames[truth.indices == k]
         errors = positions.by_person[k]
         errors = errors[np.isfinite(errors)]
-        share = clear.tracked[k] / clear.present[k]
-        status: PersonStatus = (
-            "mostly tracked" if share > 0.8 else "mostly lost" if share < 0.2 else "partly tracked"
-        )
         own = int(identity.track_of[k])
         rows.append(
             PersonRow(
@@ -96,10 +91,10 @@ def person_rows(
                 last=int(frames[-1]),
                 steps=len(frames),
                 tracked=int(clear.tracked[k]),
-                status=status,
-                found_share=float(positions.found[k]) / len(frames),
-                error=float(errors.mean()) if len(errors) else None,
-                error_95=float(np.percentile(errors, 95)) if len(errors) else None,
+                status=statuses[k],
+                found_share=float(positions.found_by_person[k]) / len(frames),
+                error=mean(errors),
+                error_95=percentile_95(errors),
                 switches=int(clear.switches[k]),
                 fragmentations=int(clear.fragmentations[k]),
                 track=int(tracks.names[own]) if own >= 0 else None,
@@ -111,64 +106,32 @@ def person_rows(
 def track_rows(comparison: Comparison, clear: Clear) -> tuple[TrackRow, ...]:
     """Return the scores of all tracks, by id, including those whose every step is ignored."""
     truth, tracks, ignored = comparison.truth, comparison.tracks, comparison.ignored
-    matches = clear.matches
-    apart = comparison.measure.between(
-        truth.positions[matches.truth_rows], tracks.positions[matches.track_rows]
-    )
     names = np.union1d(tracks.names, ignored.names)
     frames = np.concatenate([tracks.frames, ignored.frames])
     owner = np.searchsorted(names, np.concatenate([tracks.ids, ignored.ids]))
-    first = np.full(len(names), np.iinfo(np.int64).max)
-    last = np.full(len(names), -1)
-    np.minimum.at(first, owner, frames)
-    np.maximum.at(last, owner, frames)
-    reported = np.bincount(owner, minlength=len(names))
-    set_aside = np.bincount(np.searchsorted(names, ignored.ids), minlength=len(names))
-    paired = np.searchsorted(names, tracks.ids[matches.track_rows])
+    paired = np.searchsorted(names, tracks.ids[clear.matches.track_rows])
     together = np.zeros((len(names), max(len(truth.names), 1)), dtype=np.int64)
-    np.add.at(together, (paired, truth.indices[matches.truth_rows]), 1)
-    distance = np.bincount(paired, weights=apart, minlength=len(names))
-    return tuple(
-        _track_row(
-            int(name), (int(first[k]), int(last[k])), int(reported[k]), int(set_aside[k]),
-            together[k], float(distance[k]), truth.names,
+    np.add.at(together, (paired, truth.indices[clear.matches.truth_rows]), 1)
+    distances = np.bincount(paired, weights=clear.distances, minlength=len(names)).tolist()
+    rows = []
+    for k, name in enumerate(names.tolist()):
+        reported = frames[owner == k]
+        set_aside = int((ignored.ids == name).sum())
+        counted, matched = len(reported) - set_aside, int(together[k].sum())
+        best = int(together[k].argmax())
+        kind: TrackKind = "person" if 2 * matched >= counted else "false"
+        rows.append(
+            TrackRow(
+                id=name,
+                first=int(reported.min()),
+                last=int(reported.max()),
+                steps=len(reported),
+                ignored=set_aside,
+                matched=matched,
+                kind=kind if counted else "don't care",
+                person=int(truth.names[best]) if matched else None,
+                person_share=int(together[k, best]) / counted if matched else None,
+                error=distances[k] / matched if matched else None,
+            )
         )
-        for k, name in enumerate(names)
-    )  # fmt: skip
-
-
-def _track_row(
-    name: int,
-    life: tuple[int, int],
-    reported: int,
-    ignored: int,
-    together: ndarray,
-    distance: float,
-    people: ndarray,
-) -> TrackRow:
-    """Return the scores of one track.
-
-    Args:
-        name: The id of the track.
-        life: The first and the last step of the track.
-        reported: The number of steps at which the track is reported.
-        ignored: The number of these steps that do not count.
-        together: The number of steps at which the track is paired with each person.
-        distance: The sum of the distances of all pairs.
-        people: The ids of the people.
-    """
-    counted, matched = reported - ignored, int(together.sum())
-    best = int(together.argmax())
-    kind: TrackKind = "person" if 2 * matched >= counted else "false"
-    return TrackRow(
-        id=name,
-        first=life[0],
-        last=life[1],
-        steps=reported,
-        ignored=ignored,
-        matched=matched,
-        kind=kind if counted else "don't care",
-        person=int(people[best]) if matched else None,
-        person_share=int(together[best]) / counted if matched else None,
-        error=distance / matched if matched else None,
-    )
+    return tuple(rows)

@@ -24,7 +24,8 @@ from app.command.arguments.library import (
     StarRun,
 )
 from app.command.terminal import Bar, CommandError, print_json, print_table, say
-from tracker.evaluation.figures import BY_KEY, number
+from tracker.evaluation import BY_KEY
+from tracker.evaluation.figures import number
 from tracker.evaluation.settings import EvaluationSettings
 from tracker.files.folders import library_file
 from tracker.files.text import visible

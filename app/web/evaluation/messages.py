@@ -15,7 +15,6 @@ from app.web.evaluation import models
 from app.web.views.timeline import Window
 from tracker import parameters as table
 from tracker.evaluation import Evaluation, compare
-from tracker.evaluation.figures import SOURCES
 from tracker.runs import pipeline
 
 DECIMALS = 4
@@ -42,7 +41,7 @@ def evaluation_of(scored: Scored, evaluation: Evaluation) -> models.EvaluationIn
                 direction=figure.definition.direction,
                 help=figure.definition.help,
                 settings=figure.measured_with,
-                source=SOURCES.get(figure.definition.source, ""),
+                source=figure.definition.source,
                 headline=figure.definition.headline,
             )
             for figure in evaluation.figures
@@ -60,7 +59,9 @@ def evaluation_of(scored: Scored, evaluation: Evaluation) -> models.EvaluationIn
             for row in evaluation.tracks
         ],
         cameras=[
-            models.CameraScoreInfo(**_shared(row, models.CameraScoreInfo))
+            models.CameraScoreInfo(
+                false_per_picture=row.false_per_step, **_shared(row, models.CameraScoreInfo)
+            )
             for row in evaluation.cameras
         ],
         notes=list(evaluation.notes),
@@ -218,14 +219,13 @@ def comparison_of(
         ],
         rows=[
             models.DifferenceInfo(
-                name=row.key,
-                label=row.name,
+                name=row.definition.key,
+                label=row.definition.name,
+                digits=row.definition.digits,
+                direction=row.definition.direction,
+                headline=row.definition.headline,
                 settings=row.measured_with,
-                **{
-                    name: getattr(row, name)
-                    for name in models.DifferenceInfo.model_fields
-                    if name not in ("name", "label", "settings")
-                },
+                **_shared(row, models.DifferenceInfo),
             )
             for row in compared
         ],

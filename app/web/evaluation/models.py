@@ -6,9 +6,10 @@ from typing import Any, Literal
 
 from app.models import Model
 from app.state.scores import Reference
+from tracker.evaluation.clear import PersonStatus
 from tracker.evaluation.difference import Verdict
 from tracker.evaluation.figures import Direction
-from tracker.evaluation.tables import PersonStatus, TrackKind
+from tracker.evaluation.tables import TrackKind
 
 
 class FigureInfo(Model):

@@ -11,8 +11,7 @@ from collections.abc import Iterator
 from tests.benchmarks.engine.pipeline import DATA
 from tests.benchmarks.measure import Measurement
 from tests.golden.pieces import PIECES, Piece
-from tracker.evaluation import Evaluation, evaluate_sequence
-from tracker.evaluation.figures import BY_KEY
+from tracker.evaluation import BY_KEY, Evaluation, evaluate_sequence
 from tracker.runs import pipeline
 
 TOLERANCES = {"mota": 0.01, "idf1": 0.02, "ospa": 0.01, "found_share": 0.01}

@@ -43,9 +43,10 @@ def test_a_pinned_run_is_compared_with_the_engines_figures(flat_page: Page, serv
     verdicts = set()
     for wanted, row in zip(rows, body.all(), strict=True):
         name, a, b, difference, verdict = (cell.inner_text() for cell in row.locator("td").all())
-        assert name.startswith(wanted.name)
-        assert (a, b) == (number(wanted.a, wanted.digits), number(wanted.b, wanted.digits))
-        assert difference == number(wanted.difference, wanted.digits, signed=True)
+        digits = wanted.definition.digits
+        assert name.startswith(wanted.definition.name)
+        assert (a, b) == (number(wanted.a, digits), number(wanted.b, digits))
+        assert difference == number(wanted.difference, digits, signed=True)
         assert verdict.endswith(wanted.verdict) or wanted.verdict == "undefined"
         if a == b:
             assert "worse" not in verdict

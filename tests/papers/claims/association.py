@@ -19,7 +19,7 @@ from tests.papers.laboratory.experiment import Context, Experiment, Finding, Res
 from tracker import parameters as table
 from tracker import single_view
 from tracker.evaluation.figures import number
-from tracker.evaluation.measures.matching import assign
+from tracker.evaluation.matching import assign
 from tracker.geometry.boxes import Boxes
 from tracker.parameters import PRESETS, RunParameters, with_values
 from tracker.runs.pipeline import Cancelled

@@ -12,7 +12,7 @@ from tests.papers.laboratory import runs
 from tests.papers.laboratory.experiment import Context, Experiment, Finding, Result
 from tests.rooms import read_visibility
 from tracker.evaluation.figures import number
-from tracker.evaluation.measures.matching import assign
+from tracker.evaluation.matching import assign
 from tracker.geometry.boxes import box_overlaps
 from tracker.runs.pipeline import Run
 from tracker.sequences.pictures.frames import FrameReader

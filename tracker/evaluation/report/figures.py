@@ -14,8 +14,8 @@ from jaxtyping import Float, Int
 from numpy import ndarray
 from plotly.subplots import make_subplots
 
-from tracker.evaluation.measures.matching import Tracks
-from tracker.evaluation.result import Evaluation
+from tracker.evaluation import Evaluation
+from tracker.evaluation.matching import Tracks
 from tracker.sequences.sequence import Sequence
 
 INK, MUTED, GRID, LINE = "#1b1b1b", "#707070", "#e9e9e7", "#77777a"

@@ -9,8 +9,8 @@ from pathlib import Path
 from plotly.offline import get_plotlyjs
 
 from tracker import __version__
-from tracker.evaluation.figures import SOURCES
-from tracker.evaluation.measures.matching import Tracks
+from tracker.evaluation import DEFINITIONS, Evaluation
+from tracker.evaluation.matching import Tracks
 from tracker.evaluation.report.figures import DARK, over_time, top_view
 from tracker.evaluation.report.tables import (
     camera_table,
@@ -20,7 +20,6 @@ from tracker.evaluation.report.tables import (
     people_table,
     track_table,
 )
-from tracker.evaluation.result import Evaluation
 from tracker.files.atomic import replacing
 from tracker.parameters import RunParameters
 from tracker.sequences.sequence import Sequence
@@ -169,4 +168,5 @@ def _headline(evaluation: Evaluation) -> str:
 
 
 def _sources() -> str:
-    return "Sources: " + "; ".join(escaped(source) for source in SOURCES.values()) + "."
+    sources = dict.fromkeys(one.source for one in DEFINITIONS if one.source)
+    return f"Sources: {'; '.join(map(escaped, sources))}."

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from tracker import parameters as table
+from tracker.evaluation import Evaluation
 from tracker.evaluation.difference import Difference, compare
 from tracker.evaluation.figures import number
-from tracker.evaluation.measures.matching import Tracks
+from tracker.evaluation.matching import Tracks
 from tracker.evaluation.report.figures import DARK, colour
-from tracker.evaluation.result import Evaluation
 from tracker.parameters import METHODS, PARAMETERS, RunParameters
 from tracker.runs.fitting import default_parameters
 from tracker.sequences.sequence import Sequence
@@ -63,13 +63,12 @@ def figure_table(evaluation: Evaluation, reference: Evaluation | None) -> str:
         reference: An earlier evaluation, whose values and differences are shown as well; None for
             none.
     """
-    differences = compare(reference, evaluation) if reference else ()
-    by_key = {difference.key: difference for difference in differences}
+    differences = compare(reference, evaluation) if reference else evaluation.figures
     heads = ["", ">value", "unit", "measured with", "definition"]
     if reference:
         heads[1:2] = [">reference", ">value", ">difference", "is"]
     rows, group = [], ""
-    for figure in evaluation.figures:
+    for figure, difference in zip(evaluation.figures, differences, strict=True):
         definition = figure.definition
         if definition.group != group:
             group = definition.group
@@ -77,8 +76,8 @@ def figure_table(evaluation: Evaluation, reference: Evaluation | None) -> str:
                 f'<tr class="group"><th colspan="{len(heads)}" scope="rowgroup">{group}</th></tr>'
             )
         cells = [f">{figure.text}"]
-        if reference:
-            cells = _difference_cells(by_key[definition.key])
+        if isinstance(difference, Difference):
+            cells = _difference_cells(difference)
         about = definition.help
         if definition.direction in _SIGNS:
             about += f" {_SIGNS[definition.direction].capitalize()}."
@@ -97,10 +96,11 @@ def figure_table(evaluation: Evaluation, reference: Evaluation | None) -> str:
 def _difference_cells(row: Difference) -> list[str]:
     sign = {"better": "▲ better", "worse": "▼ worse"}.get(row.verdict, row.verdict)
     note = "" if row.comparable else " <span class='stated'>(other settings)</span>"
+    digits = row.definition.digits
     return [
-        f">{number(row.a, row.digits)}",
-        f">{number(row.b, row.digits)}",
-        f">{number(row.difference, row.digits, sign=True)}",
+        f">{number(row.a, digits)}",
+        f">{number(row.b, digits)}",
+        f">{number(row.difference, digits, sign=True)}",
         f"<span class='{row.verdict}'>{sign}</span>{note}",
     ]
 
@@ -175,7 +175,7 @@ def camera_table(evaluation: Evaluation) -> str:
         (
             _row(
                 escaped(score.camera), f">{score.people}", f">{score.estimates}",
-                f">{_share(score.found_share)}", f">{number(score.false_per_picture, 3)}",
+                f">{_share(score.found_share)}", f">{number(score.false_per_step, 3)}",
                 f">{number(score.error, 1)}", f">{number(score.error_95, 1)}",
                 f">{number(score.overlap, 3)}",
             )

@@ -13,9 +13,9 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
-from tracker.evaluation.measures.clear import clear
-from tracker.evaluation.measures.identity import identity
-from tracker.evaluation.measures.matching import Comparison, GatedDistance, Tracks, prepare
+from tracker.evaluation.clear import clear
+from tracker.evaluation.identity import identity
+from tracker.evaluation.matching import Comparison, GatedDistance, Tracks, prepare
 from tracker.evaluation.settings import EvaluationSettings
 from tracker.sequences.sequence import GroundTruth
 

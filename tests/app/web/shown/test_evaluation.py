@@ -132,7 +132,7 @@ def test_a_run_is_set_against_the_one_before_it(client: TestClient, crossing: Pa
     assert found["b"]["changed"] == {P_D: 0.05}
     assert [row["key"] for row in found["parameters"]] == [P_D]
     rows = [(row["name"], row["a"], row["b"], row["verdict"]) for row in found["rows"]]
-    assert rows == [(row.key, row.a, row.b, row.verdict) for row in compare(a, b)]
+    assert rows == [(row.definition.key, row.a, row.b, row.verdict) for row in compare(a, b)]
     assert {"better", "worse"} & {row[3] for row in rows}
     series = get(client, "/api/evaluation/series?of=previous")
     assert (series["run"], series["of"]) == (before.key, "previous")

@@ -31,6 +31,7 @@ touching ones, towards 1 far apart [RTGSRS19].
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -41,6 +42,11 @@ from numpy import ndarray
 from tracker.evaluation.settings import Distance
 from tracker.geometry.assignment import linear_sum_assignment
 from tracker.sequences.sequence import GroundTruth
+
+RowPairs = tuple[Int[ndarray, " M"], Int[ndarray, " M"]]
+"""The rows and the columns of the pairs of one step."""
+
+_NONE = np.zeros(0, dtype=np.int64)
 
 
 class Tracks(Protocol):
@@ -183,21 +189,21 @@ def distances_by_step(
 
 
 def assign(
-    distances: Float[ndarray, "G E"], gate: float
-) -> tuple[Int[ndarray, " M"], Int[ndarray, " M"]]:
+    distances: Float[ndarray, "G E"], gate: float, bonus: Float[ndarray, "G E"] | float = 0.0
+) -> RowPairs:
     """Pair people and estimates of one step by the module's protocol.
 
     Args:
         distances: The distance of every person (rows) to every estimate (columns).
         gate: Largest distance of a pair, in the same unit.
+        bonus: What is added to the score of each pair within the gate, at least 0.
 
     Returns:
         The row and the column of each pair; empty if there are no people or no estimates.
     """
     if not distances.size:
-        none = np.zeros(0, dtype=np.int64)
-        return none, none
-    score = np.where(distances <= gate, 1.0 - distances / (2.0 * gate), 0.0)
+        return _NONE, _NONE
+    score = np.where(distances <= gate, bonus + 1.0 - distances / (2.0 * gate), 0.0)
     rows, columns = linear_sum_assignment(score, maximize=True)
     paired = score[rows, columns] > 0.0
     return rows[paired], columns[paired]
@@ -244,6 +250,20 @@ class Comparison:
     def steps(self) -> int:
         """The number of steps compared."""
         return self.truth.steps
+
+    def by_step(
+        self,
+    ) -> Iterator[tuple[Int[ndarray, " G"], Int[ndarray, " E"], Float[ndarray, "G E"]]]:
+        """Yield the indices of the people and of the tracks of each step, and their distances."""
+        truth, tracks = self.truth, self.tracks
+        for step, distances in enumerate(self.distances):
+            yield truth.indices[truth.at(step)], tracks.indices[tracks.at(step)], distances
+
+    def apart(self, matches: Matches, measure: GatedDistance | None = None) -> Float[ndarray, " M"]:
+        """Compute the distance of each pair, by another measure if one is named."""
+        return (measure or self.measure).between(
+            self.truth.positions[matches.truth_rows], self.tracks.positions[matches.track_rows]
+        )
 
 
 def prepare(
@@ -317,20 +337,14 @@ class Matches:
         return len(self.truth_rows)
 
 
-def gather(
-    comparison: Comparison, pairs: list[tuple[Int[ndarray, " M"], Int[ndarray, " M"]]]
-) -> Matches:
+def gather(comparison: Comparison, pairs: Sequence[RowPairs]) -> Matches:
     """Convert the pairs of each step (rows, columns) to rows of the whole sequence."""
-    truth_rows = [
-        rows + offset
-        for (rows, _), offset in zip(pairs, comparison.truth.offsets[:-1].tolist(), strict=True)
-    ]
-    track_rows = [
-        columns + offset
-        for (_, columns), offset in zip(pairs, comparison.tracks.offsets[:-1].tolist(), strict=True)
-    ]
-    none = [np.zeros(0, dtype=np.int64)]
-    return Matches(np.concatenate(none + truth_rows), np.concatenate(none + track_rows))
+    columns = []
+    for side, rows in enumerate((comparison.truth, comparison.tracks)):
+        offsets = rows.offsets[:-1].tolist()
+        parts = [pair[side] + offset for pair, offset in zip(pairs, offsets, strict=True)]
+        columns.append(np.concatenate([_NONE, *parts]))
+    return Matches(*columns)
 
 
 def match(comparison: Comparison) -> Matches:

@@ -12,8 +12,11 @@ import numpy as np
 from jaxtyping import Int
 from numpy import ndarray
 
-from tracker.evaluation.measures.matching import Comparison
+from tracker.evaluation.figures import GATED, Definition
+from tracker.evaluation.matching import Comparison
 from tracker.geometry.assignment import linear_sum_assignment
+
+RSZCT16 = "Ristani et al., ECCV workshops 2016"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,6 +54,20 @@ class Identity:
         return 2 * self.true_positives / both if both else None
 
 
+IDENTITY: tuple[Definition[Identity], ...] = (
+    Definition("idf1", "IDF1", "Identity", "", "higher", 3, GATED,
+        "Share of positions that carry the right identity, when each person gets the one "
+        "track that fits best: 2 IDTP / (estimates + true positions).",
+        lambda i: i.f1, RSZCT16, True),
+    Definition("idp", "IDP", "Identity", "", "higher", 3, GATED,
+        "Identity precision: share of the estimates that carry the right identity.",
+        lambda i: i.precision, RSZCT16),
+    Definition("idr", "IDR", "Identity", "", "higher", 3, GATED,
+        "Identity recall: share of the true positions found under the right identity.",
+        lambda i: i.recall, RSZCT16),
+)  # fmt: skip
+
+
 def identity(comparison: Comparison) -> Identity:
     """Assign each person at most one track so that IDTP is largest.
 
@@ -60,9 +77,8 @@ def identity(comparison: Comparison) -> Identity:
     """
     truth, tracks = comparison.truth, comparison.tracks
     together = np.zeros((len(truth.names), len(tracks.names)), dtype=np.int64)
-    for step, distances in enumerate(comparison.distances):
+    for who, which, distances in comparison.by_step():
         rows, columns = np.nonzero(distances <= comparison.measure.gate)
-        who, which = truth.indices[truth.at(step)], tracks.indices[tracks.at(step)]
         together[who[rows], which[columns]] += 1
     people, own = linear_sum_assignment(together, maximize=True)
     right = together[people, own]

@@ -9,17 +9,27 @@ tracker for crowded scene", CVPR 2009 (mostly tracked and mostly lost).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
-from jaxtyping import Bool, Int
+from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
-from tracker.evaluation.measures.matching import Comparison, Matches, gather
-from tracker.geometry.assignment import linear_sum_assignment
+from tracker.evaluation.figures import GATED, Definition, mean
+from tracker.evaluation.matching import Comparison, Matches, assign, gather
+
+BS08 = "Bernardin, Stiefelhagen, EURASIP JIVP 2008 (CLEAR MOT)"
+LHN09 = "Li, Huang, Nevatia, CVPR 2009"
 
 CONTINUATION = 1000.0
 """The bonus on the score of a pair of the step before, as in TrackEval: far above the score of a
 pair, which is at most 1."""
+
+MOSTLY_TRACKED, MOSTLY_LOST = 0.8, 0.2
+"""Shares of a person's steps with a pair, above and below which the person is mostly tracked and
+mostly lost [LHN09]."""
+
+PersonStatus = Literal["mostly tracked", "partly tracked", "mostly lost"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,6 +38,8 @@ class Clear:
 
     matches: Matches
     """The pairs of all steps; a pair of the step before remains one while it is within the gate."""
+    distances: Float[ndarray, " M"]
+    """The distance of each pair, in the unit of the distance."""
     switch: Bool[ndarray, " M"]
     """Whether the person of each pair had another id when last paired."""
     misses: Int[ndarray, " S"]
@@ -44,8 +56,6 @@ class Clear:
     """The number of times that each person is paired again after a gap."""
     switches: Int[ndarray, " K"]
     """The number of identity switches of each person."""
-    motp: float | None
-    """Mean distance of the pairs, in the unit of the distance; None without pairs."""
 
     @property
     def mota(self) -> float | None:
@@ -55,23 +65,53 @@ class Clear:
         return 1.0 - float(wrong) / people if people else None
 
     @property
-    def _share(self) -> ndarray:
-        return np.asarray(self.tracked / np.maximum(self.present, 1))
+    def motp(self) -> float | None:
+        """Mean distance of the pairs, in the unit of the distance; None without pairs."""
+        return mean(self.distances)
 
     @property
-    def mostly_tracked(self) -> int:
-        """The number of people paired at more than 80 % of their steps."""
-        return int((self._share > 0.8).sum())
+    def statuses(self) -> list[PersonStatus]:
+        """How much of the steps of each person are tracked."""
+        shares = (self.tracked / np.maximum(self.present, 1)).tolist()
+        return [
+            "mostly tracked"
+            if share > MOSTLY_TRACKED
+            else "mostly lost"
+            if share < MOSTLY_LOST
+            else "partly tracked"
+            for share in shares
+        ]
 
-    @property
-    def mostly_lost(self) -> int:
-        """The number of people paired at less than 20 % of their steps."""
-        return int((self._share < 0.2).sum())
 
-    @property
-    def partly_tracked(self) -> int:
-        """The number of the other people."""
-        return len(self.present) - self.mostly_tracked - self.mostly_lost
+CLEAR: tuple[Definition[Clear], ...] = (
+    Definition("mota", "MOTA", "CLEAR", "", "higher", 3, GATED,
+        "1 − (misses + false positives + identity switches) / true positions.",
+        lambda c: c.mota, BS08, True),
+    Definition("motp", "MOTP", "CLEAR", "{d}", "lower", 3, GATED,
+        "Mean distance of the pairs of person and estimate, pairs being kept over time.",
+        lambda c: c.motp, BS08),
+    Definition("misses", "Missed", "CLEAR", "", "lower", 0, GATED,
+        "True positions without an estimate, over all steps.",
+        lambda c: int(c.misses.sum()), BS08, True),
+    Definition("false_positives", "False", "CLEAR", "", "lower", 0, GATED,
+        "Estimates without a person, over all steps.",
+        lambda c: int(c.false_positives.sum()), BS08, True),
+    Definition("id_switches", "Identity switches", "CLEAR", "", "lower", 0, GATED,
+        "How often a person is paired with another id than when last paired.",
+        lambda c: int(c.id_switches.sum()), BS08, True),
+    Definition("fragmentations", "Fragmentations", "CLEAR", "", "lower", 0, GATED,
+        "How often a person's pairing is taken up again after a gap, absence included.",
+        lambda c: int(c.fragmentations.sum()), LHN09),
+    Definition("mostly_tracked", "Mostly tracked", "CLEAR", "people", "higher", 0, GATED,
+        "People paired at more than 80 % of their steps.",
+        lambda c: c.statuses.count("mostly tracked"), LHN09),
+    Definition("partly_tracked", "Partly tracked", "CLEAR", "people", "none", 0, GATED,
+        "People paired at 20 to 80 % of their steps.",
+        lambda c: c.statuses.count("partly tracked"), LHN09),
+    Definition("mostly_lost", "Mostly lost", "CLEAR", "people", "lower", 0, GATED,
+        "People paired at less than 20 % of their steps.",
+        lambda c: c.statuses.count("mostly lost"), LHN09),
+)  # fmt: skip
 
 
 def clear(comparison: Comparison) -> Clear:
@@ -88,48 +128,36 @@ def clear(comparison: Comparison) -> Clear:
     Without people, MOTA is None and every estimate a false positive. Without
     estimates, MOTA is 0, every person is mostly lost and MOTP is None.
     """
-    truth, tracks, gate = comparison.truth, comparison.tracks, comparison.measure.gate
+    truth, tracks, steps = comparison.truth, comparison.tracks, comparison.steps
     people = len(truth.names)
     last = np.full(people, -1)  # track of each person when last paired
     before = np.full(people, -1)  # track of each person at the step before
     fragments = np.zeros(people, dtype=np.int64)
     pairs, switch = [], [np.zeros(0, dtype=bool)]
-    none = np.zeros(0, dtype=np.int64)
-    for step, distances in enumerate(comparison.distances):
-        if not distances.size:
-            pairs.append((none, none))
-            continue
-        who = truth.indices[truth.at(step)]
-        which = tracks.indices[tracks.at(step)]
-        score = CONTINUATION * (before[who, None] == which) + 1.0 - distances / (2.0 * gate)
-        score[distances > gate] = 0.0
-        rows, columns = linear_sum_assignment(score, maximize=True)
-        paired = score[rows, columns] > 0.0
-        rows, columns = rows[paired], columns[paired]
+    for who, which, distances in comparison.by_step():
+        bonus = CONTINUATION * (before[who, None] == which)
+        rows, columns = assign(distances, comparison.measure.gate, bonus)
         pairs.append((rows, columns))
+        if not distances.size:
+            continue
         matched, found = who[rows], which[columns]
         switch.append((last[matched] >= 0) & (last[matched] != found))
         fragments[matched] += before[matched] < 0
         last[matched] = found
         before[:] = -1
         before[matched] = found
-    matches = gather(comparison, pairs)
-    switched = np.concatenate(switch)
-    steps = truth.frames[matches.truth_rows]
-    persons = truth.indices[matches.truth_rows]
-    paired_at = np.bincount(steps, minlength=comparison.steps)
-    apart = comparison.measure.between(
-        truth.positions[matches.truth_rows], tracks.positions[matches.track_rows]
-    )
+    matches, switched = gather(comparison, pairs), np.concatenate(switch)
+    frames, persons = truth.frames[matches.truth_rows], truth.indices[matches.truth_rows]
+    paired_at = np.bincount(frames, minlength=steps)
     return Clear(
         matches=matches,
+        distances=comparison.apart(matches),
         switch=switched,
         misses=truth.counts - paired_at,
         false_positives=tracks.counts - paired_at,
-        id_switches=np.bincount(steps[switched], minlength=comparison.steps),
+        id_switches=np.bincount(frames[switched], minlength=steps),
         present=np.bincount(truth.indices, minlength=people),
         tracked=np.bincount(persons, minlength=people),
         fragmentations=np.maximum(fragments - 1, 0),
         switches=np.bincount(persons[switched], minlength=people),
-        motp=float(apart.mean()) if len(apart) else None,
     )

@@ -1,1 +1,0 @@
-"""CLEAR, identity, HOTA, OSPA and GOSPA: what tracks are measured by."""
