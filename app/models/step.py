@@ -156,6 +156,7 @@ class Step(Model):
     cameras: list[CameraStep]
     tracks: list[Track]
     truth: list[Truth]
-    components: int
-    cardinality: float
-    """Expected number of people: the sum of the weights."""
+    components: int | None
+    """Of the filter; null where only the tracks of a run were stored."""
+    cardinality: float | None
+    """Expected number of people: the sum of the weights; null where only tracks were stored."""

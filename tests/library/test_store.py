@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sqlite3
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -37,7 +38,7 @@ def test_a_run_comes_back_after_the_program_ended(path: Path) -> None:
 
 def test_the_newest_runs_come_first(path: Path) -> None:
     with filled(path, 3) as library:
-        assert [library.result(r.id).key for r in library.runs()] == ["key-2", "key-1", "key-0"]
+        assert [one.key for one in library.runs()] == ["key-2", "key-1", "key-0"]
         assert library.runs(recording=99) == []
 
 
@@ -45,6 +46,7 @@ def test_the_same_run_computed_again_is_one_run(path: Path) -> None:
     with filled(path, 2) as library:
         number = library.keep(RECORDING, run(0, began=5000.0))
         assert [r.id for r in library.runs()] == [number, 2]
+        assert (library.run(number).began, library.run(number).latest) == (1000.0, 5000.0)
         library.delete([number])
         library.keep(RECORDING, run(0, figures={"mota": 0.5}))
         assert len(library.runs()) == 2
@@ -116,6 +118,17 @@ def test_a_file_of_every_version_becomes_today_s(tmp_path: Path) -> None:
             assert now.execute("PRAGMA user_version").fetchone() == (schema.VERSION,)
             assert now.execute("PRAGMA integrity_check").fetchone() == ("ok",)
         now.close()
+
+
+def test_a_file_of_a_newer_version_is_refused_and_left_alone(path: Path) -> None:
+    filled(path, 1).close()
+    with closing(sqlite3.connect(path)) as newer:
+        newer.execute(f"PRAGMA user_version = {schema.VERSION + 1}")
+    before = path.read_bytes()
+    for read_only in (False, True):
+        with pytest.raises(LibraryError, match=r"of a newer version .* update the program"):
+            Library(path, read_only=read_only)
+    assert path.read_bytes() == before
 
 
 def test_a_migration_that_fails_leaves_the_file_as_it_was(path: Path) -> None:

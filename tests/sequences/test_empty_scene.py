@@ -13,12 +13,12 @@ import pytest
 
 from tests.single_view.pictures.furnished import empty_room, person_mask, photograph, with_person
 from tests.synthetic import camera_toml, head_toml, write_sequence
-from tracker.library import bundle
 from tracker.parameters import ForegroundParams, RunParameters
 from tracker.sequences.errors import SequenceError
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.reader import read_sequence
 from tracker.sequences.sequence import Sequence
+from tracker.sequences.writing.by_step import write_by_step
 from tracker.single_view.pictures.foreground import BackgroundModel, learn, learn_background
 from tracker.single_view.working.sequence import Working
 
@@ -147,6 +147,6 @@ def test_a_camera_without_pictures_has_no_background(tmp_path: Path) -> None:
 @pytest.mark.parametrize("line", [EMPTY_FILE, EMPTY_STEPS])
 def test_a_copy_with_videos_knows_it_too(tmp_path: Path, line: str) -> None:
     sequence = sitting(tmp_path / "known", (line,))
-    bundle._write_sequence(tmp_path / "copy", sequence, videos=True)
+    write_by_step(tmp_path / "copy", sequence, videos=True)
     copy = read_sequence(tmp_path / "copy")
     assert share_seen(copy, ForegroundParams()) > 0.6

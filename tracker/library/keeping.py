@@ -5,31 +5,25 @@ a run for display.
 from __future__ import annotations
 
 import hashlib
-import itertools
 import platform
 from dataclasses import replace
 from typing import Any
 
 import cv2
 import numpy as np
-from jaxtyping import Float
-from numpy import ndarray
 
 from tracker import __version__
 from tracker.evaluation import Evaluation
-from tracker.filters.gaussian_mixture import GaussianMixture
-from tracker.fusion.protocol import FusionResult
 from tracker.library.columns import KeptTracks
 from tracker.library.records import HEADLINES, NewRecording, NewRun, Result, Source
 from tracker.parameters import changed
 from tracker.runs.fitting import default_parameters
 from tracker.runs.gaps import gaps
 from tracker.runs.numbers_version import numbers_version
-from tracker.runs.run import Run, stage_keys
+from tracker.runs.run import Run
 from tracker.sequences.built_in import opens_by_name
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
-from tracker.single_view.protocol import ViewResult
 
 THUMBNAIL = (144, 96)
 """Width and height of a recording's thumbnail, pixels: twice the size on the page."""
@@ -116,15 +110,8 @@ def stride(steps: int, values: int) -> int:
 
 def stored_tracks(run: Run) -> KeptTracks:
     """Return the part of a run's result that the library stores."""
-    tracks = run.tracks
-    probabilities = np.zeros(tracks.seen.shape)
-    # rows by which smoothing fills gaps have no component
-    own = np.flatnonzero((tracks.components >= 0) & (tracks.frames < run.done))
-    if len(own):
-        probabilities[own] = run.fused.take(
-            "detection_probabilities", tracks.frames[own], tracks.components[own]
-        )
-    return KeptTracks(tracks, probabilities)
+    probabilities = run.detection_probabilities(np.arange(len(run.tracks)))
+    return KeptTracks(run.tracks, np.nan_to_num(probabilities))
 
 
 def record_of_run(
@@ -194,7 +181,7 @@ def rescored(result: Result, evaluation: Evaluation) -> Result:
     headlines: dict[str, Any] = {name: figures.get(name) for name in HEADLINES}
     return replace(
         result,
-        run=result.run._replace(**headlines, final=1),
+        run=replace(result.run, **headlines, final=1),
         figures={**result.figures, **figures},
         ospa=ospa_of(evaluation),
     )
@@ -220,74 +207,33 @@ def remarks_of(result: Result) -> tuple[str, ...]:
     return pictures + ((f"{words} of a person obeyed",) if corrected else ())
 
 
-def run_for_display(sequence: Sequence, result: Result, *, key: str) -> Run:
-    """Return a run for display with the tracks of a stored run.
-
-    The run has no results of stage 1 and no associations. The posterior of each step has one
-    component for each track, with a diagonal covariance.
+def run_for_display(sequence: Sequence, result: Result) -> Run:
+    """Return a run for display: the tracks of a stored run, without results of the stages.
 
     Args:
         sequence: The recording as it is now, which may have changed since the run.
         result: The stored run.
-        key: The key of the new run.
 
     Raises:
         ValueError: If the recording has a different number of cameras now.
     """
-    # the stages' keys are unique, so that no computation re-uses these incomplete stages
-    known = stage_keys(sequence, result.parameters, result.run.seed)
-    keys = {stage: f"{one}-kept-{result.run.id}" for stage, one in known.items()}
-    keys["tracks"] = key
-    run = Run(sequence, result.parameters, result.run.seed, keys)
-    tracks = result.kept.tracks
+    stored, kept = result.run, result.kept
     cameras = len(sequence.views)
-    steps = min(result.run.steps, sequence.frames)
-    rows = slice(0, tracks.at(steps).start)
-    every = np.arange(rows.stop)
-    run.tracks = tracks.take(every)
-    if tracks.seen.shape[1] != cameras:
+    if kept.tracks.seen.shape[1] != cameras:
         raise ValueError(
-            f"run {result.run.id} is of {tracks.seen.shape[1]} cameras, and {sequence.name} has "
+            f"run {stored.id} is of {kept.tracks.seen.shape[1]} cameras, and {sequence.name} has "
             f"{cameras} now"
         )
-    ends = np.searchsorted(run.tracks.frames, np.arange(steps + 1)).tolist()
-    covariances = np.zeros((rows.stop, 3, 3))
-    covariances[:, [0, 1, 2], [0, 1, 2]] = run.tracks.sigmas**2
-    probabilities = result.kept.detection_probabilities[rows].T
-    nothing = ViewResult.of_boxes(np.zeros((0, 4)), np.zeros(0), np.zeros((0, 4)))
-    for first, last in itertools.pairwise(ends):
-        run.fused.append(_posterior(run, slice(first, last), covariances, probabilities))
-        run.views.append((nothing,) * cameras)
+    steps = min(stored.steps, sequence.frames)
+    rows = np.arange(kept.tracks.at(steps).start)
+    run = Run(
+        sequence,
+        result.parameters,
+        stored.seed,
+        {"tracks": stored.key},
+        stored_probabilities=kept.detection_probabilities[rows],
+    )
+    run.tracks = kept.tracks.take(rows)
     run.done = steps
     run.finished = run.complete
     return run
-
-
-def _posterior(
-    run: Run,
-    rows: slice,
-    covariances: Float[ndarray, "N 3 3"],
-    probabilities: Float[ndarray, "C N"],
-) -> FusionResult:
-    """Return the result of fusion for one step of a run for display.
-
-    Args:
-        run: The run with its N tracked places.
-        rows: The rows of the step.
-        covariances: The covariance of the place of each row, m².
-        probabilities: The detection probability of each of C cameras for each row.
-    """
-    tracks = run.tracks
-    shape = (len(probabilities), rows.stop - rows.start)
-    return FusionResult(
-        GaussianMixture(
-            tracks.existences[rows],
-            tracks.positions[rows],
-            covariances[rows],
-            tracks.labels[rows],
-        ),
-        probabilities[:, rows],
-        np.full(shape, -1),
-        np.zeros(shape),
-        np.full(shape, -1),
-    )

@@ -1,10 +1,15 @@
-"""The records of the library: recordings and runs as they are inserted, listed and read."""
+"""The records of the library: recordings and runs as they are inserted, listed and read.
+
+The fields of a record are the columns of its table, which :func:`selected` and :func:`inserted`
+read off; a field that is computed from other columns has the expression of SQL beside it.
+"""
 
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, field, fields
+from typing import Any, Literal, TypeVar
 
 from tracker.library.columns import KeptTracks
 from tracker.parameters import RunParameters
@@ -22,11 +27,15 @@ PROVISIONAL = "made before the run was finished; opening it computes them again"
 """The note on figures that an earlier version computed before the run was finished."""
 
 
-class Recording(NamedTuple):
-    """A recording that was opened, with or without stored runs."""
+def _of(expression: str) -> Any:
+    """A field that is listed by an expression of SQL, and not inserted."""
+    return field(metadata={"expression": expression})
 
-    id: int
-    """The number of the recording in the library."""
+
+@dataclass(frozen=True, slots=True)
+class _Recording:
+    """What is known of a recording when it is inserted, and listed later."""
+
     place: str
     """The name of a built-in recording, or the folder, by which it is opened again."""
     name: str
@@ -41,29 +50,47 @@ class Recording(NamedTuple):
     """The number of steps."""
     fps: float
     """The number of steps per second."""
-    has_pictures: int
-    """Whether every camera has pictures, 0 or 1."""
-    has_detections: int
-    """Whether every camera has boxes of an outside detector, 0 or 1."""
+    has_pictures: bool
+    """Whether every camera has pictures."""
+    has_detections: bool
+    """Whether every camera has boxes of an outside detector."""
     people: int | None
     """The number of people in the ground truth; None without ground truth."""
+
+
+@dataclass(frozen=True, slots=True)
+class NewRecording(_Recording):
+    """A recording, to be inserted."""
+
+    thumbnail: bytes | None = None
+    """The JPEG thumbnail; None for the one that is stored, if any."""
+
+
+@dataclass(frozen=True, slots=True)
+class Recording(_Recording):
+    """A recording that was opened, with or without stored runs."""
+
+    id: int
+    """The number of the recording in the library."""
     opened: float
     """The time when the recording was last opened, seconds since 1970."""
-    runs: int
+    runs: int = _of(
+        "(SELECT count(*) FROM runs WHERE runs.recording = recordings.id AND deleted IS NULL)"
+    )
     """The number of stored runs of the recording."""
 
 
-class KeptRun(NamedTuple):
-    """A stored run without its tracks, so that thousands can be listed at once."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Run:
+    """What is known of a run when it is inserted, and listed later."""
 
-    id: int
-    """The number of the run in the library."""
-    recording: int
-    """The number of the recording, :attr:`Recording.id`."""
-    recording_name: str
-    """The name of the recording, for display."""
+    key: str
+    """The hash of recording, parameters, seed, corrections and code."""
+    digest: str
+    """The hash of the recording's content when it was tracked."""
     began: float
-    """The time when the computation began, seconds since 1970."""
+    """The time when the computation began, the first one if there were several, seconds since
+    1970."""
     seconds: float
     """The duration of the computation, seconds."""
     steps: int
@@ -72,18 +99,52 @@ class KeptRun(NamedTuple):
     """The key of the single-view method."""
     fusion_method: str
     """The key of the fusion method."""
-    changes_json: str
-    """The values of :attr:`changes`, as JSON."""
+    changes: dict[str, Any]
+    """The values of parameters that differ from the recording's defaults, by key."""
     seed: int
     """The seed of the random numbers."""
     version: str
     """The version of the program that computed the run."""
     code: str
     """The hash of the code that computes results, as in the keys of stages."""
-    source: str
-    """The origin of the run, a :data:`Source`."""
+    machine: str
+    """The system, the processor and the name of the computer that tracked it."""
+    source: Source
+    """The origin of the run."""
     targets: int
     """The number of tracks."""
+    name: str = ""
+    """The name that the user gave the run, or an empty string."""
+    note: str = ""
+    """The user's note, or an empty string."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class NewRun(_Run):
+    """A finished run, to be inserted."""
+
+    parameters: dict[str, Any]
+    """All parameters."""
+    figures: dict[str, float | int | None]
+    """The figures of the evaluation by key; empty without ground truth."""
+    kept: KeptTracks
+    """The tracks."""
+    ospa: tuple[float, ...] = ()
+    """OSPA over time, in the form of :attr:`Result.ospa`."""
+    corrections: tuple[dict[str, Any], ...] = ()
+    """The corrections of the run, each in the form of a line of the log of corrections."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class KeptRun(_Run):
+    """A stored run without its tracks, so that thousands can be listed at once."""
+
+    id: int
+    """The number of the run in the library."""
+    recording: int
+    """The number of the recording, :attr:`Recording.id`."""
+    recording_name: str = _of("recordings.name")
+    """The name of the recording, for display."""
     mota: float | None
     """This and the following seven figures (OSPA and position error in metres) are None if they are
     not defined or the recording has no ground truth."""
@@ -94,34 +155,22 @@ class KeptRun(NamedTuple):
     misses: int | None
     false_positives: int | None
     id_switches: int | None
-    name: str
-    """The name that the user gave the run, or an empty string."""
     star: int
     """Whether the user starred the run, 0 or 1."""
-    note: str
-    """The user's note, or an empty string."""
-    tags_json: str
-    """The values of :attr:`tags`, as JSON."""
+    tags: list[str]
+    """The tags that the user gave the run."""
     corrected: int = 0
     """The number of corrections of the run."""
     final: int = 0
     """Whether the figures are of the finished run's tracks, 0 or 1: of all steps, after smoothing
     and corrections. Earlier versions also stored figures of unfinished runs."""
+    latest: float = 0.0
+    """The time when the last computation began, seconds since 1970."""
 
     @property
     def provisional(self) -> bool:
         """Whether the run has figures of an unfinished run, which have to be computed again."""
         return not self.final and self.misses is not None
-
-    @property
-    def changes(self) -> dict[str, Any]:
-        """The values of parameters that differ from the recording's defaults, by key."""
-        return dict(json.loads(self.changes_json))
-
-    @property
-    def tags(self) -> list[str]:
-        """The tags that the user gave the run."""
-        return list(json.loads(self.tags_json))
 
     @property
     def steps_per_second(self) -> float:
@@ -135,13 +184,11 @@ class KeptRun(NamedTuple):
 
     def to_json(self) -> dict[str, Any]:
         """Return all fields as plain values."""
-        values = self._asdict()
-        del values["changes_json"], values["tags_json"], values["final"]
+        values = asdict(self)
+        del values["final"]
         return {
             **values,
             "star": bool(self.star),
-            "changes": self.changes,
-            "tags": self.tags,
             "steps_per_second": self.steps_per_second,
             "provisional": self.provisional,
         }
@@ -155,12 +202,6 @@ class Result:
     """The run as it is listed."""
     place: str
     """The name or folder by which the recording is opened again."""
-    key: str
-    """The hash of recording, parameters, seed, corrections and code."""
-    digest: str
-    """The hash of the recording's content when it was tracked."""
-    machine: str
-    """The system, the processor and the name of the computer that tracked it."""
     parameters: RunParameters
     """The parameters as this version reads them."""
     unknown: tuple[str, ...]
@@ -178,46 +219,40 @@ class Result:
     """The corrections of the run, each in the form of a line of the log of corrections."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class NewRecording:
-    """The record of a recording, to be inserted; its fields are those of :class:`Recording`."""
+R = TypeVar("R", Recording, KeptRun)
 
-    place: str
-    name: str
-    kind: str
-    digest: str
-    cameras: int
-    frames: int
-    fps: float
-    has_pictures: bool
-    has_detections: bool
-    people: int | None
-    thumbnail: bytes | None = None
+_OF_LISTS = ("changes", "tags")
+"""The columns that hold JSON."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class NewRun:
-    """The record of a finished run, to be inserted; its fields are those of :class:`KeptRun` and
-    :class:`Result`."""
+def selected(record: type[R], table: str) -> str:
+    """Return the columns of SQL of the fields of a record, in their order.
 
-    key: str
-    digest: str
-    began: float
-    seconds: float
-    steps: int
-    single_view: str
-    fusion_method: str
-    changes: dict[str, Any]
-    parameters: dict[str, Any]
-    seed: int
-    version: str
-    code: str
-    machine: str
-    source: Source
-    targets: int
-    figures: dict[str, float | int | None]
-    kept: KeptTracks
-    ospa: tuple[float, ...] = ()
-    corrections: tuple[dict[str, Any], ...] = ()
-    name: str = ""
-    note: str = ""
+    Args:
+        record: The type of the records.
+        table: The table that they are the rows of.
+    """
+    return ", ".join(
+        one.metadata.get("expression", f"{table}.{one.name}") for one in fields(record)
+    )
+
+
+def listed(record: type[R], rows: Iterable[tuple[Any, ...]]) -> list[R]:
+    """Return the records of rows of the columns of :func:`selected`."""
+    names = [one.name for one in fields(record)]
+    made = []
+    for row in rows:
+        values = dict(zip(names, row, strict=True))
+        values |= {name: json.loads(values[name]) for name in _OF_LISTS if name in values}
+        made.append(record(**values))
+    return made
+
+
+def inserted(record: NewRecording | NewRun) -> dict[str, Any]:
+    """Return the values of a record, by the columns of its table."""
+    kind = _Run if isinstance(record, NewRun) else NewRecording
+    values = {one.name: getattr(record, one.name) for one in fields(kind)}
+    return {
+        name: json.dumps(value, ensure_ascii=False) if name in _OF_LISTS else value
+        for name, value in values.items()
+    }

@@ -83,6 +83,11 @@ MIGRATIONS: tuple[tuple[str, ...], ...] = (
         "ALTER TABLE runs ADD COLUMN final INTEGER NOT NULL DEFAULT 0",
         "UPDATE runs SET final = 1 WHERE source IN ('track', 'batch')",
     ),
+    (
+        # when the run was computed last, seconds since 1970; ``began`` is of the first time
+        "ALTER TABLE runs ADD COLUMN latest REAL NOT NULL DEFAULT 0.0",
+        "UPDATE runs SET latest = began",
+    ),
 )
 """The statements that migrate a file from each version to the next, the first from an empty
 file."""

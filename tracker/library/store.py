@@ -20,7 +20,17 @@ from typing import Any, Self
 
 from tracker.library import KEEP, columns, schema
 from tracker.library.errors import LibraryError, NoSuchRun, explained
-from tracker.library.records import HEADLINES, KeptRun, NewRecording, NewRun, Recording, Result
+from tracker.library.records import (
+    HEADLINES,
+    KeptRun,
+    NewRecording,
+    NewRun,
+    Recording,
+    Result,
+    inserted,
+    listed,
+    selected,
+)
 from tracker.parameters import RunParameters, with_values
 
 WAIT_SECONDS = 5.0
@@ -37,15 +47,7 @@ before."""
 OSPA = "ospa over time"
 """The key of the curve of OSPA among a run's stored figures."""
 
-_COLUMNS_OF_RUN = ", ".join(
-    {
-        "recording_name": "recordings.name",
-        "changes_json": "changes",
-        "tags_json": "tags",
-    }.get(name, f"runs.{name}")
-    for name in KeptRun._fields
-)
-_RUNS = f"SELECT {_COLUMNS_OF_RUN} FROM runs JOIN recordings ON recordings.id = runs.recording"
+_RUNS = f"SELECT {selected(KeptRun, 'runs')} FROM runs JOIN recordings ON recordings.id = recording"
 _UNMARKED = "star = 0 AND name = '' AND note = '' AND tags = '[]'"
 """The condition of SQL for runs that a user has not marked."""
 
@@ -94,13 +96,9 @@ class Library:
     def recordings(self) -> list[Recording]:
         """Return all recordings, the one that was opened last first."""
         with self._reading() as connection:
-            found = connection.execute(
-                "SELECT recordings.id, place, recordings.name, kind, recordings.digest, cameras, "
-                "frames, fps, has_pictures, has_detections, people, opened, "
-                "(SELECT count(*) FROM runs WHERE runs.recording = recordings.id "
-                "AND deleted IS NULL) FROM recordings ORDER BY opened DESC"
-            )
-            return [Recording._make(row) for row in found]
+            columns_of = selected(Recording, "recordings")
+            found = connection.execute(f"SELECT {columns_of} FROM recordings ORDER BY opened DESC")
+            return listed(Recording, found)
 
     def thumbnail(self, recording: int) -> bytes | None:
         """Return the JPEG thumbnail of a recording; None if it has none or does not exist."""
@@ -111,14 +109,10 @@ class Library:
             return None if found is None or found[0] is None else bytes(found[0])
 
     def runs(self, recording: int | None = None) -> list[KeptRun]:
-        """Return the runs of one recording or of all recordings, the newest first, without deleted
-        ones."""
-        where, values = "deleted IS NULL", []
-        if recording is not None:
-            where, values = where + " AND recording = ?", [recording]
-        with self._reading() as connection:
-            found = connection.execute(f"{_RUNS} WHERE {where} ORDER BY began DESC", values)
-            return [KeptRun._make(row) for row in found]
+        """Return the runs of one recording or of all recordings, the one that was computed last
+        first, without deleted ones."""
+        where, values = ("recording = ?", (recording,)) if recording is not None else ("1", ())
+        return self._runs(f"{where} ORDER BY latest DESC", *values)
 
     def run(self, number: int) -> KeptRun:
         """Return the run with a number.
@@ -126,15 +120,12 @@ class Library:
         Raises:
             LibraryError: If there is no such run, or it was deleted.
         """
-        with self._reading() as connection:
-            row = connection.execute(
-                f"{_RUNS} WHERE runs.id = ? AND deleted IS NULL", (number,)
-            ).fetchone()
-            if row is None:
-                raise NoSuchRun(
-                    f"{self.path}: there is no run {number}; `multiview-phd runs` lists them"
-                )
-            return KeptRun._make(row)
+        found = self._runs("runs.id = ?", number)
+        if not found:
+            raise NoSuchRun(
+                f"{self.path}: there is no run {number}; `multiview-phd runs` lists them"
+            )
+        return found[0]
 
     def find(self, text: str) -> KeptRun:
         """Return a run by its number, or by its name.
@@ -154,12 +145,8 @@ class Library:
         return named[0]
 
     def with_key(self, key: str) -> KeptRun | None:
-        """Return the run with a key (see :attr:`Result.key`); None if it is not stored."""
-        with self._reading() as connection:
-            row = connection.execute(
-                f"{_RUNS} WHERE runs.key = ? AND deleted IS NULL ORDER BY runs.id DESC", (key,)
-            ).fetchone()
-            return None if row is None else KeptRun._make(row)
+        """Return the run with a key (see :attr:`KeptRun.key`); None if it is not stored."""
+        return next(iter(self._runs("key = ? ORDER BY runs.id DESC", key)), None)
 
     def result(self, number: int) -> Result:
         """Return a run with its parameters, figures and tracks.
@@ -170,23 +157,28 @@ class Library:
         with self._reading() as connection:
             run = self.run(number)
             row = connection.execute(
-                "SELECT parameters, figures, columns, place, key, runs.digest, machine, "
-                "corrections FROM runs JOIN results ON run = runs.id "
-                "JOIN recordings ON recordings.id = recording WHERE runs.id = ?",
+                "SELECT place, parameters, figures, columns, corrections FROM runs "
+                "JOIN results ON run = runs.id JOIN recordings ON recordings.id = recording "
+                "WHERE runs.id = ?",
                 (number,),
             ).fetchone()
             if row is None:
                 raise LibraryError(f"{self.path}: the tracks of run {number} are not there")
-            values, figures = _inflated(row[0]), _inflated(row[1])
+            values, figures = _inflated(row[1]), _inflated(row[2])
             parameters, unknown = parameters_of(values)
-            kept = columns.unpack(row[2])
-            place, key, digest, machine = row[3:7]
-            corrections = tuple(_inflated(row[7])["corrections"]) if row[7] is not None else ()
+            corrections = () if row[4] is None else tuple(_inflated(row[4])["corrections"])
             ospa = tuple(figures.pop(OSPA, ()))
             return Result(
-                run, place, key, digest, machine, parameters, unknown, values, figures, kept, ospa,
+                run, row[0], parameters, unknown, values, figures, columns.unpack(row[3]), ospa,
                 corrections,
             )  # fmt: skip
+
+    def _runs(self, where: str, *values: object) -> list[KeptRun]:
+        """Return the runs that fulfil a condition of SQL and are not deleted."""
+        with self._reading() as connection:
+            return listed(
+                KeptRun, connection.execute(f"{_RUNS} WHERE deleted IS NULL AND {where}", values)
+            )
 
     def size(self) -> int:
         """Return the size of the file and of its write-ahead log, bytes."""
@@ -205,7 +197,8 @@ class Library:
         """Store a run, and delete the oldest unmarked runs beyond the budget.
 
         A run is unmarked if it has no star, name, note or tag. If a run with the same key is
-        stored, its tracks and figures are replaced; if it was deleted, it is restored.
+        stored, it keeps its number and the date of its first computation, and its tracks and
+        figures are replaced; if it was deleted, it is restored.
 
         Args:
             recording: The run's recording.
@@ -225,12 +218,11 @@ class Library:
                 (new.key, place),
             ).fetchone()
             number = known[0] if known else self._insert(connection, place, new)
-            if known:
-                connection.execute(
-                    "UPDATE runs SET began = ?, deleted = NULL WHERE id = ?", (new.began, number)
-                )
-                if new.figures:  # other settings of the evaluation give other figures
-                    self._list_figures(connection, number, new.figures)
+            connection.execute(
+                "UPDATE runs SET latest = ?, deleted = NULL WHERE id = ?", (new.began, number)
+            )
+            if new.figures or not known:  # other settings of the evaluation give other figures
+                self._list_figures(connection, number, new.figures)
             connection.execute(
                 "INSERT OR REPLACE INTO results (run, parameters, figures, columns, corrections) "
                 "VALUES (?, ?, ?, ?, ?)",
@@ -239,7 +231,7 @@ class Library:
             connection.execute(
                 # this run is kept even if the clock was set back
                 f"DELETE FROM runs WHERE id IN (SELECT id FROM runs WHERE {_UNMARKED} "
-                "AND deleted IS NULL ORDER BY id = ? DESC, began DESC LIMIT -1 OFFSET ?)",
+                "AND deleted IS NULL ORDER BY id = ? DESC, latest DESC LIMIT -1 OFFSET ?)",
                 (number, max(budget, 1)),
             )
             connection.execute("DELETE FROM runs WHERE deleted < ?", (time.time() - UNDO_SECONDS,))
@@ -339,7 +331,7 @@ class Library:
             gone = connection.execute("DELETE FROM runs WHERE deleted IS NOT NULL").rowcount
             gone += connection.execute(
                 f"DELETE FROM runs WHERE id IN (SELECT id FROM runs WHERE {_UNMARKED} "
-                "ORDER BY began DESC LIMIT -1 OFFSET ?)",
+                "ORDER BY latest DESC LIMIT -1 OFFSET ?)",
                 (max(budget, 0),),
             ).rowcount
         with self._lock, explained(self.path):
@@ -408,33 +400,12 @@ class Library:
 
     def _recording(self, connection: sqlite3.Connection, new: NewRecording) -> int:
         """Insert or update a recording, and return its number."""
-        values = {
-            "place": new.place,
-            "name": new.name,
-            "kind": new.kind,
-            "digest": new.digest,
-            "cameras": new.cameras,
-            "frames": new.frames,
-            "fps": new.fps,
-            "has_pictures": int(new.has_pictures),
-            "has_detections": int(new.has_detections),
-            "people": new.people,
-            "thumbnail": new.thumbnail,
-            "opened": time.time(),
-        }
-        names = ", ".join(values)
-        marks = ", ".join("?" * len(values))
-        renewed = ", ".join(
-            f"{name} = coalesce(excluded.thumbnail, thumbnail)"
-            if name == "thumbnail"
-            else f"{name} = excluded.{name}"
-            for name in values
-            if name != "place"
-        )
+        values = inserted(new) | {"opened": time.time()}
+        renewed = ", ".join(f"{name} = excluded.{name}" for name in values if name != "thumbnail")
         (number,) = connection.execute(
-            f"INSERT INTO recordings ({names}) VALUES ({marks}) "
-            f"ON CONFLICT (place) DO UPDATE SET {renewed} RETURNING id",
-            tuple(values.values()),
+            f"{_insertion('recordings', values)} ON CONFLICT (place) DO UPDATE SET {renewed}, "
+            "thumbnail = coalesce(excluded.thumbnail, thumbnail) RETURNING id",
+            values,
         ).fetchone()
         return int(number)
 
@@ -451,24 +422,8 @@ class Library:
 
     def _insert(self, connection: sqlite3.Connection, recording: int, new: NewRun) -> int:
         """Insert a run into the list of runs, and return its number."""
-        values: dict[str, Any] = {
-            "recording": recording,
-            **{
-                name: getattr(new, name)
-                for name in (
-                    "key", "digest", "began", "seconds", "steps", "single_view", "fusion_method",
-                    "seed", "version", "code", "machine", "source", "targets", "name", "note",
-                )
-            },
-            **{name: new.figures.get(name) for name in HEADLINES},
-            "changes": json.dumps(new.changes, ensure_ascii=False),
-            "corrected": len(new.corrections),
-            "final": 1,
-        }  # fmt: skip
-        marks = ", ".join("?" * len(values))
-        done = connection.execute(
-            f"INSERT INTO runs ({', '.join(values)}) VALUES ({marks})", tuple(values.values())
-        )
+        values = inserted(new) | {"recording": recording, "corrected": len(new.corrections)}
+        done = connection.execute(_insertion("runs", values), values)
         assert done.lastrowid is not None
         return done.lastrowid
 
@@ -477,6 +432,11 @@ class Library:
         with self._writing() as connection:
             self.run(number)
             connection.execute(f"UPDATE runs SET {column} = ? WHERE id = ?", (value, number))
+
+
+def _insertion(table: str, values: dict[str, Any]) -> str:
+    """Return the statement that inserts values by the names of their columns."""
+    return f"INSERT INTO {table} ({', '.join(values)}) VALUES (:{', :'.join(values)})"
 
 
 def _deflated(value: dict[str, Any]) -> bytes:

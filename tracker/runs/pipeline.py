@@ -290,7 +290,7 @@ def _bounds(run: Run) -> Bounds:
 
 def _adopt(run: Run, previous: Run | None) -> None:
     """Re-use the columns of an earlier run whose keys agree."""
-    if previous is None:
+    if previous is None or previous.only_tracks:
         return
     if previous.keys["single_view"] == run.keys["single_view"]:
         run.views, run.view_states = previous.views.shared(), previous.view_states

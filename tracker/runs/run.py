@@ -8,6 +8,10 @@ import json
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+from jaxtyping import Float, Int
+from numpy import ndarray
+
 from tracker.corrections.kinds import IN_THE_FUSION, OF_PEOPLE, Correction, Kind, digest
 from tracker.corrections.outcomes import Outcome, names_by_track, supporting_corrections
 from tracker.fusion.protocol import FusionResult
@@ -71,7 +75,10 @@ class Run:
     seed: int
     """The seed of the random numbers."""
     keys: dict[Stage, str]
-    """The cache key of each stage."""
+    """The cache key of each stage whose results the run has."""
+    stored_probabilities: Float[ndarray, "N C"] | None = None
+    """The detection probability of each row of :attr:`tracks` in each camera, for a run from the
+    library: it has these and the tracks, and no results of the stages. None for other runs."""
     views: Steps[tuple[ViewResult, ...]] = field(init=False)
     """The results of stage 1 of each step, one for each camera."""
     fused: Steps[FusionResult] = field(init=False)
@@ -121,6 +128,23 @@ class Run:
         is smoothed; 2 once they are smoothed and corrected.
         """
         return (self.tracks is not self.filtered) + (self.corrected and bool(self.corrections))
+
+    @property
+    def only_tracks(self) -> bool:
+        """Whether the run is from the library: it has tracks, and no results of the stages."""
+        return self.stored_probabilities is not None
+
+    def detection_probabilities(self, rows: Int[ndarray, " K"]) -> Float[ndarray, "K C"]:
+        """Return the detection probability of rows of the tracks in each camera; NaN for rows that
+        the filter had no component for, since smoothing filled a gap with them."""
+        if self.stored_probabilities is not None:
+            return np.asarray(self.stored_probabilities[rows])
+        found = np.full((len(rows), len(self.sequence.views)), np.nan)
+        steps, components = self.tracks.frames[rows], self.tracks.components[rows]
+        own = np.flatnonzero((components >= 0) & (steps < len(self.fused)))
+        if len(own):
+            found[own] = self.fused.take("detection_probabilities", steps[own], components[own])
+        return found
 
     @property
     def complete(self) -> bool:

@@ -184,7 +184,6 @@ def _show(library: Library, command: ShowRun) -> None:
         told = {
             **run.to_json(),
             "place": result.place,
-            "machine": result.machine,
             "parameters": result.values,
             "figures": result.figures,
         }
@@ -193,8 +192,9 @@ def _show(library: Library, command: ShowRun) -> None:
     facts = {
         "run": run.title,
         "recording": f"{run.recording_name} ({result.place})",
-        "began": time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(run.began)),
-        "computed": f"{run.steps} steps in {run.seconds:.1f} s by {run.source} on {result.machine}",
+        "began": _date(run.began),
+        **({"computed again": _date(run.latest)} if run.latest > run.began else {}),
+        "computed": f"{run.steps} steps in {run.seconds:.1f} s by {run.source} on {run.machine}",
         "program": f"{run.version}, code {run.code}",
         "methods": f"{run.single_view} › {run.fusion_method}, seed {run.seed}",
         **{f"value {key}": str(value) for key, value in run.changes.items()},
@@ -209,6 +209,10 @@ def _show(library: Library, command: ShowRun) -> None:
         "note": run.note,
     }
     print_table(("what", "value"), list(facts.items()))
+
+
+def _date(seconds: float) -> str:
+    return time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(seconds))
 
 
 def _export(library: Library, command: ExportRun) -> None:

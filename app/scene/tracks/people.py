@@ -132,7 +132,9 @@ class PeopleNodes:
             selected,
             trail,
         )
-        posterior = run.fused[step].posterior if run is not None else GaussianMixture.empty(3)
+        posterior = GaussianMixture.empty(3)
+        if run is not None and not run.only_tracks:
+            posterior = run.fused[step].posterior
         recent = slice(
             int(np.searchsorted(tracks.frames, step - round(trail.seconds * sequence.fps))),
             now.stop,

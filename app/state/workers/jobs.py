@@ -175,25 +175,13 @@ class Jobs:
             snapshot = self._workbench.snapshot()
             if snapshot.sequence is None:
                 raise ValueError("no recording is open")
-            run = self.kept_run(snapshot.sequence, result)
+            run = run_for_display(snapshot.sequence, result)
             wanted = self.key_of(snapshot.sequence, result)
             if self._under_way is not None:
                 self._under_way.cancelled.set()
             self._wanted = None
             stands_for = "" if run.key == wanted else wanted
             self._workbench.show_kept(run, result.run.id, stands_for, _beyond_the_end(run, result))
-
-    def kept_run(self, sequence: Sequence, result: Result) -> Run:
-        """A run of the library to set others against, known by a key of its own.
-
-        Raises:
-            ValueError: If the recording does not fit it any more.
-        """
-        wanted = self.key_of(sequence, result)
-        same = wanted == result.key
-        return run_for_display(
-            sequence, result, key=wanted if same else f"{wanted}-kept-{result.run.id}"
-        )
 
     def key_of(self, sequence: Sequence, result: Result) -> str:
         """The key that a computation with a kept run's values would have now."""

@@ -203,5 +203,5 @@ class Keeper:
             return
         stored = library.result(number)
         same = np.array_equal(stored.kept.tracks.positions, run.tracks.positions)
-        if same and stored.digest == run.sequence.digest:
+        if same and stored.run.digest == run.sequence.digest:
             library.score(number, figures_of(evaluation), ospa_of(evaluation))

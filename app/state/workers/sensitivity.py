@@ -230,15 +230,17 @@ class Sensitivity:
         self, now: Snapshot, parameters: RunParameters, cancelled: threading.Event
     ) -> float | None:
         """What a run of these parameters reaches; None where they do not fit the recording."""
-        sequence = now.sequence
+        sequence, shown = now.sequence, now.run
         assert sequence is not None
+        if shown is not None and shown.only_tracks:
+            shown = None
         try:
             run = pipeline.compute(
                 sequence,
                 parameters,
                 seed=self._seed,
                 reader=now.reader,
-                previous=now.run if now.run is not None and now.run.complete else self._last,
+                previous=shown if shown is not None and shown.complete else self._last,
                 cancelled=cancelled.is_set,
                 thread_begins=be_nice,
             )

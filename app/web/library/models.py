@@ -61,7 +61,9 @@ class KeptRunInfo(Model):
     recording: int
     recording_name: str
     began: float
-    """Seconds since 1970."""
+    """Of the first computation; seconds since 1970."""
+    latest: float
+    """Of the last computation of the same run."""
     seconds: float
     steps: int
     steps_per_second: float

@@ -21,7 +21,7 @@ from app.web.opening import begun, told_in_the_answer
 from app.web.views import results
 from tracker import parameters as table
 from tracker.library.errors import LibraryError, NoSuchRun
-from tracker.library.keeping import code_version, record_of_recording
+from tracker.library.keeping import code_version, record_of_recording, run_for_display
 from tracker.library.records import KeptRun, Recording, Result
 from tracker.library.store import Library
 from tracker.sequences import library as sequences
@@ -254,7 +254,7 @@ async def open_run(number: RowNumber, opened: Opened, bench: Bench, jobs: Work) 
 
 
 @router.post("/runs/{number}/pin")
-def pin(number: RowNumber, opened: Opened, bench: Bench, jobs: Work) -> State:
+def pin(number: RowNumber, opened: Opened, bench: Bench) -> State:
     """Pin a kept run of the open recording: others are compared with it."""
     result = _result(opened, number)
     now = bench.snapshot()
@@ -268,7 +268,7 @@ def pin(number: RowNumber, opened: Opened, bench: Bench, jobs: Work) -> State:
             hint="Open one of its recording's runs first.",
         )
     try:
-        bench.pin_kept(jobs.kept_run(now.sequence, result))
+        bench.pin_kept(run_for_display(now.sequence, result))
     except ValueError as error:
         raise ApiError(422, "cannot_open", sentence(error), field="number") from None
     return results.state_of(bench.snapshot())

@@ -59,9 +59,9 @@ def _mask(
     run = snapshot.run
     if run is None or step >= run.done:
         raise _missing(f"Step {step} is not computed yet.", "Ask again when the run is there.")
-    if wanted is not None and wanted != run.keys["single_view"]:
+    if wanted is not None and wanted != run.keys.get("single_view"):
         raise _missing("That run is not shown any more.", "Ask for the step again.")
-    packed = run.views[step][camera].foreground
+    packed = run.views[step][camera].foreground if step < len(run.views) else None
     if packed is None:
         name, method = sequence.views[camera].camera.name, run.parameters.single_view
         raise _missing(

@@ -78,14 +78,7 @@ def _uncertainty(life: _Life) -> Float[ndarray, "1 K"]:
 
 
 def _detection(life: _Life) -> Float[ndarray, "C K"]:
-    run = life.run
-    found = np.full((len(run.sequence.views), len(life.rows)), np.nan)
-    components = run.tracks.components[life.rows]
-    own = np.flatnonzero((components >= 0) & (life.frames < len(run.fused)))
-    if len(own):
-        rows = run.fused.take("detection_probabilities", life.frames[own], components[own])
-        found[:, own] = rows.T
-    return found
+    return life.run.detection_probabilities(life.rows).T
 
 
 def _distance(life: _Life) -> Float[ndarray, "1 K"]:

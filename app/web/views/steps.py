@@ -71,13 +71,15 @@ def step_of(
         cameras=cameras,
         tracks=[],
         truth=_truth(sequence, run, step, cameras),
-        components=0,
-        cardinality=0.0,
+        components=None,
+        cardinality=None,
     )
     if run is not None and computed:
-        _add_views(message, run, step, with_samples)
+        if not run.only_tracks:
+            _add_views(message, run, step, with_samples)
         _add_tracks(message, sequence, run, step)
-        tell_owners(message, sequence, run, step)
+        if not run.only_tracks:
+            tell_owners(message, sequence, run, step)
         if trails:
             _add_trails(message, sequence, run, step, trails)
     return message
@@ -148,9 +150,7 @@ def _add_views(message: models.Step, run: Run, step: int, with_samples: bool) ->
 
 
 def _add_tracks(message: models.Step, sequence: Sequence, run: Run, step: int) -> None:
-    fused, tracks = run.fused[step], run.tracks
-    message.components = fused.posterior.size
-    message.cardinality = fused.posterior.cardinality
+    tracks = run.tracks
     rows = tracks.at(step)
     ids, positions = tracks.ids[rows].tolist(), tracks.positions[rows]
     components, seen = tracks.components[rows], tracks.seen[rows]
@@ -166,33 +166,38 @@ def _add_tracks(message: models.Step, sequence: Sequence, run: Run, step: int) -
         )
         for i in range(len(ids))
     ]
+    fused = None if run.only_tracks else run.fused[step]
+    if fused is not None:
+        message.components = fused.posterior.size
+        message.cardinality = fused.posterior.cardinality
+    probabilities = run.detection_probabilities(np.arange(rows.start, rows.stop))
     nominal = run.parameters.fusion.detection_probability
     for index, (view, camera) in enumerate(zip(sequence.views, message.cameras, strict=True)):
         boxes, visible = view.camera.project_boxes(positions, sequence.target_half_extents)
         centres, in_front = view.camera.project(positions)
-        given = _corner_boxes(run.views[step][index].boxes)
         for i, component in enumerate(components.tolist()):
             whole = bool(np.isfinite(boxes[i]).all())
+            probability = float(probabilities[i, index])
+            source, fed_by, hidden_by = -1, None, None
             # the filter knew nothing of whom the smoothing alone found
-            unknown = component < 0
-            probability = 0.0 if unknown else float(fused.detection_probabilities[index, component])
-            hider = -1 if unknown else int(fused.hidden_by[index, component])
-            hidden_by = id_of_label.get(hider) if hider >= 0 else None
+            if fused is not None and component >= 0:
+                source = int(fused.sources[index, component])
+                fed_by = _feeding(run.views[step][index], fused, index, component)
+                hider = int(fused.hidden_by[index, component])
+                hidden_by = id_of_label.get(hider) if hider >= 0 else None
             reason: models.Reason | None = None
             if not visible[i]:
                 reason = "out of view" if whole else "behind camera"
-            elif hidden_by is None and not unknown and probability < WORTH_A_REASON * nominal:
+            elif fused is not None and hidden_by is None and probability < WORTH_A_REASON * nominal:
                 reason = "near the edge"
             camera.tracks.append(
                 models.CameraTrack(
                     id=ids[i],
                     box=_box(boxes[i]) if whole else None,
                     seen=bool(seen[i, index]),
-                    detection_probability=round(probability, 4),
-                    source=-1 if unknown else int(fused.sources[index, component]),
-                    fed_by=None
-                    if unknown
-                    else _feeding(run.views[step][index], given, fused, index, component),
+                    detection_probability=round(probability, 4) if probability >= 0.0 else 0.0,
+                    source=source,
+                    fed_by=fed_by,
                     hidden_by=hidden_by,
                     visible=bool(visible[i]),
                     reason=reason,
@@ -202,13 +207,13 @@ def _add_tracks(message: models.Step, sequence: Sequence, run: Run, step: int) -
 
 
 def _feeding(
-    view: ViewResult, given: list[models.Box], fused: FusionResult, camera: int, component: int
+    view: ViewResult, fused: FusionResult, camera: int, component: int
 ) -> models.Feeding | None:
     source = int(fused.sources[camera, component])
     if not 0 <= source < len(view.boxes):
         return None
     return models.Feeding(
-        box=given[source],
+        box=_corner_boxes(view.boxes[source : source + 1])[0],
         weight=float(f"{float(view.weights[source]):.4g}"),
         share=round(float(fused.source_weights[camera, component]), 4),
     )

@@ -127,7 +127,13 @@ export function runsTable(on) {
 					: null,
 			],
 		},
-		{ word: "When", kind: "q", by: (run) => run.began, cell: (run) => when(run.began) },
+		{
+			word: "When",
+			kind: "q",
+			by: (run) => run.latest,
+			cell: (run) =>
+				run.latest > run.began ? `${when(run.began)}, again ${when(run.latest)}` : when(run.began),
+		},
 		{
 			word: "Methods",
 			cell: (run) => [run.single_view, h("span", { class: "q" }, " › "), run.fusion_method],

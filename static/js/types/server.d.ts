@@ -650,8 +650,10 @@ declare namespace Server {
 		id: number;
 		recording: number;
 		recording_name: string;
-		/** Seconds since 1970. */
+		/** Of the first computation; seconds since 1970. */
 		began: number;
+		/** Of the last computation of the same run. */
+		latest: number;
 		seconds: number;
 		steps: number;
 		steps_per_second: number;
@@ -1094,9 +1096,10 @@ declare namespace Server {
 		cameras: CameraStep[];
 		tracks: Track[];
 		truth: Truth[];
-		components: number;
-		/** Expected number of people: the sum of the weights. */
-		cardinality: number;
+		/** Of the filter; null where only the tracks of a run were stored. */
+		components: number | null;
+		/** Expected number of people: the sum of the weights; null where only tracks were stored. */
+		cardinality: number | null;
 	}
 
 	/** Everything of a study but its trials. */

@@ -144,7 +144,9 @@ def test_a_kept_run_is_shown_as_it_was_and_nothing_is_computed(kept: TestClient)
             for a, b in zip(camera_then["tracks"], camera["tracks"], strict=True):
                 probabilities = (a["detection_probability"], b["detection_probability"])
                 assert probabilities[0] == pytest.approx(probabilities[1], abs=1e-3)
+        # only its tracks were stored: nothing is made up of what the filter and the cameras had
         assert now["cameras"][0]["measurements"] == []
+        assert (now["components"], now["cardinality"]) == (None, None)
     wait_until(is_evaluated(kept))
     assert len(runs_of(kept)) == 2  # it is not kept again
 
