@@ -41,29 +41,25 @@ def explained(path: Path) -> Iterator[None]:
         raise LibraryError(f"{path}: the library cannot be reached ({error.strerror})") from error
 
 
+_HELD = "another program holds the library; end it, or wait until it has written"
+_REMEDIES = {
+    sqlite3.SQLITE_BUSY: _HELD,
+    sqlite3.SQLITE_LOCKED: _HELD,
+    sqlite3.SQLITE_FULL: "there is no space left for the library; free some, or name another place",
+    sqlite3.SQLITE_READONLY: "the library can be read but not written; change its rights, or name "
+    "another by --library",
+    sqlite3.SQLITE_CANTOPEN: "the library cannot be opened; see that its folder is there and can "
+    "be written to, or name another by --library",
+    sqlite3.SQLITE_IOERR: "the disk failed under the library ({words}); name another by --library",
+    sqlite3.SQLITE_CONSTRAINT: "the library refuses what it was given ({words})",
+}
+_DAMAGED = (
+    "the library is damaged ({words}); `multiview-phd library check --repair` keeps a copy aside "
+    "and saves what can be read"
+)
+
+
 def _sentence(path: Path, error: sqlite3.Error) -> str:
     """Return the message for an error of SQLite."""
-    words = str(error)
     code = getattr(error, "sqlite_errorcode", 0) & 0xFF
-    if code in (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED):
-        return f"{path}: another program holds the library; end it, or wait until it has written"
-    if code == sqlite3.SQLITE_FULL:
-        return f"{path}: there is no space left for the library; free some, or name another place"
-    if code == sqlite3.SQLITE_READONLY:
-        return (
-            f"{path}: the library can be read but not written; change its rights, or name another "
-            "by --library"
-        )
-    if code == sqlite3.SQLITE_CANTOPEN:
-        return (
-            f"{path}: the library cannot be opened; see that its folder is there and can be "
-            "written to, or name another by --library"
-        )
-    if code == sqlite3.SQLITE_IOERR:
-        return f"{path}: the disk failed under the library ({words}); name another by --library"
-    if code == sqlite3.SQLITE_CONSTRAINT:
-        return f"{path}: the library refuses what it was given ({words})"
-    return (
-        f"{path}: the library is damaged ({words}); `multiview-phd library check --repair` "
-        "keeps a copy aside and saves what can be read"
-    )
+    return f"{path}: {_REMEDIES.get(code, _DAMAGED).format(words=error)}"

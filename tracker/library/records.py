@@ -221,8 +221,8 @@ class Result:
 
 R = TypeVar("R", Recording, KeptRun)
 
-_OF_LISTS = ("changes", "tags")
-"""The columns that hold JSON."""
+_AS_JSON = ("changes", "tags")
+"""The fields whose columns hold JSON."""
 
 
 def selected(record: type[R], table: str) -> str:
@@ -240,10 +240,12 @@ def selected(record: type[R], table: str) -> str:
 def listed(record: type[R], rows: Iterable[tuple[Any, ...]]) -> list[R]:
     """Return the records of rows of the columns of :func:`selected`."""
     names = [one.name for one in fields(record)]
+    texts = [name for name in _AS_JSON if name in names]
     made = []
     for row in rows:
         values = dict(zip(names, row, strict=True))
-        values |= {name: json.loads(values[name]) for name in _OF_LISTS if name in values}
+        for name in texts:
+            values[name] = json.loads(values[name])
         made.append(record(**values))
     return made
 
@@ -253,6 +255,6 @@ def inserted(record: NewRecording | NewRun) -> dict[str, Any]:
     kind = _Run if isinstance(record, NewRun) else NewRecording
     values = {one.name: getattr(record, one.name) for one in fields(kind)}
     return {
-        name: json.dumps(value, ensure_ascii=False) if name in _OF_LISTS else value
+        name: json.dumps(value, ensure_ascii=False) if name in _AS_JSON else value
         for name, value in values.items()
     }
