@@ -84,7 +84,6 @@ def _fill(folder: Path, result: Result, sequence: Sequence, videos: bool) -> Non
     run = result.run
     listed = asdict(run)
     apart = {name: listed.pop(name) for name in _APART}
-    listed |= {f"{name}_json": json.dumps(listed.pop(name)) for name in ("changes", "tags")}
     manifest = {
         "format": FORMAT,
         "program": f"multiview-phd {__version__}",
@@ -138,7 +137,6 @@ def unpack_bundle(path: Path, folder: Path) -> Result:
                 "update the program"
             )
         listed = manifest["run"] | {one: manifest[one] for one in _APART if one in manifest}
-        listed |= {name: json.loads(listed.pop(f"{name}_json")) for name in ("changes", "tags")}
         parameters, unknown = parameters_of(manifest["parameters"])
         return Result(
             run=KeptRun(**listed),

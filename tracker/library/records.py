@@ -7,7 +7,6 @@ read off; a field that is computed from other columns has the expression of SQL 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field, fields
 from typing import Any, Literal, TypeVar
 
@@ -80,7 +79,7 @@ class Recording(_Recording):
     """The number of stored runs of the recording."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(slots=True)  # a frozen one takes six times as long to make, and lists have thousands
 class _Run:
     """What is known of a run when it is inserted, and listed later."""
 
@@ -99,8 +98,6 @@ class _Run:
     """The key of the single-view method."""
     fusion_method: str
     """The key of the fusion method."""
-    changes: dict[str, Any]
-    """The values of parameters that differ from the recording's defaults, by key."""
     seed: int
     """The seed of the random numbers."""
     version: str
@@ -113,16 +110,14 @@ class _Run:
     """The origin of the run."""
     targets: int
     """The number of tracks."""
-    name: str = ""
-    """The name that the user gave the run, or an empty string."""
-    note: str = ""
-    """The user's note, or an empty string."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+@dataclass(slots=True, eq=False)
 class NewRun(_Run):
     """A finished run, to be inserted."""
 
+    changes: dict[str, Any]
+    """The values of parameters that differ from the recording's defaults, by key."""
     parameters: dict[str, Any]
     """All parameters."""
     figures: dict[str, float | int | None]
@@ -133,9 +128,13 @@ class NewRun(_Run):
     """OSPA over time, in the form of :attr:`Result.ospa`."""
     corrections: tuple[dict[str, Any], ...] = ()
     """The corrections of the run, each in the form of a line of the log of corrections."""
+    name: str = ""
+    """The name of the run, or an empty string."""
+    note: str = ""
+    """The note on the run, or an empty string."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(slots=True)
 class KeptRun(_Run):
     """A stored run without its tracks, so that thousands can be listed at once."""
 
@@ -155,10 +154,16 @@ class KeptRun(_Run):
     misses: int | None
     false_positives: int | None
     id_switches: int | None
+    name: str
+    """The name that the user gave the run, or an empty string."""
     star: int
     """Whether the user starred the run, 0 or 1."""
-    tags: list[str]
-    """The tags that the user gave the run."""
+    note: str
+    """The user's note, or an empty string."""
+    changes_json: str = _of("runs.changes")
+    """The values of :attr:`changes`, as JSON."""
+    tags_json: str = _of("runs.tags")
+    """The values of :attr:`tags`, as JSON."""
     corrected: int = 0
     """The number of corrections of the run."""
     final: int = 0
@@ -173,6 +178,16 @@ class KeptRun(_Run):
         return not self.final and self.misses is not None
 
     @property
+    def changes(self) -> dict[str, Any]:
+        """The values of parameters that differ from the recording's defaults, by key."""
+        return dict(json.loads(self.changes_json))
+
+    @property
+    def tags(self) -> list[str]:
+        """The tags that the user gave the run."""
+        return list(json.loads(self.tags_json))
+
+    @property
     def steps_per_second(self) -> float:
         """The mean number of steps computed per second; 0 if nothing was computed."""
         return self.steps / self.seconds if self.seconds > 0.0 else 0.0
@@ -185,10 +200,12 @@ class KeptRun(_Run):
     def to_json(self) -> dict[str, Any]:
         """Return all fields as plain values."""
         values = asdict(self)
-        del values["final"]
+        del values["changes_json"], values["tags_json"], values["final"]
         return {
             **values,
             "star": bool(self.star),
+            "changes": self.changes,
+            "tags": self.tags,
             "steps_per_second": self.steps_per_second,
             "provisional": self.provisional,
         }
@@ -221,9 +238,6 @@ class Result:
 
 R = TypeVar("R", Recording, KeptRun)
 
-_AS_JSON = ("changes", "tags")
-"""The fields whose columns hold JSON."""
-
 
 def selected(record: type[R], table: str) -> str:
     """Return the columns of SQL of the fields of a record, in their order.
@@ -237,24 +251,10 @@ def selected(record: type[R], table: str) -> str:
     )
 
 
-def listed(record: type[R], rows: Iterable[tuple[Any, ...]]) -> list[R]:
-    """Return the records of rows of the columns of :func:`selected`."""
-    names = [one.name for one in fields(record)]
-    texts = [name for name in _AS_JSON if name in names]
-    made = []
-    for row in rows:
-        values = dict(zip(names, row, strict=True))
-        for name in texts:
-            values[name] = json.loads(values[name])
-        made.append(record(**values))
-    return made
-
-
 def inserted(record: NewRecording | NewRun) -> dict[str, Any]:
     """Return the values of a record, by the columns of its table."""
-    kind = _Run if isinstance(record, NewRun) else NewRecording
-    values = {one.name: getattr(record, one.name) for one in fields(kind)}
-    return {
-        name: json.dumps(value, ensure_ascii=False) if name in _AS_JSON else value
-        for name, value in values.items()
-    }
+    if isinstance(record, NewRecording):
+        return asdict(record)
+    names = [*(one.name for one in fields(_Run)), "name", "note"]
+    changes = json.dumps(record.changes, ensure_ascii=False)
+    return {name: getattr(record, name) for name in names} | {"changes": changes}

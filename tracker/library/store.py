@@ -28,7 +28,6 @@ from tracker.library.records import (
     Recording,
     Result,
     inserted,
-    listed,
     selected,
 )
 from tracker.parameters import RunParameters, with_values
@@ -98,7 +97,7 @@ class Library:
         with self._reading() as connection:
             columns_of = selected(Recording, "recordings")
             found = connection.execute(f"SELECT {columns_of} FROM recordings ORDER BY opened DESC")
-            return listed(Recording, found)
+            return [Recording(*row) for row in found]
 
     def thumbnail(self, recording: int) -> bytes | None:
         """Return the JPEG thumbnail of a recording; None if it has none or does not exist."""
@@ -176,9 +175,8 @@ class Library:
     def _runs(self, where: str, *values: object) -> list[KeptRun]:
         """Return the runs that fulfil a condition of SQL and are not deleted."""
         with self._reading() as connection:
-            return listed(
-                KeptRun, connection.execute(f"{_RUNS} WHERE deleted IS NULL AND {where}", values)
-            )
+            found = connection.execute(f"{_RUNS} WHERE deleted IS NULL AND {where}", values)
+            return [KeptRun(*row) for row in found]
 
     def size(self) -> int:
         """Return the size of the file and of its write-ahead log, bytes."""
