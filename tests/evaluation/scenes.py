@@ -12,11 +12,16 @@ from hypothesis import strategies as st
 
 from tests import world
 from tracker.evaluation.matching import Comparison, GatedDistance, prepare
+from tracker.geometry.camera import Camera
 from tracker.sequences.reader import read_sequence
 from tracker.sequences.sequence import GroundTruth, Sequence
 
 DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
 HALF_EXTENTS = world.PERSON
+CAMERA = Camera(
+    "front", (640, 480), np.array([[500.0, 0, 320], [0, 500, 240], [0, 0, 1]]),
+    np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]), np.array([-2.0, 1.0, 5.0]), np.zeros(5),
+)  # fmt: skip
 
 
 @dataclass(frozen=True)

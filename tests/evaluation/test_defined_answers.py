@@ -7,20 +7,11 @@ import json
 import numpy as np
 import pytest
 
-from tests.evaluation.scenes import HALF_EXTENTS, Columns, tracks_of, truth_of
+from tests.evaluation.scenes import CAMERA, HALF_EXTENTS, Columns, tracks_of, truth_of
 from tracker.evaluation import EvaluationSettings, evaluate
 from tracker.evaluation.matching import to_rows
 from tracker.fusion.trajectories import Trajectories
-from tracker.geometry.camera import Camera
 
-CAMERA = Camera(
-    "front",
-    (640, 480),
-    np.array([[500.0, 0, 320], [0, 500, 240], [0, 0, 1]]),
-    np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]),
-    np.array([0.0, 1.0, 5.0]),
-    np.zeros(5),
-)
 NOTHING = tracks_of([])
 
 

@@ -10,23 +10,13 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser
 
-from tests.evaluation.scenes import HALF_EXTENTS, Columns, perturbed, truth_of, walks
+from tests.evaluation.scenes import CAMERA, HALF_EXTENTS, Columns, perturbed, truth_of, walks
 from tracker.evaluation import EvaluationSettings, evaluate_sequence
 from tracker.evaluation.report.figures import DARK, LIGHT_IDS, broken, over_time, top_view
 from tracker.evaluation.report.page import report_html, write_report
 from tracker.fusion.trajectories import Trajectories
-from tracker.geometry.camera import Camera
 from tracker.parameters import RunParameters, with_values
 from tracker.sequences.sequence import GroundTruth, Room, Sequence, View
-
-CAMERA = Camera(
-    "front",
-    (640, 480),
-    np.array([[500.0, 0, 320], [0, 500, 240], [0, 0, 1]]),
-    np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]),
-    np.array([-2.0, 1.0, 5.0]),
-    np.zeros(5),
-)
 
 
 def sequence_of(truth: GroundTruth | None, name: str = "room", description: str = "") -> Sequence:

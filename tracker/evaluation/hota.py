@@ -23,6 +23,7 @@ ALPHAS = np.arange(1, 20) * 0.05
 [LODTGLL21]."""
 
 _TINY = np.finfo(float).eps
+"""Guards divisions by zero and the comparison with α against rounding, as in TrackEval."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -101,7 +102,8 @@ def hota(comparison: Comparison) -> Hota | None:
     similarities = np.concatenate(similarity_of)
     pair = (np.concatenate(person_of), np.concatenate(track_of))
 
-    detection, association, localisation = np.zeros(19), np.zeros(19), np.ones(19)
+    detection, association, localisation = np.zeros((3, len(ALPHAS)))
+    localisation += 1.0
     for a, alpha in enumerate(ALPHAS):
         counted = similarities >= alpha - _TINY
         pairs = int(counted.sum())

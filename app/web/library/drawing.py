@@ -21,17 +21,20 @@ from app.web.tables.markup import (
     symbol,
     table,
 )
+from tracker.evaluation import BY_KEY
 from tracker.library.keeping import CURVE, stride
-from tracker.library.records import PROVISIONAL
+from tracker.library.records import HEADLINES, PROVISIONAL
 from tracker.sequences.sequence import Room
 
 MOST_LANES = 6
 
 _FIGURES = (
-    ("MOTA", "mota", 3, 1), ("IDF1", "idf1", 3, 1), ("HOTA", "hota", 3, 1),
-    ("OSPA, m", "ospa", 3, -1), ("Position error, m", "position_error", 3, -1),
-    ("Missed", "misses", 0, -1), ("False", "false_positives", 0, -1),
-    ("Identity switches", "id_switches", 0, -1), ("Tracks", "targets", 0, 0),
+    *(
+        (", ".join(filter(None, (one.name, one.unit.replace("{d}", "m")))), key, one.digits,
+         1 if one.direction == "higher" else -1)
+        for key, one in ((key, BY_KEY[key]) for key in HEADLINES)
+    ),
+    ("Tracks", "targets", 0, 0),
 )  # fmt: skip
 """Word, field, digits, and which end is the better: 0 for neither."""
 
