@@ -152,6 +152,23 @@ def test_a_kept_run_is_shown_as_it_was_and_nothing_is_computed(kept: TestClient)
 
 
 @pytest.mark.full
+def test_of_a_kept_run_nothing_is_made_up_of_what_was_not_stored(kept: TestClient) -> None:
+    before = kept.get("/api/timeline").json()
+    track = kept.get("/api/step/60").json()["tracks"][0]["id"]
+    detected = kept.get(f"/api/courses/{track}?kind=detection").json()
+    kept.post(f"/api/library/runs/{runs_of(kept)[0]['id']}/open")
+    timeline = kept.get("/api/timeline").json()
+    assert timeline["count"] == before["count"]
+    assert timeline["cardinality"]["mean"] == timeline["deviation"]["mean"] == []
+    assert kept.get(f"/api/courses/{track}?kind=detection").json() == detected
+    for page in ("tables/step/60", "tables/events", "tables/compare", "corrections/queue"):
+        assert kept.get(f"/api/{page}").status_code == 200, page
+    refused = kept.post("/api/identity")
+    assert refused.status_code == 409
+    assert "boxes of the cameras were not kept" in refused.json()["detail"]
+
+
+@pytest.mark.full
 def test_what_the_cameras_found_comes_back_by_computing_again(kept: TestClient) -> None:
     changed, _ = runs_of(kept)
     kept.post(f"/api/library/runs/{changed['id']}/open")
