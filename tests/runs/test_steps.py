@@ -22,7 +22,7 @@ from tests.engine.synthetic import crossing, sequence, views_at
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion.protocol import Associations, FusionResult
 from tracker.single_view.dropped import Dropped
-from tracker.single_view.protocol import ViewEvent, ViewResult
+from tracker.single_view.protocol import ViewEvent, ViewResult, pack_samples
 from tracker.steps import ROWS_SECOND, Steps, steps
 
 
@@ -68,8 +68,7 @@ def random_view(rng: np.random.Generator) -> ViewResult:
         estimate_labels=rng.integers(-1, 9, estimates),
         measurements=rng.normal(size=(peaks, 4)),
         measurement_scores=rng.random(peaks),
-        samples=rng.normal(size=(samples, 4)).astype(np.float32),
-        sample_weights=rng.random(samples).astype(np.float32),
+        samples=pack_samples(rng.normal(size=(samples, 4)), rng.random(samples)),
         information={str(name): float(rng.normal()) for name in rng.integers(0, 5, 3)},
         dropped=Dropped(
             rng.random((gates, 4)).astype(np.float32), rng.integers(0, 3, gates).astype(np.int8)

@@ -26,6 +26,7 @@ from tracker.runs import pipeline
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence, View
 from tracker.single_view.pictures.foreground import unpack
+from tracker.single_view.protocol import unpack_samples
 
 
 @every_variant
@@ -40,9 +41,9 @@ def test_results_repeat_and_fit_together(
         assert one.estimates.shape == (len(one.estimate_labels), 4)
         assert len(one.estimate_weights) == len(one.estimates)
         assert one.measurements.shape == (len(one.measurement_scores), 4)
-        assert one.samples.dtype == one.sample_weights.dtype == np.float32
-        assert one.samples.shape == (len(one.sample_weights), 4)
-        assert one.sample_weights.max(initial=1.0) == 1.0
+        centres, weights = unpack_samples(one.samples)
+        assert centres.shape == (len(weights), 2)
+        assert weights.max(initial=1.0) == 1.0
         assert (one.sigmas > 0.0).all()
         for weights in (one.weights, one.measurement_scores, one.estimate_weights):
             assert ((weights >= 0.0) & (weights <= 1.0 + 1e-9)).all() or "colours" in variant

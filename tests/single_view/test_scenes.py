@@ -23,7 +23,7 @@ from tracker.sequences.sequence import Sequence
 from tracker.single_view.colour import peaks
 from tracker.single_view.colour.trust import shapes_of_templates
 from tracker.single_view.pictures.foreground import unpack
-from tracker.single_view.protocol import ViewResult
+from tracker.single_view.protocol import ViewResult, unpack_samples
 
 KEPT = Path(__file__).with_name("scenes.json")
 
@@ -88,7 +88,7 @@ def numbers(result: ViewResult) -> list[float]:
     for boxes, beside in (
         (result.boxes, result.weights), (result.sigmas, result.labels),
         (result.estimates, result.estimate_weights), (result.estimates, result.estimate_labels),
-        (result.measurements, result.measurement_scores), (result.samples, result.sample_weights),
+        (result.measurements, result.measurement_scores), unpack_samples(result.samples),
         (result.gates, np.ones(len(result.gates))), (result.dropped.boxes, result.dropped.gates),
     ):  # fmt: skip
         rows = np.column_stack([boxes, beside]).astype(float)

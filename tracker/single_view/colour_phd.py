@@ -25,7 +25,7 @@ from tracker.single_view.box_sizes import entrance_boxes
 from tracker.single_view.colour.peaks import PeakFinder, Peaks
 from tracker.single_view.dropped import Dropped
 from tracker.single_view.pictures.foreground import pack
-from tracker.single_view.protocol import ViewResult
+from tracker.single_view.protocol import ViewResult, pack_samples
 
 if TYPE_CHECKING:
     from tracker.parameters import RunParameters
@@ -198,8 +198,7 @@ class ColourPhd:
             estimate_labels=labels,
             measurements=found,
             measurement_scores=scores,
-            samples=samples.astype(np.float32),
-            sample_weights=sample_weights.astype(np.float32),
+            samples=pack_samples(samples, sample_weights),
             information={**information, "cardinality": mixture.cardinality},
             dropped=Dropped.none() if peaks is None else peaks.dropped,
             foreground=None if peaks is None or peaks.mask is None else pack(peaks.mask),

@@ -166,8 +166,6 @@ class DetectionPhd:
             estimate_labels=labels,
             measurements=found.boxes,
             measurement_scores=found.scores,
-            samples=np.zeros((0, 4), np.float32),
-            sample_weights=np.zeros(0, np.float32),
             information={
                 "boxes outside the room": float((~found.plausible).sum()),
                 "cardinality": mixture.cardinality,

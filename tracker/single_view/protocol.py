@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Literal, Protocol
 
 import numpy as np
-from jaxtyping import Float, Float16, Int, UInt8
+from jaxtyping import Float, Float16, Int, Int16, UInt8
 from numpy import ndarray
 
 from tracker.single_view.dropped import Dropped
@@ -60,12 +60,11 @@ class ViewResult:
     """The measurements of the method's filter: peaks, foreground boxes or detections."""
     measurement_scores: Float[ndarray, " M"]
     """Likelihood, or detector's score, of each measurement, 0 … 1."""
-    samples: Float[ndarray, "S 4"]
-    """Samples of the weighted intensity, float32; empty where the method has none."""
-    sample_weights: Float[ndarray, " S"]
-    """Weight of each sample relative to the largest, 0 … 1, float32."""
     information: dict[str, float]
     """Numbers about this step for display, by name."""
+    samples: Int16[ndarray, "S 3"] = field(default_factory=lambda: np.zeros((0, 3), np.int16))
+    """Samples of the weighted intensity for display, packed by :func:`pack_samples`; empty where
+    the method has none."""
     dropped: Dropped = field(default_factory=Dropped.none)
     """Candidates that the method rejected, by gate."""
     events: tuple[ViewEvent, ...] = ()
@@ -128,8 +127,6 @@ class ViewResult:
             estimate_labels=labels,
             measurements=boxes,
             measurement_scores=weights,
-            samples=np.zeros((0, 4), dtype=np.float32),
-            sample_weights=np.zeros(0, dtype=np.float32),
             information={},
         )
 
@@ -138,6 +135,44 @@ class ViewResult:
         """The result of a step at which the camera had no frame."""
         nothing = ViewResult.of_boxes(np.zeros((0, 4)), np.zeros(0), np.zeros((0, 4)))
         return replace(nothing, blind=True)
+
+
+_FRACTION = 4.0
+"""Parts of a pixel in which the centre of a packed sample is counted."""
+
+_HEAVIEST = 1000.0
+"""The packed weight of the heaviest sample."""
+
+
+def pack_samples(
+    boxes: Float[ndarray, "S D"], weights: Float[ndarray, " S"]
+) -> Int16[ndarray, "S 3"]:
+    """Pack samples for display: 6 bytes each, where a step has hundreds.
+
+    Args:
+        boxes: Centres of S samples, pixels, before any other columns.
+        weights: Their weights, not negative.
+
+    Returns:
+        Centres in quarters of a pixel, within ±8,191 pixels, and weights in thousandths of the
+        largest.
+    """
+    largest = weights.max(initial=0.0)
+    shares = weights / largest if largest > 0.0 else np.zeros(len(weights))
+    columns = np.column_stack([boxes[:, :2] * _FRACTION, shares * _HEAVIEST])
+    limits = np.iinfo(np.int16)
+    return np.clip(np.rint(columns), limits.min, limits.max).astype(np.int16)
+
+
+def unpack_samples(
+    samples: Int16[ndarray, "S 3"],
+) -> tuple[Float[ndarray, "S 2"], Float[ndarray, " S"]]:
+    """Unpack what :func:`pack_samples` packed.
+
+    Returns:
+        Centres, pixels, and weights as shares of the largest.
+    """
+    return samples[:, :2] / _FRACTION, samples[:, 2] / _HEAVIEST
 
 
 class SingleViewMethod(Protocol):

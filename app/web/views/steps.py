@@ -16,7 +16,7 @@ from tracker.parameters import ColourPhdParams
 from tracker.runs.pipeline import Run
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.dropped import GATES
-from tracker.single_view.protocol import ViewResult
+from tracker.single_view.protocol import ViewResult, unpack_samples
 
 WORTH_A_REASON = 0.9
 """Below this share of the chosen p_D, a camera's p_D for a track is explained."""
@@ -137,7 +137,7 @@ def _add_views(message: models.Step, run: Run, step: int, with_samples: bool) ->
         if view.foreground is not None:
             camera.foreground = run.keys["single_view"]
         if with_samples:
-            points = np.column_stack([view.samples[:, :2], view.sample_weights])
+            points = np.column_stack(unpack_samples(view.samples))
             camera.samples = [(x, y, w) for x, y, w in points.round(3).tolist()]
             camera.dropped = [
                 models.Candidate(box=box, gate=GATES[gate])

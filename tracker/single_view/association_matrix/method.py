@@ -164,8 +164,6 @@ class AssociationMatrix:
             estimate_labels=estimate_labels,
             measurements=seen.boxes,
             measurement_scores=np.ones(seen.size),
-            samples=np.zeros((0, 4), np.float32),
-            sample_weights=np.zeros(0, np.float32),
             information={
                 "objects": float(len(objects)),
                 "merged objects": float(sum(len(one.labels) > 1 for one in objects)),

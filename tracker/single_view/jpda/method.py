@@ -30,7 +30,7 @@ from tracker.single_view.jpda.moves import Moved, move
 from tracker.single_view.jpda.targets import Targets, innovations
 from tracker.single_view.jpda.track_management import Managed, manage
 from tracker.single_view.pictures.foreground import pack
-from tracker.single_view.protocol import ViewEvent, ViewResult
+from tracker.single_view.protocol import ViewEvent, ViewResult, pack_samples
 
 if TYPE_CHECKING:
     from tracker.parameters import RunParameters
@@ -182,8 +182,7 @@ class Jpda:
             estimate_labels=targets.labels[shown],
             measurements=seen.boxes if seen.shown is None else seen.shown,
             measurement_scores=seen.scores if seen.shown_scores is None else seen.shown_scores,
-            samples=seen.samples.astype(np.float32),
-            sample_weights=seen.sample_weights.astype(np.float32),
+            samples=pack_samples(seen.samples, seen.sample_weights),
             information={**seen.information, "newcomers": float((~counting).sum())},
             dropped=seen.dropped,
             events=_events(expected, cases, moved, managed),

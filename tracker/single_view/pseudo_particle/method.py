@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from jaxtyping import Float, Float32, Int, UInt8
+from jaxtyping import Float, Int, Int16, UInt8
 from numpy import ndarray
 from scipy.special import expit
 
@@ -19,7 +19,7 @@ from tracker.sequences.sequence import Sequence
 from tracker.single_view.colour.appearance import Scene
 from tracker.single_view.pictures import particles as particle_set
 from tracker.single_view.pictures.foreground import pack
-from tracker.single_view.protocol import ViewEvent, ViewResult
+from tracker.single_view.protocol import ViewEvent, ViewResult, pack_samples
 from tracker.single_view.pseudo_particle import hypotheses
 from tracker.single_view.pseudo_particle.particles import ColourParticles
 from tracker.single_view.pseudo_particle.track_management import (
@@ -183,8 +183,7 @@ class PseudoParticle:
             modes=modes[detected],
             scores=existences[detected],
             labels=np.where(labels == UNCONFIRMED, -1, labels),
-            samples=samples,
-            sample_weights=_relative(weights),
+            samples=pack_samples(samples, weights),
             gates=self._gates(expected),
             events=events,
             information={
@@ -218,8 +217,7 @@ class PseudoParticle:
             estimate_labels=labels,
             measurements=mean,
             measurement_scores=existence,
-            samples=samples.astype(np.float32),
-            sample_weights=_relative(weights),
+            samples=pack_samples(samples, weights),
             information={"effective particles": particle_set.effective_number(weights)},
         )
         return np.repeat(samples, counts, axis=0), result
@@ -268,8 +266,7 @@ class PseudoParticle:
         modes: Float[ndarray, "M 4"],
         scores: Float[ndarray, " M"],
         labels: Int[ndarray, " M"],
-        samples: Float[ndarray, "S 4"],
-        sample_weights: Float32[ndarray, " S"],
+        samples: Int16[ndarray, "S 3"],
         gates: Float[ndarray, "G 5"],
         events: tuple[ViewEvent, ...],
         information: dict[str, float],
@@ -290,8 +287,7 @@ class PseudoParticle:
             estimate_labels=confirmed.labels,
             measurements=modes,
             measurement_scores=scores,
-            samples=samples.astype(np.float32),
-            sample_weights=sample_weights,
+            samples=samples,
             information=information,
             events=events,
             gates=gates,
@@ -307,9 +303,3 @@ class PseudoParticle:
             estimate_weights=confirmed.existences,
             estimate_labels=confirmed.labels,
         )
-
-
-def _relative(weights: Float[ndarray, " S"]) -> Float32[ndarray, " S"]:
-    """Weights as shares of the largest one."""
-    largest = weights.max() if len(weights) else 1.0
-    return np.asarray(weights / largest, dtype=np.float32)

@@ -12,7 +12,7 @@ from tracker.geometry.boxes import Boxes
 from tracker.sequences.pictures.frames import Picture, Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.pictures.foreground import pack, unpack
-from tracker.single_view.protocol import ViewResult
+from tracker.single_view.protocol import ViewResult, pack_samples, unpack_samples
 from tracker.single_view.working.stabilisation import SteadyReader
 from tracker.single_view.working.view import WorkingView, working_view
 
@@ -72,13 +72,14 @@ class Working:
         if view is None:
             return result
         foreground = result.foreground
+        points, weights = unpack_samples(result.samples)
         return replace(
             result,
             boxes=view.boxes_back(result.boxes),
             sigmas=view.sigmas_back(result.sigmas),
             estimates=view.boxes_back(result.estimates),
             measurements=view.boxes_back(result.measurements),
-            samples=view.boxes_back(result.samples).astype(np.float32),
+            samples=pack_samples(view.points_back(points), weights),
             dropped=replace(
                 result.dropped, boxes=view.boxes_back(result.dropped.boxes).astype(np.float32)
             ),
