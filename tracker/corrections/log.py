@@ -80,7 +80,7 @@ def _kept_as(key: str) -> Path:
 
 
 def _earlier_if_alone(folder: Path) -> Path:
-    """The log of a built-in sequence: that of an earlier rendering until a correction is added."""
+    """The log of a built-in room: that of an earlier rendering until a correction is added."""
     own, key = own_place(folder), earlier_key(folder)
     earlier = own if key is None else _kept_as(key)
     return earlier if earlier.exists() and not own.exists() else own

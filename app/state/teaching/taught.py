@@ -225,7 +225,7 @@ class Taught:
             )
 
     def _take_up_earlier(self, sequence: Sequence) -> None:
-        """Go on with what was taught on a built-in sequence as it was rendered before."""
+        """Go on with what was taught on a built-in room as it was rendered before."""
         draft = self._drafts.take_earlier(sequence.folder)
         if draft is None:
             return

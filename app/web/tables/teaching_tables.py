@@ -259,7 +259,7 @@ def _saving(snapshot: Snapshot, teaching: Teaching) -> str:
     label = "Copy in"
     if reason:
         room = opens_by_name(sequence.folder)
-        label = f"{'A rendered room' if room else 'Read only'}: save a copy in"
+        label = f"{'A built-in room' if room else 'Read only'}: save a copy in"
     copy = (
         '<form class="row" data-send="POST teach/copy">'
         f'<label class="wide" title="{escaped(reason or "")}">{label}'

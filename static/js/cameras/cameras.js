@@ -330,7 +330,7 @@ export function mountCameras(root, { store, actions, playback }) {
 			h(
 				"p",
 				{},
-				opening ? "reading" : "Choose one at the top left: a rendered room needs no data.",
+				opening ? "reading" : "Choose one at the top left: a built-in room needs no data.",
 			),
 			sample &&
 				h(

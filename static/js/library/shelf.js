@@ -4,7 +4,7 @@ import { factsOf, has, many, size, when } from "./words.js";
 
 const KINDS = /** @type {const} */ ([
 	["Own", "folder"],
-	["Rendered rooms", "rendered"],
+	["Built-in rooms", "rendered"],
 ]);
 
 /** What recordings are sorted by; as they come they are by when they were opened. */

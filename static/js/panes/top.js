@@ -54,7 +54,7 @@ export function mountTop(root, { store, actions }) {
 			!open && h("option", { value: "", disabled: true }, "choose a sequence"),
 			open && !sequences.some(({ name }) => name === open) && h("option", { value: open }, open),
 			group(
-				"Rendered rooms",
+				"Built-in rooms",
 				sequences.filter(({ kind }) => kind === "rendered"),
 			),
 			group(

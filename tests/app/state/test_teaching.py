@@ -322,7 +322,7 @@ def test_a_rendered_room_is_offered_as_a_copy(
     monkeypatch.setenv("MULTIVIEW_PHD_CACHE", str(walkers.parent))
     client.post("/api/teach/entrances", json={})
     panel = client.get("/api/tables/teach").text
-    assert "A rendered room: save a copy in" in panel
+    assert "A built-in room: save a copy in" in panel
     assert 'data-send="POST teach/save"' not in panel
     words = complaint(client.post("/api/teach/save"))
     assert words.startswith("Walkers/sequence.toml: cannot be saved, since walkers lies in the ")

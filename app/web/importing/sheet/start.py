@@ -111,7 +111,7 @@ def _lists(known: Recordings, open_as: Sequence[str]) -> Markup:
             button("All in the library", "library", "end"),
         ),
         _cards(
-            "Rendered rooms",
+            "Built-in rooms",
             "they come with the program, with truth",
             rooms,
             open_as,
