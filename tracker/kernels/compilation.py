@@ -26,7 +26,7 @@ import time
 import types
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from functools import cache, wraps
+from functools import cache, partial, wraps
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -50,6 +50,9 @@ _LARGE = 50_000
 """Number of elements of an array from which plain Python takes longer than the compilation, some
 two seconds at 30 microseconds each."""
 
+_LEVEL = 1
+"""Of optimisation by LLVM, for kernels that do not loop over pixels; numba's own is 3."""
+
 _config: Any = numba.config
 
 _ROOT = Path(__file__).resolve().parents[1]
@@ -66,6 +69,7 @@ def kernel(function: _F) -> _F:
     """Compile on the first call, store the machine code on disk, release the interpreter's lock."""
     compiled: Any = pixel_kernel(function)
     if not _config.DISABLE_JIT:  # numba's own variable: then it is the function itself
+        compiled.compile = partial(_optimised_less, compiled.compile)
         compiled._compile_for_args = _Chooser(compiled)
     return cast(_F, compiled)
 
@@ -90,6 +94,22 @@ def compiled_later(function: _F) -> _F:
     finally:
         _config.CACHE_DIR = before
     return cast(_F, compiled)
+
+
+def _optimised_less(compile_for: Callable[..., Any], *arguments: Any) -> Any:
+    """Compile a kernel whose speed is not that of a loop over pixels, with fewer passes of LLVM.
+
+    The passes that are left out unroll loops and turn them into vector instructions, which matrices
+    of 3 to 9 rows do not gain from: see the benchmark ``kernels``. What the kernel calls is
+    compiled at its own level.
+    """
+    with global_compiler_lock:  # the level belongs to the whole process
+        before = _config.OPT
+        _config.OPT = min(before, type(before)(_LEVEL))
+        try:
+            return compile_for(*arguments)
+        finally:
+            _config.OPT = before
 
 
 class _Chooser:

@@ -335,7 +335,11 @@ def share_camera(
                     found_boxes.append(first + j)
                     found_shares.append(marginals[i, 1 + j])
     return SharedCamera(
-        BoxLinks(np.array(found_rows), np.array(found_boxes), np.array(found_shares)),
+        BoxLinks(
+            np.array(found_rows, dtype=np.int64),  # in plain Python none at all would be floats
+            np.array(found_boxes, dtype=np.int64),
+            np.array(found_shares, dtype=np.float64),
+        ),
         chances,
         missed,
         hidden,
