@@ -238,10 +238,12 @@ class Scene:
         self.order, self.step_starts = np.array([2, 0, 1, 3]), np.array([0, 3, 3, 4])
         self.clutter = rng.uniform(1e-6, 1e-5, 6)
 
-    def shared(self, blind: tuple[bool, ...] = (False,) * 3, rule: CameraRule = RULE):
-        """By the kernel."""
-        s = self.seen
-        return evidence.share_camera(
+    def shared(
+        self, blind: tuple[bool, ...] = (False,) * 3, rule: CameraRule = RULE, plain: bool = False
+    ):
+        """By the kernel, or by it as plain Python."""
+        s, kernel = self.seen, evidence.share_camera
+        return (getattr(kernel, "py_func", kernel) if plain else kernel)(
             evidence.Rows(
                 self.states, self.covariances, self.existences, self.labels, self.order,
                 self.step_starts,
@@ -269,6 +271,13 @@ def log_normal(offset: ndarray, spread: ndarray) -> float:
     """log N(offset; 0, spread)."""
     square = offset @ np.linalg.solve(spread, offset)
     return -0.5 * float(square + np.linalg.slogdet(2.0 * np.pi * spread)[1])
+
+
+@pytest.mark.parametrize("plain", [True, False])
+def test_links_of_no_box_are_indices_too(plain: bool) -> None:
+    links = Scene(1, 0.0).shared(blind=(True,) * 3, plain=plain).links
+    assert len(links.shares) == 0
+    assert links.rows.dtype == links.boxes.dtype == np.int64
 
 
 @pytest.mark.parametrize("posture", [0.0, 0.2])
