@@ -161,7 +161,8 @@ def pack_samples(
     shares = weights / largest if largest > 0.0 else np.zeros(len(weights))
     columns = np.column_stack([boxes[:, :2] * _FRACTION, shares * _HEAVIEST])
     limits = np.iinfo(np.int16)
-    return np.clip(np.rint(columns), limits.min, limits.max).astype(np.int16)
+    packed: ndarray = np.clip(np.rint(columns), limits.min, limits.max).astype(np.int16)
+    return packed
 
 
 def unpack_samples(
