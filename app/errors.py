@@ -14,7 +14,7 @@ from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
 
 from app.described import Described
-from tracker.parameters import ParameterError
+from tracker.parameters.values import ParameterError
 
 logger = logging.getLogger("app")
 

@@ -20,7 +20,8 @@ from tests.engine import synthetic
 from tracker import __version__
 from tracker.export import tracks_csv
 from tracker.fusion.trajectories import Trajectories
-from tracker.parameters import METHODS, PARAMETERS, RunParameters, value, with_values
+from tracker.parameters.catalogue import METHODS, PARAMETERS, RunParameters
+from tracker.parameters.values import value_of, with_values
 from tracker.sequences.csv_columns import guarded, unguarded
 from tracker.sequences.sequence import Sequence
 
@@ -98,7 +99,7 @@ def test_the_comments_say_what_made_it() -> None:
     assert lines[0] == f"# multiview-phd {__version__}"
     assert lines[1:3] == [f"# sequence = {SEQUENCE.name}", "# seed = 5"]
     for key in (*METHODS, *PARAMETERS):
-        setting = str(value(PARAMETERS_OF_RUN, key))
+        setting = str(value_of(PARAMETERS_OF_RUN, key))
         assert f"# {key} = {setting.lower() if setting in ('True', 'False') else setting}" in lines
     assert "# fusion.survival_probability = 0.97" in lines
 

@@ -12,8 +12,6 @@ from pathlib import Path
 
 import pytest
 
-from tracker.parameters import RunParameters
-
 ROOT = Path(__file__).resolve().parents[1]
 
 WORDS = (
@@ -26,16 +24,7 @@ WORDS = (
 OF_MODULES = ("checked", "visible")
 """Words that say nothing as the name of a module."""
 
-PARAMETERS = {
-    name
-    for group in RunParameters.model_fields.values()
-    for name in getattr(group.annotation, "model_fields", ())
-}
-"""Names of parameters: files have them, and only the package of parameters can change them."""
-
-NOT_DONE = {
-    "io", "parameters", "app",
-}  # fmt: skip
+NOT_DONE = {"io", "app"}
 """Packages whose inner names are not the field's yet."""
 
 FILES = {
@@ -58,14 +47,12 @@ def word_in(name: str, words: tuple[str, ...] = WORDS) -> str | None:
 
 
 def identifiers(tree: ast.AST) -> Iterator[str]:
-    """All that is named or used in a file, but for what other packages' files name, and for the
-    parameters that are read."""
+    """All that is named or used in a file, but for what other packages' files name."""
     for node in ast.walk(tree):
         if isinstance(node, ast.Name):
             yield node.id
         elif isinstance(node, ast.Attribute):
-            if node.attr not in PARAMETERS:
-                yield node.attr
+            yield node.attr
         elif isinstance(node, ast.arg):
             yield node.arg
         elif isinstance(node, ast.FunctionDef | ast.ClassDef):

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Iterable
 from dataclasses import dataclass, field, make_dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -20,9 +21,18 @@ from app.command.arguments.library import Bundle, FormatName, LibraryCommand, Li
 from app.command.arguments.listing import Benchmark, Parameters, Sequences
 from app.command.arguments.studies import Batch, Study, Tune
 from app.command.arguments.templates import Templates
-from tracker import parameters as table
 from tracker.library import KEEP
-from tracker.parameters import FOLLOWS, METHODS, PRESETS, Parameter, ParameterError
+from tracker.parameters.catalogue import (
+    FOLLOWS,
+    GROUPS,
+    METHODS,
+    PARAMETERS,
+    PRESETS,
+    RENAMED,
+    Parameter,
+    RunParameters,
+)
+from tracker.parameters.values import ParameterError, current_key
 
 DEFAULT_SEQUENCE = "room44-3p"
 
@@ -51,7 +61,7 @@ def set_values(items: tuple[str, ...]) -> dict[str, str]:
         key, mark, text = item.partition("=")
         if not mark:
             raise ParameterError("--set", f"expected KEY=VALUE, got {item!r}")
-        values[key.strip()] = text.strip()
+        values[current_key(key.strip())] = text.strip()
     return values
 
 
@@ -105,7 +115,7 @@ class Track:
         arg(
             name="fusion",
             metavar="|".join(METHODS["fusion_method"]),
-            help_behavior_hint=f"(default: {table.RunParameters().fusion_method})",
+            help_behavior_hint=f"(default: {RunParameters().fusion_method})",
         ),
     ] = None
     """Method of stage 2."""
@@ -114,7 +124,7 @@ class Track:
         arg(
             name="smoothing",
             metavar="|".join(METHODS["smoothing_method"]),
-            help_behavior_hint=f"(default: {table.RunParameters().smoothing_method})",
+            help_behavior_hint=f"(default: {RunParameters().smoothing_method})",
         ),
     ] = None
     """Method of stage 3."""
@@ -165,7 +175,7 @@ class Track:
         ):
             if chosen is not None:
                 changes[key] = chosen
-        for key in table.PARAMETERS:
+        for key in PARAMETERS:
             group, name = key.split(".", 1)
             value = getattr(getattr(self, group), name)
             if value is not None:
@@ -255,8 +265,8 @@ def _flag(parameter: Parameter) -> tuple[str, Any, Any]:
 def _track_with_flags() -> Any:
     """``Track`` with a flag for every parameter: ``--fusion.survival-probability`` and so on."""
     groups: list[tuple[str, Any, Any]] = []
-    for group, text in table.GROUPS.items():
-        flags = [_flag(p) for p in table.PARAMETERS.values() if p.group == group]
+    for group, text in GROUPS.items():
+        flags = [_flag(p) for p in PARAMETERS.values() if p.group == group]
         kind = make_dataclass(f"{group.title().replace('_', '')}Flags", flags)
         kind.__doc__ = text
         groups.append((group, kind, field(default_factory=kind)))
@@ -311,6 +321,18 @@ Arguments = (
 )
 
 
+def _with_current_flags(arguments: Iterable[str]) -> list[str]:
+    """The arguments with the flags of now for those that parameters had in earlier versions."""
+    flags = {
+        f"--{old}".replace("_", "-"): f"--{new}".replace("_", "-") for old, new in RENAMED.items()
+    }
+    found = []
+    for argument in arguments:
+        flag, mark, value = argument.partition("=")
+        found.append(flags.get(flag.replace("_", "-"), flag) + mark + value)
+    return found
+
+
 def parse(arguments: list[str] | None = None) -> Arguments:
     """The command and its arguments. Wrong usage ends the program with status 2.
 
@@ -319,7 +341,7 @@ def parse(arguments: list[str] | None = None) -> Arguments:
     """
     track: Any = _track_with_flags()
     # its settings come with the engine, which only who evaluates has to wait for
-    asked = sys.argv[1:] if arguments is None else arguments
+    asked = _with_current_flags(sys.argv[1:] if arguments is None else arguments)
     if asked[:1] and asked[0] in ONLY_IN_A_CHECKOUT:
         raise ParameterError(
             asked[0],
@@ -328,7 +350,7 @@ def parse(arguments: list[str] | None = None) -> Arguments:
         )
     evaluate: Any = _evaluate_with_flags() if asked[:1] == ["evaluate"] else Evaluate
     if asked[:1] == ["study"] and asked[1:2] and asked[1].endswith(".toml"):
-        arguments = ["study", "run", *asked[1:]]  # `study STUDY.toml` runs it
+        asked = ["study", "run", *asked[1:]]  # `study STUDY.toml` runs it
     commands: Any = (
         Annotated[Serve, subcommand("serve")]
         | Annotated[track, subcommand("track")]
@@ -354,6 +376,6 @@ def parse(arguments: list[str] | None = None) -> Arguments:
         commands,
         prog="multiview-phd",
         description="Track several people in 3D from calibrated cameras.",
-        args=arguments,
+        args=asked,
     )
     return parsed

@@ -35,7 +35,7 @@ from app.command.flags import (
 )
 from app.command.terminal import FAILURE, CommandError, check_data, check_keep, say
 from tracker.files.folders import library_file
-from tracker.parameters import ParameterError
+from tracker.parameters.values import ParameterError
 
 if TYPE_CHECKING:
     from tracker.library.records import Result

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from tracker.files.text import visible
-from tracker.parameters import ParameterError
+from tracker.parameters.values import ParameterError
 
 FAILURE = 1
 """The status of a command that could not do what was asked, or found what must not be."""

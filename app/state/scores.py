@@ -7,7 +7,7 @@ from typing import Literal
 
 from tracker.evaluation import Evaluation
 from tracker.fusion.trajectories import Trajectories
-from tracker.parameters import RunParameters
+from tracker.parameters.catalogue import RunParameters
 from tracker.runs.pipeline import Run
 from tracker.sequences.sequence import Sequence
 

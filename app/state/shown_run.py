@@ -13,7 +13,7 @@ from app.state.snapshot import (
 )
 from app.state.store import Store
 from tracker.corrections import Correction
-from tracker.parameters import RunParameters
+from tracker.parameters.catalogue import RunParameters
 from tracker.runs.pipeline import Progress, Run
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence

@@ -11,10 +11,11 @@ from typing import Any, Literal
 
 from app.colours import Theme
 from app.state.scores import Scores
-from tracker import parameters as table
 from tracker.corrections import Correction
 from tracker.fusion.trajectories import Trajectories
-from tracker.parameters import MethodKey, RunParameters
+from tracker.parameters import MethodKey
+from tracker.parameters.catalogue import METHODS, PARAMETERS, PRESETS, RunParameters
+from tracker.parameters.values import changed_values, value_of
 from tracker.review.template_suggestions import Suggestion
 from tracker.runs.fitting import unfit_methods
 from tracker.runs.pipeline import Run
@@ -179,13 +180,13 @@ class Snapshot:
     @property
     def preset(self) -> str | None:
         """The preset, built in or saved, whose values the parameters have."""
-        own = table.changed(self.parameters, self.defaults)
+        own = changed_values(self.parameters, self.defaults)
         single_view = {"single_view": self.parameters.single_view}
-        for name, values in {**table.PRESETS, **self.presets}.items():
+        for name, values in {**PRESETS, **self.presets}.items():
             meant = {**single_view, **values}
             if not meant.keys() <= _KEYS:  # saved by another version
                 continue
-            if own == {k: v for k, v in meant.items() if v != table.value(self.defaults, k)}:
+            if own == {k: v for k, v in meant.items() if v != value_of(self.defaults, k)}:
                 return name
         return None
 
@@ -193,7 +194,7 @@ class Snapshot:
     def unfit(self) -> dict[MethodKey, dict[str, str]]:
         """The methods that cannot work on the open sequence, each with the reason."""
         if self.sequence is None:
-            return {key: {} for key in table.METHODS}
+            return {key: {} for key in METHODS}
         return unfit_methods(self.sequence, self.parameters)
 
     def named(self, sequence: Sequence) -> Sequence:
@@ -206,12 +207,12 @@ class Snapshot:
         return self.run is not None and self.playhead < self.run.done
 
 
-_KEYS = {*table.METHODS, *table.PARAMETERS}
+_KEYS = {*METHODS, *PARAMETERS}
 
 
 def clamp(key: str, value: Any) -> Any:
     """A number moved into the range of its parameter; what is no number is left to the check."""
-    parameter = table.PARAMETERS.get(key)
+    parameter = PARAMETERS.get(key)
     if parameter is None or parameter.kind not in ("float", "int"):
         return value
     try:

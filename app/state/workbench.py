@@ -27,9 +27,9 @@ from app.state.snapshot import (
     View,
     clamp,
 )
-from tracker import parameters as table
 from tracker.corrections import Correction
-from tracker.parameters import ParameterError, RunParameters
+from tracker.parameters.catalogue import METHODS, PARAMETERS, PRESETS, RunParameters
+from tracker.parameters.values import ParameterError, current_key, value_of, with_values
 from tracker.review.template_suggestions import Suggestion
 from tracker.runs.pipeline import Run
 from tracker.sequences.sequence import Sequence
@@ -51,19 +51,19 @@ class Workbench(ShownRun):
         if origin.startswith(CLAMPED_ORIGIN):
             changes = {key: clamp(key, value) for key, value in changes.items()}
         with self._edit() as now:
-            return self._put_parameters(table.with_values(now.parameters, changes), origin)
+            return self._put_parameters(with_values(now.parameters, changes), origin)
 
     def reset_parameters(
         self, keys: Iterable[str] | None = None, origin: str = ""
     ) -> RunParameters:
         """Return some values, or all and the methods too, to what they are by default."""
         with self._edit() as now:
-            wanted = (*table.METHODS, *table.PARAMETERS) if keys is None else tuple(keys)
+            wanted = (*METHODS, *PARAMETERS) if keys is None else tuple(map(current_key, keys))
             for key in wanted:
-                if key not in table.METHODS and key not in table.PARAMETERS:
-                    table.with_values(now.parameters, {key: None})  # says what is wrong
-            changes = {key: table.value(now.defaults, key) for key in wanted}
-            return self._put_parameters(table.with_values(now.parameters, changes), origin)
+                if key not in METHODS and key not in PARAMETERS:
+                    with_values(now.parameters, {key: None})  # says what is wrong
+            changes = {key: value_of(now.defaults, key) for key in wanted}
+            return self._put_parameters(with_values(now.parameters, changes), origin)
 
     def apply_preset(self, name: str, origin: str = "") -> RunParameters:
         """Take a preset's values, and the defaults where it has none.
@@ -75,7 +75,7 @@ class Workbench(ShownRun):
             ParameterError: If there is no such preset.
         """
         with self._edit() as now:
-            presets = {**now.presets, **table.PRESETS}
+            presets = {**now.presets, **PRESETS}
             if name not in presets:
                 known = ", ".join(presets)
                 raise ParameterError(
@@ -84,7 +84,7 @@ class Workbench(ShownRun):
                     "GET /api/schema has the built-in presets, GET /api/state your own.",
                 )
             changes = {"single_view": now.parameters.single_view, **presets[name]}
-            return self._put_parameters(table.with_values(now.defaults, changes), origin)
+            return self._put_parameters(with_values(now.defaults, changes), origin)
 
     def set_presets(self, presets: Presets) -> None:
         """Have these presets besides the built-in ones."""
@@ -211,7 +211,7 @@ class Workbench(ShownRun):
         with self._edit() as now:
             if now.sequence is None or sequence.views is not now.sequence.views:
                 return
-            parameters = table.with_values(now.parameters, changes)
+            parameters = with_values(now.parameters, changes)
             if sequence is now.sequence:
                 self._put_parameters(parameters, "api")
                 return

@@ -6,7 +6,8 @@ import shlex
 from typing import Any
 
 from app.state.snapshot import Snapshot
-from tracker import parameters as table
+from tracker.parameters.catalogue import METHODS
+from tracker.parameters.values import changed_values
 from tracker.sequences.built_in import opens_by_name
 from tracker.sequences.sequence import Sequence
 
@@ -26,8 +27,8 @@ def command_line(snapshot: Snapshot) -> str:
         words += ["--smoothing", parameters.smoothing_method]
     if sequence.detector is not None and parameters.single_view == "onnx_detector":
         words += ["--detector", str(sequence.detector.path.absolute())]
-    for key, value in table.changed(parameters, snapshot.defaults).items():
-        if key not in table.METHODS:
+    for key, value in changed_values(parameters, snapshot.defaults).items():
+        if key not in METHODS:
             words += ["--set", f"{key}={_written(value)}"]
     if snapshot.run is not None and snapshot.run.seed:
         words += ["--seed", str(snapshot.run.seed)]

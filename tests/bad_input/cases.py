@@ -15,9 +15,9 @@ from app.command.terminal import CommandError
 from tests.app.folders import write_crossing
 from tests.bad_input.drawing import Damage, damage
 from tests.synthetic import write_sequence
-from tracker import parameters
 from tracker.export import tracks_csv
 from tracker.io.checks import check
+from tracker.parameters.values import with_values
 from tracker.runs import gaps, pipeline
 from tracker.sequences import library
 from tracker.sequences.errors import SequenceError
@@ -97,7 +97,7 @@ def _run(sequence: Sequence) -> None:
     except ValueError as error:  # neither boxes nor pictures in every camera
         raise CommandError(str(error)) from None
     if sequence.has_detections:
-        wanted = parameters.with_values(wanted, {"single_view": "none"})
+        wanted = with_values(wanted, {"single_view": "none"})
     if any(view.camera.image_size[0] * view.camera.image_size[1] > 2e6 for view in sequence.views):
         return  # a picture of that size takes its time
     run = pipeline.compute(sequence, wanted, steps=min(sequence.frames, STEPS))

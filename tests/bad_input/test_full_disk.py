@@ -17,7 +17,7 @@ from app.state.kept.json_files import read_json, write_json
 from app.state.kept.presets import OwnPresets
 from app.state.workbench import Workbench
 from tests.bad_input.writes import KINDS
-from tracker.parameters import ParameterError
+from tracker.parameters.values import ParameterError
 from tracker.sequences.errors import SequenceError
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="there is no such limit")

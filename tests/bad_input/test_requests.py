@@ -11,7 +11,7 @@ import pytest
 from starlette.testclient import TestClient
 
 from app.web.access import security
-from tracker.parameters import METHODS, PARAMETERS
+from tracker.parameters.catalogue import METHODS, PARAMETERS
 
 HUGE = [2**63, -(2**63) - 1, 10**400]
 IMPOSSIBLE = ["a\0b", "x" * 300, "x" * 4096, "~nosuch", "~nosuch/x", "/" + "a/" * 1600]

@@ -19,7 +19,8 @@ from tracker.evaluation import EvaluationSettings, evaluate_sequence
 from tracker.evaluation.report.page import report_html
 from tracker.evaluation.report.tables import parameter_table
 from tracker.fusion.trajectories import Trajectories
-from tracker.parameters import METHODS, PARAMETERS, RunParameters, stage_values, value, with_values
+from tracker.parameters.catalogue import METHODS, PARAMETERS, RunParameters
+from tracker.parameters.values import stage_values, value_of, with_values
 from tracker.sequences.sequence import Room, Sequence, View
 
 ACCEPTED = Path(__file__).with_name("accepted_report.html")
@@ -93,7 +94,7 @@ def test_the_table_of_parameters_has_a_row_for_each_that_is_used() -> None:
     assert text.startswith(f"<p class='muted'>{len(used)} parameters, ")
     for key, (head, cells) in zip(used, rows, strict=True):
         told = re.findall(r"<td[^>]*>(.*?)</td>", cells)
-        now, before = value(parameters, key), value(RunParameters(), key)
+        now, before = value_of(parameters, key), value_of(RunParameters(), key)
         shown = [f"{v:g}" if isinstance(v, float) else str(v) for v in (now, before)]
         assert [told[1], told[3]] == shown, key
         if key in PARAMETERS:

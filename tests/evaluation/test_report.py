@@ -15,7 +15,8 @@ from tracker.evaluation import EvaluationSettings, evaluate_sequence
 from tracker.evaluation.report.figures import DARK, LIGHT_IDS, broken, over_time, top_view
 from tracker.evaluation.report.page import report_html, write_report
 from tracker.fusion.trajectories import Trajectories
-from tracker.parameters import RunParameters, with_values
+from tracker.parameters.catalogue import RunParameters
+from tracker.parameters.values import with_values
 from tracker.sequences.sequence import GroundTruth, Room, Sequence, View
 
 

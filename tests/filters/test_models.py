@@ -11,7 +11,7 @@ from tests import world
 from tests.world import look_at
 from tracker.filters import models
 from tracker.filters.models import Motion
-from tracker.parameters import FusionParams
+from tracker.parameters.groups.fusion import FusionParams
 from tracker.sequences.sequence import Room
 
 ROOM = world.volume(1.5, 2.0, [(-1.2, 0.0, 1.0), (1.2, 0.1, 1.0)], (0.25, 0.3, 0.15))

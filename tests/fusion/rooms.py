@@ -16,7 +16,8 @@ from tracker.fusion.sequential_phd import SequentialPhd
 from tracker.fusion.target_model import MeasurementKind, TargetModel
 from tracker.geometry.camera import Camera
 from tracker.kernels.gating import Measurements
-from tracker.parameters import FusionParams, RunParameters
+from tracker.parameters.catalogue import RunParameters
+from tracker.parameters.groups.fusion import FusionParams
 from tracker.sequences.sequence import Room, Sequence
 from tracker.single_view.protocol import ViewResult
 

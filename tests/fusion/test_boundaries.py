@@ -40,7 +40,8 @@ from tracker.fusion.trajectories import Bounds, by_boxes, extract
 from tracker.geometry.camera import stacked
 from tracker.kernels import births as kernels
 from tracker.kernels.births import Refinement
-from tracker.parameters import FusionParams, RunParameters
+from tracker.parameters.catalogue import RunParameters
+from tracker.parameters.groups.fusion import FusionParams
 from tracker.single_view.protocol import ViewResult
 
 PLACE = np.array([0.4, -0.3, 0.85])

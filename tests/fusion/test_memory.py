@@ -10,7 +10,7 @@ from tests.fusion.rooms import empty_room
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion.memory import Memory, recall
 from tracker.fusion.model import FusionModel
-from tracker.parameters import FusionParams
+from tracker.parameters.groups.fusion import FusionParams
 
 MODEL = FusionModel(empty_room(), FusionParams())
 

@@ -11,7 +11,7 @@ from tests.fusion.rooms import HALF_EXTENTS, empty_room
 from tracker.filters import models
 from tracker.fusion.model import FusionModel
 from tracker.fusion.target_model import SIZES, MeasurementKind
-from tracker.parameters import FusionParams
+from tracker.parameters.groups.fusion import FusionParams
 
 KINDS: Many[MeasurementKind] = ("centre", "box", "box_and_width")
 every_kind = pytest.mark.parametrize("kind", KINDS)

@@ -34,7 +34,9 @@ from tracker.fusion.multi_bernoulli import MultiBernoulli, MultiBernoulliState
 from tracker.fusion.protocol import FusionResult
 from tracker.fusion.reidentification import Identities
 from tracker.fusion.sequential_phd import SequentialPhd, SequentialPhdState
-from tracker.parameters import PRESETS, FusionParams, RunParameters, with_values
+from tracker.parameters.catalogue import PRESETS, RunParameters
+from tracker.parameters.groups.fusion import FusionParams
+from tracker.parameters.values import with_values
 
 both_methods = pytest.mark.parametrize("method", METHODS, ids=lambda method: method.__name__)
 

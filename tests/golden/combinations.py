@@ -6,7 +6,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from tracker.parameters import METHODS, PARAMETERS, PRESETS, RunParameters, with_values
+from tracker.parameters.catalogue import METHODS, PARAMETERS, PRESETS, RunParameters
+from tracker.parameters.values import with_values
 from tracker.runs import pipeline
 from tracker.runs.pipeline import Run
 from tracker.sequences.sequence import Sequence

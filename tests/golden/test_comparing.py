@@ -15,7 +15,7 @@ from tests.golden.combinations import Combination, alternatives, combinations, r
 from tests.golden.exact import digest, of_run
 from tests.golden.fingerprint import Fingerprint, fingerprints
 from tests.golden.pieces import cut
-from tracker.parameters import METHODS, PARAMETERS
+from tracker.parameters.catalogue import METHODS, PARAMETERS
 from tracker.runs.pipeline import Run
 
 STEPS = 12

@@ -12,7 +12,7 @@ from tests.golden.combinations import Combination, alternatives, combinations, r
 from tests.golden.exact import WITH_ALTERNATIVES
 from tests.golden.fingerprint import fingerprints
 from tests.golden.pieces import PIECES, Piece
-from tracker.parameters import RunParameters
+from tracker.parameters.catalogue import RunParameters
 
 MOST_LINES = 40
 

@@ -12,7 +12,7 @@ from tracker.fusion.trajectories import Trajectories
 from tracker.library.columns import KeptTracks
 from tracker.library.records import NewRecording, NewRun
 from tracker.library.store import Library
-from tracker.parameters import RunParameters
+from tracker.parameters.catalogue import RunParameters
 
 RECORDING = NewRecording("room44-3p", "room44-3p", "rendered", "d", 2, 500, 25.0, True, False, 3)
 

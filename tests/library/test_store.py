@@ -14,7 +14,7 @@ from tracker.library import schema
 from tracker.library.errors import LibraryError
 from tracker.library.keeping import remarks_of
 from tracker.library.store import Library
-from tracker.parameters import RunParameters
+from tracker.parameters.catalogue import RunParameters
 
 
 @pytest.fixture

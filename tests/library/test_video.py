@@ -18,7 +18,7 @@ from tracker.export.palette import rgb
 from tracker.export.registry import FORMATS, save
 from tracker.export.video import Mosaic
 from tracker.fusion.trajectories import Trajectories
-from tracker.parameters import RunParameters
+from tracker.parameters.catalogue import RunParameters
 from tracker.sequences.reader import read_sequence
 
 MP4 = FORMATS["mp4"]

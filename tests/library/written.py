@@ -9,7 +9,8 @@ import numpy as np
 from tests.engine import synthetic
 from tracker.export.exported_run import ExportedRun
 from tracker.fusion.trajectories import Trajectories
-from tracker.parameters import RunParameters, with_values
+from tracker.parameters.catalogue import RunParameters
+from tracker.parameters.values import with_values
 from tracker.sequences.sequence import GroundTruth, Sequence
 
 STEPS = 60

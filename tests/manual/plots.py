@@ -8,7 +8,7 @@ from math import log10
 from typing import Any
 
 from app.command.flags import show
-from tracker.parameters import Parameter
+from tracker.parameters.catalogue import Parameter
 
 PANELS = ("found", "false a step", "error, m")
 LOWEST_TOP = (1.0, 0.1, 0.1)

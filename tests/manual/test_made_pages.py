@@ -10,7 +10,7 @@ import pytest
 from tests.manual.places import PAGES, ROOT, between, made_pages
 from tests.manual.plots import picture
 from tests.manual.records import results, sweeps
-from tracker.parameters import PARAMETERS
+from tracker.parameters.catalogue import PARAMETERS
 
 PAGES_OF_PROCESSES = ("command-line.md",)
 """Made by starting the program once a command."""

@@ -14,9 +14,9 @@ from tests.manual.places import PAGES, ROOT
 from tests.manual.records import sweeps
 from tracker.io.read.protocol import Format
 from tracker.io.read.registry import FORMATS
-from tracker.parameters import PARAMETERS, methods
+from tracker.parameters import method as module
+from tracker.parameters.catalogue import BUILT_IN, ENTRY_POINTS, PARAMETERS
 from tracker.parameters.definition import Params, ui
-from tracker.parameters.registry import BUILT_IN, ENTRY_POINTS
 from tracker.single_view import maker
 from tracker.single_view.protocol import SingleViewMethod, ViewResult
 
@@ -39,7 +39,7 @@ def paths() -> list[str]:
 
 def test_every_path_is_there_and_what_a_recipe_makes_is_not() -> None:
     named = paths()
-    assert {"tracker/parameters/registry.py", "static/js/main.js", "tests/page/"} <= set(named)
+    assert {"tracker/parameters/catalogue.py", "static/js/main.js", "tests/page/"} <= set(named)
     new = [ROOT / path for path in named if any(word in path for word in NEW)]
     others = [ROOT / path for path in named if ROOT / path not in new]
     assert not [place for place in others if not place.exists()]
@@ -63,7 +63,7 @@ def test_every_name_is_there() -> None:
     assert ENTRY_POINTS["single_view"] == "multiview_phd.single_view"
     asked = set(Format.__annotations__) | {"recognise", "read"}
     assert all(f"`{name}`" in PAGE for name in asked)
-    for kind in (SingleViewMethod, ViewResult, methods.Method, Format):
+    for kind in (SingleViewMethod, ViewResult, module.Method, Format):
         assert f"{kind.__module__}.{kind.__name__}" in PAGE
 
 
@@ -82,7 +82,7 @@ def test_the_example_of_a_parameter_is_one() -> None:
 def test_the_example_of_a_description_is_one() -> None:
     found = re.search(r"```text\n    METHOD = (Method\(.*?\n    \))", PAGE, flags=re.S)
     assert found is not None
-    names: dict[str, Any] = {**vars(methods), "MyTrackerParams": Params}
+    names: dict[str, Any] = {**vars(module), "MyTrackerParams": Params}
     method = eval(re.sub(r"^    ", "", found.group(1), flags=re.M), names)
     assert method.own_group == "my_tracker"
     assert method.made_by is None

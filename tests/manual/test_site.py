@@ -18,7 +18,7 @@ from starlette.testclient import TestClient
 from app.paths import static_folder
 from app.web.manual import CONTENT_POLICY, Manual
 from tests.manual.places import MANUAL, ROOT
-from tracker.parameters import GROUPS, METHODS, PARAMETERS
+from tracker.parameters.catalogue import GROUPS, METHODS, PARAMETERS
 
 pytestmark = pytest.mark.full
 

@@ -8,7 +8,7 @@ from typing import Any
 from app.command.flags import describe_range, show
 from tests.manual.plots import picture
 from tests.manual.records import sweeps
-from tracker.parameters import GROUPS, METHODS, PARAMETERS, Parameter, RunParameters
+from tracker.parameters.catalogue import GROUPS, METHODS, PARAMETERS, Parameter, RunParameters
 
 STAGES = {
     "single_view": "Stage 1, single view",

@@ -18,7 +18,7 @@ from app.command.terminal import Bar, CommandError, check_data, print_table
 from tests.papers.laboratory.experiment import Context, Experiment, RandomRooms, Result, Unavailable
 from tests.papers.laboratory.writing import write
 from tests.papers.registry import EXPERIMENTS
-from tracker.parameters import ParameterError
+from tracker.parameters.values import ParameterError
 from tracker.runs.processes import available_cores
 
 FAILURE, USAGE, INTERRUPTED = 1, 2, 130

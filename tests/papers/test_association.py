@@ -18,7 +18,7 @@ from tests.papers.clips.association import (
 )
 from tests.papers.clips.clip import Actor, Clip, constant_size, wall
 from tests.papers.clips.light import ADAPTIVE, ROBUST, FixedForeground, Light, models
-from tracker.parameters import ForegroundParams
+from tracker.parameters.groups.foreground import ForegroundParams
 from tracker.single_view.protocol import ViewResult
 
 WIDE, HIGH = 10.0, 20.0

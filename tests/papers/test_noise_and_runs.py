@@ -12,7 +12,7 @@ from tests.papers.laboratory import runs
 from tests.papers.laboratory.experiment import Context, Unavailable
 from tests.papers.laboratory.noise import NoisyReader
 from tests.synthetic import write_sequence
-from tracker.parameters import with_values
+from tracker.parameters.values import with_values
 from tracker.runs import pipeline
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.reader import read_sequence

@@ -15,7 +15,8 @@ from tracker.corrections import Correction
 from tracker.corrections.kinds import make
 from tracker.corrections.log import dump, parse
 from tracker.fusion.multi_bernoulli import MultiBernoulli
-from tracker.parameters import RunParameters, with_values
+from tracker.parameters.catalogue import RunParameters
+from tracker.parameters.values import with_values
 from tracker.review.queue.item import TrackRows
 from tracker.runs import pipeline
 from tracker.runs.pipeline import Run

@@ -7,7 +7,8 @@ import numpy as np
 from tests.runs.test_corrected_runs import place, run_of, with_a_gap
 from tracker.corrections.kinds import make
 from tracker.corrections.outcomes import supporting_corrections
-from tracker.parameters import PARAMETERS, RunParameters, with_values
+from tracker.parameters.catalogue import PARAMETERS, RunParameters
+from tracker.parameters.values import with_values
 from tracker.runs import pipeline
 
 SLIDERS = tuple(

@@ -10,7 +10,8 @@ import pytest
 
 from tests.engine.painted import GREEN, RED, painted_sequence
 from tests.engine.synthetic import walk
-from tracker.parameters import RunParameters, with_values
+from tracker.parameters.catalogue import RunParameters
+from tracker.parameters.values import with_values
 from tracker.runs import pipeline
 from tracker.runs.gates import count_gates, notices
 from tracker.runs.run import Run

@@ -12,20 +12,24 @@ import numpy as np
 import pytest
 
 from tests.single_view.networks import answering
-from tracker.parameters import (
+from tracker.parameters.catalogue import (
+    FOLLOWING,
     METHODS,
+    ORIGINS,
     PARAMETERS,
     PRESETS,
+    REGISTERED,
     Parameter,
     RunParameters,
-    changed,
     method_of,
+)
+from tracker.parameters.values import (
+    changed_values,
     shown_keys,
     stage_values,
-    value,
+    value_of,
     with_values,
 )
-from tracker.parameters.registry import FOLLOWING, ORIGINS, REGISTERED
 from tracker.runs import pipeline, warm_up
 from tracker.runs.fitting import default_parameters, unfit_methods
 from tracker.runs.run import Run
@@ -96,8 +100,8 @@ def test_what_is_shown_is_read_and_has_its_condition(choice: dict[str, Any]) -> 
     assert set(METHODS) <= set(shown) <= read
     for key in read - set(shown):
         conditions = PARAMETERS[key].when
-        assert any(value(parameters, other) not in ok for other, ok in conditions.items())
-    used = [method_of(key, value(parameters, key)).used(parameters) for key in METHODS]
+        assert any(value_of(parameters, other) not in ok for other, ok in conditions.items())
+    used = [method_of(key, value_of(parameters, key)).used(parameters) for key in METHODS]
     groups = {part.group for uses in used for part in uses.reads}
     assert {PARAMETERS[key].group for key in shown if key in PARAMETERS} <= groups
 
@@ -253,6 +257,6 @@ def test_the_default_follows_the_recording_and_nothing_else_does(recording: Sequ
     for what, expected in (("detections", first), ("templates", second), ("pictures", second)):
         found = default_parameters(without(recording, what))
         assert found.single_view == expected
-        assert set(changed(found)) <= {"single_view"}
+        assert set(changed_values(found)) <= {"single_view"}
     untaught = without(without(recording, "templates"), "detections")
     assert default_parameters(untaught) == RunParameters(single_view=third)

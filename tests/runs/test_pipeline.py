@@ -18,7 +18,8 @@ from tests.engine.synthetic import CAMERAS, crossing, sequence
 from tests.runs.test_steps import same
 from tracker.fusion.protocol import FusionResult
 from tracker.fusion.trajectories import Trajectories
-from tracker.parameters import RunParameters, with_values
+from tracker.parameters.catalogue import RunParameters
+from tracker.parameters.values import with_values
 from tracker.runs import pipeline
 from tracker.runs.pipeline import Cancelled, Progress, Run, compute, default_parameters, stage_keys
 from tracker.runs.stage_cache import StageCache

@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from tracker.evaluation import Evaluation, EvaluationSettings, evaluate_sequence
-from tracker.parameters import RunParameters, with_values
+from tracker.parameters.catalogue import RunParameters
+from tracker.parameters.values import with_values
 from tracker.runs import pipeline
 from tracker.runs.pipeline import Run
 from tracker.sequences.reader import read_sequence
@@ -102,7 +103,7 @@ def test_the_filter_in_the_picture_serves_as_well(data_folder: Path, method: str
 
 
 def test_the_published_scheme_stays_behind(data_folder: Path) -> None:
-    from tracker.parameters import PRESETS
+    from tracker.parameters.catalogue import PRESETS
 
     sequence = read_sequence(data_folder / "cmc2")
     published = with_values(parameters("sequential_phd"), PRESETS["published"])

@@ -10,7 +10,7 @@ from numpy import ndarray
 
 from tests.engine.synthetic import CAMERAS, crossing, sequence
 from tracker import single_view
-from tracker.parameters import RunParameters
+from tracker.parameters.catalogue import RunParameters
 from tracker.runs.pipeline import stage_keys
 from tracker.runs.run import Run
 from tracker.runs.single_views import SingleViews

@@ -15,7 +15,8 @@ from tests.synthetic import write_sequence
 from tracker import fusion, single_view
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion.protocol import FusionResult
-from tracker.parameters import RunParameters, with_values
+from tracker.parameters.catalogue import RunParameters
+from tracker.parameters.values import with_values
 from tracker.runs import numbers_version, pipeline, stage_cache
 from tracker.runs.numbers_version import numbers_version as version_of
 from tracker.runs.pipeline import Cancelled, Run, compute, stage_keys

@@ -13,7 +13,8 @@ import pytest
 
 from tests.single_view.pictures.furnished import empty_room, person_mask, photograph, with_person
 from tests.synthetic import camera_toml, head_toml, write_sequence
-from tracker.parameters import ForegroundParams, RunParameters
+from tracker.parameters.catalogue import RunParameters
+from tracker.parameters.groups.foreground import ForegroundParams
 from tracker.sequences.errors import SequenceError
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.reader import read_sequence

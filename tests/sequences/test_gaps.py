@@ -12,8 +12,8 @@ import pytest
 
 from app.command import main as cli
 from tests.synthetic import CODECS, number_in, write_sequence, write_video
-from tracker import parameters
 from tracker.export import tracks_csv
+from tracker.parameters.values import with_values
 from tracker.runs import gaps, pipeline
 from tracker.runs.pipeline import Run
 from tracker.runs.stage_cache import StageCache
@@ -28,7 +28,7 @@ BY_PICTURES = {"single_view": "association_matrix"}
 
 
 def tracked(sequence: Sequence, cache: StageCache | None = None) -> Run:
-    wanted = parameters.with_values(pipeline.default_parameters(sequence), BY_PICTURES)
+    wanted = with_values(pipeline.default_parameters(sequence), BY_PICTURES)
     return pipeline.compute(sequence, wanted, cache=cache)
 
 

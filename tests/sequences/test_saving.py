@@ -15,7 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.synthetic import write_sequence
-from tracker.parameters import with_values
+from tracker.parameters.values import with_values
 from tracker.runs import pipeline
 from tracker.sequences.errors import SequenceError
 from tracker.sequences.reader import FILE, read_sequence

@@ -7,7 +7,7 @@ from collections.abc import Sequence as Many
 import numpy as np
 from numpy import ndarray
 
-from tracker.parameters import AssociationMatrixParams
+from tracker.parameters.groups.association_matrix import AssociationMatrixParams
 from tracker.single_view.association_matrix.following import object_histograms
 from tracker.single_view.association_matrix.handing_over import advance
 from tracker.single_view.association_matrix.moving_objects import Situation

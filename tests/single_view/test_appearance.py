@@ -7,7 +7,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.single_view.test_scenes import SMALL
-from tracker.parameters import ForegroundParams, PseudoParticleParams
+from tracker.parameters.groups.foreground import ForegroundParams
+from tracker.parameters.groups.pseudo_particle import PseudoParticleParams
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.colour.appearance import Appearance

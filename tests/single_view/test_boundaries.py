@@ -11,7 +11,7 @@ from numpy.testing import assert_array_equal
 
 from tests import world
 from tests.single_view.pieces import PUBLISHED, draw, person, play
-from tracker.parameters import JpdaParams
+from tracker.parameters.groups.jpda import JpdaParams
 from tracker.single_view.association_matrix import decision_matrices
 from tracker.single_view.association_matrix.handing_over import decide
 from tracker.single_view.dropped import GATES, Dropped

@@ -13,7 +13,9 @@ from tests import world
 from tests.single_view.detected import CAMERA, detected, run
 from tracker import single_view
 from tracker.geometry.boxes import Boxes
-from tracker.parameters import DetectionBoxParams, RunParameters, with_values
+from tracker.parameters.catalogue import RunParameters
+from tracker.parameters.groups.detections import DetectionBoxParams
+from tracker.parameters.values import with_values
 from tracker.sequences.sequence import Room
 from tracker.single_view import box_sizes
 from tracker.single_view.box_sizes import BoxSizes, entrance_boxes, upright_boxes

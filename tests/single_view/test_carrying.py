@@ -14,7 +14,7 @@ from tests import world
 from tests.single_view.conftest import COLOURS
 from tests.single_view.test_scenes import stays
 from tracker.geometry.boxes import Boxes
-from tracker.parameters import ForegroundParams
+from tracker.parameters.groups.foreground import ForegroundParams
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.reader import read_sequence
 from tracker.sequences.sequence import Sequence, Template

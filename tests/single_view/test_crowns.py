@@ -9,7 +9,7 @@ from numpy import ndarray
 
 from tests.world import SMALL_CAMERAS as CAMERAS
 from tests.world import SMALL_ROOM as ROOM
-from tracker.parameters import JpdaParams
+from tracker.parameters.groups.jpda import JpdaParams
 from tracker.sequences.sequence import Room
 from tracker.single_view.box_sizes import upright_boxes
 from tracker.single_view.jpda.crowns import TargetSizes, crowns

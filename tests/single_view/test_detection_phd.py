@@ -11,7 +11,8 @@ from tests import world
 from tests.single_view.detected import ANYWHERE, CAMERA, detected, normal
 from tracker import single_view
 from tracker.filters.gaussian_mixture import GaussianMixture, gate_distance
-from tracker.parameters import RunParameters, with_values
+from tracker.parameters.catalogue import RunParameters
+from tracker.parameters.values import with_values
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import entrance_boxes

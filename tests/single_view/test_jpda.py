@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from tests.single_view.detected import detected, run
-from tracker.parameters import PRESETS, RunParameters, stage_values, with_values
+from tracker.parameters.catalogue import PRESETS, RunParameters
+from tracker.parameters.values import stage_values, with_values
 from tracker.single_view.protocol import ViewResult
 
 HALF = (6.0, 12.0)

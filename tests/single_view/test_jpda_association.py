@@ -10,7 +10,7 @@ import pytest
 from numpy import ndarray
 from numpy.testing import assert_allclose, assert_array_equal
 
-from tracker.parameters import JpdaParams
+from tracker.parameters.groups.jpda import JpdaParams
 from tracker.single_view.jpda.association import associate
 from tracker.single_view.jpda.targets import Innovations, Targets, innovations
 

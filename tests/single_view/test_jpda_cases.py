@@ -7,7 +7,7 @@ import pytest
 from numpy import ndarray
 from numpy.testing import assert_array_equal
 
-from tracker.parameters import JpdaParams
+from tracker.parameters.groups.jpda import JpdaParams
 from tracker.single_view.jpda.cases import (
     Cases,
     determine_cases,

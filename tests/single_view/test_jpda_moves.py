@@ -7,7 +7,7 @@ import pytest
 from numpy import ndarray
 from numpy.testing import assert_allclose, assert_array_equal
 
-from tracker.parameters import JpdaParams
+from tracker.parameters.groups.jpda import JpdaParams
 from tracker.single_view.jpda.cases import Cases
 from tracker.single_view.jpda.measurements import Measured
 from tracker.single_view.jpda.moves import Moved, _left_over, move

@@ -10,7 +10,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from tests.single_view.test_scenes import truth
-from tracker.parameters import ColourPhdParams
+from tracker.parameters.groups.colour_phd import ColourPhdParams
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.colour import templates

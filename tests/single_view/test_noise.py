@@ -7,16 +7,14 @@ from numpy import ndarray
 from numpy.testing import assert_allclose
 
 from tests import world
-from tracker.parameters import (
-    ColourPhdParams,
-    DetectionBoxParams,
-    ForegroundParams,
-    JpdaParams,
-    PseudoParticleParams,
-    RunParameters,
-    with_values,
-)
+from tracker.parameters.catalogue import RunParameters
+from tracker.parameters.groups.colour_phd import ColourPhdParams
+from tracker.parameters.groups.detections import DetectionBoxParams
+from tracker.parameters.groups.foreground import ForegroundParams
+from tracker.parameters.groups.jpda import JpdaParams
+from tracker.parameters.groups.pseudo_particle import PseudoParticleParams
 from tracker.parameters.groups.shapes import ShapesParams
+from tracker.parameters.values import with_values
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.colour.peaks import PeakFinder

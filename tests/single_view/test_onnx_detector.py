@@ -19,7 +19,8 @@ from tests.single_view.test_scenes import truth
 from tests.world import surveillance as look_at
 from tracker.geometry.boxes import Boxes
 from tracker.geometry.camera import Camera
-from tracker.parameters import RunParameters, with_values
+from tracker.parameters.catalogue import RunParameters
+from tracker.parameters.values import with_values
 from tracker.runs import pipeline
 from tracker.runs.run import stage_keys
 from tracker.sequences.errors import SequenceError

@@ -21,7 +21,8 @@ from tests.single_view.test_scenes import (
     run,
 )
 from tracker import single_view
-from tracker.parameters import RunParameters, with_values
+from tracker.parameters.catalogue import RunParameters
+from tracker.parameters.values import with_values
 from tracker.runs import pipeline
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence, View

@@ -17,7 +17,8 @@ from numpy.testing import assert_allclose
 
 from tests import world
 from tracker import single_view
-from tracker.parameters import PRESETS, RunParameters, with_values
+from tracker.parameters.catalogue import PRESETS, RunParameters
+from tracker.parameters.values import with_values
 from tracker.sequences.pictures.frames import FrameReader, Picture
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.colour import peaks

@@ -12,7 +12,7 @@ from numpy import ndarray
 from tests.world import HEAD as HALF_EXTENTS
 from tests.world import SMALL_CAMERAS as CAMERAS
 from tests.world import SMALL_ROOM as ROOM
-from tracker.parameters import AssociationMatrixParams
+from tracker.parameters.groups.association_matrix import AssociationMatrixParams
 from tracker.single_view.association_matrix.method import join
 from tracker.single_view.association_matrix.silhouettes import Fits, Silhouettes
 from tracker.single_view.box_sizes import upright_boxes

@@ -10,7 +10,8 @@ import pytest
 
 from tests.golden.pieces import cut
 from tests.single_view.shaken import scene, shaken, taken
-from tracker.parameters import RunParameters, with_values
+from tracker.parameters.catalogue import RunParameters
+from tracker.parameters.values import with_values
 from tracker.runs import pipeline
 from tracker.runs.gates import notices
 from tracker.sequences.library import open_sequence

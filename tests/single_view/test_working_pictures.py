@@ -17,8 +17,9 @@ from tests import world
 from tests.world import PERSON as HALF_EXTENTS
 from tests.world import SMALL_CAMERAS, SMALL_ROOM
 from tracker.geometry.camera import Camera
-from tracker.parameters import RunParameters, with_values
+from tracker.parameters.catalogue import RunParameters
 from tracker.parameters.groups.pictures import PictureParams
+from tracker.parameters.values import with_values
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence, Template, View
 from tracker.single_view.box_sizes import upright_boxes

@@ -11,7 +11,8 @@ from numpy import ndarray
 from tests import world
 from tracker.fusion.protocol import Associations, FusionResult
 from tracker.geometry.camera import Camera
-from tracker.parameters import RunParameters, with_values
+from tracker.parameters.catalogue import RunParameters
+from tracker.parameters.values import with_values
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult
 from tracker.smoothing.paths import Links, Paths

@@ -10,7 +10,8 @@ from numpy import ndarray
 
 from tests import world
 from tests.smoothing.known import PLAIN, Known, Step, known
-from tracker.parameters import METHODS, RunParameters, method_of, with_values
+from tracker.parameters.catalogue import METHODS, RunParameters, method_of
+from tracker.parameters.values import with_values
 from tracker.smoothing import create
 from tracker.smoothing.lifetimes import lifetimes, shown_apart
 from tracker.smoothing.paths import Paths

@@ -12,7 +12,7 @@ from scipy.stats import multivariate_normal
 
 from tracker.filters.models import Motion
 from tracker.kernels.gating import Measurements
-from tracker.parameters import FusionParams
+from tracker.parameters.groups.fusion import FusionParams
 from tracker.smoothing.identity.appearance import Appearance
 from tracker.smoothing.identity.constraints import Constraint, LinkConstraints, possible
 from tracker.smoothing.identity.ends import Ends

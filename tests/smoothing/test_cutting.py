@@ -11,7 +11,7 @@ from numpy.testing import assert_array_equal
 
 from tests import world
 from tests.smoothing.known import Known, known
-from tracker.parameters import SmoothingParams
+from tracker.parameters.groups.smoothing import SmoothingParams
 from tracker.smoothing.identity.constraints import ConstraintResolver
 from tracker.smoothing.identity.splitting import Splits, Tracked, find_splits, split_tracks
 
@@ -53,7 +53,7 @@ def test_who_is_seen_at_every_step_is_not_cut() -> None:
 
 def test_rows_whose_boxes_are_as_well_anothers_are_left_out_from_the_doubt_on() -> None:
     contested = np.zeros(STEPS)
-    contested[[10, 15]] = P.doubt, P.doubt - 1e-9
+    contested[[10, 15]] = P.ambiguity_threshold, P.ambiguity_threshold - 1e-9
     found = find_splits(tracked(standing(), contested=contested), P)
     assert left_out(found) == [10]
     assert np.flatnonzero(found.reasons).tolist() == [10]

@@ -14,7 +14,7 @@ from tests.smoothing.test_positions_laws import one_walker
 from tests.world import PERSON as HALF_EXTENTS
 from tracker.geometry.boxes import Boxes
 from tracker.geometry.camera import Camera
-from tracker.parameters import with_values
+from tracker.parameters.values import with_values
 from tracker.sequences.sequence import Sequence, Template
 from tracker.smoothing import create
 from tracker.smoothing.calibration import RIDGE, Calibration, Marks, lower, shifts, upright

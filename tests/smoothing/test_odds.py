@@ -11,7 +11,8 @@ from numpy.testing import assert_allclose
 
 from tests.smoothing.test_boundaries import PRIOR, fitted, looking, standing
 from tracker.filters.models import Motion
-from tracker.parameters import FusionParams, SmoothingParams
+from tracker.parameters.groups.fusion import FusionParams
+from tracker.parameters.groups.smoothing import SmoothingParams
 from tracker.smoothing.identity import identities, odds
 from tracker.smoothing.identity.appearance import Appearance
 from tracker.smoothing.identity.ends import Ends

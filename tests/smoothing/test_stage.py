@@ -14,7 +14,8 @@ from tests import world
 from tests.smoothing.known import CAMERAS, PLAIN, Known, backwards, known
 from tracker.corrections.kinds import make
 from tracker.corrections.outcomes import outcomes
-from tracker.parameters import RunParameters, with_values
+from tracker.parameters.catalogue import RunParameters
+from tracker.parameters.values import with_values
 from tracker.smoothing import create
 from tracker.smoothing.result import Smoothed
 

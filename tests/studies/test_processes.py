@@ -14,7 +14,7 @@ from tests.studies.processes import cluster, finish, kill, outcomes, start, wait
 from tests.studies.small import definition, recording
 from tracker.export.exported_run import ExportedRun, Options
 from tracker.export.registry import format_of, save
-from tracker.parameters import with_values
+from tracker.parameters.values import with_values
 from tracker.runs import pipeline
 from tracker.sequences.library import open_sequence
 from tracker.studies.opened import open_recordings

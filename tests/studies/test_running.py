@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from tests.studies.small import Serial, definition, made_up, recording, run
-from tracker.parameters import with_values
+from tracker.parameters.values import with_values
 from tracker.runs.run import stage_keys
 from tracker.studies.analysis.importance import ImportanceEstimator
 from tracker.studies.errors import StudyError

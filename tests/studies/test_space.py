@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tracker.parameters import METHODS, PARAMETERS, RunParameters, shown_keys, with_values
+from tracker.parameters.catalogue import METHODS, PARAMETERS, RunParameters
+from tracker.parameters.values import shown_keys, with_values
 from tracker.studies.definition import space
 from tracker.studies.definition.definition import Varied
 

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from tests.studies.small import Serial, definition, recording, run
-from tracker.parameters import PARAMETERS, table
+from tracker.parameters.catalogue import PARAMETERS
 from tracker.studies.errors import StudyError
 from tracker.studies.reporting.report import report_html
 from tracker.studies.storage.store import Store, create
@@ -116,7 +116,7 @@ def test_the_dozen_are_varied_around_where_somebody_is(tmp_path: Path) -> None:
     assert dict(made.start) == {"fusion.detection_probability": 0.6}
     assert dict(made.values) == {"fusion.vertical_share": 0.5}
     for one in made.varied:
-        now = made.start.get(one.key, table.PARAMETERS[one.key].default)
+        now = made.start.get(one.key, PARAMETERS[one.key].default)
         assert one.contains(now)
     blind = tuning("t", [str(place)], minutes=5.0, changes={}, ignore_truth=True)
     assert blind.objectives == ("identity",)

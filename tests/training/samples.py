@@ -11,9 +11,9 @@ import numpy as np
 from numpy import ndarray
 
 from tests.rooms.random_rooms.figures import HALF_EXTENTS
-from tracker import parameters as table
 from tracker.kernels.pictures.channels import cell_means
-from tracker.parameters import RunParameters
+from tracker.parameters.catalogue import RunParameters
+from tracker.parameters.values import with_values
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.reader import read_sequence
 from tracker.sequences.sequence import Sequence
@@ -108,7 +108,7 @@ def of_room(folder: Path, trees: Trees | None) -> tuple[ndarray, ndarray]:
         trees: Of the round before, None in the first.
     """
     sequence, rng = read_sequence(folder), np.random.default_rng(int(folder.name))
-    chosen = table.with_values(RunParameters(), {"single_view": "shapes"})
+    chosen = with_values(RunParameters(), {"single_view": "shapes"})
     working = Working.of(sequence, chosen, FrameReader(sequence))
     people, visible = people_of(folder), visible_of(folder)
     means, labels = [], []

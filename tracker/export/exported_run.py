@@ -11,7 +11,8 @@ from jaxtyping import Bool, Float
 from numpy import ndarray
 
 from tracker.fusion.trajectories import Trajectories
-from tracker.parameters import METHODS, PARAMETERS, RunParameters, value
+from tracker.parameters.catalogue import METHODS, PARAMETERS, RunParameters
+from tracker.parameters.values import value_of
 from tracker.sequences.sequence import Sequence
 
 
@@ -99,4 +100,4 @@ class ExportedRun:
     @property
     def settings(self) -> dict[str, str | int | float | bool]:
         """The chosen methods and the value of every parameter, by key."""
-        return {key: value(self.parameters, key) for key in (*METHODS, *PARAMETERS)}
+        return {key: value_of(self.parameters, key) for key in (*METHODS, *PARAMETERS)}

@@ -24,7 +24,8 @@ from numpy import ndarray
 from tracker import __version__
 from tracker.files.atomic import replacing
 from tracker.fusion.trajectories import Trajectories
-from tracker.parameters import METHODS, PARAMETERS, RunParameters, value
+from tracker.parameters.catalogue import METHODS, PARAMETERS, RunParameters
+from tracker.parameters.values import value_of
 from tracker.sequences.csv_columns import guarded, read_columns, unguarded
 from tracker.sequences.errors import SequenceError
 from tracker.sequences.sequence import Sequence
@@ -171,7 +172,7 @@ def _comments(
     yield f"sequence = {guarded(' '.join(sequence.name.split()))}"
     yield f"seed = {seed}"
     for key in (*METHODS, *PARAMETERS):
-        yield f"{key} = {_as_text(value(parameters, key))}"
+        yield f"{key} = {_as_text(value_of(parameters, key))}"
 
 
 def _as_text(setting: Any) -> str:

@@ -17,7 +17,7 @@ from numpy import ndarray
 from tracker.filters import gaussian_mixture
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.geometry.camera import Camera
-from tracker.parameters import FusionParams
+from tracker.parameters.groups.fusion import FusionParams
 from tracker.sequences.sequence import Room
 
 

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 from tracker.fusion.protocol import FusionMethod, FusionResult
 
 if TYPE_CHECKING:
-    from tracker.parameters import Method, RunParameters
+    from tracker.parameters import Method
+    from tracker.parameters.catalogue import RunParameters
     from tracker.sequences.sequence import Sequence
 
 __all__ = ["FusionMethod", "FusionResult", "create", "maker"]

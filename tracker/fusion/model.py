@@ -18,7 +18,7 @@ from tracker.fusion.visibility import Visibility
 from tracker.kernels import linear_algebra
 from tracker.kernels.labelled.camera_update import CameraRule
 from tracker.kernels.labelled.step import CameraBoxes
-from tracker.parameters import FusionParams
+from tracker.parameters.groups.fusion import FusionParams
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult
 

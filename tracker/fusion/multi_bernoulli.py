@@ -37,7 +37,7 @@ from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult
 
 if TYPE_CHECKING:
-    from tracker.parameters import RunParameters
+    from tracker.parameters.catalogue import RunParameters
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -14,7 +14,7 @@ from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion.model import CONFIRMED
 from tracker.fusion.protocol import Associations
 from tracker.geometry.assignment import linear_sum_assignment
-from tracker.parameters import FusionParams
+from tracker.parameters.groups.fusion import FusionParams
 from tracker.single_view.protocol import ViewResult
 
 _NEVER = -1e3
@@ -176,7 +176,7 @@ def _updated(
             strict=True,
         )
         likeness = np.array([views[camera].likenesses[box] for camera, box in pairs])
-        outliers = p.recognition_doubt
+        outliers = p.recognition_outlier_probability
         log_likelihood = np.log((1.0 - outliers) * likeness + outliers / people)
         fresh = min(step_time / p.recognition_interval, 1.0)
         share = associations.probabilities.take(rows).astype(float) * fresh

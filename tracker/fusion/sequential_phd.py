@@ -35,7 +35,7 @@ from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult
 
 if TYPE_CHECKING:
-    from tracker.parameters import RunParameters
+    from tracker.parameters.catalogue import RunParameters
 
 _LARGEST_LOG_ODDS = 600.0  # bound at which log odds are clipped, so that exp does not overflow
 

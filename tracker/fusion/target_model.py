@@ -14,7 +14,7 @@ from tracker.kernels import measurement
 from tracker.kernels.gating import Measurements
 from tracker.kernels.kalman import Expected
 from tracker.kernels.measurement import Target
-from tracker.parameters import FusionParams
+from tracker.parameters.groups.fusion import FusionParams
 from tracker.single_view.protocol import ViewResult
 
 MeasurementKind = Literal["centre", "box", "box_and_width"]

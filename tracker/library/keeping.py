@@ -16,7 +16,7 @@ from tracker import __version__
 from tracker.evaluation import Evaluation
 from tracker.library.columns import KeptTracks
 from tracker.library.records import HEADLINES, NewRecording, NewRun, Result, Source
-from tracker.parameters import changed
+from tracker.parameters.values import changed_values
 from tracker.runs.fitting import default_parameters
 from tracker.runs.gaps import gaps
 from tracker.runs.numbers_version import numbers_version
@@ -151,7 +151,7 @@ def record_of_run(
         steps=run.done,
         single_view=parameters.single_view,
         fusion_method=parameters.fusion_method,
-        changes=changed(parameters, default_parameters(run.sequence)),
+        changes=changed_values(parameters, default_parameters(run.sequence)),
         parameters=parameters.model_dump(mode="json"),
         seed=run.seed,
         version=__version__,

@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass, field, fields
 from typing import Any, Literal, TypeVar
 
 from tracker.library.columns import KeptTracks
-from tracker.parameters import RunParameters
+from tracker.parameters.catalogue import RunParameters
 
 Source = Literal["track", "page", "bundle", "batch"]
 """The origin of a run: a command, the page, or a bundle that was unpacked."""

@@ -30,7 +30,8 @@ from tracker.library.records import (
     inserted,
     selected,
 )
-from tracker.parameters import RunParameters, with_values
+from tracker.parameters.catalogue import RunParameters
+from tracker.parameters.values import with_values
 
 WAIT_SECONDS = 5.0
 """Longest wait for the transaction of another process, seconds."""

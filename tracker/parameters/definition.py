@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
 Stage = Literal["single_view", "fusion", "smoothing", "tracks"]
 """The stages of a run: boxes in each camera, 3D posterior, smoothed tracks, reported tracks."""
+
+Topic = Literal["Motion", "Birth", "Detection", "Clutter", "Foreground", "Extraction"]
+"""What a parameter is about, in the order of a filter's step: a folder of the page's panel."""
 
 NO_CONDITION: Mapping[str, tuple[Any, ...]] = MappingProxyType({})
 """The condition of a parameter that has an effect with any values of the others."""
@@ -17,6 +20,7 @@ NO_CONDITION: Mapping[str, tuple[Any, ...]] = MappingProxyType({})
 
 def ui(
     symbol: str,
+    topic: Topic | None = None,
     *,
     unit: str = "",
     step: float | None = None,
@@ -31,6 +35,7 @@ def ui(
 
     Args:
         symbol: The symbol in formulas, for instance ``p_S``.
+        topic: What the parameter is about; None for the topic of its group.
         unit: The unit of the value; empty for numbers without unit.
         step: The step of the slider, in the parameter's unit.
         log: Whether the slider is logarithmic; the range must be positive.
@@ -43,6 +48,7 @@ def ui(
     """
     extra = {
         "symbol": symbol,
+        "topic": topic,
         "unit": unit,
         "step": step,
         "log": log,
@@ -65,3 +71,6 @@ class Params(BaseModel):
         use_attribute_docstrings=True,
         validate_default=True,
     )
+
+    topic: ClassVar[Topic] = "Detection"
+    """What those parameters of the group are about that name no topic of their own."""

@@ -16,7 +16,7 @@ from numpy import ndarray
 from tracker.fusion.trajectories import Trajectories
 from tracker.geometry.boxes import Boxes, paired_overlaps
 from tracker.geometry.camera import Camera
-from tracker.parameters import ColourPhdParams
+from tracker.parameters.groups.colour_phd import ColourPhdParams
 from tracker.runs.run import Run
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence, Template

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from tracker.parameters import METHODS, MethodKey, RunParameters, method_of
-from tracker.parameters.registry import FOLLOWING
+from tracker.parameters import MethodKey
+from tracker.parameters.catalogue import FOLLOWING, METHODS, RunParameters, method_of
 from tracker.sequences.sequence import Sequence
 
 
@@ -11,7 +11,7 @@ def default_parameters(sequence: Sequence) -> RunParameters:
     """Return the default parameters, with a single-view method that can work on the recording.
 
     That is the detection network, if one is named and there are pictures; else the first of
-    :data:`tracker.parameters.registry.FOLLOWING` for which the recording has the pictures,
+    :data:`tracker.parameters.catalogue.FOLLOWING` for which the recording has the pictures,
     templates and detections that it needs.
 
     Raises:

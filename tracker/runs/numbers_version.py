@@ -14,7 +14,7 @@ import scipy
 
 from tracker import __version__
 from tracker.parameters import Method, Stage
-from tracker.parameters.registry import ORIGINS
+from tracker.parameters.catalogue import ORIGINS
 
 _ROOT = Path(__file__).resolve().parents[1]
 

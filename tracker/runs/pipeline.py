@@ -14,7 +14,8 @@ from tracker.corrections.outcomes import outcomes
 from tracker.fusion import trajectories as tracks_stage
 from tracker.fusion.place_constraints import constraints_by_step
 from tracker.fusion.trajectories import Bounds, Growing, Trajectories, corrected
-from tracker.parameters import RunParameters, Stage
+from tracker.parameters import Stage
+from tracker.parameters.catalogue import RunParameters
 from tracker.runs.fitting import default_parameters
 from tracker.runs.gaps import where_to_keep
 from tracker.runs.run import Cancelled, Progress, Run, key_without_identities, stage_keys

@@ -16,8 +16,9 @@ from tracker.corrections.kinds import IN_THE_FUSION, OF_PEOPLE, Correction, Kind
 from tracker.corrections.outcomes import Outcome, names_by_track, supporting_corrections
 from tracker.fusion.protocol import FusionResult
 from tracker.fusion.trajectories import Trajectories
-from tracker.parameters import RunParameters, Stage, stage_values
-from tracker.parameters.reading import CHOSEN_BY
+from tracker.parameters import Stage
+from tracker.parameters.catalogue import RunParameters
+from tracker.parameters.values import CHOSEN_BY, stage_values
 from tracker.runs.numbers_version import method_version, numbers_version
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult

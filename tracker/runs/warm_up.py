@@ -27,8 +27,16 @@ import numpy as np
 from tracker import fusion, single_view, smoothing
 from tracker.geometry.camera import Camera
 from tracker.kernels import compilation
-from tracker.parameters import METHODS, PRESETS, Method, MethodKey, RunParameters, with_values
-from tracker.parameters.registry import FOLLOWING, ORIGINS, REGISTERED
+from tracker.parameters import Method, MethodKey
+from tracker.parameters.catalogue import (
+    FOLLOWING,
+    METHODS,
+    ORIGINS,
+    PRESETS,
+    REGISTERED,
+    RunParameters,
+)
+from tracker.parameters.values import with_values
 from tracker.runs import pipeline
 from tracker.sequences.sequence import Detections, Entrance, Room, Sequence, Template, View
 

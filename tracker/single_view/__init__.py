@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 from tracker.single_view.protocol import SingleViewMethod, ViewResult
 
 if TYPE_CHECKING:
-    from tracker.parameters import Method, RunParameters
+    from tracker.parameters import Method
+    from tracker.parameters.catalogue import RunParameters
     from tracker.sequences.pictures.frames import Pictures
     from tracker.sequences.sequence import Sequence
 
@@ -75,7 +76,9 @@ def create(
     Raises:
         ValueError: If there is no such method, or the sequence lacks data that it needs.
     """
-    from tracker.parameters import method_of  # with those of other packages, which import this
+    from tracker.parameters.catalogue import (
+        method_of,  # with those of other packages, which import this
+    )
 
     make = maker(method_of("single_view", name))
     return make(sequence, camera_index, parameters, reader)

@@ -18,7 +18,7 @@ from numpy import ndarray
 from tracker.filters import gaussian_mixture, models, phd
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.kernels.kalman import Expected
-from tracker.parameters import ColourPhdParams
+from tracker.parameters.groups.colour_phd import ColourPhdParams
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import entrance_boxes
@@ -28,7 +28,7 @@ from tracker.single_view.pictures.foreground import pack
 from tracker.single_view.protocol import ViewResult, pack_samples
 
 if TYPE_CHECKING:
-    from tracker.parameters import RunParameters
+    from tracker.parameters.catalogue import RunParameters
 
 EXPLAINED = 0.5
 """Expected number of targets below which a peak may be of a new target: it is more likely

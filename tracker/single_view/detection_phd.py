@@ -19,13 +19,13 @@ from tracker.filters import gaussian_mixture, models, phd
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.filters.phd import PhdUpdate
 from tracker.kernels.kalman import Expected
-from tracker.parameters import DetectionPhdParams
+from tracker.parameters.groups.detections import DetectionPhdParams
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.detector_boxes import Detected, DetectorBoxes, trust
 from tracker.single_view.protocol import ViewResult
 
 if TYPE_CHECKING:
-    from tracker.parameters import RunParameters
+    from tracker.parameters.catalogue import RunParameters
     from tracker.sequences.pictures.frames import Pictures
 
 BELIEVED = 0.5

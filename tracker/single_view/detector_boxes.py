@@ -10,7 +10,7 @@ from numpy import ndarray
 
 from tracker.geometry.boxes import Boxes
 from tracker.geometry.camera import Camera
-from tracker.parameters import DetectionBoxParams
+from tracker.parameters.groups.detections import DetectionBoxParams
 from tracker.sequences.sequence import Room, Sequence
 
 _AT_ONCE = 4096

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy import ndarray
 
-from tracker.parameters import DetectionBoxParams
+from tracker.parameters.groups.detections import DetectionBoxParams
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.detector_boxes import DetectorBoxes
 from tracker.single_view.protocol import ViewResult
 
 if TYPE_CHECKING:
-    from tracker.parameters import RunParameters
+    from tracker.parameters.catalogue import RunParameters
     from tracker.sequences.pictures.frames import Pictures
 
 

@@ -14,7 +14,8 @@ from tracker.smoothing.result import Decision, DecisionKind, Smoothed
 from tracker.smoothing.tracks import names_of, tracks_of
 
 if TYPE_CHECKING:
-    from tracker.parameters import Method, RunParameters
+    from tracker.parameters import Method
+    from tracker.parameters.catalogue import RunParameters
     from tracker.sequences.sequence import Sequence
 
 __all__ = [

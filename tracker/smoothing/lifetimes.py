@@ -10,7 +10,7 @@ from numpy import ndarray
 
 from tracker.geometry.boxes import Boxes, paired_overlaps
 from tracker.kernels.smoothing.presence import Habits, presence
-from tracker.parameters import SmoothingParams
+from tracker.parameters.groups.smoothing import SmoothingParams
 from tracker.smoothing.paths import Paths
 from tracker.smoothing.smoother import BoxAssociations, Smoother
 

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 
 from tracker.corrections import Correction
 from tracker.fusion.protocol import FusionResult
-from tracker.parameters import RunParameters
+from tracker.parameters.catalogue import RunParameters
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult
 from tracker.smoothing.result import Smoothed

@@ -23,7 +23,7 @@ from tracker.fusion.model import FusionModel
 from tracker.kernels.measurement import ExpectedBoxes as SeenBoxes
 from tracker.kernels.smoothing import evidence, passes
 from tracker.kernels.smoothing.passes import SmoothedRows, drives, sums_around
-from tracker.parameters import FusionParams
+from tracker.parameters.groups.fusion import FusionParams
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult
 from tracker.smoothing.calibration import (

@@ -16,7 +16,8 @@ from tracker.fusion import trajectories
 from tracker.fusion.model import CONFIRMED
 from tracker.fusion.protocol import FusionResult
 from tracker.fusion.trajectories import Trajectories
-from tracker.parameters import RunParameters, SmoothingParams
+from tracker.parameters.catalogue import RunParameters
+from tracker.parameters.groups.smoothing import SmoothingParams
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult
 from tracker.smoothing import lifetimes

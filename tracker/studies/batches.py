@@ -17,7 +17,7 @@ from tracker.corrections.log import place_of, read_log
 from tracker.library.keeping import record_of_recording
 from tracker.library.records import KeptRun
 from tracker.library.store import Library
-from tracker.parameters import changed, with_values
+from tracker.parameters.values import changed_values, with_values
 from tracker.runs import pipeline
 from tracker.sequences.errors import SequenceError
 from tracker.sequences.library import open_sequence
@@ -196,7 +196,7 @@ def _job(
         place,
         content_of(sequence),
         parameters,
-        changed(parameters, pipeline.default_parameters(sequence)),
+        changed_values(parameters, pipeline.default_parameters(sequence)),
         seed,
         truth=sequence.ground_truth is not None,
         agreement=False,

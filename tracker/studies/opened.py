@@ -6,7 +6,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from tracker.parameters import METHODS, RunParameters, changed, value, with_values
+from tracker.parameters.catalogue import METHODS, RunParameters
+from tracker.parameters.values import changed_values, value_of, with_values
 from tracker.runs import pipeline
 from tracker.runs.fitting import unfit_methods
 from tracker.sequences.errors import SequenceError
@@ -98,7 +99,7 @@ class Recordings:
             one.place,
             one.content,
             parameters,
-            changed(parameters, one.defaults),
+            changed_values(parameters, one.defaults),
             seed,
             truth=one.has_truth,
             agreement=any(each.of == "agreement" for each in self.objectives),
@@ -157,7 +158,7 @@ def _check_methods(definition: Definition, sequence: Sequence, base: RunParamete
     unfit = unfit_methods(sequence, base)
     choices = {one.key: one.choices for one in definition.varied if one.key in METHODS}
     for key in METHODS:
-        for name in choices.get(key, (value(base, key),)):
+        for name in choices.get(key, (value_of(base, key),)):
             if why := unfit[key].get(name):
                 raise StudyError(f"{key} = {name}: {why}")
 

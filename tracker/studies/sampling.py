@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from tracker.parameters import RunParameters
+from tracker.parameters.catalogue import RunParameters
 from tracker.studies.definition import space
 from tracker.studies.definition.definition import Definition, Varied
 from tracker.studies.definition.objectives import Objective

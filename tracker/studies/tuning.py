@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from tracker import parameters as table
-from tracker.parameters import PARAMETERS, RunParameters, with_values
+from tracker.parameters.catalogue import PARAMETERS, RunParameters
+from tracker.parameters.values import changed_values, shown_keys, value_of, with_values
 from tracker.runs.fitting import default_parameters
 from tracker.sequences.errors import SequenceError
 from tracker.sequences.library import open_sequence
@@ -19,7 +19,7 @@ MORE = (
     "fusion.measurement_sigma",
     "fusion.occlusion",
     "fusion.start_velocity",
-    "smoothing.doubt",
+    "smoothing.ambiguity_threshold",
 )
 """Keys of parameters that are varied besides the essential ones."""
 
@@ -62,9 +62,9 @@ def tuning(
     truth = not ignore_truth and all(one.ground_truth is not None for one in opened)
     now = [with_values(default_parameters(one), changes) for one in opened]
     defaults = default_parameters(opened[0])
-    keys = [key for key in table.shown_keys(now[0]) if _is_varied(key, now[0], minutes)]
-    varied = [around(key, table.value(now[0], key), table.value(defaults, key)) for key in keys]
-    own = table.changed(now[0], defaults)
+    keys = [key for key in shown_keys(now[0]) if _is_varied(key, now[0], minutes)]
+    varied = [around(key, value_of(now[0], key), value_of(defaults, key)) for key in keys]
+    own = changed_values(now[0], defaults)
     return Definition(
         name=name,
         recordings=tuple(_place(one) for one in recordings),

@@ -11,10 +11,10 @@ from app.command.arguments.studies import Batch
 from app.command.commands.studies import INTERRUPTED, crew_of, to_be_stopped
 from app.command.flags import set_values
 from app.command.terminal import FAILURE, Bar, print_table, say
-from tracker import parameters as table
 from tracker.files.folders import library_file
 from tracker.library.store import open_library
-from tracker.parameters import PRESETS, ParameterError
+from tracker.parameters.catalogue import PRESETS, RunParameters
+from tracker.parameters.values import ParameterError, with_values
 from tracker.studies.batches import BatchRun, places_of, run_batch
 
 _FIGURES = ("mota", "idf1", "hota", "ospa")
@@ -33,7 +33,7 @@ def batch(command: Batch) -> int:
             raise ParameterError("--preset", f"expected one of {known}, got {command.preset!r}")
         changes |= PRESETS[command.preset]
     changes |= set_values(command.set)
-    table.with_values(table.RunParameters(), changes)  # wrong usage shows before any work
+    with_values(RunParameters(), changes)  # wrong usage shows before any work
     if command.seeds < 1:
         raise ParameterError("--seeds", f"expected a whole number from 1, got {command.seeds}")
     if command.keep < 1:

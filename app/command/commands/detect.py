@@ -24,9 +24,10 @@ def detect(command: Detect) -> None:
         ValueError: If the sequence or the model cannot be used.
     """
     from app.state.workers.compiling import Compiling
-    from tracker import parameters as table
     from tracker.files.atomic import file_names, replacing
     from tracker.geometry.boxes import Boxes
+    from tracker.parameters.catalogue import RunParameters
+    from tracker.parameters.values import with_values
     from tracker.runs import pipeline
     from tracker.runs.stage_cache import StageCache
     from tracker.sequences import library
@@ -38,9 +39,7 @@ def detect(command: Detect) -> None:
     sequence = library.with_detector(sequence, command.model)
     if not sequence.has_pictures:
         raise CommandError(f"{sequence.name}: a detector needs pictures of every camera")
-    parameters = table.with_values(
-        table.RunParameters(), {**changes, "single_view": "onnx_detector"}
-    )
+    parameters = with_values(RunParameters(), {**changes, "single_view": "onnx_detector"})
     with Bar("detecting", "step") as bar, closing(Compiling(say)) as compiling:
         bar.at(0, sequence.frames)
         compiling.wait(lambda done, total: None, lambda: False)

@@ -17,7 +17,7 @@ from tracker.evaluation import Evaluation, EvaluationSettings, evaluate_sequence
 from tracker.evaluation.figures import number
 from tracker.export import tracks_csv
 from tracker.export.tracks_csv import TrackFile
-from tracker.parameters import ParameterError
+from tracker.parameters.values import ParameterError
 from tracker.sequences import library
 from tracker.sequences.sequence import Sequence
 from tracker.sequences.tables import truth_of

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from app.command.arguments.importing import Check, ExportCalibration, Formats, Import
 from app.command.terminal import FAILURE, CommandError, print_table, say
-from tracker.parameters import ParameterError
+from tracker.parameters.values import ParameterError
 
 if TYPE_CHECKING:
     from tracker.io.importing.gathering import ParsedFiles

@@ -9,7 +9,7 @@ from pathlib import Path
 from app.command.arguments.listing import Benchmark, Sequences
 from app.command.flags import describe_range, show
 from app.command.terminal import CommandError, check_data, print_table
-from tracker import parameters as table
+from tracker.parameters.catalogue import FOLLOWS, METHODS, PARAMETERS, RunParameters
 
 
 def benchmark(command: Benchmark) -> int:
@@ -51,18 +51,18 @@ def parameters() -> None:
         "fusion_method": "Method of stage 2 (--fusion).",
         "smoothing_method": "Method of stage 3 (--smoothing).",
     }
-    defaults = table.RunParameters()
+    defaults = RunParameters()
     chosen = {
-        "single_view": table.FOLLOWS,
+        "single_view": FOLLOWS,
         "fusion_method": defaults.fusion_method,
         "smoothing_method": defaults.smoothing_method,
     }
     rows: list[tuple[str, ...]] = [
         (key, "", "|".join(choices), "", chosen[key], methods[key])
-        for key, choices in table.METHODS.items()
+        for key, choices in METHODS.items()
     ]
     rows += [
         (p.key, p.symbol, describe_range(p), p.unit, show(p.default), p.help)
-        for p in table.PARAMETERS.values()
+        for p in PARAMETERS.values()
     ]
     print_table(("key", "symbol", "range", "unit", "default", "help"), rows)

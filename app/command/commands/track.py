@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING
 from app.command.flags import Track
 from app.command.interruption import between_steps
 from app.command.terminal import FAILURE, Bar, CommandError, check_keep, check_seed, say
-from tracker import parameters as table
 from tracker.files.folders import library_file
+from tracker.parameters import Stage
+from tracker.parameters.catalogue import METHODS, RunParameters
+from tracker.parameters.values import with_values
 
 if TYPE_CHECKING:
     from tracker.runs.pipeline import Run
@@ -18,7 +20,7 @@ if TYPE_CHECKING:
 
 def track(command: Track) -> int:
     changes = command.changes()
-    table.with_values(table.RunParameters(), changes)  # wrong usage shows before any work
+    with_values(RunParameters(), changes)  # wrong usage shows before any work
     check_seed(command.seed)
     check_keep(command.keep)
     output = command.output
@@ -55,10 +57,10 @@ def track(command: Track) -> int:
     for found in check(sequence, quick=True):
         if found.status == "warning" and str(found) not in sequence.warnings:
             say(str(found))
-    parameters = table.with_values(pipeline.default_parameters(sequence), changes)
+    parameters = with_values(pipeline.default_parameters(sequence), changes)
     told_by_hand = of_run(sequence, command.corrections, none=command.no_corrections)
     begin, began = time.perf_counter(), time.time()
-    stages: set[table.Stage] = set()
+    stages: set[Stage] = set()
 
     def told(_: pipeline.Run, progress: pipeline.Progress) -> None:
         stages.add(progress.stage)
@@ -108,7 +110,7 @@ def track(command: Track) -> int:
     if command.keep and not any(gap.unexpected for gap in gaps.gaps(run)):
         _keep(command, run, began, seconds)
     incomplete = "".join(f"; {one}" for one in missing)
-    methods = [name for key in table.METHODS if (name := str(written.settings[key])) != "none"]
+    methods = [name for key in METHODS if (name := str(written.settings[key])) != "none"]
     say(
         f"{sequence.frames} steps, {targets} track{'' if targets == 1 else 's'} by "
         f"{', '.join(methods)}, {sequence.frames / seconds:.0f} steps/s "

@@ -11,8 +11,8 @@ from app.command.arguments.studies import Tune
 from app.command.commands.studies import INTERRUPTED, run, save_preset, shown_value
 from app.command.flags import set_values
 from app.command.terminal import print_table, say
-from tracker import parameters as table
-from tracker.parameters import ParameterError
+from tracker.parameters.catalogue import RunParameters
+from tracker.parameters.values import ParameterError, with_values
 from tracker.review.self_consistency.estimate import WARNING
 from tracker.studies.errors import StudyError
 from tracker.studies.storage.store import create, studies_folder
@@ -30,7 +30,7 @@ def tune(command: Tune) -> int:
     if not command.recordings:
         raise ParameterError("RECORDING …", "expected at least one recording")
     changes = set_values(command.set)
-    table.with_values(table.RunParameters(), changes)  # wrong usage shows before any work
+    with_values(RunParameters(), changes)  # wrong usage shows before any work
     name = f"tune {Path(command.recordings[0]).name} {time.strftime('%Y-%m-%d %H.%M.%S')}"
     definition = tuning(
         name,

@@ -9,25 +9,25 @@ import html
 import threading
 from collections.abc import Set
 from functools import partial
-from typing import Any
+from typing import Any, get_args
 
 import viser
 
 from app.scene.keys import hotkeys
 from app.scene.panel import curves, finding, style
-from app.scene.panel.inputs import METHODS, Inputs
+from app.scene.panel.inputs import METHOD_LABELS, Inputs
 from app.scene.panel.sliders import (
     manual_places,
     number_text,
     symbol_parts,
 )
-from app.scene.panel.topics import TOPICS, Topic, topic_of
 from app.scene.worker import LatestWorker
 from app.state.snapshot import Change, Snapshot
 from app.state.workbench import Workbench
 from app.state.workers.sensitivity import Sensitivity
-from tracker import parameters as table
-from tracker.parameters import Parameter, ParameterError, RunParameters
+from tracker.parameters import Topic
+from tracker.parameters.catalogue import METHODS, PARAMETERS, PRESETS, Parameter, RunParameters
+from tracker.parameters.values import ParameterError, changed_values, shown_keys, value_of
 
 ORIGIN = "viser"
 PANEL_WIDTH = 276
@@ -69,7 +69,7 @@ class Controls:
         self._values = server.gui.add_html("")
         self._presets: Any = server.gui.add_dropdown(
             "Preset",
-            (OWN_VALUES, *table.PRESETS),
+            (OWN_VALUES, *PRESETS),
             hint="Takes a named set of values; Changes on the page saves one of your own.",
         )
         self._presets.on_update(self._take_preset)
@@ -87,7 +87,7 @@ class Controls:
         for folder, wanted in ((self._essentials, False), (self._found, True)):
             with folder:
                 # what all methods share comes first
-                for parameter in sorted(table.PARAMETERS.values(), key=_is_of_one_method):
+                for parameter in sorted(PARAMETERS.values(), key=_is_of_one_method):
                     if wanted or parameter.essential:
                         self._inputs.add_copy(parameter)
         self._curves: Any = None
@@ -95,19 +95,19 @@ class Controls:
             self._offer_curves(sensitivity)
         self._methods = server.gui.add_folder("Methods")
         with self._methods:
-            for method in METHODS:
+            for method in METHOD_LABELS:
                 self._inputs.add_method(method)
         self._topics: dict[Topic, viser.GuiFolderHandle] = {}
-        for topic in TOPICS:
+        for topic in get_args(Topic):
             self._make_topic(topic)
         server.gui.add_html(
             style.symbols(
                 {
                     handle._impl.uuid: (
-                        symbol_parts(table.PARAMETERS[key].symbol)[1],
-                        table.PARAMETERS[key].unit,
+                        symbol_parts(PARAMETERS[key].symbol)[1],
+                        PARAMETERS[key].unit,
                     )
-                    for key in table.PARAMETERS
+                    for key in PARAMETERS
                     for handle in self._inputs.of(key)
                 }
             )
@@ -173,7 +173,7 @@ class Controls:
         content = curves.style_of(
             (
                 curve,
-                table.value(parameters, key),
+                value_of(parameters, key),
                 [h._impl.uuid for h in self._inputs.of(key)],
             )
             for key, curve in self._sensitivity.curves().items()
@@ -182,7 +182,7 @@ class Controls:
             self._curves.content = content
 
     def _make_topic(self, topic: Topic) -> None:
-        parameters = [p for p in table.PARAMETERS.values() if topic_of(p) == topic]
+        parameters = [p for p in PARAMETERS.values() if p.topic == topic]
         folder = self._topics[topic] = self._server.gui.add_folder(topic, expand_by_default=False)
         with folder:
             for group in dict.fromkeys(p.group for p in parameters):
@@ -202,7 +202,7 @@ class Controls:
 
     def _take_preset(self, event: viser.GuiEvent[Any]) -> None:
         now = self._workbench.snapshot()
-        if event.client_id is not None and event.target.value in (*table.PRESETS, *now.presets):
+        if event.client_id is not None and event.target.value in (*PRESETS, *now.presets):
             self._workbench.apply_preset(event.target.value, ORIGIN)
         self._worker.ask("refresh")  # own values cannot be taken: it shows again what they are
 
@@ -228,11 +228,11 @@ class Controls:
 
     def _refresh(self, snapshot: Snapshot) -> None:
         parameters, inputs = snapshot.parameters, self._inputs.by_key
-        changed = inputs.keys() & table.changed(parameters, snapshot.defaults).keys()
+        changed = inputs.keys() & changed_values(parameters, snapshot.defaults).keys()
         shown = inputs.keys() & self._shown_keys(parameters)
         with self._server.atomic():
             for key in inputs.keys() - METHODS.keys():
-                self._inputs.write(key, table.value(parameters, key))
+                self._inputs.write(key, value_of(parameters, key))
             for method, unfit in snapshot.unfit.items():
                 self._inputs.write_method(method, getattr(parameters, method), unfit)
             # only what differs is written: the interpreter is wanted by the run
@@ -281,19 +281,19 @@ class Controls:
     def _show_presets(self, snapshot: Snapshot) -> None:
         """Those that the page lists, in the same order, and which of them the values are."""
         own = () if snapshot.preset is not None else (OWN_VALUES,)
-        options = (*own, *table.PRESETS, *snapshot.presets)
+        options = (*own, *PRESETS, *snapshot.presets)
         if self._presets.options != options:
             self._presets.options = options
         self._presets.value = snapshot.preset or OWN_VALUES
 
     def _shown_keys(self, parameters: RunParameters) -> set[str]:
         """The choices of the methods, and what has an effect with what is chosen."""
-        return set(table.shown_keys(parameters))
+        return set(shown_keys(parameters))
 
     def _value_style(self, parameters: RunParameters, changed: set[str]) -> str:
         """The readable numbers of logarithmic sliders, and stronger ink for changed labels."""
         numbers = {
-            handle._impl.uuid: number_text(table.value(parameters, key))
+            handle._impl.uuid: number_text(value_of(parameters, key))
             for key, scale in self._inputs.scales.items()
             if scale.parameter.log
             for handle in self._inputs.of(key)
@@ -304,10 +304,8 @@ class Controls:
 
 def _about(topic: Topic, keys: set[str]) -> set[str]:
     """Those of the keys whose parameters are about something."""
-    return {
-        key for key in keys & table.PARAMETERS.keys() if topic_of(table.PARAMETERS[key]) == topic
-    }
+    return {key for key in keys & PARAMETERS.keys() if PARAMETERS[key].topic == topic}
 
 
 def _is_of_one_method(parameter: Parameter) -> bool:
-    return parameter.group in table.METHODS["single_view"] or parameter.group == "detection_boxes"
+    return parameter.group in METHODS["single_view"] or parameter.group == "detection_boxes"

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from tracker import parameters as table
-from tracker.parameters import Parameter
+from tracker.parameters.catalogue import PARAMETERS, Parameter
 
 
 def matches(parameter: Parameter, text: str) -> bool:
@@ -23,10 +22,10 @@ def found(shown: set[str], changed: set[str], text: str, *, only_changed: bool) 
         text: Of the filter.
         only_changed: Whether the others are left out.
     """
-    keys = {key for key in shown if key in table.PARAMETERS}
+    keys = {key for key in shown if key in PARAMETERS}
     if only_changed:
         keys &= changed
-    return {key for key in keys if matches(table.PARAMETERS[key], text)}
+    return {key for key in keys if matches(PARAMETERS[key], text)}
 
 
 def title(words: str, count: int, changed: int) -> str:

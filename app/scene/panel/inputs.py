@@ -14,10 +14,10 @@ from typing import Any, cast
 import viser
 
 from app.scene.panel.sliders import Scale, hint_text, label_text
-from tracker import parameters as table
-from tracker.parameters import MethodKey, Parameter, RunParameters
+from tracker.parameters import MethodKey
+from tracker.parameters.catalogue import METHODS, PARAMETERS, Parameter, RunParameters
 
-METHODS: dict[MethodKey, str] = {
+METHOD_LABELS: dict[MethodKey, str] = {
     "single_view": "Single view",
     "fusion_method": "Fusion",
     "smoothing_method": "Smoothing",
@@ -78,9 +78,9 @@ class Inputs:
     def add_method(self, method: MethodKey) -> None:
         """The choice of a method."""
         chooser = self._server.gui.add_dropdown(
+            METHOD_LABELS[method],
             METHODS[method],
-            table.METHODS[method],
-            initial_value=table.METHODS[method][0],
+            initial_value=METHODS[method][0],
             hint=RunParameters.model_fields[method].description,
         )
         self._follow(method, chooser)
@@ -170,7 +170,7 @@ class Inputs:
     def write_method(self, key: MethodKey, name: str, unfit: Mapping[str, str]) -> None:
         """The methods, marked where one cannot work here; of the chosen one the hint says why."""
         handle = self.by_key[key]
-        marked = {name: f"{name}{UNFIT}" if name in unfit else name for name in table.METHODS[key]}
+        marked = {name: f"{name}{UNFIT}" if name in unfit else name for name in METHODS[key]}
         with self._lock:
             if key in self._moved:
                 return
@@ -184,10 +184,10 @@ class Inputs:
 
     def label(self, key: str, *, changed: bool) -> None:
         """Write a name, marked where the value is not the default."""
-        if key in table.PARAMETERS:
-            label = label_text(table.PARAMETERS[key], changed=changed)
+        if key in PARAMETERS:
+            label = label_text(PARAMETERS[key], changed=changed)
         else:
-            words = METHODS[cast(MethodKey, key)]
+            words = METHOD_LABELS[cast(MethodKey, key)]
             label = f"• {words}" if changed else words
         for handle in self.of(key):
             handle.label = label

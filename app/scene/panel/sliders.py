@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from tracker.parameters import Parameter
+from tracker.parameters.catalogue import Parameter
 
 LOG_STEP = 0.01
 """Decades between two places of a logarithmic slider: 2.3 %."""

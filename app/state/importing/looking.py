@@ -20,7 +20,7 @@ from tracker.io.checks.timing import check_counting, check_time
 from tracker.io.importing.preview import as_sequence
 from tracker.io.importing.remedies import for_import
 from tracker.io.importing.settling import ImportPlan
-from tracker.parameters import METHODS
+from tracker.parameters.catalogue import METHODS
 from tracker.runs.fitting import default_parameters, unfit_methods
 from tracker.runs.pipeline import Cancelled, compute
 from tracker.sequences.pictures.frames import FrameReader

@@ -10,8 +10,8 @@ from typing import Any
 
 from app.state.snapshot import Change, RunState
 from app.state.workbench import Workbench
-from tracker import parameters as table
-from tracker.parameters import ParameterError, RunParameters
+from tracker.parameters.catalogue import METHODS, PARAMETERS, RunParameters
+from tracker.parameters.values import ParameterError, changed_values, value_of
 
 MOST_RUNS = 50
 """Older ones are forgotten."""
@@ -80,8 +80,8 @@ class History:
                 f"expected the number of a listed run, got {number}",
                 "GET /api/tables/runs lists them.",
             )
-        keys = (*table.METHODS, *table.PARAMETERS)
-        values = {key: table.value(run.parameters, key) for key in keys}
+        keys = (*METHODS, *PARAMETERS)
+        values = {key: value_of(run.parameters, key) for key in keys}
         if not restore(run.taught, values):
             self._workbench.set_parameters(values, "api")
 
@@ -106,7 +106,7 @@ class History:
                 if same and asked - earlier[0].asked < DRAG_SECONDS:
                     self._counted = earlier.pop(0).number - 1
             self._counted += 1
-            changes = len(table.changed(now.parameters, now.defaults))
+            changes = len(changed_values(now.parameters, now.defaults))
             at = time.strftime("%H:%M:%S")
             new = PastRun(
                 self._counted, at, sequence.name, now.sequence_key, now.parameters, changes, state,
@@ -117,5 +117,5 @@ class History:
 
 def _differing(a: RunParameters, b: RunParameters) -> frozenset[str]:
     """The keys of the values that two runs do not share."""
-    keys = (*table.METHODS, *table.PARAMETERS)
-    return frozenset(key for key in keys if table.value(a, key) != table.value(b, key))
+    keys = (*METHODS, *PARAMETERS)
+    return frozenset(key for key in keys if value_of(a, key) != value_of(b, key))

@@ -15,9 +15,9 @@ from app.errors import FULL, sentence
 from app.state.kept.json_files import read_as, set_aside, write_json
 from app.state.snapshot import Presets
 from app.state.workbench import Workbench
-from tracker import parameters as table
 from tracker.files.atomic import locked
-from tracker.parameters import ParameterError
+from tracker.parameters.catalogue import PRESETS
+from tracker.parameters.values import ParameterError, changed_values, with_current_keys
 
 YOURS = "GET /api/state lists your presets."
 
@@ -49,7 +49,7 @@ class OwnPresets:
             ParameterError: If the name is empty, too long or a built-in preset's.
         """
         now = self._workbench.snapshot()
-        self.keep(name, table.changed(now.parameters, now.defaults))
+        self.keep(name, changed_values(now.parameters, now.defaults))
 
     def keep(self, name: str, values: Mapping[str, Any]) -> None:
         """Keep values, by key against the defaults, under a name.
@@ -115,7 +115,7 @@ class OwnPresets:
     def _read(self, path: Path) -> Presets:
         """What the file has; a spoilt one is set aside, and what is known stays."""
         try:
-            return read_as(path, _KIND)
+            return _stored(path)
         except FileNotFoundError:
             return self._workbench.snapshot().presets
         except (OSError, ValueError) as error:
@@ -140,8 +140,13 @@ def keep_preset(path: Path, name: str, values: Mapping[str, Any]) -> None:
     """
     name = _checked(name)
     with locked(path):
-        presets = read_as(path, _KIND) if path.is_file() else {}
+        presets = _stored(path) if path.is_file() else {}
         write_json(path, {**presets, name: dict(values)})
+
+
+def _stored(path: Path) -> dict[str, dict[str, Any]]:
+    """The presets of a file, under the names that the parameters have now."""
+    return {name: with_current_keys(values) for name, values in read_as(path, _KIND).items()}
 
 
 def _checked(name: str) -> str:
@@ -152,7 +157,7 @@ def _checked(name: str) -> str:
         )
     if not name.isprintable():
         raise ParameterError("name", f"expected letters that can be seen, got {name!r}", YOURS)
-    if name in table.PRESETS:
+    if name in PRESETS:
         raise ParameterError(
             "name", f"expected a name of your own: {name} is a built-in preset", YOURS
         )

@@ -20,7 +20,7 @@ from app.errors import sentence
 from app.state.kept.drafts import Drafts
 from app.state.snapshot import Change
 from app.state.workbench import Workbench
-from tracker.parameters import RunParameters
+from tracker.parameters.catalogue import RunParameters
 from tracker.runs import pipeline
 from tracker.sequences.built_in import EARLIER
 from tracker.sequences.errors import SequenceError

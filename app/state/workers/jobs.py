@@ -27,7 +27,8 @@ from app.state.workers.watchdog import Watchdog
 from tracker.fusion.trajectories import Trajectories, corrected
 from tracker.library.keeping import run_for_display
 from tracker.library.records import Result
-from tracker.parameters import RunParameters, changed, with_values
+from tracker.parameters.catalogue import RunParameters
+from tracker.parameters.values import changed_values, with_values
 from tracker.runs import gaps, pipeline
 from tracker.runs.gates import notices
 from tracker.runs.outcome import why_no_tracks
@@ -331,7 +332,7 @@ class Jobs:
         snapshot = wanted.snapshot
         assert snapshot.sequence is not None
         draft = self._draft_of(snapshot.sequence.folder)
-        with self._crashes.computing(draft, key, changed(parameters, snapshot.defaults)):
+        with self._crashes.computing(draft, key, changed_values(parameters, snapshot.defaults)):
             return pipeline.compute(
                 snapshot.sequence,
                 parameters,

@@ -15,7 +15,8 @@ from app.state.snapshot import Opening
 from app.state.workbench import Workbench
 from app.state.workers.threads import be_nice
 from tracker.corrections.log import open_log
-from tracker.parameters import RunParameters, changed, with_values
+from tracker.parameters.catalogue import RunParameters
+from tracker.parameters.values import changed_values, with_values
 from tracker.runs import pipeline
 from tracker.runs.pipeline import Cancelled
 from tracker.sequences import library
@@ -125,7 +126,7 @@ class Opener:
         """
         now = self._workbench.snapshot()
         self._own_detectors[now.opened_as] = model
-        values = changed(now.parameters, now.defaults)
+        values = changed_values(now.parameters, now.defaults)
         values.pop("single_view", None)
         return self.open(now.opened_as, values)
 

@@ -18,9 +18,9 @@ from app.errors import sentence
 from app.state.snapshot import Change, Snapshot
 from app.state.workbench import Workbench
 from app.state.workers.threads import CLOSING_SECONDS, be_nice
-from tracker import parameters as table
 from tracker.evaluation import EvaluationSettings, evaluate_sequence
-from tracker.parameters import Parameter, RunParameters
+from tracker.parameters.catalogue import PARAMETERS, Parameter, RunParameters
+from tracker.parameters.values import current_key, value_of, with_values
 from tracker.runs import pipeline
 from tracker.runs.pipeline import Cancelled, Run
 
@@ -113,10 +113,10 @@ class Sensitivity:
         Raises:
             ParameterError: If there is no such parameter.
         """
-        now, keys = self._workbench.snapshot(), list(keys)
+        now, keys = self._workbench.snapshot(), list(map(current_key, keys))
         for key in keys:
-            if key not in table.PARAMETERS:
-                table.with_values(now.parameters, {key: None})  # says what is wrong
+            if key not in PARAMETERS:
+                with_values(now.parameters, {key: None})  # says what is wrong
         with self._condition:
             self._cancelled.set()
             self._cancelled = threading.Event()
@@ -155,8 +155,8 @@ class Sensitivity:
     def _basis(self, now: Snapshot, key: str) -> str:
         """Names recording and parameters but for the one: whatever that is, its curve holds."""
         assert now.sequence is not None
-        first = values_to_try(table.PARAMETERS[key], table.PARAMETERS[key].default)[0]
-        other = table.with_values(now.parameters, {key: first})
+        first = values_to_try(PARAMETERS[key], PARAMETERS[key].default)[0]
+        other = with_values(now.parameters, {key: first})
         return pipeline.stage_keys(now.sequence, other, self._seed)["tracks"]
 
     def _on_change(self, change: Change) -> None:
@@ -203,17 +203,17 @@ class Sensitivity:
             return
         basis, values = (
             self._basis(now, key),
-            values_to_try(table.PARAMETERS[key], table.value(now.parameters, key)),
+            values_to_try(PARAMETERS[key], value_of(now.parameters, key)),
         )
         before = self._curves.get((key, basis))
         known = dict(zip(before.values, before.scores, strict=True)) if before else {}
         values = tuple(dict.fromkeys((*values, *known)))
-        if table.PARAMETERS[key].kind in ("float", "int"):
+        if PARAMETERS[key].kind in ("float", "int"):
             values = tuple(sorted(values))
         measure = "MOTA" if now.sequence.ground_truth is not None else "tracks"
         for value in values:
             if value not in known:
-                parameters = table.with_values(now.parameters, {key: value})
+                parameters = with_values(now.parameters, {key: value})
                 known[value] = self._score(now, parameters, cancelled)
             there = [value for value in values if value in known]
             with self._condition:

@@ -13,8 +13,8 @@ from app.models import Model
 from app.state.scores import Reference, Scored
 from app.web.evaluation import models
 from app.web.views.timeline import Window
-from tracker import parameters as table
 from tracker.evaluation import Evaluation, compare
+from tracker.parameters.values import changed_values, value_of
 from tracker.runs import pipeline
 
 DECIMALS = 4
@@ -214,8 +214,8 @@ def comparison_of(
         a=_side(a[0]),
         b=_side(b[0]),
         parameters=[
-            models.ParameterDifference(key=key, a=table.value(before, key), b=value)
-            for key, value in table.changed(after, before).items()
+            models.ParameterDifference(key=key, a=value_of(before, key), b=value)
+            for key, value in changed_values(after, before).items()
         ],
         rows=[
             models.DifferenceInfo(
@@ -243,4 +243,4 @@ def _side(scored: Scored) -> models.ComparedRun:
 
 def changed(scored: Scored) -> dict[str, Any]:
     """The values of a run that are not the defaults of its sequence."""
-    return table.changed(scored.parameters, pipeline.default_parameters(scored.sequence))
+    return changed_values(scored.parameters, pipeline.default_parameters(scored.sequence))

@@ -30,7 +30,8 @@ from app.web.importing.models import (
 from app.web.importing.sheet.start import start_sheet
 from app.web.importing.views import info_of, wish_of
 from tracker.io.read.pieces import FormatError
-from tracker.parameters import ParameterError, RunParameters, with_values
+from tracker.parameters.catalogue import RunParameters
+from tracker.parameters.values import ParameterError, with_values
 from tracker.sequences import library
 
 router = APIRouter(prefix="/api", responses=ERRORS)

@@ -19,11 +19,11 @@ from app.web.dependencies import ERRORS, Bench, Work, nothing_open
 from app.web.library import drawing, models, preview
 from app.web.opening import begun, told_in_the_answer
 from app.web.views import results
-from tracker import parameters as table
 from tracker.library.errors import LibraryError, NoSuchRun
 from tracker.library.keeping import code_version, record_of_recording, run_for_display
 from tracker.library.records import KeptRun, Recording, Result
 from tracker.library.store import Library
+from tracker.parameters.catalogue import PARAMETERS
 from tracker.sequences import library as sequences
 from tracker.sequences.reader import FILE
 
@@ -305,7 +305,7 @@ def _result(opened: Library, number: int) -> Result:
 def _info(run: KeptRun) -> models.KeptRunInfo:
     changes = []
     for key, value in run.changes.items():
-        parameter = table.PARAMETERS.get(key)
+        parameter = PARAMETERS.get(key)
         changes.append(
             models.ChangeInfo(
                 key=key,

@@ -13,7 +13,7 @@ from numpy import ndarray
 from app.errors import sentence
 from app.state.snapshot import Snapshot
 from app.web.pictures import address
-from tracker.parameters import ColourPhdParams
+from tracker.parameters.groups.colour_phd import ColourPhdParams
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import BoxSizes

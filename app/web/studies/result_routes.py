@@ -14,7 +14,8 @@ from app.web.dependencies import ERRORS, Bench, Own, file_name, nothing_open
 from app.web.studies import models, views
 from app.web.studies.dependencies import Named, no_study
 from app.web.views import results
-from tracker import parameters as table
+from tracker.parameters.catalogue import METHODS, PARAMETERS
+from tracker.parameters.values import changed_values, value_of, with_values
 from tracker.sequences.errors import SequenceError
 from tracker.studies.errors import StudyError
 from tracker.studies.reporting.commands import track_commands
@@ -83,7 +84,7 @@ def preset(store: Named, number: int, wish: models.PresetWish, bench: Bench, own
 
 def _keep(name: str, values: dict[str, object], bench: Bench, own: Own) -> None:
     defaults = bench.snapshot().defaults
-    own.keep(name, table.changed(table.with_values(defaults, values), defaults))
+    own.keep(name, changed_values(with_values(defaults, values), defaults))
 
 
 def _values(store: Store, number: int, bench: Bench) -> dict[str, object]:
@@ -100,8 +101,8 @@ def _all(values: dict[str, object], bench: Bench) -> dict[str, object]:
     snapshot = bench.snapshot()
     if snapshot.sequence is None:
         raise nothing_open()
-    parameters = table.with_values(snapshot.defaults, values)
-    return {key: table.value(parameters, key) for key in (*table.METHODS, *table.PARAMETERS)}
+    parameters = with_values(snapshot.defaults, values)
+    return {key: value_of(parameters, key) for key in (*METHODS, *PARAMETERS)}
 
 
 @router.get("/{name}/tuned")

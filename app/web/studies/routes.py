@@ -13,7 +13,7 @@ from app.state.studies.desk import StudyDesk
 from app.web.dependencies import ERRORS, Bench, nothing_open
 from app.web.studies import models, views
 from app.web.studies.dependencies import Desk, Named, no_study
-from tracker import parameters as table
+from tracker.parameters.values import changed_values
 from tracker.runs.processes import available_cores
 from tracker.studies.definition.definition import Definition
 from tracker.studies.definition.objectives import OBJECTIVES, SELF_CONSISTENCY, WITH_TRUTH, chosen
@@ -106,7 +106,7 @@ def _definition(wish: models.StudyWish, bench: Bench) -> Definition:
     snapshot = bench.snapshot()
     if snapshot.sequence is None:
         raise nothing_open()
-    own = table.changed(snapshot.parameters, snapshot.defaults)
+    own = changed_values(snapshot.parameters, snapshot.defaults)
     ranges = {key: one.model_dump(exclude_none=True) for key, one in wish.parameters.items()}
     return definition_of(
         {
@@ -214,7 +214,7 @@ def tune(wish: models.TuneWish, desk: Desk, bench: Bench) -> models.Study:
             _free_name(desk, f"tune {snapshot.sequence.name}"),
             [views.place_of(snapshot)],
             minutes=wish.minutes,
-            changes=table.changed(snapshot.parameters, snapshot.defaults),
+            changes=changed_values(snapshot.parameters, snapshot.defaults),
             ignore_truth=wish.without_truth,
         )
         desk.define(definition)

@@ -8,9 +8,9 @@ from typing import Any
 from app.state.snapshot import Snapshot
 from app.state.studies.desk import StudyDesk
 from app.web.studies import models
-from tracker import parameters as table
 from tracker.files.folders import cache_folder
-from tracker.parameters import METHODS, PARAMETERS
+from tracker.parameters.catalogue import METHODS, PARAMETERS
+from tracker.parameters.values import shown_keys, value_of, with_values
 from tracker.studies.definition.definition import Varied
 from tracker.studies.definition.objectives import Objective
 from tracker.studies.definition.space import around
@@ -141,14 +141,12 @@ def ranges_of(snapshot: Snapshot, keys: list[str] | None) -> list[models.RangeIn
     """
     now, defaults = snapshot.parameters, snapshot.defaults
     if keys is None:
-        keys = [
-            key for key in table.shown_keys(now) if key in PARAMETERS and PARAMETERS[key].essential
-        ]
+        keys = [key for key in shown_keys(now) if key in PARAMETERS and PARAMETERS[key].essential]
     found = []
     for key in keys:
         if key not in PARAMETERS and key not in METHODS:
-            table.with_values(now, {key: None})  # says what is wrong
-        own, default = table.value(now, key), table.value(defaults, key)
+            with_values(now, {key: None})  # says what is wrong
+        own, default = value_of(now, key), value_of(defaults, key)
         if key == "single_view":
             fit = [
                 one for one in METHODS["single_view"] if one not in snapshot.unfit["single_view"]

@@ -38,10 +38,11 @@ from app.web.tables.markup import (
     vector,
 )
 from app.web.views import steps
-from tracker import parameters as parameter_table
 from tracker.evaluation import Evaluation
 from tracker.evaluation.difference import Verdict
 from tracker.evaluation.figures import Figure
+from tracker.parameters.catalogue import METHODS, PARAMETERS
+from tracker.parameters.values import changed_values, value_of
 from tracker.runs.run import given_names
 from tracker.sequences.sequence import Sequence
 
@@ -190,7 +191,7 @@ def change_table(request: Request, bench: Bench) -> str:
     snapshot = bench.snapshot()
     sensitivity: Sensitivity = request.app.state.sensitivity
     curves = _curves_of(sensitivity.curves())
-    if curves and not parameter_table.changed(snapshot.parameters, snapshot.defaults):
+    if curves and not changed_values(snapshot.parameters, snapshot.defaults):
         return line("All parameters stand at their defaults.") + curves
     return _changed(snapshot) + curves
 
@@ -212,7 +213,7 @@ def _curves_of(curves: Mapping[str, Curve]) -> str:
 
 
 def _changed(snapshot: Snapshot) -> str:
-    changed = parameter_table.changed(snapshot.parameters, snapshot.defaults)
+    changed = changed_values(snapshot.parameters, snapshot.defaults)
     if not changed:
         return blank(
             "All parameters stand at their defaults",
@@ -225,7 +226,7 @@ def _changed(snapshot: Snapshot) -> str:
             (
                 quiet(_stage(key)),
                 _name(key),
-                quiet(value_text(parameter_table.value(snapshot.defaults, key))),
+                quiet(value_text(value_of(snapshot.defaults, key))),
                 joined(value_text(value), quiet(f" {_unit(key)}".rstrip())),
                 button("reset", "reset", key, label=f"Reset {_label(key)}"),
             )
@@ -235,19 +236,19 @@ def _changed(snapshot: Snapshot) -> str:
 
 
 def _label(key: str) -> str:
-    known = parameter_table.PARAMETERS.get(key)
+    known = PARAMETERS.get(key)
     return known.label if known is not None else key.replace("_", " ")
 
 
 def _stage(key: str) -> str:
     group = key.partition(".")[0]
-    if group in parameter_table.METHODS:
+    if group in METHODS:
         return "method"
-    return group if group in parameter_table.METHODS["single_view"] else group.replace("_", " ")
+    return group if group in METHODS["single_view"] else group.replace("_", " ")
 
 
 def _name(key: str) -> Markup:
-    known = parameter_table.PARAMETERS.get(key)
+    known = PARAMETERS.get(key)
     if known is None:
         return Markup(escaped(_label(key)))
     words = joined(known.label, " ", symbol(known.symbol)).html
@@ -255,7 +256,7 @@ def _name(key: str) -> Markup:
 
 
 def _unit(key: str) -> str:
-    known = parameter_table.PARAMETERS.get(key)
+    known = PARAMETERS.get(key)
     return known.unit if known is not None else ""
 
 

@@ -12,7 +12,7 @@ from app.state.snapshot import Snapshot
 from app.state.teaching import Part, Side, Teaching
 from app.web.dependencies import ERRORS, Bench, nothing_open
 from app.web.tables.markup import Cell, Markup, escaped, id_tag, line, quiet, table
-from tracker.parameters import METHODS, method_of
+from tracker.parameters.catalogue import METHODS, method_of
 from tracker.sequences.built_in import opens_by_name
 from tracker.sequences.sequence import PRESETS, Sequence, Template
 from tracker.sequences.writing.teaching import AXES, changes, taught_values

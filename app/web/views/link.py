@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from urllib.parse import urlencode
 
-from tracker import parameters as table
-from tracker.parameters import RunParameters
+from tracker.parameters.catalogue import RunParameters
+from tracker.parameters.values import changed_values
 
 
 def address_of(base: str, opens: str, parameters: RunParameters, defaults: RunParameters) -> str:
@@ -19,6 +19,6 @@ def address_of(base: str, opens: str, parameters: RunParameters, defaults: RunPa
     """
     changes = {
         f"p.{key}": str(value).lower() if isinstance(value, bool) else value
-        for key, value in table.changed(parameters, defaults).items()
+        for key, value in changed_values(parameters, defaults).items()
     }
     return f"{base}?{urlencode({'seq': opens, **changes})}"

@@ -10,7 +10,8 @@ from app import models
 from app.state.snapshot import Snapshot
 from app.web.command_line import command_line
 from app.web.corrections import views as corrections
-from tracker import parameters as table
+from tracker.parameters.catalogue import GROUPS, METHODS, PARAMETERS, PRESETS
+from tracker.parameters.values import changed_values, shown_keys, value_of
 from tracker.sequences.writing.teaching import changes, taught_values
 
 
@@ -24,9 +25,9 @@ def state_of(snapshot: Snapshot) -> models.State:
         opening=None
         if snapshot.opening is None
         else models.OpeningInfo(**asdict(snapshot.opening)),
-        parameters={key: table.value(parameters, key) for key in table.PARAMETERS},
-        changed=list(table.changed(parameters, snapshot.defaults)),
-        shown=table.shown_keys(parameters),
+        parameters={key: value_of(parameters, key) for key in PARAMETERS},
+        changed=list(changed_values(parameters, snapshot.defaults)),
+        shown=shown_keys(parameters),
         command=command_line(snapshot),
         methods=models.MethodsInfo(
             single_view=parameters.single_view,
@@ -79,24 +80,24 @@ def _pinned_of(snapshot: Snapshot) -> models.PinnedInfo | None:
     values = pinned.parameters
     return models.PinnedInfo(
         key=pinned.key,
-        parameters={key: table.value(values, key) for key in (*table.METHODS, *table.PARAMETERS)},
-        changed=list(table.changed(values, snapshot.defaults)),
-        differs=list(table.changed(values, snapshot.parameters)),
+        parameters={key: value_of(values, key) for key in (*METHODS, *PARAMETERS)},
+        changed=list(changed_values(values, snapshot.defaults)),
+        differs=list(changed_values(values, snapshot.parameters)),
     )
 
 
 def schema() -> models.Schema:
     """Every parameter, method and preset."""
     return models.Schema(
-        groups=[models.GroupInfo(name=name, help=text) for name, text in table.GROUPS.items()],
+        groups=[models.GroupInfo(name=name, help=text) for name, text in GROUPS.items()],
         parameters=[
             models.ParameterInfo(
                 **{name: getattr(p, name) for name in models.ParameterInfo.model_fields}
             )
-            for p in table.PARAMETERS.values()
+            for p in PARAMETERS.values()
         ],
-        methods={key: list(choices) for key, choices in table.METHODS.items()},
-        presets=table.PRESETS,
+        methods={key: list(choices) for key, choices in METHODS.items()},
+        presets=PRESETS,
     )
 
 

@@ -12,7 +12,7 @@ from app.web.pictures.likelihood import key_of
 from app.web.views.owners import tell_owners
 from tracker.fusion.protocol import FusionResult
 from tracker.geometry.boxes import Boxes
-from tracker.parameters import ColourPhdParams
+from tracker.parameters.groups.colour_phd import ColourPhdParams
 from tracker.runs.pipeline import Run
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.dropped import GATES

@@ -16,10 +16,10 @@ from app.command.commands import listing
 from app.command.flags import Track, parse
 from tests.app.conftest import Runs
 from tests.app.folders import write_crossing
-from tracker import parameters
 from tracker.export import tracks_csv
 from tracker.kernels import compilation
-from tracker.parameters import PARAMETERS, ParameterError
+from tracker.parameters.catalogue import METHODS, PARAMETERS, PRESETS, RunParameters
+from tracker.parameters.values import ParameterError, value_of, with_values
 from tracker.runs import pipeline
 from tracker.runs.pipeline import Run
 from tracker.sequences.reader import read_sequence
@@ -29,7 +29,7 @@ P_D = "fusion.detection_probability"
 
 def engine_csv(crossing: Path, path: Path, changes: dict[str, Any], seed: int = 0) -> str:
     sequence = read_sequence(crossing)
-    wanted = parameters.with_values(pipeline.default_parameters(sequence), changes)
+    wanted = with_values(pipeline.default_parameters(sequence), changes)
     computed = pipeline.compute(sequence, wanted, seed=seed)
     tracks_csv.save_tracks_csv(path, sequence, computed.tracks, wanted, seed)
     return path.read_text(encoding="utf-8")
@@ -74,7 +74,7 @@ def test_methods_and_presets(run: Runs, crossing: Path, tmp_path: Path) -> None:
     out = tmp_path / "tracks.csv"
     chosen = ["--single-view", "none", "--fusion", "sequential_phd", "--preset", "published"]
     assert run("track", crossing, "-o", out, *chosen)[0] == 0
-    changes = {**parameters.PRESETS["published"], "fusion_method": "sequential_phd"}
+    changes = {**PRESETS["published"], "fusion_method": "sequential_phd"}
     assert out.read_text(encoding="utf-8") == engine_csv(crossing, tmp_path / "own.csv", changes)
 
 
@@ -144,9 +144,9 @@ def test_every_parameter_has_its_flag() -> None:
     assert isinstance(command, Track)
     changes = command.changes()
     assert list(changes) == list(PARAMETERS)
-    checked = parameters.with_values(parameters.RunParameters(), changes)
+    checked = with_values(RunParameters(), changes)
     for key, parameter in PARAMETERS.items():
-        assert parameters.value(checked, key) == parameter.default
+        assert value_of(checked, key) == parameter.default
 
 
 def test_help_names_every_flag_with_range_and_default(run: Runs) -> None:
@@ -335,7 +335,7 @@ def test_parameters(run: Runs) -> None:
     lines = stdout.splitlines()
     assert lines[0].split() == ["key", "symbol", "range", "unit", "default", "help"]
     table = {line.split()[0]: line for line in lines[1:]}
-    assert set(table) == {*PARAMETERS, *parameters.METHODS}
+    assert set(table) == {*PARAMETERS, *METHODS}
     for key, parameter in PARAMETERS.items():
         assert parameter.symbol in table[key]
         assert parameter.help in table[key]
@@ -344,7 +344,7 @@ def test_parameters(run: Runs) -> None:
 
 
 def test_changes_of_a_flag_beat_those_of_a_preset() -> None:
-    key, published = next(iter(parameters.PRESETS["published"].items()))
+    key, published = next(iter(PRESETS["published"].items()))
     other = PARAMETERS[key].default
     assert other != published
     flag = "--" + key.replace("_", "-")

@@ -10,7 +10,8 @@ from starlette.testclient import TestClient
 
 from app.command.flags import Track, parse
 from tests.app.conftest import Runs, run_is, wait_until
-from tracker import parameters
+from tracker.parameters.catalogue import PARAMETERS, RunParameters
+from tracker.parameters.values import value_of, with_values
 
 
 @pytest.mark.full
@@ -29,7 +30,7 @@ def test_it_gives_the_same_file(client: TestClient, run: Runs, tmp_path: Path) -
 def test_every_value_goes_the_way_there_and_back(client: TestClient) -> None:
     before = client.get("/api/state").json()["parameters"]
     changes = {}
-    for key, parameter in parameters.PARAMETERS.items():
+    for key, parameter in PARAMETERS.items():
         if parameter.kind == "bool":
             changes[key] = not before[key]
         elif parameter.kind == "choice":
@@ -43,6 +44,6 @@ def test_every_value_goes_the_way_there_and_back(client: TestClient) -> None:
     assert isinstance(wish, Track)
     told = {key: value for key, value in wish.changes().items() if key in before}
     assert set(told) == set(state["changed"]) & set(before)
-    taken = parameters.with_values(parameters.RunParameters(), told)
+    taken = with_values(RunParameters(), told)
     for key in told:
-        assert parameters.value(taken, key) == state["parameters"][key], key
+        assert value_of(taken, key) == state["parameters"][key], key

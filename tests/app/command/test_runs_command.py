@@ -11,7 +11,8 @@ from tests.app.conftest import Runs
 from tests.library.runs import RECORDING, filled, made_by_the_version_before
 from tests.library.runs import run as made
 from tracker.library.store import Library
-from tracker.parameters import RunParameters, with_values
+from tracker.parameters.catalogue import RunParameters
+from tracker.parameters.values import with_values
 
 
 @pytest.fixture

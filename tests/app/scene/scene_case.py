@@ -12,7 +12,7 @@ from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion import trajectories
 from tracker.fusion.protocol import FusionResult
 from tracker.geometry.camera import Camera
-from tracker.parameters import RunParameters
+from tracker.parameters.catalogue import RunParameters
 from tracker.runs.pipeline import Progress, Run, stage_keys
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Entrance, GroundTruth, Room, Sequence, View

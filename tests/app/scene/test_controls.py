@@ -6,7 +6,7 @@ import json
 import threading
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from typing import Any
+from typing import Any, get_args
 
 import pytest
 import viser
@@ -17,11 +17,11 @@ from app.paths import static_folder
 from app.scene.keys import hotkeys
 from app.scene.panel.controls import ORIGIN, Controls
 from app.scene.panel.sliders import Scale, hint_text, label_text, number_text, symbol_parts
-from app.scene.panel.topics import TOPICS, topic_of
 from app.state.workbench import Workbench
 from tests.app.scene import scene_case
-from tracker import parameters as table
-from tracker.parameters import PARAMETERS
+from tracker.parameters import Topic
+from tracker.parameters.catalogue import METHODS, PARAMETERS, PRESETS, Parameter, RunParameters
+from tracker.parameters.values import value_of, with_values
 
 SECONDS = 20.0
 P_D = "fusion.detection_probability"
@@ -55,7 +55,7 @@ def take_preset(panel: Controls, name: str) -> None:
 
 
 def value(workbench: Workbench, key: str) -> Any:
-    return table.value(workbench.snapshot().parameters, key)
+    return value_of(workbench.snapshot().parameters, key)
 
 
 class Eager:
@@ -95,14 +95,12 @@ def test_both_ends_and_the_default_stand_on_every_slider() -> None:
 
 
 @given(st.sampled_from(NUMBERS), st.floats(-0.5, 1.5))
-def test_every_place_gives_a_value_that_is_allowed(
-    parameter: table.Parameter, share: float
-) -> None:
+def test_every_place_gives_a_value_that_is_allowed(parameter: Parameter, share: float) -> None:
     scale = Scale(parameter)
     place = scale.minimum + share * (scale.maximum - scale.minimum)
     number = scale.value(place)
-    changed = table.with_values(table.RunParameters(), {parameter.key: number})
-    assert table.value(changed, parameter.key) == number
+    changed = with_values(RunParameters(), {parameter.key: number})
+    assert value_of(changed, parameter.key) == number
     # what was sent stands where it was put, unless it had to be moved into the range
     if 0.0 <= share <= 1.0:
         assert scale.stands_at(min(max(place, scale.minimum), scale.maximum), number)
@@ -211,7 +209,9 @@ def test_the_filter_lists_what_has_its_words_and_says_where_nothing_has(
 def test_every_parameter_is_about_one_thing_and_none_of_them_about_nothing(
     panel: Controls,
 ) -> None:
-    about = {topic: {k for k, p in PARAMETERS.items() if topic_of(p) == topic} for topic in TOPICS}
+    about = {
+        topic: {k for k, p in PARAMETERS.items() if p.topic == topic} for topic in get_args(Topic)
+    }
     assert sum(map(len, about.values())) == len(PARAMETERS)
     for topic, key in (
         ("Motion", "fusion.acceleration_sigma"),
@@ -227,7 +227,7 @@ def test_every_parameter_is_about_one_thing_and_none_of_them_about_nothing(
 
 
 def test_every_parameter_and_method_has_one_input(panel: Controls) -> None:
-    assert set(panel._inputs.by_key) == {*PARAMETERS, *table.METHODS}
+    assert set(panel._inputs.by_key) == {*PARAMETERS, *METHODS}
     kinds = {
         "float": viser.GuiSliderHandle,
         "int": viser.GuiSliderHandle,
@@ -354,19 +354,19 @@ def test_presets_move_the_sliders_and_those_of_ones_own_are_in_the_panel(
 ) -> None:
     take_preset(panel, "published")
     assert panel.wait(SECONDS)
-    for key, wanted in table.PRESETS["published"].items():
+    for key, wanted in PRESETS["published"].items():
         assert value(workbench, key) == wanted
         at = panel._inputs.by_key[key].value
         assert at == wanted or panel._inputs.scales[key].stands_at(at, wanted)
     workbench.apply_preset("robust")
     assert panel.wait(SECONDS)
     assert panel._presets.value == "robust"
-    assert panel._presets.options == tuple(table.PRESETS)
+    assert panel._presets.options == tuple(PRESETS)
     workbench.set_presets({"quick": {P_D: 0.6}})
     take_preset(panel, "quick")
     assert panel.wait(SECONDS)
     assert value(workbench, P_D) == 0.6
-    assert (panel._presets.value, panel._presets.options) == ("quick", (*table.PRESETS, "quick"))
+    assert (panel._presets.value, panel._presets.options) == ("quick", (*PRESETS, "quick"))
     workbench.set_parameters({P_D: 0.7}, "api")
     assert panel.wait(SECONDS)
     assert (panel._presets.value, panel._presets.options[0]) == ("own values", "own values")

@@ -14,7 +14,7 @@ from app.scene.room.editing import FACES, Face, RoomEditing, dragged, grips
 from app.state.teaching import Teaching
 from app.state.workbench import Workbench
 from tests.app.scene import scene_case
-from tracker.parameters import RunParameters
+from tracker.parameters.catalogue import RunParameters
 from tracker.sequences.pictures.frames import FrameReader
 
 RIGHT = Face("max", 0)

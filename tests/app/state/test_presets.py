@@ -12,7 +12,7 @@ from app.state.snapshot import Event, Notice
 from app.state.workbench import Workbench
 from tests.app.conftest import run_is, wait_until
 from tracker.files.folders import settings_folder
-from tracker.parameters import ParameterError, value
+from tracker.parameters.values import ParameterError, value_of
 
 P_D = "fusion.detection_probability"
 
@@ -41,7 +41,7 @@ def test_what_was_saved_is_there_again(tmp_path: Path) -> None:
     later.apply_preset("büro am Morgen")
     assert shown(later) == (["büro am Morgen"], "büro am Morgen")
     parameters = later.snapshot().parameters
-    assert (value(parameters, P_D), parameters.fusion_method) == (0.7, "sequential_phd")
+    assert (value_of(parameters, P_D), parameters.fusion_method) == (0.7, "sequential_phd")
     assert [p.name for p in path.parent.iterdir() if p.suffix == ".json"] == [path.name]
 
 

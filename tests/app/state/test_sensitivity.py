@@ -13,9 +13,9 @@ from app.scene.panel.curves import drawing_of, style_of, words_of
 from app.state.workbench import Workbench
 from app.state.workers import sensitivity as module
 from app.state.workers.sensitivity import Curve, Sensitivity, values_to_try
-from tracker import parameters as table
 from tracker.evaluation import evaluate_sequence
-from tracker.parameters import PARAMETERS, ParameterError
+from tracker.parameters.catalogue import PARAMETERS, RunParameters
+from tracker.parameters.values import ParameterError, value_of, with_values
 from tracker.runs import pipeline
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.reader import read_sequence
@@ -54,7 +54,7 @@ def test_the_values_tried_are_few_allowed_and_hold_the_one_now() -> None:
     ]
     for key, (_, values) in tried.items():
         for value in values:
-            table.with_values(table.RunParameters(), {key: value})
+            with_values(RunParameters(), {key: value})
 
 
 def test_a_curve_is_what_runs_of_these_values_reach(bench: Workbench, curves: Sensitivity) -> None:
@@ -65,8 +65,8 @@ def test_a_curve_is_what_runs_of_these_values_reach(bench: Workbench, curves: Se
     assert curve.measure == "MOTA"
     now = bench.snapshot()
     assert now.sequence is not None
-    assert curve.values == values_to_try(PARAMETERS[T_E], table.value(now.parameters, T_E))
-    last = table.with_values(now.parameters, {T_E: curve.values[-1]})
+    assert curve.values == values_to_try(PARAMETERS[T_E], value_of(now.parameters, T_E))
+    last = with_values(now.parameters, {T_E: curve.values[-1]})
     run = pipeline.compute(now.sequence, last)
     figures = evaluate_sequence(now.sequence, run.tracks).figures
     mota = next(figure.value for figure in figures if figure.definition.key == "mota")

@@ -10,7 +10,8 @@ import pytest
 from app.state.snapshot import LAYERS, Change, Command, Event, Notice, clamp
 from app.state.workbench import Workbench
 from app.state.workers.jobs import silence
-from tracker.parameters import PARAMETERS, PRESETS, ParameterError, value
+from tracker.parameters.catalogue import PARAMETERS, PRESETS
+from tracker.parameters.values import ParameterError, value_of
 from tracker.runs import pipeline
 from tracker.runs.pipeline import Progress, Run
 from tracker.sequences.pictures.frames import FrameReader
@@ -42,7 +43,7 @@ def test_values_are_taken_all_or_none(bench: Workbench) -> None:
     bench.set_parameters({P_D: 0.7}, "test")
     with pytest.raises(ParameterError, match="must be between"):
         bench.set_parameters({P_D: 0.6, "fusion.clutter_rate": 1e9}, "test")
-    assert value(bench.snapshot().parameters, P_D) == 0.7
+    assert value_of(bench.snapshot().parameters, P_D) == 0.7
     assert bench.snapshot().parameters_origin == "test"
 
 
@@ -56,7 +57,7 @@ def test_numbers_of_the_sliders_are_moved_into_their_range(bench: Workbench) -> 
         sent = {key: bounds[index] + beyond for key, bounds in ranges.items()}
         bench.set_parameters(sent, "viser")
         now = bench.snapshot().parameters
-        taken = {key: value(now, key) for key in ranges}
+        taken = {key: value_of(now, key) for key in ranges}
         assert taken == {key: bounds[index] for key, bounds in ranges.items()}
 
 
@@ -74,8 +75,8 @@ def test_reset_of_some_and_of_all(bench: Workbench) -> None:
     bench.set_parameters({P_D: 0.7, "fusion.clutter_rate": 2.0}, "test")
     bench.reset_parameters([P_D])
     now = bench.snapshot()
-    assert value(now.parameters, P_D) == value(now.defaults, P_D)
-    assert value(now.parameters, "fusion.clutter_rate") == 2.0
+    assert value_of(now.parameters, P_D) == value_of(now.defaults, P_D)
+    assert value_of(now.parameters, "fusion.clutter_rate") == 2.0
     bench.reset_parameters()
     assert bench.snapshot().parameters == now.defaults
     with pytest.raises(ParameterError, match="no such parameter"):
@@ -88,9 +89,9 @@ def test_a_preset_replaces_every_number_and_the_fusion(bench: Workbench) -> None
     now = bench.snapshot()
     assert now.parameters.single_view == "none"
     for key, published in PRESETS["published"].items():
-        assert value(now.parameters, key) == published
+        assert value_of(now.parameters, key) == published
     bench.apply_preset("robust")
-    assert value(bench.snapshot().parameters, P_D) == value(now.defaults, P_D)
+    assert value_of(bench.snapshot().parameters, P_D) == value_of(now.defaults, P_D)
     with pytest.raises(ParameterError, match="robust, published"):
         bench.apply_preset("magic")
 

@@ -20,8 +20,9 @@ from app.web.server import ROUTERS, Settings, create_app
 from tests.app.conftest import ADDRESS, run_is, wait_until
 from tests.app.folders import FRAMES
 from tests.synthetic import number_in
-from tracker import parameters
 from tracker.export import tracks_csv
+from tracker.parameters.catalogue import GROUPS, METHODS, PARAMETERS, PRESETS
+from tracker.parameters.values import with_values
 from tracker.runs import pipeline
 from tracker.sequences.reader import read_sequence
 
@@ -60,7 +61,7 @@ def test_state(client: TestClient) -> None:
     assert state["methods"]["single_view"] == "none"
     assert state["changed"] == []
     assert state["run"]["done"] == FRAMES
-    assert set(state["parameters"]) == set(parameters.PARAMETERS)
+    assert set(state["parameters"]) == set(PARAMETERS)
     assert state["viser"]["path"] == "/viser/"
 
 
@@ -80,7 +81,7 @@ def test_nothing_open(empty: TestClient) -> None:
 @pytest.mark.full
 def test_schema_has_every_parameter_with_all_a_slider_needs(client: TestClient) -> None:
     schema = client.get("/api/schema").json()
-    assert [p["key"] for p in schema["parameters"]] == list(parameters.PARAMETERS)
+    assert [p["key"] for p in schema["parameters"]] == list(PARAMETERS)
     for p in schema["parameters"]:
         assert p["help"].endswith(".")
         assert p["symbol"]
@@ -90,9 +91,9 @@ def test_schema_has_every_parameter_with_all_a_slider_needs(client: TestClient) 
             assert p["minimum"] <= p["default"] <= p["maximum"]
         if p["kind"] == "choice":
             assert p["default"] in p["choices"]
-    assert {group["name"] for group in schema["groups"]} == set(parameters.GROUPS)
-    assert set(schema["methods"]) == set(parameters.METHODS)
-    assert set(schema["presets"]) == set(parameters.PRESETS)
+    assert {group["name"] for group in schema["groups"]} == set(GROUPS)
+    assert set(schema["methods"]) == set(METHODS)
+    assert set(schema["presets"]) == set(PRESETS)
 
 
 @pytest.mark.full
@@ -199,7 +200,7 @@ def test_the_csv_is_the_engines(client: TestClient, crossing: Path, tmp_path: Pa
     assert "crossing-tracks.csv" in answer.headers["content-disposition"]
     assert answer.headers["x-run-partial"] == "false"
     sequence = read_sequence(crossing)
-    wanted = parameters.with_values(pipeline.default_parameters(sequence), {P_D: 0.9})
+    wanted = with_values(pipeline.default_parameters(sequence), {P_D: 0.9})
     run = pipeline.compute(sequence, wanted)
     assert answer.headers["x-run-key"] == run.key
     path = tmp_path / "tracks.csv"

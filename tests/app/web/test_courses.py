@@ -9,7 +9,7 @@ from starlette.testclient import TestClient
 from app.web.views.courses import KINDS, courses_of
 from app.web.views.timeline import Window
 from tests.engine.synthetic import crossing, sequence
-from tracker.parameters import RunParameters
+from tracker.parameters.catalogue import RunParameters
 from tracker.runs import pipeline
 
 STEPS = 40

@@ -14,7 +14,8 @@ from tests.app.web.test_api import assert_error
 from tracker.evaluation import evaluate_sequence
 from tracker.evaluation.report.page import report_html
 from tracker.export import tracks_csv
-from tracker.parameters import FOLLOWS, METHODS, PARAMETERS, RunParameters, value, with_values
+from tracker.parameters.catalogue import FOLLOWS, METHODS, PARAMETERS, RunParameters
+from tracker.parameters.values import value_of, with_values
 from tracker.runs import pipeline
 from tracker.sequences.reader import read_sequence
 
@@ -29,9 +30,9 @@ def test_one_default_in_definition_list_help_page_report_and_plain_run(
     assert followed.model_copy(update={"single_view": DEFINED.single_view}) == DEFINED
 
     state = client.get("/api/state").json()
-    assert state["methods"] == {key: value(followed, key) for key in METHODS}
+    assert state["methods"] == {key: value_of(followed, key) for key in METHODS}
     assert state["changed"] == []
-    assert state["parameters"] == {key: value(DEFINED, key) for key in PARAMETERS}
+    assert state["parameters"] == {key: value_of(DEFINED, key) for key in PARAMETERS}
     schema = client.get("/api/schema").json()
     assert {p["key"]: p["default"] for p in schema["parameters"]} == state["parameters"]
 

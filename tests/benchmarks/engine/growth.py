@@ -15,7 +15,8 @@ from tests.engine import synthetic
 from tests.filters.mixtures import random_mixture
 from tracker.filters import gaussian_mixture
 from tracker.geometry.camera import Camera
-from tracker.parameters import RunParameters, with_values
+from tracker.parameters.catalogue import RunParameters
+from tracker.parameters.values import with_values
 from tracker.runs import pipeline
 
 PEOPLE = RunParameters(single_view="none", fusion_method="multi_bernoulli")

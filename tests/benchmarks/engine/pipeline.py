@@ -11,7 +11,8 @@ from tests.benchmarks.measure import Measurement
 from tests.engine import synthetic
 from tracker import fusion, smoothing
 from tracker.fusion import FusionMethod, FusionResult
-from tracker.parameters import PRESETS, RunParameters, with_values
+from tracker.parameters.catalogue import PRESETS, RunParameters
+from tracker.parameters.values import with_values
 from tracker.runs import pipeline
 from tracker.sequences.reader import read_sequence
 from tracker.single_view.protocol import ViewResult

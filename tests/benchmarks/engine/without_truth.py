@@ -21,7 +21,8 @@ from scipy.stats import spearmanr
 from tests.conftest import DATA
 from tests.random_rooms import random_room
 from tracker.evaluation import evaluate_sequence
-from tracker.parameters import RunParameters, with_values
+from tracker.parameters.catalogue import RunParameters
+from tracker.parameters.values import with_values
 from tracker.review.self_consistency import estimate
 from tracker.review.self_consistency.estimate import FILE
 from tracker.runs import pipeline

@@ -29,7 +29,8 @@ from tests.browser.looking import (
 from tests.browser.serving import Server
 from tests.browser.walkers import FRAMES
 from tracker.export.tracks_csv import read_tracks_csv
-from tracker.parameters import PARAMETERS, with_values
+from tracker.parameters.catalogue import PARAMETERS
+from tracker.parameters.values import with_values
 from tracker.runs import pipeline
 from tracker.sequences.library import open_sequence
 

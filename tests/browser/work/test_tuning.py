@@ -8,7 +8,8 @@ from app.web.tables.markup import number
 from tests.browser.looking import as_at_first, ask
 from tests.browser.serving import Server
 from tracker.evaluation import compare, evaluate_sequence
-from tracker.parameters import PARAMETERS, with_values
+from tracker.parameters.catalogue import PARAMETERS
+from tracker.parameters.values import with_values
 from tracker.runs import pipeline
 from tracker.sequences.library import open_sequence
 

@@ -19,7 +19,7 @@ from typing import Any
 from tests.golden.exact import of_run
 from tests.manual.places import RECORDS, ROOT
 from tests.rooms import render
-from tracker.parameters import RunParameters
+from tracker.parameters.catalogue import RunParameters
 from tracker.runs import pipeline
 from tracker.sequences.reader import read_sequence
 

@@ -11,8 +11,8 @@ from typing import Any
 from tests.golden.pieces import PIECES, cut
 from tests.manual.places import RECORDS
 from tracker.evaluation import evaluate_sequence
-from tracker.parameters import PARAMETERS, Parameter, RunParameters, with_values
-from tracker.parameters.registry import REGISTERED
+from tracker.parameters.catalogue import PARAMETERS, REGISTERED, Parameter, RunParameters
+from tracker.parameters.values import with_values
 from tracker.runs import pipeline
 from tracker.runs.pipeline import Run
 from tracker.sequences.library import open_sequence

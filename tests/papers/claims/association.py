@@ -16,12 +16,12 @@ from tests.papers.clips.association import CLIPS, together
 from tests.papers.clips.clip import Clip
 from tests.papers.clips.light import Light, light_rows, segment
 from tests.papers.laboratory.experiment import Context, Experiment, Finding, Result
-from tracker import parameters as table
 from tracker import single_view
 from tracker.evaluation.figures import number
 from tracker.evaluation.matching import assign
 from tracker.geometry.boxes import Boxes
-from tracker.parameters import PRESETS, RunParameters, with_values
+from tracker.parameters.catalogue import PRESETS, RunParameters
+from tracker.parameters.values import changed_values, with_values
 from tracker.runs.pipeline import Cancelled
 from tracker.runs.processes import WorkerControl
 from tracker.sequences.pictures.frames import FrameReader
@@ -114,7 +114,7 @@ def run(context: Context) -> Result:
             "seeds": len(seeds),
             "clips": measured,
             "light": light.numbers(),
-            "parameters": {name: table.changed(p) for name, p in methods().items()},
+            "parameters": {name: changed_values(p) for name, p in methods().items()},
         },
         findings=_findings(measured, light),
         figure=lambda: _draw(tracked, measured, light),

@@ -12,10 +12,10 @@ import numpy as np
 from tests.papers.claims.fig3 import parameters_of
 from tests.papers.laboratory import runs
 from tests.papers.laboratory.experiment import Context, Experiment, Finding, Result
-from tracker import parameters as table
 from tracker.evaluation import EvaluationSettings, evaluate
 from tracker.evaluation.figures import number
-from tracker.parameters import RunParameters
+from tracker.parameters.catalogue import RunParameters
+from tracker.parameters.values import changed_values
 from tracker.runs.processes import WorkerControl
 from tracker.sequences.reader import read_sequence
 
@@ -73,7 +73,7 @@ def run(context: Context) -> Result:
             "steps": steps,
             "seeds": len(seeds),
             "settings": settings.model_dump(),
-            "parameters": table.changed(parameters),
+            "parameters": changed_values(parameters),
             "choices": measured,
             "by_count": {str(size): figures for size, figures in by_count.items()},
         },

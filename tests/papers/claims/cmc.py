@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 from tests.papers.laboratory import runs
 from tests.papers.laboratory.experiment import Context, Experiment, Finding, Result, Unavailable
 from tracker import fusion
-from tracker import parameters as table
 from tracker.evaluation import EvaluationSettings, evaluate_sequence
 from tracker.evaluation.figures import number
-from tracker.parameters import PRESETS, RunParameters, with_values
+from tracker.parameters.catalogue import PRESETS, RunParameters
+from tracker.parameters.values import changed_values, with_values
 from tracker.runs import pipeline
 from tracker.runs.pipeline import Cancelled, Run
 from tracker.sequences.sequence import Sequence
@@ -95,7 +95,7 @@ def run(context: Context) -> Result:
                 name: {"mota": mota, "idf1": idf1}
                 for name, (mota, idf1) in BEST_PUBLISHED.items()
             },
-            "parameters": {name: table.changed(p) for name, p in methods().items()},
+            "parameters": {name: changed_values(p) for name, p in methods().items()},
         },
         findings=_findings(measured),
         figure=lambda: _draw(measured),

@@ -11,7 +11,7 @@ from tests.papers.laboratory.attainable import attainable
 from tests.papers.laboratory.experiment import Context, Experiment, Finding, Result, Unavailable
 from tracker.evaluation import EvaluationSettings
 from tracker.evaluation.figures import number
-from tracker.parameters import changed, with_values
+from tracker.parameters.values import changed_values, with_values
 from tracker.runs import pipeline
 from tracker.runs.pipeline import Cancelled
 
@@ -82,7 +82,7 @@ def run(context: Context) -> Result:
         unmet = sum(not outcome.met for outcome in steps[-1].run.outcomes)
         measured[task.name] = {
             "gate": task.gate,
-            "changes": {**changed(parameters)},
+            "changes": {**changed_values(parameters)},
             "idf1": curve,
             "identities": best.identities,
             "best": list(best.best),

@@ -16,11 +16,11 @@ from tests.papers.laboratory import runs
 from tests.papers.laboratory.experiment import Context, Experiment, Finding, Result, Verdict
 from tests.papers.laboratory.noise import NoisyReader
 from tests.rooms import read_visibility
-from tracker import parameters as table
 from tracker.evaluation import EvaluationSettings, evaluate
 from tracker.evaluation.figures import number
 from tracker.fusion.trajectories import Trajectories
-from tracker.parameters import RunParameters
+from tracker.parameters.catalogue import RunParameters
+from tracker.parameters.values import changed_values, with_values
 from tracker.runs import pipeline
 from tracker.runs.processes import WorkerControl
 from tracker.sequences.reader import read_sequence
@@ -108,7 +108,7 @@ def run(context: Context) -> Result:
         "seeds": len(seeds),
         "noise": NOISE,
         "settings": settings.model_dump(),
-        "parameters": table.changed(parameters),
+        "parameters": changed_values(parameters),
         "groups": measured,
         "people": over_time(scheme, single),
     }
@@ -139,7 +139,7 @@ def parameters_of(sequence: Sequence) -> RunParameters:
     defaults = pipeline.default_parameters(sequence)
     if defaults.fusion.birth == "measurements":
         changes["fusion.birth"] = "both"
-    return table.with_values(defaults, changes)
+    return with_values(defaults, changes)
 
 
 def _one_seed(
@@ -157,7 +157,7 @@ def _one_seed(
 
     others = {
         f"one camera that measures {words}": alone(
-            table.with_values(parameters, {"fusion.measurement": measurement})
+            with_values(parameters, {"fusion.measurement": measurement})
         )
         for measurement, words in (("centre", "the boxes' centres"), ("box", "whole boxes"))
         if measurement != parameters.fusion.measurement

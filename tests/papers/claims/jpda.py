@@ -20,13 +20,13 @@ from tests.papers.claims import cameras
 from tests.papers.clips import clip as clips
 from tests.papers.laboratory import runs
 from tests.papers.laboratory.experiment import Context, Experiment, Finding, Result, Unavailable
-from tracker import parameters as table
 from tracker import single_view
 from tracker.evaluation.figures import number
 from tracker.evaluation.matching import assign
 from tracker.geometry.assignment import linear_sum_assignment
 from tracker.geometry.boxes import Boxes
-from tracker.parameters import PRESETS, RunParameters, with_values
+from tracker.parameters.catalogue import PRESETS, RunParameters
+from tracker.parameters.values import changed_values, with_values
 from tracker.runs.pipeline import Cancelled
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
@@ -146,7 +146,7 @@ def run(context: Context) -> Result:
             "error_of_the_middle": middle,
             "steps": STEPS,
             "half_sizes": list(HALF_SIZES),
-            "parameters": {name: table.changed(p) for name, p in methods().items()},
+            "parameters": {name: changed_values(p) for name, p in methods().items()},
         },
         findings=_findings(clip_figures),
         figure=lambda: _draw(first, measured),

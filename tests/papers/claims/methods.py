@@ -10,10 +10,10 @@ import numpy as np
 from tests.papers.claims import cameras, fig1
 from tests.papers.laboratory import runs, sequences
 from tests.papers.laboratory.experiment import Context, Experiment, Finding, Result, Unavailable
-from tracker import parameters as table
 from tracker.evaluation import EvaluationSettings, evaluate_sequence
 from tracker.evaluation.figures import number
-from tracker.parameters import METHODS, RunParameters, method_of
+from tracker.parameters.catalogue import METHODS, RunParameters, method_of
+from tracker.parameters.values import changed_values, with_values
 from tracker.runs import pipeline
 from tracker.sequences.sequence import Sequence
 
@@ -84,7 +84,7 @@ def run(context: Context) -> Result:
             "settings": settings.model_dump(),
             "sequences": measured,
             "parameters": {
-                name: table.changed(_parameters(name)) for name in (*ON_PICTURES, ON_BOXES)
+                name: changed_values(_parameters(name)) for name in (*ON_PICTURES, ON_BOXES)
             },
         },
         findings=_findings(measured),
@@ -112,7 +112,7 @@ def _scenes(context: Context, notes: list[str]) -> list[tuple[Sequence, int]]:
 
 
 def _parameters(name: str) -> RunParameters:
-    return table.with_values(RunParameters(), {"single_view": name, "fusion_method": FUSION})
+    return with_values(RunParameters(), {"single_view": name, "fusion_method": FUSION})
 
 
 def _measure(context: Context, sequence: Sequence, name: str, steps: int) -> dict[str, Any]:

@@ -17,11 +17,11 @@ from tests.papers.clips import clip as clips
 from tests.papers.clips.ppf import CLIPS
 from tests.papers.laboratory import runs
 from tests.papers.laboratory.experiment import Context, Experiment, Finding, Result, Unavailable
-from tracker import parameters as table
 from tracker import single_view
 from tracker.evaluation.figures import number
 from tracker.evaluation.matching import assign
-from tracker.parameters import PRESETS, RunParameters, with_values
+from tracker.parameters.catalogue import PRESETS, RunParameters
+from tracker.parameters.values import changed_values, with_values
 from tracker.runs.pipeline import Cancelled
 from tracker.runs.processes import WorkerControl
 from tracker.sequences.pictures.frames import FrameReader
@@ -122,7 +122,7 @@ def run(context: Context) -> Result:
             "seeds": seeds,
             "settling_seconds": SETTLING,
             "scenes": measured,
-            "parameters": {name: table.changed(p) for name, p in methods().items()},
+            "parameters": {name: changed_values(p) for name, p in methods().items()},
         },
         findings=_findings(measured),
         figure=lambda: _draw(scenes[1], followed[scenes[1].name], measured),

@@ -12,7 +12,7 @@ from numpy import ndarray
 from tests.papers.clips.association import FULL_LIGHT, coming_and_going, light, true_mask
 from tests.papers.laboratory.experiment import Context, Finding
 from tracker.evaluation.figures import number
-from tracker.parameters import ForegroundParams
+from tracker.parameters.groups.foreground import ForegroundParams
 from tracker.runs.pipeline import Cancelled
 from tracker.runs.processes import WorkerControl
 from tracker.single_view.pictures.foreground import AdaptiveForeground, first_background

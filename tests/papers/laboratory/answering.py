@@ -12,7 +12,7 @@ from tracker.corrections import Correction, Place
 from tracker.corrections.kinds import leeway
 from tracker.evaluation import EvaluationSettings, evaluate_sequence
 from tracker.fusion.trajectories import Trajectories
-from tracker.parameters import RunParameters
+from tracker.parameters.catalogue import RunParameters
 from tracker.review.queue import ReviewItem, queue
 from tracker.review.queue.item import TrackRows, confirmed
 from tracker.review.self_consistency.estimate import Common, Variant, track_variant

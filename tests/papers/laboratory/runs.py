@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from tests import rooms
 from tests.papers.laboratory.experiment import Context, Unavailable
 from tracker.fusion.trajectories import Trajectories
-from tracker.parameters import RunParameters
+from tracker.parameters.catalogue import RunParameters
 from tracker.runs import pipeline
 from tracker.runs.pipeline import Cancelled, Progress, Run
 from tracker.runs.processes import WorkerControl

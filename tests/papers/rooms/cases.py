@@ -16,9 +16,10 @@ from tests.papers.laboratory import runs
 from tests.papers.rooms.kept import keep_row
 from tests.rooms import RenderCancelled, choose, render_random
 from tests.rooms.random_rooms import VERSION
-from tracker import parameters as table
 from tracker.evaluation import evaluate_sequence
-from tracker.parameters import METHODS, RunParameters, Stage, method_of
+from tracker.parameters import Stage
+from tracker.parameters.catalogue import METHODS, RunParameters, method_of
+from tracker.parameters.values import with_values
 from tracker.runs import pipeline
 from tracker.runs.numbers_version import method_version, numbers_version
 from tracker.runs.processes import WorkerControl
@@ -145,7 +146,7 @@ def _give_way() -> None:
 
 def parameters_of(case: Case) -> RunParameters:
     """Defaults, with the method."""
-    return table.with_values(RunParameters(), {"single_view": case.method})
+    return with_values(RunParameters(), {"single_view": case.method})
 
 
 def _row(item: Item, case: Case, sequence: Sequence, control: WorkerControl) -> dict[str, Any]:

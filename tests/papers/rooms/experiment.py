@@ -14,8 +14,7 @@ from tests.papers.rooms.causes import causes_of, worst_of
 from tests.papers.rooms.kept import read_rows
 from tracker.evaluation import EvaluationSettings
 from tracker.evaluation.figures import number
-from tracker.parameters import METHODS
-from tracker.parameters.registry import FOLLOWING
+from tracker.parameters.catalogue import FOLLOWING, METHODS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -12,7 +12,7 @@ from scipy.stats import spearmanr
 from tests.engine.synthetic import crossing, sequence
 from tests.random_rooms import random_room
 from tracker.fusion.trajectories import Trajectories
-from tracker.parameters import RunParameters
+from tracker.parameters.catalogue import RunParameters
 from tracker.review.self_consistency import estimate
 from tracker.review.self_consistency.agreement import (
     agreement,

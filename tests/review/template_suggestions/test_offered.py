@@ -14,7 +14,7 @@ from tests.engine.painted import GREEN, RED, Colour, corner_box, paint, wall
 from tests.engine.synthetic import CAMERAS, HALF_EXTENTS, ROOM, walk
 from tracker.fusion.trajectories import Trajectories
 from tracker.geometry.boxes import box_overlaps
-from tracker.parameters import RunParameters
+from tracker.parameters.catalogue import RunParameters
 from tracker.review.template_suggestions import (
     Suggestion,
     drawn_boxes,

@@ -18,7 +18,7 @@ from tests.single_view.pictures.furnished import (
     with_person,
 )
 from tracker.kernels.pictures.foreground import above
-from tracker.parameters import ForegroundParams
+from tracker.parameters.groups.foreground import ForegroundParams
 from tracker.single_view.pictures.foreground import AdaptiveForeground, first_background
 from tracker.single_view.pictures.foreground.adaptive import (
     AdaptiveState,

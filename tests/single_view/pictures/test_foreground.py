@@ -19,7 +19,7 @@ from tests.single_view.pictures.furnished import (
     with_person,
 )
 from tracker.kernels.pictures import images
-from tracker.parameters import ForegroundParams
+from tracker.parameters.groups.foreground import ForegroundParams
 from tracker.single_view.pictures import foreground
 from tracker.single_view.pictures.foreground import BackgroundModel, LearntForeground, tone_curve
 

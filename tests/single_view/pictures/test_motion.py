@@ -7,7 +7,7 @@ import pytest
 from numpy import ndarray
 from numpy.testing import assert_array_equal
 
-from tracker.parameters import ForegroundParams
+from tracker.parameters.groups.foreground import ForegroundParams
 from tracker.single_view.pictures.foreground import BackgroundModel, MovingForeground, spread_steps
 
 

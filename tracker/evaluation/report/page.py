@@ -21,7 +21,7 @@ from tracker.evaluation.report.tables import (
     track_table,
 )
 from tracker.files.atomic import replacing
-from tracker.parameters import RunParameters
+from tracker.parameters.catalogue import RunParameters
 from tracker.sequences.sequence import Sequence
 
 _HERE = Path(__file__).parent

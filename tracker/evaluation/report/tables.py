@@ -8,13 +8,20 @@ from typing import Any
 
 import numpy as np
 
-from tracker import parameters as table
 from tracker.evaluation import Evaluation
 from tracker.evaluation.difference import Difference, compare
 from tracker.evaluation.figures import number
 from tracker.evaluation.matching import Tracks
 from tracker.evaluation.report.figures import DARK, colour
-from tracker.parameters import METHODS, PARAMETERS, RunParameters
+from tracker.parameters.catalogue import METHODS, PARAMETERS, RunParameters
+from tracker.parameters.values import (
+    ParameterError,
+    changed_values,
+    stage_values,
+    value_of,
+    with_current_keys,
+    with_values,
+)
 from tracker.runs.fitting import default_parameters
 from tracker.sequences.sequence import Sequence
 
@@ -195,11 +202,12 @@ def parameter_table(
         return "<p class='muted'>The parameters of these tracks are not known.</p>"
     if isinstance(parameters, RunParameters):
         return _changed_table(parameters, _defaults(sequence))
+    parameters = with_current_keys(parameters)
     known = {k: v for k, v in parameters.items() if k in PARAMETERS or k in METHODS}
     try:
         defaults = _defaults(sequence)
-        return _changed_table(table.with_values(defaults, known), defaults)
-    except table.ParameterError:  # the file is of another version: show its text
+        return _changed_table(with_values(defaults, known), defaults)
+    except ParameterError:  # the file is of another version: show its text
         return _table(("", "value"), [_row(escaped(k), escaped(v)) for k, v in parameters.items()])
 
 
@@ -213,10 +221,10 @@ def _defaults(sequence: Sequence) -> RunParameters:
 def _changed_table(parameters: RunParameters, defaults: RunParameters) -> str:
     """Return the table of all parameters with an effect; those that differ from the defaults are
     marked."""
-    used: dict[str, Any] = {key: table.value(parameters, key) for key in METHODS}
+    used: dict[str, Any] = {key: value_of(parameters, key) for key in METHODS}
     for stage in ("single_view", "fusion", "smoothing", "tracks"):
-        used |= table.stage_values(parameters, stage)
-    changed = table.changed(parameters, defaults)
+        used |= stage_values(parameters, stage)
+    changed = changed_values(parameters, defaults)
     rows, group = [], ""
     for key in used:
         parameter = PARAMETERS.get(key)
@@ -231,7 +239,7 @@ def _changed_table(parameters: RunParameters, defaults: RunParameters) -> str:
                 escaped(parameter.symbol) if parameter else "",
                 f">{_value(used[key])}",
                 escaped(parameter.unit) if parameter else "",
-                f">{_value(table.value(defaults, key))}",
+                f">{_value(value_of(defaults, key))}",
                 f"<span class='muted'>{escaped(parameter.help)}</span>" if parameter else "",
                 kind="changed" if key in changed else "",
             )

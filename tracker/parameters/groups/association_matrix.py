@@ -11,7 +11,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from tracker.parameters.definition import Params, ui
-from tracker.parameters.methods import Method, Reads, Uses
+from tracker.parameters.method import Method, Reads, Uses
 
 _APART = {"follow_mild": (True,)}
 _TARGETS = {"output": ("targets",)}
@@ -20,7 +20,9 @@ _TARGETS = {"output": ("targets",)}
 class AssociationMatrixParams(Params):
     """Single-view tracker by association matrices of foreground objects ([CMQ07])."""
 
-    reach: Annotated[float, Field(ge=0.1, le=10.0), ui("T_d", unit="object sizes", step=0.1)] = 1.0
+    reach: Annotated[
+        float, Field(ge=0.1, le=10.0), ui("T_d", "Motion", unit="object sizes", step=0.1)
+    ] = 1.0
     """Same count: how far an object may move in a step, in roots of half width × half height."""
 
     overlap: Annotated[Literal["pixels", "boxes"], ui("O∩O", published="boxes")] = "pixels"
@@ -30,7 +32,7 @@ class AssociationMatrixParams(Params):
     """Other count: objects of two steps that share more than this are the same."""
 
     confirmation_steps: Annotated[
-        int, Field(ge=1, le=100), ui("n_c", unit="steps", step=1, published=1)
+        int, Field(ge=1, le=100), ui("n_c", "Birth", unit="steps", step=1, published=1)
     ] = 5
     """A new target is confirmed once its object was alone for so long; a piece split off is not."""
 
@@ -39,35 +41,39 @@ class AssociationMatrixParams(Params):
     ] = 0.3
     """Pieces of foreground above each other, no further apart than this, are one object."""
 
-    interrupted_steps: Annotated[int, Field(ge=1, le=1000), ui("N", unit="steps", log=True)] = 25
+    interrupted_steps: Annotated[
+        int, Field(ge=1, le=1000), ui("N", "Motion", unit="steps", log=True)
+    ] = 25
     """A track without an object for longer than this has ended."""
 
-    return_similarity: Annotated[float, Field(ge=0.0, le=1.0), ui("ρ_min", step=0.01)] = 0.6
+    return_similarity: Annotated[float, Field(ge=0.0, le=1.0), ui("ρ_min", "Motion", step=0.01)] = (
+        0.6
+    )
     """An object continues an interrupted track if its colours are at least so similar."""
 
-    follow_mild: Annotated[bool, ui("MS")] = True
+    follow_mild: Annotated[bool, ui("MS", "Motion")] = True
     """Whether two people who merge under mild occlusion are tracked separately by mean shift."""
 
     mild_share: Annotated[
-        float, Field(ge=0.1, le=1.5), ui("S_k/(S_a+S_b)", step=0.01, when=_APART)
+        float, Field(ge=0.1, le=1.5), ui("S_k/(S_a+S_b)", "Motion", step=0.01, when=_APART)
     ] = 0.8
     """Two people are mildly occluded if their merged object is larger than this share of both."""
 
     occlusion_distance: Annotated[
-        float, Field(ge=0.0, le=3.0), ui("ε", unit="half widths", step=0.05, when=_APART)
+        float, Field(ge=0.0, le=3.0), ui("ε", "Motion", unit="half widths", step=0.05, when=_APART)
     ] = 0.5
     """Two people who are tracked separately become one object once their centres are this near."""
 
-    histogram_rate: Annotated[float, Field(ge=0.0, le=1.0), ui("β", step=0.01)] = 0.1
+    histogram_rate: Annotated[float, Field(ge=0.0, le=1.0), ui("β", "Motion", step=0.01)] = 0.1
     """Weight of the present colours in a track's colours, at each step in which it is alone."""
 
-    output: Annotated[Literal["targets", "objects"], ui("Y", published="objects")] = "targets"
+    output: Annotated[Literal["targets", "objects"], ui("Y", "Extraction", published="objects")] = (
+        "targets"
+    )
     """What goes to the fusion: target boxes fitted to the objects' outlines, or the objects."""
 
     acceptance: Annotated[
-        float,
-        Field(ge=-10.0, le=0.0),
-        ui("s_min", step=0.1, when=_TARGETS, essential=True),
+        float, Field(ge=-10.0, le=0.0), ui("s_min", step=0.1, when=_TARGETS, essential=True)
     ] = -2.0
     """Targets: least score of the best box of an object."""
 
@@ -92,7 +98,7 @@ class AssociationMatrixParams(Params):
     """Standard deviation of a box's half sizes."""
 
     straying: Annotated[
-        float, Field(ge=0.0, le=2.0), ui("v_s", unit="1/step", step=0.01, advanced=True)
+        float, Field(ge=0.0, le=2.0), ui("v_s", "Motion", unit="1/step", step=0.01, advanced=True)
     ] = 0.1
     """Growth of the distance at which an interrupted object may be found again, per step, as a
     share of its reach."""

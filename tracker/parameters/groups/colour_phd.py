@@ -6,15 +6,13 @@ density filtering", 2021.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
 from tracker.parameters.definition import Params, ui
-from tracker.parameters.methods import Method, Reads, Uses
-
-if TYPE_CHECKING:
-    from tracker.parameters.run import RunParameters
+from tracker.parameters.groups.foreground import ForegroundParams
+from tracker.parameters.method import Method, Reads, Uses, Values
 
 
 class ColourPeakParams(Params):
@@ -40,12 +38,12 @@ class ColourPeakParams(Params):
     likelihood at this distance."""
 
     acceptance_foreground: Annotated[
-        float, Field(ge=0.0, le=1.0), ui("f_min", step=0.01, published=0.0)
+        float, Field(ge=0.0, le=1.0), ui("f_min", "Foreground", step=0.01, published=0.0)
     ] = 0.35
     """A peak with a smaller share of foreground in its box is rejected."""
 
     foreground_weight: Annotated[
-        float, Field(ge=0.0, le=10.0), ui("a", step=0.1, published=0.0)
+        float, Field(ge=0.0, le=10.0), ui("a", "Foreground", step=0.1, published=0.0)
     ] = 3.0
     """The likelihood is multiplied by the share of foreground in the box to this power."""
 
@@ -76,7 +74,7 @@ class ColourPeakParams(Params):
     """Boxes that are compared with the templates."""
 
     foreground_samples: Annotated[
-        float, Field(ge=0.0, le=1.0), ui("s", step=0.05, published=0.0)
+        float, Field(ge=0.0, le=1.0), ui("s", "Foreground", step=0.05, published=0.0)
     ] = 0.5
     """Share of the samples drawn anywhere on the foreground; the rest from the prediction."""
 
@@ -86,7 +84,7 @@ class ColourPeakParams(Params):
     mean_shift_starts: Annotated[int, Field(ge=1, le=100), ui("K", step=1)] = 20
     """Largest number of samples from which the search for peaks starts."""
 
-    spread_starts: Annotated[bool, ui("K_s", published=False)] = True
+    spread_starts: Annotated[bool, ui("K_s", "Birth", published=False)] = True
     """Whether starts keep apart; if not, the heaviest samples are used, which are often all on one
     person."""
 
@@ -115,12 +113,16 @@ class ColourPeakParams(Params):
     """Relative spread of the samples' sizes around that of a target at the place: people differ."""
 
     merge_distance: Annotated[
-        float, Field(ge=0.1, le=5.0), ui("d_m", unit="half sizes", step=0.1, advanced=True)
+        float,
+        Field(ge=0.1, le=5.0),
+        ui("d_m", "Clutter", unit="half sizes", step=0.1, advanced=True),
     ] = 0.8
     """Climbs that end nearer to each other than this are one peak."""
 
     same_person_distance: Annotated[
-        float, Field(ge=0.1, le=5.0), ui("d_g", unit="half sizes", step=0.1, advanced=True)
+        float,
+        Field(ge=0.1, le=5.0),
+        ui("d_g", "Clutter", unit="half sizes", step=0.1, advanced=True),
     ] = 1.5
     """Least distance between two peaks of one person's colours."""
 
@@ -139,7 +141,9 @@ class ColourPeakParams(Params):
 class ColourPhdParams(ColourPeakParams):
     """Single-view GM-PHD filter on colour likelihood ([ZW21] §2.1–2.3)."""
 
-    survival_probability: Annotated[float, Field(ge=0.5, le=1.0), ui("p_S", step=0.001)] = 0.99
+    survival_probability: Annotated[
+        float, Field(ge=0.5, le=1.0), ui("p_S", "Motion", step=0.001)
+    ] = 0.99
     """Probability that a person in the picture is still there a step later."""
 
     detection_probability: Annotated[
@@ -148,43 +152,53 @@ class ColourPhdParams(ColourPeakParams):
     """Probability that a person in the picture makes a colour peak."""
 
     motion_sigma: Annotated[
-        float, Field(ge=0.1, le=50.0), ui("σ_w", unit="half sizes/√s", step=0.1, log=True)
+        float, Field(ge=0.1, le=50.0), ui("σ_w", "Motion", unit="half sizes/√s", step=0.1, log=True)
     ] = 3.0
     """Random walk: standard deviation of a person's displacement in the picture in one second."""
 
     growth_sigma: Annotated[
-        float, Field(ge=0.01, le=5.0), ui("σ_H", unit="half sizes/√s", step=0.01, log=True)
+        float,
+        Field(ge=0.01, le=5.0),
+        ui("σ_H", "Motion", unit="half sizes/√s", step=0.01, log=True),
     ] = 0.4
     """Random walk: standard deviation of the change of a box's half sizes in one second."""
 
-    birth: Annotated[Literal["peaks", "entrances", "both"], ui("γ(x)", published="entrances")] = (
-        "peaks"
-    )
+    birth: Annotated[
+        Literal["peaks", "entrances", "both"], ui("γ(x)", "Birth", published="entrances")
+    ] = "peaks"
     """Where people may appear: at peaks that no component explained, at the entrances, or both."""
 
-    birth_rate: Annotated[float, Field(ge=1e-3, le=50.0), ui("γ", unit="1/(place·s)", log=True)] = (
-        1.0
-    )
+    birth_rate: Annotated[
+        float, Field(ge=1e-3, le=50.0), ui("γ", "Birth", unit="1/(place·s)", log=True)
+    ] = 1.0
     """Expected number of people who appear at each such place in one second."""
 
     clutter_rate: Annotated[
-        float, Field(ge=0.001, le=50.0), ui("λ_c", unit="1/step", step=0.1, log=True)
+        float, Field(ge=0.001, le=50.0), ui("λ_c", "Clutter", unit="1/step", step=0.1, log=True)
     ] = 1.0
     """Expected number of false peaks, uniform over the picture and the sizes."""
 
-    pruning_threshold: Annotated[float, Field(ge=1e-8, le=0.1), ui("T", log=True)] = 1e-4
+    pruning_threshold: Annotated[float, Field(ge=1e-8, le=0.1), ui("T", "Extraction", log=True)] = (
+        1e-4
+    )
     """Components lighter than this are dropped."""
 
-    merging_threshold: Annotated[float, Field(ge=0.0, le=50.0), ui("U", step=0.5)] = 4.0
+    merging_threshold: Annotated[float, Field(ge=0.0, le=50.0), ui("U", "Extraction", step=0.5)] = (
+        4.0
+    )
     """Squared Mahalanobis distance within which a component joins a heavier one."""
 
-    max_components: Annotated[int, Field(ge=1, le=300), ui("J_max", step=1)] = 30
+    max_components: Annotated[int, Field(ge=1, le=300), ui("J_max", "Extraction", step=1)] = 30
     """The heaviest components that are kept."""
 
-    extraction_threshold: Annotated[float, Field(ge=0.01, le=0.99), ui("T_e", step=0.01)] = 0.5
+    extraction_threshold: Annotated[
+        float, Field(ge=0.01, le=0.99), ui("T_e", "Extraction", step=0.01)
+    ] = 0.5
     """A component whose weight is above this is a 2D estimate."""
 
-    output: Annotated[Literal["peaks", "estimates"], ui("Y", published="estimates")] = "peaks"
+    output: Annotated[
+        Literal["peaks", "estimates"], ui("Y", "Extraction", published="estimates")
+    ] = "peaks"
     """What goes to the fusion: this step's peaks, which lag less, or the filter's estimates."""
 
     gate_probability: Annotated[float, Field(ge=0.5, le=0.999999), ui("P_G", advanced=True)] = (
@@ -193,9 +207,9 @@ class ColourPhdParams(ColourPeakParams):
     """Probability that a person's own peak lies in the gate."""
 
 
-def _uses(parameters: RunParameters) -> Uses:
+def _uses(parameters: Values) -> Uses:
     asked = parameters.of(ColourPhdParams).asks_foreground
-    foreground = parameters.foreground.read_by_colours if asked else ()
+    foreground = parameters.of(ForegroundParams).read_by_colours if asked else ()
     reads = (Reads("colour_phd"), Reads("pictures"), *foreground)
     return Uses(pictures=True, templates="needed", reads=reads)
 

@@ -7,18 +7,20 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from tracker.parameters.definition import Params, ui
-from tracker.parameters.methods import Method, Reads, Uses
+from tracker.parameters.method import Method, Reads, Uses
 
 
 class DetectionBoxParams(Params):
     """An outside detector's boxes, as they are."""
 
     score_threshold: Annotated[
-        float, Field(ge=0.0, le=1.0), ui("s_min", step=0.01, essential=True)
+        float, Field(ge=0.0, le=1.0), ui("s_min", "Clutter", step=0.01, essential=True)
     ] = 0.0
     """Boxes with a lower score are left out."""
 
-    room_tolerance: Annotated[float, Field(ge=0.0, le=100.0), ui("d_r", unit="m", step=0.1)] = 1.0
+    room_tolerance: Annotated[
+        float, Field(ge=0.0, le=100.0), ui("d_r", "Birth", unit="m", step=0.1)
+    ] = 1.0
     """A box whose target would stand further outside the room's volume than this is clutter."""
 
     centre_sigma: Annotated[
@@ -48,46 +50,62 @@ class DetectionBoxParams(Params):
 class DetectionPhdParams(DetectionBoxParams):
     """Single-view GM-PHD filter on an outside detector's boxes."""
 
-    survival_probability: Annotated[float, Field(ge=0.5, le=1.0), ui("p_S", step=0.001)] = 0.99
+    survival_probability: Annotated[
+        float, Field(ge=0.5, le=1.0), ui("p_S", "Motion", step=0.001)
+    ] = 0.99
     """Probability that a person in the picture is still there a step later."""
 
     detection_probability: Annotated[float, Field(ge=0.05, le=1.0), ui("p_D", step=0.01)] = 0.9
     """Probability that a person in the picture gets a box."""
 
     clutter_rate: Annotated[
-        float, Field(ge=0.001, le=50.0), ui("λ_c", unit="1/step", step=0.1, log=True)
+        float, Field(ge=0.001, le=50.0), ui("λ_c", "Clutter", unit="1/step", step=0.1, log=True)
     ] = 1.0
     """Expected number of false boxes, uniform over the picture and the sizes."""
 
-    score_clutter: Annotated[float, Field(ge=0.0, le=5.0), ui("b_s", step=0.1)] = 1.0
+    score_clutter: Annotated[float, Field(ge=0.0, le=5.0), ui("b_s", "Clutter", step=0.1)] = 1.0
     """How much likelier a box of low score is clutter: the rate times exp(2 b_s (½ − score))."""
 
-    birth_rate: Annotated[float, Field(ge=1e-3, le=50.0), ui("γ", unit="1/(box·s)", log=True)] = 1.0
+    birth_rate: Annotated[
+        float, Field(ge=1e-3, le=50.0), ui("γ", "Birth", unit="1/(box·s)", log=True)
+    ] = 1.0
     """Expected number of people who appear in one second at a box that no component explained."""
 
     motion_sigma: Annotated[
-        float, Field(ge=0.05, le=50.0), ui("σ_w", unit="half heights/√s", step=0.1, log=True)
+        float,
+        Field(ge=0.05, le=50.0),
+        ui("σ_w", "Motion", unit="half heights/√s", step=0.1, log=True),
     ] = 0.5
     """Random walk: standard deviation of a person's displacement in the picture in one second."""
 
     growth_sigma: Annotated[
-        float, Field(ge=0.01, le=5.0), ui("σ_H", unit="half sizes/√s", step=0.01, log=True)
+        float,
+        Field(ge=0.01, le=5.0),
+        ui("σ_H", "Motion", unit="half sizes/√s", step=0.01, log=True),
     ] = 0.2
     """Random walk: standard deviation of the change of a box's half sizes in one second."""
 
-    pruning_threshold: Annotated[float, Field(ge=1e-8, le=0.1), ui("T", log=True)] = 1e-4
+    pruning_threshold: Annotated[float, Field(ge=1e-8, le=0.1), ui("T", "Extraction", log=True)] = (
+        1e-4
+    )
     """Components lighter than this are dropped."""
 
-    merging_threshold: Annotated[float, Field(ge=0.0, le=50.0), ui("U", step=0.5)] = 4.0
+    merging_threshold: Annotated[float, Field(ge=0.0, le=50.0), ui("U", "Extraction", step=0.5)] = (
+        4.0
+    )
     """Squared Mahalanobis distance within which a component joins a heavier one."""
 
-    max_components: Annotated[int, Field(ge=1, le=300), ui("J_max", step=1)] = 60
+    max_components: Annotated[int, Field(ge=1, le=300), ui("J_max", "Extraction", step=1)] = 60
     """The heaviest components that are kept."""
 
-    extraction_threshold: Annotated[float, Field(ge=0.01, le=0.99), ui("T_e", step=0.01)] = 0.5
+    extraction_threshold: Annotated[
+        float, Field(ge=0.01, le=0.99), ui("T_e", "Extraction", step=0.01)
+    ] = 0.5
     """A component whose weight is above this is a 2D estimate."""
 
-    output: Annotated[Literal["boxes", "estimates"], ui("Y", published="estimates")] = "boxes"
+    output: Annotated[
+        Literal["boxes", "estimates"], ui("Y", "Extraction", published="estimates")
+    ] = "boxes"
     """What goes to the fusion: the boxes that more likely are of a target than not, or the
     estimates."""
 

@@ -6,18 +6,20 @@ sequence", Control and Decision 22(4), 2007.
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from tracker.parameters.definition import Params, ui
-from tracker.parameters.methods import Reads
+from tracker.parameters.definition import Params, Topic, ui
+from tracker.parameters.method import Reads
 
 _LEARNT, _ADAPTIVE = {"model": ("learnt",)}, {"model": ("adaptive",)}
 
 
 class ForegroundParams(Params):
     """Foreground of a picture, for every method that looks at it ([CMQ07])."""
+
+    topic: ClassVar[Topic] = "Foreground"
 
     model: Annotated[Literal["learnt", "adaptive"], ui("M", published="adaptive")] = "learnt"
     """A background learnt once from the clip and one threshold, or the c-means of [CMQ07]."""
@@ -40,9 +42,7 @@ class ForegroundParams(Params):
     it, since people then stay in one place."""
 
     motion_memory: Annotated[
-        float,
-        Field(ge=0.0, le=4.0),
-        ui("T_m", unit="s", step=0.1, published=0.0, when=_LEARNT),
+        float, Field(ge=0.0, le=4.0), ui("T_m", unit="s", step=0.1, published=0.0, when=_LEARNT)
     ] = 0.6
     """Learnt: where the median is uncertain, pixels that changed within this time are
     foreground."""

@@ -6,15 +6,12 @@ density filtering", 2021.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
 from tracker.parameters.definition import Params, ui
-from tracker.parameters.methods import Method, Reads, Uses
-
-if TYPE_CHECKING:
-    from tracker.parameters.run import RunParameters
+from tracker.parameters.method import Method, Reads, Uses, Values
 
 _BOXES = {"measurement": ("box", "box_and_width")}
 _RECOGNITION = {"recognition": (True,)}
@@ -25,7 +22,7 @@ class FusionParams(Params):
     """Fusion of the cameras in 3D ([ZW21] §2.4)."""
 
     survival_probability: Annotated[
-        float, Field(ge=0.5, le=1.0), ui("p_S", step=0.001, essential=True)
+        float, Field(ge=0.5, le=1.0), ui("p_S", "Motion", step=0.001, essential=True)
     ] = 0.99
     """Probability that a person in the room is still there a step later."""
 
@@ -37,14 +34,22 @@ class FusionParams(Params):
     clutter_rate: Annotated[
         float,
         Field(ge=0.001, le=50.0),
-        ui("λ_c", unit="1/(camera·step)", step=0.1, log=True, published=0.5, essential=True),
+        ui(
+            "λ_c",
+            "Clutter",
+            unit="1/(camera·step)",
+            step=0.1,
+            log=True,
+            published=0.5,
+            essential=True,
+        ),
     ] = 3.0
     """Expected number of false boxes that a camera gives at each step."""
 
     birth_rate: Annotated[
         float,
         Field(ge=1e-4, le=10.0),
-        ui("γ", unit="1/(entrance·s)", log=True, published=0.5, essential=True),
+        ui("γ", "Birth", unit="1/(entrance·s)", log=True, published=0.5, essential=True),
     ] = 0.05
     """Expected number of people who come in at each entrance in one second."""
 
@@ -54,9 +59,7 @@ class FusionParams(Params):
     """What is used of a box: its centre; its horizontal centre, top and bottom; and its width."""
 
     posture_share: Annotated[
-        float,
-        Field(ge=0.0, le=0.5),
-        ui("ε", step=0.01, published=0.0, when=_BOXES),
+        float, Field(ge=0.0, le=0.5), ui("ε", step=0.01, published=0.0, when=_BOXES)
     ] = 0.1
     """Share of the boxes that show a person lying, crouching or bent; 0 if all people stand."""
 
@@ -64,41 +67,45 @@ class FusionParams(Params):
     """How the nonlinear projection is handled: linearised at the mean, or by unscented points."""
 
     motion: Annotated[
-        Literal["random_walk", "constant_velocity"], ui("F", published="random_walk")
+        Literal["random_walk", "constant_velocity"], ui("F", "Motion", published="random_walk")
     ] = "constant_velocity"
     """How people move between two steps."""
 
     motion_sigma: Annotated[
-        float, Field(ge=0.01, le=3.0), ui("σ_w", unit="m/√s", step=0.01, log=True, when=_WALK)
+        float,
+        Field(ge=0.01, le=3.0),
+        ui("σ_w", "Motion", unit="m/√s", step=0.01, log=True, when=_WALK),
     ] = 0.4
     """Random walk: standard deviation of a person's displacement in one second, along each axis."""
 
     acceleration_sigma: Annotated[
         float,
         Field(ge=0.05, le=10.0),
-        ui("σ_a", unit="m/s per √s", step=0.05, log=True, when=_VELOCITY, essential=True),
+        ui("σ_a", "Motion", unit="m/s per √s", step=0.05, log=True, when=_VELOCITY, essential=True),
     ] = 0.6
     """Constant velocity: standard deviation of the change of a person's velocity in one second,
     along each horizontal axis."""
 
     vertical_share: Annotated[
-        float, Field(ge=0.01, le=1.0), ui("σ_z/σ_x", step=0.01, when=_VELOCITY)
+        float, Field(ge=0.01, le=1.0), ui("σ_z/σ_x", "Motion", step=0.01, when=_VELOCITY)
     ] = 0.1
     """Constant velocity: σ_a along the vertical axis, as a share of that along the floor."""
 
     velocity_memory: Annotated[
-        float, Field(ge=0.1, le=100.0), ui("τ", unit="s", step=0.1, log=True, when=_VELOCITY)
+        float,
+        Field(ge=0.1, le=100.0),
+        ui("τ", "Motion", unit="s", step=0.1, log=True, when=_VELOCITY),
     ] = 2.0
     """Constant velocity: time after which a person who is not seen has slowed to a third."""
 
     start_velocity: Annotated[
-        float, Field(ge=0.01, le=5.0), ui("σ_v0", unit="m/s", step=0.1, when=_VELOCITY)
+        float, Field(ge=0.01, le=5.0), ui("σ_v0", "Motion", unit="m/s", step=0.1, when=_VELOCITY)
     ] = 0.7
     """Constant velocity: standard deviation of a new target's velocity along each axis, around
     0."""
 
     birth: Annotated[
-        Literal["entrances", "measurements", "both"], ui("γ(x)", published="entrances")
+        Literal["entrances", "measurements", "both"], ui("γ(x)", "Birth", published="entrances")
     ] = "both"
     """Where people may appear: at the entrances, where boxes of two cameras agree, or both."""
 
@@ -113,27 +120,31 @@ class FusionParams(Params):
     edge: Annotated[Literal["soft", "hard"], ui("∂I", published="hard")] = "soft"
     """Whether p_D falls towards the picture's edge with a target's uncertainty, or ends there."""
 
-    duplicate_distance: Annotated[float, Field(ge=0.0, le=2.0), ui("d_2", step=0.05)] = 0.5
+    duplicate_distance: Annotated[float, Field(ge=0.0, le=2.0), ui("d_2", "Clutter", step=0.05)] = (
+        0.5
+    )
     """Tracks nearer than this share of a target's width, without a box each, are one person."""
 
     room_margin: Annotated[
         float,
         Field(ge=0.0, le=5.0),
-        ui("m", unit="m", step=0.05, stage="tracks", published=0.1),
+        ui("m", "Extraction", unit="m", step=0.05, stage="tracks", published=0.1),
     ] = 0.0
     """How far outside the room's volume a person is still reported."""
 
     followed_margin: Annotated[
-        float, Field(ge=0.0, le=5.0), ui("m_f", unit="m", step=0.05, published=0.6)
+        float, Field(ge=0.0, le=5.0), ui("m_f", "Motion", unit="m", step=0.05, published=0.6)
     ] = 0.5
     """How far outside the room people are tracked, unreported, so their boxes start no track."""
 
     memory: Annotated[
-        float, Field(ge=0.0, le=30.0), ui("t_m", unit="s", step=0.1, published=0.0, essential=True)
+        float,
+        Field(ge=0.0, le=30.0),
+        ui("t_m", "Motion", unit="s", step=0.1, published=0.0, essential=True),
     ] = 3.0
     """How long a person whom no camera sees may be gone and still come back under the same id."""
 
-    recognition: Annotated[bool, ui("π", published=False)] = True
+    recognition: Annotated[bool, ui("π", "Motion", published=False)] = True
     """Multi-Bernoulli: whether colours tell people apart, also when a person who left returns."""
 
     measurement_sigma: Annotated[float, Field(ge=0.1, le=10.0), ui("σ_v", step=0.1, log=True)] = 1.0
@@ -142,22 +153,29 @@ class FusionParams(Params):
     gate_probability: Annotated[float, Field(ge=0.5, le=1.0), ui("P_G", step=0.0001)] = 0.9999
     """Probability that a person's own box lies inside the gate; 1 switches gating off."""
 
-    pruning_threshold: Annotated[float, Field(ge=1e-8, le=0.1), ui("T", log=True)] = 1e-4
+    pruning_threshold: Annotated[float, Field(ge=1e-8, le=0.1), ui("T", "Extraction", log=True)] = (
+        1e-4
+    )
     """Components lighter than this are dropped."""
 
-    merging_threshold: Annotated[float, Field(ge=0.0, le=50.0), ui("U", step=0.5)] = 4.0
+    merging_threshold: Annotated[float, Field(ge=0.0, le=50.0), ui("U", "Extraction", step=0.5)] = (
+        4.0
+    )
     """Squared Mahalanobis distance within which a component joins a heavier one."""
 
-    max_components: Annotated[int, Field(ge=5, le=500), ui("J_max", step=1)] = 60
+    max_components: Annotated[int, Field(ge=5, le=500), ui("J_max", "Extraction", step=1)] = 60
     """Largest number of components; the heaviest ones remain."""
 
     extraction: Annotated[
-        Literal["components", "boxes"], ui("W_z", stage="tracks", published="components")
+        Literal["components", "boxes"],
+        ui("W_z", "Extraction", stage="tracks", published="components"),
     ] = "components"
     """Sequential PHD: whether the components that one box made are reported singly or as one."""
 
     extraction_threshold: Annotated[
-        float, Field(ge=0.01, le=0.99), ui("T_e", step=0.01, stage="tracks", essential=True)
+        float,
+        Field(ge=0.01, le=0.99),
+        ui("T_e", "Extraction", step=0.01, stage="tracks", essential=True),
     ] = 0.5
     """A component whose weight is above this is reported as a person."""
 
@@ -204,45 +222,51 @@ class FusionParams(Params):
     """Other posture: standard deviation of the vertical displacement of the person's centre."""
 
     memory_gate_probability: Annotated[
-        float, Field(ge=0.1, le=0.9999), ui("P_m", step=0.01, advanced=True)
+        float, Field(ge=0.1, le=0.9999), ui("P_m", "Motion", step=0.01, advanced=True)
     ] = 0.9
     """Probability that a person who comes back is within the gate of the predicted position."""
 
-    recognition_doubt: Annotated[
-        float, Field(ge=0.0, le=1.0), ui("ε_r", step=0.01, advanced=True, when=_RECOGNITION)
+    recognition_outlier_probability: Annotated[
+        float,
+        Field(ge=0.0, le=1.0),
+        ui("ε_r", "Motion", step=0.01, advanced=True, when=_RECOGNITION),
     ] = 0.1
     """Recognition: probability that a box's colours are uninformative about the person."""
 
     recognition_interval: Annotated[
         float,
         Field(ge=0.01, le=60.0),
-        ui("τ_r", unit="s", log=True, advanced=True, when=_RECOGNITION),
+        ui("τ_r", "Motion", unit="s", log=True, advanced=True, when=_RECOGNITION),
     ] = 1.0
     """Recognition: pictures within this time are alike and count as one observation of colours."""
 
     recognition_swap: Annotated[
         float,
         Field(ge=0.1, le=1000.0),
-        ui("T_r", unit="s", log=True, advanced=True, when=_RECOGNITION),
+        ui("T_r", "Motion", unit="s", log=True, advanced=True, when=_RECOGNITION),
     ] = 30.0
     """Recognition: time constant with which earlier evidence of a track's identity fades."""
 
     recognition_odds: Annotated[
-        float, Field(ge=1.0, le=10000.0), ui("o_s", log=True, advanced=True, when=_RECOGNITION)
+        float,
+        Field(ge=1.0, le=10000.0),
+        ui("o_s", "Motion", log=True, advanced=True, when=_RECOGNITION),
     ] = 20.0
     """Recognition: least odds of the best assignment of ids against the best without a pair, for
     the pair to be accepted."""
 
     recognition_own_odds: Annotated[
-        float, Field(ge=1.0, le=1000.0), ui("o_o", log=True, advanced=True, when=_RECOGNITION)
+        float,
+        Field(ge=1.0, le=1000.0),
+        ui("o_o", "Motion", log=True, advanced=True, when=_RECOGNITION),
     ] = 3.0
     """Recognition: least odds of a track's colours, for one person against every other, for it to
     get that person's id."""
 
 
-def _multi_bernoulli_uses(parameters: RunParameters) -> Uses:
+def _multi_bernoulli_uses(parameters: Values) -> Uses:
     without = {"misses", "extraction"}
-    if parameters.fusion.birth == "measurements":
+    if parameters.of(FusionParams).birth == "measurements":
         without.add("merging_threshold")  # of the people not yet detected, of whom there are none
     return Uses(reads=(Reads("fusion", without=frozenset(without)),))
 

@@ -6,16 +6,13 @@ data association", patent CN101783020A, 2010.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
 from tracker.parameters.definition import Params, ui
 from tracker.parameters.groups.colour_phd import ColourPeakParams
-from tracker.parameters.methods import Method, Reads, Uses
-
-if TYPE_CHECKING:
-    from tracker.parameters.run import RunParameters
+from tracker.parameters.method import Method, Reads, Uses, Values
 
 _FOREGROUND = {"measurements": ("foreground",)}
 _CROWNS = {**_FOREGROUND, "foreground_box": ("target",)}
@@ -30,7 +27,7 @@ class JpdaParams(Params):
     detector's boxes."""
 
     foreground_box: Annotated[
-        Literal["target", "piece"], ui("z", published="piece", when=_FOREGROUND)
+        Literal["target", "piece"], ui("z", "Foreground", published="piece", when=_FOREGROUND)
     ] = "target"
     """Box of a foreground measurement: a target under each top of a piece, or the whole piece."""
 
@@ -55,31 +52,35 @@ class JpdaParams(Params):
     detection_probability: Annotated[float, Field(ge=0.05, le=0.999), ui("P_D", step=0.01)] = 0.9
     """Probability that a person in the picture makes a measurement."""
 
-    clutter: Annotated[Literal["poisson", "diffuse"], ui("g(Φ)", published="diffuse")] = "poisson"
+    clutter: Annotated[
+        Literal["poisson", "diffuse"], ui("g(Φ)", "Clutter", published="diffuse")
+    ] = "poisson"
     """Model of the number of false measurements: Poisson with a known mean, or nothing is known."""
 
     clutter_rate: Annotated[
         float,
         Field(ge=0.001, le=50.0),
-        ui("λ_c", unit="1/step", step=0.1, log=True, when={"clutter": ("poisson",)}),
+        ui("λ_c", "Clutter", unit="1/step", step=0.1, log=True, when={"clutter": ("poisson",)}),
     ] = 0.5
     """For poisson: expected number of false measurements, uniform over the picture."""
 
     gate_volume: Annotated[
         float,
         Field(ge=1.0, le=1000.0),
-        ui("V", unit="√|S|", log=True, advanced=True, when={"clutter": ("diffuse",)}),
+        ui("V", "Clutter", unit="√|S|", log=True, advanced=True, when={"clutter": ("diffuse",)}),
     ] = 9.5
     """For diffuse: volume of a gate, in which a false measurement is uniform, in standard
     deviations of the innovation."""
 
     acceleration_sigma: Annotated[
-        float, Field(ge=0.1, le=200.0), ui("σ_a", unit="half sizes/s^1.5", step=0.1, log=True)
+        float,
+        Field(ge=0.1, le=200.0),
+        ui("σ_a", "Motion", unit="half sizes/s^1.5", step=0.1, log=True),
     ] = 8.0
     """How much a person's velocity in the picture changes in one second."""
 
     velocity_sigma: Annotated[
-        float, Field(ge=0.1, le=100.0), ui("σ_v", unit="half sizes/s", step=0.1, log=True)
+        float, Field(ge=0.1, le=100.0), ui("σ_v", "Motion", unit="half sizes/s", step=0.1, log=True)
     ] = 6.0
     """Standard deviation of a new target's velocity along each axis, around 0."""
 
@@ -103,11 +104,11 @@ class JpdaParams(Params):
     ] = 2.5
     """Part of the noise of a foreground box's centre that does not depend on the box's size."""
 
-    size_rate: Annotated[float, Field(ge=0.01, le=1.0), ui("α", step=0.01)] = 0.2
+    size_rate: Annotated[float, Field(ge=0.01, le=1.0), ui("α", "Motion", step=0.01)] = 0.2
     """Weight of a measurement's size in the smoothed size of its target, at each step."""
 
     least_probability: Annotated[
-        float, Field(ge=0.0, le=0.9), ui("β_min", step=0.01, published=0.0, when=_FIVE)
+        float, Field(ge=0.0, le=0.9), ui("β_min", "Clutter", step=0.01, published=0.0, when=_FIVE)
     ] = 0.1
     """Entries of the association matrix up to this count as 0 in the choice of each target's
     case."""
@@ -118,26 +119,28 @@ class JpdaParams(Params):
     """Where occluded targets are: predicted inside the piece of foreground that hides them, or at
     rest at the one measurement that lies in all their gates."""
 
-    vanish_steps: Annotated[int, Field(ge=1, le=100), ui("k_v", unit="steps", step=1)] = 3
+    vanish_steps: Annotated[int, Field(ge=1, le=100), ui("k_v", "Motion", unit="steps", step=1)] = 3
     """A target without measurement at so many steps in a row has vanished."""
 
     return_steps: Annotated[
-        int, Field(ge=0, le=250), ui("k_s", unit="steps", step=1, when=_FIVE)
+        int, Field(ge=0, le=250), ui("k_s", "Motion", unit="steps", step=1, when=_FIVE)
     ] = 5
     """A new target in the gate of one that vanished at most so many steps ago continues it."""
 
     confirmation_steps: Annotated[
-        int, Field(ge=1, le=50), ui("k_n", unit="steps", step=1, published=1)
+        int, Field(ge=1, le=50), ui("k_n", "Birth", unit="steps", step=1, published=1)
     ] = 5
     """A new target is confirmed once it was measured at so many steps in a row."""
 
-    output: Annotated[Literal["estimates", "measurements"], ui("Y", published="estimates")] = (
-        "estimates"
-    )
+    output: Annotated[
+        Literal["estimates", "measurements"], ui("Y", "Extraction", published="estimates")
+    ] = "estimates"
     """What goes to the fusion: the targets' boxes, or the measurements that belong to targets."""
 
     longest_hidden: Annotated[
-        float, Field(ge=0.0, le=60.0), ui("t_h", unit="s", step=0.5, advanced=True, when=_FIVE)
+        float,
+        Field(ge=0.0, le=60.0),
+        ui("t_h", "Motion", unit="s", step=0.5, advanced=True, when=_FIVE),
     ] = 4.0
     """A target that stays occluded for longer than this is dropped."""
 
@@ -150,7 +153,7 @@ class JpdaParams(Params):
     leap: Annotated[
         float,
         Field(ge=0.0, le=10.0),
-        ui("k_l", unit="half sizes", step=0.1, advanced=True, when=_FIVE),
+        ui("k_l", "Motion", unit="half sizes", step=0.1, advanced=True, when=_FIVE),
     ] = 2.0
     """A target in a merged piece takes a measurement outside its gate if it is this near."""
 
@@ -223,7 +226,7 @@ class JpdaParams(Params):
     """Largest distance below a target's top at which another top may be its shoulder."""
 
 
-def _uses(parameters: RunParameters) -> Uses:
+def _uses(parameters: Values) -> Uses:
     """Return what the method uses with the chosen kind of measurements."""
     source = parameters.of(JpdaParams).measurements
     own = Reads("jpda")

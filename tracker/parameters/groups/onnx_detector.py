@@ -8,14 +8,14 @@ from pydantic import Field
 
 from tracker.parameters.definition import ui
 from tracker.parameters.groups.detections import DetectionBoxParams
-from tracker.parameters.methods import Method, Reads, Uses
+from tracker.parameters.method import Method, Reads, Uses
 
 
 class OnnxDetectorParams(DetectionBoxParams):
     """Single-view boxes of a detection network (ONNX) that is run on the pictures."""
 
     score_threshold: Annotated[
-        float, Field(ge=0.0, le=1.0), ui("s_min", step=0.01, essential=True)
+        float, Field(ge=0.0, le=1.0), ui("s_min", "Clutter", step=0.01, essential=True)
     ] = 0.35
     """Boxes with a lower score are left out."""
 

@@ -7,15 +7,13 @@ radius; λ and d_0, for flat RGB histograms, and h near that radius are chosen o
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
 from tracker.parameters.definition import Params, ui
-from tracker.parameters.methods import Method, Reads, Uses
-
-if TYPE_CHECKING:
-    from tracker.parameters.run import RunParameters
+from tracker.parameters.groups.foreground import ForegroundParams
+from tracker.parameters.method import Method, Reads, Uses, Values
 
 _PSEUDO = {"filter": ("pseudo",)}
 
@@ -45,7 +43,7 @@ class PseudoParticleParams(Params):
     """How fast a particle's weight exp(-λ d) falls with the distance d to a target's colours."""
 
     foreground_weight: Annotated[
-        float, Field(ge=0.0, le=10.0), ui("a", step=0.1, published=0.0)
+        float, Field(ge=0.0, le=10.0), ui("a", "Foreground", step=0.1, published=0.0)
     ] = 3.0
     """The weight is multiplied by the share of foreground in the box to this power."""
 
@@ -54,31 +52,35 @@ class PseudoParticleParams(Params):
     ] = 3.0
     """The weight falls by exp(-b · share of foreground above and beside the box)."""
 
-    birth: Annotated[Literal["foreground", "picture"], ui("γ(x)", published="picture")] = (
+    birth: Annotated[Literal["foreground", "picture"], ui("γ(x)", "Birth", published="picture")] = (
         "foreground"
     )
     """Where particles look for new targets: on the foreground, or anywhere in the picture."""
 
-    newcomer_share: Annotated[float, Field(ge=0.0, le=1.0), ui("s", step=0.05, when=_PSEUDO)] = 0.4
+    newcomer_share: Annotated[
+        float, Field(ge=0.0, le=1.0), ui("s", "Birth", step=0.05, when=_PSEUDO)
+    ] = 0.4
     """Share of the particles that look for new targets; all do while there is no target."""
 
     resampling: Annotated[
-        Literal["each", "together"], ui("w_i", published="together", when=_PSEUDO)
+        Literal["each", "together"], ui("w_i", "Extraction", published="together", when=_PSEUDO)
     ] = "each"
     """Whether each target's particles, and the newcomers', keep their number, or all compete."""
 
     motion_sigma: Annotated[
-        float, Field(ge=0.1, le=50.0), ui("σ_w", unit="half sizes/√s", step=0.1, log=True)
+        float, Field(ge=0.1, le=50.0), ui("σ_w", "Motion", unit="half sizes/√s", step=0.1, log=True)
     ] = 3.0
     """Random walk: standard deviation of a person's displacement in the picture in one second."""
 
     growth_sigma: Annotated[
-        float, Field(ge=0.01, le=5.0), ui("σ_H", unit="half sizes/√s", step=0.01, log=True)
+        float,
+        Field(ge=0.01, le=5.0),
+        ui("σ_H", "Motion", unit="half sizes/√s", step=0.01, log=True),
     ] = 0.4
     """Random walk: standard deviation of the change of a box's half sizes in one second."""
 
     velocity_share: Annotated[
-        float, Field(ge=0.0, le=1.0), ui("v", step=0.05, published=0.0, when=_PSEUDO)
+        float, Field(ge=0.0, le=1.0), ui("v", "Motion", step=0.05, published=0.0, when=_PSEUDO)
     ] = 0.8
     """How much of its mean displacement a target repeats: 0 is a random walk."""
 
@@ -95,14 +97,14 @@ class PseudoParticleParams(Params):
     """Radius of the mean shift's kernel; it follows the size of the target."""
 
     smallest_cluster: Annotated[
-        float, Field(ge=0.0, le=0.5), ui("c_min", step=0.005, when=_PSEUDO)
+        float, Field(ge=0.0, le=0.5), ui("c_min", "Clutter", step=0.005, when=_PSEUDO)
     ] = 0.01
     """A cluster with a smaller share of the particles is dropped."""
 
     redistribution: Annotated[
         float,
         Field(ge=0.0, le=3.0),
-        ui("σ_r", unit="half sizes", step=0.05, published=1.0, when=_PSEUDO),
+        ui("σ_r", "Extraction", unit="half sizes", step=0.05, published=1.0, when=_PSEUDO),
     ] = 0.7
     """Spread of the particles that are drawn anew around each target; 0 keeps the resampled."""
 
@@ -113,7 +115,9 @@ class PseudoParticleParams(Params):
     background."""
 
     acceptance_foreground: Annotated[
-        float, Field(ge=0.0, le=1.0), ui("f_min", step=0.01, published=0.0, when=_PSEUDO)
+        float,
+        Field(ge=0.0, le=1.0),
+        ui("f_min", "Foreground", step=0.01, published=0.0, when=_PSEUDO),
     ] = 0.35
     """A mode with a smaller share of foreground in its box is background."""
 
@@ -127,27 +131,27 @@ class PseudoParticleParams(Params):
     separation: Annotated[
         float,
         Field(ge=0.0, le=5.0),
-        ui("r_n", unit="half sizes", step=0.1, published=0.0, when=_PSEUDO),
+        ui("r_n", "Clutter", unit="half sizes", step=0.1, published=0.0, when=_PSEUDO),
     ] = 2.0
     """Least distance of a new target's mode from that of another target."""
 
     targets_per_person: Annotated[
-        int, Field(ge=1, le=10), ui("n_g", step=1, published=1, when=_PSEUDO)
+        int, Field(ge=1, le=10), ui("n_g", "Extraction", step=1, published=1, when=_PSEUDO)
     ] = 2
     """How many targets may look like one person's templates at a time."""
 
     confirmation: Annotated[
-        int, Field(ge=1, le=50), ui("n_c", unit="steps", step=1, when=_PSEUDO)
+        int, Field(ge=1, le=50), ui("n_c", "Birth", unit="steps", step=1, when=_PSEUDO)
     ] = 3
     """Number of steps at which a new target must be detected before it is confirmed."""
 
     patience: Annotated[
-        float, Field(ge=0.0, le=10.0), ui("t_p", unit="s", step=0.05, when=_PSEUDO)
+        float, Field(ge=0.0, le=10.0), ui("t_p", "Motion", unit="s", step=0.05, when=_PSEUDO)
     ] = 0.8
     """Time for which a target that is not detected is predicted before it has vanished."""
 
     memory: Annotated[
-        float, Field(ge=0.0, le=100.0), ui("t_m", unit="s", step=0.5, when=_PSEUDO)
+        float, Field(ge=0.0, le=100.0), ui("t_m", "Motion", unit="s", step=0.5, when=_PSEUDO)
     ] = 10.0
     """Time after a target vanished within which one of the same colours continues its id."""
 
@@ -161,9 +165,9 @@ class PseudoParticleParams(Params):
     ] = 0.5
     """Standard deviation of a mode's half sizes, which colour alone hardly determines."""
 
-    output: Annotated[Literal["modes", "targets"], ui("Y", published="targets", when=_PSEUDO)] = (
-        "modes"
-    )
+    output: Annotated[
+        Literal["modes", "targets"], ui("Y", "Extraction", published="targets", when=_PSEUDO)
+    ] = "modes"
     """What goes to the fusion: every mode that is not background, or the confirmed targets."""
 
     size_jitter: Annotated[float, Field(ge=0.0, le=1.0), ui("σ_s", step=0.01, advanced=True)] = 0.1
@@ -173,17 +177,19 @@ class PseudoParticleParams(Params):
     merge_distance: Annotated[
         float,
         Field(ge=0.1, le=5.0),
-        ui("d_m", unit="half sizes", step=0.1, advanced=True, when=_PSEUDO),
+        ui("d_m", "Clutter", unit="half sizes", step=0.1, advanced=True, when=_PSEUDO),
     ] = 1.0
     """Modes nearer to each other than this are one."""
 
     newcomer_misses: Annotated[
-        int, Field(ge=1, le=50), ui("n_m", unit="steps", step=1, advanced=True, when=_PSEUDO)
+        int,
+        Field(ge=1, le=50),
+        ui("n_m", "Birth", unit="steps", step=1, advanced=True, when=_PSEUDO),
     ] = 2
     """An unconfirmed target that is not detected at so many steps in a row ends."""
 
     velocity_memory: Annotated[
-        float, Field(ge=0.0, le=0.99), ui("μ", step=0.05, advanced=True, when=_PSEUDO)
+        float, Field(ge=0.0, le=0.99), ui("μ", "Motion", step=0.05, advanced=True, when=_PSEUDO)
     ] = 0.8
     """Weight of the old mean displacement at each new one."""
 
@@ -199,9 +205,9 @@ class PseudoParticleParams(Params):
         return self.birth == "foreground" or max(asked) > 0.0
 
 
-def _uses(parameters: RunParameters) -> Uses:
+def _uses(parameters: Values) -> Uses:
     asked = parameters.of(PseudoParticleParams).asks_foreground
-    foreground = parameters.foreground.read_by_colours if asked else ()
+    foreground = parameters.of(ForegroundParams).read_by_colours if asked else ()
     reads = (Reads("pseudo_particle"), Reads("pictures"), *foreground)
     return Uses(pictures=True, templates="needed", reads=reads)
 

@@ -11,7 +11,7 @@ from pydantic import Field
 
 from tracker.parameters.definition import Params, ui
 from tracker.parameters.groups.jpda import JpdaParams
-from tracker.parameters.methods import Method, Reads, Uses
+from tracker.parameters.method import Method, Reads, Uses
 
 
 class ShapesParams(Params):

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from pydantic import Field
 
-from tracker.parameters.definition import Params, ui
-from tracker.parameters.methods import Method, Reads, Uses
+from tracker.parameters.definition import Params, Topic, ui
+from tracker.parameters.method import Method, Reads, Uses
 
 
 class SmoothingParams(Params):
     """Smoothing of the tracks over all steps: positions, ends, gaps and identities."""
+
+    topic: ClassVar[Topic] = "Extraction"
 
     iterations: Annotated[int, Field(ge=1, le=10), ui("n", step=1)] = 2
     """Number of times that boxes are associated with the smoothed tracks, and tracks fitted to
@@ -21,9 +23,9 @@ class SmoothingParams(Params):
     """Whether people's heights and process noise, the cameras' offsets and noise, and the offset of
     boxes from the templates are estimated."""
 
-    memory: Annotated[float, Field(ge=0.05, le=10.0), ui("τ_z", unit="s", step=0.05, log=True)] = (
-        0.25
-    )
+    memory: Annotated[
+        float, Field(ge=0.05, le=10.0), ui("τ_z", "Motion", unit="s", step=0.05, log=True)
+    ] = 0.25
     """Correlation time of a camera's boxes and misses, within which they count as one
     observation."""
 
@@ -33,7 +35,7 @@ class SmoothingParams(Params):
     reach: Annotated[float, Field(ge=0.0, le=10.0), ui("t_e", unit="s", step=0.1)] = 1.0
     """Time before the first and after the last box of a track in which further boxes are sought."""
 
-    doubt: Annotated[float, Field(ge=0.05, le=1.0), ui("d", step=0.05)] = 0.6
+    ambiguity_threshold: Annotated[float, Field(ge=0.05, le=1.0), ui("d", step=0.05)] = 0.6
     """Identities: a track is split where this share of its boxes may as well belong to another
     track."""
 
@@ -63,7 +65,7 @@ class SmoothingParams(Params):
 
 
 _IDENTITIES_ONLY = frozenset(
-    {"doubt", "jump", "exchange", "gap", "longest", "keeping", "rounds", "appearance"}
+    {"ambiguity_threshold", "jump", "exchange", "gap", "longest", "keeping", "rounds", "appearance"}
 )
 
 NONE = Method(

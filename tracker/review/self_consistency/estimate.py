@@ -16,7 +16,7 @@ from numpy import ndarray
 from tracker.fusion.trajectories import Trajectories
 from tracker.geometry.assignment import linear_sum_assignment
 from tracker.geometry.camera import Camera
-from tracker.parameters import RunParameters
+from tracker.parameters.catalogue import RunParameters
 from tracker.review.self_consistency.agreement import (
     Disagreement,
     agreement,

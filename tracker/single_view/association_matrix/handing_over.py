@@ -14,7 +14,7 @@ from jaxtyping import Bool, Float
 from numpy import ndarray
 
 from tracker.geometry.assignment import linear_sum_assignment
-from tracker.parameters import AssociationMatrixParams
+from tracker.parameters.groups.association_matrix import AssociationMatrixParams
 from tracker.single_view.association_matrix import decision_matrices
 from tracker.single_view.association_matrix.following import coefficients
 from tracker.single_view.association_matrix.moving_objects import MovingObject, Situation, Track

@@ -15,7 +15,7 @@ from numpy import ndarray
 from scipy.sparse.csgraph import connected_components
 
 from tracker.geometry.boxes import Boxes
-from tracker.parameters import AssociationMatrixParams
+from tracker.parameters.groups.association_matrix import AssociationMatrixParams
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.association_matrix.following import follow, object_histograms
@@ -29,7 +29,7 @@ from tracker.single_view.pictures.foreground import ForegroundModel, learn, pack
 from tracker.single_view.protocol import ViewEvent, ViewResult
 
 if TYPE_CHECKING:
-    from tracker.parameters import RunParameters
+    from tracker.parameters.catalogue import RunParameters
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -17,7 +17,7 @@ from numpy import ndarray
 from tracker.geometry.camera import Camera
 from tracker.kernels.pictures import silhouettes
 from tracker.kernels.pictures.silhouettes import Acceptance, SizeTable
-from tracker.parameters import AssociationMatrixParams
+from tracker.parameters.groups.association_matrix import AssociationMatrixParams
 from tracker.sequences.sequence import Room
 from tracker.single_view.box_sizes import BoxSizes
 from tracker.single_view.pictures.blobs import Blobs

@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Float, Int, UInt8, UInt16
 from numpy import ndarray
 
-from tracker.parameters import ForegroundParams
+from tracker.parameters.groups.foreground import ForegroundParams
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import BoxSizes, geometry

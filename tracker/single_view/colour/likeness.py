@@ -13,7 +13,7 @@ from jaxtyping import Float, Float16, Int, UInt8, UInt16
 from numpy import ndarray
 
 from tracker.geometry.boxes import Boxes
-from tracker.parameters import ColourPhdParams
+from tracker.parameters.groups.colour_phd import ColourPhdParams
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.colour.templates import read_templates

@@ -15,7 +15,8 @@ from numpy import ndarray
 from scipy.special import expit
 
 from tracker.filters.gaussian_mixture import GaussianMixture
-from tracker.parameters import ColourPeakParams, ForegroundParams
+from tracker.parameters.groups.colour_phd import ColourPeakParams
+from tracker.parameters.groups.foreground import ForegroundParams
 from tracker.parameters.groups.shapes import ShapesParams
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence

@@ -9,7 +9,7 @@ from scipy.special import gammaln
 
 from tracker.filters import association
 from tracker.filters.association import MOST_ITEMS, Marginals
-from tracker.parameters import JpdaParams
+from tracker.parameters.groups.jpda import JpdaParams
 from tracker.single_view.jpda.targets import Innovations
 
 

@@ -22,7 +22,7 @@ from numpy import ndarray
 from scipy.ndimage import minimum_filter1d
 
 from tracker.geometry.camera import Camera
-from tracker.parameters import JpdaParams
+from tracker.parameters.groups.jpda import JpdaParams
 from tracker.sequences.sequence import Room
 from tracker.single_view.box_sizes import BELOW_FLOOR, BoxSizes
 from tracker.single_view.dropped import Dropped

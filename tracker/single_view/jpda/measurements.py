@@ -14,7 +14,10 @@ from numpy import ndarray
 
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.geometry.boxes import Boxes
-from tracker.parameters import ColourPhdParams, DetectionBoxParams, ForegroundParams, JpdaParams
+from tracker.parameters.groups.colour_phd import ColourPhdParams
+from tracker.parameters.groups.detections import DetectionBoxParams
+from tracker.parameters.groups.foreground import ForegroundParams
+from tracker.parameters.groups.jpda import JpdaParams
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.colour.peaks import PeakFinder
@@ -32,7 +35,7 @@ from tracker.single_view.pictures.foreground import (
 from tracker.single_view.protocol import UNCERTAINTY
 
 if TYPE_CHECKING:
-    from tracker.parameters import RunParameters
+    from tracker.parameters.catalogue import RunParameters
 
 
 @dataclass(frozen=True, slots=True, eq=False)

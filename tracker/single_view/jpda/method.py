@@ -15,7 +15,7 @@ from numpy import ndarray
 
 from tracker.filters.association import validation_matrix
 from tracker.filters.gaussian_mixture import gate_distance
-from tracker.parameters import JpdaParams
+from tracker.parameters.groups.jpda import JpdaParams
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.jpda.association import associate
@@ -33,7 +33,7 @@ from tracker.single_view.pictures.foreground import pack
 from tracker.single_view.protocol import ViewEvent, ViewResult, pack_samples
 
 if TYPE_CHECKING:
-    from tracker.parameters import RunParameters
+    from tracker.parameters.catalogue import RunParameters
 
 BELIEVED = 0.5
 """Probability above which a measurement belongs to a target: more likely than not."""

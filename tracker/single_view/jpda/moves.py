@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
-from tracker.parameters import JpdaParams
+from tracker.parameters.groups.jpda import JpdaParams
 from tracker.single_view.jpda import targets as kalman
 from tracker.single_view.jpda.cases import Cases
 from tracker.single_view.jpda.measurements import Measured

@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
 from tracker.geometry.assignment import linear_sum_assignment
-from tracker.parameters import JpdaParams
+from tracker.parameters.groups.jpda import JpdaParams
 from tracker.single_view.jpda.measurements import Measured
 from tracker.single_view.jpda.targets import Targets, concatenate, innovations
 

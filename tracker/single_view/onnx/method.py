@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy import ndarray
 
-from tracker.parameters import OnnxDetectorParams
+from tracker.parameters.groups.onnx_detector import OnnxDetectorParams
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.detector_boxes import judged
 from tracker.single_view.onnx.network import Network, Settings
 from tracker.single_view.protocol import ViewResult
 
 if TYPE_CHECKING:
-    from tracker.parameters import RunParameters
+    from tracker.parameters.catalogue import RunParameters
     from tracker.sequences.pictures.frames import Pictures
 
 

@@ -13,7 +13,7 @@ from jaxtyping import Float, Int, Int16, UInt8
 from numpy import ndarray
 from scipy.special import expit
 
-from tracker.parameters import PseudoParticleParams
+from tracker.parameters.groups.pseudo_particle import PseudoParticleParams
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.colour.appearance import Scene
@@ -30,7 +30,7 @@ from tracker.single_view.pseudo_particle.track_management import (
 )
 
 if TYPE_CHECKING:
-    from tracker.parameters import RunParameters
+    from tracker.parameters.catalogue import RunParameters
 
 CLASSICAL_LABEL = 1
 """Label of the single estimate of the classical filter."""

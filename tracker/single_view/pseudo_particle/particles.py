@@ -8,7 +8,8 @@ import numpy as np
 from jaxtyping import Float, Int, UInt8
 from numpy import ndarray
 
-from tracker.parameters import ForegroundParams, PseudoParticleParams
+from tracker.parameters.groups.foreground import ForegroundParams
+from tracker.parameters.groups.pseudo_particle import PseudoParticleParams
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.colour.appearance import Appearance, Scene

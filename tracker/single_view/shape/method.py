@@ -28,7 +28,7 @@ from tracker.single_view.shape.evidence import log_ratios, shape_sigmas
 from tracker.single_view.shape.finder import ShapeFinder
 
 if TYPE_CHECKING:
-    from tracker.parameters import RunParameters
+    from tracker.parameters.catalogue import RunParameters
 
 
 class ShapesInCamera:

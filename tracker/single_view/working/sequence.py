@@ -17,7 +17,7 @@ from tracker.single_view.working.stabilisation import SteadyReader
 from tracker.single_view.working.view import WorkingView, working_view
 
 if TYPE_CHECKING:
-    from tracker.parameters import RunParameters
+    from tracker.parameters.catalogue import RunParameters
 
 _Made = TypeVar("_Made")
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from tracker.parameters import RunParameters, with_values
+from tracker.parameters.catalogue import RunParameters
+from tracker.parameters.values import with_values
 from tracker.sequences.finding import Check, absent, good, warning
 from tracker.sequences.pictures.frames import FrameReader, Pictures
 from tracker.sequences.sequence import Sequence

@@ -20,7 +20,7 @@ from tracker.corrections.kinds import OF_PEOPLE, digest
 from tracker.corrections.kinds import leeway as corrections_leeway
 from tracker.corrections.outcomes import outcomes
 from tracker.geometry.assignment import names_by_majority
-from tracker.parameters import SmoothingParams
+from tracker.parameters.groups.smoothing import SmoothingParams
 from tracker.smoothing.identity import association, odds, splitting
 from tracker.smoothing.identity.constraints import ConstraintResolver, LinkConstraints
 from tracker.smoothing.identity.ends import Ends

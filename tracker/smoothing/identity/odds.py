@@ -10,7 +10,7 @@ from numpy import ndarray
 
 from tracker.fusion import visibility
 from tracker.kernels.smoothing import evidence
-from tracker.parameters import SmoothingParams
+from tracker.parameters.groups.smoothing import SmoothingParams
 from tracker.smoothing.identity import tracklets
 from tracker.smoothing.identity.appearance import Appearance
 from tracker.smoothing.identity.ends import Ends

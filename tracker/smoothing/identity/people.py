@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from tracker.parameters import FusionParams
+from tracker.parameters.groups.fusion import FusionParams
 from tracker.single_view.protocol import ViewResult
 from tracker.smoothing.identity import appearance
 from tracker.smoothing.paths import Links, Paths
@@ -108,7 +108,7 @@ def template_log_odds(
     owners = tracklets.owners[own.rows]
     people = seen.likenesses[0].shape[1]
     scores = np.zeros((len(tracklets.labels), people))
-    outliers = _AS_THE_FILTER.recognition_doubt
+    outliers = _AS_THE_FILTER.recognition_outlier_probability
     fresh = weight * min(smoother.model.step_time / _AS_THE_FILTER.recognition_interval, 1.0)
     for c, likeness in enumerate(seen.likenesses):
         of_camera = own.cameras == c

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
-from tracker.parameters import SmoothingParams
+from tracker.parameters.groups.smoothing import SmoothingParams
 from tracker.smoothing.identity.constraints import ConstraintResolver
 from tracker.smoothing.identity.exchanges import exchange_breaks
 from tracker.smoothing.identity.odds import FASTEST
@@ -71,10 +71,11 @@ class Splits:
 def find_splits(tracked: Tracked, p: SmoothingParams) -> Splits:
     """Find where tracks are split without any correction.
 
-    Rows are left out where a share of ``p.doubt`` of the boxes may belong to another track, around
-    a jump (the squared Mahalanobis distance between the estimates from the past and from the future
-    exceeds ``p.jump``), and where no camera detected the track for longer than ``p.gap``. Tracks
-    are also split where a swap with another track has log odds of at least ``p.exchange``.
+    Rows are left out where a share of ``p.ambiguity_threshold`` of the boxes may belong to another
+    track, around a jump (the squared Mahalanobis distance between the estimates from the past and
+    from the future exceeds ``p.jump``), and where no camera detected the track for longer than
+    ``p.gap``. Tracks are also split where a swap with another track has log odds of at least
+    ``p.exchange``.
     """
     smoother, fitted, shared = tracked.smoother, tracked.fitted, tracked.shared
     step_time, paths = smoother.model.step_time, fitted.paths
@@ -94,7 +95,7 @@ def find_splits(tracked: Tracked, p: SmoothingParams) -> Splits:
         near = np.clip(jumps + offset, 0, rows - 1)
         near = near[owners[near] == owners[jumps]]
         reasons[near] = 2
-    reasons[tracked.contested >= p.doubt] = 1
+    reasons[tracked.contested >= p.ambiguity_threshold] = 1
     breaks = np.zeros(rows, dtype=bool)
     breaks[jumps] = True
     breaks |= exchange_breaks(

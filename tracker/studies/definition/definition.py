@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from tracker.parameters import PARAMETERS, PRESETS
+from tracker.parameters.catalogue import PARAMETERS, PRESETS
 
 Search = Literal["auto", "tpe", "nsga2", "random", "grid"]
 """The search method; ``auto`` is TPE for one objective and NSGA-II for several."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 
-from tracker.parameters import PARAMETERS
+from tracker.parameters.catalogue import PARAMETERS
 from tracker.studies.definition.space import around
 
 _KEYS = ("fusion.detection_probability", "fusion.clutter_rate", "fusion.acceleration_sigma")

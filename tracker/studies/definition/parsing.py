@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import Any, get_args
 
 from tracker.files.text import not_utf_8, shown
-from tracker.parameters import METHODS, PARAMETERS, PRESETS, RunParameters, value, with_values
+from tracker.parameters.catalogue import METHODS, PARAMETERS, PRESETS, RunParameters
+from tracker.parameters.values import value_of, with_values
 from tracker.sequences.fields import did_you_mean
 from tracker.studies.definition.definition import (
     GRID_STEPS,
@@ -197,7 +198,7 @@ def _values(fields: _Fields, name: str) -> dict[str, Any]:
     values = dict(fields.table(name))
     for key in values:
         try:
-            values[key] = value(with_values(RunParameters(), {key: values[key]}), key)
+            values[key] = value_of(with_values(RunParameters(), {key: values[key]}), key)
         except ValueError as error:
             raise StudyError(f"{fields.where}, {name}: {error}") from None
     return values
@@ -279,7 +280,7 @@ def _number(fields: _Fields, where: str, key: str, found: Any) -> float:
         found: The value in the file.
     """
     try:
-        return float(value(with_values(RunParameters(), {key: found}), key))
+        return float(value_of(with_values(RunParameters(), {key: found}), key))
     except ValueError as error:
         words = str(error).removeprefix(f"{key}: ")
         hint = "`multiview-phd parameters` tells how far each goes"

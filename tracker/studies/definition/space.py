@@ -7,15 +7,8 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
-from tracker.parameters import (
-    METHODS,
-    PARAMETERS,
-    Parameter,
-    RunParameters,
-    shown_keys,
-    value,
-    with_values,
-)
+from tracker.parameters.catalogue import METHODS, PARAMETERS, Parameter, RunParameters
+from tracker.parameters.values import shown_keys, value_of, with_values
 from tracker.studies.definition.definition import Varied
 
 Draw = Callable[[Varied], Any]
@@ -149,4 +142,4 @@ def _around(parameter: Parameter, now: float) -> tuple[float, float]:
 
 def defaults_of(varied: Sequence[Varied], base: RunParameters) -> dict[str, Any]:
     """Return the values that the varied parameters have in ``base``, by key."""
-    return {one.key: value(base, one.key) for one in varied}
+    return {one.key: value_of(base, one.key) for one in varied}

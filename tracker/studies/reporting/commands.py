@@ -7,7 +7,7 @@ import shlex
 from pathlib import Path
 from typing import Any
 
-from tracker.parameters import changed, with_values
+from tracker.parameters.values import changed_values, with_values
 from tracker.runs import pipeline
 from tracker.sequences.library import open_sequence
 from tracker.studies.definition.definition import Definition
@@ -37,7 +37,7 @@ def changes_of(definition: Definition, trial: Trial, recording: str) -> dict[str
     """
     defaults = pipeline.default_parameters(open_sequence(recording))
     values = trial.values if trial.number else {}
-    return changed(with_values(defaults, {**definition.held(), **values}), defaults)
+    return changed_values(with_values(defaults, {**definition.held(), **values}), defaults)
 
 
 def _command(definition: Definition, trial: Trial, row: JobRow) -> str:

@@ -12,7 +12,7 @@ from typing import Any
 from tracker import __version__
 from tracker.evaluation.report.tables import escaped
 from tracker.files.atomic import replacing
-from tracker.parameters import PARAMETERS
+from tracker.parameters.catalogue import PARAMETERS
 from tracker.sequences.errors import SequenceError
 from tracker.studies.judging import usable
 from tracker.studies.reporting.commands import track_commands

@@ -14,7 +14,7 @@ from typing import Any, Literal
 from tracker import evaluation
 from tracker.corrections import Correction
 from tracker.library.records import NewRecording, NewRun
-from tracker.parameters import RunParameters
+from tracker.parameters.catalogue import RunParameters
 from tracker.runs.numbers_version import numbers_version
 from tracker.runs.run import stage_keys
 from tracker.sequences.sequence import Sequence

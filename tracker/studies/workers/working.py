@@ -27,7 +27,7 @@ from tracker.evaluation import evaluate_sequence
 from tracker.files.folders import cache_folder
 from tracker.kernels import compilation
 from tracker.library.keeping import record_of_recording, record_of_run, thumbnail_of
-from tracker.parameters import with_values
+from tracker.parameters.values import with_values
 from tracker.review.self_consistency import estimate
 from tracker.runs import pipeline
 from tracker.runs.pipeline import Run

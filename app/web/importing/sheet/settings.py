@@ -19,7 +19,8 @@ from app.web.importing.sheet.building import (
 )
 from app.web.importing.sheet.drawing import plan_picture
 from app.web.tables.markup import Cell, Markup, joined
-from tracker.parameters import METHODS, MethodKey
+from tracker.parameters import MethodKey
+from tracker.parameters.catalogue import METHODS
 from tracker.sequences.sequence import PRESETS
 
 AXES = "xyz"

@@ -7,7 +7,7 @@ from dataclasses import replace
 from app.web.views.decisions import decided, words_of
 from app.web.views.timeline import Timelines, Window
 from tests.engine.synthetic import crossing, sequence
-from tracker.parameters import RunParameters
+from tracker.parameters.catalogue import RunParameters
 from tracker.review.queue import queue
 from tracker.review.queue.item import TrackRows
 from tracker.review.queue.moves import tracklets_of

@@ -25,7 +25,7 @@ from app.web.server import Settings, create_app
 from tests.app.conftest import ADDRESS, connect, is_evaluated, run_is, wait_until
 from tests.app.folders import FRAMES
 from tracker.evaluation import DEFINITIONS, compare, evaluate_sequence
-from tracker.parameters import with_values
+from tracker.parameters.values import with_values
 from tracker.runs import pipeline
 from tracker.runs.pipeline import Progress, Run
 from tracker.sequences.pictures.frames import FrameReader

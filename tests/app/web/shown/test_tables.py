@@ -17,7 +17,7 @@ from app.web.server import Settings, create_app
 from app.web.tables import markup
 from tests.app.conftest import ADDRESS, is_evaluated, run_is, wait_until
 from tests.browser.walkers import write_walkers
-from tracker.parameters import PARAMETERS
+from tracker.parameters.catalogue import PARAMETERS
 
 
 def cells(html: str, label: str) -> list[list[str]]:

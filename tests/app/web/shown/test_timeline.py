@@ -16,7 +16,7 @@ from app.web.views.timeline import MOST_TRACKS, Timelines, Window, counts, numbe
 from tests.app.folders import FRAMES
 from tests.engine.synthetic import crossing, sequence
 from tracker.fusion.trajectories import Trajectories
-from tracker.parameters import RunParameters
+from tracker.parameters.catalogue import RunParameters
 from tracker.runs import pipeline
 from tracker.runs.pipeline import Run
 

@@ -2,8 +2,8 @@
 
 A method of stage 1, 2 or 3 is described once, by a :class:`Method`. The descriptions give
 the choices of the command line and of the page, the parameters that are shown and
-that a result depends on, and whether a method can work on a recording. Methods of this
-project and of plugins are registered alike: see :mod:`tracker.parameters.registry`.
+that a result depends on, and whether a method can work on a recording. Methods of this project and
+of other packages are listed alike: see :mod:`tracker.parameters.catalogue`.
 """
 
 from __future__ import annotations
@@ -11,15 +11,21 @@ from __future__ import annotations
 import importlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal, Protocol, TypeVar
 
 from tracker.parameters.definition import Params
 
-if TYPE_CHECKING:
-    from tracker.parameters.run import RunParameters
+P = TypeVar("P", bound=Params)
 
 MethodKey = Literal["single_view", "fusion_method", "smoothing_method"]
 """The parameter that chooses the method of stage 1, of stage 2, or of stage 3."""
+
+
+class Values(Protocol):
+    """The values of a run, as far as the description of a method depends on them."""
+
+    def of(self, kind: type[P]) -> P:
+        """Return the values of one group, by the class that defines it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +86,7 @@ class Method:
             ``(sequence, parameters)`` and expects a
             :class:`~tracker.fusion.protocol.FusionMethod`; stage 3 calls it with the same and
             expects a :class:`~tracker.smoothing.protocol.SmoothingMethod`. ``parameters`` are those
-            of the run; :meth:`RunParameters.of` returns the method's own group.
+            of the run; :meth:`Values.of` returns the method's own group.
         uses: What the method uses, or a function that returns it for the chosen values. A
             parameter that is left out here is not shown and must not change any result.
         parameters: The class of the method's own parameters; None if it has none.
@@ -90,7 +96,7 @@ class Method:
     name: str
     help: str
     made_by: str | Callable[..., Any] | None = None
-    uses: Uses | Callable[[RunParameters], Uses] = field(default_factory=Uses)
+    uses: Uses | Callable[[Values], Uses] = field(default_factory=Uses)
     parameters: type[Params] | None = None
     group: str = ""
     resolves_identities: bool = False
@@ -102,12 +108,12 @@ class Method:
         """The name of the group of the method's own parameters."""
         return self.group or self.name
 
-    def used(self, parameters: RunParameters) -> Uses:
+    def used(self, parameters: Values) -> Uses:
         """Return what the method uses with the values of these parameters."""
         return self.uses if isinstance(self.uses, Uses) else self.uses(parameters)
 
     def load(self) -> Callable[..., Any]:
-        """Import the class or function that makes the method of a plugin.
+        """Import the class or function that makes the method of another package.
 
         Raises:
             ValueError: If ``made_by`` is None.

@@ -13,18 +13,20 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from tracker.parameters import (
+from tracker.parameters import Stage
+from tracker.parameters.catalogue import (
     GROUPS,
     METHODS,
     PARAMETERS,
     PRESETS,
     Parameter,
-    ParameterError,
     RunParameters,
-    Stage,
-    changed,
+)
+from tracker.parameters.values import (
+    ParameterError,
+    changed_values,
     stage_values,
-    value,
+    value_of,
     with_values,
 )
 
@@ -89,7 +91,7 @@ def test_every_value_belongs_to_exactly_one_stage() -> None:
         assert set(METHODS) <= set(keys)
         for stage in STAGES:
             for key, found in stage_values(parameters, stage).items():
-                assert found == value(parameters, key)
+                assert found == value_of(parameters, key)
         covered |= set(keys)
     assert covered == {*METHODS, *PARAMETERS}, "a value that no stage depends on does nothing"
 
@@ -115,7 +117,7 @@ def test_both_bounds_are_taken_and_what_lies_beyond_is_refused_with_range_and_va
             if not (said.startswith(expected) and p.unit in said and said.endswith(f"got {wrong}")):
                 faults.append(f"{p.key}: {wrong} is refused by {said!r}")
         for right in (p.minimum, p.maximum):
-            if value(with_values(DEFAULTS, {p.key: right}), p.key) != right:
+            if value_of(with_values(DEFAULTS, {p.key: right}), p.key) != right:
                 faults.append(f"{p.key}: {right} is not taken as it is")
     assert not faults
 
@@ -153,7 +155,7 @@ def test_a_switch_understands_words() -> None:
     faults = []
     for p in numbers("bool"):
         for word, meant in words.items():
-            if value(with_values(DEFAULTS, {p.key: word}), p.key) is not meant:
+            if value_of(with_values(DEFAULTS, {p.key: word}), p.key) is not meant:
                 faults.append(f"{p.key}: {word!r} is not {meant}")
         if not refusal(p.key, "perhaps").endswith("expected true or false, got 'perhaps'"):
             faults.append(f"{p.key}: 'perhaps' is refused by {refusal(p.key, 'perhaps')!r}")
@@ -164,7 +166,7 @@ def test_a_choice_that_does_not_exist_is_told_the_ones_that_do() -> None:
     faults = []
     for key, choices in {**METHODS, **{p.key: p.choices for p in numbers("choice")}}.items():
         for choice in choices:
-            if value(with_values(DEFAULTS, {key: choice}), key) != choice:
+            if value_of(with_values(DEFAULTS, {key: choice}), key) != choice:
                 faults.append(f"{key}: {choice} is not taken")
         for wrong in ("magic", 3, None):
             expected = f"{key}: expected one of {', '.join(choices)}, got {wrong!r}"
@@ -216,19 +218,19 @@ def changes(draw: st.DrawFn) -> dict[str, Any]:
 def test_changes_go_round(wanted: dict[str, Any]) -> None:
     after = with_values(DEFAULTS, wanted)
     differing = {k: v for k, v in wanted.items() if v != PARAMETERS[k].default}
-    assert changed(after) == differing
-    assert with_values(DEFAULTS, changed(after)) == after
-    assert with_values(DEFAULTS, {k: str(v) for k, v in changed(after).items()}) == after
+    assert changed_values(after) == differing
+    assert with_values(DEFAULTS, changed_values(after)) == after
+    assert with_values(DEFAULTS, {k: str(v) for k, v in changed_values(after).items()}) == after
     assert RunParameters.model_validate_json(after.model_dump_json()) == after
-    assert changed(after, after) == {}
-    assert set(changed(DEFAULTS, after)) == set(differing)
+    assert changed_values(after, after) == {}
+    assert set(changed_values(DEFAULTS, after)) == set(differing)
 
 
 @pytest.mark.parametrize("name", sorted(PRESETS))
 def test_a_preset_sets_what_it_says_and_nothing_else(name: str) -> None:
     after = with_values(DEFAULTS, PRESETS[name])
-    assert all(value(after, key) == wanted for key, wanted in PRESETS[name].items())
-    assert set(changed(after)) <= set(PRESETS[name])
+    assert all(value_of(after, key) == wanted for key, wanted in PRESETS[name].items())
+    assert set(changed_values(after)) <= set(PRESETS[name])
 
 
 def test_values_are_never_changed_in_place() -> None:
