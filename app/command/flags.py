@@ -92,6 +92,9 @@ class Serve:
     memory: Annotated[float | None, arg(metavar="GB", help_behavior_hint="(optional)")] = None
     """Memory for what is kept for speed, pictures and columns of runs; half of the machine, and
     no more than 1 GB, where it is not said."""
+    disk: Annotated[float | None, arg(metavar="GB", help_behavior_hint="(optional)")] = None
+    """Disk space for what cameras found in earlier runs, of which the least recently used goes
+    first; $MULTIVIEW_PHD_CACHE_GB, or 2 GB, where it is not said. 0 keeps none."""
 
 
 @dataclass

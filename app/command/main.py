@@ -34,7 +34,7 @@ from app.command.flags import (
     parse,
 )
 from app.command.terminal import FAILURE, CommandError, check_data, check_keep, say
-from tracker.files.folders import library_file
+from tracker.files.folders import MOST_GB, cache_bytes, library_file
 from tracker.parameters.values import ParameterError
 
 if TYPE_CHECKING:
@@ -181,6 +181,8 @@ def _serve(command: Serve, run: int | Result | None = None) -> int:
     check_keep(command.keep)
     if command.memory is not None and not 0.0625 <= command.memory <= 65536.0:
         raise ParameterError("--memory", f"expected 0.0625 to 65536 GB, got {command.memory:g}")
+    if command.disk is not None and not 0.0 <= command.disk <= MOST_GB:
+        raise ParameterError("--disk", f"expected 0 to {MOST_GB} GB, got {command.disk:g}")
     gc.disable()  # a seventh of the time: nothing that is imported ever goes
     from app.state.workers.opening import locate
     from app.web import server
@@ -245,6 +247,7 @@ def _serve(command: Serve, run: int | Result | None = None) -> int:
             library=None if isinstance(run, Result) else command.library or library_file(),
             keep=command.keep,
             memory=None if command.memory is None else int(command.memory * 2**30),
+            disk=cache_bytes() if command.disk is None else int(command.disk * 2**30),
             run=run,
             say=say,
             ended=None if life is None else life.ended,

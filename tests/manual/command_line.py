@@ -29,6 +29,21 @@ Three places are kept outside the sequences: compiled kernels and what cameras f
 of a built-in room, in `~/.config/multiview-phd` or `$MULTIVIEW_PHD_SETTINGS`; the library of runs
 and the studies in `~/.local/share/multiview-phd`. With `MULTIVIEW_PHD_TRACEBACK=1` an unexpected
 failure shows where it happened.
+
+## The cache
+
+What the methods of stage 1 found in the pictures of a recording is written to the folder
+`stages` of the cache once a run has all of its steps, so that a run with other values of the
+later stages, also after the next start, reads no picture again. All that lies there can be
+computed anew and may be deleted at any time.
+
+It takes 2 GB at most, or `$MULTIVIEW_PHD_CACHE_GB` of all commands, studies and their workers,
+or `serve --disk GB` of one workbench; 0 keeps nothing. What was used least recently is deleted
+first: when a result is written, and at the start for a limit that is lower than before. A
+result that is larger than the limit is not written: an hour of one camera at 25 fps takes about
+0.8 GB, so that long recordings of several cameras want a higher limit. Where the disk is full
+or the folder cannot be written to, runs go on without the cache, with a line in the log; `track
+--no-cache` neither reads nor writes it.
 """
 
 WIDTH = "88"

@@ -17,6 +17,7 @@ import pytest
 from tests.engine.synthetic import crossing, sequence, views_at
 from tests.runs.test_steps import same
 from tracker.files.atomic import ABANDONED_SECONDS
+from tracker.runs.stage_cache import StageCache
 from tracker.runs.stage_files import StageFiles, Views
 from tracker.single_view.protocol import ViewResult
 from tracker.steps import Steps, steps
@@ -172,6 +173,55 @@ def test_what_was_used_least_recently_goes_first(tmp_path: Path) -> None:
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a", "c", "d"]
     StageFiles(tmp_path, limit_bytes=0).prune()
     assert list(tmp_path.iterdir()) == []
+
+
+def test_what_is_larger_than_the_limit_is_not_written_and_takes_nothing_with_it(
+    tmp_path: Path,
+) -> None:
+    StageFiles(tmp_path).write("a", VIEWS)
+    for limit in (0, VIEWS.nbytes - 1):
+        assert not StageFiles(tmp_path, limit_bytes=limit).write("b", VIEWS)
+        assert [path.name for path in tmp_path.iterdir()] == ["a"]
+
+
+def test_the_limit_is_that_of_the_environment_where_none_is_given(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    StageFiles(tmp_path).write("a", VIEWS)
+    size = sum(path.stat().st_size for path in (tmp_path / "a", *(tmp_path / "a").iterdir()))
+    monkeypatch.setenv("MULTIVIEW_PHD_CACHE_GB", str(2.5 * size / 2**30))
+    files = StageFiles(tmp_path)
+    for number, key in enumerate("abc"):
+        assert files.write(key, VIEWS)
+        os.utime(tmp_path / key, (1000.0 + number,) * 2)
+    files.prune()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["b", "c"]
+    for wrong in ("-1", "much", "nan", "1e9"):
+        monkeypatch.setenv("MULTIVIEW_PHD_CACHE_GB", wrong)
+        with pytest.raises(ValueError, match=rf"expected 0 to 65536 GB, got '{wrong}'"):
+            StageFiles(tmp_path)
+
+
+def test_a_cache_on_disk_deletes_at_its_start_what_is_beyond_a_new_limit(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MULTIVIEW_PHD_CACHE", str(tmp_path))
+    StageFiles(tmp_path / "stages").write("a", VIEWS)
+    StageCache.on_disk()
+    assert [path.name for path in (tmp_path / "stages").iterdir()] == ["a"]
+    StageCache.on_disk(disk_bytes=0)
+    assert list((tmp_path / "stages").iterdir()) == []
+
+
+def test_a_cache_that_cannot_be_written_to_is_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refused(*_: object) -> None:
+        raise PermissionError(1, "Operation not permitted")
+
+    StageFiles(tmp_path).write("a", VIEWS)
+    monkeypatch.setattr(os, "utime", refused)
+    assert is_whole(StageFiles(tmp_path).read("a", **HOW))
 
 
 def test_a_column_that_is_deleted_stays_readable_where_it_was_mapped(tmp_path: Path) -> None:

@@ -113,9 +113,22 @@ class StageCache:
     def on_disk(
         start: Callable[[Callable[[], object]], object] = lambda work: work(),
         memory_bytes: int = MEMORY_BYTES,
+        disk_bytes: int | None = None,
     ) -> StageCache:
-        """Make a cache that also keeps files in the user's cache folder."""
-        files = StageFiles(cache_folder() / "stages")
+        """Make a cache that also keeps files in the user's cache folder.
+
+        Args:
+            start: Runs a function that writes or deletes files.
+            memory_bytes: Largest size of all columns in memory.
+            disk_bytes: Largest size of all files; None for
+                :func:`~tracker.files.folders.cache_bytes`. If earlier runs left more, the least
+                recently used are deleted now.
+
+        Raises:
+            ValueError: If the limit in the environment is no size.
+        """
+        files = StageFiles(cache_folder() / "stages", disk_bytes)
+        start(files.prune)
         return StageCache(memory_bytes=memory_bytes, files=files, start=start)
 
     @property

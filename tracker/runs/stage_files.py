@@ -16,13 +16,11 @@ import time
 from pathlib import Path
 
 from tracker.files.atomic import ABANDONED_SECONDS, beside, new_folder
+from tracker.files.folders import cache_bytes
 from tracker.single_view.protocol import ViewResult
 from tracker.steps import Steps
 
 logger = logging.getLogger(__name__)
-
-LIMIT_BYTES = 2 << 30
-"""Disk space of all folders together, bytes."""
 
 _UNREADABLE = (OSError, ValueError, TypeError, KeyError, IndexError, EOFError)
 """What is raised for a folder that is not what was written."""
@@ -34,15 +32,19 @@ Views = Steps[tuple[ViewResult, ...]]
 class StageFiles:
     """A folder of results of stage 1, by their cache key. Several processes may use it at once."""
 
-    def __init__(self, folder: Path, limit_bytes: int = LIMIT_BYTES) -> None:
+    def __init__(self, folder: Path, limit_bytes: int | None = None) -> None:
         """Store the arguments; the folder is made when a result is written.
 
         Args:
             folder: The folder; everything in it belongs to the cache.
-            limit_bytes: Largest size of all results together; the least recently used are deleted.
+            limit_bytes: Largest size of all results together, from which on the least recently
+                used are deleted; None for :func:`~tracker.files.folders.cache_bytes`.
+
+        Raises:
+            ValueError: If the limit in the environment is no size.
         """
         self._folder = folder
-        self._limit = limit_bytes
+        self._limit = cache_bytes() if limit_bytes is None else limit_bytes
 
     def read(self, key: str, *, frames: int, cameras: int) -> Views | None:
         """Map the results of a finished stage 1; None if there are no usable files.
@@ -55,7 +57,8 @@ class StageFiles:
         path = self._folder / key
         try:
             found = Steps.read(path, ViewResult, frames=frames, width=cameras, key=key)
-            os.utime(path)  # marks it as used
+            with contextlib.suppress(OSError):  # a folder that is read-only is read as it is
+                os.utime(path)  # marks it as used
         except (FileNotFoundError, NotADirectoryError):
             if not path.is_dir():
                 return None
@@ -75,6 +78,8 @@ class StageFiles:
         path = self._folder / key
         if path.exists():
             return True
+        if views.nbytes > self._limit:  # it would be deleted at once, and all others with it
+            return False
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
             with new_folder(path) as begun:

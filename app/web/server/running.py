@@ -65,7 +65,7 @@ async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         data=settings.data,
         detector=settings.detector,
         seed=settings.seed,
-        cache=StageCache.on_disk(in_background, budget.columns)
+        cache=StageCache.on_disk(in_background, budget.columns, settings.disk)
         if kept
         else StageCache(memory_bytes=budget.columns),
         picture_bytes=budget.pictures,

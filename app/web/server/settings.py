@@ -34,6 +34,8 @@ class Settings:
     """How many untouched runs stay in it."""
     memory: int | None = None
     """Bytes that may be kept for speed; None for half of the machine, or less."""
+    disk: int | None = None
+    """Bytes on disk that may be kept of earlier runs' stages; None for the usual limit."""
     run: int | Result | None = None
     """A run of it that is shown at once, instead of a sequence; or one that lies elsewhere, which
     is only looked at: nothing is computed, and nothing can be changed."""

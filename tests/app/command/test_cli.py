@@ -406,6 +406,13 @@ def test_a_port_that_cannot_be_is_wrong_usage(run: Runs, port: str) -> None:
     assert f"--port: expected 0 (any that is free) to 65535, got {port}" in stderr
 
 
+@pytest.mark.parametrize("size", ["-0.1", "65537", "nan"])
+def test_a_limit_of_the_cache_that_cannot_be_is_wrong_usage(run: Runs, size: str) -> None:
+    status, stdout, stderr = run("serve", f"--disk={size}")
+    assert (status, stdout) == (2, "")
+    assert f"--disk: expected 0 to 65536 GB, got {size}" in stderr
+
+
 @pytest.mark.parametrize(
     ("line", "option", "values"),
     [
