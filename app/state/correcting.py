@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import logging
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
-
-from app.state.kept.json_files import read_json, write_json
 from app.state.snapshot import Change
 from app.state.workbench import Workbench
 from tracker.corrections import Correction, CorrectionError
 from tracker.corrections.contradictions import find_repeated, refuse_contradiction
 from tracker.corrections.log import Log, open_log, own_place, remark_on, write_log, writing_place
+from tracker.files.validated import read_as, write_json
 from tracker.sequences.built_in import key_of
 from tracker.sequences.sequence import Sequence as Recording
 
@@ -37,6 +35,37 @@ class Action:
     words: str
     before: Told
     after: Told
+
+
+@dataclass(frozen=True, slots=True)
+class _StoredAction:
+    """An action as the file of the history has it."""
+
+    words: str
+    before: list[str]
+    """The ids of the corrections before it."""
+    after: list[str]
+    """The ids of the corrections after it."""
+
+
+@dataclass(frozen=True, slots=True)
+class _History:
+    """The file of the actions that can be taken back or done again."""
+
+    done: list[_StoredAction]
+    undone: list[_StoredAction]
+    corrections: dict[str, dict[str, Any]]
+    """Each correction of all actions once, by its id."""
+
+
+def _action(stored: _StoredAction, corrections: Mapping[str, Correction]) -> Action:
+    """Return a stored action with its corrections.
+
+    Raises:
+        KeyError: If one of them is missing.
+    """
+    before = tuple(corrections[one] for one in stored.before)
+    return Action(stored.words, before, tuple(corrections[one] for one in stored.after))
 
 
 def _mark_of(path: Path) -> tuple[int, int, int] | None:
@@ -245,20 +274,15 @@ class Correcting:
         """What can be taken back, unless somebody else has changed the log meanwhile."""
         path = self._history_file()
         try:
-            value = read_json(path) if path is not None else None
-            if value is None:
+            if path is None:
                 return
-            known = {k: Correction.model_validate(v) for k, v in value["corrections"].items()}
-            action: Callable[[Any], Action] = lambda plain: Action(  # noqa: E731
-                plain["words"],
-                tuple(known[k] for k in plain["before"]),
-                tuple(known[k] for k in plain["after"]),
-            )
-            done = [action(plain) for plain in value["done"]]
-            undone = [action(plain) for plain in value["undone"]]
+            stored = read_as(path, _History)
+            known = {k: Correction.model_validate(v) for k, v in stored.corrections.items()}
+            done = [_action(one, known) for one in stored.done]
+            undone = [_action(one, known) for one in stored.undone]
         except FileNotFoundError:
             return
-        except (OSError, ValueError, LookupError, TypeError, ValidationError) as error:
+        except (OSError, ValueError, LookupError) as error:
             logger.warning("%s cannot be read; earlier corrections stay: %s", path, error)
             return
         now = done[-1].after if done else undone[-1].before if undone else ()

@@ -9,10 +9,10 @@ import pytest
 from starlette.testclient import TestClient
 
 from app.command.flags import parse
-from app.state.kept.json_files import write_json
 from app.state.kept.presets import OwnPresets
 from app.state.workbench import Workbench
 from tests.parameters.test_renamed import DEFAULTS, MEANT, OTHER
+from tracker.files.validated import write_json
 from tracker.parameters.catalogue import RENAMED
 from tracker.parameters.values import changed_values, with_values
 

@@ -13,10 +13,10 @@ from pathlib import Path
 
 import pytest
 
-from app.state.kept.json_files import read_json, write_json
 from app.state.kept.presets import OwnPresets
 from app.state.workbench import Workbench
 from tests.bad_input.writes import KINDS
+from tracker.files.validated import read_json, write_json
 from tracker.parameters.values import ParameterError
 from tracker.sequences.errors import SequenceError
 

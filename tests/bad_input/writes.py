@@ -14,7 +14,6 @@ from pathlib import Path
 import numpy as np
 
 from app.state.kept.drafts import Drafts
-from app.state.kept.json_files import read_json, write_json
 from app.state.kept.presets import OwnPresets, keep_preset
 from app.state.workbench import Workbench
 from tests.engine import synthetic
@@ -27,6 +26,7 @@ from tracker.corrections.kinds import make
 from tracker.corrections.log import read_log, write_log
 from tracker.export import tracks_csv
 from tracker.files.atomic import new_folder, write_whole
+from tracker.files.validated import read_json, write_json
 from tracker.kernels.checked_cache import CheckedFiles
 from tracker.library import repair
 from tracker.library.store import Library

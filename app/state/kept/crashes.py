@@ -22,7 +22,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, TextIO
 
-from app.state.kept.json_files import read_as, set_aside
+from tracker.files.validated import read_as, set_aside
 
 LAST = "last-crash.txt"
 """What is known of the last crash: for whoever reports it."""

@@ -3,13 +3,24 @@
 from __future__ import annotations
 
 import logging
+from dataclasses import dataclass
 from pathlib import Path
 
-from app.state.kept.json_files import read_json, set_aside, write_json
+from tracker.files.validated import read_as, set_aside, write_json
 from tracker.sequences.built_in import earlier_key, key_of
 from tracker.sequences.writing.teaching import Values, changes
 
 logger = logging.getLogger("app")
+
+
+@dataclass(frozen=True, slots=True)
+class _Draft:
+    """A draft as its file has it."""
+
+    saved: Values
+    """Room and templates as they were saved, by the keys of a ``sequence.toml``."""
+    taught: Values
+    """Room and templates as they were taught since."""
 
 
 class Drafts:
@@ -73,10 +84,9 @@ class Drafts:
 
 def _read(path: Path) -> tuple[Values, Values] | None:
     try:
-        draft = read_json(path)
-        saved, taught = draft["saved"], draft["taught"]
-        changes(saved, taught)  # raises where another version wrote them
-        return saved, taught
+        draft = read_as(path, _Draft)
+        changes(draft.saved, draft.taught)  # raises where another version wrote them
+        return draft.saved, draft.taught
     except FileNotFoundError:
         return None
     except (OSError, ValueError, LookupError, TypeError, AttributeError) as error:

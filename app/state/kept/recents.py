@@ -14,11 +14,11 @@ from pathlib import Path
 from pydantic import FiniteFloat
 
 from app.state.importing.draft import small_jpeg
-from app.state.kept.json_files import read_as, set_aside, write_json
 from app.state.snapshot import Change
 from app.state.workbench import Workbench
 from tracker.files.atomic import locked, write_whole
 from tracker.files.folders import cache_folder
+from tracker.files.validated import read_as, set_aside, write_json
 from tracker.sequences import library
 from tracker.sequences.built_in import opens_by_name
 from tracker.sequences.errors import SequenceError

@@ -13,10 +13,10 @@ from queue import SimpleQueue
 import pytest
 
 from app.state.kept.crashes import LAST, Crashes, Note
-from app.state.kept.json_files import write_json
 from app.state.memory import LEAST_BYTES, Budget, machine_memory
 from app.state.workers.watchdog import Watchdog
 from tests.app.conftest import wait_until
+from tracker.files.validated import write_json
 
 START = """
 import os, sys

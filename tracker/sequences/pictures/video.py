@@ -11,7 +11,6 @@ from their start.
 from __future__ import annotations
 
 import contextlib
-import stat
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
@@ -22,6 +21,7 @@ import numpy as np
 from jaxtyping import Int, UInt8
 from numpy import ndarray
 
+from tracker.files.atomic import size_of
 from tracker.sequences.pictures.containers import MOST_PIXELS, VideoError, opened
 
 __all__ = ["VideoDecoder", "VideoError", "VideoIndex", "index_video", "read_image"]
@@ -293,8 +293,7 @@ class VideoDecoder:
 def read_image(path: Path) -> UInt8[ndarray, "h w 3"] | None:
     """Read a picture file, BGR; None if it is missing, too large or not a picture."""
     with contextlib.suppress(OSError, cv2.error):
-        status = path.stat()
-        if not stat.S_ISREG(status.st_mode) or status.st_size > LARGEST_IMAGE:
+        if size_of(path) > LARGEST_IMAGE:
             return None
         data = np.frombuffer(path.read_bytes(), dtype=np.uint8)
         picture = cv2.imdecode(data, cv2.IMREAD_COLOR) if len(data) else None
@@ -305,8 +304,7 @@ def read_image(path: Path) -> UInt8[ndarray, "h w 3"] | None:
 def why_no_picture(path: Path) -> str:
     """Return the reason why :func:`read_image` returned None; a message puts the name before it."""
     try:
-        status = path.stat()
-        found = f"{status.st_size:,} bytes" if stat.S_ISREG(status.st_mode) else "no file"
+        found = f"{size_of(path):,} bytes"
     except OSError as error:
         found = error.strerror or "nothing"
     return (
