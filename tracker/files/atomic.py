@@ -36,10 +36,12 @@ _BEGUN = "part"
 """The part of a temporary file's name by which it is recognised."""
 
 _LONGEST = 200
-"""Most characters of a name that are repeated in the name of its temporary file."""
+"""Most bytes of a name that are repeated in the name of its temporary file: with what stands before
+them they are within the 255 bytes that file systems allow (NAME_MAX of Linux and macOS)."""
 
 ABANDONED_SECONDS = 3600.0
-"""Time without a write after which a temporary file counts as left by a dead process, seconds."""
+"""Time without a write after which a temporary file counts as left by a dead process, seconds. A
+write takes seconds; a process that was suspended for longer finds its file gone and fails."""
 
 
 @contextmanager
@@ -119,7 +121,7 @@ def sweep(folder: Path, name: str) -> None:
     """Remove the temporary files and folders that dead processes left for a name in a folder."""
     with contextlib.suppress(OSError):
         now = time.time()
-        for path in folder.glob(f".*.{_BEGUN}.{glob.escape(name[-_LONGEST:])}"):
+        for path in folder.glob(f".*.{_BEGUN}.{glob.escape(_end_of(name))}"):
             with contextlib.suppress(OSError):
                 if abs(now - path.lstat().st_mtime) < ABANDONED_SECONDS:
                     continue
@@ -148,7 +150,14 @@ def locked(path: Path) -> Iterator[None]:
 
 def beside(path: Path) -> Path:
     """Return the path of a new temporary file in the same folder, with a name of valid length."""
-    return path.with_name(f".{secrets.token_hex(4)}.{_BEGUN}.{path.name[-_LONGEST:]}")
+    return path.with_name(f".{secrets.token_hex(4)}.{_BEGUN}.{_end_of(path.name)}")
+
+
+def _end_of(name: str) -> str:
+    """Return the end of a name, of at most :data:`_LONGEST` bytes."""
+    while len(os.fsencode(name)) > _LONGEST:
+        name = name[1:]
+    return name
 
 
 @contextmanager
