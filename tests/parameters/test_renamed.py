@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import pytest
 
-from tracker.library.store import parameters_of
+from tests.library.runs import RECORDING, run
+from tracker.library.store import Library, parameters_of
 from tracker.parameters.catalogue import METHODS, PARAMETERS, RENAMED, RunParameters
 from tracker.parameters.values import (
     ParameterError,
@@ -57,6 +59,17 @@ def stored(values: dict[str, Any]) -> dict[str, dict[str, Any]]:
         group, name = key.split(".")
         groups.setdefault(group, {})[name] = value
     return groups
+
+
+def test_a_run_of_the_library_lists_its_changes_by_the_keys_of_now(tmp_path: Path) -> None:
+    values = {**RunParameters().model_dump(mode="json"), **stored(OTHER)}
+    with Library(tmp_path / "library.sqlite3") as library:
+        number = library.keep(RECORDING, run(0, changes=OTHER, parameters=values))
+        (row,) = library.runs()
+        assert (row.id, row.changes) == (number, MEANT)
+        assert library.result(number).unknown == ()
+        for key, value in MEANT.items():
+            assert value_of(library.result(number).parameters, key) == value
 
 
 def test_a_run_of_the_library_is_read_whole() -> None:

@@ -12,6 +12,7 @@ from typing import Any, Literal, TypeVar
 
 from tracker.library.columns import KeptTracks
 from tracker.parameters.catalogue import RunParameters
+from tracker.parameters.values import with_current_keys
 
 Source = Literal["track", "page", "bundle", "batch"]
 """The origin of a run: a command, the page, or a bundle that was unpacked."""
@@ -180,7 +181,7 @@ class KeptRun(_Run):
     @property
     def changes(self) -> dict[str, Any]:
         """The values of parameters that differ from the recording's defaults, by key."""
-        return dict(json.loads(self.changes_json))
+        return with_current_keys(json.loads(self.changes_json))
 
     @property
     def tags(self) -> list[str]:

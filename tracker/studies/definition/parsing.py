@@ -12,7 +12,7 @@ from typing import Any, get_args
 
 from tracker.files.text import not_utf_8, shown
 from tracker.parameters.catalogue import METHODS, PARAMETERS, PRESETS, RunParameters
-from tracker.parameters.values import value_of, with_values
+from tracker.parameters.values import value_of, with_current_keys, with_values
 from tracker.sequences.fields import did_you_mean
 from tracker.studies.definition.definition import (
     GRID_STEPS,
@@ -354,7 +354,7 @@ def _flat(table: Mapping[str, Any]) -> dict[str, Any]:
             flat |= {f"{key}.{name}": one for name, one in found.items()}
         else:
             flat[key] = found
-    return flat
+    return with_current_keys(flat)
 
 
 def _flat_ranges(table: Mapping[str, Any]) -> dict[str, Any]:
@@ -366,7 +366,7 @@ def _flat_ranges(table: Mapping[str, Any]) -> dict[str, Any]:
             flat |= {f"{key}.{name}": one for name, one in found.items()}
         else:
             flat[key] = found
-    return flat
+    return with_current_keys(flat)
 
 
 def _shown(found: Any) -> str:

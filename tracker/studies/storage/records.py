@@ -5,8 +5,10 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, field
 from typing import Annotated, Any, Literal, Required
 
-from pydantic import ConfigDict, Field
+from pydantic import AfterValidator, ConfigDict, Field
 from typing_extensions import TypedDict
+
+from tracker.parameters.values import with_current_keys
 
 TrialState = Literal["complete", "pruned", "failed"]
 """The state of a trial that ended: with all runs, after its first runs, or because a run failed."""
@@ -32,7 +34,7 @@ class Trial:
     """The number of the trial; 0 is that of the defaults."""
     state: TrialState
     """How the trial ended."""
-    values: dict[str, Any]
+    values: Annotated[dict[str, Any], AfterValidator(with_current_keys)]
     """The varied parameters, by key."""
     objectives: tuple[float, ...] | None
     """The mean of each objective over recordings and seeds, or over the first runs if the trial was
