@@ -92,8 +92,8 @@ import json, sys, tempfile
 {first}
 from app.web.views.results import schema
 from tracker.runs import pipeline, warm_up
-from tracker.parameters import METHODS, RunParameters, changed, shown_keys
-from tracker.parameters import stage_values, with_values
+from tracker.parameters.catalogue import METHODS, RunParameters
+from tracker.parameters.values import changed_values, shown_keys, stage_values, with_values
 from tracker.runs.fitting import unfit_methods
 from tracker.runs.run import stage_keys
 from pathlib import Path
@@ -110,7 +110,7 @@ print(json.dumps({{
     "methods": METHODS,
     "shown": shown_keys(parameters),
     "read": list(stage_values(parameters, "single_view")),
-    "changed": changed(parameters),
+    "changed": changed_values(parameters),
     "boxes": run.views[2][0].boxes.tolist(),
     "keys": keys,
     "page": [p.key for p in told.parameters if p.group in ("middle", "calm")],
@@ -225,7 +225,9 @@ def test_its_parameters_have_flags_and_are_listed(tmp_path: Path) -> None:
 def test_what_cannot_be_used_is_told_and_left_out(tmp_path: Path) -> None:
     installed(tmp_path, {"single_view": {**POINTS["single_view"], **BROKEN}})
     done = python(
-        tmp_path, "-c", "from tracker.parameters import METHODS; print(*METHODS['single_view'])"
+        tmp_path,
+        "-c",
+        "from tracker.parameters.catalogue import METHODS; print(*METHODS['single_view'])",
     )
     assert done.returncode == 0, done.stderr
     assert done.stdout.split()[-1] == "middle"
