@@ -301,7 +301,7 @@ def test_other_code_has_other_keys(tmp_path: Path, monkeypatch: pytest.MonkeyPat
         ("fusion/model.py", {"fusion", "smoothing", "tracks"}),
         ("smoothing/stage.py", {"smoothing", "tracks"}),
         ("fusion/trajectories.py", {"smoothing", "tracks"}),
-        ("evaluation/measures/ospa.py", set()),
+        ("evaluation/ospa.py", set()),
     ):
         path = copy / name
         text = path.read_text(encoding="utf-8")
