@@ -14,13 +14,6 @@ import zipfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from types import ModuleType
-
-fcntl: ModuleType | None
-try:
-    import fcntl
-except ImportError:  # Windows
-    fcntl = None
 
 
 def file_names(names: Sequence[str]) -> list[str]:
@@ -129,23 +122,6 @@ def sweep(folder: Path, name: str) -> None:
                     shutil.rmtree(path, ignore_errors=True)
                 else:
                     path.unlink()
-
-
-@contextmanager
-def locked(path: Path) -> Iterator[None]:
-    """Let only one process at a time run the block, for a file that several processes change.
-
-    The lock is held on a file beside it, which is never deleted. Where the system has no file
-    locks, nothing is locked.
-
-    Raises:
-        OSError: If the lock file cannot be created.
-    """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with path.with_name(f".{path.name}.lock").open("ab") as file:
-        if fcntl is not None:
-            fcntl.flock(file.fileno(), fcntl.LOCK_EX)
-        yield
 
 
 def beside(path: Path) -> Path:

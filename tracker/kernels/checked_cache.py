@@ -29,7 +29,7 @@ from llvmlite import binding as llvm
 from numba.core import caching, sigutils
 from numba.core.compiler_lock import global_compiler_lock
 
-from tracker.files.atomic import locked
+from tracker.files.lock import locked
 
 _SIZE = hashlib.sha256().digest_size
 

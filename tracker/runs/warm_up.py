@@ -16,7 +16,9 @@ import os
 import subprocess
 import sys
 import tempfile
+import threading
 from collections.abc import Callable, Iterable
+from contextlib import ExitStack, suppress
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -25,6 +27,7 @@ import cv2
 import numpy as np
 
 from tracker import fusion, single_view, smoothing
+from tracker.files.lock import locked
 from tracker.geometry.camera import Camera
 from tracker.kernels import compilation
 from tracker.parameters import Method, MethodKey
@@ -66,6 +69,12 @@ _COLOURS = ((40, 40, 220), (220, 60, 40))
 HALVES = ("first", "second")
 """The two halves of the work: stage 1 with the PHD filter; and the step of the multi-Bernoulli
 filter, which takes longest to compile, with the smoothing."""
+
+COMPILING = "compiling the kernels, once per machine"
+"""The sentence that is reported while kernels are compiled."""
+
+_SECONDS_BETWEEN = 0.1
+"""Interval at which the processes that compile are looked at, seconds."""
 
 _OTHER_WAYS = (
     {"fusion.update": "unscented"},
@@ -212,19 +221,96 @@ def _camera(name: str, place: float) -> Camera:
     return Camera(name, SIZE, intrinsics, rotation, -rotation @ position, distortion)
 
 
-def start(half: str, **how: Any) -> subprocess.Popen[str]:
-    """Start the process that compiles one half; it prints its progress to standard output."""
-    line = [sys.executable, "-m", "tracker.runs.warm_up", half]
-    return subprocess.Popen(line, stdin=subprocess.DEVNULL, text=True, **how)
+def ensure_compiled(
+    tell: Callable[[str], None] = lambda words: None,
+    *,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+    ready: Callable[[], None] = lambda: None,
+    stopped: Callable[[], bool] = lambda: False,
+) -> int:
+    """Compile all kernels, unless that was done on this machine, and return when they are there.
+
+    Two processes of a low priority compile, for one caller of the machine at a time; the others
+    wait, and go on where it was ended.
+
+    Args:
+        tell: A callback that gets a sentence if there is something to compile.
+        progress: A callback that gets the number of compiled kernels and of all.
+        ready: A callback that is called when the first run may begin.
+        stopped: A function that returns whether to end the processes; what they compiled remains.
+
+    Returns:
+        0 if all kernels are compiled, else the status of a process that failed or was ended.
+
+    Raises:
+        OSError: If no process can be started.
+    """
+    if compilation.is_compiled():
+        return 0
+    tell(COMPILING)
+
+    def wait() -> bool:
+        ready()  # what another caller's processes have compiled is used from now on
+        compilation.news_of_compiling()
+        return not stopped()
+
+    with ExitStack() as held:
+        with suppress(OSError):  # nothing can be stored: each caller compiles for itself
+            held.enter_context(locked(compilation.kernel_folder() / "compiling", wait=wait))
+        if not compilation.is_compiled() and not stopped():
+            return _compile_in_processes(progress, ready, stopped)
+    return int(not compilation.is_compiled())
+
+
+def _compile_in_processes(
+    progress: Callable[[int, int], None], ready: Callable[[], None], stopped: Callable[[], bool]
+) -> int:
+    """Run a process for each half, and follow what they print until both have ended."""
+    counts: dict[str, tuple[int, int]] = {}
+
+    def follow(half: str, process: subprocess.Popen[str]) -> None:
+        assert process.stdout is not None
+        with process.stdout:
+            for line in process.stdout:
+                words = line.split()
+                if words == ["ready"]:
+                    ready()
+                elif len(words) == 2:
+                    counts[half] = int(words[0]), int(words[1])
+                    compilation.news_of_compiling()
+                    progress(*max(counts.values()))
+        if process.wait() != 0:  # it will not print that it is ready
+            ready()
+
+    readers: list[tuple[threading.Thread, subprocess.Popen[str]]] = []
+    try:
+        for half in HALVES:
+            process = subprocess.Popen(
+                [sys.executable, "-m", "tracker.runs.warm_up", half], text=True,
+                stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
+            )  # fmt: skip
+            reader = threading.Thread(
+                target=follow, args=(half, process), name=f"compiling {half}", daemon=True
+            )
+            readers.append((reader, process))
+            reader.start()
+        while any(reader.is_alive() for reader, _ in readers) and not stopped():
+            next(reader for reader, _ in readers if reader.is_alive()).join(_SECONDS_BETWEEN)
+    finally:
+        for _, process in readers:
+            process.terminate()
+        statuses = [process.wait() for _, process in readers]
+        for reader, _ in readers:
+            reader.join()
+    if not any(statuses):
+        compilation.mark_compiled()
+    return max(statuses, key=abs)
 
 
 def main() -> int:
     """Compile one half and print the progress, or compile both in processes; with low priority."""
     if len(sys.argv) < 2:
-        statuses = [process.wait() for process in [start(half) for half in HALVES]]
-        if not any(statuses):
-            compilation.mark_compiled()
-        return max(statuses)
+        return ensure_compiled()
     half = sys.argv[1]
     _give_way(5 if half == HALVES[0] else 19)
 

@@ -14,7 +14,7 @@ from typing import Any
 from app.errors import FULL, sentence
 from app.state.snapshot import Presets
 from app.state.workbench import Workbench
-from tracker.files.atomic import locked
+from tracker.files.lock import locked
 from tracker.files.validated import read_as, set_aside, write_json
 from tracker.parameters.catalogue import PRESETS
 from tracker.parameters.values import ParameterError, changed_values, with_current_keys

@@ -16,8 +16,9 @@ from pydantic import FiniteFloat
 from app.state.importing.draft import small_jpeg
 from app.state.snapshot import Change
 from app.state.workbench import Workbench
-from tracker.files.atomic import locked, write_whole
+from tracker.files.atomic import write_whole
 from tracker.files.folders import cache_folder
+from tracker.files.lock import locked
 from tracker.files.validated import read_as, set_aside, write_json
 from tracker.sequences import library
 from tracker.sequences.built_in import opens_by_name

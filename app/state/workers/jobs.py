@@ -20,7 +20,7 @@ from app.errors import sentence
 from app.state.kept.crashes import Crashes, Note
 from app.state.snapshot import Change, RunState, Snapshot
 from app.state.workbench import Workbench
-from app.state.workers.compiling import WORDS, Compiling
+from app.state.workers.compiling import Compiling
 from app.state.workers.opening import Opener
 from app.state.workers.threads import CLOSING_SECONDS, be_nice
 from app.state.workers.watchdog import Watchdog
@@ -34,6 +34,7 @@ from tracker.runs.gates import notices
 from tracker.runs.outcome import why_no_tracks
 from tracker.runs.pipeline import Cancelled, Progress, Run
 from tracker.runs.stage_cache import StageCache
+from tracker.runs.warm_up import COMPILING
 from tracker.sequences.pictures.frames import CACHE_BYTES, FrameReader
 from tracker.sequences.sequence import Sequence
 
@@ -280,7 +281,7 @@ class Jobs:
 
         def on_compiling(done: int, total: int) -> None:
             if total and not wanted.cancelled.is_set():
-                workbench.run_waits(wanted.key, f"{WORDS}, {done} of {total}")
+                workbench.run_waits(wanted.key, f"{COMPILING}, {done} of {total}")
 
         try:
             if self._compiling is not None:

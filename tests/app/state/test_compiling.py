@@ -11,11 +11,13 @@ from typing import Any
 import pytest
 
 from app.state.workbench import Workbench
-from app.state.workers.compiling import WORDS, Compiling
+from app.state.workers.compiling import Compiling
 from app.state.workers.jobs import Jobs
 from tests.app.conftest import wait_until
+from tracker.files.lock import locked
 from tracker.kernels import compilation
 from tracker.runs import warm_up
+from tracker.runs.warm_up import COMPILING
 
 
 @pytest.fixture
@@ -24,14 +26,16 @@ def uncompiled(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(compilation, "is_compiled", lambda: False)
 
 
-def instead(monkeypatch: pytest.MonkeyPatch, code: str) -> None:
-    """Another program in place of the one that compiles."""
-    real = subprocess.Popen
+def instead(monkeypatch: pytest.MonkeyPatch, code: str) -> list[subprocess.Popen[str]]:
+    """Another program in place of the one that compiles; its processes, once they are started."""
+    real, started = subprocess.Popen, list[subprocess.Popen[str]]()
 
     def start(line: list[str], **how: Any) -> Any:
-        return real([sys.executable, "-c", code, line[-1]], **how)
+        started.append(real([sys.executable, "-c", code, line[-1]], **how))
+        return started[-1]
 
     monkeypatch.setattr(warm_up.subprocess, "Popen", start)
+    return started
 
 
 SLOW = """
@@ -53,7 +57,7 @@ def test_a_sequence_is_shown_at_once_and_run_when_its_loops_over_pixels_are_ther
     uncompiled: None, monkeypatch: pytest.MonkeyPatch, data: Path, tmp_path: Path
 ) -> None:
     seen = tmp_path / "seen"
-    instead(monkeypatch, SLOW.replace("SEEN", repr(str(seen))))
+    processes = instead(monkeypatch, SLOW.replace("SEEN", repr(str(seen))))
     said: list[str] = []
     bench = Workbench()
     waits: list[str] = []
@@ -62,30 +66,30 @@ def test_a_sequence_is_shown_at_once_and_run_when_its_loops_over_pixels_are_ther
         now = bench.snapshot()
         if now.sequence is not None and now.run is None:
             waits.append(now.run_state.message)
-            if waits[-1] == f"{WORDS}, 20 of 50":
+            if waits[-1] == f"{COMPILING}, 20 of 50":
                 seen.touch()
 
     bench.subscribe(note)
     worker = Compiling(said.append)
     jobs = Jobs(bench, data=data, compiling=worker)
     jobs.open("crossing").result(30.0)
-    assert said == [WORDS]
+    assert said == [COMPILING]
     assert bench.snapshot().run_state.done == 0, "it is seen before it can be run"
     wait_until(lambda: bench.snapshot().run_state.state == "done")
     jobs.close()
-    assert len(worker._processes) == 2
-    for process in worker._processes.values():
+    assert len(processes) == 2
+    for process in processes:
         assert process.wait(10.0) < 0, "what goes on for the other methods ends with the workbench"
 
 
 def test_a_run_that_is_under_way_at_the_end_does_not_begin_to_compile(
     uncompiled: None, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    instead(monkeypatch, SLOW.replace("SEEN", repr(str(tmp_path / "seen"))))
+    processes = instead(monkeypatch, SLOW.replace("SEEN", repr(str(tmp_path / "seen"))))
     worker = Compiling()
-    assert len(worker._processes) == 2
+    wait_until(lambda: len(processes) == 2)
     worker.stop()
-    for process in worker._processes.values():
+    for process in processes:
         assert process.wait(10.0) != 0
     wait_until(lambda: not any("compiling" in each.name for each in threading.enumerate()))
     assert compilation._Elsewhere.compiles, "what runs as plain Python does so to its end"
@@ -122,12 +126,12 @@ def test_nobody_waits_for_a_process_that_failed(
 def test_nobody_waits_for_the_other_process_where_the_first_one_failed(
     uncompiled: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    instead(
+    processes = instead(
         monkeypatch, "import sys, time; time.sleep(300 if sys.argv[-1] != 'first' else 0); 1 / 0"
     )
     worker = Compiling()
     worker.wait(lambda done, total: None, lambda: False)
-    assert any(process.poll() is None for process in worker._processes.values())
+    assert any(process.poll() is None for process in processes)
     worker.close()
 
 
@@ -144,9 +148,58 @@ def test_nobody_waits_where_no_process_can_be_started(
 def test_who_does_not_want_the_sequence_any_more_does_not_wait(
     uncompiled: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    instead(monkeypatch, "import time; time.sleep(300)")
+    processes = instead(monkeypatch, "import time; time.sleep(300)")
     worker = Compiling()
     reported = threading.Event()
     worker.wait(lambda done, total: reported.set(), reported.is_set)
-    assert all(process.poll() is None for process in worker._processes.values())
+    wait_until(lambda: len(processes) == 2)
+    assert all(process.poll() is None for process in processes)
     worker.close()
+
+
+@pytest.fixture
+def elsewhere(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
+    """A machine on which no kernel was compiled, with a folder of its own for them."""
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    return compilation.kernel_folder() / "compiling"
+
+
+def test_one_of_a_machine_compiles_and_the_others_find_it_done(
+    elsewhere: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    processes = instead(monkeypatch, "")
+    ready, statuses = threading.Event(), list[int]()
+    with locked(elsewhere):
+        other = threading.Thread(
+            target=lambda: statuses.append(warm_up.ensure_compiled(ready=ready.set))
+        )
+        other.start()
+        assert ready.wait(30.0), "its first run goes on meanwhile"
+        compilation.mark_compiled()
+    other.join(30.0)
+    assert (statuses, processes) == ([0], [])
+
+
+def test_who_waits_for_another_that_was_ended_compiles_itself(
+    elsewhere: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    processes = instead(monkeypatch, "")
+    asked = threading.Event()
+    with locked(elsewhere):
+        other = threading.Thread(target=lambda: warm_up.ensure_compiled(ready=asked.set))
+        other.start()
+        assert asked.wait(30.0)
+    other.join(30.0)
+    assert len(processes) == 2
+    assert compilation.is_compiled()
+    with locked(elsewhere):
+        assert warm_up.ensure_compiled(stopped=lambda: True) == 0
+
+
+def test_who_is_stopped_while_it_waits_compiles_nothing(
+    elsewhere: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    processes = instead(monkeypatch, "")
+    with locked(elsewhere):
+        assert warm_up.ensure_compiled(stopped=lambda: True) != 0
+    assert processes == []
