@@ -37,7 +37,7 @@ from tracker.library.store import Library
 from tracker.sequences.errors import SequenceError
 from tracker.sequences.reader import read_sequence
 from tracker.single_view.onnx.network import Network
-from tracker.studies.definition.parsing import read_definition
+from tracker.studies.definition import read_definition
 from tracker.studies.errors import StudyError
 
 

@@ -37,11 +37,8 @@ from tracker.sequences.writing import saving
 from tracker.sequences.writing.teaching import Values, taught_values, with_taught
 from tracker.single_view.protocol import ViewResult
 from tracker.steps import Steps
-from tracker.studies.sampling import Journal
-from tracker.studies.storage.records import Status, Trial
-from tracker.studies.storage.store import Store, create
-from tracker.studies.storage.writer import Writer
-from tracker.studies.workers.jobs import Outcome
+from tracker.studies.jobs import Outcome
+from tracker.studies.store import Status, Store, Trial, Writer, create
 
 STEP = 2.0**-12
 """Of a number in which the number of a write is told: it is the same when it is read back."""
@@ -188,6 +185,8 @@ def study(folder: Path) -> None:
 
 def end_trial(folder: Path, number: int) -> None:
     with Writer(folder / "studies" / "small") as writer:
+        if number not in Store(folder / "studies" / "small").running_trials():
+            writer.begin(number, {"fusion.clutter_rate": 1.0 + number})
         writer.keep(Outcome(f"key-{number}", "done", figures={"score": 0.5}))
         writer.end(Trial(number, "complete", {}, (0.5,), (0.0,), {}, False, "", 1.0, ()))
         writer.write_status(Status("running", done=number))
@@ -199,24 +198,8 @@ def ended_trials(folder: Path) -> int:
     for trial in trials[-3:]:
         assert store.outcome(f"key-{trial.number}") is not None
     assert store.status().done <= len(trials)
+    assert set(store.running_trials()) <= {len(trials) + 1}
     return _without_gap({trial.number for trial in trials})
-
-
-def note_trial(folder: Path, number: int) -> None:
-    journal = Journal(folder / "journal.log")
-    with journal.transaction():
-        for part in range(4):
-            journal.append_logs([{"number": number, "part": part}])
-    journal.close()
-
-
-def noted_trials(folder: Path) -> int:
-    journal = Journal(folder / "journal.log")
-    found = [(one["number"], one["part"]) for one in journal.read_logs(0)]
-    journal.close()
-    whole = {number for number, part in found if part == 3}
-    assert found[: 4 * len(whole)] == [(n, part) for n in sorted(whole) for part in range(4)]
-    return _without_gap(whole)
 
 
 # what can be made again, and must never be taken for what it is not
@@ -302,7 +285,6 @@ KINDS = {
         Kind("tracks", nothing, export_tracks, exported),
         Kind("copy", room, copy, copies),
         Kind("study", study, end_trial, ended_trials),
-        Kind("journal", nothing, note_trial, noted_trials),
         Kind("column", nothing, keep_column, kept_columns),
         Kind("kernel", nothing, keep_kernel, kept_kernel),
         Kind("import", nothing, fill, filled),

@@ -19,15 +19,13 @@ import psutil
 from tests.benchmarks.measure import Measurement
 from tests.conftest import DATA
 from tests.synthetic import write_sequence
-from tracker.studies.definition.definition import Definition
-from tracker.studies.definition.parsing import definition_of
-from tracker.studies.opened import open_recordings
-from tracker.studies.running import run_study
-from tracker.studies.storage.store import Store, create
-from tracker.studies.storage.writer import RESULTS
-from tracker.studies.workers import working
-from tracker.studies.workers.cluster import DaskCrew
-from tracker.studies.workers.jobs import Job, Outcome
+from tracker.studies import worker
+from tracker.studies.cluster import DaskCrew
+from tracker.studies.definition import StudyDefinition, definition_of
+from tracker.studies.jobs import Job, Outcome
+from tracker.studies.recordings import open_recordings
+from tracker.studies.runner import run_study
+from tracker.studies.store import RESULTS, Store, create
 
 RECORDINGS = ("cmc1", "cmc2", "av163-seq45-3p-1111-points")
 WORKERS = 2
@@ -58,7 +56,7 @@ def crowd(short: bool) -> Iterator[Measurement]:
         yield Measurement(f"studies: the asker's time a trial, {words}", beside * 1e3, "ms")
 
 
-def _definition(folder: Path, recordings: list[str], trials: int, search: str) -> Definition:
+def _definition(folder: Path, recordings: list[str], trials: int, search: str) -> StudyDefinition:
     fields = {
         "name": f"{trials} {search}",
         "recordings": recordings,
@@ -175,9 +173,9 @@ def _by_hand(jobs: list[Job]) -> float:
     from joblib import Parallel, delayed
 
     with Parallel(n_jobs=WORKERS, backend="loky", batch_size=1) as parallel:
-        parallel(delayed(working.work)(job) for job in jobs[: 2 * WORKERS * len(RECORDINGS)])
+        parallel(delayed(worker.work)(job) for job in jobs[: 2 * WORKERS * len(RECORDINGS)])
         begin = time.perf_counter()
-        parallel(delayed(working.work)(job) for job in jobs)
+        parallel(delayed(worker.work)(job) for job in jobs)
         return time.perf_counter() - begin
 
 

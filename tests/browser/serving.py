@@ -15,7 +15,7 @@ import httpx2
 import psutil
 
 from tracker.kernels.compilation import kernel_folder
-from tracker.studies.storage.store import stores
+from tracker.studies.store import stores
 
 
 class Server:

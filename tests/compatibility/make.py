@@ -150,9 +150,9 @@ def corrections(work: Path) -> None:
 def study(work: Path) -> None:
     """A study of six trials that was stopped after three."""
     from tests.studies.small import Serial
-    from tracker.studies.definition.parsing import read_definition
-    from tracker.studies.running import run_study
-    from tracker.studies.storage.store import create
+    from tracker.studies.definition import read_definition
+    from tracker.studies.runner import run_study
+    from tracker.studies.store import create
 
     (work / "half.toml").write_text(STUDY, encoding="utf-8")
     store = create(read_definition(work / "half.toml"), work / "studies")

@@ -33,8 +33,8 @@ from tracker.kernels.compilation import kernel_folder
 from tracker.library.bundle import unpack_bundle
 from tracker.library.store import Library
 from tracker.sequences.library import open_sequence
-from tracker.studies.storage.store import find
-from tracker.studies.workers.jobs import code_version
+from tracker.studies.jobs import code_version
+from tracker.studies.store import find
 
 HERE = Path(__file__).resolve().parent
 ADDRESSES = json.loads((HERE / "addresses.json").read_text(encoding="utf-8"))

@@ -8,12 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from tests.synthetic import write_sequence
-from tracker.studies.definition.definition import Definition
-from tracker.studies.definition.parsing import definition_of
-from tracker.studies.storage.store import Store
-from tracker.studies.workers import working
-from tracker.studies.workers.cluster import WorkerState
-from tracker.studies.workers.jobs import Job, Outcome
+from tracker.studies import worker
+from tracker.studies.cluster import WorkerState
+from tracker.studies.definition import StudyDefinition, definition_of
+from tracker.studies.jobs import Job, Outcome
+from tracker.studies.store import Store
 
 PARAMETERS: dict[str, Any] = {
     "fusion.detection_probability": {"low": 0.6, "high": 0.98},
@@ -28,7 +27,7 @@ def recording(folder: Path, *, truth: bool = True, frames: int = 24) -> Path:
     )
 
 
-def definition(folder: Path, name: str = "small", **fields: Any) -> Definition:
+def definition(folder: Path, name: str = "small", **fields: Any) -> StudyDefinition:
     """A study of a recording that it makes."""
     place = folder / "recording"
     if not place.exists():
@@ -49,9 +48,7 @@ class Serial:
 
     slots = 1
 
-    def __init__(
-        self, do: Callable[[Job], Outcome] = working.work, stop_after: int = 10**9
-    ) -> None:
+    def __init__(self, do: Callable[[Job], Outcome] = worker.work, stop_after: int = 10**9) -> None:
         self.done: list[str] = []
         self._do = do
         self._stop_after = stop_after
@@ -69,17 +66,13 @@ class Serial:
         self.done.append(job.key)
         return [self._do(job)]
 
-    def call(self, function: Callable[..., Any], *arguments: Any) -> Callable[[], Any]:
-        found = function(*arguments)
-        return lambda: found
-
     def workers(self) -> list[WorkerState]:
         return [WorkerState("here", "here", "", None, 0.0)]
 
 
 def run(store: Store, crew: Serial, **how: Any) -> Any:
     """A study run by a crew."""
-    from tracker.studies.running import run_study
+    from tracker.studies.runner import run_study
 
     with store.running() as writer:
         return run_study(store, writer, lambda tell: crew, **how)

@@ -15,7 +15,7 @@ from tracker.library.store import open_library
 from tracker.runs import pipeline
 from tracker.sequences.library import open_sequence
 from tracker.studies.batches import BatchRun, places_of, run_batch
-from tracker.studies.workers.working import tracks_hash
+from tracker.studies.worker import tracks_hash
 
 FRAMES = 60
 
@@ -56,7 +56,7 @@ def test_a_run_obeys_the_recordings_corrections_as_track_does(
         for one, other in zip(found, alone, strict=True):
             assert one.run is not None, one.words
             result = library.result(one.run.id)
-            assert result.run.key == other.run.key
+            assert result.run.key == other.key
             assert result.kept.tracks.ids.tolist() == other.tracks.ids.tolist()
     again = run([str(corrected)], tmp_path / "library.sqlite3", crew)
     assert len(crew.done) == 2

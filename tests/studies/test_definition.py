@@ -6,8 +6,7 @@ import tomllib
 from pathlib import Path
 
 from tests.studies.small import PARAMETERS, definition, recording
-from tracker.studies.definition.example import example
-from tracker.studies.definition.parsing import definition_of, read_definition
+from tracker.studies.definition import definition_of, example, read_definition
 
 
 def test_what_is_written_is_read_back(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ from tests.parameters.test_renamed import MEANT, OTHER
 from tests.studies.small import definition
 from tracker.files.validated import parse_json
 from tracker.parameters.catalogue import RENAMED
-from tracker.studies.storage.records import Trial
+from tracker.studies.store import Trial
 
 ENDED = Trial(
     number=3,

@@ -19,8 +19,7 @@ from app.state.studies.desk import StudyDesk
 from app.web.server import Settings, create_app
 from app.web.studies import routes
 from tests.studies.small import Serial, made_up, recording, run
-from tracker.studies.storage.records import Status
-from tracker.studies.storage.store import Store, find
+from tracker.studies.store import Status, Store, find
 
 ADDRESS = "http://127.0.0.1:8000"
 RANGES = {"fusion.detection_probability": {"low": 0.6, "high": 0.98}, "fusion.clutter_rate": {}}

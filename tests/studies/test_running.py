@@ -5,25 +5,26 @@ from __future__ import annotations
 import json
 import math
 import sqlite3
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from tests.studies.processes import wait
 from tests.studies.small import Serial, definition, made_up, recording, run
+from tracker.parameters.catalogue import RunParameters
 from tracker.parameters.values import with_values
 from tracker.runs.run import stage_keys
-from tracker.studies.analysis.importance import ImportanceEstimator
+from tracker.studies import space, worker
 from tracker.studies.errors import StudyError
-from tracker.studies.opened import open_recordings
-from tracker.studies.reporting.report import report_html
-from tracker.studies.reporting.summary import summary_of
+from tracker.studies.importance import ImportanceEstimator
+from tracker.studies.jobs import Job, Outcome
+from tracker.studies.recordings import open_recordings
+from tracker.studies.report import report_html
 from tracker.studies.sampling import Sampler
-from tracker.studies.storage.records import Trial
-from tracker.studies.storage.store import JOURNAL, Store, create
-from tracker.studies.storage.writer import RESULTS
-from tracker.studies.workers import working
-from tracker.studies.workers.jobs import Job, Outcome
+from tracker.studies.store import RESULTS, Store, Trial, create
+from tracker.studies.summary import summary_of
 
 
 def near(values: dict[str, Any]) -> float:
@@ -117,16 +118,6 @@ def test_a_study_that_is_ended_goes_on_and_does_nothing_twice(tmp_path: Path, af
     # until it was ended it asked for what the other did
     same = [one.values for one in store.trials()[: max(1, len(ended))]]
     assert same == [one.values for one in whole.trials()[: len(same)]]
-
-
-def test_a_record_that_was_cut_off_is_gone_on_with(tmp_path: Path) -> None:
-    store = study(tmp_path, trials=4)
-    with pytest.raises(KeyboardInterrupt):
-        run(store, Serial(made_up(near), stop_after=2))
-    journal = store.folder / JOURNAL
-    journal.write_bytes(journal.read_bytes()[:-7])
-    run(store, Serial(made_up(near)))
-    assert [one.number for one in store.trials()] == [0, 1, 2, 3]
 
 
 def test_the_same_values_are_run_once(tmp_path: Path) -> None:
@@ -231,7 +222,8 @@ def test_a_study_of_before_the_camera_left_out_was_kept_opens_and_goes_on(tmp_pa
     with pytest.raises(KeyboardInterrupt):
         run(store, Serial(made_up(near), stop_after=2))
     with sqlite3.connect(store.folder / RESULTS) as results:
-        for number, told in results.execute("SELECT number, told FROM trials").fetchall():
+        ended = "SELECT number, told FROM trials WHERE state != 'running'"
+        for number, told in results.execute(ended).fetchall():
             trial = json.loads(told)
             del trial["figures"]["held_out"]
             results.execute(
@@ -292,10 +284,10 @@ def test_a_trial_that_ended_before_the_sampler_heard_of_it_stays_as_it_is(
     store = study(tmp_path, trials=6, seeds=2)
     tell = Sampler.tell
 
-    def killed(self: Sampler, number: int, values: Any, *, pruned: bool = False) -> None:
-        if number == 2:
+    def killed(self: Sampler, trial: Trial) -> None:
+        if trial.number == 2:
             raise KeyboardInterrupt
-        tell(self, number, values, pruned=pruned)
+        tell(self, trial)
 
     monkeypatch.setattr(Sampler, "tell", killed)
     with pytest.raises(KeyboardInterrupt):
@@ -308,50 +300,67 @@ def test_a_trial_that_ended_before_the_sampler_heard_of_it_stays_as_it_is(
     assert len(store.trials()) == 6
 
 
+def test_trials_under_way_are_tried_again_with_their_values(tmp_path: Path) -> None:
+    store = study(tmp_path, trials=6, seeds=4)
+    with pytest.raises(KeyboardInterrupt):
+        run(store, Serial(made_up(near), stop_after=10))
+    before = store.running_trials()
+    assert before
+    run(store, Serial(made_up(near)))
+    assert store.running_trials() == {}
+    assert {number: store.trial(number).values for number in before} == before
+
+
 def test_a_worker_keeps_stage_1_and_little_else(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(working, "_process", None)
-    monkeypatch.setattr(working, "LATER_BYTES", 120_000)
+    monkeypatch.setattr(worker, "_process", None)
+    monkeypatch.setattr(worker, "LATER_BYTES", 120_000)
     every = open_recordings(definition(tmp_path))
     kept = []
     for number in range(24):
         values = {"fusion.detection_probability": 0.7 + 0.01 * number}
         ((_, job),) = every.jobs(values)
-        assert working.work(job).became == "done"
-        assert working._process is not None
-        kept.append(working._process.cache.used_bytes)
+        assert worker.work(job).became == "done"
+        assert worker._process is not None
+        kept.append(worker._process.cache.used_bytes)
     assert kept[0] < kept[1], "later stages are kept at all"
     assert max(kept) < kept[0] + 120_000 < 24 * (kept[1] - kept[0])
     one = every.every[0]
     parameters = with_values(one.base, {"fusion.detection_probability": 0.5})
     key = stage_keys(one.sequence, parameters, job.seed)["single_view"]
-    cache = working._process.cache
+    cache = worker._process.cache
     assert cache.views(key, frames=one.sequence.frames, cameras=3) is not None
 
 
-def test_what_matters_is_told_by_all_trials_at_the_end() -> None:
-    trials = [
-        Trial(k, "complete", {}, (float(k),), (None,), {}, False, "", 0.1, ()) for k in range(40)
-    ]
-    asked: list[int] = []
+def test_what_matters_is_told_by_all_trials_at_the_end_and_not_twice(tmp_path: Path) -> None:
+    store = study(tmp_path, trials=31, prune=False)
+    run(store, Serial(made_up(near)))
+    assert store.fact("importance")["trials"] == 31
+    with closing(sqlite3.connect(store.folder / RESULTS, isolation_level=None)) as results:
+        known = json.dumps({"trials": 31, "shares": {}})
+        results.execute("UPDATE told SET value = ? WHERE name = 'importance'", (known,))
+    run(store, Serial(made_up(near)))
+    assert store.fact("importance")["shares"] == {}
 
-    class Slow(Serial):
-        def call(self, function: Any, *arguments: Any) -> Any:
-            rows = arguments[1]
-            asked.append(len(rows))
-            looks = 0
 
-            def found() -> dict[str, Any] | None:
-                nonlocal looks
-                looks += 1
-                return {"trials": len(rows), "seconds": 0.0} if looks > 2 else None
+def test_what_matters_is_told_again_when_trials_have_doubled_and_at_the_end(
+    tmp_path: Path,
+) -> None:
+    varied = definition(tmp_path).varied
+    trials = []
+    for number in range(48):
+        share = (7 * number % 48) / 48.0
+        values = {one.key: one.low + share * (one.high - one.low) for one in varied}
+        trials.append(Trial(number, "complete", values, (share,), (None,), {}, False, "", 0.1, ()))
+    with closing(ImportanceEstimator(varied, space.defaults_of(varied, RunParameters()))) as own:
 
-            return found
+        def until_found(number: int) -> int:
+            return int(wait(lambda: own.update(trials[:number]))["trials"])
 
-    weighing, crew = ImportanceEstimator((), {}), Slow()
-    assert weighing.update(trials[:13], crew, worked=9.0) is None
-    assert weighing.update(trials, crew, worked=9.0, last=True) == {"trials": 40}
-    assert asked == [13, 40]
-    assert weighing.update(trials, crew, worked=9.0, last=True) is None
-    assert asked == [13, 40]
+        assert [own.update(trials[:number]) for number in (1, 11)] == [None, None]
+        assert until_found(13) == 13
+        assert [own.update(trials[:number]) for number in (13, 25)] == [None, None]
+        assert until_found(26) == 26
+        assert own.update(trials, last=True)["trials"] == 48
+        assert own.update(trials, last=True) is None

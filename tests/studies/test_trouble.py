@@ -16,14 +16,12 @@ from app.command.commands.studies import crew_of
 from app.command.terminal import CommandError
 from tests.studies.small import Serial, definition, made_up, run
 from tracker.files.atomic import write_whole
+from tracker.studies import store as studies_store
 from tracker.studies.errors import StudyError
-from tracker.studies.reporting.summary import summary_of
-from tracker.studies.storage import writer
-from tracker.studies.storage.records import Status
-from tracker.studies.storage.store import JOURNAL, Store, create, find
-from tracker.studies.storage.writer import RESULTS, STATUS, Writer
-from tracker.studies.workers.jobs import Job, Outcome
-from tracker.studies.workers.recordings import packed
+from tracker.studies.jobs import Job, Outcome
+from tracker.studies.store import RESULTS, STATUS, Status, Store, Writer, create, find
+from tracker.studies.summary import summary_of
+from tracker.studies.transfer import packed
 
 
 def study(folder: Path, **fields: object) -> Store:
@@ -55,19 +53,9 @@ def test_a_full_disk_is_told_and_gone_on_from(
     assert len(store.trials()) == 400
 
 
-def test_a_damaged_record_of_the_sampler_is_told(tmp_path: Path) -> None:
-    store = study(tmp_path, trials=3)
-    run(store, Serial(made_up(lambda values: 0.5)))
-    journal = store.folder / JOURNAL
-    lines = journal.read_bytes().splitlines(keepends=True)
-    journal.write_bytes(b"".join([lines[0], b"{no json\n", *lines[2:]]))
-    with pytest.raises(StudyError, match="the record of what was tried cannot be read"):
-        run(store, Serial(made_up(lambda values: 0.5)))
-
-
 def test_a_reader_finds_all_tables_or_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     store, looked = study(tmp_path), 0
-    tables = writer._TABLES
+    tables = studies_store._TABLES
 
     def one_by_one() -> Iterator[str]:
         nonlocal looked
@@ -76,7 +64,7 @@ def test_a_reader_finds_all_tables_or_none(tmp_path: Path, monkeypatch: pytest.M
             looked += 1
             yield table
 
-    monkeypatch.setattr(writer, "_TABLES", one_by_one())
+    monkeypatch.setattr(studies_store, "_TABLES", one_by_one())
     with Writer(store.folder):
         assert store.trials() == []
     assert looked == len(tables)
@@ -133,23 +121,18 @@ def test_a_spoilt_status_stops_nobody(tmp_path: Path, text: str) -> None:
     assert store.status() == Status()
 
 
-@pytest.mark.parametrize("line", ['{"op_code": null}', "[]", '{"op_code": 99}'])
-def test_a_line_that_the_sampler_never_wrote_is_told(tmp_path: Path, line: str) -> None:
-    store = study(tmp_path, trials=2)
+def test_trials_that_are_gone_are_tried_again(tmp_path: Path) -> None:
+    """As of a study of before, of which only the sampler's own file knew the trials under way."""
+    store = study(tmp_path, trials=4)
     run(store, Serial(made_up(lambda values: 0.5)))
-    with (store.folder / JOURNAL).open("a") as journal:
-        journal.write(line + "\n")
-    with pytest.raises(StudyError, match=r"journal\.log: the record of what was tried cannot"):
-        run(store, Serial(made_up(lambda values: 0.5)))
-
-
-def test_trials_that_are_gone_are_told(tmp_path: Path) -> None:
-    store = study(tmp_path, trials=3)
-    run(store, Serial(made_up(lambda values: 0.5)))
+    before = store.trials()
     with closing(sqlite3.connect(store.folder / RESULTS, isolation_level=None)) as connection:
-        connection.execute("DELETE FROM trials WHERE number = 1")
+        connection.execute("DELETE FROM trials WHERE number IN (0, 2)")
     status = run(store, Serial(made_up(lambda values: 0.5)))
-    assert status.words == "some of its trials are not among the results any more"
+    assert (status.state, status.words) == ("done", "")
+    assert [one.number for one in store.trials()] == [0, 1, 2, 3]
+    assert store.trial(0).values == before[0].values
+    assert store.trial(3) == before[3]
 
 
 def test_a_study_that_is_not_there_is_told(tmp_path: Path) -> None:
@@ -164,8 +147,8 @@ def test_a_study_that_is_not_there_is_told(tmp_path: Path) -> None:
 def test_a_worker_with_other_code_does_nothing(tmp_path: Path) -> None:
     from dataclasses import replace
 
-    from tracker.studies.opened import open_recordings
-    from tracker.studies.workers.working import work
+    from tracker.studies.recordings import open_recordings
+    from tracker.studies.worker import work
 
     (_, job), *_ = open_recordings(definition(tmp_path)).jobs({})
     outcome = work(replace(job, code="another"))
@@ -175,7 +158,7 @@ def test_a_worker_with_other_code_does_nothing(tmp_path: Path) -> None:
 def test_the_same_run_has_the_same_key_wherever_it_lies(tmp_path: Path) -> None:
     import shutil
 
-    from tracker.studies.opened import open_recordings
+    from tracker.studies.recordings import open_recordings
 
     made = definition(tmp_path)
     shutil.copytree(tmp_path / "recording", tmp_path / "copy")  # other times of the files

@@ -11,10 +11,10 @@ import pytest
 from tests.studies.small import Serial, definition, recording, run
 from tracker.parameters.catalogue import PARAMETERS
 from tracker.studies.errors import StudyError
-from tracker.studies.reporting.report import report_html
-from tracker.studies.storage.store import Store, create
+from tracker.studies.jobs import Job, Outcome
+from tracker.studies.report import report_html
+from tracker.studies.store import Store, create
 from tracker.studies.tuning import tuning
-from tracker.studies.workers.jobs import Job, Outcome
 
 
 def study(folder: Path, **fields: Any) -> Store:
@@ -117,7 +117,7 @@ def test_the_dozen_are_varied_around_where_somebody_is(tmp_path: Path) -> None:
     assert dict(made.values) == {"fusion.vertical_share": 0.5}
     for one in made.varied:
         now = made.start.get(one.key, PARAMETERS[one.key].default)
-        assert one.contains(now)
+        assert one.nearest(now) == now
     blind = tuning("t", [str(place)], minutes=5.0, changes={}, ignore_truth=True)
     assert blind.objectives == ("identity",)
     with pytest.raises(StudyError, match="cannot be read"):

@@ -9,8 +9,7 @@ import pytest
 
 from tests.app.conftest import wait_until
 from tests.studies.small import Serial, definition, made_up, run
-from tracker.studies.storage.store import create
-from tracker.studies.turn import turn
+from tracker.studies.store import create, turn
 
 
 @pytest.fixture(autouse=True)

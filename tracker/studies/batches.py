@@ -6,13 +6,11 @@ as in a single run.
 
 from __future__ import annotations
 
-import glob
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from tracker.corrections import Correction
 from tracker.corrections.log import place_of, read_log
 from tracker.library.keeping import record_of_recording
 from tracker.library.records import KeptRun
@@ -21,12 +19,11 @@ from tracker.parameters.values import changed_values, with_values
 from tracker.runs import pipeline
 from tracker.sequences.errors import SequenceError
 from tracker.sequences.library import open_sequence
-from tracker.sequences.reader import FILE
-from tracker.sequences.sequence import Sequence as Recording
+from tracker.studies import definition
+from tracker.studies.cluster import Crew
 from tracker.studies.errors import StudyError
-from tracker.studies.workers.cluster import Crew
-from tracker.studies.workers.jobs import job_of
-from tracker.studies.workers.recordings import content_of
+from tracker.studies.jobs import job_of
+from tracker.studies.transfer import content_of
 
 WAIT_SECONDS = 0.5
 """Longest wait for an outcome before cancellation is checked, seconds."""
@@ -59,25 +56,16 @@ def places_of(names: Sequence[str]) -> list[str]:
     Raises:
         StudyError: If a name matches nothing.
     """
-    from tracker.sequences.library import is_room
+    return definition.places_of(_without_lists(names), Path.cwd())
 
-    found: list[str] = []
+
+def _without_lists(names: Sequence[str]) -> Iterator[str]:
+    """Yield names, and those in files that are named by ``@FILE``."""
     for name in names:
         if name.startswith("@"):
-            found += places_of(_listed(Path(name[1:])))
-        elif is_room(name):
-            found.append(name)
-        elif Path(name).exists():
-            found.append(str(Path(name).absolute()))
+            yield from _without_lists(_listed(Path(name[1:])))
         else:
-            some = [path for path in sorted(glob.glob(name)) if (Path(path) / FILE).is_file()]
-            if not some:
-                raise StudyError(
-                    f"{name}: expected a rendered room, a folder, a pattern of folders with a "
-                    f"{FILE}, or @FILE with one a line, found nothing"
-                )
-            found += [str(Path(path).absolute()) for path in some]
-    return list(dict.fromkeys(found))
+            yield name
 
 
 def _listed(file: Path) -> list[str]:
@@ -129,12 +117,13 @@ def run_batch(
     found: dict[tuple[str, int], BatchRun] = {}
     wanted: dict[str, list[tuple[str, int]]] = {}
     jobs = []
-    by_hand: dict[str, tuple[Correction, ...]] = {}
+    keys: dict[tuple[str, int], str] = {}
     total = len(places) * seeds
     for place in places:
         try:
             sequence = open_sequence(place)
-            parameters = with_values(pipeline.default_parameters(sequence), changes)
+            defaults = pipeline.default_parameters(sequence)
+            parameters = with_values(defaults, changes)
             corrections = read_log(place_of(sequence.folder)) if corrected else ()
         except (SequenceError, ValueError, OSError) as error:
             words = " ".join(str(error).split())
@@ -146,8 +135,13 @@ def run_batch(
             if kept is not None and not kept.provisional:
                 found[place, seed] = BatchRun(place, seed, kept)
                 continue
-            job = _job(sequence, place, parameters, seed, corrections)
-            by_hand[job.key] = corrections
+            job = job_of(
+                sequence, place, content_of(sequence), parameters,
+                changed_values(parameters, defaults),
+                seed, truth=sequence.ground_truth is not None, agreement=False, timed=False,
+                keep=True, corrections=corrections,
+            )  # fmt: skip
+            keys[place, seed] = key
             if job.key not in wanted:
                 jobs.append(job)
             wanted.setdefault(job.key, []).append((place, seed))
@@ -161,12 +155,10 @@ def run_batch(
                 run = None
                 if outcome.kept is not None:
                     recording, new = outcome.kept
-                    here, _ = wanted[outcome.key][0]
+                    here, seed = wanted[outcome.key][0]
                     # the worker may have the recording in another folder than this machine
                     recording = record_of_recording(open_sequence(here), here, recording.thumbnail)
-                    new = replace(
-                        new, digest=recording.digest, key=_key(here, new, by_hand[outcome.key])
-                    )
+                    new = replace(new, digest=recording.digest, key=keys[here, seed])
                     run = library.run(library.keep(recording, new, budget))
                 for place, seed in wanted.pop(outcome.key, ()):
                     found[place, seed] = BatchRun(place, seed, run, outcome.words, True)
@@ -174,33 +166,3 @@ def run_batch(
     return [
         found[place, seed] for place in places for seed in range(seeds) if (place, seed) in found
     ]
-
-
-def _key(place: str, new: Any, corrections: tuple[Correction, ...]) -> str:
-    """Return the key of a run on this machine's copy of the recording."""
-    sequence = open_sequence(place)
-    parameters = with_values(pipeline.default_parameters(sequence), new.changes)
-    return pipeline.stage_keys(sequence, parameters, new.seed, corrections)["tracks"]
-
-
-def _job(
-    sequence: Recording,
-    place: str,
-    parameters: Any,
-    seed: int,
-    corrections: tuple[Correction, ...],
-) -> Any:
-    """Return the job of a run, whose outcome includes the records for the library."""
-    job = job_of(
-        sequence,
-        place,
-        content_of(sequence),
-        parameters,
-        changed_values(parameters, pipeline.default_parameters(sequence)),
-        seed,
-        truth=sequence.ground_truth is not None,
-        agreement=False,
-        timed=False,
-        corrections=corrections,
-    )
-    return replace(job, keep=True)

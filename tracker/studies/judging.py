@@ -6,9 +6,9 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from tracker.studies.definition.objectives import HELD_OUT, VETO, Objective, front, mean_over
-from tracker.studies.storage.records import JobRow, Trial
-from tracker.studies.workers.jobs import Outcome
+from tracker.studies.jobs import Outcome
+from tracker.studies.objectives import HELD_OUT, VETO, Objective, front, mean_over
+from tracker.studies.store import JobRow, Trial
 
 FIRST_SHARE = 1.0 / 3.0
 """Share of a trial's runs that are computed before it may be pruned."""
@@ -143,17 +143,17 @@ class Judge:
             }
             if found:
                 figures[key] = mean_over(found)
-        missing = [one for one in self._objectives if self._lacks(one, done)]
-        if not failed and missing:
+        undefined = [one for one in self._objectives if self._lacks(one, done)]
+        if not failed and undefined:
             failed = True
-            words = f"{missing[0].name} is not defined: nobody is where it needs somebody"
+            words = f"{undefined[0].name} is not defined: nobody is where it needs somebody"
         objectives = spreads = None
         if not failed:
             objectives = tuple(figures[one.key].value for one in self._objectives)
             spreads = tuple(figures[one.key].spread for one in self._objectives)
         if pruned and not failed:
             words = "given up after its first runs: worse than half of the others"
-        vetoed = number != 0 and self._is_vetoed(done)
+        missing = 0.0 if number == 0 else self._missing_overlap(done)
         trial = Trial(
             number,
             "failed" if failed else "pruned" if pruned else "complete",
@@ -161,10 +161,11 @@ class Judge:
             objectives,
             spreads or (),
             {key: mean.value for key, mean in figures.items()},
-            vetoed,
+            missing > 0.0,
             words,
             sum(outcome.seconds for _, outcome in done),
             rows,
+            missing_overlap=missing,
         )
         self._add(trial, {row.key: outcome for row, outcome in done})
         return trial
@@ -173,22 +174,15 @@ class Judge:
         """Whether an objective is not defined for one of the runs."""
         return any(outcome.figures.get(one.key) is None for _, outcome in done)
 
-    def _is_vetoed(self, done: Sequence[tuple[JobRow, Outcome]]) -> bool:
-        """Whether the held-out overlap of a run is less than that of the defaults by more than
-        :data:`VETO`."""
-        for row, outcome in done:
-            usual = self._overlaps.get((row.recording, row.seed))
-            if usual is not None and (outcome.overlap or 0.0) < usual - VETO:
-                return True
-        return False
-
-    def for_sampler(self, trial: Trial) -> tuple[float, ...]:
-        """Return the objectives that the sampler gets: identity is 0 if the trial is vetoed."""
-        assert trial.objectives is not None
-        return tuple(
-            0.0 if trial.vetoed and one.of == "agreement" else value
-            for one, value in zip(self._objectives, trial.objectives, strict=True)
-        )
+    def _missing_overlap(self, done: Sequence[tuple[JobRow, Outcome]]) -> float:
+        """Return by how much more than :data:`VETO` the held-out overlap of a run is less than that
+        of the defaults, at most over the runs; 0 if it is not."""
+        pairs = [
+            (self._overlaps.get((row.recording, row.seed)), outcome.overlap or 0.0)
+            for row, outcome in done
+        ]
+        missing = [usual - VETO - here for usual, here in pairs if usual is not None]
+        return max(0.0, *missing) if missing else 0.0
 
 
 def best_of(trials: Sequence[Trial], objectives: Sequence[Objective]) -> Trial | None:

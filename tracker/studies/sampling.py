@@ -1,4 +1,4 @@
-"""The choice of the next trial's values by Optuna, whose storage is a file of the study.
+"""The choice of the next trial's values by Optuna, in memory, from the trials of the study.
 
 [AYY19] Akiba, Sano, Yanase, Ohta, Koyama, "Optuna: a next-generation hyperparameter optimization
 framework", KDD 2019. TPE: Bergstra, Bardenet, Bengio, Kégl, NeurIPS 2011; for several objectives
@@ -9,18 +9,18 @@ from __future__ import annotations
 
 import heapq
 import itertools
-import json
-import os
-from collections.abc import Container, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from pathlib import Path
+from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from tracker.parameters.catalogue import RunParameters
-from tracker.studies.definition import space
-from tracker.studies.definition.definition import Definition, Varied
-from tracker.studies.definition.objectives import Objective
+from tracker.studies import space
+from tracker.studies.definition import StudyDefinition
 from tracker.studies.errors import StudyError
+from tracker.studies.objectives import VETO, Objective
+from tracker.studies.space import Varied
+from tracker.studies.store import Trial
 
 STARTUP = 12
 """The number of random trials before TPE is used."""
@@ -31,8 +31,11 @@ LAST = 400
 trial does not grow with the number of trials. TPE compares at most 25 good trials with all others,
 among which old ones have little weight; the good ones are still the best of all trials."""
 
+REBUILD = 250
+"""The number of trials that end before the search is rebuilt from the best and the last ones."""
 
-def first_values(definition: Definition, defaults: dict[str, Any]) -> list[dict[str, Any]]:
+
+def first_values(definition: StudyDefinition, defaults: dict[str, Any]) -> list[dict[str, Any]]:
     """Return the values of the first trials: the defaults, and the defaults with the user's own
     values if these differ."""
     first, start = [defaults], dict(definition.start or {})
@@ -41,159 +44,215 @@ def first_values(definition: Definition, defaults: dict[str, Any]) -> list[dict[
     return first
 
 
-class Sampler:
-    """The sampler, which asks Optuna for the values of each trial and reports the results to it.
+def distribution(one: Varied) -> Any:
+    """Return Optuna's distribution of a varied parameter."""
+    from optuna.distributions import CategoricalDistribution, FloatDistribution, IntDistribution
 
-    Trials without a result are in the journal: when it is opened again, they are still open, with
-    the same numbers and values.
+    if one.choices:
+        return CategoricalDistribution(list(one.choices))
+    low, high = one.limits
+    if one.is_whole:
+        return IntDistribution(int(low), int(high), log=one.log)
+    return FloatDistribution(low, high, log=one.log)
+
+
+class Sampler:
+    """The search of a study: it chooses the values of each trial, given those that ended.
+
+    What was tried is in the study's own table alone. The search by Optuna is made from it, and made
+    anew from the best and the last trials from time to time.
     """
 
     def __init__(
         self,
-        path: Path,
-        definition: Definition,
+        definition: StudyDefinition,
         objectives: Sequence[Objective],
         bases: Sequence[RunParameters],
+        ended: Sequence[Trial] = (),
+        running: Mapping[int, Mapping[str, Any]] | None = None,
     ) -> None:
-        """Open the journal, or make it.
+        """Rebuild the search from the trials that ended and those under way.
 
         Args:
-            path: The file of Optuna's journal.
             definition: The study's definition.
             objectives: The objectives whose values are reported.
             bases: The parameters on each recording with the fixed values of the study.
+            ended: The trials that ended.
+            running: The values by key of each trial under way, by its number.
 
         Raises:
-            StudyError: If the file cannot be read.
+            StudyError: If a grid has more combinations than the study has trials.
         """
+        self._definition, self._bases = definition, bases
+        self._objectives = tuple(objectives)
+        self._varied = {one.key: one for one in definition.varied}
+        self.defaults = space.defaults_of(definition.varied, bases[0])
+        """The default values of the varied parameters, by key."""
+        given = first_values(definition, self.defaults)
+        self.fixed = len(given)
+        """The number of trials whose values are the defaults or the user's own."""
+        if definition.search == "grid":
+            given += self._grid()
+        self._given = given
+        self.trials = definition.trials if definition.search != "grid" else len(given)
+        """The number of trials that the study has."""
+        self._search = definition.search
+        if self._search == "auto":
+            self._search = "tpe" if len(self._objectives) == 1 else "nsga2"
+        self._constrained = any(one.of == "agreement" for one in objectives)
+        self._next = 0
+        self._ended = list(ended)
+        self._running = {number: dict(values) for number, values in (running or {}).items()}
+        self._known = {trial.number for trial in ended} | set(self._running)
+        self._rebuild()
+
+    @property
+    def left(self) -> int:
+        """The number of trials that have not begun."""
+        return self.trials - len(self._known)
+
+    @property
+    def has_begun(self) -> bool:
+        """Whether the trial of the defaults has begun."""
+        return 0 in self._known
+
+    def ask(self) -> tuple[int, dict[str, Any]]:
+        """Choose the values of the next trial, and return its number and the values by key."""
+        number = next(k for k in itertools.count(self._next) if k not in self._known)
+        self._next = number
+        given = self._given[number] if number < len(self._given) else None
+        values = self._begin(number, given)
+        if given is not None and number < self.fixed:
+            values = given if number == 0 else values | given
+        self._known.add(number)
+        self._running[number] = values
+        return number, values
+
+    def tell(self, trial: Trial) -> None:
+        """Report a trial that ended.
+
+        One with :attr:`~tracker.studies.store.Trial.missing_overlap` is infeasible, whatever its
+        objectives are.
+        """
+        from optuna.trial import TrialState
+
+        self._ended.append(trial)
+        del self._running[trial.number]
+        if self._search != "nsga2" and len(self._ended) - self._built >= REBUILD:
+            self._rebuild()
+            return
+        # what began is replaced by what ended, since a rebuilt search has no handle to tell it by
+        self._study.tell(self._open.pop(trial.number), state=TrialState.FAIL)
+        self._study.add_trial(self._ended_trial(trial))
+
+    def _rebuild(self) -> None:
+        """Make Optuna's study from the trials that ended and those under way."""
         import optuna
 
         optuna.logging.set_verbosity(optuna.logging.ERROR)
-        self._optuna: Any = optuna
-        self._definition, self._bases = definition, bases
-        self._varied = {one.key: one for one in definition.varied}
-        self._single = len(objectives) == 1
-        self._journal: Journal | None = None
-        try:
-            self._journal = Journal(path)
-            self._study: Any = optuna.create_study(
-                storage=storage(self._journal, minimized=self._minimized(objectives)),
-                study_name=definition.name,
-                directions=["maximize" if one.higher else "minimize" for one in objectives],
-                sampler=self._sampler(),
-                load_if_exists=True,
-            )
-            self._study.get_trials(
-                deepcopy=False
-            )  # reads the file here, where exceptions are handled
-        except (ValueError, LookupError, TypeError, AttributeError, AssertionError,
-                RecursionError) as error:  # fmt: skip
-            self.close()
-            raise StudyError(
-                f"{path}: the record of what was tried cannot be read ({error}); the results are "
-                "in results.sqlite3 beside it: start a new study with what they show"
-            ) from None
-        self._trials: dict[int, Any] = {}
-
-    def close(self) -> None:
-        """Close the file."""
-        if self._journal is not None:
-            self._journal.close()
+        self._built = len(self._ended)
+        self._generations = itertools.count()
+        self._study = optuna.create_study(
+            directions=["maximize" if one.higher else "minimize" for one in self._objectives],
+            sampler=self._sampler(),
+        )
+        ended = [self._ended_trial(trial) for trial in self._remembered()]
+        running = [
+            self._trial(optuna.trial.TrialState.RUNNING, values)
+            for values in self._running.values()
+        ]
+        self._study.add_trials([*ended, *running])
+        self._open = {number: len(ended) + k for k, number in enumerate(self._running)}
 
     def _sampler(self) -> Any:
-        """Return Optuna's sampler for the search method of the study."""
-        samplers, seed = self._optuna.samplers, self._definition.seed
-        search = self._definition.search
-        if search == "auto":
-            search = "tpe" if self._single else "nsga2"
-        if search == "tpe":
+        """Return Optuna's sampler; one that goes on draws other numbers than from the beginning."""
+        from optuna import samplers
+
+        seed = self._definition.seed
+        if self._known:
+            seed = int(np.random.SeedSequence([seed, len(self._known)]).generate_state(1)[0])
+        if self._search == "tpe":
             return samplers.TPESampler(
                 multivariate=True, constant_liar=True, n_startup_trials=STARTUP, seed=seed
             )
-        if search == "nsga2":
-            size = max(8, min(50, self._definition.trials // 5))
-            return samplers.NSGAIISampler(population_size=size, seed=seed)
+        if self._search == "nsga2":
+            return samplers.NSGAIISampler(population_size=self._population, seed=seed)
         return samplers.RandomSampler(seed=seed)
 
-    def _minimized(self, objectives: Sequence[Objective]) -> bool | None:
-        """Whether the smallest value is the best, for a search by TPE; None for other searches."""
-        by_tpe = self._single and self._definition.search in ("auto", "tpe")
-        return not objectives[0].higher if by_tpe else None
-
     @property
-    def asked(self) -> int:
-        """The number of trials that were asked for, in all sessions."""
-        return len(self._study.get_trials(deepcopy=False))
+    def _population(self) -> int:
+        """The number of trials of a generation of NSGA-II."""
+        return max(8, min(50, self._definition.trials // 5))
 
-    def open_trials(self) -> list[int]:
-        """Return the numbers of trials that were asked for and have no result."""
-        state = self._optuna.trial.TrialState
-        found = self._study.get_trials(deepcopy=False, states=(state.RUNNING,))
-        return [trial.number for trial in found]
+    def _remembered(self) -> list[Trial]:
+        """Return the trials that the search uses, by number: for TPE the best and the last ones."""
+        if self._search in ("random", "grid"):
+            return []
+        if self._search == "nsga2" or len(self._ended) <= BEST + LAST:
+            return sorted(self._ended, key=lambda one: one.number)
+        early = [one for one in self._ended[:-LAST] if one.state == "complete"]
+        sign = -1.0 if self._objectives[0].higher else 1.0
+        best = heapq.nsmallest(
+            BEST, early, key=lambda one: (_violation(one), sign * (one.objectives or (0.0,))[0])
+        )
+        return sorted([*best, *self._ended[-LAST:]], key=lambda one: one.number)
 
-    def resume(self, number: int) -> dict[str, Any]:
-        """Continue an open trial, and return its values by key."""
-        trials = self._study.get_trials(deepcopy=False)
-        identity = trials[number]._trial_id
-        self._trials[number] = self._optuna.trial.Trial(self._study, identity)
-        return self._drawn(number)
+    def _ended_trial(self, trial: Trial) -> Any:
+        """Return a trial that ended as Optuna's."""
+        reached: dict[str, Any] = {}
+        if trial.objectives is not None and trial.state == "complete":
+            reached["values"] = list(trial.objectives)
+            generation = next(self._generations) // self._population
+            reached["system_attrs"] = {"NSGAIISampler:generation": generation}
+        elif trial.objectives is not None and len(trial.objectives) == 1:
+            reached["intermediate_values"] = {0: trial.objectives[0]}
+        if self._constrained and trial.objectives is not None:
+            reached["constraints"] = {"missing overlap": _violation(trial)}
+        return self._trial(_state_of(trial), trial.values, **reached)
 
-    def ask(self, values: Mapping[str, Any] | None = None) -> tuple[int, dict[str, Any]]:
-        """Ask for a trial, and return its number and values.
+    def _trial(self, state: Any, tried: Mapping[str, Any], **reached: Any) -> Any:
+        """Return a trial of Optuna's with a state and values by key.
 
         Args:
-            values: The values to try; None if the sampler chooses them.
+            state: Optuna's state.
+            tried: The values by key.
+            reached: Further arguments of Optuna's function.
         """
-        assert self._journal is not None
-        with self._journal.transaction():
-            if values is not None:
-                fit = {k: v for k, v in values.items() if self._varied[k].contains(v)}
-                self._study.enqueue_trial(fit)
-            trial = self._study.ask()
-            self._trials[trial.number] = trial
-            return trial.number, self._drawn(trial.number)
+        from optuna.trial import create_trial
 
-    def _drawn(self, number: int) -> dict[str, Any]:
-        """Return the values that the sampler draws for an open trial, by key."""
-        trial = self._trials[number]
+        chosen = {key: one for key, one in self._varied.items() if key in tried}
+        return create_trial(
+            state=state,
+            params={key: one.nearest(tried[key]) for key, one in chosen.items()},
+            distributions={key: distribution(one) for key, one in chosen.items()},
+            **reached,
+        )
+
+    def _begin(self, number: int, given: Mapping[str, Any] | None) -> dict[str, Any]:
+        """Begin a trial of Optuna's study, and return its values by key.
+
+        Args:
+            number: The number of the trial.
+            given: Values that the trial has, as far as the ranges allow; None if they are chosen.
+        """
+        if given is not None:
+            near = {k: self._varied[k].nearest(v) for k, v in given.items() if k in self._varied}
+            self._study.enqueue_trial(near)
+        trial = self._study.ask()
+        self._open[number] = trial.number
 
         def draw(one: Varied) -> Any:
             if one.choices:
                 return trial.suggest_categorical(one.key, list(one.choices))
-            assert one.low is not None
-            assert one.high is not None
+            low, high = one.limits
             if one.is_whole:
-                return trial.suggest_int(one.key, int(one.low), int(one.high), log=one.log)
-            return trial.suggest_float(one.key, one.low, one.high, log=one.log)
+                return trial.suggest_int(one.key, int(low), int(high), log=one.log)
+            return trial.suggest_float(one.key, low, high, log=one.log)
 
         return space.drawn(self._definition.varied, self._bases, draw)
 
-    def tell(self, number: int, values: Sequence[float] | None, *, pruned: bool = False) -> None:
-        """Report the result of a trial.
-
-        Args:
-            number: The trial's number.
-            values: The values of the objectives; None if the trial failed.
-            pruned: Whether the trial was pruned, so that the values are those of its first runs.
-        """
-        trial, state = self._trials.pop(number), self._optuna.trial.TrialState
-        assert self._journal is not None
-        with self._journal.transaction():
-            if values is None:
-                self._study.tell(trial, state=state.FAIL)
-            elif pruned:
-                if self._single:
-                    trial.report(float(values[0]), 0)
-                self._study.tell(trial, state=state.PRUNED)
-            else:
-                self._study.tell(trial, [float(one) for one in values])
-
-    def grid(self) -> list[dict[str, Any]]:
-        """Return the values of all trials of a grid.
-
-        Raises:
-            StudyError: If there are more than the study's largest number of trials.
-        """
+    def _grid(self) -> list[dict[str, Any]]:
+        """Return the values of all trials of a grid."""
         most = self._definition.trials
         found = list(itertools.islice(space.grid(self._definition.varied, self._bases), most + 1))
         if len(found) > most:
@@ -204,120 +263,16 @@ class Sampler:
         return found
 
 
-class Journal:
-    """A journal backend of Optuna without a lock, written by one process.
-
-    An incomplete last line, which a killed process may leave, is removed. Lines are written at once
-    but not forced to disk: if the machine loses power, the values of the last trials may be lost,
-    but not their results, which the file of results has.
-    """
-
-    def __init__(self, path: Path) -> None:
-        """Open the file, or make it.
-
-        Raises:
-            ValueError: If the file is not a journal.
-        """
-        whole = path.read_bytes() if path.exists() else b""
-        complete = whole[: whole.rfind(b"\n") + 1]
-        if len(complete) < len(whole):
-            with path.open("r+b") as file:
-                file.truncate(len(complete))
-        self._path = path
-        self._lines: list[dict[str, Any]] = [json.loads(one) for one in complete.splitlines()]
-        self._first = 0
-        self._file = path.open("ab", buffering=0)
-        self._size = len(complete)
-        self._waiting: list[bytes] | None = None
-
-    def close(self) -> None:
-        """Close the file."""
-        self._file.close()
-
-    def read_logs(self, log_number_from: int) -> Iterator[dict[str, Any]]:
-        """Yield the lines from a number on; earlier lines are removed from memory, since Optuna
-        reads each line only once."""
-        del self._lines[: log_number_from - self._first]
-        self._first = max(self._first, log_number_from)
-        yield from list(self._lines)
-
-    def append_logs(self, logs: list[dict[str, Any]]) -> None:
-        """Append lines, all or none.
-
-        Raises:
-            StudyError: If they cannot be written.
-        """
-        texts = [json.dumps(one, separators=(",", ":")).encode() + b"\n" for one in logs]
-        if self._waiting is None:
-            self._write(b"".join(texts))
-        else:
-            self._waiting += texts
-        self._lines += [json.loads(one) for one in texts]
-
-    @contextmanager
-    def transaction(self) -> Iterator[None]:
-        """Collect the lines of the block, and write them at its end, all or none."""
-        self._waiting = []
-        try:
-            yield
-        finally:
-            waiting, self._waiting = self._waiting, None
-            self._write(b"".join(waiting))
-
-    def _write(self, data: bytes) -> None:
-        """Write bytes at the end of the file, or restore its size if that fails."""
-        try:
-            if data and self._file.write(data) != len(data):
-                raise OSError(28, "No space left on device")
-        except OSError as error:
-            os.ftruncate(self._file.fileno(), self._size)
-            raise StudyError(
-                f"{self._path}: cannot be written ({error.strerror}); free some space and go on "
-                "by `multiview-phd study resume`: every run that ended is kept"
-            ) from None
-        self._size += len(data)
-
-
-def storage(journal: Any, *, minimized: bool | None) -> Any:
-    """Return Optuna's storage on a journal.
-
-    Args:
-        journal: A :class:`Journal`, which has the methods of Optuna's backends.
-        minimized: Whether the smallest value is the best, for a search by TPE; None for other
-            searches, which use all trials.
-    """
-    from optuna.storages import JournalStorage
+def _state_of(trial: Trial) -> Any:
+    """Return Optuna's state of a trial that ended."""
     from optuna.trial import TrialState
 
-    class Storage(JournalStorage):
-        """A storage that does not search all trials for waiting ones, and that gives TPE only the
-        best and the last trials."""
+    if trial.objectives is None:
+        return TrialState.FAIL
+    return TrialState.COMPLETE if trial.state == "complete" else TrialState.PRUNED
 
-        _waits = True  # an earlier process may have left waiting trials
 
-        def create_new_trial(self, study_id: int, template_trial: Any = None) -> int:
-            self._waits |= template_trial is not None
-            number: int = super().create_new_trial(study_id, template_trial)
-            return number
-
-        def get_all_trials(
-            self, study_id: int, deepcopy: bool = True, states: Container[Any] | None = None
-        ) -> list[Any]:
-            if states == (TrialState.WAITING,):
-                if not self._waits:
-                    return []
-                waiting: list[Any] = super().get_all_trials(study_id, deepcopy, states)
-                self._waits = bool(waiting)
-                return waiting
-            found: list[Any] = super().get_all_trials(study_id, deepcopy, states)
-            if minimized is None or states is None or TrialState.COMPLETE not in states:
-                return found
-            if len(found) <= BEST + LAST:
-                return found
-            last = found[-LAST:]
-            early = [one for one in found[:-LAST] if one.state == TrialState.COMPLETE]
-            sign = 1.0 if minimized else -1.0
-            best = heapq.nsmallest(BEST, early, key=lambda one: sign * one.value)
-            return sorted([*best, *last], key=lambda one: one.number)
-
-    return Storage(journal)
+def _violation(trial: Trial) -> float:
+    """Return by how much a trial violates the constraint on the held-out overlap; 0 if it does
+    not. Earlier versions stored only that a trial is vetoed."""
+    return trial.missing_overlap or (VETO if trial.vetoed else 0.0)

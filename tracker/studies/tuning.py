@@ -11,9 +11,9 @@ from tracker.parameters.values import changed_values, shown_keys, value_of, with
 from tracker.runs.fitting import default_parameters
 from tracker.sequences.errors import SequenceError
 from tracker.sequences.library import open_sequence
-from tracker.studies.definition.definition import MOST_TRIALS, Definition
-from tracker.studies.definition.space import around
+from tracker.studies.definition import MOST_TRIALS, StudyDefinition
 from tracker.studies.errors import StudyError
+from tracker.studies.space import around
 
 MORE = (
     "fusion.measurement_sigma",
@@ -38,7 +38,7 @@ def tuning(
     minutes: float,
     changes: Mapping[str, Any],
     ignore_truth: bool = False,
-) -> Definition:
+) -> StudyDefinition:
     """Return the definition of a study that tunes the parameters for recordings.
 
     Args:
@@ -65,7 +65,7 @@ def tuning(
     keys = [key for key in shown_keys(now[0]) if _is_varied(key, now[0], minutes)]
     varied = [around(key, value_of(now[0], key), value_of(defaults, key)) for key in keys]
     own = changed_values(now[0], defaults)
-    return Definition(
+    return StudyDefinition(
         name=name,
         recordings=tuple(_place(one) for one in recordings),
         varied=tuple(varied),

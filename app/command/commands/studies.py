@@ -29,11 +29,10 @@ from app.command.arguments.studies import (
 )
 from app.command.terminal import Bar, CommandError, print_table, say
 from tracker.studies.errors import StudyError
-from tracker.studies.storage.records import Status, Trial
-from tracker.studies.storage.store import Store, create, find, stores, studies_folder
+from tracker.studies.store import Status, Store, Trial, create, find, stores, studies_folder
 
 if TYPE_CHECKING:
-    from tracker.studies.workers.cluster import DaskCrew
+    from tracker.studies.cluster import DaskCrew
 
 INTERRUPTED = 130
 
@@ -54,7 +53,7 @@ def study(command: Study) -> int:
     folder = action.studies or studies_folder()
     match action:
         case RunStudy():
-            from tracker.studies.definition.parsing import read_definition
+            from tracker.studies.definition import read_definition
 
             return run(create(read_definition(action.file), folder), action, as_json=action.json)
         case ResumeStudy():
@@ -76,7 +75,7 @@ def study(command: Study) -> int:
 
 def _new(command: NewStudy) -> None:
     from tracker.files.atomic import replacing
-    from tracker.studies.definition.example import example
+    from tracker.studies.definition import example
 
     file = command.file
     if file.exists():
@@ -112,7 +111,7 @@ def to_be_stopped() -> Iterator[threading.Event]:
 @contextmanager
 def crew_of(where: Where) -> Iterator[Any]:
     """What makes the workers that the flags name; they end with this."""
-    from tracker.studies.workers.cluster import ADDRESS, DaskCrew, check_address
+    from tracker.studies.cluster import ADDRESS, DaskCrew, check_address
 
     scheduler = where.scheduler or os.environ.get(ADDRESS) or None
     if scheduler is not None:
@@ -145,8 +144,8 @@ def run(store: Store, where: Where, *, as_json: bool = False, quiet: bool = Fals
         as_json: Tell the end as JSON.
         quiet: Tell nothing at the end.
     """
-    from tracker.studies.running import run_study
-    from tracker.studies.workers.cluster import ADDRESS
+    from tracker.studies.cluster import ADDRESS
+    from tracker.studies.runner import run_study
 
     before: list[str] = []
     by_time_alone = store.definition().by_time_alone
@@ -239,7 +238,7 @@ def _show(command: ShowStudy, folder: Path) -> None:
         return
     trial = store.trial(number)
     if command.command:
-        from tracker.studies.reporting.commands import track_commands
+        from tracker.studies.summary import track_commands
 
         sys.stdout.writelines(f"{one}\n" for one in track_commands(store.definition(), trial))
     elif command.json:
@@ -262,7 +261,7 @@ def _named(what: tuple[str, ...], folder: Path) -> tuple[Store, int | None]:
 
 
 def _show_trials(store: Store) -> None:
-    from tracker.studies.reporting.summary import summary_of
+    from tracker.studies.summary import summary_of
 
     summary = summary_of(store)
     keys = [key for key, _ in summary.importance[:6]] or [
@@ -300,7 +299,7 @@ def _show_trial(store: Store, trial: Trial) -> None:
 
 
 def _best(store: Store, command: BestOfStudy) -> None:
-    from tracker.studies.reporting.summary import summary_of
+    from tracker.studies.summary import summary_of
 
     summary = summary_of(store)
     best = summary.best
@@ -337,7 +336,7 @@ def save_preset(name: str, values: dict[str, Any]) -> None:
 
 
 def _export(store: Store, command: ExportStudy) -> None:
-    from tracker.studies.reporting.report import write_csv, write_json, write_report
+    from tracker.studies.report import write_csv, write_json, write_report
 
     writers = {".csv": write_csv, ".json": write_json, ".html": write_report}
     output = command.output
@@ -348,7 +347,7 @@ def _export(store: Store, command: ExportStudy) -> None:
 
 
 def _everything(store: Store) -> dict[str, Any]:
-    from tracker.studies.reporting.report import study_values
+    from tracker.studies.report import study_values
 
     return study_values(store)
 

@@ -15,7 +15,7 @@ from tracker.parameters.catalogue import RunParameters
 from tracker.parameters.values import ParameterError, with_values
 from tracker.review.self_consistency.estimate import WARNING
 from tracker.studies.errors import StudyError
-from tracker.studies.storage.store import create, studies_folder
+from tracker.studies.store import create, studies_folder
 from tracker.studies.tuning import tuning
 
 

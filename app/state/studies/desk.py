@@ -20,13 +20,11 @@ from typing import Any
 
 from app.state.workbench import Workbench
 from tracker.files.atomic import write_whole
-from tracker.studies.definition.definition import Definition
+from tracker.studies.cluster import worker_count
+from tracker.studies.definition import StudyDefinition
 from tracker.studies.errors import StudyError
-from tracker.studies.reporting.summary import Summary, summary_of
-from tracker.studies.storage.reading import read_as
-from tracker.studies.storage.records import Trial
-from tracker.studies.storage.store import FILE, Store, create, find, stores
-from tracker.studies.workers.local import worker_count
+from tracker.studies.store import FILE, Store, Trial, create, find, read_as, stores
+from tracker.studies.summary import Summary, summary_of
 
 logger = logging.getLogger("app")
 
@@ -95,7 +93,7 @@ class StudyDesk:
             raise StudyError(f"expected the name of a study, got {name!r}")
         return find(name, self.folder)
 
-    def define(self, definition: Definition) -> Store:
+    def define(self, definition: StudyDefinition) -> Store:
         """Make a study's folder.
 
         Raises:
@@ -117,7 +115,7 @@ class StudyDesk:
         if scheduler is None:
             worker_count(workers)
         else:
-            from tracker.studies.workers.cluster import check_address
+            from tracker.studies.cluster import check_address
 
             check_address(scheduler)
 

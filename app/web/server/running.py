@@ -45,7 +45,7 @@ from tracker.files.folders import settings_folder
 from tracker.library.records import Result
 from tracker.runs.pipeline import Cancelled
 from tracker.runs.stage_cache import StageCache
-from tracker.studies.storage.store import studies_folder
+from tracker.studies.store import studies_folder
 
 logger = logging.getLogger("app")
 

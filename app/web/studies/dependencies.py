@@ -9,7 +9,7 @@ from fastapi import Depends, Request
 from app.errors import ApiError, sentence
 from app.state.studies.desk import StudyDesk
 from tracker.studies.errors import StudyError
-from tracker.studies.storage.store import Store
+from tracker.studies.store import Store
 
 
 def _desk(request: Request) -> StudyDesk:

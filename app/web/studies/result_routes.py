@@ -18,8 +18,8 @@ from tracker.parameters.catalogue import METHODS, PARAMETERS
 from tracker.parameters.values import changed_values, value_of, with_values
 from tracker.sequences.errors import SequenceError
 from tracker.studies.errors import StudyError
-from tracker.studies.reporting.commands import track_commands
-from tracker.studies.storage.store import Store
+from tracker.studies.store import Store
+from tracker.studies.summary import track_commands
 
 router = APIRouter(prefix="/api/studies", responses=ERRORS)
 
@@ -146,7 +146,7 @@ def _proposed(store: Store, bench: Bench) -> dict[str, object]:
 )
 def export(store: Named, file: Literal["report.html", "trials.csv", "study.json"]) -> Response:
     """A study as a report, a table, or everything."""
-    from tracker.studies.reporting import report  # and with it the library of plots
+    from tracker.studies import report  # and with it the library of plots
 
     write = {
         "report.html": report.write_report,

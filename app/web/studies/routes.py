@@ -15,11 +15,10 @@ from app.web.studies import models, views
 from app.web.studies.dependencies import Desk, Named, no_study
 from tracker.parameters.values import changed_values
 from tracker.runs.processes import available_cores
-from tracker.studies.definition.definition import Definition
-from tracker.studies.definition.objectives import OBJECTIVES, SELF_CONSISTENCY, WITH_TRUTH, chosen
-from tracker.studies.definition.parsing import definition_of
+from tracker.studies.definition import StudyDefinition, definition_of
 from tracker.studies.errors import StudyError
-from tracker.studies.storage.store import Store
+from tracker.studies.objectives import OBJECTIVES, SELF_CONSISTENCY, WITH_TRUTH, chosen
+from tracker.studies.store import Store
 from tracker.studies.tuning import tuning
 
 router = APIRouter(prefix="/api/studies", responses=ERRORS)
@@ -97,7 +96,7 @@ def _left_out(snapshot: Snapshot) -> str:
     return ""
 
 
-def _definition(wish: models.StudyWish, bench: Bench) -> Definition:
+def _definition(wish: models.StudyWish, bench: Bench) -> StudyDefinition:
     """The study that is wished for, from what is on the sliders.
 
     Raises:
@@ -161,7 +160,7 @@ def estimate(wish: models.CostWish, desk: Desk, bench: Bench) -> models.StudyCos
     return models.StudyCost(runs=runs, seconds=seconds, bytes=size, words=words, error=None)
 
 
-def _seconds(snapshot: Snapshot, definition: Definition, runs: int) -> float | None:
+def _seconds(snapshot: Snapshot, definition: StudyDefinition, runs: int) -> float | None:
     """Of one worker, for all runs; None where nothing is known yet."""
     state, sequence = snapshot.run_state, snapshot.sequence
     speed = state.steps_per_second
@@ -191,7 +190,7 @@ def define(wish: models.StudyWish, desk: Desk, bench: Bench) -> models.Study:
 @router.post("/scheduler")
 def scheduler(wish: models.SchedulerWish) -> models.SchedulerInfo:
     """Whether a Dask scheduler answers at an address, and who works for it."""
-    from tracker.studies.workers.cluster import scheduler_numbers
+    from tracker.studies.cluster import scheduler_numbers
 
     try:
         found = scheduler_numbers(wish.address, SECONDS_FOR_A_SCHEDULER)

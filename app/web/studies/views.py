@@ -11,11 +11,9 @@ from app.web.studies import models
 from tracker.files.folders import cache_folder
 from tracker.parameters.catalogue import METHODS, PARAMETERS
 from tracker.parameters.values import shown_keys, value_of, with_values
-from tracker.studies.definition.definition import Varied
-from tracker.studies.definition.objectives import Objective
-from tracker.studies.definition.space import around
-from tracker.studies.storage.records import Trial
-from tracker.studies.storage.store import Store
+from tracker.studies.objectives import Objective
+from tracker.studies.space import Varied, around
+from tracker.studies.store import Store, Trial
 
 _METHOD_HELP = {
     "single_view": "Method of stage 1.",
@@ -94,7 +92,7 @@ def range_of(one: Varied, default: Any, now: Any) -> models.RangeInfo:
 def trial_of(trial: Trial) -> models.TrialInfo:
     """A trial that ended."""
     told = asdict(trial)
-    del told["jobs"]
+    del told["jobs"], told["missing_overlap"]
     return models.TrialInfo(**told)
 
 

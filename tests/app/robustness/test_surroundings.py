@@ -21,7 +21,7 @@ from tests.studies.small import run as run_study
 from tracker.files import folders
 from tracker.kernels.compilation import kernel_folder
 from tracker.library.store import Library
-from tracker.studies.storage.store import create
+from tracker.studies.store import create
 
 PROGRAM = """
 import os, sys

@@ -10,14 +10,11 @@ from __future__ import annotations
 import hashlib
 import os
 import platform
-import sqlite3
-import subprocess
 import sys
 import threading
 import time
 from collections import OrderedDict
 from collections.abc import Callable
-from contextlib import closing
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -25,7 +22,6 @@ import cv2
 
 from tracker.evaluation import evaluate_sequence
 from tracker.files.folders import cache_folder
-from tracker.kernels import compilation
 from tracker.library.keeping import record_of_recording, record_of_run, thumbnail_of
 from tracker.parameters.values import with_values
 from tracker.review.self_consistency import estimate
@@ -33,12 +29,13 @@ from tracker.runs import pipeline
 from tracker.runs.pipeline import Run
 from tracker.runs.stage_cache import StageCache
 from tracker.runs.stage_files import StageFiles
+from tracker.runs.warm_up import ensure_compiled
 from tracker.sequences.errors import SequenceError
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
-from tracker.studies.definition.objectives import OBJECTIVES
-from tracker.studies.workers import recordings
-from tracker.studies.workers.jobs import Job, Outcome, code_version
+from tracker.studies import transfer
+from tracker.studies.jobs import Job, Outcome, code_version
+from tracker.studies.objectives import OBJECTIVES
 
 CACHE_BYTES = 128 << 20
 """Memory of a worker for cached results of stages, bytes: mainly of stage 1, which is re-used by
@@ -57,9 +54,6 @@ KNOWN_TIMES = 4096
 NICENESS = 5
 """Niceness (priority in POSIX) of a worker on this machine, so that interactive programs come
 first."""
-
-COMPILING = "compiling the kernels, once per machine"
-"""The sentence that is reported while kernels are compiled."""
 
 Tell = Callable[[str], None]
 """A callback that gets a sentence on the progress."""
@@ -105,25 +99,11 @@ def prepare(tell: Tell = lambda words: None) -> None:
         if _process is not None:
             return
         cv2.setNumThreads(1)
-        if not compilation.is_compiled():
-            tell(COMPILING)
-            _compile()
+        ensure_compiled(tell)
         files = StageFiles(cache_folder() / "stages")
         _process = _Process(
             StageCache(memory_bytes=CACHE_BYTES, later_bytes=LATER_BYTES, files=files)
         )
-
-
-def _compile() -> None:
-    """Compile the kernels in two processes, for one worker of the machine at a time."""
-    folder = compilation.kernel_folder()
-    folder.mkdir(parents=True, exist_ok=True)
-    with closing(sqlite3.connect(folder / "compiling.lock", timeout=600.0)) as lock:
-        lock.isolation_level = None
-        lock.execute("BEGIN EXCLUSIVE")  # the system releases it when the process ends
-        if not compilation.is_compiled():
-            line = [sys.executable, "-m", "tracker.runs.warm_up"]
-            subprocess.run(line, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, check=False)
 
 
 def work(job: Job, tell: Tell = lambda words: None, worker: str = "") -> Outcome:
@@ -162,7 +142,7 @@ def _opened(job: Job, tell: Tell) -> tuple[Sequence, FrameReader]:
         kept.move_to_end(job.content)
         return kept[job.content]
     tell(f"opens {job.place}")
-    sequence = recordings.opened(job.place, job.content)
+    sequence = transfer.opened(job.place, job.content)
     tell("")
     kept[job.content] = sequence, FrameReader(sequence)
     while len(kept) > MOST_OPEN:
@@ -278,3 +258,9 @@ def tracks_hash(run: Run) -> str:
     for name in ("frames", "ids", "positions", "existences", "sigmas", "seen"):
         digest.update(getattr(run.tracks, name).tobytes())
     return digest.hexdigest()[:24]
+
+
+def dask_setup(worker: Any) -> None:
+    """Prepare a worker's process on this machine before its first job; Dask calls it."""
+    lower_priority()
+    prepare()

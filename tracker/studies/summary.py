@@ -1,26 +1,31 @@
-"""The summary of a study: trials, the best one, the importance of parameters, and sentences."""
+"""The summary of a study: trials, the best one, the importance of parameters, sentences, and the
+commands that repeat a trial."""
 
 from __future__ import annotations
 
+import json
+import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from tracker.files.text import shown
+from tracker.parameters.values import changed_values, with_values
 from tracker.review.self_consistency.estimate import WARNING
-from tracker.studies.definition.definition import Definition
-from tracker.studies.definition.objectives import (
+from tracker.runs import pipeline
+from tracker.sequences.library import open_sequence
+from tracker.studies.definition import StudyDefinition
+from tracker.studies.errors import StudyError
+from tracker.studies.judging import best_of, front_of, usable
+from tracker.studies.objectives import (
     BESIDE,
     IDENTITY,
     OBJECTIVES,
     WITH_TRUTH,
     Objective,
 )
-from tracker.studies.errors import StudyError
-from tracker.studies.judging import best_of, front_of, usable
-from tracker.studies.storage.records import Status, Trial
-from tracker.studies.storage.store import Store
-from tracker.studies.storage.writer import RESULTS
+from tracker.studies.store import RESULTS, JobRow, Status, Store, Trial
 
 BETTER_SIGMAS = 2.0
 """Number of standard deviations over the seeds below which a difference is described as
@@ -33,7 +38,7 @@ class Summary:
 
     name: str
     """The name of the study."""
-    definition: Definition
+    definition: StudyDefinition
     """The definition of the study."""
     status: Status
     """The status of the study."""
@@ -162,7 +167,7 @@ def summary_of(store: Store, before: Summary | None = None) -> Summary:
     )
 
 
-def objectives_of(store: Store, definition: Definition) -> tuple[Objective, ...]:
+def objectives_of(store: Store, definition: StudyDefinition) -> tuple[Objective, ...]:
     """Return the objectives that were stored when the study began, or else those of its
     definition."""
     stored: Sequence[dict[str, Any]] | None = store.fact("objectives")
@@ -176,3 +181,39 @@ def objectives_of(store: Store, definition: Definition) -> tuple[Objective, ...]
                 )
         return tuple(OBJECTIVES[one["key"]] for one in stored)
     return tuple(OBJECTIVES[key] for key in definition.objectives or WITH_TRUTH)
+
+
+def track_commands(definition: StudyDefinition, trial: Trial) -> list[str]:
+    """Return the ``track`` command of each run of a trial.
+
+    Args:
+        definition: The definition of the study.
+        trial: The trial.
+
+    Raises:
+        SequenceError: If a recording cannot be read.
+    """
+    return [_command(definition, trial, row) for row in trial.jobs]
+
+
+def changes_of(definition: StudyDefinition, trial: Trial, recording: str) -> dict[str, Any]:
+    """Return the values of a trial that differ from the recording's defaults, by key.
+
+    Args:
+        definition: The definition of the study.
+        trial: The trial.
+        recording: The name or folder of the recording.
+    """
+    defaults = pipeline.default_parameters(open_sequence(recording))
+    values = trial.values if trial.number else {}
+    return changed_values(with_values(defaults, {**definition.held(), **values}), defaults)
+
+
+def _command(definition: StudyDefinition, trial: Trial, row: JobRow) -> str:
+    """Return the ``track`` command of one run of a trial."""
+    words = ["multiview-phd", "track", row.recording, "--no-corrections", "--seed", str(row.seed)]
+    for key, value in changes_of(definition, trial, row.recording).items():
+        text = json.dumps(value) if not isinstance(value, str) else value
+        words += ["--set", f"{key}={text}"]
+    name = f"{definition.name} trial {trial.number} {Path(row.recording).name} seed {row.seed}"
+    return shlex.join([*words, "--output", f"{name.replace(' ', '-')}.csv"])

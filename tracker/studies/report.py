@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -15,10 +15,8 @@ from tracker.files.atomic import replacing
 from tracker.parameters.catalogue import PARAMETERS
 from tracker.sequences.errors import SequenceError
 from tracker.studies.judging import usable
-from tracker.studies.reporting.commands import track_commands
-from tracker.studies.reporting.summary import Summary, summary_of
-from tracker.studies.storage.records import Trial
-from tracker.studies.storage.store import Store
+from tracker.studies.store import Store, Trial
+from tracker.studies.summary import Summary, summary_of, track_commands
 
 _STYLE = """
 :root { color-scheme: light dark; --line: #8884; }
@@ -165,7 +163,7 @@ def report_html(store: Store) -> str:
             f'<div class="wide">{_trials(summary)}</div>',
             "<h2>Repeat the best one</h2>",
             f'<pre class="command">{escaped(_commands(summary))}</pre>',
-            "<h2>Definition</h2>",
+            "<h2>StudyDefinition</h2>",
             "<details><summary>As a file that starts it again</summary>",
             f"<pre>{escaped(definition.to_toml())}</pre></details>",
             "</body></html>",
@@ -258,45 +256,16 @@ def _value(value: Any) -> str:
 def objective_figure(summary: Summary) -> Any | None:
     """Plot the first over the last objective with the Pareto front, or a single objective over the
     number of the trial; None without complete trials."""
-    import plotly.graph_objects as go
-
-    trials = usable(summary.trials)
-    if not trials:
-        return None
-    figure = go.Figure(layout=_layout())
     several = len(summary.objectives) > 1
-    across = summary.objectives[-1] if several else None
 
-    def x(trial: Trial) -> float:
-        assert trial.objectives is not None
-        return trial.objectives[-1] if several else float(trial.number)
+    def x(trial: Trial) -> Any:
+        return (trial.objectives or (None,))[-1] if several else trial.number
 
-    def points(some: list[Trial], name: str, **marker: Any) -> Any:
-        return go.Scatter(
-            x=[x(one) for one in some],
-            y=[(one.objectives or (0.0,))[0] for one in some],
-            text=[f"trial {one.number}" for one in some],
-            mode="markers",
-            name=name,
-            marker=marker,
-        )
-
-    figure.add_trace(points(trials, "trials", color=_FAINT, size=6, opacity=0.6))
-    if several:
-        front = sorted((one for one in trials if one.number in summary.front), key=x)
-        ways = points(front, "front", color=_ACCENT, size=7)
-        figure.add_trace(ways.update(mode="lines+markers", line_shape="vh", line_color=_ACCENT))
-    if summary.default is not None and summary.default.objectives is not None:
-        default = points([summary.default], "default", symbol="diamond", size=12, color=_DEFAULT)
-        figure.add_trace(default)
-    if summary.best is not None:
-        ring = {"color": _ACCENT, "width": 2}
-        best = points(
-            [summary.best], "best", color=_ACCENT, symbol="circle-open", size=15, line=ring
-        )
-        figure.add_trace(best)
-    figure.update_xaxes(title=_axis(across) if across is not None else "trial")
-    _limit_range(figure, summary)
+    figure = _over(summary, x, _axis(summary.objectives[-1]) if several else "trial", _HEIGHT)
+    if figure is not None and several:
+        front = sorted((one for one in summary.trials if one.number in summary.front), key=x)
+        line = {"line_shape": "vh", "line_color": _ACCENT, "mode": "lines+markers"}
+        figure.add_trace(_points(front, x, "front", color=_ACCENT, size=7).update(**line))
     return figure
 
 
@@ -321,45 +290,61 @@ def importance_figure(summary: Summary) -> Any | None:
 
 def parameter_figures(summary: Summary) -> list[Any]:
     """Plot the first objective over each of the most important parameters."""
-    import plotly.graph_objects as go
-
-    trials = usable(summary.trials)
-    if not trials:
-        return []
     order = [key for key, _ in summary.importance] or [one.key for one in summary.definition.varied]
     logs = {one.key: one.log for one in summary.definition.varied}
     found = []
     for key in order[:_MOST]:
-        some = [one for one in trials if key in one.values]
-        dots = go.Scatter(
-            x=[one.values[key] for one in some],
-            y=[(one.objectives or (0.0,))[0] for one in some],
-            text=[f"trial {one.number}" for one in some],
-            mode="markers",
-            marker={"color": _FAINT, "size": 6, "opacity": 0.6},
-            name="trials",
-        )
-        figure = go.Figure(dots, layout=_layout(260))
-        for trial, name, colour in (
-            (summary.default, "default", _DEFAULT), (summary.best, "best", _ACCENT),
-        ):  # fmt: skip
-            if trial is not None and key in trial.values and trial.objectives is not None:
-                marker: dict[str, Any] = {"color": colour, "size": 12, "symbol": "diamond"}
-                if name == "best":
-                    marker |= {"symbol": "circle-open", "line": {"color": colour, "width": 2}}
-                figure.add_trace(
-                    go.Scatter(
-                        x=[trial.values[key]], y=[trial.objectives[0]], mode="markers", name=name,
-                        marker=marker,
-                    )
-                )  # fmt: skip
         unit = PARAMETERS[key].unit if key in PARAMETERS else ""
-        figure.update_xaxes(
-            title=f"{key}{f' [{unit}]' if unit else ''}", type="log" if logs.get(key) else None
-        )
-        _limit_range(figure, summary)
-        found.append(figure)
+        title = f"{key}{f' [{unit}]' if unit else ''}"
+        figure = _over(summary, lambda trial, key=key: trial.values.get(key), title, 260)  # type: ignore[misc]
+        if figure is not None:
+            figure.update_xaxes(type="log" if logs.get(key) else None)
+            found.append(figure)
     return found
+
+
+def _over(summary: Summary, x: Callable[[Trial], Any], title: str, height: int) -> Any | None:
+    """Plot the first objective over a figure of the trials, with the default and the best marked;
+    None without complete trials.
+
+    Args:
+        summary: The summary of the study.
+        x: A function that returns the figure of a trial; None leaves the trial out.
+        title: The title of the figure's axis.
+        height: The height of the plot, pixels.
+    """
+    import plotly.graph_objects as go
+
+    trials = usable(summary.trials)
+    if not trials:
+        return None
+    figure = go.Figure(layout=_layout(height))
+    figure.add_trace(_points(trials, x, "trials", color=_FAINT, size=6, opacity=0.6))
+    default = {"symbol": "diamond", "size": 12, "color": _DEFAULT}
+    best = {"symbol": "circle-open", "size": 15, "line": {"color": _ACCENT, "width": 2}}
+    for trial, name, marker in (
+        (summary.default, "default", default), (summary.best, "best", {"color": _ACCENT, **best}),
+    ):  # fmt: skip
+        if trial is not None and trial.objectives is not None and x(trial) is not None:
+            figure.add_trace(_points([trial], x, name, **marker))
+    figure.update_xaxes(title=title)
+    _limit_range(figure, summary)
+    return figure
+
+
+def _points(trials: Sequence[Trial], x: Callable[[Trial], Any], name: str, **marker: Any) -> Any:
+    """Return a trace with a point for each trial that has the figure on the x-axis."""
+    import plotly.graph_objects as go
+
+    some = [one for one in trials if x(one) is not None]
+    return go.Scatter(
+        x=[x(one) for one in some],
+        y=[(one.objectives or (0.0,))[0] for one in some],
+        text=[f"trial {one.number}" for one in some],
+        mode="markers",
+        name=name,
+        marker=marker,
+    )
 
 
 def _limit_range(figure: Any, summary: Summary) -> None:

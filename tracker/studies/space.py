@@ -5,11 +5,60 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from tracker.parameters.catalogue import METHODS, PARAMETERS, Parameter, RunParameters
 from tracker.parameters.values import shown_keys, value_of, with_values
-from tracker.studies.definition.definition import Varied
+
+GRID_STEPS = 5
+"""The default number of a parameter's values on a grid."""
+
+
+@dataclass(frozen=True, slots=True)
+class Varied:
+    """A parameter, or the choice of a method, that a study varies."""
+
+    key: str
+    """The key of the parameter."""
+    low: float | None = None
+    """Smallest value in the parameter's unit; None if there are choices."""
+    high: float | None = None
+    """Largest value in the parameter's unit, included; None if there are choices."""
+    log: bool = False
+    """Whether the logarithm of the value is drawn uniformly, rather than the value."""
+    steps: int = GRID_STEPS
+    """The number of values on a grid."""
+    choices: tuple[Any, ...] = ()
+    """The values of a parameter that is not varied over a range."""
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether the parameter is an integer."""
+        return self.key in PARAMETERS and PARAMETERS[self.key].kind == "int"
+
+    @property
+    def limits(self) -> tuple[float, float]:
+        """The smallest and the largest value of a parameter that has no choices."""
+        assert self.low is not None
+        assert self.high is not None
+        return self.low, self.high
+
+    def nearest(self, tried: Any) -> Any:
+        """Return the value of the range that is nearest to a value; of choices, the value itself,
+        or the first choice if it is none of them."""
+        if self.choices:
+            return tried if tried in self.choices else self.choices[0]
+        low, high = self.limits
+        near = min(max(tried, low), high)
+        return int(near) if self.is_whole else near
+
+    def table(self) -> dict[str, Any]:
+        """Return the parameter's table in a study's file."""
+        if self.choices:
+            return {"choices": list(self.choices)}
+        return {"low": self.low, "high": self.high, "log": self.log, "steps": self.steps}
+
 
 Draw = Callable[[Varied], Any]
 """A function that draws a value of one varied parameter."""

@@ -13,7 +13,6 @@ from typing import Any, Literal
 
 from tracker import evaluation
 from tracker.corrections import Correction
-from tracker.library.records import NewRecording, NewRun
 from tracker.parameters.catalogue import RunParameters
 from tracker.runs.numbers_version import numbers_version
 from tracker.runs.run import stage_keys
@@ -23,16 +22,27 @@ FORMAT = 1
 """Version of the outcomes; if it changes, all jobs are computed again."""
 
 
+_TRACKER = Path(evaluation.__file__).parents[1]
+
+FIGURES = ("evaluation", "review/self_consistency")
+"""The packages that compute the figures of a run from its tracks."""
+
+
 @cache
-def code_version() -> str:
+def code_version(tracker: Path = _TRACKER) -> str:
     """Return a hash of the code that may change a figure of a run.
 
-    It covers the code of the tracks and the modules of :mod:`tracker.evaluation`, without those of
-    its subpackages.
+    It covers the code of the tracks and that of the figures, without the reports on them.
+
+    Args:
+        tracker: The folder of the package whose code of the figures is read.
     """
     digest = hashlib.sha256(f"{FORMAT} {numbers_version('tracks')}".encode())
-    for path in sorted(Path(evaluation.__file__).parent.glob("*.py")):
-        digest.update(path.read_bytes())
+    for package in FIGURES:
+        for path in sorted((tracker / package).rglob("*.py")):
+            name = path.relative_to(tracker).as_posix()
+            if not name.startswith("evaluation/report"):
+                digest.update(name.encode() + b"\0" + path.read_bytes() + b"\0")
     return digest.hexdigest()[:16]
 
 
@@ -95,8 +105,9 @@ class Outcome:
     """The name of the worker."""
     machine: str = ""
     """The name of the worker's machine."""
-    kept: tuple[NewRecording, NewRun] | None = None
-    """The records for the library; None if the job did not ask for them."""
+    kept: Any = None
+    """The records for the library, a :class:`~tracker.library.records.NewRecording` and a
+    :class:`~tracker.library.records.NewRun`; None if the job did not ask for them."""
 
     def to_json(self) -> dict[str, Any]:
         """Return all fields but ``kept`` as plain values."""
@@ -114,6 +125,7 @@ def job_of(
     truth: bool,
     agreement: bool,
     timed: bool,
+    keep: bool = False,
     corrections: tuple[Correction, ...] = (),
 ) -> Job:
     """Return the job of a run.
@@ -128,6 +140,7 @@ def job_of(
         truth: Whether to evaluate the run against ground truth.
         agreement: Whether to compare the run with its variants.
         timed: Whether the time of stage 1 must be known.
+        keep: Whether the outcome includes the records for the library.
         corrections: The corrections that the run applies.
     """
     own = replace(sequence, digest=content)
@@ -137,6 +150,5 @@ def job_of(
     asked = [run, code, truth, agreement]
     key = hashlib.sha256(json.dumps(asked).encode()).hexdigest()[:24]
     return Job(
-        key, place, content, dict(values), seed, code, truth, agreement, timed,
-        corrections=corrections,
+        key, place, content, dict(values), seed, code, truth, agreement, timed, keep, corrections
     )  # fmt: skip

@@ -10,8 +10,6 @@ import importlib
 import logging
 import queue
 import re
-import subprocess
-import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -21,13 +19,12 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from tracker.files.text import visible
-from tracker.kernels import compilation
 from tracker.runs.processes import available_cores
+from tracker.runs.warm_up import ensure_compiled
+from tracker.studies import transfer, worker
 from tracker.studies.errors import StudyError
-from tracker.studies.workers import recordings, working
-from tracker.studies.workers.jobs import Job, Outcome
-from tracker.studies.workers.local import worker_count
-from tracker.studies.workers.working import Tell
+from tracker.studies.jobs import Job, Outcome
+from tracker.studies.worker import Tell
 
 ADDRESS = "DASK_SCHEDULER_ADDRESS"
 """The environment variable with the scheduler's address, if none is named."""
@@ -52,6 +49,11 @@ _QUIET = {
 }
 """Settings that reduce what Dask collects for its dashboard, which is not used here; with many
 workers it would take much of the scheduler's time."""
+
+
+MOST_A_CORE = 4
+"""Largest number of processes for each core; more would wait for each other, and each takes up to
+1 GB of memory."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,39 +92,40 @@ class Crew(Protocol):
             StudyError: If the crew cannot continue; earlier outcomes are not lost.
         """
 
-    def call(self, function: Callable[..., Any], *arguments: Any) -> Callable[[], Any | None]:
-        """Have a worker call a function, and return a getter of the result, which returns None
-        until there is one."""
-
     def workers(self) -> list[WorkerState]:
         """Return the states of all workers."""
 
 
-def compile_first(tell: Tell) -> None:
-    """Compile this machine's kernels before its workers start.
+def worker_count(wanted: int | None) -> int:
+    """Return the number of workers for this machine: the number wanted, or one for each core if
+    None.
 
-    Args:
-        tell: A callback that gets a sentence on the progress.
+    Raises:
+        StudyError: If more are wanted than the machine can run.
     """
-    if not compilation.is_compiled():
-        tell(working.COMPILING)
-        line = [sys.executable, "-m", "tracker.runs.warm_up"]
-        subprocess.run(line, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, check=False)
+    cores = available_cores()
+    most = MOST_A_CORE * cores
+    if wanted is not None and not 1 <= wanted <= most:
+        raise StudyError(
+            f"workers: expected 1 to {most} processes on this machine of {cores} cores, got "
+            f"{wanted}; a cluster's scheduler takes more (--scheduler)"
+        )
+    return wanted or cores
 
 
 def _do(job: Job) -> Outcome:
     """Do a job as a task of Dask, and report its progress as events."""
     from distributed import get_worker
 
-    worker = get_worker()
-    name = str(worker.address)
+    here = get_worker()
+    name = str(here.address)
 
     def tell(words: str) -> None:
-        event = {"worker": name, "words": words, "job": job.key, "machine": working.machine()}
-        worker.log_event(TOPIC, event)
+        event = {"worker": name, "words": words, "job": job.key, "machine": worker.machine()}
+        here.log_event(TOPIC, event)
 
     tell("")
-    return working.work(job, tell, name)
+    return worker.work(job, tell, name)
 
 
 def scheduler_numbers(address: str, seconds: float) -> dict[str, Any]:
@@ -188,7 +191,6 @@ class DaskCrew:
         tell: Tell = lambda words: None,
         do: Callable[[Job], Outcome] = _do,
         processes: bool = True,
-        sent_bytes: int = recordings.SENT_BYTES,
     ) -> None:
         """Start workers on this machine, or join a cluster.
 
@@ -198,8 +200,6 @@ class DaskCrew:
             tell: A callback that gets a sentence on the progress.
             do: The function with which a worker does a job.
             processes: Whether the workers of this machine are processes rather than threads.
-            sent_bytes: Largest size of a recording that is sent to a worker that cannot read it,
-                bytes.
 
         Raises:
             StudyError: If there is no scheduler at the address.
@@ -208,7 +208,7 @@ class DaskCrew:
 
         for name in ("distributed", "distributed.worker", "distributed.nanny"):
             logging.getLogger(name).setLevel(logging.CRITICAL)
-        self._do, self._address, self._sent_bytes = do, scheduler, sent_bytes
+        self._do, self._address = do, scheduler
         self._jobs: dict[Any, Job] = {}
         """The jobs that have not ended, by their futures."""
         self._states: dict[str, WorkerState] = {}
@@ -251,9 +251,9 @@ class DaskCrew:
         distributed: Any = importlib.import_module("distributed")  # slow, and without types
         dask: Any = importlib.import_module("dask")
         if processes:
-            compile_first(tell)
+            ensure_compiled(tell)
         tell(f"starting {count} worker{'s' if count > 1 else ''}")
-        own = {"preload": ["tracker.studies.workers.local"]} if processes else {}
+        own = {"preload": ["tracker.studies.worker"]} if processes else {}
         environment = {"NUMBA_NUM_THREADS": "1"}
         with dask.config.set(_QUIET):
             return distributed.LocalCluster(
@@ -389,7 +389,7 @@ class DaskCrew:
         try:
             from tracker.sequences.library import open_sequence
 
-            data = recordings.packed(open_sequence(job.place).folder, self._sent_bytes)
+            data = transfer.packed(open_sequence(job.place).folder)
         except (StudyError, OSError) as error:
             raise StudyError(
                 f"worker {outcome.worker} on {outcome.machine} cannot read {job.place} "
@@ -397,23 +397,9 @@ class DaskCrew:
             ) from None
         with self._explained():
             sent = self._client.submit(
-                recordings.unpack, job.content, data, workers=[outcome.worker], pure=False
+                transfer.unpack, job.content, data, workers=[outcome.worker], pure=False
             )
             sent.result(timeout=SENDING_SECONDS)
-
-    def call(self, function: Callable[..., Any], *arguments: Any) -> Callable[[], Any | None]:
-        """Have a worker call a function, and return a getter of the result, which returns None
-        until there is one.
-
-        The same worker is used each time if possible, since it has to import further packages.
-        """
-        first = sorted(self._threads())[:1]
-        with self._explained():
-            future = self._client.submit(
-                function, *arguments, pure=False, priority=10,
-                workers=first or None, allow_other_workers=bool(first),
-            )  # fmt: skip
-        return lambda: future.result() if future.status == "finished" else None
 
     def _on_report(self, event: tuple[float, Any]) -> None:
         """Store the report of a worker, which Dask passes with its time."""

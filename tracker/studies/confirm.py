@@ -10,11 +10,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from tracker.studies.definition.objectives import OBJECTIVES
+from tracker.studies.jobs import Job, Outcome
 from tracker.studies.judging import Judge, usable
-from tracker.studies.opened import Opened, Recordings
-from tracker.studies.storage.records import JobRow, Trial
-from tracker.studies.workers.jobs import Job, Outcome
+from tracker.studies.objectives import OBJECTIVES
+from tracker.studies.recordings import Opened, Recordings
+from tracker.studies.store import JobRow, Trial
 
 CANDIDATES = 4
 """The number of best trials that are evaluated again."""

@@ -1,7 +1,8 @@
 """The run of a study: the sampler draws trials, workers compute their runs, results are stored.
 
-Every result is on disk before it is reported to the sampler, so that the process may be killed at
-any time: the next start continues the open trials, and reads the runs that ended from disk.
+Every trial is on disk before its runs begin, and every result before it is reported to the sampler,
+so that the process may be killed at any time: the next start continues the trials under way, and
+reads the runs that ended from disk.
 """
 
 from __future__ import annotations
@@ -13,20 +14,16 @@ from contextlib import nullcontext
 from dataclasses import dataclass, field
 from typing import Any
 
-from tracker.studies.analysis.importance import ImportanceEstimator
-from tracker.studies.analysis.proposing import SEARCH_SHARE, Proposer
-from tracker.studies.definition.definition import Definition
-from tracker.studies.definition.space import defaults_of
+from tracker.studies.cluster import Crew, WorkerState
+from tracker.studies.confirm import SEARCH_SHARE, Proposer
+from tracker.studies.definition import StudyDefinition
 from tracker.studies.errors import StudyError
+from tracker.studies.importance import ImportanceEstimator
+from tracker.studies.jobs import Job, Outcome
 from tracker.studies.judging import Judge
-from tracker.studies.opened import Recordings, check_same, open_recordings
-from tracker.studies.sampling import Sampler, first_values
-from tracker.studies.storage.records import JobRow, Status, Trial
-from tracker.studies.storage.store import JOURNAL, Store
-from tracker.studies.storage.writer import Writer
-from tracker.studies.turn import turn
-from tracker.studies.workers.cluster import Crew, WorkerState
-from tracker.studies.workers.jobs import Job, Outcome
+from tracker.studies.recordings import Recordings, check_same, open_recordings
+from tracker.studies.sampling import Sampler
+from tracker.studies.store import JobRow, Status, Store, Trial, Writer, turn
 
 SECONDS_BETWEEN = 0.5
 """Interval at which the status is written and a request to stop is checked, seconds."""
@@ -49,7 +46,7 @@ def run_study(
 
     Args:
         store: The folder of the study.
-        writer: The writer from :meth:`~tracker.studies.storage.store.Store.running`.
+        writer: The writer from :meth:`~tracker.studies.store.Store.running`.
         crew: A function that starts the workers; its argument is a callback that gets sentences on
             the progress.
         on_status: A callback that gets the status at intervals.
@@ -100,10 +97,9 @@ class _Running:
     ) -> None:
         self._store, self._writer = store, writer
         self._on_status, self._stopped = on_status, stopped
-        self._definition: Definition = store.definition()
+        self._definition: StudyDefinition = store.definition()
         self._active: dict[int, Active] = {}
         self._waiting: dict[str, list[Active]] = {}
-        self._queue: list[dict[str, Any]] = []
         self._begin = time.monotonic()
         self._spent = float(store.fact("spent") or 0.0)
         self._pace = Pace()
@@ -119,35 +115,23 @@ class _Running:
         definition = self._definition
         self._recordings: Recordings = open_recordings(definition, self.wait_for)
         check_same(self._store, self._writer, self._recordings)
-        ended = self._store.trials()
+        ended, running = self._store.trials(), self._store.running_trials()
         self._judge = Judge(self._recordings.objectives, ended, self._writer.outcome)
         self._ended = {trial.number for trial in ended}
         self._sampler = Sampler(
-            self._store.folder / JOURNAL,
-            definition,
-            self._recordings.objectives,
-            self._recordings.bases,
+            definition, self._recordings.objectives, self._recordings.bases, ended, running
         )
-        self._asked = self._sampler.asked
-        by_number = {trial.number: trial for trial in ended}
-        for number in self._sampler.open_trials():
-            values = self._sampler.resume(number)
-            if number in by_number:  # its result was stored but not reported to the sampler
-                self._report_to_sampler(by_number[number])
-            else:
-                self._activate(number, values)
-        defaults = defaults_of(definition.varied, self._recordings.bases[0])
-        first = first_values(definition, defaults)
-        self._fixed = len(first)
-        grid = self._sampler.grid() if definition.search == "grid" else None
-        self._trials = definition.trials if grid is None else len(first) + len(grid)
-        self._queue = [*first, *(grid or [])][self._asked :]
-        self._estimator = ImportanceEstimator(definition.varied, defaults)
+        for number, values in running.items():
+            self._activate(number, values)
+        known = self._store.fact("importance") or {"trials": 0}
+        self._estimator = ImportanceEstimator(
+            definition.varied, self._sampler.defaults, known["trials"]
+        )
 
     def close(self) -> None:
-        """Close the sampler's files."""
-        if hasattr(self, "_sampler"):
-            self._sampler.close()
+        """End the thread that estimates the importance."""
+        if hasattr(self, "_estimator"):
+            self._estimator.close()
 
     # the loop
 
@@ -179,21 +163,18 @@ class _Running:
     def _fill(self) -> None:
         """Ask the sampler for trials until enough runs are queued for all workers."""
         while len(self._waiting) < self._slots * (1 + AHEAD) and self._may_ask():
-            values = self._queue.pop(0) if self._queue else None
-            number, drawn = self._sampler.ask(values)
-            self._asked = number + 1
-            if number < self._fixed and values is not None:
-                drawn = values if number == 0 else drawn | values
-            active = self._activate(number, drawn)
+            number, values = self._sampler.ask()
+            self._writer.begin(number, values)
+            active = self._activate(number, values)
             self._send(active)
             if active.all_ended:  # all runs of the trial are stored already
                 self._receive()
 
     def _may_ask(self) -> bool:
         """Whether another trial may begin; the trial of the defaults may at any time."""
-        if self._asked >= self._trials or self._stopped():
+        if self._sampler.left <= 0 or self._stopped():
             return False
-        return self._asked < 1 or self._minutes_left() > 0.0
+        return not self._sampler.has_begun or self._minutes_left() > 0.0
 
     def _minutes_left(self, share: float | None = None) -> float:
         """Return the remaining time, minutes; infinity if it is not limited.
@@ -213,8 +194,6 @@ class _Running:
 
     def _activate(self, number: int, values: dict[str, Any]) -> Active:
         """Return an open trial with a number and values, which is active from now on."""
-        if number == 0:
-            values = defaults_of(self._definition.varied, self._recordings.bases[0])
         # trial 0 has the defaults of each recording, which may differ; the values are of the first
         jobs = self._recordings.jobs({} if number == 0 else values)
         active = self._active[number] = Active(number, values, jobs)
@@ -245,8 +224,8 @@ class _Running:
         proposer = Proposer(
             self._recordings,
             self._store.trials(),
-            defaults_of(definition.varied, self._recordings.bases[0]),
-            definition.start if self._fixed > 1 else {},
+            self._sampler.defaults,
+            definition.start if self._sampler.fixed > 1 else {},
             range(first, first + definition.propose),
             self._measure,
         )
@@ -293,7 +272,7 @@ class _Running:
 
         All results are on disk before they are reported to the sampler.
         """
-        ended = []
+        ended: list[Trial] = []
         with self._writer.transaction():
             for outcome in outcomes:
                 self._record_outcome(outcome)
@@ -301,7 +280,7 @@ class _Running:
                 if (trial := self._continued(self._active[number])) is not None:
                     ended.append(trial)
         for trial in ended:
-            self._report_to_sampler(trial)
+            self._sampler.tell(trial)
 
     def _continued(self, active: Active) -> Trial | None:
         """Submit the next runs of a trial, or end it.
@@ -322,7 +301,7 @@ class _Running:
             if failed is None and active.sent < len(active.jobs):
                 rows = [row for row, _ in active.jobs[: active.sent]]
                 hopeless = self._judge.is_hopeless(rows, active.outcomes)
-                if not hopeless or active.number < self._fixed:
+                if not hopeless or active.number < self._sampler.fixed:
                     self._send(active)
                     continue
             return self._end(active, failed)
@@ -337,7 +316,7 @@ class _Running:
         """
         rows = tuple(row for row, _ in active.jobs[: active.sent])
         words = "the defaults" if active.number == 0 else ""
-        if active.number == 1 and self._fixed > 1:
+        if active.number == 1 and self._sampler.fixed > 1:
             words = "where you were"
         trial = self._judge.trial(
             active.number,
@@ -352,11 +331,6 @@ class _Running:
         self._ended.add(trial.number)
         del self._active[active.number]
         return trial
-
-    def _report_to_sampler(self, trial: Trial) -> None:
-        """Report the result of a trial to the sampler."""
-        values = None if trial.state == "failed" else self._judge.for_sampler(trial)
-        self._sampler.tell(trial.number, values, pruned=trial.state == "pruned")
 
     # the status
 
@@ -389,7 +363,7 @@ class _Running:
             self.state,
             self.words,
             done=done,
-            trials=getattr(self, "_trials", self._definition.trials),
+            trials=self._trials,
             runs=self._pace.runs,
             seconds=seconds,
             seconds_left=self._seconds_left(done),
@@ -401,31 +375,32 @@ class _Running:
             written=time.time(),
         )
         self._writer.write_status(self.status)
-        if hasattr(self, "_trials"):
+        if hasattr(self, "_sampler"):
             self._writer.put_fact("spent", self._spent + seconds)
         self._on_status(self.status)
         self._last_status = time.monotonic()
 
+    @property
+    def _trials(self) -> int:
+        """The number of trials that the study has."""
+        return self._sampler.trials if hasattr(self, "_sampler") else self._definition.trials
+
     def _seconds_left(self, done: int) -> float | None:
         """Return the estimated time to the end, seconds; None if it is not known."""
-        if self.state != "running" or not hasattr(self, "_trials"):
+        if self.state != "running" or not hasattr(self, "_sampler"):
             return None
         left = self._pace.seconds_left(done, self._trials)
         return None if left is None else max(0.0, min(left, 60.0 * self._minutes_left()))
 
     def _why_done(self) -> str:
         """Return why there are no more trials, in words; empty if all have ended."""
-        if len(self._ended) >= self._trials:
+        if len(self._ended) >= self._trials or self._definition.minutes is None:
             return ""
-        if self._definition.minutes is None:
-            return "some of its trials are not among the results any more"
         return f"the {self._definition.minutes:g} minutes are over"
 
     def _update_importance(self, *, last: bool = False) -> None:
         """Store the importance of the parameters if there is a new estimate."""
-        found = self._estimator.update(
-            self._judge.complete, self.crew, worked=self._pace.worked, last=last
-        )
+        found = self._estimator.update(self._judge.complete, last=last)
         if found is not None:
             self._writer.put_fact("importance", found)
 
@@ -481,8 +456,6 @@ class Pace:
     def __init__(self) -> None:
         self.runs = 0
         """The number of runs that ended."""
-        self.worked = 0.0
-        """The time that workers spent on these runs, seconds."""
         self._warm: float | None = None
         """The time when the first run ended, on the monotonic clock, seconds."""
         self._since_warm = 0.0
@@ -493,7 +466,6 @@ class Pace:
     def count(self, seconds: float) -> None:
         """Count a run that ended, and on which a worker spent so many seconds."""
         self.runs += 1
-        self.worked += seconds
         if self._warm is None:
             self._warm = time.monotonic()
         else:

@@ -13,15 +13,13 @@ from tracker.runs.fitting import unfit_methods
 from tracker.sequences.errors import SequenceError
 from tracker.sequences.library import open_sequence
 from tracker.sequences.sequence import Sequence
-from tracker.studies.definition import objectives
-from tracker.studies.definition.definition import Definition
-from tracker.studies.definition.objectives import Objective
+from tracker.studies import objectives
+from tracker.studies.definition import StudyDefinition
 from tracker.studies.errors import StudyError
-from tracker.studies.storage.records import JobRow
-from tracker.studies.storage.store import Store
-from tracker.studies.storage.writer import Writer
-from tracker.studies.workers.jobs import Job, code_version, job_of
-from tracker.studies.workers.recordings import content_of
+from tracker.studies.jobs import Job, code_version, job_of
+from tracker.studies.objectives import Objective
+from tracker.studies.store import JobRow, Store, Writer
+from tracker.studies.transfer import content_of
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -106,19 +104,9 @@ class Recordings:
             timed=any(each.key == "speed" for each in self.objectives),
         )
 
-    def parameters(self, place: str, values: Mapping[str, Any]) -> RunParameters:
-        """Return all parameters of a trial on a recording.
-
-        Args:
-            place: The name or folder by which the recording is opened.
-            values: The varied parameters, by key.
-        """
-        one = next(each for each in self.every if each.place == place)
-        return with_values(one.base, values)
-
 
 def open_recordings(
-    definition: Definition,
+    definition: StudyDefinition,
     tell: Callable[[str], None] = lambda words: None,
 ) -> Recordings:
     """Open all recordings of a study.
@@ -149,7 +137,7 @@ def open_recordings(
     )
 
 
-def _check_methods(definition: Definition, sequence: Sequence, base: RunParameters) -> None:
+def _check_methods(definition: StudyDefinition, sequence: Sequence, base: RunParameters) -> None:
     """Check that all methods of the trials can track a recording.
 
     Raises:

@@ -1,1 +1,0 @@
-"""The analysis of a study: importance of parameters, and the proposal of values."""

@@ -1,1 +1,0 @@
-"""The presentation of a study: a summary, commands, and reports."""

@@ -1,1 +1,0 @@
-"""The storage of a study: its folder, records and results."""
