@@ -88,7 +88,7 @@ def size_of(path: Path) -> int:
     """
     there = path.stat()
     if not stat.S_ISREG(there.st_mode):
-        raise OSError(errno.EINVAL, "it is a folder, pipe or device")
+        raise OSError(errno.EINVAL, "expected a file, found a folder, pipe or device")
     return there.st_size
 
 

@@ -230,7 +230,12 @@ export function createPlayback(store, sendSeek) {
 		if (state.playing) ask();
 	}
 
+	/** @type {number | null} */
+	let keptBefore = null;
 	store.on(["server", "run", "basis", "revision", "timeline"], (state) => {
+		const kept = state.run?.kept ?? null;
+		if (kept !== keptBefore) results.clear(); // the same run, with or without its stages
+		keptBefore = kept;
 		const done = shownDone(state);
 		for (const name of [...results.names()]) {
 			const result = results.get(name);
