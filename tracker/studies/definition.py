@@ -420,7 +420,7 @@ def example(name: str, recordings: Sequence[str]) -> str:
 
 name = {json.dumps(name, ensure_ascii=False)}
 
-# Rendered rooms, folders, or patterns of folders such as "recordings/*"; paths from this file on.
+# Built-in rooms, folders, or patterns of folders such as "recordings/*"; paths from this file on.
 recordings = [{listed}]
 
 # How many values are tried. The first trial is always the defaults.

@@ -64,7 +64,7 @@ class NewStudy:
         UseAppendAction[tuple[str, ...]],
         arg(metavar="NAME", help_behavior_hint="(repeatable; default: room44-3p)"),
     ] = ()
-    """A rendered room, or a folder."""
+    """A built-in room, or a folder."""
 
 
 @dataclass
@@ -154,7 +154,7 @@ class Batch(Where):
         Positional[tuple[str, ...]],
         arg(
             metavar="RECORDING …",
-            help="Rendered rooms, folders, patterns of folders, or @FILE with one a line.",
+            help="Built-in rooms, folders, patterns of folders, or @FILE with one a line.",
             help_behavior_hint="",
         ),
     ]
@@ -185,7 +185,7 @@ class Tune(Where, OfStudies):
 
     recordings: Annotated[
         Positional[tuple[str, ...]],
-        arg(metavar="RECORDING …", help="Rendered rooms, or folders.", help_behavior_hint=""),
+        arg(metavar="RECORDING …", help="Built-in rooms, or folders.", help_behavior_hint=""),
     ]
     minutes: float = 5.0
     """How long it seeks."""
