@@ -143,7 +143,7 @@ def kept_runs(folder: Path) -> int:
         found = library.runs()
         for one in found[:3]:
             library.result(one.id)
-        keys = {int(library.result(one.id).key.removeprefix("run-")) for one in found}
+        keys = {int(one.key.removeprefix("run-")) for one in found}
     return _without_gap(keys)
 
 
