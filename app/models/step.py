@@ -157,6 +157,6 @@ class Step(Model):
     tracks: list[Track]
     truth: list[Truth]
     components: int | None
-    """Of the filter; null where only the tracks of a run were stored."""
+    """The number of components of the filter; null where only the tracks of a run were stored."""
     cardinality: float | None
     """Expected number of people: the sum of the weights; null where only tracks were stored."""

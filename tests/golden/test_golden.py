@@ -27,23 +27,21 @@ ONE_ROOM = "room44-3p"
 """What the short form looks at, with the default methods: the hardest of the rooms."""
 
 
-def _parameters(pieces: Iterable[Piece]) -> list[object]:
-    return [pytest.param(piece, id=piece.name, marks=_marks(piece)) for piece in pieces]
-
-
-def _marks(piece: Piece) -> list[pytest.MarkDecorator]:
-    return [pytest.mark.data if piece.real else pytest.mark.full]
-
-
-def _pieces() -> list[object]:
-    """All pieces; rooms other than the hardest are for the longer form."""
+def _parameters(
+    pieces: Iterable[Piece], other_rooms: pytest.MarkDecorator = pytest.mark.full
+) -> list[object]:
+    """The pieces as parameters of a test, with a mark for the rooms other than the hardest."""
     return [
         pytest.param(
             piece,
             id=piece.name,
-            marks=pytest.mark.long if not piece.real and piece.name != ONE_ROOM else _marks(piece),
+            marks=pytest.mark.data
+            if piece.real
+            else pytest.mark.full
+            if piece.name == ONE_ROOM
+            else other_rooms,
         )
-        for piece in PIECES
+        for piece in pieces
     ]
 
 
@@ -88,7 +86,7 @@ def check(
     return checked
 
 
-@pytest.mark.parametrize("piece", _pieces())
+@pytest.mark.parametrize("piece", _parameters(PIECES, other_rooms=pytest.mark.long))
 def test_every_stage_gives_what_it_gave(
     piece: Piece, data: Path, check: Callable[[str, files.Fingerprints], None]
 ) -> None:

@@ -96,7 +96,7 @@ def test_the_same_trials_lead_to_the_same_values(made: StudyDefinition) -> None:
 def test_what_was_learnt_is_used_after_a_restart(
     made: StudyDefinition, keys: tuple[str, ...]
 ) -> None:
-    """Of uniform draws a sixth is as near to the best p_D."""
+    """The search goes on near the best p_D, where a sixth of uniform draws lies."""
 
     def score(values: dict[str, Any]) -> tuple[float, ...]:
         return near(values)[: len(keys)]

@@ -122,7 +122,7 @@ def test_a_spoilt_status_stops_nobody(tmp_path: Path, text: str) -> None:
 
 
 def test_trials_that_are_gone_are_tried_again(tmp_path: Path) -> None:
-    """As of a study of before, of which only the sampler's own file knew the trials under way."""
+    """A study of an earlier version has trials under way that only the sampler's own file knew."""
     store = study(tmp_path, trials=4)
     run(store, Serial(made_up(lambda values: 0.5)))
     before = store.trials()

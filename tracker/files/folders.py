@@ -14,7 +14,7 @@ import platformdirs
 
 CACHE_BYTES = 2 << 30
 """Disk space for results of finished stages where no other is set, bytes. Measured was stage 1 of
-``room44-3p`` by colour: 8.7 kB a step and camera, which makes 0.8 GB an hour at 25 fps."""
+``room44-3p`` by colour: 4.7 kB a step and camera, which makes 0.4 GB an hour at 25 fps."""
 
 MOST_GB = 65536
 """Largest limit of memory or disk space that can be set, GB."""

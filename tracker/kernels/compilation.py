@@ -51,7 +51,7 @@ _LARGE = 50_000
 two seconds at 30 microseconds each."""
 
 _LEVEL = 1
-"""Of optimisation by LLVM, for kernels that do not loop over pixels; numba's own is 3."""
+"""The level of optimisation by LLVM of kernels that do not loop over pixels; numba's own is 3."""
 
 _config: Any = numba.config
 

@@ -55,7 +55,7 @@ class Drafts:
         return draft
 
     def take_earlier(self, sequence: Path) -> tuple[Values, Values] | None:
-        """As saved and as taught on a built-in room as it was rendered before; None where
+        """What was saved and taught on a built-in room as it was rendered before; None where
         nothing was. The file gets another name, so that it is taken up once and nothing is lost."""
         key = earlier_key(sequence)
         if self._folder is None or key is None:

@@ -61,9 +61,9 @@ class KeptRunInfo(Model):
     recording: int
     recording_name: str
     began: float
-    """Of the first computation; seconds since 1970."""
+    """When the run was computed first, seconds since 1970."""
     latest: float
-    """Of the last computation of the same run."""
+    """When the same run was computed last, seconds since 1970."""
     seconds: float
     steps: int
     steps_per_second: float

@@ -650,9 +650,9 @@ declare namespace Server {
 		id: number;
 		recording: number;
 		recording_name: string;
-		/** Of the first computation; seconds since 1970. */
+		/** When the run was computed first, seconds since 1970. */
 		began: number;
-		/** Of the last computation of the same run. */
+		/** When the same run was computed last, seconds since 1970. */
 		latest: number;
 		seconds: number;
 		steps: number;
@@ -1096,7 +1096,7 @@ declare namespace Server {
 		cameras: CameraStep[];
 		tracks: Track[];
 		truth: Truth[];
-		/** Of the filter; null where only the tracks of a run were stored. */
+		/** The number of components of the filter; null where only the tracks of a run were stored. */
 		components: number | null;
 		/** Expected number of people: the sum of the weights; null where only tracks were stored. */
 		cardinality: number | null;
