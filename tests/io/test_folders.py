@@ -1,0 +1,19 @@
+"""Generated folders are not imported wrongly without a word more often than before."""
+
+from __future__ import annotations
+
+from tests.io.scoreboard import score
+
+SEED = 7
+FOLDERS = 12
+SILENT = 9
+"""Of these so many are wrong without a word: fewer is progress, more is a fault."""
+
+
+def test_no_more_folders_are_silently_wrong_than_before() -> None:
+    found = [score(SEED, number, most_frames=200) for number in range(FOLDERS)]
+    silent = [
+        f"{number}: {why}" for number, (_, how, why, _) in enumerate(found) if how == "silent"
+    ]
+    assert len(silent) <= SILENT, silent
+    assert any(how == "right" for _, how, _, _ in found)
