@@ -1,0 +1,166 @@
+"""Densities of one camera's boxes given another camera's boxes of the same moments, compiled."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy import ndarray
+
+from tracker.kernels.compilation import compiled_later
+
+
+def _density_ratios(
+    feet: ndarray,
+    heads: ndarray,
+    whole: ndarray,
+    starts: ndarray,
+    centre: ndarray,
+    seen: ndarray,
+    background: ndarray,
+    seen_starts: ndarray,
+    rotation: ndarray,
+    seen_centre: ndarray,
+    scene: ndarray,
+    sigma: float,
+    height_sigma: float,
+) -> ndarray:
+    """Compute how much likelier each box of camera b is by the boxes of camera a than by itself.
+
+    The foot of box i of camera a lies along its ray d at the distance s = arg min |h × (s d + r)|
+    with the deviation s √(σ_H² + 2 σ²), and by the floor at s' = (f − n·c) / n·d with the deviation
+    √(τ² + σ² H²) / |n·d|; both are combined by their information unless they differ by three
+    deviations. In camera b this is a box μ_i, with the middle's place across, the foot's along and
+    the head's along the vertical, and the covariance S_i = v J Jᵀ + η² diag(σ², σ², σ² + σ_H²/4),
+    and the result of a box z is
+
+        (1 / N_a) Σ_i N(z; μ_i, S_i) / p_b(z)
+
+    Args:
+        feet: (N, 3), d, unit directions to the feet of camera a's boxes, world axes.
+        heads: (N, 3), h, unit directions to their heads.
+        whole: (N,), whether neither end of the box is cut off.
+        starts: (M + 1,), index of the first box of camera a of each of M moments, and N.
+        centre: (3,), c, position of camera a.
+        seen: (D, 4), x and y of foot and head of camera b's boxes on its image plane at distance 1.
+        background: (D,), log p_b(z), NaN for a box that is not compared.
+        seen_starts: (M + 1,), index of the first box of camera b of each moment, and D.
+        rotation: (3, 3), R of camera b.
+        seen_centre: (3,), position of camera b.
+        scene: (8,), the rise r, the normal n, f and τ.
+        sigma: σ, deviation of a box's ends in its heights.
+        height_sigma: σ_H, deviation of people's heights in the common height.
+
+    Returns:
+        (D,), the ratio; NaN where nothing is compared.
+    """
+    result = np.full(len(seen), np.nan)
+    rise, normal = scene[:3], scene[3:6]
+    floor, scatter = scene[6], scene[7]
+    height = math.sqrt(rise[0] ** 2 + rise[1] ** 2 + rise[2] ** 2)
+    floor_sd = math.sqrt(scatter**2 + (sigma * height) ** 2)
+    above = floor - (normal[0] * centre[0] + normal[1] * centre[1] + normal[2] * centre[2])
+    size_share = math.sqrt(height_sigma**2 + 2.0 * sigma**2)
+    base = centre - seen_centre
+    for m in range(len(starts) - 1):
+        count = starts[m + 1] - starts[m]
+        if count == 0 or seen_starts[m] == seen_starts[m + 1]:
+            continue
+        for z in range(seen_starts[m], seen_starts[m + 1]):
+            if not math.isnan(background[z]):
+                result[z] = 0.0
+        for i in range(starts[m], starts[m + 1]):
+            if not whole[i]:
+                continue
+            dx, dy, dz = feet[i, 0], feet[i, 1], feet[i, 2]
+            hx, hy, hz = heads[i, 0], heads[i, 1], heads[i, 2]
+            ax, ay, az = hy * dz - hz * dy, hz * dx - hx * dz, hx * dy - hy * dx
+            bx = hy * rise[2] - hz * rise[1]
+            by = hz * rise[0] - hx * rise[2]
+            bz = hx * rise[1] - hy * rise[0]
+            square = ax * ax + ay * ay + az * az
+            if square < 1e-12:
+                continue
+            s = -(ax * bx + ay * by + az * bz) / square
+            if s <= 0.0:
+                continue
+            variance = (s * size_share) ** 2
+            slope = normal[0] * dx + normal[1] * dy + normal[2] * dz
+            if abs(slope) > 1e-3:
+                other = above / slope
+                other_variance = (floor_sd / slope) ** 2
+                if (s - other) ** 2 < 9.0 * (variance + other_variance):
+                    total = variance + other_variance
+                    s = (s * other_variance + other * variance) / total
+                    variance = variance * other_variance / total
+            fx, fy, fz = base[0] + s * dx, base[1] + s * dy, base[2] + s * dz
+            gx, gy, gz = fx + rise[0], fy + rise[1], fz + rise[2]
+            foot_z = rotation[2, 0] * fx + rotation[2, 1] * fy + rotation[2, 2] * fz
+            head_z = rotation[2, 0] * gx + rotation[2, 1] * gy + rotation[2, 2] * gz
+            if foot_z < 0.02 * s or head_z < 0.02 * s:
+                continue
+            foot_x = (rotation[0, 0] * fx + rotation[0, 1] * fy + rotation[0, 2] * fz) / foot_z
+            foot_y = (rotation[1, 0] * fx + rotation[1, 1] * fy + rotation[1, 2] * fz) / foot_z
+            head_x = (rotation[0, 0] * gx + rotation[0, 1] * gy + rotation[0, 2] * gz) / head_z
+            head_y = (rotation[1, 0] * gx + rotation[1, 1] * gy + rotation[1, 2] * gz) / head_z
+            way_x = rotation[0, 0] * dx + rotation[0, 1] * dy + rotation[0, 2] * dz
+            way_y = rotation[1, 0] * dx + rotation[1, 1] * dy + rotation[1, 2] * dz
+            way_z = rotation[2, 0] * dx + rotation[2, 1] * dy + rotation[2, 2] * dz
+            along_x, along_y = head_x - foot_x, head_y - foot_y
+            eta = math.sqrt(along_x**2 + along_y**2)
+            if eta < 1e-9:
+                continue
+            along_x, along_y = along_x / eta, along_y / eta
+            foot_jx, foot_jy = (way_x - foot_x * way_z) / foot_z, (way_y - foot_y * way_z) / foot_z
+            head_jx, head_jy = (way_x - head_x * way_z) / head_z, (way_y - head_y * way_z) / head_z
+            j0 = 0.5 * ((foot_jy + head_jy) * along_x - (foot_jx + head_jx) * along_y)
+            j1 = foot_jx * along_x + foot_jy * along_y
+            j2 = head_jx * along_x + head_jy * along_y
+            p01 = 1.0 / (eta * sigma) ** 2
+            p2 = 1.0 / (eta**2 * (sigma**2 + 0.25 * height_sigma**2))
+            growth = 1.0 + variance * (p01 * (j0 * j0 + j1 * j1) + p2 * j2 * j2)
+            log_scale = 0.5 * math.log(p01 * p01 * p2 / growth) - 2.756815599614018
+            for z in range(seen_starts[m], seen_starts[m + 1]):
+                if math.isnan(background[z]):
+                    continue
+                ex, ey = seen[z, 0] - foot_x, seen[z, 1] - foot_y
+                ux, uy = seen[z, 2] - head_x, seen[z, 3] - head_y
+                r0 = 0.5 * ((ey + uy) * along_x - (ex + ux) * along_y)
+                r1 = ex * along_x + ey * along_y
+                r2 = ux * along_x + uy * along_y
+                length = p01 * (r0 * r0 + r1 * r1) + p2 * r2 * r2
+                on = p01 * (j0 * r0 + j1 * r1) + p2 * j2 * r2
+                distance = length - variance * on * on / growth
+                if distance < 60.0:
+                    result[z] += math.exp(log_scale - 0.5 * distance - background[z]) / count
+    return result
+
+
+def _best_share(ratios: ndarray) -> float:
+    """Find the q in 0 … 0.999 that maximises Σ log(1 − q + q ρ), a concave function.
+
+    Args:
+        ratios: (D,), ρ >= 0; NaN is left out.
+
+    Returns:
+        q, zero where the ratios explain nothing.
+    """
+    low, high = 0.0, 0.999
+    for step in range(30):
+        q = 0.0 if step == 0 else 0.5 * (low + high)
+        slope = 0.0
+        for ratio in ratios:
+            if not math.isnan(ratio):
+                slope += (ratio - 1.0) / (1.0 - q + q * ratio)
+        if step == 0:
+            if slope <= 0.0:
+                return 0.0
+        elif slope > 0.0:
+            low = q
+        else:
+            high = q
+    return 0.5 * (low + high)
+
+
+density_ratios = compiled_later(_density_ratios)
+best_share = compiled_later(_best_share)
