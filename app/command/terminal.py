@@ -16,6 +16,12 @@ from tracker.parameters.values import ParameterError
 FAILURE = 1
 """The status of a command that could not do what was asked, or found what must not be."""
 
+ASKED = 3
+"""The status of an import whose files leave open how they are meant."""
+
+REFUSED = 4
+"""The status of an import whose boxes no interpretation explains."""
+
 
 class CommandError(Exception):
     """A failure with its sentence."""

@@ -63,7 +63,7 @@ class Known:
     """Whether the format's unit is arbitrary."""
     defect: str = "none"
     suspects: tuple[str, ...] = ()
-    """Names, one of which a sentence about the defect has."""
+    """Cameras, one of which a sentence about the defect names."""
     late: dict[int, float] = field(default_factory=dict)
     """Seconds by which cameras show what happened before."""
     form: str = ""
@@ -404,9 +404,13 @@ def _spoil(folder: Path, form: str, stem: str) -> None:
 def judge(plan: ImportPlan, known: Known) -> str:
     """What is wrong with an import plan; empty where all is right, or the defect is reported."""
     reported = " ".join([*plan.told, *(f"{name} {value}" for name, value in plan.found)])
-    named = any(
-        re.search(rf"(?<!\w){name}(?![\w.])", " ".join(plan.told)) for name in known.suspects
-    )
+    suspects = {
+        view.camera.name
+        for view in plan.views
+        if view.matched.detections is not None
+        and known.cameras[_source(view.matched.detections.source, known)].name in known.suspects
+    }
+    named = any(re.search(rf"(?<!\w){name}(?![\w.])", " ".join(plan.told)) for name in suspects)
     if known.defect == "every second frame":
         return "" if "second frame" in reported else "frames between are said to be empty"
     if known.defect == "boxes of all classes":

@@ -64,6 +64,9 @@ class Import:
     """Number of the first frame in boxes and truth, 0 or 1."""
     fps: Annotated[float | None, arg(help_behavior_hint="(default: the videos')")] = None
     """Steps a second."""
+    accept_best: FlagCreatePairsOff[bool] = False
+    """Take the likeliest interpretation where the files leave open how they are meant (status 3),
+    or where none explains the boxes (status 4)."""
     camera: Annotated[
         UseAppendAction[tuple[str, ...]],
         arg(metavar="NAME=FILE", help_behavior_hint="(repeatable)"),

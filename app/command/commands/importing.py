@@ -7,10 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from app.command.arguments.importing import Check, ExportCalibration, Formats, Import
-from app.command.terminal import FAILURE, CommandError, print_table, say
+from app.command.terminal import ASKED, FAILURE, REFUSED, CommandError, print_table, say
 from tracker.parameters.values import ParameterError
 
 if TYPE_CHECKING:
+    from tracker.io.conventions.questions import Question
     from tracker.io.importing.gathering import ParsedFiles
 
 MOST_UNKNOWN = 30
@@ -43,6 +44,7 @@ def _import(command: Import) -> int:
     if not command.sources:
         raise ParameterError("SOURCE", "expected files or a folder to import, got none")
     options = _options(command)
+    from tracker.io.conventions.questions import Undecided, Unexplained
     from tracker.io.importing.arriving import gather_whole
     from tracker.io.importing.settling import settle
     from tracker.io.importing.writing import FILE, write
@@ -62,7 +64,14 @@ def _import(command: Import) -> int:
 
     taken, _ = gather_whole(sources, wait_for)
     print_table(("file", "taken for", "note"), list(_rows(taken)))
-    settled = settle(taken, options)
+    try:
+        settled = settle(taken, options)
+    except Undecided as open_:
+        _ask(open_.question)
+        return ASKED
+    except Unexplained as refusal:
+        say(f"{refusal}; nothing was written")
+        return REFUSED
     print()
     print_table(("found out", "as"), [*settled.found, *(("not used", t) for t in settled.told)])
     facts = (
@@ -78,6 +87,14 @@ def _import(command: Import) -> int:
     say(f"{facts}, written to {command.output}")
     _print_checks(library.open_sequence(str(command.output)), settled.reading)
     return 0
+
+
+def _ask(question: Question) -> None:
+    """Print both interpretations with the flags that decide."""
+    rows = zip(question.interpretations, question.flags, strict=True)
+    print()
+    print_table(("it may be", "then"), list(rows))
+    say(f"{question.difference}; nothing was written: import again with one of the flags")
 
 
 def _rows(taken: Sequence[ParsedFiles]) -> Iterator[tuple[str, str, str]]:
@@ -140,6 +157,7 @@ def _options(command: Import) -> Any:
         normalised=True if normalised else None,
         first_index=first,
         fps=command.fps,
+        accept_best=command.accept_best,
         cameras=tuple((a, Path(b)) for a, b in _pairs("--camera", "NAME=FILE", command.camera)),
         swap=tuple(_pairs("--swap", "NAME=NAME", command.swap)),
     )

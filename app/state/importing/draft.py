@@ -25,6 +25,7 @@ from tracker.sequences.reader import FILE
 
 if TYPE_CHECKING:
     from app.state.importing.looking import Looked
+    from tracker.io.conventions.questions import Question
     from tracker.io.importing.arriving import Footprint
     from tracker.io.importing.gathering import ParsedFiles
     from tracker.io.importing.settling import ImportPlan, PlannedView
@@ -58,6 +59,8 @@ class Known:
     waiting: str = ""
     """What is waited for before anything is read: a file that is still being copied there."""
     error: str = ""
+    question: Question | None = None
+    """What is asked where the files leave open how they are meant."""
     folder: Path | None = None
     """Where it was written."""
     told: tuple[str, ...] = field(default_factory=tuple)
@@ -168,7 +171,7 @@ class Draft:
         self._stop.set()
         stop = self._stop = threading.Event()
         phase: Phase = "settled" if self._gathered and self._known.settled else "reading"
-        self._tell(phase=phase, busy=True, error="", waiting="")
+        self._tell(phase=phase, busy=True, error="", question=None, waiting="")
         threading.Thread(target=self._look, args=(stop,), name="importing", daemon=True).start()
 
     def _look(self, stop: threading.Event) -> None:
@@ -208,7 +211,9 @@ class Draft:
                 logger.exception("looking into an import failed")
             with self._lock:
                 if not stop.is_set():
-                    self._tell(phase="failed", busy=False, error=sentence(error))
+                    question = getattr(error, "question", None)
+                    said = sentence(error)
+                    self._tell(phase="failed", busy=False, error=said, question=question)
 
     def picture(self, camera: str) -> bytes | None:
         """The middle picture of a camera, by its name in the calibration, as JPEG."""

@@ -39,6 +39,7 @@ class Wish:
     axes: Axes | None = None
     boxes: Layout | None = None
     normalised: bool | None = None
+    accept_best: bool = False
     first_index: int | None = None
     turns: str | None = None
     """How rotations given by three angles are composed."""
@@ -82,6 +83,7 @@ def options_of(wish: Wish, taken: Sequence[ParsedFiles]) -> ImportOptions:
         axes=wish.axes,
         boxes=wish.boxes,
         normalised=wish.normalised,
+        accept_best=wish.accept_best,
         first_index=first,
         turns=wish.turns,
         fps=wish.fps,

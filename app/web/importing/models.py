@@ -50,6 +50,8 @@ class ImportWish(Model):
     axes: Axes | None = None
     boxes: Layout | None = None
     normalised: bool | None = None
+    accept_best: bool = False
+    """Whether the likeliest interpretation is taken where the files leave it open."""
     first_index: Literal[0, 1] | None = None
     turns: str | None = Field(default=None, max_length=40)
     """How rotations given by three angles are composed."""
@@ -155,6 +157,17 @@ class ImportedPlan(Model):
     feet: list[tuple[float, float]]
 
 
+class ImportQuestion(Model):
+    """What is asked where the files leave open how they are meant."""
+
+    code: Literal["convention", "moments"]
+    interpretations: tuple[str, str]
+    """In words, the likelier one first."""
+    difference: str
+    flags: tuple[str, str]
+    """The flag of the command line for each, which is what a wish is called here."""
+
+
 class ImportInfo(Model):
     """An import on its way."""
 
@@ -165,6 +178,7 @@ class ImportInfo(Model):
     under_way: str
     """What is being looked into."""
     error: str
+    question: ImportQuestion | None
     wish: ImportWish
     received: int
     """Bytes."""

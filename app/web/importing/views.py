@@ -6,6 +6,7 @@ import math
 import shutil
 import time
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from app.web.importing.models import (
     ImportedPair,
     ImportedPlan,
     ImportInfo,
+    ImportQuestion,
     ImportWish,
 )
 from app.web.importing.sheet.draft import draft_sheet
@@ -77,6 +79,7 @@ def _info(draft: Draft) -> ImportInfo:
         busy=known.busy,
         under_way=known.waiting or (looked.under_way if looked is not None and known.busy else ""),
         error=known.error,
+        question=None if known.question is None else ImportQuestion(**asdict(known.question)),
         wish=_wish_info(known.wish),
         received=draft.size if upload is None else upload.received,
         bytes=draft.size,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
@@ -12,6 +13,7 @@ from app.command.main import main
 from tests.io.read.recorded import PLACES, detections, settled_of, toml, videos
 from tests.io.read.rig import SIZE, boxes, cameras
 from tracker.io.checks import check
+from tracker.io.conventions.questions import Undecided, Unexplained
 from tracker.io.importing.gathering import gather
 from tracker.io.importing.options import ImportOptions
 from tracker.io.importing.preview import as_sequence
@@ -51,7 +53,7 @@ def test_parts_of_the_picture_may_reach_beyond_it(tmp_path: Path) -> None:
 
 
 @pytest.mark.full
-def test_exchanged_calibrations_are_named_and_mended_by_a_flag(
+def test_exchanged_calibrations_are_mended_and_named_with_the_flag(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     files, out = tmp_path / "files", tmp_path / "out"
@@ -65,13 +67,9 @@ def test_exchanged_calibrations_are_named_and_mended_by_a_flag(
     (files / "calibration.toml").write_text(text.replace("xcam", "cam"))
     assert main(["import", str(files), "-o", str(out)]) == 0
     said = capsys.readouterr().out
-    assert "with the calibrations exchanged" in said
-    flags = said[said.index("--swap") :].split("\n")[0].split()
-    assert flags[::2] == ["--swap", "--swap"]
-    mended = tmp_path / "mended"
-    assert main(["import", str(files), "-o", str(mended), *flags]) == 0
-    assert "exchanged" not in capsys.readouterr().out
-    by_name = {camera.name: camera for camera in read_sequence(mended).cameras}
+    assert "--swap" in said
+    assert "exchanged" in said
+    by_name = {camera.name: camera for camera in read_sequence(out).cameras}
     for camera in cameras():
         np.testing.assert_allclose(by_name[camera.name].centre, camera.centre, atol=1e-6)
 
@@ -159,8 +157,6 @@ def test_what_cannot_be_taken_is_told(tmp_path: Path, options: ImportOptions, wo
 @pytest.mark.parametrize(
     ("options", "flags"),
     [
-        (ImportOptions(pose="camera-to-world", axes="opencv"), "--pose world-to-camera"),
-        (ImportOptions(axes="opengl", pose="world-to-camera"), "--axes opencv"),
         (ImportOptions(up="-y"), "--up z"),
         (ImportOptions(up="x"), "--up z"),
     ],
@@ -174,6 +170,35 @@ def test_what_was_told_wrongly_is_mended_by_the_right_flag(
     checks = [for_import(one, settled.reading) for one in check(as_sequence(settled, "told"))]
     told = [str(remedy) for one in checks for remedy in one.remedies]
     assert flags in told
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        ImportOptions(pose="camera-to-world", axes="opencv"),
+        ImportOptions(axes="opengl", pose="world-to-camera"),
+    ],
+)
+def test_poses_that_were_told_wrongly_are_not_taken(tmp_path: Path, options: ImportOptions) -> None:
+    toml(tmp_path)
+    detections(tmp_path)
+    with pytest.raises((Undecided, Unexplained)):
+        settled_of(tmp_path, options)
+    settled = settled_of(tmp_path, replace(options, accept_best=True))
+    assert "--accept-best" in settled.accepted
+    write(settled, tmp_path / "out", "accepted")
+    assert "--accept-best" in (tmp_path / "out" / "sequence.toml").read_text().splitlines()[0]
+
+
+def test_an_import_asks_and_refuses_with_a_status_of_its_own(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    toml(tmp_path)
+    detections(tmp_path)
+    wrong = ["--pose", "camera-to-world", "--axes", "opencv"]
+    assert main(["import", str(tmp_path), "-o", str(tmp_path / "out"), *wrong]) in (3, 4)
+    assert "nothing was written" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.full

@@ -16,7 +16,7 @@ in nats: what the other cameras tell of a camera's boxes. Since q may be 0, it i
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from collections.abc import Sequence as Many
 from dataclasses import dataclass
 
@@ -73,6 +73,8 @@ class Evidence:
     """q by (a, b)."""
     cameras: int
     """C: number of cameras that have boxes."""
+    moments: int
+    """M."""
 
     @property
     def by_moment(self) -> Float[ndarray, " M"]:
@@ -88,9 +90,9 @@ class Evidence:
         """The part of the pairs with one camera, by moment, nats."""
         return self._sum(own for key, own in self.terms.items() if camera in key)
 
-    def _sum(self, terms: object) -> Float[ndarray, " M"]:
-        rows = list(terms)  # type: ignore[call-overload]
-        total = np.sum(rows, axis=0) if rows else np.zeros(1)
+    def _sum(self, terms: Iterable[Float[ndarray, " M"]]) -> Float[ndarray, " M"]:
+        rows = list(terms)
+        total = np.sum(rows, axis=0) if rows else np.zeros(self.moments)
         return np.asarray(total / max(self.cameras - 1, 1))
 
     @property
@@ -184,7 +186,8 @@ def evidence(
             nats = np.nan_to_num(np.log(1.0 - q + q * ratios))
             terms[a, b] = np.bincount(moment, nats, len(own.starts) - 1)
             explained[a, b] = float(q)
-    return Evidence(terms, explained, len(there))
+    moments = max((len(own.starts) - 1 for own in boxes if own is not None), default=0)
+    return Evidence(terms, explained, len(there), moments)
 
 
 def _on_image_plane(own: Moments) -> tuple[Float[ndarray, "N 4"], Float[ndarray, " N"]]:

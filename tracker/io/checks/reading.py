@@ -16,6 +16,9 @@ from tracker.io.read.pieces import IN_DEGREES, METRES, Axes, Direction, Layout, 
 FLIP = np.diag([1.0, -1.0, -1.0])
 """Between OpenCV's camera axes (y down, z ahead) and OpenGL's (y up, z back), either way."""
 
+MIRROR = np.diag([1.0, -1.0, 1.0])
+"""From a left-handed world to a right-handed one."""
+
 UPS: tuple[Up, ...] = ("x", "y", "z", "-x", "-y", "-z")
 
 
@@ -37,6 +40,13 @@ class Reading:
     """Of cameras whose rotations are given by angles: how these are composed."""
     order: tuple[int, ...] | None = None
     """Of each camera's boxes and pictures: whose calibration is theirs. None: their own."""
+    mirrored: bool = False
+    """Whether the calibration is of a left-handed world, in which people lie behind every camera;
+    its y axis is mirrored to make it right-handed."""
+    flipped: bool = False
+    """Whether boxes are of pictures whose left and right are exchanged."""
+    pixels: float = 1.0
+    """The width of the pictures in which boxes are given, in that of the calibration's pictures."""
 
 
 def pose(camera: RawCamera, reading: Reading) -> Pose:
@@ -45,6 +55,14 @@ def pose(camera: RawCamera, reading: Reading) -> Pose:
     Raises:
         ValueError: If the file gives no pose.
     """
+    stands = _pose(camera, reading)
+    if reading.mirrored:
+        return Pose(-stands.rotation @ MIRROR, MIRROR @ stands.centre)
+    return stands
+
+
+def _pose(camera: RawCamera, reading: Reading) -> Pose:
+    """The pose in the world of the file, be it left-handed."""
     if camera.projection is not None:
         split = _split(camera)
         return Pose(split.rotation, split.centre)
@@ -134,6 +152,21 @@ def lens_of(camera: RawCamera, image_size: tuple[int, int]) -> Camera:
     return Camera(camera.name, image_size, intrinsics, np.eye(3), np.zeros(3), distortion, fisheye)
 
 
+def with_pixels(raw: RawCamera, factor: float) -> RawCamera:
+    """The camera for pictures so many times as wide: pixels' corners, not centres, are scaled."""
+    if factor == 1.0:
+        return raw
+    half = 0.5 * factor - 0.5
+    scale = np.array([[factor, 0.0, half], [0.0, factor, half], [0.0, 0.0, 1.0]])
+    size = raw.image_size
+    return replace(
+        raw,
+        image_size=None if size is None else (round(factor * size[0]), round(factor * size[1])),
+        projection=None if raw.projection is None else scale @ raw.projection,
+        intrinsics=None if raw.intrinsics is None else scale @ raw.intrinsics,
+    )
+
+
 def _split(camera: RawCamera) -> Camera:
     assert camera.projection is not None
     return Camera.from_projection(camera.name, (1, 1), np.asarray(camera.projection, dtype=float))
@@ -157,6 +190,22 @@ def read_boxes(
     if scale is not None:
         boxes *= np.array([*scale, *scale], dtype=float)
         boxes[:, :2] -= 0.5  # a part of the picture's size begins at the pixel's corner
+    return boxes
+
+
+def boxes_by(
+    four: Float[ndarray, "D 4"], reading: Reading, size: tuple[int, int]
+) -> Float[ndarray, "D 4"]:
+    """Boxes as left, top, width, height in pixels, by a reading.
+
+    Args:
+        four: The numbers as the file has them.
+        reading: How they are meant.
+        size: Width and height of the pictures.
+    """
+    boxes = read_boxes(four, reading.layout, size if reading.normalised else None)
+    if reading.flipped:
+        boxes[:, 0] = size[0] - 1.0 - boxes[:, 0] - boxes[:, 2]
     return boxes
 
 

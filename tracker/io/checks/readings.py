@@ -24,12 +24,13 @@ from tracker.geometry.consistency.observed import PairsOfBoxes, Pose, Rays, pair
 from tracker.io.checks.level import upwards
 from tracker.io.checks.reading import (
     Reading,
+    boxes_by,
     lens_of,
     likely_size,
     pose,
-    read_boxes,
     turns_of,
     upright,
+    with_pixels,
 )
 from tracker.io.checks.sizes import likely_unit
 from tracker.io.checks.standing import reversed_, standing, turns_tried, upside_down
@@ -178,7 +179,7 @@ def find_meaning(
     judge = Judge(cameras, seen)
     if not judge.possible:
         return None
-    open_ = _restricted(tried or Open(), cameras, seen)
+    open_ = restricted(tried or Open(), cameras, seen)
     parts = (open_.directions, open_.axes, open_.layouts, open_.normalised, turns_of(cameras))
     judged = [
         judge.turned(Reading(direction, axes, layout, normalised, turns=turns))
@@ -193,8 +194,7 @@ def find_meaning(
     unit = unit or next((c.unit for c in conventions if c.unit is not None), None)
     up = up or next((c.up for c in conventions if c.up is not None), None)
     best = judge.righted(judged[0], up, unit, height)
-    reading = replace(best.reading, up=up or upwards(best.consensus.rise))
-    reading = replace(reading, unit=unit or likely_unit(judge.away(best), best.consensus, height))
+    reading = judge.meant(best, up, unit, height)
     return Meaning(replace(best, reading=reading), (*judged,))
 
 
@@ -217,7 +217,7 @@ class Judge:
         self.cameras = tuple(cameras)
         self._seen = tuple(seen)
         self.sizes = [likely_size(camera) for camera in cameras]
-        self._rays: dict[tuple[int, int, Layout, bool, int | tuple[float, ...]], Rays] = {}
+        self._rays: dict[tuple[object, ...], Rays] = {}
         empty = Rays(np.zeros(0, int), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, bool))
         times = [
             empty
@@ -268,7 +268,7 @@ class Judge:
                 continue
             rays = [
                 self._of(camera, own, reading, turn)
-                for (camera, own), turn in zip(enumerate(self._order(reading)), turns, strict=True)
+                for (camera, own), turn in zip(enumerate(self.order(reading)), turns, strict=True)
             ]
             agreed = consensus(rays, poses, self.pairs)
             score = float(agreed.fits.sum())
@@ -285,8 +285,8 @@ class Judge:
         own = self._seen[camera]
         if own is None or not len(own.four):
             return 0.0
-        size = self.sizes[self._order(reading)[camera]]
-        boxes = read_boxes(own.four, reading.layout, size if reading.normalised else None)
+        _, size = self.lens_at(self.order(reading)[camera], reading)
+        boxes = boxes_by(own.four, reading, size)
         sides = boxes[uncut(boxes, size), 2:]
         return float(np.median(np.log(sides[:, 0] / sides[:, 1]))) if len(sides) else 0.0
 
@@ -299,7 +299,7 @@ class Judge:
         rays = [
             self._of(camera, own, judged.reading, pose.rotation @ up)
             for (camera, own), pose in zip(
-                enumerate(self._order(judged.reading)), poses, strict=True
+                enumerate(self.order(judged.reading)), poses, strict=True
             )
         ]
         agreed = consensus(rays, poses, self.pairs)
@@ -325,11 +325,20 @@ class Judge:
         turns = tuple((turn + 2) % 4 for turn in judged.turns)
         return replace(judged, consensus=reversed_(agreed), pictured=-judged.pictured, turns=turns)
 
+    def meant(
+        self, judged: Judged, up: Up | None, unit: Unit | None = None, height: float | None = None
+    ) -> Reading:
+        """The reading with the axis that points up and the unit, where the file states neither."""
+        agreed = judged.consensus
+        reading = replace(judged.reading, up=up or upwards(agreed.rise))
+        return replace(reading, unit=unit or likely_unit(self.away(judged), agreed, height))
+
     def poses(self, reading: Reading) -> list[Pose]:
         """Where the cameras stand."""
-        return [pose(self.cameras[own], reading) for own in self._order(reading)]
+        return [pose(self.cameras[own], reading) for own in self.order(reading)]
 
-    def _order(self, reading: Reading) -> tuple[int, ...]:
+    def order(self, reading: Reading) -> tuple[int, ...]:
+        """Whose calibration is that of each camera's boxes."""
         return reading.order or tuple(range(len(self.cameras)))
 
     def _of(
@@ -343,16 +352,29 @@ class Judge:
         if own is None:
             return self._empty
         told = heads if isinstance(heads, int) else tuple(np.round(heads, 9).tolist())
-        key = (camera, calibration, reading.layout, reading.normalised, told)
+        key = (
+            camera,
+            calibration,
+            reading.layout,
+            reading.normalised,
+            reading.pixels,
+            reading.flipped,
+            told,
+        )
         if key not in self._rays:
-            size = self.sizes[calibration]
-            raw = self.cameras[calibration]
-            boxes = read_boxes(own.four, reading.layout, size if reading.normalised else None)
+            raw, size = self.lens_at(calibration, reading)
+            boxes = boxes_by(own.four, reading, size)
             turn, up = (heads, None) if isinstance(heads, int) else (0, heads)
             self._rays[key] = rays_of(
                 own.frames, boxes, lens_of(raw, size), raw.image_size is not None, up, turn
             )
         return self._rays[key]
+
+    def lens_at(self, calibration: int, reading: Reading) -> tuple[RawCamera, tuple[int, int]]:
+        """A camera for the pictures in which boxes are given, and the size of these."""
+        raw, size = self.cameras[calibration], self.sizes[calibration]
+        factor = reading.pixels
+        return with_pixels(raw, factor), (round(factor * size[0]), round(factor * size[1]))
 
     def away(self, judged: Judged) -> float:
         """The usual distance from a camera to people, in the world's unit."""
@@ -408,7 +430,7 @@ def _orders(best: Judged, count: int) -> Iterable[tuple[int, ...]]:
         yield tuple(changed)
 
 
-def _restricted(tried: Open, cameras: Many[RawCamera], seen: Many[Seen | None]) -> Open:
+def restricted(tried: Open, cameras: Many[RawCamera], seen: Many[Seen | None]) -> Open:
     """Without what the files state, and what their numbers exclude."""
     conventions = [camera.convention for camera in cameras]
     directions = {c.direction for c in conventions if c.direction is not None}

@@ -36,6 +36,9 @@ class ImportOptions:
     """The number of the first frame in detections and truth."""
     fps: float | None = None
     """Steps a second."""
+    accept_best: bool = False
+    """Whether the likeliest interpretation is taken where the files leave open how they are meant,
+    or where none explains the boxes."""
     cameras: tuple[tuple[str, Path], ...] = ()
     """Video, pictures or boxes that belong to a camera of the calibration: its name, and what."""
     swap: tuple[tuple[str, str], ...] = ()

@@ -5,8 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from jaxtyping import Bool
+from numpy import ndarray
 
-from tracker.io.importing.settling import ImportPlan, at_steps_of
+from tracker.io.importing.settling import ImportPlan, PlannedView, at_steps_of
 from tracker.sequences.sequence import Room, Sequence, View
 
 
@@ -24,6 +26,7 @@ def as_sequence(settled: ImportPlan, name: str) -> Sequence:
             images=() if view.matched.images is None else view.matched.images.files,
             detections=None if view.detections is None else at_steps_of(view.detections, view.time),
             clock=view.time.clock,
+            detector_ran=_ran(view, settled.frames),
         )
         for view in settled.views
     )
@@ -38,3 +41,13 @@ def as_sequence(settled: ImportPlan, name: str) -> Sequence:
         views=views,
         ground_truth=settled.truth,
     )
+
+
+def _ran(view: PlannedView, steps: int) -> Bool[ndarray, " steps"] | None:
+    """Whether the detector ran, by step; None where it ran at all."""
+    if view.looked_at is None:
+        return None
+    ran = np.zeros(steps, dtype=bool)
+    at = view.time.steps_of(view.looked_at)
+    ran[at[(at >= 0) & (at < steps)]] = True
+    return ran

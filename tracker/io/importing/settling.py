@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from numpy import ndarray
 
 from tracker.geometry.camera import Camera
@@ -16,16 +16,29 @@ from tracker.geometry.consistency.suggestion import (
     consensus_of_cameras,
     suggest,
 )
-from tracker.io.checks.level import lean_of
-from tracker.io.checks.reading import Reading, pose, read_boxes, to_camera
-from tracker.io.checks.readings import Open, Seen, find_meaning
+from tracker.io.checks.level import lean_of, upwards
+from tracker.io.checks.reading import Reading, read_boxes, to_camera
+from tracker.io.checks.readings import Open, Seen
+from tracker.io.conventions.questions import (
+    ACCEPTED,
+    check_verdict,
+    matched_by,
+    rearranged,
+    told_of_moments,
+)
+from tracker.io.conventions.search import find_reading
 from tracker.io.importing.arriving import short_videos
 from tracker.io.importing.finding.angles import check_turns, chosen_turns, turns_in_words
 from tracker.io.importing.finding.calibrations import camera_sets
 from tracker.io.importing.finding.geometry import check_places, read_poses
-from tracker.io.importing.finding.matching import MatchedCamera, match_all, nothing_of
+from tracker.io.importing.finding.matching import (
+    MatchedCamera,
+    match_all,
+    nothing_of,
+    same_aspect,
+)
 from tracker.io.importing.finding.people import rate_of, rays_of_all
-from tracker.io.importing.finding.pictures import picture_sizes, scaled
+from tracker.io.importing.finding.pictures import COMMON_SIZES, picture_sizes, scaled
 from tracker.io.importing.finding.scale import AS_STANDING, PERSON, paced, resized
 from tracker.io.importing.finding.times import (
     CameraTime,
@@ -47,6 +60,9 @@ ROOM_MARGIN = 1.0
 FARTHEST = 1e6
 """Pixels from a picture's corner: a box that lies farther is no one's."""
 
+_ALONG_AXIS = 0.9999
+"""Cosine from which people stand along an axis of the world."""
+
 _WITHOUT_UNIT = ("COLMAP", "nerfstudio", "Metashape", "OpenMVG", "MVSNet", "Middlebury")
 """Formats whose unit is arbitrary."""
 
@@ -60,6 +76,8 @@ class PlannedView:
     detections: Detections | None
     """By frames of the camera's own file."""
     time: CameraTime
+    looked_at: Int[ndarray, " K"] | None = None
+    """Frames of the file at which the detector ran; None where it ran at all."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,6 +101,8 @@ class ImportPlan:
     """What was not in the files or had to be chosen, and why it is so."""
     told: tuple[str, ...]
     """Sentences about what is not used or odd."""
+    accepted: str = ""
+    """What was taken though nothing proves it; empty where nothing was."""
 
 
 def settle(taken: Sequence[ParsedFiles], options: ImportOptions | None = None) -> ImportPlan:
@@ -110,7 +130,16 @@ def settle(taken: Sequence[ParsedFiles], options: ImportOptions | None = None) -
     times = settle_times(cameras, matched.truths, options, found)
     boxes = _boxes(cameras, sizes, times, options, found, told)
     arbitrary = matched.format.startswith(_WITHOUT_UNIT)
-    reading, raws, boxes, factor = _read(raws, boxes, times, arbitrary, options, found)
+    offsets: dict[str, float] = {}
+    reading, raws, boxes, factor = _read(
+        raws, cameras, boxes, times, arbitrary, options, found, told, offsets
+    )
+    if offsets:
+        both = {name: offsets.get(name, 0.0) + options.offsets.get(name, 0.0)
+                for name in (*offsets, *options.offsets)}  # fmt: skip
+        options = replace(options, offsets=both)
+        times = settle_times(cameras, matched.truths, options, [])
+    sizes = [raw.image_size or size for raw, size in zip(raws, sizes, strict=True)]
     settled = [to_camera(raw, reading, size) for raw, size in zip(raws, sizes, strict=True)]
     check_places(settled, matched.format)
     detections = [_detections(own) for own in boxes]
@@ -127,6 +156,7 @@ def settle(taken: Sequence[ParsedFiles], options: ImportOptions | None = None) -
         found.append(("fps", f"{fps:g}, {why}, since no file says it; --fps"))
         times = settle_times(cameras, matched.truths, replace(options, fps=fps), [])
         at_steps = _at_steps(detections, times)
+    looked_at = _looked_at(detections, [camera.name for camera in settled], found)
     suggested = _room(settled, at_steps, found)
     room = _as_told(suggested, options)
     truth = settle_truth(
@@ -140,9 +170,9 @@ def settle(taken: Sequence[ParsedFiles], options: ImportOptions | None = None) -
         found,
     )
     views = tuple(
-        PlannedView(camera, own, boxes_, time)
-        for camera, own, boxes_, time in zip(
-            _renamed(settled, options), cameras, detections, times.cameras, strict=True
+        PlannedView(camera, own, boxes_, time, at)
+        for camera, own, boxes_, time, at in zip(
+            _renamed(settled, options), cameras, detections, times.cameras, looked_at, strict=True
         )
     )
     return ImportPlan(
@@ -157,7 +187,37 @@ def settle(taken: Sequence[ParsedFiles], options: ImportOptions | None = None) -
         reading,
         tuple(found),
         tuple(told),
+        "; ".join(words for name, words in found if name == ACCEPTED),
     )
+
+
+_GAPS = {2: "second", 3: "third", 4: "fourth", 5: "fifth", 10: "tenth"}
+_LEAST_LISTED = 10
+"""Frames with boxes by which a regular gap is known."""
+
+
+def _looked_at(
+    detections: Sequence[Detections | None], names: Sequence[str], found: list[tuple[str, str]]
+) -> list[Int[ndarray, " K"] | None]:
+    """The frames at which detectors ran, where these are every second, third … one.
+
+    A frame without a box may be one in which nobody was; frames between which there never is a
+    box are those that nobody looked at.
+    """
+    result: list[Int[ndarray, " K"] | None] = []
+    gaps: dict[int, list[str]] = {}
+    for name, own in zip(names, detections, strict=True):
+        frames = np.unique(own.frames) if own is not None else np.zeros(0, dtype=np.int64)
+        gap = int(np.gcd.reduce(np.diff(frames))) if len(frames) >= _LEAST_LISTED else 1
+        result.append(None if gap < 2 else np.arange(frames[0] % gap, frames[-1] + 1, gap))
+        if gap > 1:
+            gaps.setdefault(gap, []).append(name)
+    for gap, own_names in gaps.items():
+        every = f"every {_GAPS.get(gap, f'{gap}th')} frame"
+        found.append(
+            ("detector", f"ran at {every} of {', '.join(own_names)}; others were not looked at")
+        )
+    return result
 
 
 def _at_steps(detections: Sequence[Detections | None], times: Times) -> list[Detections | None]:
@@ -277,6 +337,8 @@ def _boxes(
                 f"{piece.source.name}: {int((~sane).sum())} of {len(sane)} boxes lie farther than "
                 f"{FARTHEST:,.0f} pixels away; they are left out"
             )
+        if piece.left_out:
+            told.append(piece.left_out)
         if beyond := told_beyond(piece, first, within):
             told.append(beyond)
         scores = np.clip(piece.scores, 0.0, 1.0)
@@ -288,11 +350,14 @@ def _boxes(
 
 def _read(
     raws: list[RawCamera],
+    cameras: Sequence[MatchedCamera],
     boxes: list[_Boxes | None],
     times: Times,
     arbitrary: bool,
     options: ImportOptions,
     found: list[tuple[str, str]],
+    told: list[str],
+    offsets: dict[str, float],
 ) -> tuple[Reading, list[RawCamera], list[_Boxes | None], float | None]:
     """How poses and boxes are meant: by flags, formats, the boxes and the poses, in this order.
 
@@ -307,29 +372,50 @@ def _read(
     unknown = any(own is not None and own[1] is None for own in boxes)
     layouts: tuple[Layout, ...] = ("ltwh", "xyxy", "cxcywh") if unknown else ("ltwh",)
     convention = raws[0].convention
-    meaning = find_meaning(
+    free = not options.swap and not options.cameras
+    verdict = find_reading(
         raws,
         seen,
-        tried=Open(layouts=layouts, normalised=(False,), orders=False),
-        unit=convention.unit,
-        up=convention.up,
+        fps=times.fps,
+        tried=Open(layouts=layouts, normalised=(False,), orders=free),
+        names=matched_by(cameras),
+        pixels=_pixels(raws, seen) if all(c.picture_size is None for c in cameras) else (),
     )
-    enough = meaning is not None and meaning.best.consensus.agreeing >= 20
-    if meaning is None or not enough:
+    if verdict is not None:
+        unproved = check_verdict(verdict, raws, options)
+        if unproved:
+            found.append((ACCEPTED, unproved))
+    enough = verdict is not None and verdict.kind in ("decided", "open")
+    if verdict is None or not enough:
         check_turns(raws)
         reading = read_poses(raws, boxes=any(own is not None for own in boxes))
         why = "from where the cameras look; the boxes do not tell"
+        best = None
     else:
-        reading = meaning.reading
-        if convention.up is None:
-            poses = [pose(raw, reading) for raw in raws]
-            best = meaning.best
+        best = verdict.judge.righted(verdict.best.judged, convention.up, convention.unit)
+        rise = verdict.best.scene.rise
+        up = convention.up or upwards(rise if rise @ best.consensus.rise >= 0.0 else -rise)
+        reading = replace(verdict.judge.meant(best, up, convention.unit), flipped=False)
+        for camera, clock in verdict.clocks.items():
+            if raws[camera].name in options.offsets:
+                continue  # what is stated is not questioned
+            if clock.late and clock.steady:
+                offsets[raws[camera].name] = -clock.late / times.fps
+                how = f"{clock.late / times.fps:.2f} s late ({clock.late} steps, within 1)"
+                found.append((f"{raws[camera].name} clock", f"{how}, since boxes meet so"))
+        # boxes lean in rolled cameras; where people along an axis are likelier, the world is level
+        along = float(np.abs(rise).max() / np.linalg.norm(rise))
+        if convention.up is None and along < _ALONG_AXIS:
+            poses = verdict.judge.poses(reading)
             lean = lean_of(best.consensus, best.pictured, poses, best.turns, reading.up)
             reading = replace(reading, lean=lean)
-        share = 100.0 * meaning.best.consensus.share
+        share = 100.0 * best.consensus.share
         why = f"since {share:.0f} % of the boxes meet so"
         if unknown:
             found.append(("boxes", f"{reading.layout}, {why}; --boxes"))
+        raws, told_ = rearranged(raws, reading)
+        found += told_
+        told += told_of_moments(verdict, [raw.name for raw in raws])
     if any(raw.turns for raw in raws):
         found.append(("angles", f"{turns_in_words(reading.turns)}, {why}; --euler"))
     if reading.lean != (0.0, 0.0):
@@ -351,11 +437,30 @@ def _read(
             four = read_boxes(own[0].boxes, reading.layout)
             own = (replace(own[0], boxes=four), reading.layout)
         changed.append(own)
-    if meaning is not None and enough and arbitrary and convention.unit is None:
+    if best is not None and arbitrary and convention.unit is None:
         stated = options.half_extents
-        factor = (PERSON if stated is None else 2.0 * stated[2]) / meaning.height
+        factor = (PERSON if stated is None else 2.0 * stated[2]) / best.consensus.height
         raws = [_resized(raw, factor) for raw in raws]
-    return replace(reading, layout="ltwh", order=None), raws, changed, factor
+    reading = replace(reading, layout="ltwh", order=None, pixels=1.0)
+    return reading, raws, changed, factor
+
+
+def _pixels(raws: Sequence[RawCamera], seen: Sequence[Seen | None]) -> tuple[float, ...]:
+    """Widths of pictures that the boxes may be of, in that of the calibration's."""
+    first = raws[0].image_size
+    if first is None:
+        return (0.5, 2.0)
+    begins = [
+        np.quantile(own.four[:, 0], 0.99) for own in seen if own is not None and len(own.four)
+    ]
+    least = float(max(begins, default=0.0))
+    known = [
+        size[0] / first[0]
+        for size in COMMON_SIZES
+        if same_aspect(size, first) and least <= size[0] <= 4.0 * least
+    ]
+    # what differs by a few per cent leads to the same scene
+    return tuple(dict.fromkeys(round(own, 6) for own in (0.5, 2.0, *known) if abs(own - 1) > 0.05))
 
 
 def _seen(own: Detections, time: CameraTime) -> Seen:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from numpy import ndarray
 
 from tracker.files.atomic import replacing, write_whole
@@ -58,6 +58,7 @@ def write(
         _write_truth(folder / "ground_truth.csv", settled.truth)
         truth = '\n[ground_truth]\nfile = "ground_truth.csv"\n'
     head = [
+        *([f"# {settled.accepted}"] if settled.accepted else []),
         "format = 1",
         f"name = {_text(name)}",
         f"fps = {_number(settled.fps)}",
@@ -117,7 +118,8 @@ def _camera(
         lines.append(f"timestamps = {_text(file)}")
     if view.detections is not None:
         file = f"{name}.csv"
-        _write_boxes(folder / file, view.detections)
+        _write_boxes(folder / file, view.detections, view.looked_at)
+        lines += ['detected_steps = "listed"'] if view.looked_at is not None else []
         lines.append(f"detections = {_text(file)}")
     lines += [
         f"K = {_rows(camera.intrinsics)}",
@@ -145,7 +147,8 @@ def _file_names(names: Sequence[str]) -> list[str]:
     return found
 
 
-def _write_boxes(path: Path, detections: Detections) -> None:
+def _write_boxes(path: Path, detections: Detections, looked_at: Int[ndarray, " K"] | None) -> None:
+    """Write the boxes, and a row without a box for each frame that was looked at in vain."""
     rows = [
         f"{frame},{','.join(f'{value:.3f}' for value in box)},{score:.4f}"
         for frame, box, score in zip(
@@ -153,6 +156,8 @@ def _write_boxes(path: Path, detections: Detections) -> None:
             strict=True,
         )
     ]  # fmt: skip
+    empty = np.setdiff1d([] if looked_at is None else looked_at, detections.frames)
+    rows += [f"{int(frame)},,,,," for frame in empty]
     text = "\n".join(["frame,left,top,width,height,score", *rows]) + "\n"
     write_whole(path, text.encode())
 

@@ -122,6 +122,8 @@ class DetectionPiece:
     """The class of each row."""
     image_size: tuple[int, int] | None = None
     """Width and height of the pictures, if the file states them, pixels."""
+    left_out: str = ""
+    """A sentence about rows of the file that are no boxes of people; empty where there are none."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

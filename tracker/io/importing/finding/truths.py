@@ -16,6 +16,12 @@ from tracker.sequences.sequence import Detections, GroundTruth
 _SAMPLED = 300
 """Places that are held against the boxes."""
 
+_MOST_INSIDE = 0.5
+"""Share of places in boxes that another unit or another turn must reach to be believed."""
+
+_LEAST_INSIDE = 0.2
+"""Share below which the truth contradicts the boxes."""
+
 _CLEARLY = 0.05
 """By how much more of the places must lie in boxes for another reading than the plain one."""
 
@@ -65,8 +71,13 @@ def settle_truth(
             moved = _moved(given, on_floor, factor, turn, middle)
             scores.append(_inside(own, moved, cameras, detections))
         best = int(np.argmax(scores))
-        if scores[best] < scores[0] + _CLEARLY:
+        if scores[best] < max(scores[0] + _CLEARLY, _MOST_INSIDE):
             best = 0
+        if scores[best] < _LEAST_INSIDE and any(own is not None for own in detections):
+            found.append(
+                ("truth", f"{piece.source.name}: {100 * scores[best]:.0f} % of its places lie in "
+                 "boxes; its origin, axes, grid or unit may be others than the calibration's")
+            )  # fmt: skip
         if best:
             found.append(
                 ("truth", f"{piece.source.name}: turned so that {100 * scores[best]:.0f} % of its "

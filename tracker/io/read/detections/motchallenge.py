@@ -27,6 +27,12 @@ SERIES = False
 PEOPLE = (1, 2, 7)
 """Classes of the ground truth: pedestrian, person on a vehicle, static person."""
 
+LABELS = "labels.txt"
+"""The names of the classes beside the ground truth, one a line, as annotation tools write them."""
+
+_PEOPLE_WORDS = ("person", "people", "pedestrian", "human", "man", "woman", "player")
+_MOST_LABELS = 2**16  # bytes
+
 
 def recognise(file: SourceFile) -> Certainty:
     """Rows of 6 to 10 numbers with commas, or blanks, the first two whole and no header."""
@@ -51,12 +57,16 @@ def read(file: SourceFile) -> Iterator[Piece]:
     frames, ids, boxes = table[:, 0].astype(np.int64), table[:, 1].astype(np.int64), table[:, 2:6]
     columns = table.shape[1]
     is_truth = columns in (8, 9) and set(np.unique(table[:, 6])) <= {0.0, 1.0}
+    # the ninth number of the ground truth is how much of a person is seen; -1 is of a tracker's
+    is_truth &= columns < 9 or bool((table[:, 8] >= 0.0).all())
     keep = np.ones(len(table), dtype=bool)
     scores = np.ones(len(table))
     if is_truth:
-        keep = (table[:, 6] == 1.0) & np.isin(table[:, 7], PEOPLE)
+        keep = (table[:, 6] == 1.0) & np.isin(table[:, 7], _people(file))
     elif columns >= 7:
         scores = to_unit(table[:, 6])
+        if not scores.any():  # a tracker that writes none
+            scores = np.ones(len(table))
     first = 0 if len(frames) and frames.min() == 0 else 1
     yield DetectionPiece(
         source=file.path,
@@ -67,6 +77,7 @@ def read(file: SourceFile) -> Iterator[Piece]:
         scores=scores[keep],
         layout="ltwh",
         first_index=1 if first else 0,
+        left_out=_left_out(file, table, keep),
     )
     placed = np.zeros(len(table), dtype=bool)
     if columns == 10:
@@ -81,6 +92,28 @@ def read(file: SourceFile) -> Iterator[Piece]:
             up="z",
             first_index=1 if first else 0,
         )
+
+
+def _people(file: SourceFile) -> tuple[int, ...]:
+    """The classes of people: those that the labels beside the file call so, else the usual ones."""
+    labels = file.path.parent / LABELS
+    if labels.is_symlink() or not labels.is_file() or labels.stat().st_size > _MOST_LABELS:
+        return PEOPLE
+    names = labels.read_text("utf-8", "replace").splitlines()
+    found = [n for n, name in enumerate(names, 1) if name.strip().lower() in _PEOPLE_WORDS]
+    return tuple(found) or PEOPLE
+
+
+def _left_out(file: SourceFile, table: Float[ndarray, "N C"], keep: ndarray) -> str:
+    """A sentence about rows that are no boxes of people; empty where all are."""
+    out = int((~keep).sum())
+    if not out:
+        return ""
+    classes = sorted({int(number) for number in table[~keep, 7]})
+    return (
+        f"{file.where}: {out} of {len(table)} rows are left out: of classes that are no people "
+        f"({', '.join(map(str, classes[:8]))}), or with 0 in column 7, which is not to count"
+    )
 
 
 def _table(file: SourceFile) -> Float[ndarray, "N C"]:

@@ -7,6 +7,7 @@ Source: OpenSim, "Marker (.trc) files".
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 
 import numpy as np
@@ -23,6 +24,9 @@ SERIES = False
 
 HIPS = {"rhip", "lhip", "hip", "midhip", "pelvis", "rasis", "lasis", "rpsis", "lpsis"}
 
+_PERSON = re.compile(r"(person|people|player|id|track|target|p)[\W_]*\d+")
+"""A marker that is a person, one of several."""
+
 _MOST_FRAMES = 1e9
 """Of one file: a year at 30 a second."""
 
@@ -35,7 +39,7 @@ def recognise(file: SourceFile) -> Certainty:
 
 
 def read(file: SourceFile) -> Iterator[Piece]:
-    """One piece with the place of the one person; 1 is its id."""
+    """One piece: the place of the one person, whose id is 1, or of each marker that is a person."""
     lines = file.lines()
     if len(lines) < 5:
         raise file.error("expected five lines of a header, found fewer; it is cut short")
@@ -55,19 +59,25 @@ def read(file: SourceFile) -> Iterator[Piece]:
             raise file.error(f"row {place + 1}: expected numbers") from None
         table[place, : len(values)] = values
     joints = table[:, 2:].reshape(len(rows), len(names), 3)
-    place_of = _middle(joints, [name.strip().lower() for name in names])
+    names = [name.strip().lower() for name in names]
+    if names and all(_PERSON.fullmatch(name) for name in names):
+        people = [joints[:, n] for n in range(len(names))]
+    else:
+        people = [_middle(joints, names)]
+    ids = np.repeat(np.arange(1, len(people) + 1), len(rows))
+    place_of, numbers = np.concatenate(people), np.tile(table[:, 0], len(people))
     # of a number that is no frame's nothing is known
-    good = np.isfinite(place_of).all(axis=1) & (np.abs(table[:, 0]) < _MOST_FRAMES)
+    good = np.isfinite(place_of).all(axis=1) & (np.abs(numbers) < _MOST_FRAMES)
     try:
         rate = float(facts.get("DataRate", "nan"))
     except ValueError:
         rate = float("nan")
-    frames = table[good, 0].astype(np.int64)
+    frames = numbers[good].astype(np.int64)
     yield TruthPiece(
         source=file.path,
         format=NAME,
         frames=frames,
-        ids=np.ones(len(frames), dtype=np.int64),
+        ids=ids[good],
         positions=place_of[good],
         unit=_UNITS.get(facts.get("Units", "").strip().lower()),
         up="y",

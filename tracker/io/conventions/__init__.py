@@ -1,0 +1,1 @@
+"""How files are meant: every interpretation judged by one likelihood, decided, open or none."""

@@ -1,0 +1,208 @@
+"""What an import asks where the files leave open how they are meant, and what it says else."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Literal
+
+from tracker.geometry.consistency.odds import DECISIVE
+from tracker.io.checks.reading import Reading, exchanged, exchanges, with_pixels
+from tracker.io.conventions.search import Verdict
+from tracker.io.read.pieces import FormatError, RawCamera
+
+if TYPE_CHECKING:
+    from tracker.io.importing.finding.matching import MatchedCamera
+    from tracker.io.importing.options import ImportOptions
+
+ACCEPT = "--accept-best"
+"""The flag that takes the likelier interpretation."""
+
+ACCEPTED = "accepted"
+"""What a finding is called that was taken though nothing proves it."""
+
+_LAYOUTS = {"ltwh": "left, top and size", "xyxy": "two corners", "cxcywh": "centre and size"}
+
+
+@dataclass(frozen=True, slots=True)
+class Question:
+    """What is open: two interpretations, what differs and the flags that decide."""
+
+    code: Literal["convention", "moments"]
+    interpretations: tuple[str, str]
+    """In words, the likelier one first."""
+    difference: str
+    """What differs, and how sure the likelier one is."""
+    flags: tuple[str, str]
+    """The flag for each."""
+
+
+class Undecided(FormatError):
+    """The files leave open how they are meant."""
+
+    def __init__(self, question: Question) -> None:
+        """Begin.
+
+        Args:
+            question: What is asked.
+        """
+        self.question = question
+        first, second = question.interpretations
+        one, other = question.flags
+        super().__init__(
+            f"{question.difference}: {first} ({one}), or {second} ({other})? {ACCEPT} takes the "
+            "first"
+        )
+
+
+class Unexplained(FormatError):
+    """No interpretation explains the boxes."""
+
+
+def matched_by(cameras: Sequence[MatchedCamera]) -> Literal["name", "number", "order"]:
+    """By what the boxes of cameras were matched, the weakest of all."""
+    ways = {camera.how.get("detections", "name") for camera in cameras}
+    return "order" if "order" in ways else "number" if "number" in ways else "name"
+
+
+def check_verdict(verdict: Verdict, cameras: Sequence[RawCamera], options: ImportOptions) -> str:
+    """Ask or refuse where the boxes do not decide.
+
+    Args:
+        verdict: What they tell.
+        cameras: As they are given.
+        options: Whether the likelier interpretation is to be taken all the same.
+
+    Returns:
+        What is taken though the boxes do not prove it; empty where they do.
+
+    Raises:
+        Undecided: If two interpretations are left, or nothing tells whether the cameras show the
+            same moments.
+        Unexplained: If no interpretation explains the boxes.
+    """
+    try:
+        _check(verdict, cameras)
+    except (Undecided, Unexplained) as error:
+        if not options.accept_best:
+            raise
+        return f"by {ACCEPT}: {error}"
+    return ""
+
+
+def _check(verdict: Verdict, cameras: Sequence[RawCamera]) -> None:
+    names = [camera.name for camera in cameras]
+    best = verdict.best.reading
+    if verdict.kind == "none":
+        raise Unexplained(
+            f"no interpretation explains these boxes; the closest, {in_words(best, names)}, "
+            f"explains {100.0 * verdict.best.evidence.share:.0f} % of a camera's boxes by another "
+            "camera's: check that calibration and boxes belong together and are of the same "
+            f"moments; {ACCEPT} imports them as they are"
+        )
+    if best.flipped:
+        raise Unexplained(
+            "the boxes are of pictures whose left and right are exchanged: with them mirrored "
+            f"{100.0 * verdict.best.evidence.share:.0f} % are explained by another camera's; "
+            f"mirror pictures and boxes; {ACCEPT} imports them as they are"
+        )
+    if verdict.kind == "open" and verdict.rival is not None:
+        raise Undecided(_open(best, verdict.rival.reading, verdict.odds, names))
+
+
+def _open(best: Reading, rival: Reading, odds: float, names: Sequence[str]) -> Question:
+    sure = "as likely" if odds < math.log(2.0) else f"{math.exp(min(odds, 7.0)):.0f} : 1"
+    parts = ("direction", "axes", "layout", "turns", "order", "mirrored", "flipped", "pixels")
+    differing = [part for part in parts if getattr(best, part) != getattr(rival, part)]
+    words = {"layout": "boxes", "order": "which calibration is whose", "turns": "angles",
+             "direction": "where R and t lead", "axes": "axes of cameras",
+             "mirrored": "handedness of the world", "flipped": "left and right of the pictures",
+             "pixels": "size of the pictures"}  # fmt: skip
+    what = " and ".join(words[part] for part in differing) or "the scene"
+    return Question(
+        "convention",
+        (in_words(best, names, differing), in_words(rival, names, differing)),
+        f"the files leave open {what} ({sure})",
+        (_flags(best, rival, names), _flags(rival, best, names)),
+    )
+
+
+def _flags(wanted: Reading, other: Reading, names: Sequence[str]) -> str:
+    """The flags that state what one reading has and the other has not."""
+    flags = []
+    if wanted.direction != other.direction:
+        flags.append(f"--pose {wanted.direction}")
+    if wanted.axes != other.axes:
+        flags.append(f"--axes {wanted.axes}")
+    if wanted.layout != other.layout:
+        flags.append(f"--boxes {wanted.layout}")
+    if wanted.turns != other.turns:
+        flags.append(f"--euler {wanted.turns.split(' in ')[0]}")
+    if wanted.order != other.order and wanted.order is not None:
+        flags += [f"--swap {a}={b}" for a, b in exchanges(wanted.order, names)]
+    return " ".join(flags) or ACCEPT
+
+
+def in_words(reading: Reading, names: Sequence[str], parts: Sequence[str] = ()) -> str:
+    """A reading in words, or some parts of it."""
+    every = {
+        "direction": f"poses {reading.direction}",
+        "axes": "y down and z ahead" if reading.axes == "opencv" else "y up and z back",
+        "layout": f"boxes as {_LAYOUTS[reading.layout]}",
+        "turns": f"angles {reading.turns}" if reading.turns else "",
+        "order": "calibrations as given"
+        if reading.order is None
+        else f"calibrations exchanged ({exchanged(reading.order, names)})",
+        "mirrored": "a mirrored world" if reading.mirrored else "",
+        "flipped": "pictures with left and right exchanged" if reading.flipped else "",
+        "pixels": f"pictures {reading.pixels:g} times as wide" if reading.pixels != 1.0 else "",
+    }
+    chosen = [words for part, words in every.items() if words and (not parts or part in parts)]
+    return ", ".join(chosen) or "as given"
+
+
+def rearranged(
+    raws: Sequence[RawCamera], reading: Reading
+) -> tuple[list[RawCamera], list[tuple[str, str]]]:
+    """The cameras for the boxes that are theirs, and for the pictures that these are of.
+
+    Returns:
+        The cameras, and what has changed and why.
+    """
+    found: list[tuple[str, str]] = []
+    names = [raw.name for raw in raws]
+    order = reading.order or tuple(range(len(raws)))
+    if order != tuple(range(len(raws))):
+        flags = " ".join(f"--swap {a}={b}" for a, b in exchanges(order, names))
+        found.append(("exchanged", f"{exchanged(order, names)}, since boxes meet so; {flags}"))
+    if reading.mirrored:
+        found.append(("mirrored", "the calibration's world is left-handed; its y axis is mirrored"))
+    if reading.pixels != 1.0:
+        why = f"{reading.pixels:.4g} times as large as the calibration's, since boxes meet so"
+        found.append(("image size", why))
+    changed = [with_pixels(raws[own], reading.pixels) for own in order]
+    return [replace(raw, name=name) for raw, name in zip(changed, names, strict=True)], found
+
+
+def told_of_moments(verdict: Verdict, names: Sequence[str]) -> list[str]:
+    """Cameras whose boxes nothing confirms to be of the same moments as those of the others."""
+    confirmed = verdict.confirmed
+    told = [
+        f"{names[camera]}: about step {fit.jump} its clock jumps by {fit.ends - fit.begins} steps, "
+        f"or it drifts: it is {fit.begins} steps late in the first third of the recording and "
+        f"{fit.ends} in the last; frames were lost, or its rate is another one"
+        for camera, fit in verdict.clocks.items()
+        if not fit.steady
+    ]
+    failing = [camera for camera, odds in confirmed.items() if odds < DECISIVE]
+    if not failing:
+        return told
+    listed = ", ".join(names[camera] for camera in failing)
+    if 2 * len(failing) < len(confirmed):
+        return [
+            *told,
+            f"{listed}: boxes agree with those of no other camera: another recording, a camera "
+            "that was moved, or late by more than 10 s",
+        ]
+    return [*told, f"{listed}: nothing confirms that these cameras show the same moments"]

@@ -1,0 +1,493 @@
+"""The interpretation of calibration and boxes that explains the boxes, or what is open.
+
+Every candidate (direction of poses, axes of cameras, order of angles, layout of boxes, whose
+calibration is whose, size of the pictures, handedness of the world) is judged by the evidence E of
+:mod:`tracker.geometry.consistency.likelihood` and a log prior. It is *decided* where its log odds
+are above ln 1000 over every rival that leads to another scene, *open* where they are not, and there
+is *none* where the boxes of many cameras are there and none explains them.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Mapping
+from collections.abc import Sequence as Many
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float, Int
+from numpy import ndarray
+
+from tracker.geometry.consistency.likelihood import (
+    Evidence,
+    Moments,
+    Scene,
+    at_moments,
+    evidence,
+    fit_floor,
+)
+from tracker.geometry.consistency.observed import Pose, Rays, rays_of
+from tracker.geometry.consistency.odds import DECISIVE, log_odds
+from tracker.io.checks.reading import Reading, boxes_by, lens_of, turns_of
+from tracker.io.checks.readings import Judge, Judged, Open, Seen, restricted
+from tracker.io.read.pieces import RawCamera
+
+MOST_MOMENTS = 120
+"""Number of steps whose boxes are compared."""
+
+SPACING = 0.5
+"""Seconds between two of them, where the recording is long enough for :data:`FEW_MOMENTS`."""
+
+FEW_MOMENTS = 60
+"""Number of moments for which a short recording is sampled more densely."""
+
+NAME_PRIOR = {"name": 7.0, "number": 3.0, "order": 1.0}
+"""Nats for each camera that keeps the files which belong to it by name, by number or by order."""
+
+RARE = 7.0
+"""Nats against a mirrored world, mirrored pictures, and pictures of another size than stated."""
+
+_RIVALS = 4  # number of readings whose pixels, handedness and order are questioned
+_LEAST_SHARE = 0.1  # of a camera's boxes that another one explains, below which none is explained
+_MANY_BOXES = 200  # least number of boxes that have to be explained
+_COARSE, _NEAR, _WIDEST = 0.2, 3.0, 10.0  # seconds between lags, and to the farthest of them
+_EXPLAINED = 0.3  # share of boxes with which the calibration is read nearly rightly
+_EVERY_ORDER = 4  # number of cameras up to which every order is tried
+_SAME_SCENE = 0.03  # difference of two scenes, in radians and in the size of the rig
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Interpretation:
+    """A reading, and what the boxes say of it."""
+
+    reading: Reading
+    judged: Judged
+    scene: Scene
+    evidence: Evidence
+    prior: float
+    """Log prior, nats."""
+
+    @property
+    def score(self) -> float:
+        """Evidence and prior, nats."""
+        return self.evidence.total + self.prior
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Verdict:
+    """What the boxes tell of how they and the calibration are meant."""
+
+    kind: Literal["decided", "open", "none", "unproven"]
+    """Unproven: there are too few boxes to tell anything."""
+    best: Interpretation
+    judge: Judge
+    rival: Interpretation | None = None
+    """The likeliest one that leads to another scene."""
+    odds: float = math.inf
+    """Log odds of the best over the rival."""
+    confirmed: Mapping[int, float] = field(default_factory=dict)
+    """Log odds by camera that its boxes are of the same moments as those of the others."""
+    clocks: Mapping[int, ClockFit] = field(default_factory=dict)
+    """Cameras whose clock is not that of the others."""
+
+
+@dataclass(frozen=True, slots=True)
+class ClockFit:
+    """How late a camera is, steps: it shows later what the others show at a step."""
+
+    late: int
+    begins: int
+    """In the first third of the recording."""
+    ends: int
+    """In the last third."""
+    jump: int
+    """The step at which it changes from one to the other, if it does so at once."""
+
+    @property
+    def steady(self) -> bool:
+        """Whether the clock goes as those of the others."""
+        return self.begins == self.ends
+
+
+class Likelihood:
+    """E of readings of one set of cameras and boxes."""
+
+    def __init__(self, judge: Judge, seen: Many[Seen | None], fps: float) -> None:
+        """Prepare.
+
+        Args:
+            judge: Of the consensus of pairs of boxes.
+            seen: Boxes of each camera, sorted by step.
+            fps: Steps a second.
+        """
+        self.judge = judge
+        self.moments = choose_moments(seen, fps)
+        chosen = set(self.moments.tolist())
+        self._seen: list[Seen | None] = []
+        for own in seen:
+            if own is None:
+                self._seen.append(None)
+                continue
+            rows = np.flatnonzero(np.isin(own.frames, list(chosen)))
+            rows = rows[np.argsort(own.frames[rows], kind="stable")]
+            self._seen.append(Seen(own.frames[rows], own.four[rows]))
+        self._rays: dict[tuple[object, ...], Rays] = {}
+        self.fps = fps
+        self._every = list(seen)
+        self._every_rays: dict[tuple[object, ...], Rays] = {}
+
+    @property
+    def boxes(self) -> int:
+        """The number of boxes at the moments."""
+        return sum(len(own.frames) for own in self._seen if own is not None)
+
+    def rays(
+        self, reading: Reading, poses: Many[Pose], up: ndarray, *, every: bool = False
+    ) -> list[Rays | None]:
+        """The boxes as rays of people who stand along a direction of the world.
+
+        Args:
+            reading: How calibration and boxes are meant.
+            poses: Of the cameras.
+            up: A unit vector of the world.
+            every: Whether the boxes of all steps are meant, not those of the moments alone.
+        """
+        found: list[Rays | None] = []
+        known_rays = self._every_rays if every else self._rays
+        for camera, (own, calibration) in enumerate(
+            zip(self._every if every else self._seen, self.judge.order(reading), strict=True)
+        ):
+            if own is None:
+                found.append(None)
+                continue
+            way = poses[camera].rotation @ up
+            key = (camera, calibration, reading.layout, reading.normalised, reading.flipped,
+                   reading.pixels, tuple(np.round(way, 7).tolist()))  # fmt: skip
+            if key not in known_rays:
+                raw, size = self.judge.lens_at(calibration, reading)
+                boxes = boxes_by(own.four, reading, size)
+                known = raw.image_size is not None
+                known_rays[key] = rays_of(own.frames, boxes, lens_of(raw, size), known, way)
+            found.append(known_rays[key])
+        return found
+
+    def score(self, judged: Judged, prior: float = 0.0) -> Interpretation | None:
+        """Fit the scene and compute E; None where no boxes meet."""
+        best: Interpretation | None = None
+        for judged_, rise in self._rises(judged):
+            scene = fit_floor(rise, judged_.consensus.feet)
+            found = self.at(judged_, scene, prior)
+            if best is None or found.score > best.score:
+                best = found
+        return best
+
+    def at(
+        self, judged: Judged, scene: Scene, prior: float, late: Mapping[int, int] | None = None
+    ) -> Interpretation:
+        """Compute E of a reading with a given scene.
+
+        Args:
+            judged: The reading.
+            scene: How people stand.
+            prior: Log prior.
+            late: Moments by which the boxes of cameras are turned around in time.
+        """
+        poses = self.judge.poses(judged.reading)
+        rays = self.rays(judged.reading, poses, scene.rise / np.linalg.norm(scene.rise))
+        boxes: list[Moments | None] = []
+        for camera, own in enumerate(rays):
+            if own is None:
+                boxes.append(None)
+                continue
+            turned = np.roll(self.moments, -(late or {}).get(camera, 0))
+            boxes.append(at_moments(own, turned))
+        return Interpretation(judged.reading, judged, scene, evidence(boxes, poses, scene), prior)
+
+    def by_lag(
+        self, best: Interpretation, camera: int, lags: Many[int], late: Mapping[int, int]
+    ) -> Float[ndarray, "L M"]:
+        """Evidence of the pairs with one camera by its lag, in steps, and moment.
+
+        Args:
+            best: The reading.
+            camera: Which camera.
+            lags: Steps by which it is late.
+            late: Steps by which other cameras are late.
+        """
+        poses = self.judge.poses(best.reading)
+        up = best.scene.rise / np.linalg.norm(best.scene.rise)
+        every = self.rays(best.reading, poses, up, every=True)
+        boxes = [
+            None if own is None else at_moments(own, self.moments + late.get(other, 0))
+            for other, own in enumerate(every)
+        ]
+        among = np.zeros((len(boxes), len(boxes)), dtype=bool)
+        among[camera], among[:, camera] = True, True
+        rows = []
+        own = every[camera]
+        assert own is not None
+        for lag in lags:
+            boxes[camera] = at_moments(own, self.moments + lag)
+            rows.append(evidence(boxes, poses, best.scene, among=among).of_camera(camera))
+        return np.array(rows)
+
+    def _rises(self, judged: Judged) -> Iterator[tuple[Judged, Float[ndarray, " 3"]]]:
+        """The common rise, and the same turned to the nearest axis of the world."""
+        for one in (judged, self.judge.refined(judged)):
+            rise = one.consensus.rise
+            height = float(np.linalg.norm(rise))
+            if height <= 0.0 or not one.consensus.agreeing:
+                continue
+            axis = np.zeros(3)
+            nearest = int(np.argmax(np.abs(rise)))
+            axis[nearest] = math.copysign(height, rise[nearest])
+            if one is judged:
+                yield one, rise
+            yield one, axis
+
+
+def choose_moments(seen: Many[Seen | None], fps: float) -> Int[ndarray, " M"]:
+    """Choose steps at which at least two cameras have boxes, at most :data:`MOST_MOMENTS`."""
+    own = [np.unique(one.frames) for one in seen if one is not None and len(one.frames)]
+    steps, counts = np.unique(np.concatenate([np.zeros(0, int), *own]), return_counts=True)
+    steps = steps[counts >= 2]
+    if not len(steps):
+        return np.asarray(steps)
+    seconds = (steps[-1] - steps[0] + 1) / fps
+    wanted = int(min(MOST_MOMENTS, max(seconds / SPACING, FEW_MOMENTS), len(steps)))
+    return np.asarray(steps[np.unique(np.linspace(0, len(steps) - 1, wanted).astype(int))])
+
+
+def find_reading(
+    cameras: Many[RawCamera],
+    seen: Many[Seen | None],
+    *,
+    fps: float,
+    tried: Open | None = None,
+    names: Literal["name", "number", "order"] = "name",
+    pixels: Many[float] = (),
+) -> Verdict | None:
+    """Judge all interpretations of a calibration and its boxes.
+
+    What a camera's :class:`~tracker.io.read.pieces.Convention` states is not questioned.
+
+    Args:
+        cameras: As their files give them; each needs a lens and a pose.
+        seen: The boxes of each, None for a camera without any.
+        fps: Steps a second.
+        tried: What is to be found out; everything where it is None.
+        names: By what files belong to the cameras.
+        pixels: Widths of the pictures that are tried besides, in that of the calibration's.
+
+    Returns:
+        None where fewer than two cameras have boxes at the same steps.
+    """
+    judge = Judge(cameras, seen)
+    if not judge.possible:
+        return None
+    likelihood = Likelihood(judge, seen, fps)
+    open_ = restricted(tried or Open(), cameras, seen)
+    readings = list(_readings(open_, cameras))
+    found = _scored(likelihood, readings, 0.0)
+    rivals = [one.reading for one in found[:_RIVALS]]
+    if not found or found[0].evidence.share < _EXPLAINED:
+        rivals = readings  # any of them may explain the boxes in a mirror or of other pictures
+    found += _scored(likelihood, list(_questioned(rivals, pixels)), -RARE)
+    if not found:
+        return None
+    found.sort(key=lambda one: -one.score)
+    if open_.orders:
+        found += _with_orders(likelihood, found[0], NAME_PRIOR[names])
+        found.sort(key=lambda one: -one.score)
+    best = found[0]
+    others = [one for one in found[1:] if not same_scene(judge, best, one)]
+    odds = [
+        log_odds(best.evidence.by_moment, one.evidence.by_moment) + best.prior - one.prior
+        for one in others
+    ]
+    nearest = int(np.argmin(odds)) if odds else -1
+    rival = others[nearest] if others else None
+    least = odds[nearest] if odds else math.inf
+    confirmed = confirm_moments(likelihood, best)
+    clocks = fit_clocks(likelihood, best, confirmed)
+    nothing = log_odds(best.evidence.by_moment, np.zeros(len(likelihood.moments)))
+    if likelihood.boxes < _MANY_BOXES and nothing < DECISIVE:
+        return Verdict("unproven", best, judge, rival, least, confirmed, clocks)
+    if best.evidence.share < _LEAST_SHARE or nothing < DECISIVE:
+        return Verdict("none", best, judge, rival, least, confirmed, clocks)
+    kind: Literal["decided", "open"] = "decided" if least >= DECISIVE else "open"
+    return Verdict(kind, best, judge, rival, least, confirmed, clocks)
+
+
+def _readings(open_: Open, cameras: Many[RawCamera]) -> Iterator[Reading]:
+    parts = (open_.directions, open_.axes, open_.layouts, open_.normalised, turns_of(cameras))
+    for direction, axes, layout, normalised, turns in itertools.product(*parts):
+        yield Reading(direction, axes, layout, normalised, turns=turns)
+
+
+def _scored(likelihood: Likelihood, readings: Many[Reading], prior: float) -> list[Interpretation]:
+    """The interpretations in which any boxes meet, the likeliest first."""
+    found = [likelihood.score(likelihood.judge.turned(reading), prior) for reading in readings]
+    return sorted((one for one in found if one is not None), key=lambda one: -one.score)
+
+
+def _questioned(readings: Many[Reading], pixels: Many[float]) -> Iterator[Reading]:
+    """Readings in a mirrored world, with mirrored pictures, and for pictures of another size."""
+    for reading in readings:
+        yield replace(reading, mirrored=True)
+        yield replace(reading, flipped=True)
+        if not reading.normalised:
+            yield from (replace(reading, pixels=factor) for factor in pixels)
+
+
+def _with_orders(likelihood: Likelihood, best: Interpretation, each: float) -> list[Interpretation]:
+    """The best reading with calibrations exchanged; a camera that keeps its own has a prior."""
+    count = len(likelihood.judge.cameras)
+    found: list[Interpretation] = []
+    start = tuple(range(count))
+    known = {start}
+    for _ in range(1 if count <= _EVERY_ORDER else count):
+        better: Interpretation | None = None
+        for order in _orders(start, count):
+            if order in known:
+                continue
+            known.add(order)
+            prior = -each * sum(own != camera for camera, own in enumerate(order))
+            other = _exchanged(likelihood, best, order, prior)
+            if other is None:
+                continue
+            found.append(other)
+            if better is None or other.score > better.score:
+                better = other
+        if better is None or better.score <= best.score:
+            break
+        best = better
+        start = best.reading.order or start
+    return found
+
+
+def _exchanged(
+    likelihood: Likelihood, best: Interpretation, order: tuple[int, ...], prior: float
+) -> Interpretation | None:
+    reading = replace(best.reading, order=order)
+    judged = replace(best.judged, reading=reading)
+    found = likelihood.at(judged, best.scene, prior)
+    # the scene of a wrong order is wrong, unless most cameras are right
+    if len(order) <= _EVERY_ORDER and best.evidence.share < _EXPLAINED:
+        own = likelihood.score(likelihood.judge.turned(reading), prior)
+        if own is not None and own.score > found.score:
+            return own
+    return found
+
+
+def _orders(own: tuple[int, ...], count: int) -> Iterator[tuple[int, ...]]:
+    if count <= _EVERY_ORDER:
+        yield from itertools.permutations(range(count))
+        return
+    for a, b in itertools.combinations(range(count), 2):
+        changed = list(own)
+        changed[a], changed[b] = changed[b], changed[a]
+        yield tuple(changed)
+
+
+def same_scene(judge: Judge, one: Interpretation, other: Interpretation) -> bool:
+    """Whether two interpretations differ by a turn, shift or scale of the world alone."""
+    parts = ("layout", "pixels", "flipped", "mirrored")
+    if any(getattr(one.reading, part) != getattr(other.reading, part) for part in parts):
+        return False
+    first, second = judge.poses(one.reading), judge.poses(other.reading)
+    turn = first[0].rotation.T @ second[0].rotation
+    away = [a.rotation.T @ b.rotation - turn for a, b in zip(first, second, strict=True)]
+    if max(float(np.abs(own).max()) for own in away) > _SAME_SCENE:
+        return False
+    centres = np.array([own.centre for own in first])
+    others = np.array([own.centre for own in second]) @ turn.T
+    centres, others = centres - centres.mean(axis=0), others - others.mean(axis=0)
+    size, other_size = (float(np.linalg.norm(own)) for own in (centres, others))
+    if size == 0.0 or other_size == 0.0:
+        return size == other_size
+    return float(np.abs(centres / size - others / other_size).max()) < _SAME_SCENE
+
+
+def confirm_moments(likelihood: Likelihood, best: Interpretation) -> dict[int, float]:
+    """Log odds by camera that its boxes show the same moments as those of the other cameras.
+
+    The evidence of its pairs is compared with their mean evidence when its clock is turned by a
+    quarter to three quarters of the recording: people who stand about one room agree by chance.
+    """
+    count = len(likelihood.moments)
+    turns = sorted({round(share * count) for share in (0.25, 0.4, 0.5, 0.6, 0.75)} - {0, count})
+    found = {}
+    for camera in sorted({camera for pair in best.evidence.terms for camera in pair}):
+        own = best.evidence.of_camera(camera)
+        turned = [
+            likelihood.at(best.judged, best.scene, 0.0, {camera: turn}).evidence.of_camera(camera)
+            for turn in turns
+        ]
+        found[camera] = log_odds(own, np.mean(turned, axis=0)) if turned else 0.0
+    return found
+
+
+def fit_clocks(
+    likelihood: Likelihood, best: Interpretation, confirmed: dict[int, float]
+) -> dict[int, ClockFit]:
+    """Find the cameras that are late, or whose clocks jump or drift, by the same evidence.
+
+    A camera whose moments are confirmed is searched 3 s around, the others 10 s. Every camera that
+    is shifted pays the logarithm of the number of lags, and at most half of them are shifted.
+
+    Args:
+        likelihood: Of the boxes.
+        best: The reading.
+        confirmed: Log odds by camera; those of a camera that is shifted are set to its own.
+    """
+    found: dict[int, ClockFit] = {}
+    coarse = max(1, round(_COARSE * likelihood.fps))
+    third = len(likelihood.moments) // 3
+    # of two cameras either may be meant
+    by_doubt = sorted(confirmed, key=lambda one: (len(confirmed) > 2) * confirmed[one] - 1e-6 * one)
+    for camera in by_doubt:
+        if not third or len(found) > (len(confirmed) - 1) // 2:
+            break
+        late = {other: fit.late for other, fit in found.items()}
+        reach = round((_NEAR if confirmed[camera] >= DECISIVE else _WIDEST) * likelihood.fps)
+        lags = coarse * np.arange(-(reach // coarse), reach // coarse + 1)
+        nats = likelihood.by_lag(best, camera, lags.tolist(), late)
+        usual = np.mean(nats, axis=0)
+        parts = (slice(None), slice(None, third), slice(-third, None))
+        peaks = [int(np.argmax(nats[:, part].sum(axis=1))) for part in parts]
+        here = len(lags) // 2
+        first, last = nats[peaks[1]], nats[peaks[2]]
+        penalty = math.log(len(lags))
+        jumps = abs(peaks[1] - peaks[2]) > 1 and all(
+            log_odds(own[part], other[part]) >= DECISIVE + penalty
+            for own, other, part in ((first, last, parts[1]), (last, first, parts[2]))
+        )
+        moved = nats[peaks[0]]
+        clear = min(log_odds(moved, usual), log_odds(moved, nats[here])) >= DECISIVE + penalty
+        if jumps:
+            begins, ends = (
+                _fine(likelihood, best, camera, int(lags[peak]), coarse, late, part)
+                for peak, part in zip(peaks[1:], parts[1:], strict=True)
+            )
+            before, after = np.cumsum(first), np.cumsum(last[::-1])[::-1]
+            at = int(np.argmax(np.append(0.0, before[:-1]) + after))
+            found[camera] = ClockFit(0, begins, ends, int(likelihood.moments[at]))
+        elif peaks[0] != here and clear:
+            lag = int(lags[peaks[0]])
+            steps = _fine(likelihood, best, camera, lag, coarse, late, slice(None))
+            found[camera] = ClockFit(steps, steps, steps, 0)
+            confirmed[camera] = log_odds(moved, usual)
+    return found
+
+
+def _fine(
+    likelihood: Likelihood, best: Interpretation, camera: int, lag: int, reach: int,
+    late: Mapping[int, int], part: slice,
+) -> int:  # fmt: skip
+    """The best lag around one, step by step, in a part of the recording."""
+    lags = np.arange(lag - reach, lag + reach + 1)
+    nats = likelihood.by_lag(best, camera, lags.tolist(), late)[:, part].sum(axis=1)
+    return int(lags[int(np.argmax(nats))])
