@@ -419,10 +419,10 @@ def judge(plan: ImportPlan, known: Known) -> str:
         if own > 1.01 * people and "class" not in reported:
             return "cars are people"
     wrong = _wrong_cameras(plan, known) or _wrong_boxes(plan, known) or _wrong_times(plan, known)
-    unmended = ("mirrored", "camera moved", "boxes of another recording", "other rate",
+    unmended = ("late", "mirrored", "camera moved", "boxes of another recording", "other rate",
                 "frames lost")  # fmt: skip
     if known.defect in unmended:
-        wrong = wrong or known.defect
+        wrong = wrong or ("" if known.defect == "late" else known.defect)
         if known.defect == "mirrored" and "mirror" in reported:
             return ""
         return "" if named and known.defect != "mirrored" else wrong

@@ -299,7 +299,11 @@ def find_reading(
         return None
     found.sort(key=lambda one: -one.score)
     if open_.orders:
-        found += _with_orders(likelihood, found[0], NAME_PRIOR[names])
+        starts = found[:1]
+        if found[0].evidence.share < _EXPLAINED and len(cameras) < _EVERY_ORDER:
+            starts = found[:_RIVALS]  # of few cameras nothing agrees before they are exchanged
+        for start in starts:
+            found += _with_orders(likelihood, start, NAME_PRIOR[names])
         found.sort(key=lambda one: -one.score)
     best = found[0]
     others = [one for one in found[1:] if not same_scene(judge, best, one)]
@@ -348,13 +352,14 @@ def _with_orders(likelihood: Likelihood, best: Interpretation, each: float) -> l
     found: list[Interpretation] = []
     start = tuple(range(count))
     known = {start}
+    base = best.prior
     for _ in range(1 if count <= _EVERY_ORDER else count):
         better: Interpretation | None = None
         for order in _orders(start, count):
             if order in known:
                 continue
             known.add(order)
-            prior = -each * sum(own != camera for camera, own in enumerate(order))
+            prior = base - each * sum(own != camera for camera, own in enumerate(order))
             other = _exchanged(likelihood, best, order, prior)
             if other is None:
                 continue

@@ -1,0 +1,49 @@
+"""Folders made after public reports, as far as their import goes; skipped where they are absent."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from tests.conftest import DATA
+from tracker.io.importing.gathering import gather
+from tracker.io.importing.options import ImportOptions
+from tracker.io.importing.settling import ImportPlan, settle
+
+CASES = DATA.parent / "foreign" / "cases"
+
+
+def _counts(plan: ImportPlan) -> list[int]:
+    return [len(view.detections.frames) for view in plan.views if view.detections is not None]
+
+
+def _found(plan: ImportPlan, name: str) -> str:
+    return " ".join(words for what, words in plan.found if what == name)
+
+
+def _people(plan: ImportPlan) -> int:
+    return 0 if plan.truth is None else len(np.unique(plan.truth.ids))
+
+
+HOLD: dict[str, Callable[[ImportPlan], bool]] = {
+    "boxes-of-larger-pictures": lambda plan: plan.views[0].camera.image_size[0] == 1920,
+    "dropped-frames": lambda plan: any("cam2: about step 1" in told for told in plan.told),
+    "every-second-frame": lambda plan: all(
+        view.looked_at is not None and (view.looked_at % 2 == 0).all() for view in plan.views
+    ),
+    "grid-truth": lambda plan: "5 % of its places lie in boxes" in _found(plan, "truth"),
+    "mirrored-world": lambda plan: "left-handed" in _found(plan, "mirrored"),
+    "mot-labels": lambda plan: _counts(plan) == [300] * 4 and len(plan.told) == 4,
+    "mot-none-counts": lambda plan: min(_counts(plan)) > 220,
+    "trc-of-several": lambda plan: _people(plan) == 3,
+    "truth-elsewhere": lambda plan: "0 % of its places lie in boxes" in _found(plan, "truth"),
+}
+
+
+@pytest.mark.parametrize("case", HOLD)
+def test_a_reported_fault_is_mended_or_reported(case: str) -> None:
+    if not CASES.is_dir():
+        pytest.skip(f"the reported cases are not there: no folder {CASES}")
+    assert HOLD[case](settle(gather([CASES / case / "recording"]), ImportOptions(fps=25.0)))
