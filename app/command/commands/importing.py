@@ -73,7 +73,7 @@ def _import(command: Import) -> int:
         say(f"{refusal}; nothing was written")
         return REFUSED
     print()
-    print_table(("found out", "as"), [*settled.found, *(("not used", t) for t in settled.told)])
+    print_table(("found out", "as"), [*settled.found, *(("note", t) for t in settled.told)])
     facts = (
         f"{len(settled.views)} cameras, {settled.frames} steps at {settled.fps:g} a second, "
         f"{'with' if settled.truth is not None else 'without'} truth"

@@ -7,7 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
-from tracker.geometry.consistency.odds import DECISIVE
+import numpy as np
+
+from tracker.geometry.consistency.odds import DECISIVE, log_odds
 from tracker.io.checks.reading import Reading, exchanged, exchanges, with_pixels
 from tracker.io.conventions.search import Verdict
 from tracker.io.read.pieces import FormatError, RawCamera
@@ -196,13 +198,16 @@ def told_of_moments(verdict: Verdict, names: Sequence[str]) -> list[str]:
         if not fit.steady
     ]
     failing = [camera for camera, odds in confirmed.items() if odds < DECISIVE]
-    if not failing:
-        return told
-    listed = ", ".join(names[camera] for camera in failing)
-    if 2 * len(failing) < len(confirmed):
-        return [
-            *told,
-            f"{listed}: boxes agree with those of no other camera: another recording, a camera "
-            "that was moved, or late by more than 10 s",
-        ]
-    return [*told, f"{listed}: nothing confirms that these cameras show the same moments"]
+    evidence = verdict.best.evidence
+    nothing = np.zeros(evidence.moments)
+    alone = [c for c in failing if log_odds(evidence.of_camera(c), nothing) < DECISIVE]
+    if 2 * len(failing) >= len(confirmed):
+        alone = []  # it is not known which of them are the ones that do not belong
+    if alone:
+        told.append(
+            f"{', '.join(names[c] for c in alone)}: boxes agree with those of no other camera: "
+            "another recording, a camera that was moved, or late by more than 10 s"
+        )
+    if rest := [names[c] for c in failing if c not in alone]:
+        told.append(f"{', '.join(rest)}: nothing confirms that these show the same moments")
+    return told
