@@ -24,11 +24,9 @@ class Remedy:
     """The name of the camera that the field belongs to; empty for other fields."""
 
     def __str__(self) -> str:
-        return (
-            f"{self.flag} {self.value}"
-            if self.flag.startswith("-")
-            else (f"{self.flag} = {self.value}")
-        )
+        if self.flag.startswith("-"):
+            return f"{self.flag} {self.value}".rstrip()
+        return f"{self.flag} = {self.value}"
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,9 +25,10 @@ from tracker.sequences.reader import FILE
 
 if TYPE_CHECKING:
     from app.state.importing.looking import Looked
-    from tracker.io.conventions.questions import Question
+    from tracker.io.conventions.questions import Question, Undecided, Unexplained
     from tracker.io.importing.arriving import Footprint
     from tracker.io.importing.gathering import ParsedFiles
+    from tracker.io.importing.options import ImportOptions
     from tracker.io.importing.settling import ImportPlan, PlannedView
 
 logger = logging.getLogger("app")
@@ -59,6 +60,8 @@ class Known:
     waiting: str = ""
     """What is waited for before anything is read: a file that is still being copied there."""
     error: str = ""
+    undecided: str = ""
+    """Why nothing can be written before somebody decides how the files are meant."""
     question: Question | None = None
     """What is asked where the files leave open how they are meant."""
     folder: Path | None = None
@@ -171,7 +174,7 @@ class Draft:
         self._stop.set()
         stop = self._stop = threading.Event()
         phase: Phase = "settled" if self._gathered and self._known.settled else "reading"
-        self._tell(phase=phase, busy=True, error="", question=None, waiting="")
+        self._tell(phase=phase, busy=True, error="", undecided="", waiting="")
         threading.Thread(target=self._look, args=(stop,), name="importing", daemon=True).start()
 
     def _look(self, stop: threading.Event) -> None:
@@ -183,8 +186,8 @@ class Draft:
 
         # the readers of all formats: a server starts without them
         from app.state.importing.looking import look_into
+        from tracker.io.conventions.questions import Undecided
         from tracker.io.importing.arriving import gather_whole
-        from tracker.io.importing.settling import settle
 
         def sleep(seconds: float) -> None:
             if stop.wait(seconds):
@@ -199,8 +202,10 @@ class Draft:
                 with self._lock:
                     tell(taken=taken, waiting="")
                     self._gathered, self._read = True, read
-            settled = settle(taken, options_of(wish, taken))
-            tell(settled=settled, phase="settled", error="")
+            settled, open_ = _settle(taken, options_of(wish, taken))
+            question = open_.question if isinstance(open_, Undecided) else None
+            undecided = "" if open_ is None else sentence(open_)
+            tell(settled=settled, phase="settled", error="", undecided=undecided, question=question)
             for looked in look_into(settled, wish.name, stop.is_set):
                 tell(looked=looked)
             tell(busy=False)
@@ -211,9 +216,7 @@ class Draft:
                 logger.exception("looking into an import failed")
             with self._lock:
                 if not stop.is_set():
-                    question = getattr(error, "question", None)
-                    said = sentence(error)
-                    self._tell(phase="failed", busy=False, error=said, question=question)
+                    self._tell(phase="failed", busy=False, error=sentence(error))
 
     def picture(self, camera: str) -> bytes | None:
         """The middle picture of a camera, by its name in the calibration, as JPEG."""
@@ -244,6 +247,8 @@ class Draft:
         """
         with self._lock:
             known = self._known
+            if known.undecided:
+                raise FormatError(known.undecided)
             if known.phase != "settled":
                 raise FormatError(known.error or "the files are not understood yet; wait a moment")
             place = self.home / folder_name(known.wish.name)
@@ -331,6 +336,19 @@ class Draft:
 def folder_name(name: str) -> str:
     """A name as a folder's: letters, digits, blanks, dashes and dots."""
     return re.sub(r"[^\w\- .]+", "-", name).strip(" .-")[:80] or "recording"
+
+
+def _settle(
+    taken: tuple[ParsedFiles, ...], options: ImportOptions
+) -> tuple[ImportPlan, Undecided | Unexplained | None]:
+    """Settle the likeliest interpretation, and why it may not be taken without a decision."""
+    from tracker.io.conventions.questions import Undecided, Unexplained
+    from tracker.io.importing.settling import settle
+
+    try:
+        return settle(taken, options), None
+    except (Undecided, Unexplained) as open_:
+        return settle(taken, replace(options, accept_best=True)), open_
 
 
 def _middle(view: PlannedView) -> bytes | None:

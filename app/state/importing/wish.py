@@ -8,7 +8,6 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from tracker.io.checks import Check
 from tracker.io.importing.options import Corner, ImportOptions
 from tracker.io.read.pieces import (
     METRES,
@@ -23,6 +22,7 @@ from tracker.io.read.pieces import (
     Up,
     VideoPiece,
 )
+from tracker.sequences.finding import Remedy
 
 if TYPE_CHECKING:
     from tracker.io.importing.gathering import ParsedFiles
@@ -129,18 +129,22 @@ def _place(piece: Piece) -> Path | None:
     return None
 
 
-def mended(wish: Wish, check: Check) -> dict[str, Any]:
-    """What a check's remedies change of a wish; nothing where the page cannot mend it."""
+def mended(wish: Wish, remedies: Sequence[Remedy]) -> dict[str, Any]:
+    """What remedies change of a wish; nothing where the page cannot mend it."""
     own = {called: name for name, called in wish.names.items()}  # checks call cameras as shown
     changes: dict[str, Any] = {}
     room: dict[str, Any] = {}
-    for remedy in check.remedies:
+    for remedy in remedies:
         flag, value = remedy.flag.removeprefix("--"), remedy.value
         if flag in ("pose", "axes", "up") or (flag == "unit" and value in METRES):
             changes[flag] = value
         elif flag == "boxes":
             layout, _, normalised = value.partition("-")
             changes |= {"boxes": layout, "normalised": True if normalised else None}
+        elif flag == "euler":
+            changes["turns"] = value
+        elif flag == "accept-best":
+            changes["accept_best"] = True
         elif flag == "first-index":
             changes["first_index"] = int(value)
         elif flag == "swap":

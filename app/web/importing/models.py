@@ -165,7 +165,9 @@ class ImportQuestion(Model):
     """In words, the likelier one first."""
     difference: str
     flags: tuple[str, str]
-    """The flag of the command line for each, which is what a wish is called here."""
+    """The flags of the command line for each."""
+    wishes: tuple[ImportWish, ImportWish]
+    """What decides for each here."""
 
 
 class ImportInfo(Model):
@@ -178,6 +180,8 @@ class ImportInfo(Model):
     under_way: str
     """What is being looked into."""
     error: str
+    undecided: str
+    """Why nothing can be written before somebody decides how the files are meant; else empty."""
     question: ImportQuestion | None
     wish: ImportWish
     received: int

@@ -6,7 +6,6 @@ import math
 import shutil
 import time
 from collections.abc import Mapping
-from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -34,6 +33,7 @@ from tracker.io.read.pieces import CalibrationPiece, DetectionPiece
 if TYPE_CHECKING:
     from app.state.importing.looking import Looked
     from tracker.geometry.consistency.entrances import Door
+    from tracker.io.conventions.questions import Question
     from tracker.io.importing.settling import ImportPlan, PlannedView
 
 MOST_OFFSETS = 241
@@ -79,7 +79,8 @@ def _info(draft: Draft) -> ImportInfo:
         busy=known.busy,
         under_way=known.waiting or (looked.under_way if looked is not None and known.busy else ""),
         error=known.error,
-        question=None if known.question is None else ImportQuestion(**asdict(known.question)),
+        undecided=known.undecided,
+        question=None if known.question is None else _question(known.question, known.wish),
         wish=_wish_info(known.wish),
         received=draft.size if upload is None else upload.received,
         bytes=draft.size,
@@ -212,8 +213,19 @@ def _offset(one: CameraOffset) -> ImportedOffset:
     )
 
 
+def _question(question: Question, wish: Wish) -> ImportQuestion:
+    wishes = [_wish_info(wish, mended(wish, own)) for own in question.remedies]
+    return ImportQuestion(
+        code=question.code,
+        interpretations=question.interpretations,
+        difference=question.difference,
+        flags=question.flags,
+        wishes=(wishes[0], wishes[1]),
+    )
+
+
 def _check(one: Check, wish: Wish) -> ImportedCheck:
-    changes = mended(wish, one)
+    changes = mended(wish, one.remedies)
     return ImportedCheck(
         name=one.name,
         status=one.status,

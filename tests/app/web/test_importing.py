@@ -121,10 +121,14 @@ def test_files_that_are_sent_become_a_recording(
 def test_a_wish_is_looked_into_and_can_be_taken_back(client: TestClient, files: Path) -> None:
     info = _settled(client, _send(client, files))
     other = _wish(client, info, pose="camera-to-world")
-    assert other["phase"] == "failed"  # no interpretation with it explains the boxes
-    assert "--accept-best" in other["error"]
-    assert _wish(client, other, accept_best=True)["phase"] == "settled"
-    assert _wish(client, other, pose=None)["checks"] == info["checks"]
+    assert "without --pose camera-to-world" in other["undecided"]
+    refused = client.post(f"/api/import/{info['key']}/write", json={})
+    assert refused.status_code == 422
+    assert "no interpretation" in refused.text.lower()
+    mend = next(one["mend"] for one in other["checks"] if one["mend"])
+    assert mend["pose"] == "world-to-camera"
+    assert _wish(client, other, accept_best=True)["undecided"] == ""
+    assert _wish(client, other, **mend)["checks"] == info["checks"]
     late = _wish(client, info, offsets={"cam2": -0.2})
     assert late["cameras"][1]["offset"]["steps"] == pytest.approx(-0.2 * info["fps"], abs=1.0)
     room = [[-2.0, -2.0, 0.0], [2.0, 2.0, 2.0]]

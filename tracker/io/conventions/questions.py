@@ -13,6 +13,7 @@ from tracker.geometry.consistency.odds import DECISIVE, log_odds
 from tracker.io.checks.reading import Reading, exchanged, exchanges, with_pixels
 from tracker.io.conventions.search import Verdict
 from tracker.io.read.pieces import FormatError, RawCamera
+from tracker.sequences.finding import Remedy
 
 if TYPE_CHECKING:
     from tracker.io.importing.finding.matching import MatchedCamera
@@ -36,8 +37,14 @@ class Question:
     """In words, the likelier one first."""
     difference: str
     """What differs, and how sure the likelier one is."""
-    flags: tuple[str, str]
-    """The flag for each."""
+    remedies: tuple[tuple[Remedy, ...], tuple[Remedy, ...]]
+    """The flags that decide for each."""
+
+    @property
+    def flags(self) -> tuple[str, str]:
+        """The flags that decide for each, as they are typed."""
+        first, second = (" ".join(map(str, own)) for own in self.remedies)
+        return first, second
 
 
 class Undecided(FormatError):
@@ -68,13 +75,21 @@ def matched_by(cameras: Sequence[MatchedCamera]) -> Literal["name", "number", "o
     return "order" if "order" in ways else "number" if "number" in ways else "name"
 
 
-def check_verdict(verdict: Verdict, cameras: Sequence[RawCamera], options: ImportOptions) -> str:
+def check_verdict(
+    verdict: Verdict,
+    cameras: Sequence[RawCamera],
+    options: ImportOptions,
+    stated: str = "",
+    otherwise: Verdict | None = None,
+) -> str:
     """Ask or refuse where the boxes do not decide.
 
     Args:
         verdict: What they tell.
         cameras: As they are given.
         options: Whether the likelier interpretation is to be taken all the same.
+        stated: The flags that leave no interpretation that explains the boxes.
+        otherwise: What the boxes tell without these.
 
     Returns:
         What is taken though the boxes do not prove it; empty where they do.
@@ -85,7 +100,7 @@ def check_verdict(verdict: Verdict, cameras: Sequence[RawCamera], options: Impor
         Unexplained: If no interpretation explains the boxes.
     """
     try:
-        _check(verdict, cameras)
+        _check(verdict, cameras, stated, otherwise)
     except (Undecided, Unexplained) as error:
         if not options.accept_best:
             raise
@@ -93,15 +108,23 @@ def check_verdict(verdict: Verdict, cameras: Sequence[RawCamera], options: Impor
     return ""
 
 
-def _check(verdict: Verdict, cameras: Sequence[RawCamera]) -> None:
+def _check(
+    verdict: Verdict, cameras: Sequence[RawCamera], stated: str, otherwise: Verdict | None
+) -> None:
     names = [camera.name for camera in cameras]
     best = verdict.best.reading
     if verdict.kind == "none":
+        mended = (
+            "check that calibration and boxes belong together and are of the same moments"
+            if otherwise is None
+            else f"without {stated} {in_words(otherwise.best.reading, names)} explains "
+            f"{100.0 * otherwise.best.evidence.share:.0f} %"
+        )
         raise Unexplained(
-            f"no interpretation explains these boxes; the closest, {in_words(best, names)}, "
-            f"explains {100.0 * verdict.best.evidence.share:.0f} % of a camera's boxes by another "
-            "camera's: check that calibration and boxes belong together and are of the same "
-            f"moments; {ACCEPT} imports them as they are"
+            f"no interpretation{f' with {stated}' if stated else ''} explains these boxes; the "
+            f"closest, {in_words(best, names)}, explains "
+            f"{100.0 * verdict.best.evidence.share:.0f} % of a camera's boxes by another camera's: "
+            f"{mended}; {ACCEPT} imports them as they are"
         )
     if best.flipped:
         raise Unexplained(
@@ -130,20 +153,21 @@ def _open(best: Reading, rival: Reading, odds: float, names: Sequence[str]) -> Q
     )
 
 
-def _flags(wanted: Reading, other: Reading, names: Sequence[str]) -> str:
+def _flags(wanted: Reading, other: Reading, names: Sequence[str]) -> tuple[Remedy, ...]:
     """The flags that state what one reading has and the other has not."""
     flags = []
     if wanted.direction != other.direction:
-        flags.append(f"--pose {wanted.direction}")
+        flags.append(Remedy("--pose", wanted.direction))
     if wanted.axes != other.axes:
-        flags.append(f"--axes {wanted.axes}")
+        flags.append(Remedy("--axes", wanted.axes))
     if wanted.layout != other.layout:
-        flags.append(f"--boxes {wanted.layout}")
+        flags.append(Remedy("--boxes", wanted.layout))
     if wanted.turns != other.turns:
-        flags.append(f"--euler {wanted.turns.split(' in ')[0]}")
+        flags.append(Remedy("--euler", wanted.turns.split(" in ")[0]))
     if wanted.order != other.order and wanted.order is not None:
-        flags += [f"--swap {a}={b}" for a, b in exchanges(wanted.order, names)]
-    return " ".join(flags) or ACCEPT
+        pairs = exchanges(wanted.order, names)
+        flags += [Remedy("--swap", f"{first}={second}") for first, second in pairs]
+    return tuple(flags) or (Remedy(ACCEPT, ""),)
 
 
 def in_words(reading: Reading, names: Sequence[str], parts: Sequence[str] = ()) -> str:

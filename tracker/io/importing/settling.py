@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -121,10 +122,8 @@ def settle(taken: Sequence[ParsedFiles], options: ImportOptions | None = None) -
     for way in sorted({how for camera in cameras for how in camera.how.values()} - {"name"}):
         found.append(("matching", f"pictures and boxes go to the cameras by {way}"))
     sizes = picture_sizes(cameras, found)
-    raws = [
-        _told(scaled(camera.raw, size), options)
-        for camera, size in zip(cameras, sizes, strict=True)
-    ]
+    plain = [scaled(camera.raw, size) for camera, size in zip(cameras, sizes, strict=True)]
+    raws = [_told(raw, options) for raw in plain]
     if not any(c.video or c.images or c.detections is not None for c in cameras):
         raise nothing_of(cameras, taken, told)
     times = settle_times(cameras, matched.truths, options, found)
@@ -132,7 +131,7 @@ def settle(taken: Sequence[ParsedFiles], options: ImportOptions | None = None) -
     arbitrary = matched.format.startswith(_WITHOUT_UNIT)
     offsets: dict[str, float] = {}
     reading, raws, boxes, factor = _read(
-        raws, cameras, boxes, times, arbitrary, options, found, told, offsets
+        raws, plain, cameras, boxes, times, arbitrary, options, found, told, offsets
     )
     if offsets:
         both = {name: offsets.get(name, 0.0) + options.offsets.get(name, 0.0)
@@ -350,6 +349,7 @@ def _boxes(
 
 def _read(
     raws: list[RawCamera],
+    plain: Sequence[RawCamera],
     cameras: Sequence[MatchedCamera],
     boxes: list[_Boxes | None],
     times: Times,
@@ -373,16 +373,21 @@ def _read(
     layouts: tuple[Layout, ...] = ("ltwh", "xyxy", "cxcywh") if unknown else ("ltwh",)
     convention = raws[0].convention
     free = not options.swap and not options.cameras
-    verdict = find_reading(
-        raws,
-        seen,
+    find = partial(
+        find_reading,
+        seen=seen,
         fps=times.fps,
         tried=Open(layouts=layouts, normalised=(False,), orders=free),
         names=matched_by(cameras),
         pixels=_pixels(raws, seen) if all(c.picture_size is None for c in cameras) else (),
     )
+    verdict = find(raws)
     if verdict is not None:
-        unproved = check_verdict(verdict, raws, options)
+        stated = _stated(options) if verdict.kind == "none" else ""
+        otherwise = find(plain) if stated else None
+        if otherwise is not None and otherwise.kind not in ("decided", "open"):
+            otherwise = None
+        unproved = check_verdict(verdict, raws, options, stated, otherwise)
         if unproved:
             found.append((ACCEPTED, unproved))
     enough = verdict is not None and verdict.kind in ("decided", "open")
@@ -438,11 +443,17 @@ def _read(
             own = (replace(own[0], boxes=four), reading.layout)
         changed.append(own)
     if best is not None and arbitrary and convention.unit is None:
-        stated = options.half_extents
-        factor = (PERSON if stated is None else 2.0 * stated[2]) / best.consensus.height
+        size = options.half_extents
+        factor = (PERSON if size is None else 2.0 * size[2]) / best.consensus.height
         raws = [_resized(raw, factor) for raw in raws]
     reading = replace(reading, layout="ltwh", order=None, pixels=1.0)
     return reading, raws, changed, factor
+
+
+def _stated(options: ImportOptions) -> str:
+    """The flags that state how poses are meant."""
+    flags = (("pose", options.pose), ("axes", options.axes), ("euler", options.turns))
+    return " ".join(f"--{name} {value}" for name, value in flags if value is not None)
 
 
 def _pixels(raws: Sequence[RawCamera], seen: Sequence[Seen | None]) -> tuple[float, ...]:

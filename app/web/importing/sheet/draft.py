@@ -20,7 +20,7 @@ from app.web.tables.markup import Markup, joined
 def can_be_written(info: ImportInfo) -> bool:
     """Whether a recording can be made of it."""
     pictured = all(camera.video or camera.detections for camera in info.cameras)
-    return info.phase == "settled" and pictured
+    return info.phase == "settled" and pictured and not info.undecided
 
 
 def draft_sheet(info: ImportInfo) -> str:
@@ -80,7 +80,7 @@ def _copying(info: ImportInfo) -> str:
 def _foot(info: ImportInfo) -> Markup:
     odd = sum(one.status == "warning" for one in info.checks)
     done = sum(ready(info, camera) for camera in info.cameras)
-    odd = max(odd, len(info.cameras) - done)
+    odd = max(odd + bool(info.undecided), len(info.cameras) - done)
     things = f"{odd} thing{'' if odd == 1 else 's'} to decide" if odd else "nothing to decide"
     words = {
         "uploading": "Uploading",

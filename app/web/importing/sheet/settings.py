@@ -169,13 +169,30 @@ def checks_part(info: ImportInfo) -> Markup:
     return element(
         "section",
         heading("Checks", small(under_way), GROW, small(f"{fine} fine · {odd} to look at")),
-        element("div", [_check(one) for one in checks], class_="checks"),
+        element("div", [*_undecided(info), *map(_check, checks)], class_="checks"),
         _pairs(info),
         _line("good" if info.truth else "absent", "truth", truth),
         class_="in-scroll",
         tabindex=0,
         aria_label="Checks",
     )
+
+
+def _undecided(info: ImportInfo) -> list[Markup]:
+    """What has to be decided before anything is written, with a button for each way."""
+    if not info.undecided:
+        return []
+    if info.question is None:
+        taken = info.wish.model_copy(update={"accept_best": True}).model_dump(mode="json")
+        button = wishing("Import it as it is", taken, title="--accept-best")
+        return [_line("warning", "unexplained", info.undecided, button)]
+    ways = zip(info.question.wishes, info.question.interpretations, info.question.flags,
+               strict=True)  # fmt: skip
+    buttons = [
+        wishing(words[:1].upper() + words[1:], wish.model_dump(mode="json"), title=flag)
+        for wish, words, flag in ways
+    ]
+    return [_line("warning", "open", info.question.difference, *buttons)]
 
 
 def _check(one: ImportedCheck) -> Markup:
