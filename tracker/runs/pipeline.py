@@ -6,6 +6,9 @@ import inspect
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
+from dataclasses import replace
+
+import numpy as np
 
 from tracker import fusion, smoothing
 from tracker.corrections import Correction
@@ -251,6 +254,11 @@ def _smooth(
             run.smoothed = method.smooth(views, fused, check)
         if run.smoothed is None:
             return
+    if run.smoothed.common:
+        # the filter takes boxes of one step for independent as well
+        added = run.smoothed.common * np.array([1.0, 1.0, 0.0])
+        sigmas = np.sqrt(run.filtered.sigmas**2 + added)
+        run.filtered = replace(run.filtered, sigmas=sigmas)
     run.tracks = smoothing.tracks_of(
         run.smoothed,
         run.fused,

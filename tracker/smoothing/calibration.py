@@ -19,6 +19,7 @@ from tracker.geometry.boxes import Boxes
 from tracker.geometry.camera import Camera
 from tracker.kernels.gating import Measurements
 from tracker.sequences.sequence import Sequence
+from tracker.smoothing.noise import NoiseModel
 from tracker.smoothing.paths import Paths
 
 _BOX_SIGMA = 0.1
@@ -80,6 +81,8 @@ class Calibration:
     """f: factor on the standard deviations of each camera's boxes."""
     shifts: Float[ndarray, " n"]
     """d: distance of the boxes below the person's centre, half heights."""
+    noise: NoiseModel | None = None
+    """The noise of boxes, where it is not that which stage 1 states."""
 
     @staticmethod
     def none(people: int, cameras: int, size: int) -> Calibration:
@@ -99,7 +102,12 @@ class Calibration:
         return replace(self, sizes=self.sizes[people], shifts=self.shifts[people])
 
     def measured(self, camera: int, measurements: Measurements) -> Measurements:
-        """Scale the noise of a camera's measurements by the estimated factor."""
+        """A camera's measurements with the estimated noise, or the stated one by its factor."""
+        if self.noise is not None:
+            values = measurements.values
+            half_heights = np.maximum((values[:, 2] - values[:, 1]) / 2.0, 1.0)
+            noises = self.noise.variances(half_heights)
+            return measurements._replace(noises=noises[:, :, None] * np.eye(values.shape[1]))
         return measurements._replace(noises=self.noises[camera] ** 2 * measurements.noises)
 
     def shift(self, camera: int, people: ndarray, expected: ExpectedBoxes) -> Float[ndarray, "L m"]:

@@ -10,6 +10,7 @@ from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
 from tracker.smoothing.calibration import Calibration
+from tracker.smoothing.noise import NoiseModel
 
 DecisionKind = Literal["cut", "joined", "removed"]
 
@@ -84,6 +85,10 @@ class Smoothed:
     """The self-calibration of the boxes; its sizes are those of the final tracks."""
     joined: Joined | None = None
     """The tracklets of the tracks, where identities were resolved."""
+    noise: NoiseModel | None = None
+    """The noise of the boxes, of which the covariances follow; None where it is not estimated."""
+    common: float = 0.0
+    """Part of the covariances along x and y: of errors that all cameras have in common, m²."""
 
     @staticmethod
     def empty(dimension: int, cameras: int) -> Smoothed:

@@ -6,7 +6,7 @@ algorithm", Journal of Time Series Analysis 3(4), 1982.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from collections.abc import Sequence as Many
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
@@ -40,6 +40,14 @@ from tracker.smoothing.calibration import (
     shifts,
     upright,
 )
+from tracker.smoothing.noise import (
+    NoiseModel,
+    PersistentErrors,
+    SureBoxes,
+    choose_rows,
+    common_variance,
+    estimate_noise,
+)
 from tracker.smoothing.paths import Links, Paths
 from tracker.smoothing.place_constraints import PlaceMeasurements
 from tracker.smoothing.recording import CameraBoxes
@@ -57,6 +65,7 @@ all their derivatives these take more than the paths."""
 _MOST_THREADS = 4
 _LEAST = 0.01  # association probability below which a pair is left out
 _SURE = 0.9  # least association probability of a box that is used for the self-calibration
+_MAINLY = 0.5  # least association probability of a box by which the noise is estimated
 _MEDIAN = 0.4549  # median of χ² with one degree of freedom
 
 _HABIT = 8.0
@@ -569,6 +578,66 @@ class Smoother:
             own_noise = np.diagonal(measured.noises[whole], axis1=1, axis2=2)
             parts.append((rows[whole], plain[whole], half[whole], left[whole], spread, own_noise))
         return _Residuals(*(np.concatenate(each) for each in zip(*parts, strict=True)))
+
+    def reported(
+        self, fitted: Fitted, links: Links, learnt: Calibration
+    ) -> tuple[NoiseModel, float, Float[ndarray, "N d d"]] | None:
+        """Estimate the noise of boxes, and the covariances of paths whose boxes err so.
+
+        Args:
+            fitted: The paths, with N rows.
+            links: Association probabilities of rows and boxes.
+            learnt: The self-calibration of the boxes.
+
+        Returns:
+            The noise, the variance that all cameras have in common, square metres, and the
+            covariances; None where two cameras see too few rows, or boxes have no height.
+        """
+        paths = fitted.paths
+        sure = links.shares > _MAINLY
+        rows = choose_rows(paths, np.bincount(links.rows[sure], minlength=len(paths.states)))
+        if rows is None or self.model.target.size < 3:
+            return None
+        chosen = links.take(sure & np.isin(links.rows, rows))
+        parts = [*self._sure_boxes(paths, chosen, learnt)]
+        seen = SureBoxes(*(np.concatenate(each) for each in zip(*parts, strict=True)))
+        noise = estimate_noise(
+            paths, rows, seen, self.model.motion, fitted.noise_scales, self.model.step_time
+        )
+        half_height = float(self._sequence.target_half_extents[2])
+        covariances = self.fit(paths, links, 1, replace(learnt, noise=noise)).paths.covariances
+        errors = PersistentErrors(noise, len(paths.states), half_height)
+        for part in self._sure_boxes(paths, links.take(sure), learnt):
+            errors.add(SureBoxes(*part))
+        covariances[:, :3, :3] += errors.covariances(paths)
+        common = common_variance(noise, learnt.offsets, half_height)
+        covariances[:, [0, 1], [0, 1]] += common
+        # there a correction says how sure a position is
+        stated = self.rows_with_places(paths)[0]
+        covariances[stated] = paths.covariances[stated]
+        return noise, common, covariances
+
+    def _sure_boxes(
+        self, paths: Paths, links: Links, learnt: Calibration
+    ) -> Iterator[tuple[ndarray, ...]]:
+        """The columns of :class:`tracker.smoothing.noise.SureBoxes`, some boxes at a time."""
+        owners = paths.owners
+        for camera in range(len(self.cameras)):
+            own = links.take(links.cameras == camera)
+            for first in range(0, max(len(own.rows), 1), _AT_ONCE):
+                rows = own.rows[first : first + _AT_ONCE]
+                boxes = own.boxes[first : first + _AT_ONCE]
+                expected = self.model.target.expected(
+                    self.model.cameras[camera], paths.states[rows], paths.covariances[rows]
+                )
+                half = np.maximum((expected.boxes[:, 3] - expected.boxes[:, 1]) / 2.0, 1.0)
+                left = self.cameras[camera].measurements(boxes).values - expected.expected.values
+                left -= learnt.shift(camera, owners[rows], expected)
+                whole = expected.valid & free(expected).all(axis=1)
+                whole &= (np.abs(left) < half[:, None]).all(axis=1)
+                jacobians = expected.jacobians[whole][:, :, :3]
+                of_camera = np.full(int(whole.sum()), camera)
+                yield of_camera, rows[whole], left[whole], jacobians, half[whole]
 
     def with_shifts(self, paths: Paths, learnt: Calibration) -> Calibration:
         """Add to a calibration the shifts that hand-marked boxes show.

@@ -332,9 +332,11 @@ def _finished(
             fitted = smoother.fit(fitted.paths, shared.links, 1, learnt).without_predictions()
     del shared
     shared = smoother.associate(fitted.paths, existences, learnt)
+    reported = smoother.reported(fitted, shared.links, learnt) if p.learning else None
     there, odds = lifetimes.lifetimes(smoother, fitted.paths, shared, p)
     there[away] = 0.0
     paths = fitted.places.lead(fitted.paths, smoother.model.step_time)
+    noise, common, covariances = reported or (None, 0.0, paths.covariances)
     owners = paths.owners
     present = odds > 0.0
     removed = [_removed(paths, path, odds[path]) for path in np.flatnonzero(~present).tolist()]
@@ -348,12 +350,14 @@ def _finished(
         paths.steps[rows],
         paths.labels[owners[rows]],
         paths.states[rows],
-        paths.covariances[rows],
+        covariances[rows],
         there[rows],
         seen[rows],
         tuple(sorted([*decided.decisions, *removed], key=lambda one: (one.step, one.label))),
         learnt,
         decided.joined,
+        noise,
+        common,
     )
 
 

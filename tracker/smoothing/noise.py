@@ -1,0 +1,279 @@
+"""The noise of boxes, estimated from the recording, and the covariance that follows from it.
+
+Detectors err alike in consecutive frames: a smoother that takes the errors of boxes as independent
+averages what does not average. The model of a box of person i in camera c at step k is
+
+    z = h_c(x_k) + η (β_ick + r v) + ς v',   β_(k+1) = exp(-Δt/τ) β_k + w,   Var β = q²
+
+with half height η, white noise v and v', and errors β that persist for a time τ. One model holds
+for all cameras: a camera whose noise is estimated by its own residuals leaves small ones where it
+is trusted, and is trusted the more.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from jaxtyping import Float, Int
+from numpy import ndarray
+from scipy.optimize import minimize
+
+from tracker.filters.models import Motion
+from tracker.kernels.smoothing.innovations import (
+    BoxErrors,
+    DeviationMotion,
+    Windows,
+    log_likelihood,
+)
+from tracker.smoothing.paths import Paths
+
+MOST_ROWS = 600
+"""Number of rows from which the noise is estimated."""
+
+WINDOW = 60
+"""Most rows of one window."""
+
+LEAST_ROWS = 50
+"""Number of rows that two cameras see below which nothing is estimated."""
+
+COMMON = 1.5
+"""κ: variance of the error that all cameras have in common, in that of one camera's persistent
+errors and offset: a calibration that is wrong alike in all cameras leaves no trace in their
+residuals, only its order of size can be inferred from what cameras differ by. The value is a
+correlation of 0.6 between the persistent errors of two cameras."""
+
+_FARTHEST = 8.0
+"""Bound of the persistent errors' part of a covariance, in the variance of one camera's."""
+
+_DEVIATION, _DEVIATION_VELOCITY = 0.5, 1.0
+"""Prior standard deviation of a window's first state around the smoothed one, m and m/s."""
+
+SHARES = 1e-3, 1.0
+"""Bounds of r and q, half heights."""
+
+PIXELS = 0.05, 20.0
+"""Bounds of ς, pixels."""
+
+SECONDS = 0.02, 60.0
+"""Bounds of τ."""
+
+PROCESS = 0.05, 20.0
+"""Bounds of the factor on the process noise."""
+
+_START_TIME, _START_PIXELS = 1.0, 1.0  # seconds, pixels
+_ITERATIONS, _TOLERANCE = 40, 1e-6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NoiseModel:
+    """The noise of boxes with measurements of size m."""
+
+    white: Float[ndarray, " m"]
+    """r: standard deviation of errors without memory, half heights."""
+    pixels: float
+    """ς: standard deviation of errors without memory, pixels."""
+    persistent: Float[ndarray, " m"]
+    """q: standard deviation of errors that persist, half heights."""
+    time: float
+    """τ: the time for which they persist, seconds."""
+    process: float
+    """Factor on the process noise of the motion model."""
+
+    def variances(self, half_heights: Float[ndarray, " M"]) -> Float[ndarray, "M m"]:
+        """R of M boxes, η² (r² + q²) + ς², squared pixels."""
+        shares = self.white**2 + self.persistent**2
+        return np.asarray(half_heights[:, None] ** 2 * shares + self.pixels**2)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SureBoxes:
+    """The L boxes that are surely those of rows of paths, camera after camera."""
+
+    cameras: Int[ndarray, " L"]
+    """Index of the camera."""
+    rows: Int[ndarray, " L"]
+    """Index of the row."""
+    residuals: Float[ndarray, "L m"]
+    """Measurement less what is expected, pixels."""
+    jacobians: Float[ndarray, "L m 3"]
+    """Derivative of the measurement by the position, pixels per metre."""
+    half_heights: Float[ndarray, " L"]
+    """Half height of the expected box, pixels."""
+
+
+def choose_rows(paths: Paths, counts: Int[ndarray, " N"]) -> Int[ndarray, " K"] | None:
+    """Choose the rows from which the noise is estimated: windows that are spread over the paths.
+
+    Args:
+        paths: Paths with N rows.
+        counts: The number of cameras that see each row.
+
+    Returns:
+        Ascending rows, at most about :data:`MOST_ROWS`; None if fewer than :data:`LEAST_ROWS`
+        rows of all are seen by two cameras.
+    """
+    double = np.concatenate([[0], np.cumsum(counts >= 2)])
+    if double[-1] < LEAST_ROWS:
+        return None
+    begins = [np.arange(*ends, WINDOW) for ends in pairwise(paths.starts.tolist())]
+    first = np.concatenate(begins)
+    last = np.append(first[1:], len(counts))
+    lengths = last - first
+    seen = double[last] - double[first]
+    usable = np.flatnonzero((2 * seen >= lengths) & (lengths > 1))
+    if lengths[usable].sum() < LEAST_ROWS:
+        usable = np.flatnonzero((seen > 0) & (lengths > 1))
+    order = usable[np.argsort(-lengths[usable], kind="stable")]
+    wanted = int(np.searchsorted(np.cumsum(lengths[order]), MOST_ROWS)) + 1
+    long = order[lengths[order] == WINDOW]
+    if len(long) > wanted:
+        order = long[np.linspace(0, len(long) - 1, wanted).astype(int)]
+    chosen = np.sort(order[:wanted])
+    return np.concatenate([np.arange(first[w], last[w]) for w in chosen])
+
+
+def estimate_noise(
+    paths: Paths,
+    rows: Int[ndarray, " K"],
+    seen: SureBoxes,
+    motion: Motion,
+    noise_scales: Float[ndarray, " N"],
+    step_time: float,
+) -> NoiseModel:
+    """Maximise the innovation likelihood of white and persistent errors of boxes.
+
+    Args:
+        paths: Smoothed paths, with N rows.
+        rows: Those that count, ascending, as :func:`choose_rows` returns them.
+        seen: The boxes of these rows.
+        motion: The motion model.
+        noise_scales: Factor on the process noise of the step to each row.
+        step_time: Time between two steps, seconds.
+    """
+    windows = _windows(paths, rows, seen, motion.transition, noise_scales)
+    dimension, size = paths.states.shape[1], seen.residuals.shape[1]
+    prior = np.diag(np.repeat([_DEVIATION**2, _DEVIATION_VELOCITY**2], 3)[:dimension])
+    deviation = DeviationMotion(motion.transition, motion.noise, prior)
+
+    def model_of(logarithms: ndarray) -> NoiseModel:
+        values = np.exp(logarithms)
+        white, persistent = values[:size], values[size + 1 : -2]
+        return NoiseModel(
+            white, float(values[size]), persistent, float(values[-2]), float(values[-1])
+        )
+
+    def cost(logarithms: ndarray) -> float:
+        noise = model_of(logarithms)
+        kept = float(np.exp(-step_time / noise.time))
+        errors = BoxErrors(noise.white, noise.pixels, noise.persistent, kept, noise.process)
+        return -float(log_likelihood(windows, deviation, errors))
+
+    shares = np.square(windows.residuals / windows.half_heights[:, None]).mean(axis=0)
+    each = np.clip(np.sqrt(shares / 2.0), 2.0 * SHARES[0], SHARES[1] / 2.0)
+    start = np.log([*each, _START_PIXELS, *each, _START_TIME, 1.0])
+    bounds = np.log([*[SHARES] * size, PIXELS, *[SHARES] * size, SECONDS, PROCESS])
+    options = {"maxiter": _ITERATIONS, "ftol": _TOLERANCE}
+    found = minimize(cost, start, method="L-BFGS-B", bounds=bounds, options=options)
+    return model_of(found.x)
+
+
+def _windows(
+    paths: Paths,
+    rows: Int[ndarray, " K"],
+    seen: SureBoxes,
+    transition: Float[ndarray, "d d"],
+    noise_scales: Float[ndarray, " N"],
+) -> Windows:
+    """The rows with their boxes, row after row; a window ends with its path or its length."""
+    owners = paths.owners_of(rows)
+    within = rows - paths.starts[owners]
+    begins = np.append(True, (np.diff(rows) != 1) | (within[1:] % WINDOW == 0))
+    order = np.lexsort((seen.cameras, seen.rows))
+    order = order[np.isin(seen.rows[order], rows)]
+    at = np.searchsorted(rows, seen.rows[order])
+    window = np.cumsum(begins)[at]
+    # the cameras of each window, from 0
+    pairs = window * (seen.cameras.max(initial=0) + 1) + seen.cameras[order]
+    distinct, index = np.unique(pairs, return_inverse=True)
+    of_window = distinct // (seen.cameras.max(initial=0) + 1)
+    slots = index - np.searchsorted(of_window, window)
+    drifts = np.zeros((len(rows), paths.states.shape[1]))
+    later = np.flatnonzero(~begins)
+    drifts[later] = paths.states[rows[later] - 1] @ transition.T - paths.states[rows[later]]
+    return Windows(
+        np.append(np.flatnonzero(begins), len(rows)),
+        drifts,
+        np.ascontiguousarray(noise_scales[rows]),
+        np.searchsorted(at, np.arange(len(rows) + 1)),
+        slots.astype(np.int64),
+        np.ascontiguousarray(seen.residuals[order]),
+        np.ascontiguousarray(seen.jacobians[order]),
+        np.ascontiguousarray(seen.half_heights[order]),
+    )
+
+
+class PersistentErrors:
+    """The part of covariances of positions that does not average over time.
+
+    It is the covariance of a filter that *considers* errors which it does not estimate (Schmidt,
+    "Application of State-Space Methods to Navigation Problems", Advances in Control Systems 3,
+    1966), of each step alone, and that of the errors which all cameras have in common:
+
+        G Q_β Gᵀ + κ (q_x² + b_x²) h² I,   G = (Σ Hᵀ R⁻¹ H)⁻¹ Hᵀ R⁻¹
+
+    with the mean square b_x² of the cameras' offsets.
+    """
+
+    def __init__(self, noise: NoiseModel, rows: int, half_height: float) -> None:
+        """Begin without boxes.
+
+        Args:
+            noise: The noise.
+            rows: N, the number of rows of the paths.
+            half_height: h, of the target, metres.
+        """
+        self._noise = noise
+        self._unit = (noise.persistent[0] * half_height) ** 2
+        self._information = np.zeros((rows, 3, 3))
+        self._spread = np.zeros((rows, 3, 3))
+
+    def add(self, seen: SureBoxes) -> None:
+        """Add boxes of one camera, of each row at most one."""
+        squares = seen.half_heights[:, None] ** 2
+        weighted = seen.jacobians / self._noise.variances(seen.half_heights)[:, :, None]
+        self._information[seen.rows] += np.swapaxes(seen.jacobians, 1, 2) @ weighted
+        persistent = (squares * self._noise.persistent**2)[:, :, None] * weighted
+        self._spread[seen.rows] += np.swapaxes(weighted, 1, 2) @ persistent
+
+    def covariances(self, paths: Paths) -> Float[ndarray, "N 3 3"]:
+        """Compute G Q_β Gᵀ of each row; a row without boxes has that of the nearest of its path."""
+        found = np.zeros_like(self._spread)
+        has = np.flatnonzero(np.trace(self._spread, axis1=1, axis2=2) > 0.0)
+        # where the boxes tell nothing of a direction, a weak prior keeps the inverse finite
+        prior = np.eye(3) / (_FARTHEST * self._unit)
+        inverse = np.linalg.inv(self._information[has] + prior)
+        own = inverse @ self._spread[has] @ inverse
+        trace = np.trace(own, axis1=1, axis2=2)
+        found[has] = own * np.minimum(1.0, _FARTHEST * self._unit / trace)[:, None, None]
+        nearest = _nearest(has, paths)
+        return np.asarray(found[nearest])
+
+
+def common_variance(noise: NoiseModel, offsets: Float[ndarray, "C m"], half_height: float) -> float:
+    """The variance along x and y of errors that all cameras have in common, square metres."""
+    between = noise.persistent[0] ** 2 + np.mean(offsets[:, 0] ** 2)
+    return float(COMMON * between * half_height**2)
+
+
+def _nearest(has: Int[ndarray, " K"], paths: Paths) -> Int[ndarray, " N"]:
+    """The nearest of some rows in each row's path; the row itself where its path has none."""
+    rows, owners = np.arange(len(paths.states)), paths.owners
+    if not len(has):
+        return rows
+    places = np.searchsorted(has, rows)
+    sides = np.stack([has[np.maximum(places - 1, 0)], has[np.minimum(places, len(has) - 1)]])
+    gaps = np.where(owners[sides] == owners, np.abs(sides - rows), len(rows))
+    nearest = np.where(gaps[0] < gaps[1], sides[0], sides[1])
+    return np.where(gaps.min(axis=0) < len(rows), nearest, rows)
