@@ -81,7 +81,8 @@ def boxes_of(
         ends, valid = camera.project(middle + np.outer([half[2], -half[2]], [0.0, 0.0, 1.0]))
         if not valid.all() or rng.random() < misses:
             continue
-        (x, top), (_, bottom) = ends
+        (above, top), (below, bottom) = ends
+        x = (above + below) / 2.0
         across = 0.36 * (bottom - top)
         corners = np.array([x - across / 2, top, x + across / 2, bottom])
         corners += noise * (bottom - top) * rng.standard_normal(4)

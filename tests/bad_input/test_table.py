@@ -7,6 +7,7 @@ was found and what to do; nothing half written is left, and what was open still 
 from __future__ import annotations
 
 import shutil
+import time
 import tracemalloc
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -43,6 +44,10 @@ def desk(data: Path) -> Iterator[TestClient]:
     """The workbench that all rows are sent to, with a good recording open."""
     app = create_app(Settings(sequence="crossing", data=data, with_viser=False))
     with TestClient(app, base_url=ADDRESS) as client:
+        deadline = time.monotonic() + 120.0
+        while client.get("/api/state").json()["sequence"] is None:  # it opens in the background
+            assert time.monotonic() < deadline
+            time.sleep(0.02)
         yield client
 
 

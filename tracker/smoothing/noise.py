@@ -12,6 +12,7 @@ is trusted, and is trusted the more.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -56,8 +57,8 @@ SHARES = 1e-3, 1.0
 PIXELS = 0.05, 20.0
 """Bounds of ς, pixels."""
 
-SECONDS = 0.02, 60.0
-"""Bounds of τ."""
+LONGEST = 60.0
+"""Bound of τ, seconds; what is forgotten within a step does not persist."""
 
 PROCESS = 0.05, 20.0
 """Bounds of the factor on the process noise."""
@@ -172,10 +173,16 @@ def estimate_noise(
 
     shares = np.square(windows.residuals / windows.half_heights[:, None]).mean(axis=0)
     each = np.clip(np.sqrt(shares / 2.0), 2.0 * SHARES[0], SHARES[1] / 2.0)
-    start = np.log([*each, _START_PIXELS, *each, _START_TIME, 1.0])
-    bounds = np.log([*[SHARES] * size, PIXELS, *[SHARES] * size, SECONDS, PROCESS])
-    options = {"maxiter": _ITERATIONS, "ftol": _TOLERANCE}
-    found = minimize(cost, start, method="L-BFGS-B", bounds=bounds, options=options)
+    start = np.log([*each, _START_PIXELS, *each, max(_START_TIME, step_time), 1.0])
+    limits = [SHARES] * size + [PIXELS] + [SHARES] * size + [(step_time, LONGEST), PROCESS]
+    bounds = [(math.log(low), math.log(high)) for low, high in limits]
+    found = minimize(
+        cost,
+        start,
+        method="L-BFGS-B",
+        bounds=bounds,
+        options={"maxiter": _ITERATIONS, "ftol": _TOLERANCE},
+    )
     return model_of(found.x)
 
 

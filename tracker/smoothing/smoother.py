@@ -613,8 +613,8 @@ class Smoother:
         common = common_variance(noise, learnt.offsets, half_height)
         covariances[:, [0, 1], [0, 1]] += common
         # there a correction says how sure a position is
-        stated = self.rows_with_places(paths)[0]
-        covariances[stated] = paths.covariances[stated]
+        placed = self.rows_with_places(paths)[0]
+        covariances[placed] = paths.covariances[placed]
         return noise, common, covariances
 
     def _sure_boxes(

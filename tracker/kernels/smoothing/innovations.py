@@ -124,7 +124,7 @@ def _update(
         mean[a] += share * innovation
         for b in range(size):
             covariance[a, b] -= share * gain[b]
-    return -0.5 * (math.log(2.0 * math.pi * variance) + innovation * innovation / variance)
+    return float(-0.5 * (math.log(2.0 * math.pi * variance) + innovation * innovation / variance))
 
 
 @pixel_kernel

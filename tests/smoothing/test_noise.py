@@ -1,0 +1,261 @@
+"""The noise of boxes that a recording shows, and the covariance that follows from it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy import ndarray
+from numpy.testing import assert_allclose
+from scipy.linalg import block_diag
+from scipy.stats import multivariate_normal
+
+from tests.random_rooms import random_room
+from tracker.filters.models import Motion, constant_velocity
+from tracker.kernels.smoothing.innovations import (
+    BoxErrors,
+    DeviationMotion,
+    Windows,
+    log_likelihood,
+)
+from tracker.runs.fitting import default_parameters
+from tracker.runs.pipeline import compute
+from tracker.sequences.sequence import Sequence
+from tracker.smoothing.noise import (
+    COMMON,
+    LEAST_ROWS,
+    MOST_ROWS,
+    WINDOW,
+    NoiseModel,
+    PersistentErrors,
+    SureBoxes,
+    choose_rows,
+    common_variance,
+    estimate_noise,
+)
+from tracker.smoothing.paths import Paths
+
+STEP = 0.1
+NUMBERS = 3
+
+
+def paths_of(*lengths: int, dimension: int = 6) -> Paths:
+    """Paths of some lengths that stand at the origin."""
+    found = Paths.blank(range(len(lengths)), [0] * len(lengths), lengths, dimension)
+    found.states[:], found.covariances[:] = 0.0, np.eye(dimension)
+    return found
+
+
+def motion_of(sigma: float = 0.5) -> Motion:
+    return Motion(*constant_velocity(np.full(3, sigma), STEP, 100.0), 1.0)
+
+
+def jacobians_of(angle: float, pixels: float) -> ndarray:
+    """Derivative of centre, top and bottom of a camera at an angle, with pixels per metre."""
+    across = [-math.sin(angle), math.cos(angle), 0.0]
+    ahead = 0.15 * np.array([math.cos(angle), math.sin(angle), 0.0])
+    return pixels * np.array([across, ahead - [0.0, 0.0, 1.0], -ahead - [0.0, 0.0, 1.0]])
+
+
+def simulated(seed: int, noise: NoiseModel, rows: int, cameras: int = 4) -> tuple[Paths, SureBoxes]:
+    """Walks of 60 steps around paths at rest, and boxes with white and persistent errors."""
+    rng = np.random.default_rng(seed)
+    motion, kept = motion_of(), math.exp(-STEP / noise.time)
+    paths = paths_of(*[60] * (rows // 60))
+    parts = []
+    for own in map(paths.rows_of, range(len(paths.labels))):
+        state = np.zeros(6)
+        errors = noise.persistent * rng.standard_normal((cameras, NUMBERS))
+        for row in range(own.start, own.stop):
+            state = motion.transition @ state + rng.multivariate_normal(np.zeros(6), motion.noise)
+            fresh = rng.standard_normal(errors.shape)
+            errors = kept * errors + math.sqrt(1.0 - kept**2) * noise.persistent * fresh
+            for camera in range(cameras):
+                half = rng.uniform(20.0, 120.0)
+                jacobian = jacobians_of(1.3 * camera + 0.4, half / 0.85)
+                white = half * noise.white * rng.standard_normal(NUMBERS)
+                white += noise.pixels * rng.standard_normal(NUMBERS)
+                parts.append(
+                    (camera, row, jacobian @ state[:3] + half * errors[camera] + white, jacobian,
+                     half)
+                )  # fmt: skip
+    return paths, SureBoxes(*(np.array(column) for column in zip(*parts, strict=True)))
+
+
+TRUE = NoiseModel(np.array([0.02, 0.03, 0.04]), 2.0, np.array([0.05, 0.03, 0.04]), 1.0, 1.0)
+
+
+def estimates(seeds: range) -> ndarray:
+    """r, ς, q, τ and the factor on Q, the median of some simulations of 600 rows."""
+    found = []
+    for seed in seeds:
+        paths, seen = simulated(seed, TRUE, 600)
+        rows, scales = np.arange(600), np.ones(600)
+        one = estimate_noise(paths, rows, seen, motion_of(), scales, STEP)
+        found.append([*one.white, one.pixels, *one.persistent, one.time, one.process])
+    return np.asarray(np.median(found, axis=0))
+
+
+@pytest.mark.parametrize("seeds", [range(3), pytest.param(range(20), marks=pytest.mark.long)])
+def test_the_noise_of_simulated_boxes_is_found(seeds: range) -> None:
+    *shares, time, process = estimates(seeds)
+    assert_allclose(shares, [*TRUE.white, TRUE.pixels, *TRUE.persistent], rtol=0.15)
+    assert_allclose([time, process], [TRUE.time, TRUE.process], rtol=0.3)
+
+
+def test_the_likelihood_is_that_of_all_boxes_together() -> None:
+    """It is the density of the joint normal distribution of all residuals of a window."""
+    rng = np.random.default_rng(5)
+    motion, prior = motion_of(), np.diag([0.3, 0.2, 0.4, 1.0, 0.5, 0.8])
+    errors = BoxErrors(np.array([0.02, 0.05, 0.03]), 1.5, np.array([0.06, 0.02, 0.04]), 0.8, 1.7)
+    scales, drifts = np.array([1.0, 0.5, 2.0]), rng.normal(size=(3, 6)) * 0.1
+    boxes, slots = np.array([0, 2, 3, 5]), np.array([0, 1, 1, 0, 1])
+    half = rng.uniform(20.0, 80.0, 5)
+    jacobians = rng.normal(size=(5, NUMBERS, 3)) * 50.0
+    residuals = rng.normal(size=(5, NUMBERS)) * 10.0
+    windows = Windows(np.array([0, 3]), drifts, scales, boxes, slots, residuals, jacobians, half)
+    found = log_likelihood(windows, DeviationMotion(motion.transition, motion.noise, prior), errors)
+
+    means, covariance = [np.zeros(6)], prior
+    spreads = {(0, 0): prior}
+    for k in (1, 2):
+        means.append(motion.transition @ means[-1] + drifts[k])
+        covariance = motion.transition @ covariance @ motion.transition.T
+        covariance = covariance + errors.process * scales[k] * motion.noise
+        spreads[k, k] = covariance
+        for j in range(k):
+            spreads[k, j] = motion.transition @ spreads[k - 1, j]
+            spreads[j, k] = spreads[k, j].T
+    rows = np.repeat(np.arange(3), np.diff(boxes))
+    mean = np.concatenate([jacobians[o] @ means[rows[o]][:3] for o in range(5)])
+    joint = np.block([
+        [jacobians[a] @ spreads[rows[a], rows[b]][:3, :3] @ jacobians[b].T for b in range(5)]
+        for a in range(5)
+    ])  # fmt: skip
+    for a in range(5):
+        for b in range(5):
+            if slots[a] == slots[b]:
+                kept = errors.kept ** abs(int(rows[a]) - int(rows[b]))
+                part = half[a] * half[b] * kept * np.diag(errors.persistent**2)
+                joint[3 * a : 3 * a + 3, 3 * b : 3 * b + 3] += part
+    joint += block_diag(*(np.diag((h * errors.white) ** 2 + errors.pixels**2) for h in half))
+    assert_allclose(found, multivariate_normal(mean, joint).logpdf(residuals.ravel()))
+    twice = windows._replace(
+        starts=np.array([0, 3, 6]), drifts=np.tile(drifts, (2, 1)), noise_scales=np.tile(scales, 2),
+        boxes=np.append(boxes, 5 + boxes[1:]), slots=np.tile(slots, 2),
+        residuals=np.tile(residuals, (2, 1)), jacobians=np.tile(jacobians, (2, 1, 1)),
+        half_heights=np.tile(half, 2),
+    )  # fmt: skip
+    deviation = DeviationMotion(motion.transition, motion.noise, prior)
+    assert_allclose(log_likelihood(twice, deviation, errors), 2.0 * found)
+
+
+def test_rows_are_windows_that_two_cameras_see() -> None:
+    paths = paths_of(2000, 30, 500)
+    counts = np.full(2530, 2)
+    counts[1000:2000] = 1
+    rows = choose_rows(paths, counts)
+    assert rows is not None
+    assert MOST_ROWS <= len(rows) <= MOST_ROWS + WINDOW
+    assert (np.diff(rows) > 0).all()
+    assert (counts[rows] == 2).mean() > 0.9
+    assert set(paths.owners_of(rows).tolist()) == {0, 2}  # of both long paths
+    assert choose_rows(paths, np.ones(2530, dtype=int)) is None
+    few = np.zeros(2530, dtype=int)
+    few[: LEAST_ROWS - 1] = 2
+    assert choose_rows(paths, few) is None
+    few[LEAST_ROWS - 1] = 2
+    assert choose_rows(paths, few) is not None
+
+
+def test_what_does_not_average_is_considered() -> None:
+    """G Q_β Gᵀ of the boxes of a step, of two cameras that see it."""
+    noise = replace(TRUE, pixels=1.0)
+    paths = paths_of(3, 2)
+    angles, halves = (0.3, 1.7), (50.0, 80.0)
+    errors = PersistentErrors(noise, 5, 0.85)
+    every = [jacobians_of(angle, half / 0.85) for angle, half in zip(angles, halves, strict=True)]
+    for camera, (jacobian, half) in enumerate(zip(every, halves, strict=True)):
+        errors.add(
+            SureBoxes(np.array([camera]), np.array([1]), np.zeros((1, 3)), jacobian[None],
+                      np.array([half]))
+        )  # fmt: skip
+    h = np.concatenate(every)
+    inverse = np.diag(np.concatenate([1.0 / noise.variances(np.array([one]))[0] for one in halves]))
+    lasting = np.diag(np.concatenate([(one * noise.persistent) ** 2 for one in halves]))
+    unit = (noise.persistent[0] * 0.85) ** 2
+    gain = np.linalg.inv(h.T @ inverse @ h + np.eye(3) / (8.0 * unit)) @ h.T @ inverse
+    expected = gain @ lasting @ gain.T
+    assert np.trace(expected) < 8.0 * unit
+    found = errors.covariances(paths)
+    # rows without boxes are as those beside them, and another path's are not
+    assert_allclose(found, [expected] * 3 + [np.zeros((3, 3))] * 2, atol=1e-18)
+
+
+def test_a_poor_view_is_bounded() -> None:
+    noise, paths = replace(TRUE, pixels=0.0), paths_of(1)
+    errors = PersistentErrors(noise, 1, 0.85)
+    jacobian = jacobians_of(0.3, 60.0)
+    jacobian[1:, :2] = 0.0  # nothing tells how far away somebody is
+    errors.add(
+        SureBoxes(np.array([0]), np.array([0]), np.zeros((1, 3)), jacobian[None], np.ones(1))
+    )
+    unit = (noise.persistent[0] * 0.85) ** 2
+    assert 0.0 < np.trace(errors.covariances(paths)[0]) <= 8.0 * unit * (1.0 + 1e-12)
+
+
+def test_what_cameras_have_in_common_is_as_large_as_what_they_differ_by() -> None:
+    offsets = np.array([[0.03, 0.5, 0.5], [-0.04, 0.5, 0.5]])
+    expected = COMMON * (0.05**2 + (0.03**2 + 0.04**2) / 2.0) * 0.85**2
+    assert_allclose(common_variance(TRUE, offsets, 0.85), expected)
+
+
+def covered(sequence: Sequence, *, smoothed: bool) -> float:
+    """Share of true positions within the 95 % ellipse on the floor of the track nearest to them."""
+    run = compute(sequence, default_parameters(sequence))
+    truth = sequence.ground_truth
+    assert truth is not None
+    assert run.smoothed is not None
+    if smoothed:
+        found = run.smoothed
+        frames, places, spreads = found.frames, found.means[:, :2], found.covariances[:, :2, :2]
+    else:
+        tracks = run.filtered
+        frames, places = tracks.frames, tracks.positions[:, :2]
+        spreads = tracks.sigmas[:, :2, None] ** 2 * np.eye(2)
+    within = []
+    for frame, place in zip(truth.frames, truth.positions[:, :2], strict=True):
+        rows = np.flatnonzero(frames == frame)
+        gaps = place - places[rows]
+        if len(rows) and np.linalg.norm(gaps, axis=1).min() < 0.5:
+            nearest = int(np.linalg.norm(gaps, axis=1).argmin())
+            square = gaps[nearest] @ np.linalg.solve(spreads[rows[nearest]], gaps[nearest])
+            within.append(square < 5.99)
+    assert len(within) > 0.8 * len(truth.frames)
+    return float(np.mean(within))
+
+
+def displaced(sequence: Sequence, seed: int) -> Sequence:
+    """The same with the calibration of cameras off by some centimetres."""
+    rng = np.random.default_rng(seed)
+    views = []
+    for view in sequence.views:
+        camera = view.camera
+        centre = camera.centre + rng.normal(0.0, 0.04, 3)
+        moved = replace(camera, translation=-camera.rotation @ centre)
+        views.append(replace(view, camera=moved))
+    return replace(sequence, views=tuple(views), digest=f"{sequence.digest} displaced")
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("smoothed", [True, False])
+def test_ellipses_hold_the_truth_where_calibrations_are_off(*, smoothed: bool) -> None:
+    seeds = (71, 72, 73)
+    rooms = [random_room(seed, cameras=4, people=3, steps=150) for seed in seeds]
+    shares = [
+        covered(displaced(room, seed), smoothed=smoothed)
+        for room, seed in zip(rooms, seeds, strict=True)
+    ]
+    assert np.mean(shares) > 0.9
