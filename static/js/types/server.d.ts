@@ -476,6 +476,9 @@ declare namespace Server {
 		/** What is being looked into. */
 		under_way: string;
 		error: string;
+		/** Why nothing can be written before somebody decides how the files are meant; else empty. */
+		undecided: string;
+		question: ImportQuestion | null;
 		wish: ImportWish;
 		/** Bytes. */
 		received: number;
@@ -529,6 +532,18 @@ declare namespace Server {
 		sheet: string;
 	}
 
+	/** What is asked where the files leave open how they are meant. */
+	interface ImportQuestion {
+		code: "convention" | "moments";
+		/** In words, the likelier one first. */
+		interpretations: [string, string];
+		difference: string;
+		/** The flags of the command line for each. */
+		flags: [string, string];
+		/** What decides for each here. */
+		wishes: [ImportWish, ImportWish];
+	}
+
 	/** What somebody knows better than the files; null and empty: as it was found out. */
 	interface ImportWish {
 		name: string;
@@ -538,6 +553,8 @@ declare namespace Server {
 		axes: "opencv" | "opengl" | null;
 		boxes: "ltwh" | "xyxy" | "cxcywh" | null;
 		normalised: boolean | null;
+		/** Whether the likeliest interpretation is taken where the files leave it open. */
+		accept_best: boolean;
 		first_index: 0 | 1 | null;
 		/** How rotations given by three angles are composed. */
 		turns: string | null;
