@@ -27,11 +27,20 @@ class Certainty(IntEnum):
 class Format(Protocol):
     """One format. Plugins add formats by the entry point group ``multiview_phd.formats``."""
 
-    NAME: str
-    """The name for display: the program that writes the format, and the kind of file."""
-    KIND: Kind
-    SERIES: bool
-    """Whether a recording may be a series of numbered files, which are read together."""
+    @property
+    def NAME(self) -> str:
+        """The name for display: the program that writes the format, and the kind of file."""
+        ...
+
+    @property
+    def KIND(self) -> Kind:
+        """What the files hold."""
+        ...
+
+    @property
+    def SERIES(self) -> bool:
+        """Whether a recording may be a series of numbered files, which are read together."""
+        ...
 
     def recognise(self, file: SourceFile) -> Certainty:
         """Judge by the content (``file.head``), and never by the name alone, in a short time.

@@ -9,16 +9,15 @@ from importlib.metadata import entry_points
 from tracker.io.read.calibration import (
     camera_rows,
     camera_tables,
-    kalibr,
     labelled,
     matlab,
     opencv,
     plain,
     projection,
     qualisys,
-    ros,
+    trees,
 )
-from tracker.io.read.calibration.datasets import middlebury, panoptic, tsai, voxelpose
+from tracker.io.read.calibration.datasets import middlebury, tsai
 from tracker.io.read.calibration.reconstruction import (
     colmap,
     colmap_binary,
@@ -31,9 +30,12 @@ from tracker.io.read.detections import (
     coco,
     motchallenge,
     nested,
+    nvidia,
     openpose,
     parquet,
+    scenescape,
     table,
+    tables,
     yolo,
 )
 from tracker.io.read.detections.annotations import cvat, label_studio, labelme, via, voc
@@ -42,14 +44,14 @@ from tracker.io.read.pieces import FormatError
 from tracker.io.read.protocol import Certainty, Format
 from tracker.io.read.refused import refusal
 from tracker.io.read.source import SourceFile
-from tracker.io.read.truth import panoptic as panoptic_skeletons
-from tracker.io.read.truth import trc, wildtrack
+from tracker.io.read.truth import panoptic, trc, wildtrack
 
 GROUP = "multiview_phd.formats"
 """The group of entry points of plugins; each names a module or object that is a
 :class:`Format`."""
 
 FORMATS: tuple[Format, ...] = (
+    *trees.FORMATS,
     opencv,
     camera_tables,
     qualisys,
@@ -59,11 +61,7 @@ FORMATS: tuple[Format, ...] = (
     metashape,
     mvsnet,
     openmvg,
-    kalibr,
-    ros,
-    panoptic,
     tsai,
-    voxelpose,
     middlebury,
     projection,
     matlab,
@@ -71,6 +69,7 @@ FORMATS: tuple[Format, ...] = (
     plain,
     camera_rows,
     motchallenge,
+    *tables.FORMATS,
     coco,
     yolo,
     openpose,
@@ -79,12 +78,14 @@ FORMATS: tuple[Format, ...] = (
     label_studio,
     via,
     voc,
+    nvidia,
+    scenescape,
     nested,
     table,
     parquet,
     wildtrack,
     trc,
-    panoptic_skeletons,
+    panoptic,
     video,
     images,
     times,

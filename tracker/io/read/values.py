@@ -15,6 +15,9 @@ from tracker.io.read.source import SourceFile
 ROTATION_TOLERANCE = 2e-3
 """How far R Rᵀ may be from the identity: entries written with three decimals pass."""
 
+ROUNDED_ZERO = 1e-9
+"""An entry of K below the diagonal that is zero but for rounding, pixels."""
+
 MOST_TURNED = 1000.0
 """Of a rotation vector's numbers: radians, or degrees by mistake."""
 
@@ -73,8 +76,10 @@ def intrinsics(file: SourceFile, field: str, value: Any) -> Float[ndarray, "3 3"
     """
     found = matrix(file, field, value, 3, 3)
     form = "[[fx, s, cx], [0, fy, cy], [0, 0, 1]] in pixels"
-    if found[1, 0] or found[2, 0] or found[2, 1] or abs(found[2, 2] - 1.0) > 1e-9:
+    below = found[[1, 2, 2], [0, 0, 1]]
+    if np.abs(below).max() > ROUNDED_ZERO or abs(found[2, 2] - 1.0) > 1e-9:
         raise file.error(f"expected {form}, found {shown(found.tolist())}", field)
+    found[[1, 2, 2], [0, 0, 1]] = 0.0
     if found[0, 0] <= 0.0 or found[1, 1] <= 0.0:
         raise file.error(
             f"expected focal lengths above 0 pixels, found {found[0, 0]:g} and {found[1, 1]:g}",

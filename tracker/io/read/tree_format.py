@@ -1,0 +1,278 @@
+"""A calibration format that is declared: where the fields of a camera lie in a tree, in what form.
+
+A format names the path to its cameras and, for each part of a camera, where it lies; recognising,
+reading and wording errors is done here. Paths are keys with ``/`` between them; ``*`` stands for
+every field of a table or every element of a list, ``.`` for the whole file, ``|`` for "or".
+"""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+
+from tracker.io.read import values
+from tracker.io.read.pieces import CalibrationPiece, Convention, Piece, RawCamera
+from tracker.io.read.protocol import Certainty, Kind
+from tracker.io.read.source import SourceFile
+from tracker.io.read.values import shown
+
+Syntax = Literal["json", "yaml", "toml", "xml"]
+
+
+@dataclass(frozen=True, slots=True)
+class Node:
+    """The table of one camera in the tree of a file."""
+
+    file: SourceFile
+    value: Any
+    key: str = ""
+    """The key of the table, or its place in a list; empty for the whole file."""
+    place: int = 0
+    """The number of cameras before this one in the file."""
+
+    def find(self, path: str) -> Any:
+        """Return what lies at a path; None where there is nothing."""
+        value = self.value
+        for step in path.split("/"):
+            if isinstance(value, list) and step.isdigit():
+                value = value[int(step)] if int(step) < len(value) else None
+            else:
+                value = value.get(step) if isinstance(value, Mapping) else None
+        return value
+
+    def get(self, path: str) -> Any:
+        """Return what lies at a path.
+
+        Raises:
+            FormatError: If there is nothing.
+        """
+        value = self.find(path)
+        if value is None:
+            raise self.file.error(f"expected the field {path}, which is missing", self.key)
+        return value
+
+    def where(self, path: str) -> str:
+        """Return the name of a field in messages."""
+        return f"{self.key}.{path}" if self.key else path
+
+
+Part = Callable[[Node], Mapping[str, Any]]
+"""Reads some fields of a :class:`RawCamera` from a camera's table."""
+
+
+@dataclass(frozen=True, slots=True)
+class TreeFormat:
+    """Cameras in a tree of named fields, recognised where a camera has all required paths."""
+
+    KIND: ClassVar[Kind] = "calibration"
+    SERIES: ClassVar[bool] = False
+
+    NAME: str
+    syntax: Syntax
+    cameras: str
+    """The path to one camera."""
+    required: tuple[str, ...]
+    """Paths in a camera's table. A table that has none of them is no camera's."""
+    parts: tuple[Part, ...]
+    convention: Convention = field(default_factory=Convention)
+
+    def recognise(self, file: SourceFile) -> Certainty:
+        """The words of all paths in the beginning, and a camera with every required field."""
+        head = file.head_text
+        steps = {step for path in self.required for step in path.split("/")}
+        if not all(step in head or step.isdigit() for step in steps):
+            return Certainty.NO
+        starts = {"json": "{[", "xml": "<"}.get(self.syntax)
+        if starts is not None and head.lstrip()[:1] not in tuple(starts):
+            return Certainty.NO
+        nodes = self._nodes(file)
+        whole = any(all(node.find(path) is not None for path in self.required) for node in nodes)
+        return Certainty.SURE if whole else Certainty.NO
+
+    def read(self, file: SourceFile) -> Iterator[Piece]:
+        """One piece with every camera of the file."""
+        found = []
+        pose = np.eye(4)
+        for node in self._nodes(file):
+            missing = [path for path in self.required if node.find(path) is None]
+            if missing:
+                raise file.error(
+                    f"expected the fields {', '.join(missing)}, which are missing", node.key
+                )
+            fields: dict[str, Any] = {"name": "", "convention": self.convention}
+            for part in self.parts:
+                fields |= part(node)
+            step = fields.pop("step", None)
+            if step is not None:
+                pose = step @ pose
+                fields |= {"rotation": pose[:3, :3], "translation": pose[:3, 3]}
+            found.append(RawCamera(**fields))
+        yield CalibrationPiece(file.path, self.NAME, tuple(found))
+
+    def _nodes(self, file: SourceFile) -> list[Node]:
+        """The tables at the path to a camera that have any of the required fields."""
+        tree = _of_xml(file.xml) if self.syntax == "xml" else getattr(file, self.syntax)
+        found: list[Node] = []
+        for path in self.cameras.split("|"):
+            for key, value in _matches(tree, path):
+                node = Node(file, value, key, len(found))
+                if any(node.find(path) is not None for path in self.required):
+                    found.append(node)
+        return found
+
+
+def _matches(value: Any, path: str, key: str = "") -> Iterator[tuple[str, Any]]:
+    """The values at a path, each with its last key."""
+    if path in (".", ""):
+        yield key, value
+        return
+    step, _, rest = path.partition("/")
+    rows: Any = ()
+    if isinstance(value, Mapping):
+        rows = value.items()
+    elif isinstance(value, list):
+        rows = enumerate(value)
+    for own, item in rows:
+        if step == "*" or str(own) == step:
+            yield from _matches(item, rest, str(own))
+
+
+def _of_xml(element: ElementTree.Element) -> Any:
+    """An element as a table of its attributes and children; those of one name are a list."""
+    children: dict[str, list[Any]] = {}
+    for child in element:
+        children.setdefault(child.tag, []).append(_of_xml(child))
+    if not children and not element.attrib:
+        return element.text or ""
+    several = {tag: own if len(own) > 1 else own[0] for tag, own in children.items()}
+    return {**element.attrib, **several}
+
+
+def name(path: str = "") -> Part:
+    """The camera's name, at a path; its key without one."""
+    return lambda node: {"name": str(node.find(path) or "") if path else node.key}
+
+
+def image_size(path: str, height: str = "") -> Part:
+    """Width and height, at one path or at two; nothing where there is none."""
+
+    def part(node: Node) -> Mapping[str, Any]:
+        given = [node.find(path), node.find(height)] if height else node.find(path)
+        if given is None or (height and None in given):
+            return {}
+        where = node.where(f"{path} and {height}" if height else path)
+        return {"image_size": values.image_size(node.file, where, given)}
+
+    return part
+
+
+def intrinsics(*paths: str) -> Part:
+    """K as a 3×3 matrix at one path, as fx, fy, cx, cy in one list, or at a path each."""
+
+    def part(node: Node) -> Mapping[str, Any]:
+        given = node.get(paths[0]) if len(paths) == 1 else [node.get(path) for path in paths]
+        where = node.where(paths[0] if len(paths) == 1 else ", ".join(paths))
+        if np.size(given) == 4:
+            four = values.vector(node.file, where, given, 4, "fx fy cx cy")
+            return {"intrinsics": values.focal_and_centre(*four)}
+        return {"intrinsics": values.intrinsics(node.file, where, given)}
+
+    return part
+
+
+def lens(*paths: str, model: str = "", fisheyes: Mapping[str, bool] | None = None) -> Part:
+    """The numbers of a lens in OpenCV's order, in one list or at a path each.
+
+    Args:
+        paths: Where they are.
+        model: Where the file names the model of the lens.
+        fisheyes: Whether each model is one of a fisheye; the first is that of a file that names
+            none. One that is called ``none`` has no numbers.
+    """
+
+    def part(node: Node) -> Mapping[str, Any]:
+        models = dict(fisheyes or {"": False})
+        own = node.find(model) if model else None
+        own = next(iter(models)) if own is None else own
+        if own not in models:
+            known = ", ".join(models)
+            raise node.file.error(
+                f"expected one of {known}, found {shown(own)}; calibrate with one of those",
+                node.where(model),
+            )
+        given = node.get(paths[0]) if len(paths) == 1 else [node.get(path) for path in paths]
+        if own == "none":
+            given = []
+        where = node.where(", ".join(paths))
+        found, kind = values.lens(node.file, where, given, fisheye=models[own])
+        return {"distortion": found, "lens": kind}
+
+    return part
+
+
+def pose(rotation: str, translation: str) -> Part:
+    """A rotation (matrix or vector) and a translation."""
+
+    def part(node: Node) -> Mapping[str, Any]:
+        return {
+            "rotation": values.rotation(node.file, node.where(rotation), node.get(rotation)),
+            "translation": values.vector(
+                node.file, node.where(translation), node.get(translation), 3, "x y z"
+            ),
+        }
+
+    return part
+
+
+def pose_at(rotation: str, centre: str) -> Part:
+    """A rotation into the camera, and the camera's place C: t = -R C."""
+    given = pose(rotation, centre)
+
+    def part(node: Node) -> Mapping[str, Any]:
+        turned, place = (given(node)[name] for name in ("rotation", "translation"))
+        return {"rotation": turned, "translation": -turned @ place}
+
+    return part
+
+
+def pose_matrix(path: str, rows: Literal[3, 4] = 4) -> Part:
+    """A pose [R | t] of three or four rows."""
+
+    def part(node: Node) -> Mapping[str, Any]:
+        found = values.matrix(node.file, node.where(path), node.get(path), rows, 4)
+        turned = values.rotation(node.file, node.where(path), found[:3, :3])
+        return {"rotation": turned, "translation": found[:3, 3]}
+
+    return part
+
+
+def step_from_last(path: str) -> Part:
+    """A 4×4 pose relative to the camera before; the world is the first camera."""
+
+    def part(node: Node) -> Mapping[str, Any]:
+        if node.place == 0:
+            return {"step": np.eye(4)}
+        found = values.matrix(node.file, node.where(path), node.get(path), 4, 4)
+        values.rotation(node.file, node.where(path), found[:3, :3])
+        return {"step": found}
+
+    return part
+
+
+def only(path: str, *known: str) -> Part:
+    """Refuse a camera whose field, if it is there, says anything else."""
+
+    def part(node: Node) -> Mapping[str, Any]:
+        own = node.find(path)
+        if own is not None and own not in known:
+            raise node.file.error(
+                f"expected {' or '.join(known)}, found {shown(own)}; calibrate with that",
+                node.where(path),
+            )
+        return {}
+
+    return part
