@@ -29,14 +29,16 @@ def _people(plan: ImportPlan) -> int:
 
 HOLD: dict[str, Callable[[ImportPlan], bool]] = {
     "boxes-of-larger-pictures": lambda plan: plan.views[0].camera.image_size[0] == 1920,
+    "comma-yolo": lambda plan: _counts(plan) == [120, 120, 120, 120],
     "dropped-frames": lambda plan: any("cam2: about step 1" in told for told in plan.told),
     "every-second-frame": lambda plan: all(
         view.looked_at is not None and (view.looked_at % 2 == 0).all() for view in plan.views
     ),
-    "grid-truth": lambda plan: "5 % of its places lie in boxes" in _found(plan, "truth"),
+    "grid-truth": lambda plan: "MultiviewX so that 100 %" in _found(plan, "truth"),
     "mirrored-world": lambda plan: "left-handed" in _found(plan, "mirrored"),
     "mot-labels": lambda plan: _counts(plan) == [300] * 4 and len(plan.told) == 4,
     "mot-none-counts": lambda plan: min(_counts(plan)) > 220,
+    "nan-people": lambda plan: min(_counts(plan)) > 110,
     "trc-of-several": lambda plan: _people(plan) == 3,
     "truth-elsewhere": lambda plan: "0 % of its places lie in boxes" in _found(plan, "truth"),
 }

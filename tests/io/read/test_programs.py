@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 from numpy import ndarray
@@ -267,3 +268,46 @@ def test_a_scene_of_scenescape(tmp_path: Path) -> None:
     plan = _plan(tmp_path)
     _assert_boxes(plan)
     _assert_truth(plan)
+
+
+@pytest.mark.parametrize("columns", [1000, 640], ids=["MultiviewX", "another grid"])
+def test_multiviewx_has_a_grid_and_calibrations_of_its_own(tmp_path: Path, columns: int) -> None:
+    shift = np.array([4.0, 4.0, 0.0])  # its places are positive
+    for folder in ("calibrations/intrinsic", "calibrations/extrinsic", "annotations_positions"):
+        (tmp_path / folder).mkdir(parents=True)
+    for number, camera in enumerate(cameras(distortion=False), 1):
+        parts = {"camera_matrix": camera.intrinsics, "distortion_coefficients": np.zeros((1, 5))}
+        _storage(tmp_path / f"calibrations/intrinsic/intr_Camera{number}.xml", parts)
+        moved = camera.translation - camera.rotation @ shift
+        pose = {"rvec": Rotation.from_matrix(camera.rotation).as_rotvec()[:, None],
+                "tvec": moved[:, None]}  # fmt: skip
+        _storage(tmp_path / f"calibrations/extrinsic/extr_Camera{number}.xml", pose)
+    for frame, people in enumerate(PLACES):
+        cells = np.round((people + shift)[:, :2] / 0.025).astype(int)
+        rows: list[dict[str, object]] = []
+        for who, (place, cell) in enumerate(zip(people, cells, strict=True)):
+            views = []
+            for number, (frames, boxes_) in enumerate(SEEN):
+                at = _row(frames, boxes_, number, frame, place)
+                box = [-1.0] * 4 if at is None else _corners(boxes_[at])
+                sides = dict(zip(("xmin", "ymin", "xmax", "ymax"), box, strict=True))
+                views.append({"viewNum": number, **sides})
+            rows.append({"personID": who, "positionID": int(cell[0] + columns * cell[1]),
+                         "views": views})  # fmt: skip
+        (tmp_path / f"annotations_positions/{frame:05}.json").write_text(json.dumps(rows))
+    plan = _plan(tmp_path)
+    _assert_boxes(plan)
+    assert plan.truth is not None
+    expected = (PLACES + shift).reshape(-1, 3)[:, :2]
+    off = plan.truth.positions[:, :2] - expected
+    tolerance = 0.0126 if columns == 1000 else 0.1
+    assert np.abs(off).max() < tolerance
+    words = " ".join(text for name, text in plan.found if name == "truth")
+    assert ("MultiviewX" if columns == 1000 else "640 columns of 2.5 cm") in words
+
+
+def _storage(path: Path, values: dict[str, ndarray]) -> None:
+    storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_WRITE)
+    for key, value in values.items():
+        storage.write(key, value)
+    storage.release()

@@ -66,12 +66,22 @@ _LONGEST = 1e6
 _LONGEST_BOX = 8
 """Numbers of a box that is a list: the four, a score, a class, a track, and one to spare."""
 
+_DECIMAL_COMMA = re.compile(r"[-+]?\d+,\d+(e[-+]?\d+)?", re.IGNORECASE)
+
 Column = Sequence[Any]
 
 
 def plain(name: str) -> str:
     """A column's name without case, blanks, brackets and underscores."""
     return re.sub(r"[^a-z0-9]", "", name.lower())
+
+
+def decimal_points(line: str) -> str:
+    """A row with blanks between its cells, decimal commas as points; any other row as it is."""
+    words = line.split() if "," in line else []
+    if len(words) < 3 or not all("," not in w or _DECIMAL_COMMA.fullmatch(w) for w in words):
+        return line
+    return line.replace(",", ".")
 
 
 def meanings(names: Sequence[str]) -> dict[str, str]:

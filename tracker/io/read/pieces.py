@@ -16,6 +16,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Literal
 
+import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
@@ -126,6 +127,31 @@ class DetectionPiece:
     """A sentence about rows of the file that are no boxes of people; empty where there are none."""
 
 
+@dataclass(frozen=True, slots=True)
+class Grid:
+    """A grid of numbered places on the floor, row by row."""
+
+    name: str
+    """The data set that defines the grid, or how it was inferred."""
+    columns: int
+    cell: float
+    """Metres."""
+    origin: tuple[float, float] = (0.0, 0.0)
+    """x and y of cell 0, metres."""
+
+    def places(self, cells: Int[ndarray, " G"]) -> Float[ndarray, "G 2"]:
+        """Return x and y of the cells in metres."""
+        steps = np.column_stack([cells % self.columns, cells // self.columns])
+        return np.asarray(self.cell * steps + self.origin)
+
+
+GRIDS = (
+    Grid("WILDTRACK", 480, 0.025, (-3.0, -9.0)),
+    Grid("MultiviewX", 1000, 0.025),
+)
+"""Grids that data sets in the format of WILDTRACK's annotations define; the files name none."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class TruthPiece:
     """The true positions of people, G rows."""
@@ -141,6 +167,11 @@ class TruthPiece:
     fps: float | None = None
     first_index: Literal[0, 1] | None = None
     valid: Bool[ndarray, " G"] | None = None
+    cells: Int[ndarray, " G"] | None = None
+    """The number of each row's place on a grid that the file does not define; ``positions`` are
+    those of the first of :data:`GRIDS`."""
+    feet: Mapping[str, Float[ndarray, "G 2"]] = field(default_factory=lambda: MappingProxyType({}))
+    """By view the middle of the lower edge of each row's own box, pixels; NaN for none."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

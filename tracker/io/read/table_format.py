@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from tracker.io.read.columns import Column, read_table
+from tracker.io.read.columns import Column, decimal_points, read_table
 from tracker.io.read.picture_names import number_in
 from tracker.io.read.pieces import DetectionPiece, Piece, TruthPiece, Unit
 from tracker.io.read.protocol import Certainty, Kind
@@ -99,7 +99,7 @@ class TableFormat:
                 yield replace(piece, unit=self.unit, up="z")
 
     def _cells(self, line: str) -> list[str]:
-        words = line.split()
+        words = decimal_points(line).split()
         if self.columns[0] != "class":
             return words
         count = next((n for n, word in enumerate(words) if n and _number(word) is not None), 1)

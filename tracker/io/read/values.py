@@ -25,8 +25,16 @@ LARGEST_SIDE = 65535
 """Pixels."""
 
 
-def numbers(file: SourceFile, field: str, value: Any) -> Float[ndarray, " n"]:
+def numbers(
+    file: SourceFile, field: str, value: Any, *, missing: bool = False
+) -> Float[ndarray, " n"]:
     """All numbers of a list of any nesting, or of a text with blanks or commas between them.
+
+    Args:
+        file: The file, for the message.
+        field: The name of the field, for the message.
+        value: What the file has there.
+        missing: Whether NaN is one of the values: what was not measured.
 
     Raises:
         FormatError: If something else is among them.
@@ -37,7 +45,7 @@ def numbers(file: SourceFile, field: str, value: Any) -> Float[ndarray, " n"]:
         found = np.asarray(value, dtype=float).ravel()
     except (ValueError, TypeError):
         raise file.error(f"expected numbers, found {shown(value)}", field) from None
-    if not np.isfinite(found).all():
+    if not (np.isfinite(found) | (missing & np.isnan(found))).all():
         raise file.error(f"expected finite numbers, found {shown(value)}", field)
     return found
 

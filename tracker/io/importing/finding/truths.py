@@ -10,7 +10,8 @@ from numpy import ndarray
 
 from tracker.geometry.camera import Camera
 from tracker.io.checks.reading import Reading, levelled, upright
-from tracker.io.read.pieces import METRES, TruthPiece, Unit
+from tracker.io.importing.finding.grids import feet_on_floor, infer_grid
+from tracker.io.read.pieces import GRIDS, METRES, TruthPiece, Unit
 from tracker.sequences.sequence import Detections, GroundTruth
 
 _SAMPLED = 300
@@ -30,8 +31,10 @@ def settle_truth(
     pieces: Sequence[TruthPiece],
     cameras: Sequence[Camera],
     detections: Sequence[Detections | None],
+    views: Sequence[str | None],
     reading: Reading,
     frames: int,
+    floor: float,
     middle: float,
     first_index: int | None,
     found: list[tuple[str, str]],
@@ -45,8 +48,10 @@ def settle_truth(
         pieces: As their files have them; several of one person each become several people.
         cameras: In metres, z up.
         detections: Of each camera.
+        views: What each camera is called in the annotations whose boxes it has; None without.
         reading: Of the calibration.
         frames: Steps of the recording; what is beyond is left out.
+        floor: z of the floor, metres.
         middle: z of the middle of a person, metres, for places on the floor.
         first_index: Number of the first frame, where it is known better.
         found: What was found out is added.
@@ -65,11 +70,21 @@ def settle_truth(
         given = piece.positions.copy()
         given[~np.isfinite(given[:, 2]), 2] = 0.0
         on_floor = ~np.isfinite(piece.positions[:, 2])
-        ways = list(_ways(piece, reading))
-        scores = []
-        for factor, turn in ways:
-            moved = _moved(given, on_floor, factor, turn, middle)
-            scores.append(_inside(own, moved, cameras, detections))
+        candidates: list[tuple[str, Float[ndarray, "G 3"]]] = []
+        grids = GRIDS if piece.cells is not None else (None,)
+        for grid in grids:
+            if grid is not None and piece.cells is not None:
+                given = np.column_stack([grid.places(piece.cells), np.zeros(len(given))])
+            for factor, turn in _ways(piece, reading):
+                moved = _moved(given, on_floor, factor, turn, middle)
+                candidates.append(("" if grid is None else f"the grid of {grid.name}", moved))
+        scores = [_inside(own, moved, cameras, detections) for _, moved in candidates]
+        if piece.cells is not None and max(scores) < _MOST_INSIDE:
+            inferred = infer_grid(piece.cells, feet_on_floor(piece, views, cameras, floor))
+            if inferred is not None:
+                moved = np.column_stack([inferred[0], np.full(len(given), middle)])
+                candidates.append((f"a grid of {inferred[1]}, by where the boxes stand", moved))
+                scores.append(_inside(own, moved, cameras, detections))
         best = int(np.argmax(scores))
         if scores[best] < max(scores[0] + _CLEARLY, _MOST_INSIDE):
             best = 0
@@ -78,17 +93,18 @@ def settle_truth(
                 ("truth", f"{piece.source.name}: {100 * scores[best]:.0f} % of its places lie in "
                  "boxes; its origin, axes, grid or unit may be others than the calibration's")
             )  # fmt: skip
+        grid_words, moved = candidates[best]
         if best:
+            how = "turned" if grid_words == candidates[0][0] else f"taken with {grid_words}"
             found.append(
-                ("truth", f"{piece.source.name}: turned so that {100 * scores[best]:.0f} % of its "
+                ("truth", f"{piece.source.name}: {how} so that {100 * scores[best]:.0f} % of its "
                  f"places lie in boxes ({100 * scores[0]:.0f} % as it is)")
             )  # fmt: skip
-        factor, turn = ways[best]
         keep = (own >= 0) & (own < frames)
         beyond += int((~keep).sum())
         steps.append(own[keep])
         ids.append(piece.ids[keep])
-        places.append(_moved(given, on_floor, factor, turn, middle)[keep])
+        places.append(moved[keep])
         valid.append(
             np.ones(int(keep.sum()), dtype=bool) if piece.valid is None else piece.valid[keep]
         )

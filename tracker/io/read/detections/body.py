@@ -88,7 +88,11 @@ def read_people(file: SourceFile, poses: Sequence[Any]) -> People | None:
     Raises:
         FormatError: If a list is not of three numbers a joint.
     """
-    flat = [numbers(file, "keypoints", pose) for pose in poses if pose is not None and len(pose)]
+    flat = [
+        numbers(file, "keypoints", pose, missing=True)
+        for pose in poses
+        if pose is not None and len(pose)
+    ]
     if not flat:
         return None
     count = len(flat[0])
@@ -99,7 +103,7 @@ def read_people(file: SourceFile, poses: Sequence[Any]) -> People | None:
     joints = np.full((len(poses), count // 3, 3), np.nan)
     rows = [n for n, pose in enumerate(poses) if pose is not None and len(pose)]
     joints[rows] = np.reshape(flat, (len(flat), -1, 3))
-    joints[~(joints[:, :, 2] > LEAST_CONFIDENCE)] = np.nan
+    joints[~(joints[:, :, 2] > LEAST_CONFIDENCE) | np.isnan(joints).any(axis=2)] = np.nan
     return People(joints, boxes_of(joints))
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from tracker.io.read.columns import to_unit
+from tracker.io.read.columns import decimal_points, to_unit
 from tracker.io.read.pieces import DetectionPiece, Piece, TruthPiece
 from tracker.io.read.protocol import Certainty, Kind
 from tracker.io.read.source import SourceFile
@@ -36,7 +36,7 @@ _MOST_LABELS = 2**16  # bytes
 
 def recognise(file: SourceFile) -> Certainty:
     """Rows of 6 to 10 numbers with commas, or blanks, the first two whole and no header."""
-    rows = [line for line in file.head_text.splitlines()[:50] if line.strip()]
+    rows = [decimal_points(line) for line in file.head_text.splitlines()[:50] if line.strip()]
     rows = rows[:-1] if len(rows) == 50 else rows
     widths = set()
     for row in rows:
@@ -117,7 +117,8 @@ def _left_out(file: SourceFile, table: Float[ndarray, "N C"], keep: ndarray) -> 
 
 
 def _table(file: SourceFile) -> Float[ndarray, "N C"]:
-    lines = [line.replace(",", " ").replace(";", " ") for line in file.lines() if line.strip()]
+    lines = [decimal_points(line) for line in file.lines() if line.strip()]
+    lines = [line.replace(",", " ").replace(";", " ") for line in lines]
     try:
         table = np.loadtxt(lines, ndmin=2, comments=None)
     except ValueError as error:

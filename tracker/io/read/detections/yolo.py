@@ -14,7 +14,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from tracker.io.read.columns import people
+from tracker.io.read.columns import decimal_points, people
 from tracker.io.read.picture_names import number_in
 from tracker.io.read.pieces import DetectionPiece, Piece
 from tracker.io.read.protocol import Certainty, Kind
@@ -31,7 +31,7 @@ _KEYPOINTS = 17
 
 def recognise(file: SourceFile) -> Certainty:
     """Rows of a whole number and four or more numbers, of which four are parts of 1."""
-    rows = [line for line in file.head_text.splitlines()[:20] if line.strip()]
+    rows = [decimal_points(line) for line in file.head_text.splitlines()[:20] if line.strip()]
     if not rows or not all(_ROW.fullmatch(row.strip()) for row in rows[:-1] or rows):
         return Certainty.NO
     values = [[float(word) for word in row.split()[1:5]] for row in rows[:-1] or rows]
@@ -52,7 +52,7 @@ def read(file: SourceFile) -> Iterator[Piece]:
             if not text.strip():
                 continue
             try:
-                values = [float(word) for word in text.split()]
+                values = [float(word) for word in decimal_points(text).split()]
             except ValueError:
                 raise member.error(f"line {line}: expected numbers, found {text[:40]!r}") from None
             if len(values) < 5 or not np.isfinite(values).all():
