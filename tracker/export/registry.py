@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from tracker.export import csv_file, gltf, json_file, motchallenge, parquet, rerun_file, trc
+from tracker.export import gltf, json_file, motchallenge, parquet, rerun_file, tracks_csv, trc
 from tracker.export.exported_run import ExportedRun, Options
 from tracker.files.atomic import new_folder, replacing, zip_folder
 from tracker.sequences.sequence import Sequence
@@ -85,7 +85,7 @@ FORMATS: dict[str, Format] = {
     for form in (
         Format(
             "csv", "CSV", ".csv", "one row a person a step, with boxes",
-            csv_file.write, "text/csv",
+            tracks_csv.write, "text/csv",
         ),
         Format(
             "motchallenge", "MOTChallenge", "", "a text a camera, in TrackEval's folders",

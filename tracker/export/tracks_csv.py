@@ -22,6 +22,7 @@ from jaxtyping import Float, Int
 from numpy import ndarray
 
 from tracker import __version__
+from tracker.export.exported_run import ExportedRun, Options
 from tracker.files.atomic import replacing
 from tracker.fusion.trajectories import Trajectories
 from tracker.parameters.catalogue import METHODS, PARAMETERS, RunParameters
@@ -178,6 +179,23 @@ def _comments(
 def _as_text(setting: Any) -> str:
     """Return a value of a parameter as text; Boolean values are in lower case, as in TOML."""
     return str(setting).lower() if isinstance(setting, bool) else str(setting)
+
+
+def write(path: Path, run: ExportedRun, options: Options) -> None:
+    """Write a run as a track file."""
+    with path.open("w", encoding="utf-8", newline="") as stream:
+        write_tracks_csv(
+            stream,
+            run.sequence,
+            run.tracks,
+            run.parameters,
+            run.seed,
+            done=run.done,
+            remarks=run.remarks,
+            row_corrections=run.row_corrections,
+            names=run.names,
+        )
+    options.at(run.steps, run.steps)
 
 
 def save_tracks_csv(

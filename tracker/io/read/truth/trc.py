@@ -24,8 +24,8 @@ SERIES = False
 
 HIPS = {"rhip", "lhip", "hip", "midhip", "pelvis", "rasis", "lasis", "rpsis", "lpsis"}
 
-_PERSON = re.compile(r"(person|people|player|id|track|target|p)[\W_]*\d+")
-"""A marker that is a person, one of several."""
+_PERSON = re.compile(r"(?:person|people|player|id|track|target|p)[\W_]*(\d{1,9})")
+"""A marker that is a person, one of several, and the person's number."""
 
 _MOST_FRAMES = 1e9
 """Of one file: a year at 30 a second."""
@@ -39,7 +39,8 @@ def recognise(file: SourceFile) -> Certainty:
 
 
 def read(file: SourceFile) -> Iterator[Piece]:
-    """One piece: the place of the one person, whose id is 1, or of each marker that is a person."""
+    """One piece: the place of the one person, whose id is 1, or of each marker that is a person,
+    whose number is the id."""
     lines = file.lines()
     if len(lines) < 5:
         raise file.error("expected five lines of a header, found fewer; it is cut short")
@@ -60,11 +61,12 @@ def read(file: SourceFile) -> Iterator[Piece]:
         table[place, : len(values)] = values
     joints = table[:, 2:].reshape(len(rows), len(names), 3)
     names = [name.strip().lower() for name in names]
-    if names and all(_PERSON.fullmatch(name) for name in names):
-        people = [joints[:, n] for n in range(len(names))]
+    found = [int(match[1]) for name in names if (match := _PERSON.fullmatch(name))]
+    if names and len(set(found)) == len(names):
+        people, own_ids = [joints[:, n] for n in range(len(names))], found
     else:
-        people = [_middle(joints, names)]
-    ids = np.repeat(np.arange(1, len(people) + 1), len(rows))
+        people, own_ids = [_middle(joints, names)], [1]
+    ids = np.repeat(np.array(own_ids, dtype=np.int64), len(rows))
     place_of, numbers = np.concatenate(people), np.tile(table[:, 0], len(people))
     # of a number that is no frame's nothing is known
     good = np.isfinite(place_of).all(axis=1) & (np.abs(numbers) < _MOST_FRAMES)

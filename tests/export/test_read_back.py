@@ -1,0 +1,131 @@
+"""What the program writes it reads back: three people, one of them with a gap, one who leaves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy import ndarray
+
+from tests.engine import synthetic
+from tests.io.read.rig import raw_cameras, read
+from tracker.export import read_tracks_csv
+from tracker.export.calibration import save_calibration
+from tracker.export.exported_run import ExportedRun
+from tracker.export.json_file import TracksFile
+from tracker.export.registry import FORMATS, save
+from tracker.fusion.trajectories import Trajectories
+from tracker.io.read.pieces import DetectionPiece, TruthPiece
+from tracker.parameters.catalogue import RunParameters
+
+STEPS = 40
+PRESENT = {1: [*range(STEPS)], 4: [*range(0, 12), *range(25, STEPS)], 11: [*range(3, 20)]}
+"""The steps of each person."""
+
+TO_WORLD = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+"""From a world with y up."""
+
+
+def _tracks() -> Trajectories:
+    rows = sorted((step, who) for who, steps in PRESENT.items() for step in steps)
+    frames, ids = np.array(rows, dtype=np.int64).T
+    cameras = len(SEQUENCE.views)
+    time = frames / SEQUENCE.fps
+    places = np.column_stack(
+        [0.1 * ids - 0.5 + 0.2 * time, 0.3 * np.sin(ids + time), 0.85 + 0 * time]
+    )
+    return replace(
+        Trajectories.empty(cameras),
+        frames=frames,
+        ids=ids,
+        positions=places,
+        existences=np.linspace(0.5, 1.0, len(ids)),
+        sigmas=np.full((len(ids), 3), 0.05),
+        seen=np.ones((len(ids), cameras), dtype=bool),
+        components=np.zeros(len(ids), dtype=np.int64),
+    )
+
+
+SEQUENCE = synthetic.sequence([], STEPS)
+RUN = ExportedRun(SEQUENCE, _tracks(), RunParameters())
+Rows = tuple[ndarray, ndarray, ndarray]
+"""Frames from 0, ids, and places in metres."""
+
+
+def _of_truth(path: Path) -> Rows:
+    (truth,) = (piece for piece in read(path)[1] if isinstance(piece, TruthPiece))
+    assert truth.unit in (None, "m")
+    places = truth.positions @ TO_WORLD.T if truth.up == "y" else truth.positions
+    return truth.frames - int(truth.first_index or 0), truth.ids, places
+
+
+def _of_csv(path: Path) -> Rows:
+    found = read_tracks_csv(path)
+    return found.frames, found.ids, found.positions
+
+
+def _of_json(path: Path) -> Rows:
+    tracks = TracksFile.model_validate_json(path.read_text()).tracks
+    ids = np.concatenate([np.full(len(track.frames), track.id) for track in tracks])
+    frames = np.concatenate([track.frames for track in tracks])
+    return frames, ids, np.concatenate([track.positions for track in tracks])
+
+
+def _of_parquet(path: Path) -> Rows:
+    table = pytest.importorskip("pyarrow.parquet").read_table(path).to_pydict()
+    places = np.column_stack([table[axis] for axis in "xyz"])
+    return np.array(table["frame"]), np.array(table["id"]), places
+
+
+def _of_motchallenge(path: Path) -> Rows:
+    """The places of the ground plane; and in each camera the boxes, in pixels from 1."""
+    for number, camera in enumerate(SEQUENCE.cameras):
+        (file,) = path.glob(f"trackers/**/*-{camera.name}.txt")
+        (piece,) = (own for own in read(file)[1] if isinstance(own, DetectionPiece))
+        boxes, visible = RUN.boxes[number]
+        np.testing.assert_array_equal(piece.frames - 1, RUN.tracks.frames[visible])
+        np.testing.assert_allclose(piece.boxes - [1, 1, 0, 0], boxes[visible], atol=1e-6)
+    (file,) = path.glob("trackers/**/*-ground-plane.txt")
+    return _of_truth(file)
+
+
+READERS: dict[str, Callable[[Path], Rows]] = {
+    "csv": _of_csv,
+    "json": _of_json,
+    "motchallenge": _of_motchallenge,
+    "parquet": _of_parquet,
+    "trc": _of_truth,
+}
+
+TO_LOOK_AT = {"gltf", "html", "mp4", "rerun"}
+"""Formats that are drawings of the tracks."""
+
+
+def test_every_format_is_read_back_or_drawn() -> None:
+    assert READERS.keys() | TO_LOOK_AT == FORMATS.keys()
+
+
+@pytest.mark.parametrize("name", READERS)
+def test_tracks_come_back_with_their_ids_and_gaps(tmp_path: Path, name: str) -> None:
+    if FORMATS[name].needs_package:
+        pytest.importorskip(FORMATS[name].needs_package)
+    path = tmp_path / f"tracks{FORMATS[name].suffix}"
+    save(path, FORMATS[name], RUN)
+    frames, ids, places = READERS[name](path)
+    order = np.lexsort([ids, frames])
+    np.testing.assert_array_equal(frames[order], RUN.tracks.frames)
+    np.testing.assert_array_equal(ids[order], RUN.tracks.ids)
+    np.testing.assert_allclose(places[order], RUN.tracks.positions, atol=0.5001e-4)
+
+
+@pytest.mark.parametrize(("form", "suffix"), [("opencv", ".yml"), ("pose2sim", ".toml")])
+def test_cameras_come_back(tmp_path: Path, form: str, suffix: str) -> None:
+    path = tmp_path / f"cameras{suffix}"
+    save_calibration(path, SEQUENCE.cameras, form)  # type: ignore[arg-type]
+    for raw, camera in zip(raw_cameras(path), SEQUENCE.cameras, strict=True):
+        assert (raw.name, raw.image_size) == (camera.name, camera.image_size)
+        for part in ("intrinsics", "rotation", "translation"):
+            np.testing.assert_allclose(getattr(raw, part), getattr(camera, part), atol=1e-9)
