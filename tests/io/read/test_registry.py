@@ -45,8 +45,21 @@ def test_a_format_of_another_package_reads_its_files(
 
 def test_what_is_no_format_is_told_by_its_name(monkeypatch: pytest.MonkeyPatch) -> None:
     _install(monkeypatch, SimpleNamespace(NAME="half"))
-    with pytest.raises(FormatError, match=r"lab\.format"):
+    with pytest.raises(FormatError, match=r"lab\.format.*KIND.*expected NAME, KIND, SERIES"):
         registry.all_formats()
+
+
+def test_a_format_for_the_version_before_gets_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    def load() -> object:
+        raise ModuleNotFoundError("No module named 'tracker.formats'")
+
+    point = SimpleNamespace(name="lab", value="lab.format", load=load)
+    monkeypatch.setattr(registry, "entry_points", lambda group: [point])
+    with pytest.raises(
+        FormatError, match=r"No module named 'tracker\.formats'.*TreeFormat"
+    ) as told:
+        registry.all_formats()
+    assert "\n" not in str(told.value)
 
 
 def test_every_format_has_a_name_of_its_own() -> None:

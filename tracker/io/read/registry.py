@@ -8,13 +8,11 @@ from importlib.metadata import entry_points
 
 from tracker.io.read.calibration import (
     camera_rows,
-    camera_tables,
     labelled,
     matlab,
     opencv,
     plain,
     projection,
-    qualisys,
     trees,
 )
 from tracker.io.read.calibration.datasets import middlebury, tsai
@@ -53,8 +51,6 @@ GROUP = "multiview_phd.formats"
 FORMATS: tuple[Format, ...] = (
     *trees.FORMATS,
     opencv,
-    camera_tables,
-    qualisys,
     colmap,
     colmap_binary,
     nerfstudio,
@@ -106,7 +102,9 @@ def all_formats() -> tuple[Format, ...]:
             _ = (added.NAME, added.KIND, added.SERIES, added.recognise, added.read)
         except Exception as error:
             raise FormatError(
-                f"{GROUP}: {point.name} ({point.value}) cannot be used as a format: {error}"
+                f"{GROUP}: {point.name} ({point.value}) cannot be used as a format ({error}); "
+                "expected NAME, KIND, SERIES, recognise and read of tracker.io.read.protocol, or "
+                "a TreeFormat or TableFormat of tracker.io.read"
             ) from None
         found.append(added)
     return tuple(found)

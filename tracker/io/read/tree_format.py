@@ -2,7 +2,8 @@
 
 A format names the path to its cameras and, for each part of a camera, where it lies; recognising,
 reading and wording errors is done here. Paths are keys with ``/`` between them; ``*`` stands for
-every field of a table or every element of a list, ``.`` for the whole file, ``|`` for "or".
+every field of a table or every element of a list, ``.`` for the whole file, ``|`` for "or". An
+attribute of XML is a field like a child.
 """
 
 from __future__ import annotations
@@ -79,6 +80,8 @@ class TreeFormat:
     """Paths in a camera's table. A table that has none of them is no camera's."""
     parts: tuple[Part, ...]
     convention: Convention = field(default_factory=Convention)
+    choose: Callable[[list[Node]], list[Node]] = list
+    """Which cameras of a file are wanted."""
 
     def recognise(self, file: SourceFile) -> Certainty:
         """The words of all paths in the beginning, and a camera with every required field."""
@@ -97,7 +100,7 @@ class TreeFormat:
         """One piece with every camera of the file."""
         found = []
         pose = np.eye(4)
-        for node in self._nodes(file):
+        for node in self.choose(self._nodes(file)):
             missing = [path for path in self.required if node.find(path) is None]
             if missing:
                 raise file.error(
@@ -128,7 +131,9 @@ class TreeFormat:
 def _matches(value: Any, path: str, key: str = "") -> Iterator[tuple[str, Any]]:
     """The values at a path, each with its last key."""
     if path in (".", ""):
-        yield key, value
+        # several children of one name in XML
+        several = isinstance(value, list) and all(isinstance(item, dict) for item in value)
+        yield from ((str(n), one) for n, one in enumerate(value)) if several else ((key, value),)
         return
     step, _, rest = path.partition("/")
     rows: Any = ()
@@ -153,8 +158,8 @@ def _of_xml(element: ElementTree.Element) -> Any:
 
 
 def name(path: str = "") -> Part:
-    """The camera's name, at a path; its key without one."""
-    return lambda node: {"name": str(node.find(path) or "") if path else node.key}
+    """The camera's name, at a path; its key where there is none."""
+    return lambda node: {"name": str((path and node.find(path)) or node.key)}
 
 
 def image_size(path: str, height: str = "") -> Part:
@@ -168,6 +173,11 @@ def image_size(path: str, height: str = "") -> Part:
         return {"image_size": values.image_size(node.file, where, given)}
 
     return part
+
+
+def number(node: Node, path: str) -> float:
+    """The number at a path."""
+    return values.number(node.file, node.where(path), node.get(path))
 
 
 def intrinsics(*paths: str) -> Part:
@@ -184,7 +194,7 @@ def intrinsics(*paths: str) -> Part:
     return part
 
 
-def lens(*paths: str, model: str = "", fisheyes: Mapping[str, bool] | None = None) -> Part:
+def lens(*paths: str, model: str = "", fisheyes: Mapping[Any, bool] | None = None) -> Part:
     """The numbers of a lens in OpenCV's order, in one list or at a path each.
 
     Args:
@@ -199,7 +209,7 @@ def lens(*paths: str, model: str = "", fisheyes: Mapping[str, bool] | None = Non
         own = node.find(model) if model else None
         own = next(iter(models)) if own is None else own
         if own not in models:
-            known = ", ".join(models)
+            known = ", ".join(map(str, models))
             raise node.file.error(
                 f"expected one of {known}, found {shown(own)}; calibrate with one of those",
                 node.where(model),
@@ -214,10 +224,12 @@ def lens(*paths: str, model: str = "", fisheyes: Mapping[str, bool] | None = Non
     return part
 
 
-def pose(rotation: str, translation: str) -> Part:
+def pose(rotation: str, translation: str, *, optional: bool = False) -> Part:
     """A rotation (matrix or vector) and a translation."""
 
     def part(node: Node) -> Mapping[str, Any]:
+        if optional and None in (node.find(rotation), node.find(translation)):
+            return {}
         return {
             "rotation": values.rotation(node.file, node.where(rotation), node.get(rotation)),
             "translation": values.vector(

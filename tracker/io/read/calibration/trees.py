@@ -1,16 +1,20 @@
 """The calibrations in JSON, YAML, TOML and XML whose fields are declared.
 
-Sources: ROS, ``camera_calibration_parsers`` and ``sensor_msgs/CameraInfo``; Furgale, Rehder,
-Siegwart, "Unified temporal and spatial calibration for multi-sensor systems", IROS 2013, and
-Kalibr, "YAML formats"; Joo et al., "Panoptic Studio", IEEE TPAMI 41(1), 2019, and its toolbox; Tu,
-Wang, Zeng, "VoxelPose", ECCV 2020, and its data sets; camera-intrinsic-calibration (``ccrs``),
-``types.rs`` and ``camera-intrinsic-model``; NVIDIA, Physical AI Smart Spaces data set (AI City
-Challenge) and AutoMagicCalib, "Ground truth data format"; Intel, SceneScape, tracker metric set.
+Sources: aniposelib, ``CameraGroup.dump`` (Karashchuk et al., "Anipose", Cell Reports 2021); Pagnon,
+Domalain, Reveret, "Pose2Sim", JOSS 2022; Caliscope, ``camera_array.toml``; Qualisys, "QTM Real-time
+Server Protocol", calibration packet; ROS, ``camera_calibration_parsers`` and
+``sensor_msgs/CameraInfo``; Furgale, Rehder, Siegwart, "Unified temporal and spatial calibration for
+multi-sensor systems", IROS 2013, and Kalibr, "YAML formats"; Joo et al., "Panoptic Studio", IEEE
+TPAMI 41(1), 2019, and its toolbox; Tu, Wang, Zeng, "VoxelPose", ECCV 2020, and its data sets;
+camera-intrinsic-calibration (``ccrs``), ``types.rs`` and ``camera-intrinsic-model``; NVIDIA,
+Physical AI Smart Spaces data set (AI City Challenge) and AutoMagicCalib, "Ground truth data
+format"; Intel, SceneScape, tracker metric set.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import cv2
@@ -25,11 +29,105 @@ from tracker.io.read.tree_format import (
     intrinsics,
     lens,
     name,
+    number,
     only,
     pose,
     pose_at,
     pose_matrix,
     step_from_last,
+)
+
+_WORLD_TO_CAMERA = Convention(direction="world-to-camera", axes="opencv")
+
+
+def _of_toml(node: Node) -> Mapping[str, Any]:
+    """The unit: Anipose's is the one that its board was given in, the others write metres.
+
+    Caliscope counts turns of the picture; Pose2Sim says of every camera whether it is one of a
+    fisheye, Anipose only of those that are.
+    """
+    tables = node.file.toml
+    inner = tables.get("cameras")
+    tables = {**tables, **inner} if isinstance(inner, dict) else tables
+    own = [table for table in tables.values() if isinstance(table, dict) and "matrix" in table]
+    metres = any(
+        "rotation_count" in table or "grid_count" in table or table.get("fisheye") is False
+        for table in own
+    )
+    return {"convention": replace(_WORLD_TO_CAMERA, unit="m" if metres else None)}
+
+
+ANIPOSE = TreeFormat(
+    "Anipose, Pose2Sim or Caliscope TOML",
+    "toml",
+    cameras="cameras/*|*",
+    required=("matrix", "distortions"),
+    parts=(
+        name("name"),
+        image_size("size"),
+        intrinsics("matrix"),
+        lens("distortions", model="fisheye", fisheyes={False: False, True: True}),
+        pose("rotation", "translation", optional=True),
+        _of_toml,
+    ),
+    choose=lambda nodes: [node for node in nodes if node.find("ignore") is not True],
+)
+
+
+def _qualisys_lens(node: Node) -> Mapping[str, Any]:
+    """K and size of the recorded part of the sensor; lengths are in 1/64 pixel from its corner."""
+    left, top, right, bottom = (
+        number(node, f"fov_video/{side}") for side in ("left", "top", "right", "bottom")
+    )
+    fx, fy, cx, cy = (
+        number(node, f"intrinsic/{part}") / 64.0
+        for part in ("focalLengthU", "focalLengthV", "centerPointU", "centerPointV")
+    )
+    return {
+        "image_size": (round(right - left) + 1, round(bottom - top) + 1),
+        "intrinsics": values.focal_and_centre(fx, fy, cx - left, cy - top),
+    }
+
+
+def _qualisys_pose(node: Node) -> Mapping[str, Any]:
+    """r11 r12 r13 is the first column of the rotation from camera to world."""
+    turned = [[number(node, f"transform/r{row}{column}") for row in "123"] for column in "123"]
+    return {
+        "rotation": values.rotation(node.file, node.where("transform"), turned),
+        "translation": np.array([number(node, f"transform/{axis}") for axis in "xyz"]),
+    }
+
+
+def _of_video(nodes: list[Node]) -> list[Node]:
+    """The cameras that record video; all, where none says so."""
+    films = ("Miqus Video", "none")
+    return [n for n in nodes if str(n.find("model") or "none").startswith(films)] or nodes
+
+
+QUALISYS = TreeFormat(
+    "Qualisys .qca.txt",
+    "xml",
+    cameras="cameras/camera",
+    required=("fov_video", "transform", "intrinsic/focalLengthU"),
+    parts=(
+        name("serial"),
+        _qualisys_lens,
+        lens(
+            *(
+                f"intrinsic/{part}"
+                for part in (
+                    "radialDistortion1",
+                    "radialDistortion2",
+                    "tangentalDistortion1",
+                    "tangentalDistortion2",
+                    "radialDistortion3",
+                )
+            ),
+        ),
+        _qualisys_pose,
+    ),
+    convention=Convention(unit="mm", direction="camera-to-world", axes="opengl", up="z"),
+    choose=_of_video,
 )
 
 ROS = TreeFormat(
@@ -102,7 +200,7 @@ VOXELPOSE = TreeFormat(
         lens("k/0", "k/1", "p/0", "p/1", "k/2"),
         pose_at("R", "T"),
     ),
-    convention=Convention(direction="world-to-camera", axes="opencv"),
+    convention=_WORLD_TO_CAMERA,
 )
 
 
@@ -207,6 +305,6 @@ SCENESCAPE = TreeFormat(
 )
 
 FORMATS = (
-    ROS, KALIBR, PANOPTIC, VOXELPOSE, CCRS_LENS, CCRS_POSES, NVIDIA, SCENESCAPE,
+    ANIPOSE, QUALISYS, ROS, KALIBR, PANOPTIC, VOXELPOSE, CCRS_LENS, CCRS_POSES, NVIDIA, SCENESCAPE,
 )  # fmt: skip
 """All of them; of two that fit a file, the later one reads it."""
