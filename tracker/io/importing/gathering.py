@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -222,7 +222,10 @@ def _recognise(file: SourceFile) -> tuple[Format | None, Certainty, str]:
 def _series_pieces(
     found: Format, certainty: Certainty, file: SourceFile, root: Path
 ) -> Iterator[ParsedFiles]:
-    """A series; without those of its files that cannot be read by themselves, each told."""
+    """A series; without those of its files that cannot be read by themselves, each told.
+
+    Where these are more than half of the files, the rest is not used either.
+    """
     series = file.series
     label = f"{SourceFile(series[0], root).where} … ({len(series)})"
     taken = _pieces(found, certainty, file, label)
@@ -235,6 +238,10 @@ def _series_pieces(
     whole = tuple(path for path, one in zip(series, each, strict=True) if not one.complaint)
     if not whole or not 0 < len(spoilt) <= _LOOKED_AT:
         yield taken
+        return
+    if len(spoilt) > len(whole):
+        share = f"{len(spoilt)} of {len(series)} files cannot be read, so the others are not used"
+        yield replace(taken, complaint=f"{label}: {share}; {spoilt[0].complaint}")
         return
     yield from spoilt
     label = f"{SourceFile(whole[0], root).where} … ({len(whole)})"

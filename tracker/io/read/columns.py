@@ -8,7 +8,9 @@ list of four, the layout stays open.
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -56,6 +58,9 @@ _MEANING = {word: meaning for meaning, words in WORDS.items() for word in words}
 
 PEOPLE = ("person", "pedestrian", "people", "human", "1", "0")
 """Classes that are people: by name, or the first of COCO (1) and of YOLO (0)."""
+
+_LISTED = 4
+"""Classes that a sentence names."""
 
 _OURS = "existence"
 """A column of the track files that this program writes, which are no one's truth."""
@@ -204,15 +209,17 @@ def _detections(
     scores = np.ones(len(frames))
     if "score" in found:
         scores = _numbers(file, found["score"], columns[found["score"]], blank=1.0)
-    keep = np.isfinite(boxes).all(axis=1) & np.isfinite(scores)
+    boxes = np.where(np.isfinite(scores)[:, None], boxes, np.nan)
     if "score" in found:
         scores = to_unit(np.where(np.isfinite(scores), scores, 0.0))
-    if "class" in found:
-        keep &= people([str(cell) for cell in columns[found["class"]]])
+    given = columns[found["class"]] if "class" in found else [""] * len(frames)
+    classes = np.array([str(cell) for cell in given], dtype=object)
+    wanted = people(classes.tolist())
+    keep = wanted & np.isfinite(boxes).all(axis=1)
     cameras = np.array(_cameras(columns, found, len(frames)))
     for camera in dict.fromkeys(cameras[keep].tolist()) or [""]:
-        rows = keep & (cameras == camera) if len(cameras) else keep
-        yield DetectionPiece(
+        rows = (cameras == camera) | (not keep.any())
+        piece = DetectionPiece(
             source=file.path,
             format=name,
             camera=str(camera),
@@ -220,11 +227,12 @@ def _detections(
             boxes=boxes[rows],
             scores=scores[rows],
             layout=layout,
-            normalised=is_normalised(boxes[rows]),
+            normalised=is_normalised(boxes[rows & keep]),
             first_index=None if fps is None else 0,
             last_frame=int(frames.max()) if len(frames) else None,
             fps=fps,
         )
+        yield only_people(file, piece, classes[rows].tolist(), wanted[rows])
 
 
 def _cameras(columns: Mapping[str, Column], found: Mapping[str, str], rows: int) -> list[str]:
@@ -237,6 +245,42 @@ def _cameras(columns: Mapping[str, Column], found: Mapping[str, str], rows: int)
         if len(set(named)) > 1:
             return named
     return [""] * rows
+
+
+def only_people(
+    file: SourceFile,
+    piece: DetectionPiece,
+    classes: Sequence[str],
+    wanted: Bool[ndarray, " D"] | None = None,
+) -> DetectionPiece:
+    """The boxes of a piece that are people's, with a sentence about the others.
+
+    Args:
+        file: The file, for the sentence.
+        piece: All boxes of a camera; a row without a box has NaN.
+        classes: The class of each row.
+        wanted: Whether each row's class is people, if other cameras tell that, too.
+    """
+    is_box = np.isfinite(piece.boxes).all(axis=1)
+    keep = (people(classes) if wanted is None else wanted) & is_box
+    if keep.all():
+        return piece
+    others = Counter(
+        one if there else "without a box"
+        for one, kept, there in zip(classes, keep, is_box, strict=True)
+        if not kept
+    )
+    listed = ", ".join(f"{count} {name}".strip() for name, count in others.most_common(_LISTED))
+    out = int((~keep).sum())
+    return replace(
+        piece,
+        frames=piece.frames[keep],
+        boxes=piece.boxes[keep],
+        scores=piece.scores[keep],
+        keypoints=None if piece.keypoints is None else piece.keypoints[keep],
+        left_out=f"{file.where}: {out} of {len(keep)} boxes ({out / len(keep):.0%}) are left out, "
+        f"which are no people's ({listed}{' …' if len(others) > _LISTED else ''})",
+    )
 
 
 def people(classes: Sequence[str]) -> Bool[ndarray, " D"]:

@@ -99,6 +99,9 @@ def match_all(
         raise FormatError("every camera is left out; expected at least one that is not")
     cameras = wanted
     used = [c for c in cameras if c.video or c.images or c.detections is not None]
+    lost = [c.detections.left_out for c in used if c.detections and not len(c.detections.frames)]
+    if len(lost) == len(used) and any(lost) and not any(c.video or c.images for c in used):
+        raise FormatError(f"no box of a person is left in any camera: {next(filter(None, lost))}")
     if used and len(used) < len(cameras):
         left = [c.raw.name for c in cameras if c not in used]
         told.append(

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from tracker.io.read.columns import people, to_unit
+from tracker.io.read.columns import only_people, to_unit
 from tracker.io.read.detections.body import read_people
 from tracker.io.read.picture_names import camera_of, number_in
 from tracker.io.read.pieces import DetectionPiece, Piece
@@ -86,21 +86,21 @@ def _piece(
     keypoints = read_people(file, [record.get("keypoints") for *_, record in rows])
     if keypoints is not None:
         boxes = np.where(np.isfinite(keypoints.boxes), keypoints.boxes, boxes)
-    keep = people(kinds) & np.isfinite(boxes).all(axis=1) if rows else np.zeros(0, dtype=bool)
     # AlphaPose's score is a sum over box and joints, and above 1
     scores = to_unit(np.minimum(scores, 1.0) if keypoints is not None else scores)
     image = rows[0][1] if rows else {}
     size: tuple[Any, Any] = (image.get("width"), image.get("height"))
     known = all(isinstance(side, int) and 0 < side < 65536 for side in size)
-    return DetectionPiece(
+    piece = DetectionPiece(
         source=file.path,
         format="AlphaPose JSON" if keypoints is not None else NAME,
         camera=camera,
-        frames=frames[keep],
-        boxes=boxes[keep],
-        scores=scores[keep],
+        frames=frames,
+        boxes=boxes,
+        scores=scores,
         layout="ltwh",
-        keypoints=None if keypoints is None else keypoints.joints[keep],
+        keypoints=None if keypoints is None else keypoints.joints,
         last_frame=int(frames.max()) if len(frames) else None,
         image_size=(int(size[0]), int(size[1])) if known else None,
     )
+    return only_people(file, piece, kinds)

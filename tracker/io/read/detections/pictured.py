@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from tracker.io.read.columns import people
+from tracker.io.read.columns import only_people
 from tracker.io.read.picture_names import number_in
 from tracker.io.read.pieces import DetectionPiece
 from tracker.io.read.source import SourceFile
@@ -56,16 +56,16 @@ class PicturedBoxes:
 
     def piece(self, format_name: str) -> DetectionPiece:
         """All that are people."""
-        keep = people(self._labels)
-        return DetectionPiece(
+        piece = DetectionPiece(
             source=self._file.path,
             format=format_name,
             camera="",
-            frames=np.array(self._frames, dtype=np.int64)[keep],
-            boxes=np.array(self._corners).reshape(-1, 4)[keep],
-            scores=np.ones(int(keep.sum())),
+            frames=np.array(self._frames, dtype=np.int64),
+            boxes=np.array(self._corners).reshape(-1, 4),
+            scores=np.ones(len(self._frames)),
             layout="xyxy",
             first_index=0 if 0 in self._looked_at else None,
             last_frame=max([0, *self._looked_at]),
             image_size=self._size,
         )
+        return only_people(self._file, piece, self._labels)

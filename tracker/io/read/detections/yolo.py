@@ -14,7 +14,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from tracker.io.read.columns import decimal_points, people
+from tracker.io.read.columns import decimal_points, only_people
 from tracker.io.read.picture_names import number_in
 from tracker.io.read.pieces import DetectionPiece, Piece
 from tracker.io.read.protocol import Certainty, Kind
@@ -64,21 +64,21 @@ def read(file: SourceFile) -> Iterator[Piece]:
             classes.append(f"{values[0]:g}")
             rows.append(_row(values))
     table = np.array(rows).reshape(-1, 5)
-    keep = people(classes)
     numbers = np.array(frames, dtype=np.int64)
     first: int | None = 0 if len(numbers) and numbers.min() == 0 else 1
-    yield DetectionPiece(
+    piece = DetectionPiece(
         source=file.path,
         format=NAME,
         camera="",
-        frames=numbers[keep],
-        boxes=table[keep, :4],
-        scores=np.clip(table[keep, 4], 0.0, 1.0),
+        frames=numbers,
+        boxes=table[:, :4],
+        scores=np.clip(table[:, 4], 0.0, 1.0),
         layout="cxcywh",
         normalised=True,
         first_index=1 if first else 0,
         last_frame=int(numbers.max()) if len(numbers) else None,
     )
+    yield only_people(file, piece, classes)
 
 
 def _row(values: list[float]) -> tuple[float, float, float, float, float]:

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from tracker.io.read.columns import people
+from tracker.io.read.columns import only_people
 from tracker.io.read.pieces import DetectionPiece, Piece
 from tracker.io.read.protocol import Certainty, Kind
 from tracker.io.read.source import SourceFile
@@ -55,20 +55,20 @@ def read(file: SourceFile) -> Iterator[Piece]:
     for image in root.findall("image"):
         for box in image.findall("box"):
             add(image.get("id"), box, box.get("label", ""))
-    keep = people(labels)
     size = root.find(".//original_size")
     found = [None if size is None else size.findtext(side) for side in ("width", "height")]
     known = all(side is not None and side.strip().isdigit() for side in found)
     last = root.findtext(".//task/stop_frame") or root.findtext(".//task/size")
-    yield DetectionPiece(
+    piece = DetectionPiece(
         source=file.path,
         format=NAME,
         camera=root.findtext(".//source") or root.findtext(".//task/name") or "",
-        frames=np.array(frames, dtype=np.int64)[keep],
-        boxes=np.array(corners).reshape(-1, 4)[keep],
-        scores=np.ones(int(keep.sum())),
+        frames=np.array(frames, dtype=np.int64),
+        boxes=np.array(corners).reshape(-1, 4),
+        scores=np.ones(len(frames)),
         layout="xyxy",
         first_index=0,
         last_frame=int(last) if last is not None and last.strip().isdigit() else None,
         image_size=(int(str(found[0])), int(str(found[1]))) if known else None,
     )
+    yield only_people(file, piece, labels)

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tracker.io.read.columns import people
+from tracker.io.read.columns import only_people
 from tracker.io.read.picture_names import camera_of, number_in
 from tracker.io.read.pieces import DetectionPiece, Piece
 from tracker.io.read.protocol import Certainty, Kind
@@ -70,22 +70,22 @@ def read(file: SourceFile) -> Iterator[Piece]:
             if all(isinstance(side, int) and 0 < side < 65536 for side in size):
                 sizes[camera] = (int(str(size[0])), int(str(size[1])))
     for camera, boxes in by_camera.items():
-        keep = people([box.label for box in boxes])
         numbered = np.array([box.frame for box in boxes], dtype=np.int64)
         own = frames[camera] if camera not in videos else [1, *numbered.tolist()]
-        yield DetectionPiece(
+        piece = DetectionPiece(
             source=file.path,
             format=NAME,
             camera=camera,
-            frames=numbered[keep],
-            boxes=np.array([box.sides for box in boxes]).reshape(-1, 4)[keep] / 100.0,
-            scores=np.ones(int(keep.sum())),
+            frames=numbered,
+            boxes=np.array([box.sides for box in boxes]).reshape(-1, 4) / 100.0,
+            scores=np.ones(len(boxes)),
             layout="ltwh",
             normalised=True,
             first_index=1 if camera in videos else 0 if 0 in own else None,
             last_frame=max(own),
             image_size=sizes.get(camera),
         )
+        yield only_people(file, piece, [box.label for box in boxes])
 
 
 def _source(task: dict[str, Any]) -> str:

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from tracker.io.read.columns import people
+from tracker.io.read.columns import only_people
 from tracker.io.read.picture_names import camera_of, number_in
 from tracker.io.read.pieces import DetectionPiece, Piece
 from tracker.io.read.protocol import Certainty, Kind
@@ -54,19 +54,19 @@ def read(file: SourceFile) -> Iterator[Piece]:
         by_camera.setdefault(camera_of(picture), []).append(row)
     for camera, rows in by_camera.items():
         boxed = [(frame, corners, label) for frame, corners, label in rows if corners is not None]
-        keep = people([label for *_, label in boxed])
         looked_at = [frame for frame, *_ in rows]
-        yield DetectionPiece(
+        piece = DetectionPiece(
             source=file.path,
             format=NAME,
             camera=camera,
-            frames=np.array([frame for frame, *_ in boxed], dtype=np.int64)[keep],
-            boxes=np.array([corners for _, corners, _ in boxed]).reshape(-1, 4)[keep],
-            scores=np.ones(int(keep.sum())),
+            frames=np.array([frame for frame, *_ in boxed], dtype=np.int64),
+            boxes=np.array([corners for _, corners, _ in boxed]).reshape(-1, 4),
+            scores=np.ones(len(boxed)),
             layout="xyxy",
             first_index=0 if 0 in looked_at else None,
             last_frame=max(looked_at),
         )
+        yield only_people(file, piece, [label for *_, label in boxed])
 
 
 def _of_json(file: SourceFile) -> Iterator[_Row]:

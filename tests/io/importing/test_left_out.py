@@ -1,0 +1,73 @@
+"""What an import leaves out is summed up; where most of it would be, it ends with an error."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from tests.io.read.rig import boxes, cameras, walks
+from tracker.export.calibration import save_calibration
+from tracker.io.importing.gathering import gather
+from tracker.io.importing.options import ImportOptions
+from tracker.io.importing.settling import ImportPlan, settle
+from tracker.io.read.pieces import FormatError
+
+
+def _coco(folder: Path, *, people: bool) -> ImportPlan:
+    """Import COCO files in which every frame of a camera also has two cars and a dog."""
+    save_calibration(folder / "cameras.toml", cameras(), "pose2sim")
+    kinds = {1: "person", 2: "car", 3: "dog"}
+    for camera in cameras():
+        frames, rows = boxes(camera, walks())
+        found = [(frame, 1, box) for frame, box in zip(frames.tolist(), rows.tolist(), strict=True)]
+        others = [(frame, kind, [5, 5, 9, 9]) for frame in range(60) for kind in (2, 2, 3)]
+        images = [{"id": n, "file_name": f"{n:04}.jpg"} for n in range(60)]
+        annotations = [
+            {"id": n, "image_id": frame, "category_id": kind, "bbox": box}
+            for n, (frame, kind, box) in enumerate([*(found if people else []), *others])
+        ]
+        categories = [{"id": number, "name": name} for number, name in kinds.items()]
+        values = {"images": images, "annotations": annotations, "categories": categories}
+        (folder / f"{camera.name}.json").write_text(json.dumps(values))
+    return settle(gather([folder]), ImportOptions(fps=25.0))
+
+
+def test_boxes_of_other_classes_are_summed_up_camera_by_camera(tmp_path: Path) -> None:
+    plan = _coco(tmp_path, people=True)
+    for view in plan.views:
+        assert view.detections is not None
+        count = len(view.detections.frames)
+        (words,) = (text for text in plan.told if text.startswith(f"{view.camera.name}.json"))
+        assert f"180 of {count + 180} boxes" in words
+        assert "(120 car, 60 dog)" in words
+
+
+def test_a_recording_of_no_people_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(
+        FormatError, match=r"no box of a person.*180 of 180 boxes \(100%\).*120 car"
+    ):
+        _coco(tmp_path, people=False)
+
+
+@pytest.mark.parametrize(("spoilt", "used"), [(5, True), (45, False)])
+def test_a_series_of_which_most_is_spoilt_is_not_used(
+    tmp_path: Path, spoilt: int, used: bool
+) -> None:
+    joints = [100.0, 100.0, 0.9, 110.0, 200.0, 0.9, 105.0, 150.0, 0.9] * 6
+    for frame in range(60):
+        own = (
+            [{"pose_keypoints_2d": joints[:54]}]
+            if frame >= spoilt
+            else [{"pose_keypoints_2d": "x"}]
+        )
+        (tmp_path / f"cam1_{frame:06}.json").write_text(json.dumps({"people": own}))
+    taken = gather([tmp_path])
+    assert any(one.pieces for one in taken) == used
+    complaints = [one.complaint for one in taken if one.complaint]
+    if used:
+        assert len(complaints) == spoilt
+    else:
+        assert "45 of 60 files cannot be read, so the others are not used" in complaints[0]
+        assert "keypoints: expected numbers" in complaints[0]
