@@ -61,7 +61,7 @@ def test_metashape(tmp_path: Path) -> None:
 
 
 def test_the_scale_of_a_chunk_leads_to_metres(tmp_path: Path) -> None:
-    path = _metashape(tmp_path / "c.xml", "<transform><scale>2.5</scale></transform>")
+    path = _metashape(tmp_path / "c.xml", "<transform><scale locked='true'>2.5</scale></transform>")
     _as_world_to_camera(path, 2.5)
     assert raw_cameras(path)[0].convention.unit == "m"
 

@@ -19,10 +19,8 @@ from tracker.io.read.calibration.datasets import middlebury, tsai
 from tracker.io.read.calibration.reconstruction import (
     colmap,
     colmap_binary,
-    metashape,
     mvsnet,
-    nerfstudio,
-    openmvg,
+    scenes,
 )
 from tracker.io.read.detections import (
     coco,
@@ -53,11 +51,9 @@ FORMATS: tuple[Format, ...] = (
     opencv,
     colmap,
     colmap_binary,
-    nerfstudio,
-    metashape,
+    *scenes.FORMATS,
     mvsnet,
-    openmvg,
-    tsai,
+    tsai.TSAI,
     middlebury,
     projection,
     matlab,

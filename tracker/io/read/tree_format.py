@@ -9,7 +9,7 @@ attribute of XML is a field like a child.
 from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal
 
@@ -22,6 +22,20 @@ from tracker.io.read.source import SourceFile
 from tracker.io.read.values import shown
 
 Syntax = Literal["json", "yaml", "toml", "xml"]
+
+
+_TEXT = "text()"
+"""The key of the text of an element that has attributes."""
+
+
+def at(value: Any, path: str) -> Any:
+    """Return what lies at a path in a tree; None where there is nothing."""
+    for step in path.split("/"):
+        if isinstance(value, list) and step.isdigit():
+            value = value[int(step)] if int(step) < len(value) else None
+        else:
+            value = value.get(step) if isinstance(value, Mapping) else None
+    return value.get(_TEXT, value) if isinstance(value, Mapping) else value
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,13 +51,7 @@ class Node:
 
     def find(self, path: str) -> Any:
         """Return what lies at a path; None where there is nothing."""
-        value = self.value
-        for step in path.split("/"):
-            if isinstance(value, list) and step.isdigit():
-                value = value[int(step)] if int(step) < len(value) else None
-            else:
-                value = value.get(step) if isinstance(value, Mapping) else None
-        return value
+        return at(self.value, path)
 
     def get(self, path: str) -> Any:
         """Return what lies at a path.
@@ -74,18 +82,25 @@ class TreeFormat:
 
     NAME: str
     syntax: Syntax
-    cameras: str
-    """The path to one camera."""
+    cameras: str | Callable[[Any], Iterable[tuple[str, Any]]]
+    """The path to one camera; or a function that puts the tables of the cameras together from the
+    tree of the file, each with a key."""
     required: tuple[str, ...]
     """Paths in a camera's table. A table that has none of them is no camera's."""
     parts: tuple[Part, ...]
     convention: Convention = field(default_factory=Convention)
+    marks: tuple[str, ...] = ()
+    """Words in the beginning of a file that state the format; none if its fields do."""
+    most: int | None = None
+    """The largest number of cameras of a rig that stands still; None for any."""
     choose: Callable[[list[Node]], list[Node]] = list
     """Which cameras of a file are wanted."""
 
     def recognise(self, file: SourceFile) -> Certainty:
-        """The words of all paths in the beginning, and a camera with every required field."""
+        """The marks in the beginning; or a camera with every required field."""
         head = file.head_text
+        if self.marks:
+            return Certainty.SURE if all(mark in head for mark in self.marks) else Certainty.NO
         steps = {step for path in self.required for step in path.split("/")}
         if not all(step in head or step.isdigit() for step in steps):
             return Certainty.NO
@@ -100,7 +115,13 @@ class TreeFormat:
         """One piece with every camera of the file."""
         found = []
         pose = np.eye(4)
-        for node in self.choose(self._nodes(file)):
+        nodes = self.choose(self._nodes(file))
+        if self.most is not None and not 1 <= len(nodes) <= self.most:
+            raise file.error(
+                f"has {len(nodes)} posed pictures, expected one a camera that stands still, from 1 "
+                f"to {self.most}; leave out the others, or reconstruct one moment"
+            )
+        for node in nodes:
             missing = [path for path in self.required if node.find(path) is None]
             if missing:
                 raise file.error(
@@ -120,6 +141,9 @@ class TreeFormat:
         """The tables at the path to a camera that have any of the required fields."""
         tree = _of_xml(file.xml) if self.syntax == "xml" else getattr(file, self.syntax)
         found: list[Node] = []
+        if not isinstance(self.cameras, str):
+            rows = self.cameras(tree)
+            return [Node(file, value, key, place) for place, (key, value) in enumerate(rows)]
         for path in self.cameras.split("|"):
             for key, value in _matches(tree, path):
                 node = Node(file, value, key, len(found))
@@ -154,7 +178,8 @@ def _of_xml(element: ElementTree.Element) -> Any:
     if not children and not element.attrib:
         return element.text or ""
     several = {tag: own if len(own) > 1 else own[0] for tag, own in children.items()}
-    return {**element.attrib, **several}
+    text = {_TEXT: element.text} if not children and (element.text or "").strip() else {}
+    return {**element.attrib, **several, **text}
 
 
 def name(path: str = "") -> Part:

@@ -10,67 +10,53 @@ Source: Tsai, "A versatile camera calibration technique", IEEE J. Robotics and A
 
 from __future__ import annotations
 
-import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterator
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from tracker.io.read.pieces import CalibrationPiece, Convention, Piece, RawCamera
-from tracker.io.read.protocol import Certainty, Kind
+from tracker.io.read import values
+from tracker.io.read.pieces import Convention
 from tracker.io.read.source import SourceFile
-from tracker.io.read.values import focal_and_centre, image_size, number
-
-NAME = "Tsai camera XML (PETS, EPFL)"
-KIND: Kind = "calibration"
-SERIES = False
+from tracker.io.read.tree_format import Node, TreeFormat, name, number
 
 LARGEST_ERROR = 1.0
 """Pixels that OpenCV's lens may differ from Tsai's anywhere in the picture."""
 
-_CONVENTION = Convention(unit="mm", direction="world-to-camera", axes="opencv", up="z")
+
+def _lens(node: Node) -> Mapping[str, Any]:
+    sides = [number(node, f"Geometry/{side}") for side in ("width", "height")]
+    size = values.image_size(node.file, node.where("Geometry"), sides)
+    focal, kappa = number(node, "Intrinsic/focal"), number(node, "Intrinsic/kappa1")
+    fx = focal * number(node, "Intrinsic/sx") / number(node, "Geometry/dpx")
+    fy = focal / number(node, "Geometry/dpy")
+    cx, cy = (number(node, f"Intrinsic/{part}") for part in ("cx", "cy"))
+    k = values.focal_and_centre(fx, fy, cx, cy)
+    distortion = _distortion(node.file, size, k, kappa * focal * focal)
+    return {"image_size": size, "intrinsics": k, "distortion": distortion}
 
 
-def recognise(file: SourceFile) -> Certainty:
-    """XML with a Geometry that has dpx and an Intrinsic that has kappa1."""
-    head = file.head_text
-    is_it = "<" in head and "kappa1" in head and "dpx" in head and "Extrinsic" in head
-    return Certainty.SURE if is_it else Certainty.NO
-
-
-def read(file: SourceFile) -> Iterator[Piece]:
-    """One piece with every camera of the file."""
-    cameras = [e for e in file.xml.iter() if e.find("Geometry") is not None]
-    if not cameras:
-        raise file.error("expected a camera with Geometry, Intrinsic and Extrinsic, found none")
-    yield CalibrationPiece(file.path, NAME, tuple(_camera(file, camera) for camera in cameras))
-
-
-def _camera(file: SourceFile, element: ElementTree.Element) -> RawCamera:
+def _pose(node: Node) -> Mapping[str, Any]:
+    """R = Rz Ry Rx, and t."""
     from scipy.spatial.transform import Rotation  # a server starts without it
 
-    def value(tag: str, field: str) -> float:
-        child = element.find(tag)
-        text = None if child is None else child.get(field)
-        return number(file, f"{tag} {field}", text)
+    angles = [number(node, f"Extrinsic/r{axis}") for axis in "xyz"]
+    return {
+        "rotation": np.asarray(Rotation.from_euler("xyz", angles).as_matrix()),
+        "translation": np.array([number(node, f"Extrinsic/t{axis}") for axis in "xyz"]),
+    }
 
-    size = image_size(file, "Geometry", [value("Geometry", "width"), value("Geometry", "height")])
-    focal, kappa = value("Intrinsic", "focal"), value("Intrinsic", "kappa1")
-    fx = focal * value("Intrinsic", "sx") / value("Geometry", "dpx")
-    fy = focal / value("Geometry", "dpy")
-    k = focal_and_centre(fx, fy, value("Intrinsic", "cx"), value("Intrinsic", "cy"))
-    angles = [value("Extrinsic", f"r{axis}") for axis in "xyz"]
-    return RawCamera(
-        name=element.get("name", ""),
-        image_size=size,
-        intrinsics=k,
-        distortion=_distortion(file, size, k, kappa * focal * focal),
-        # R = Rz Ry Rx
-        rotation=np.asarray(Rotation.from_euler("xyz", angles).as_matrix()),
-        translation=np.array([value("Extrinsic", f"t{axis}") for axis in "xyz"]),
-        convention=_CONVENTION,
-    )
+
+TSAI = TreeFormat(
+    "Tsai camera XML (PETS, EPFL)",
+    "xml",
+    cameras=".|*|*/*",
+    required=("Geometry/dpx", "Intrinsic/kappa1", "Extrinsic/rx"),
+    parts=(name("name"), _lens, _pose),
+    convention=Convention(unit="mm", direction="world-to-camera", axes="opencv", up="z"),
+)
 
 
 def _distortion(
