@@ -40,14 +40,12 @@ def test_boxes_of_other_classes_are_summed_up_camera_by_camera(tmp_path: Path) -
         assert view.detections is not None
         count = len(view.detections.frames)
         (words,) = (text for text in plan.told if text.startswith(f"{view.camera.name}.json"))
-        assert f"180 of {count + 180} boxes" in words
+        assert f"180 of {count + 180} rows" in words
         assert "(120 car, 60 dog)" in words
 
 
 def test_a_recording_of_no_people_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(
-        FormatError, match=r"no box of a person.*180 of 180 boxes \(100%\).*120 car"
-    ):
+    with pytest.raises(FormatError, match=r"no box of a person.*180 of 180 rows \(100%\).*120 car"):
         _coco(tmp_path, people=False)
 
 

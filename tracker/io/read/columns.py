@@ -278,8 +278,8 @@ def only_people(
         boxes=piece.boxes[keep],
         scores=piece.scores[keep],
         keypoints=None if piece.keypoints is None else piece.keypoints[keep],
-        left_out=f"{file.where}: {out} of {len(keep)} boxes ({out / len(keep):.0%}) are left out, "
-        f"which are no people's ({listed}{' …' if len(others) > _LISTED else ''})",
+        left_out=f"{file.where}: {out} of {len(keep)} rows ({out / len(keep):.0%}) are left out, "
+        f"which are no boxes of people ({listed}{' …' if len(others) > _LISTED else ''})",
     )
 
 
