@@ -127,14 +127,17 @@ def test_results_of_ultralytics(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("index", [True, False], ids=["pandas", "polars"])
 def test_tables_of_ultralytics(tmp_path: Path, index: bool) -> None:
-    """With the box as Python writes it, in one cell; data frames of pandas number their rows."""
+    """With the box as Python writes it, in one cell; data frames of pandas number their rows, those
+    of polars have tracks and key points here."""
     files = []
     for frame in np.unique(FRAMES):
-        rows = [["", *_HEAD] if index else _HEAD]
+        head = _HEAD if index else [*_HEAD, "track_id", "keypoints"]
+        rows = [["", *head] if index else head]
         for number, box in enumerate(BOXES[FRAMES == frame]):
             corners = dict(zip(("x1", "y1", "x2", "y2"), _corners(box), strict=True))
             row = ["person", 0, 0.7, repr(corners)]
-            rows.append([number, *row] if index else row)
+            pose = repr({"x": [1.0, 2.0], "y": [3.0, 4.0], "visible": [0.9, 0.8]})
+            rows.append([number, *row] if index else [*row, number + 1, pose])
         files.append(tmp_path / f"frame{frame}.csv")
         with files[-1].open("w", newline="") as file:
             csv.writer(file).writerows(rows)
@@ -226,6 +229,18 @@ def test_decimal_commas(tmp_path: Path) -> None:
     text = "\r\n".join(["Frame;Left;Top;Width;Height", *lines])
     path.write_text(text.replace(",0;", ";", 1), encoding="utf-8-sig")
     _assert_boxes(_detections(path))
+
+
+def test_decimal_commas_between_blanks(tmp_path: Path) -> None:
+    """As programs in C write text where the decimal sign is a comma."""
+    path = tmp_path / "det.txt"
+    rows = zip(FRAMES, BOXES.tolist(), strict=True)
+    lines = [f"{f + 1} -1 {' '.join(map(repr, b))} 0.9 -1 -1 -1" for f, b in rows]
+    path.write_text("\n".join(lines).replace(".", ","))
+    piece = _detections(path)
+    assert piece.format == "MOTChallenge detections"
+    _assert_boxes(piece, first=1)
+    np.testing.assert_array_equal(piece.scores, 0.9)
 
 
 @pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "cp1252"])

@@ -73,6 +73,23 @@ def test_openpose_a_file_a_frame_with_nobody_in_the_first(tmp_path: Path) -> Non
     np.testing.assert_allclose(piece.scores, 0.8)
 
 
+@pytest.mark.parametrize("missing", ["NaN", "null", "0"])
+def test_a_joint_or_a_person_of_nan_was_not_seen(tmp_path: Path, missing: str) -> None:
+    joints = _stick_figure(600.0)
+    pose = [number for name in COCO for number in (*joints[name], 0.9)]
+    gaps = [None if n // 3 in (7, 8) else number for n, number in enumerate(pose)]
+    people = [{"pose_keypoints_2d": own} for own in (pose, gaps, [None] * len(pose))]
+    path = tmp_path / "cam1_000000.json"
+    path.write_text(json.dumps({"people": people}).replace("null", missing))
+    piece = _detections(path)
+    np.testing.assert_allclose(piece.boxes[0], piece.boxes[1])
+    assert len(piece.boxes) == 2
+    assert piece.keypoints is not None
+    assert np.isnan(piece.keypoints[1, 7:9]).all()
+    assert np.isfinite(piece.keypoints[1, 9:]).all()
+    np.testing.assert_allclose(piece.scores, 0.9)
+
+
 def test_alphapose(tmp_path: Path) -> None:
     joints = _stick_figure(600.0)
     pose = [value for name in COCO for value in (*joints[name], 0.8)]

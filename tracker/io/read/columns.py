@@ -212,9 +212,11 @@ def _detections(
     boxes = np.where(np.isfinite(scores)[:, None], boxes, np.nan)
     if "score" in found:
         scores = to_unit(np.where(np.isfinite(scores), scores, 0.0))
-    given = columns[found["class"]] if "class" in found else [""] * len(frames)
-    classes = np.array([str(cell) for cell in given], dtype=object)
-    wanted = people(classes.tolist())
+    classes = np.full(len(frames), "", dtype=object)
+    wanted = np.ones(len(frames), dtype=bool)
+    if "class" in found:
+        classes[:] = [str(cell) for cell in columns[found["class"]]]
+        wanted = people(classes.tolist())
     keep = wanted & np.isfinite(boxes).all(axis=1)
     cameras = np.array(_cameras(columns, found, len(frames)))
     for camera in dict.fromkeys(cameras[keep].tolist()) or [""]:
