@@ -23,7 +23,6 @@ from tracker.io.read.values import shown
 
 Syntax = Literal["json", "yaml", "toml", "xml"]
 
-
 _TEXT = "text()"
 """The key of the text of an element that has attributes."""
 
@@ -102,7 +101,8 @@ class TreeFormat:
         if self.marks:
             return Certainty.SURE if all(mark in head for mark in self.marks) else Certainty.NO
         steps = {step for path in self.required for step in path.split("/")}
-        if not all(step in head or step.isdigit() for step in steps):
+        sign = '"' if self.syntax == "json" else ""
+        if not all(f"{sign}{step}{sign}" in head or step.isdigit() for step in steps):
             return Certainty.NO
         starts = {"json": "{[", "xml": "<"}.get(self.syntax)
         if starts is not None and head.lstrip()[:1] not in tuple(starts):
