@@ -22,6 +22,9 @@ _FEWEST = 50
 _SAMPLED = 1000
 """Rows of which the grid is inferred, at most."""
 
+_COMPARED = 200
+"""Rows of these by which counts of columns are compared."""
+
 _MOST_COLUMNS = 10_000
 
 _LARGEST_CELL = 1.0
@@ -117,12 +120,13 @@ def _slope(cells: Float[ndarray, " N"], along: Float[ndarray, " N"]) -> float:
 
 def _columns(cells: Int[ndarray, " N"], along: Float[ndarray, " N"], slope: float) -> int:
     """Return the count of columns with which the other coordinate scatters least."""
-    counts = range(2, min(_MOST_COLUMNS, 3 + int(_LARGEST_CELL / abs(slope))))
+    some = slice(None, None, max(1, len(cells) // _COMPARED))
+    counts = np.arange(2, min(_MOST_COLUMNS, 3 + int(_LARGEST_CELL / abs(slope))))
     scatters = []
-    for count in counts:
-        off = along - slope * count * (cells % count)
-        scatters.append(float(np.median(np.abs(off - np.median(off)))))
-    return counts[int(np.argmin(scatters))]
+    for few in np.array_split(counts[:, None], len(counts) // _COMPARED + 1):
+        off = along[some] - slope * few * (cells[some] % few)
+        scatters.append(np.median(np.abs(off - np.median(off, axis=1)[:, None]), axis=1))
+    return int(counts[np.argmin(np.concatenate(scatters))])
 
 
 def _rounded(cell: float) -> float:
