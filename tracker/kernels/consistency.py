@@ -10,7 +10,8 @@ from numpy import ndarray
 from tracker.kernels.compilation import compiled_later
 
 
-def _density_ratios(
+@compiled_later
+def density_ratios(
     feet: ndarray,
     heads: ndarray,
     whole: ndarray,
@@ -136,7 +137,8 @@ def _density_ratios(
     return result
 
 
-def _best_share(ratios: ndarray) -> float:
+@compiled_later
+def best_share(ratios: ndarray) -> float:
     """Find the q in 0 … 0.999 that maximises Σ log(1 − q + q ρ), a concave function.
 
     Args:
@@ -162,5 +164,58 @@ def _best_share(ratios: ndarray) -> float:
     return 0.5 * (low + high)
 
 
-density_ratios = compiled_later(_density_ratios)
-best_share = compiled_later(_best_share)
+@compiled_later
+def pair_evidence(
+    feet: ndarray,
+    heads: ndarray,
+    whole: ndarray,
+    seen: ndarray,
+    background: ndarray,
+    starts: ndarray,
+    rotations: ndarray,
+    centres: ndarray,
+    compared: ndarray,
+    scene: ndarray,
+    sigma: float,
+    height_sigma: float,
+) -> tuple[ndarray, ndarray]:
+    """Compute max_q Σ_z log(1 − q + q ρ_z) of the boxes of each camera given those of another.
+
+    Args:
+        feet: (N, 3), unit directions to the feet of the boxes of all C cameras, world axes.
+        heads: (N, 3), unit directions to their heads.
+        whole: (N,), whether neither end of the box is cut off.
+        seen: (N, 4), x and y of foot and head on the camera's image plane at distance 1.
+        background: (N,), log p_b(z), NaN for a box that is not compared.
+        starts: (C, M + 1), index of the first box of each camera and moment.
+        rotations: (C, 3, 3), R of each camera.
+        centres: (C, 3), position of each camera.
+        compared: (C, C), whether the boxes of camera b are compared with those of camera a.
+        scene: (8,), the rise r, the normal n, f and τ.
+        sigma: σ, deviation of a box's ends in its heights.
+        height_sigma: σ_H, deviation of people's heights in the common height.
+
+    Returns:
+        (C, C, M), nats by a, b and moment; and (C, C), q.
+    """
+    cameras, moments = len(starts), starts.shape[1] - 1
+    nats = np.zeros((cameras, cameras, moments))
+    shares = np.zeros((cameras, cameras))
+    for a in range(cameras):
+        begin, end = starts[a, 0], starts[a, moments]
+        for b in range(cameras):
+            if not compared[a, b]:
+                continue
+            low, high = starts[b, 0], starts[b, moments]
+            ratios = density_ratios(
+                feet[begin:end], heads[begin:end], whole[begin:end], starts[a] - begin, centres[a],
+                seen[low:high], background[low:high], starts[b] - low, rotations[b], centres[b],
+                scene, sigma, height_sigma,
+            )  # fmt: skip
+            q = best_share(ratios)
+            shares[a, b] = q
+            for m in range(moments):
+                for z in range(starts[b, m] - low, starts[b, m + 1] - low):
+                    if not math.isnan(ratios[z]):
+                        nats[a, b, m] += math.log(1.0 - q + q * ratios[z])
+    return nats, shares

@@ -49,6 +49,10 @@ class Moments:
     feet: Float[ndarray, "N 3"]
     whole: Bool[ndarray, " N"]
     """False where a box is clipped by the image's edge."""
+    seen: Float[ndarray, "N 4"]
+    """x and y of foot and head at distance 1 ahead."""
+    background: Float[ndarray, " N"]
+    """log p_b(z), NaN for a box that is not compared."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -101,18 +105,24 @@ class Evidence:
         return float(np.mean(list(self.explained.values()))) if self.explained else 0.0
 
 
-def at_moments(rays: Rays, moments: Int[ndarray, " M"]) -> Moments:
+def at_moments(
+    rays: Rays, moments: Int[ndarray, " M"], plane: tuple[ndarray, ndarray] | None = None
+) -> Moments:
     """Select the boxes of some steps.
 
     Args:
         rays: Boxes of one camera, sorted by step.
         moments: Steps, in any order.
+        plane: What :func:`on_image_plane` returns for these boxes, where it is known.
     """
     first = np.searchsorted(rays.frames, moments, "left")
     counts = np.searchsorted(rays.frames, moments, "right") - first
     starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
     rows = np.arange(starts[-1]) - np.repeat(starts[:-1] - first, counts)
-    return Moments(starts, rays.heads[rows], rays.feet[rows], rays.whole[rows])
+    seen, background = on_image_plane(rays) if plane is None else plane
+    return Moments(
+        starts, rays.heads[rows], rays.feet[rows], rays.whole[rows], seen[rows], background[rows]
+    )
 
 
 def fit_floor(
@@ -158,40 +168,40 @@ def evidence(
         among: Which pairs (a, b) are compared; all where it is not given.
     """
     there = [camera for camera, own in enumerate(boxes) if own is not None and len(own.heads)]
-    height = float(np.linalg.norm(scene.rise))
-    values = np.array([*scene.rise, *(scene.rise / height), scene.floor, scene.scatter])
-    world = {}
-    for camera in there:
-        own = boxes[camera]
-        assert own is not None
-        feet, heads = in_world(poses[camera], own.feet), in_world(poses[camera], own.heads)
-        world[camera] = (np.ascontiguousarray(feet), np.ascontiguousarray(heads))
-    terms, explained = {}, {}
-    for b in there:
-        own = boxes[b]
-        assert own is not None
-        seen, background = _on_image_plane(own)
-        moment = np.repeat(np.arange(len(own.starts) - 1), np.diff(own.starts))
-        for a in there:
-            if a == b or (among is not None and not among[a, b]):
-                continue
-            of = boxes[a]
-            assert of is not None
-            ratios = kernels.density_ratios(
-                *world[a], of.whole, of.starts, poses[a].centre, seen, background, own.starts,
-                np.ascontiguousarray(poses[b].rotation), poses[b].centre, values, SIGMA,
-                HEIGHT_SIGMA,
-            )  # fmt: skip
-            q = kernels.best_share(ratios)
-            nats = np.nan_to_num(np.log(1.0 - q + q * ratios))
-            terms[a, b] = np.bincount(moment, nats, len(own.starts) - 1)
-            explained[a, b] = float(q)
     moments = max((len(own.starts) - 1 for own in boxes if own is not None), default=0)
-    return Evidence(terms, explained, len(there), moments)
+    if not there:
+        return Evidence({}, {}, 0, moments)
+    own = [box for box in boxes if box is not None and len(box.heads)]
+    firsts = np.cumsum([0, *(len(box.heads) for box in own[:-1])])
+    compared = ~np.eye(len(there), dtype=bool)
+    if among is not None:
+        compared &= among[np.ix_(there, there)]
+    height = float(np.linalg.norm(scene.rise))
+    nats, explained = kernels.pair_evidence(
+        np.concatenate([in_world(poses[c], box.feet) for c, box in zip(there, own, strict=True)]),
+        np.concatenate([in_world(poses[c], box.heads) for c, box in zip(there, own, strict=True)]),
+        np.concatenate([box.whole for box in own]),
+        np.concatenate([box.seen for box in own]),
+        np.concatenate([box.background for box in own]),
+        np.array([first + box.starts for first, box in zip(firsts, own, strict=True)]),
+        np.array([poses[camera].rotation for camera in there]),
+        np.array([poses[camera].centre for camera in there]),
+        compared,
+        np.array([*scene.rise, *(scene.rise / height), scene.floor, scene.scatter]),
+        SIGMA,
+        HEIGHT_SIGMA,
+    )
+    pairs = [(int(a), int(b)) for a, b in np.argwhere(compared)]
+    return Evidence(
+        {(there[a], there[b]): nats[a, b] for a, b in pairs},
+        {(there[a], there[b]): float(explained[a, b]) for a, b in pairs},
+        len(there),
+        moments,
+    )
 
 
-def _on_image_plane(own: Moments) -> tuple[Float[ndarray, "N 4"], Float[ndarray, " N"]]:
-    """Feet and heads at distance 1 ahead, and the logarithm of the density p_b of each box."""
+def on_image_plane(own: Rays) -> tuple[Float[ndarray, "N 4"], Float[ndarray, " N"]]:
+    """Compute feet and heads at distance 1 ahead, and log p_b of each box of a camera."""
     good = own.whole & (own.feet[:, 2] > _AHEAD) & (own.heads[:, 2] > _AHEAD)
     with np.errstate(all="ignore"):
         feet = own.feet[:, :2] / own.feet[:, 2:]

@@ -19,6 +19,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
+from tracker.geometry.camera import Camera
 from tracker.geometry.consistency.consensus import Consensus, consensus
 from tracker.geometry.consistency.observed import PairsOfBoxes, Pose, Rays, pair_up, rays_of, uncut
 from tracker.io.checks.level import upwards
@@ -215,9 +216,10 @@ class Judge:
             most_pairs: Of boxes of two cameras.
         """
         self.cameras = tuple(cameras)
-        self._seen = tuple(seen)
         self.sizes = [likely_size(camera) for camera in cameras]
         self._rays: dict[tuple[object, ...], Rays] = {}
+        self._lenses: dict[tuple[int, float], Camera] = {}
+        self._breadths: dict[tuple[object, ...], float] = {}
         empty = Rays(np.zeros(0, int), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, bool))
         times = [
             empty
@@ -282,13 +284,17 @@ class Judge:
 
     def _breadth(self, camera: int, reading: Reading) -> float:
         """The logarithm of how many times as broad as tall the usual box of a camera is."""
-        own = self._seen[camera]
+        own, calibration = self._paired[camera], self.order(reading)[camera]
         if own is None or not len(own.four):
             return 0.0
-        _, size = self.lens_at(self.order(reading)[camera], reading)
-        boxes = boxes_by(own.four, reading, size)
-        sides = boxes[uncut(boxes, size), 2:]
-        return float(np.median(np.log(sides[:, 0] / sides[:, 1]))) if len(sides) else 0.0
+        key = (camera, calibration, reading.layout, reading.normalised, reading.pixels)
+        if key not in self._breadths:
+            size = self.lens_at(calibration, reading)[0].image_size
+            boxes = boxes_by(own.four, reading, size)
+            sides = boxes[uncut(boxes, size), 2:]
+            broad = float(np.median(np.log(sides[:, 0] / sides[:, 1]))) if len(sides) else 0.0
+            self._breadths[key] = broad
+        return self._breadths[key]
 
     def refined(self, judged: Judged) -> Judged:
         """With heads and feet where people who stand upright have them in the boxes."""
@@ -362,19 +368,21 @@ class Judge:
             told,
         )
         if key not in self._rays:
-            raw, size = self.lens_at(calibration, reading)
-            boxes = boxes_by(own.four, reading, size)
+            lens, known = self.lens_at(calibration, reading)
+            boxes = boxes_by(own.four, reading, lens.image_size)
             turn, up = (heads, None) if isinstance(heads, int) else (0, heads)
-            self._rays[key] = rays_of(
-                own.frames, boxes, lens_of(raw, size), raw.image_size is not None, up, turn
-            )
+            self._rays[key] = rays_of(own.frames, boxes, lens, known, up, turn)
         return self._rays[key]
 
-    def lens_at(self, calibration: int, reading: Reading) -> tuple[RawCamera, tuple[int, int]]:
-        """A camera for the pictures in which boxes are given, and the size of these."""
-        raw, size = self.cameras[calibration], self.sizes[calibration]
-        factor = reading.pixels
-        return with_pixels(raw, factor), (round(factor * size[0]), round(factor * size[1]))
+    def lens_at(self, calibration: int, reading: Reading) -> tuple[Camera, bool]:
+        """A lens for the pictures in which boxes are given, and whether their size is known."""
+        key = calibration, reading.pixels
+        if key not in self._lenses:
+            factor = reading.pixels
+            raw = with_pixels(self.cameras[calibration], factor)
+            width, height = self.sizes[calibration]
+            self._lenses[key] = lens_of(raw, (round(factor * width), round(factor * height)))
+        return self._lenses[key], self.cameras[calibration].image_size is not None
 
     def away(self, judged: Judged) -> float:
         """The usual distance from a camera to people, in the world's unit."""

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from collections.abc import Sequence as Many
 from dataclasses import dataclass, field, replace
 from typing import Literal
@@ -27,10 +27,11 @@ from tracker.geometry.consistency.likelihood import (
     at_moments,
     evidence,
     fit_floor,
+    on_image_plane,
 )
 from tracker.geometry.consistency.observed import Pose, Rays, rays_of
 from tracker.geometry.consistency.odds import DECISIVE, log_odds
-from tracker.io.checks.reading import Reading, boxes_by, lens_of, turns_of
+from tracker.io.checks.reading import Reading, boxes_by, turns_of
 from tracker.io.checks.readings import Judge, Judged, Open, Seen, restricted
 from tracker.io.read.pieces import RawCamera
 
@@ -43,13 +44,27 @@ SPACING = 0.5
 FEW_MOMENTS = 60
 """Number of moments for which a short recording is sampled more densely."""
 
+PART = 3
+"""Every so many-th moment is compared first; what is far behind there is compared no further."""
+
+BEHIND = 30.0
+"""Nats by which an interpretation is far behind, if its odds are decisive too."""
+
 NAME_PRIOR = {"name": 7.0, "number": 3.0, "order": 1.0}
 """Nats for each camera that keeps the files which belong to it by name, by number or by order."""
+
+Plane = tuple[Float[ndarray, "N 4"], Float[ndarray, " N"]]
 
 RARE = 7.0
 """Nats against a mirrored world, mirrored pictures, and pictures of another size than stated."""
 
-_RIVALS = 4  # number of readings whose pixels, handedness and order are questioned
+_MOST_PAIRS, _MOST_PAIRS_FIRST = 2000, 600  # of boxes of two cameras, in all and at first
+_MOST_COMPARED = 16  # interpretations that are compared by all moments
+_LEAST_FIRST = 20  # moments that are compared first, one for each block of time
+_LEAST_RIVALS, _RIVALS = (
+    2,
+    4,
+)  # readings whose pixels, handedness and order are questioned
 _LEAST_SHARE = 0.1  # of a camera's boxes that another one explains, below which none is explained
 _MANY_BOXES = 200  # least number of boxes that have to be explained
 _COARSE, _NEAR, _WIDEST = 0.2, 3.0, 10.0  # seconds between lags, and to the farthest of them
@@ -114,63 +129,79 @@ class ClockFit:
 class Likelihood:
     """E of readings of one set of cameras and boxes."""
 
-    def __init__(self, judge: Judge, seen: Many[Seen | None], fps: float) -> None:
+    def __init__(
+        self,
+        cameras: Many[RawCamera],
+        seen: Many[Seen | None],
+        fps: float,
+        moments: Int[ndarray, " M"] | None = None,
+    ) -> None:
         """Prepare.
 
         Args:
-            judge: Of the consensus of pairs of boxes.
-            seen: Boxes of each camera, sorted by step.
+            cameras: As their files give them.
+            seen: Boxes of each camera.
             fps: Steps a second.
+            moments: Steps that alone are looked at; chosen among all where they are not given.
         """
-        self.judge = judge
-        self.moments = choose_moments(seen, fps)
-        chosen = set(self.moments.tolist())
-        self._seen: list[Seen | None] = []
-        for own in seen:
-            if own is None:
-                self._seen.append(None)
-                continue
-            rows = np.flatnonzero(np.isin(own.frames, list(chosen)))
-            rows = rows[np.argsort(own.frames[rows], kind="stable")]
-            self._seen.append(Seen(own.frames[rows], own.four[rows]))
-        self._rays: dict[tuple[object, ...], Rays] = {}
+        self.moments = choose_moments(seen, fps) if moments is None else moments
+        self._seen = [None if own is None else _at(own, self.moments) for own in seen]
+        most = _MOST_PAIRS if moments is None else _MOST_PAIRS_FIRST
+        self.judge = Judge(cameras, seen if moments is None else self._seen, most)
         self.fps = fps
         self._every = list(seen)
-        self._every_rays: dict[tuple[object, ...], Rays] = {}
+        self._boxes: dict[tuple[object, ...], tuple[Rays, Plane]] = {}
+        self._chosen: dict[tuple[object, ...], Moments] = {}
+
+    def thinned(self) -> Likelihood:
+        """The same of every third moment."""
+        count = len(self.moments)
+        part = max(1, min(PART, count // _LEAST_FIRST))
+        return Likelihood(self.judge.cameras, self._every, self.fps, self.moments[::part])
 
     @property
     def boxes(self) -> int:
         """The number of boxes at the moments."""
         return sum(len(own.frames) for own in self._seen if own is not None)
 
-    def rays(
-        self, reading: Reading, poses: Many[Pose], up: ndarray, *, every: bool = False
-    ) -> list[Rays | None]:
-        """The boxes as rays of people who stand along a direction of the world.
+    def boxes_at(
+        self,
+        reading: Reading,
+        poses: Many[Pose],
+        scene: Scene,
+        steps: Many[Int[ndarray, " M"] | None],
+    ) -> list[Moments | None]:
+        """The boxes of each camera at its own steps, of people who stand along the rise.
 
         Args:
             reading: How calibration and boxes are meant.
             poses: Of the cameras.
-            up: A unit vector of the world.
-            every: Whether the boxes of all steps are meant, not those of the moments alone.
+            scene: How people stand.
+            steps: Of each camera; None for the moments.
         """
-        found: list[Rays | None] = []
-        known_rays = self._every_rays if every else self._rays
-        for camera, (own, calibration) in enumerate(
-            zip(self._every if every else self._seen, self.judge.order(reading), strict=True)
-        ):
+        up = scene.rise / np.linalg.norm(scene.rise)
+        found: list[Moments | None] = []
+        for camera, calibration in enumerate(self.judge.order(reading)):
+            own = self._seen[camera] if steps[camera] is None else self._every[camera]
             if own is None:
                 found.append(None)
                 continue
             way = poses[camera].rotation @ up
-            key = (camera, calibration, reading.layout, reading.normalised, reading.flipped,
-                   reading.pixels, tuple(np.round(way, 7).tolist()))  # fmt: skip
-            if key not in known_rays:
-                raw, size = self.judge.lens_at(calibration, reading)
-                boxes = boxes_by(own.four, reading, size)
-                known = raw.image_size is not None
-                known_rays[key] = rays_of(own.frames, boxes, lens_of(raw, size), known, way)
-            found.append(known_rays[key])
+            key = (steps[camera] is None, camera, calibration, reading.layout, reading.normalised,
+                   reading.flipped, reading.pixels, tuple(np.round(way, 7).tolist()))  # fmt: skip
+            if key not in self._boxes:
+                lens, known = self.judge.lens_at(calibration, reading)
+                four = boxes_by(own.four, reading, lens.image_size)
+                rays = rays_of(own.frames, four, lens, known, way)
+                self._boxes[key] = rays, on_image_plane(rays)
+            rays, plane = self._boxes[key]
+            at = steps[camera]
+            if at is not None:
+                found.append(at_moments(rays, at, plane))
+                continue
+            if key not in self._chosen:
+                self._chosen[key] = at_moments(rays, self.moments, plane)
+            found.append(self._chosen[key])
         return found
 
     def score(self, judged: Judged, prior: float = 0.0) -> Interpretation | None:
@@ -183,53 +214,46 @@ class Likelihood:
                 best = found
         return best
 
-    def at(
-        self, judged: Judged, scene: Scene, prior: float, late: Mapping[int, int] | None = None
-    ) -> Interpretation:
+    def at(self, judged: Judged, scene: Scene, prior: float) -> Interpretation:
         """Compute E of a reading with a given scene.
 
         Args:
             judged: The reading.
             scene: How people stand.
             prior: Log prior.
-            late: Moments by which the boxes of cameras are turned around in time.
         """
         poses = self.judge.poses(judged.reading)
-        rays = self.rays(judged.reading, poses, scene.rise / np.linalg.norm(scene.rise))
-        boxes: list[Moments | None] = []
-        for camera, own in enumerate(rays):
-            if own is None:
-                boxes.append(None)
-                continue
-            turned = np.roll(self.moments, -(late or {}).get(camera, 0))
-            boxes.append(at_moments(own, turned))
+        boxes = self.boxes_at(judged.reading, poses, scene, [None] * len(poses))
         return Interpretation(judged.reading, judged, scene, evidence(boxes, poses, scene), prior)
 
-    def by_lag(
-        self, best: Interpretation, camera: int, lags: Many[int], late: Mapping[int, int]
+    def of_camera(
+        self,
+        best: Interpretation,
+        camera: int,
+        steps: Iterable[Int[ndarray, " M"]],
+        late: Mapping[int, int] | None = None,
     ) -> Float[ndarray, "L M"]:
-        """Evidence of the pairs with one camera by its lag, in steps, and moment.
+        """Evidence of the pairs with one camera by the steps at which its boxes are taken.
 
         Args:
             best: The reading.
             camera: Which camera.
-            lags: Steps by which it is late.
+            steps: What of its boxes is compared with the others' at the moments.
             late: Steps by which other cameras are late.
         """
         poses = self.judge.poses(best.reading)
-        up = best.scene.rise / np.linalg.norm(best.scene.rise)
-        every = self.rays(best.reading, poses, up, every=True)
-        boxes = [
-            None if own is None else at_moments(own, self.moments + late.get(other, 0))
-            for other, own in enumerate(every)
-        ]
-        among = np.zeros((len(boxes), len(boxes)), dtype=bool)
+        late = late or {}
+        at: list[Int[ndarray, " M"] | None] = [None] * len(poses)
+        for other, lag in late.items():
+            at[other] = self.moments + lag
+        among = np.zeros((len(poses), len(poses)), dtype=bool)
         among[camera], among[:, camera] = True, True
+        boxes = self.boxes_at(best.reading, poses, best.scene, at)
         rows = []
-        own = every[camera]
-        assert own is not None
-        for lag in lags:
-            boxes[camera] = at_moments(own, self.moments + lag)
+        for own in steps:
+            at = [None] * len(poses)
+            at[camera] = own
+            boxes[camera] = self.boxes_at(best.reading, poses, best.scene, at)[camera]
             rows.append(evidence(boxes, poses, best.scene, among=among).of_camera(camera))
         return np.array(rows)
 
@@ -246,6 +270,13 @@ class Likelihood:
             if one is judged:
                 yield one, rise
             yield one, axis
+
+
+def _at(own: Seen, moments: Int[ndarray, " M"]) -> Seen:
+    """The boxes of some steps, sorted by step."""
+    rows = np.flatnonzero(np.isin(own.frames, moments))
+    rows = rows[np.argsort(own.frames[rows], kind="stable")]
+    return Seen(own.frames[rows], own.four[rows])
 
 
 def choose_moments(seen: Many[Seen | None], fps: float) -> Int[ndarray, " M"]:
@@ -284,27 +315,15 @@ def find_reading(
     Returns:
         None where fewer than two cameras have boxes at the same steps.
     """
-    judge = Judge(cameras, seen)
+    likelihood = Likelihood(cameras, seen, fps)
+    judge = likelihood.judge
     if not judge.possible:
         return None
-    likelihood = Likelihood(judge, seen, fps)
     open_ = restricted(tried or Open(), cameras, seen)
-    readings = list(_readings(open_, cameras))
-    found = _scored(likelihood, readings, 0.0)
-    rivals = [one.reading for one in found[:_RIVALS]]
-    if not found or found[0].evidence.share < _EXPLAINED:
-        rivals = readings  # any of them may explain the boxes in a mirror or of other pictures
-    found += _scored(likelihood, list(_questioned(rivals, pixels)), -RARE)
+    first = _candidates(likelihood.thinned(), open_, NAME_PRIOR[names], pixels)
+    found = _compared(likelihood, first)
     if not found:
         return None
-    found.sort(key=lambda one: -one.score)
-    if open_.orders:
-        starts = found[:1]
-        if found[0].evidence.share < _EXPLAINED and len(cameras) < _EVERY_ORDER:
-            starts = found[:_RIVALS]  # of few cameras nothing agrees before they are exchanged
-        for start in starts:
-            found += _with_orders(likelihood, start, NAME_PRIOR[names])
-        found.sort(key=lambda one: -one.score)
     best = found[0]
     others = [one for one in found[1:] if not same_scene(judge, best, one)]
     odds = [
@@ -323,6 +342,52 @@ def find_reading(
         return Verdict("none", best, judge, rival, least, confirmed, clocks)
     kind: Literal["decided", "open"] = "decided" if least >= DECISIVE else "open"
     return Verdict(kind, best, judge, rival, least, confirmed, clocks)
+
+
+def _candidates(
+    likelihood: Likelihood, open_: Open, each: float, pixels: Many[float]
+) -> list[Interpretation]:
+    """Every interpretation in which any boxes meet, the likeliest first."""
+    cameras = likelihood.judge.cameras
+    readings = list(_readings(open_, cameras))
+    found = _scored(likelihood, readings, 0.0)
+    rivals = [
+        one.reading
+        for number, one in enumerate(found[:_RIVALS])
+        if number < _LEAST_RIVALS or not _far_behind(found[0], one)
+    ]
+    if not found or found[0].evidence.share < _EXPLAINED:
+        rivals = readings  # any of them may explain the boxes in a mirror or of other pictures
+    found += _scored(likelihood, list(_questioned(rivals, pixels)), -RARE)
+    found.sort(key=lambda one: -one.score)
+    if open_.orders and found:
+        starts = found[:1]
+        if found[0].evidence.share < _EXPLAINED and len(cameras) < _EVERY_ORDER:
+            starts = found[:_RIVALS]  # of few cameras nothing agrees before they are exchanged
+        for start in starts:
+            found += _with_orders(likelihood, start, each)
+        found.sort(key=lambda one: -one.score)
+    return found
+
+
+def _compared(likelihood: Likelihood, first: Many[Interpretation]) -> list[Interpretation]:
+    """By all moments those that are not far behind by some of them, the likeliest first."""
+    found: dict[Reading, Interpretation] = {}
+    near = [one for one in first if not _far_behind(first[0], one)][:_MOST_COMPARED]
+    for one in sorted(near, key=lambda one: one.reading.order is not None):
+        parent = found.get(replace(one.reading, order=None))
+        if one.reading.order is not None and parent is not None:
+            own = _exchanged(likelihood, parent, one.reading.order, one.prior)
+        else:
+            own = likelihood.score(likelihood.judge.turned(one.reading), one.prior)
+        if own is not None:
+            found[one.reading] = own
+    return sorted(found.values(), key=lambda one: -one.score)
+
+
+def _far_behind(best: Interpretation, one: Interpretation) -> bool:
+    odds = log_odds(best.evidence.by_moment, one.evidence.by_moment) + best.prior - one.prior
+    return best.score - one.score > BEHIND and odds > DECISIVE
 
 
 def _readings(open_: Open, cameras: Many[RawCamera]) -> Iterator[Reading]:
@@ -426,12 +491,9 @@ def confirm_moments(likelihood: Likelihood, best: Interpretation) -> dict[int, f
     turns = sorted({round(share * count) for share in (0.25, 0.4, 0.5, 0.6, 0.75)} - {0, count})
     found = {}
     for camera in sorted({camera for pair in best.evidence.terms for camera in pair}):
-        own = best.evidence.of_camera(camera)
-        turned = [
-            likelihood.at(best.judged, best.scene, 0.0, {camera: turn}).evidence.of_camera(camera)
-            for turn in turns
-        ]
-        found[camera] = log_odds(own, np.mean(turned, axis=0)) if turned else 0.0
+        rolled = [np.roll(likelihood.moments, -turn) for turn in (0, *turns)]
+        nats = likelihood.of_camera(best, camera, rolled)
+        found[camera] = log_odds(nats[0], nats[1:].mean(axis=0)) if turns else 0.0
     return found
 
 
@@ -459,7 +521,7 @@ def fit_clocks(
         late = {other: fit.late for other, fit in found.items()}
         reach = round((_NEAR if confirmed[camera] >= DECISIVE else _WIDEST) * likelihood.fps)
         lags = coarse * np.arange(-(reach // coarse), reach // coarse + 1)
-        nats = likelihood.by_lag(best, camera, lags.tolist(), late)
+        nats = likelihood.of_camera(best, camera, likelihood.moments + lags[:, None], late)
         usual = np.mean(nats, axis=0)
         parts = (slice(None), slice(None, third), slice(-third, None))
         peaks = [int(np.argmax(nats[:, part].sum(axis=1))) for part in parts]
@@ -494,5 +556,5 @@ def _fine(
 ) -> int:  # fmt: skip
     """The best lag around one, step by step, in a part of the recording."""
     lags = np.arange(lag - reach, lag + reach + 1)
-    nats = likelihood.by_lag(best, camera, lags.tolist(), late)[:, part].sum(axis=1)
-    return int(lags[int(np.argmax(nats))])
+    nats = likelihood.of_camera(best, camera, likelihood.moments + lags[:, None], late)
+    return int(lags[int(np.argmax(nats[:, part].sum(axis=1)))])
