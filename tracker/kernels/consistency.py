@@ -219,3 +219,99 @@ def pair_evidence(
                     if not math.isnan(ratios[z]):
                         nats[a, b, m] += math.log(1.0 - q + q * ratios[z])
     return nats, shares
+
+
+@compiled_later
+def meeting_heights(
+    feet: ndarray,
+    heads: ndarray,
+    whole: ndarray,
+    starts: ndarray,
+    other_feet: ndarray,
+    other_heads: ndarray,
+    other_whole: ndarray,
+    other_starts: ndarray,
+    base: ndarray,
+    axis: ndarray,
+    log_heights: ndarray,
+    largest_gap: float,
+    spread: float,
+) -> ndarray:
+    """Count the boxes of camera a that meet one of camera b in people along an axis, by height.
+
+    Heads and feet are triangulated by the midpoint method; a pair weighs
+    (1 − (gap / largest gap)²) (1 − (lean / spread)²) with the gap between the rays and the lean of
+    the rise in heights of the person, and each box of camera a counts by its best pair.
+
+    Args:
+        feet: (N, 3), unit directions to the feet of camera a's boxes, world axes.
+        heads: (N, 3), unit directions to their heads.
+        whole: (N,), whether neither end of the box is cut off.
+        starts: (M + 1,), index of the first box of camera a of each of M moments, and N.
+        other_feet: (D, 3), the same of camera b.
+        other_heads: (D, 3), the same of camera b.
+        other_whole: (D,), the same of camera b.
+        other_starts: (M + 1,), the same of camera b.
+        base: (3,), position of camera b relative to camera a.
+        axis: (3,), unit vector along which people stand.
+        log_heights: (H,), logarithms of heights, evenly spaced, in the unit of ``base``.
+        largest_gap: Largest distance of two rays, in heights of the person.
+        spread: Largest distance of the rise from the axis, in heights.
+
+    Returns:
+        (H,), the sums of weights.
+    """
+    heights = len(log_heights)
+    result = np.zeros(heights)
+    best = np.zeros(heights)
+    step = log_heights[1] - log_heights[0]
+    ends = np.zeros((2, 3))
+    for m in range(len(starts) - 1):
+        for i in range(starts[m], starts[m + 1]):
+            if not whole[i]:
+                continue
+            best[:] = 0.0
+            for j in range(other_starts[m], other_starts[m + 1]):
+                if not other_whole[j]:
+                    continue
+                gap = 0.0
+                good = True
+                for end in range(2):
+                    one = feet[i] if end == 0 else heads[i]
+                    other = other_feet[j] if end == 0 else other_heads[j]
+                    cosine = one[0] * other[0] + one[1] * other[1] + one[2] * other[2]
+                    sine = 1.0 - cosine * cosine
+                    if sine < 0.0025:
+                        good = False
+                        break
+                    on_one = one[0] * base[0] + one[1] * base[1] + one[2] * base[2]
+                    on_other = other[0] * base[0] + other[1] * base[1] + other[2] * base[2]
+                    s = (on_one - cosine * on_other) / sine
+                    t = (cosine * on_one - on_other) / sine
+                    if s <= 0.0 or t <= 0.0:
+                        good = False
+                        break
+                    square = 0.0
+                    for n in range(3):
+                        first, second = s * one[n], base[n] + t * other[n]
+                        ends[end, n] = 0.5 * (first + second)
+                        square += (first - second) ** 2
+                    gap = max(gap, square)
+                if not good:
+                    continue
+                height, length = 0.0, 0.0
+                for n in range(3):
+                    height += (ends[1, n] - ends[0, n]) * axis[n]
+                    length += (ends[1, n] - ends[0, n]) ** 2
+                if height <= 0.0:
+                    continue
+                gap = gap / height**2 / largest_gap**2
+                lean = (length / height**2 - 1.0) / spread**2
+                if gap >= 1.0 or lean >= 1.0:
+                    continue
+                place = math.floor((math.log(height) - log_heights[0]) / step)
+                if 0 <= place < heights:
+                    best[place] = max(best[place], (1.0 - gap) * (1.0 - lean))
+            for place in range(heights):
+                result[place] += best[place]
+    return result

@@ -22,6 +22,7 @@ from numpy import ndarray
 from tracker.geometry.camera import Camera
 from tracker.geometry.consistency.consensus import Consensus, consensus
 from tracker.geometry.consistency.observed import PairsOfBoxes, Pose, Rays, pair_up, rays_of, uncut
+from tracker.geometry.consistency.standing import turn_of
 from tracker.io.checks.level import upwards
 from tracker.io.checks.reading import (
     Reading,
@@ -311,6 +312,20 @@ class Judge:
         agreed = consensus(rays, poses, self.pairs)
         score = float(agreed.fits.sum())
         return replace(judged, consensus=agreed, score=score) if score > judged.score else judged
+
+    def along(self, reading: Reading, axis: Float[ndarray, " 3"]) -> Judged:
+        """How well the boxes meet of people who stand along an axis of the world."""
+        poses = self.poses(reading)
+        up = axis * (1.0 if sum(pose.rotation[1] @ axis for pose in poses) <= 0.0 else -1.0)
+        rays = [
+            self._of(camera, calibration, reading, pose.rotation @ up)
+            for (camera, calibration), pose in zip(
+                enumerate(self.order(reading)), poses, strict=True
+            )
+        ]
+        agreed = consensus(rays, poses, self.pairs)
+        turns = tuple(turn_of(pose.rotation @ up) for pose in poses)
+        return Judged(reading, agreed, float(agreed.fits.sum()), agreed.rise, turns)
 
     def righted(
         self, judged: Judged, up: Up | None, unit: Unit | None = None, height: float | None = None

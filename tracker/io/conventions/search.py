@@ -33,6 +33,7 @@ from tracker.geometry.consistency.observed import Pose, Rays, rays_of
 from tracker.geometry.consistency.odds import DECISIVE, log_odds
 from tracker.io.checks.reading import Reading, boxes_by, turns_of
 from tracker.io.checks.readings import Judge, Judged, Open, Seen, restricted
+from tracker.io.conventions.orders import MOST_CAMERAS, likely_orders
 from tracker.io.read.pieces import RawCamera
 
 MOST_MOMENTS = 120
@@ -68,6 +69,8 @@ _LEAST_RIVALS, _RIVALS = (
 _LEAST_SHARE = 0.1  # of a camera's boxes that another one explains, below which none is explained
 _MANY_BOXES = 200  # least number of boxes that have to be explained
 _COARSE, _NEAR, _WIDEST = 0.2, 3.0, 10.0  # seconds between lags, and to the farthest of them
+_PLAINLY = 0.4  # share of boxes from which nobody asks whether all calibrations are exchanged
+_LEAST_REASSIGNED = 3  # cameras: two are exchanged by trying it
 _EXPLAINED = 0.3  # share of boxes with which the calibration is read nearly rightly
 _EVERY_ORDER = 4  # number of cameras up to which every order is tried
 _SAME_SCENE = 0.03  # difference of two scenes, in radians and in the size of the rig
@@ -204,10 +207,18 @@ class Likelihood:
             found.append(self._chosen[key])
         return found
 
-    def score(self, judged: Judged, prior: float = 0.0) -> Interpretation | None:
-        """Fit the scene and compute E; None where no boxes meet."""
+    def score(
+        self, judged: Judged, prior: float = 0.0, *, axes: bool = False
+    ) -> Interpretation | None:
+        """Fit the scene and compute E; None where no boxes meet.
+
+        Args:
+            judged: The reading.
+            prior: Log prior.
+            axes: Whether people are tried along every axis of the world.
+        """
         best: Interpretation | None = None
-        for judged_, rise in self._rises(judged):
+        for judged_, rise in self._rises(judged, axes):
             scene = fit_floor(rise, judged_.consensus.feet)
             found = self.at(judged_, scene, prior)
             if best is None or found.score > best.score:
@@ -257,9 +268,14 @@ class Likelihood:
             rows.append(evidence(boxes, poses, best.scene, among=among).of_camera(camera))
         return np.array(rows)
 
-    def _rises(self, judged: Judged) -> Iterator[tuple[Judged, Float[ndarray, " 3"]]]:
+    def likely_orders(self, reading: Reading) -> list[tuple[float, tuple[int, ...]]]:
+        """The assignments of calibrations with which most boxes meet, the best first."""
+        return likely_orders(self.judge, self._seen, self.moments, reading)
+
+    def _rises(self, judged: Judged, axes: bool) -> Iterator[tuple[Judged, Float[ndarray, " 3"]]]:
         """The common rise, and the same turned to the nearest axis of the world."""
-        for one in (judged, self.judge.refined(judged)):
+        others = [self.judge.along(judged.reading, axis) for axis in np.eye(3)] if axes else []
+        for one in (judged, self.judge.refined(judged), *others):
             rise = one.consensus.rise
             height = float(np.linalg.norm(rise))
             if height <= 0.0 or not one.consensus.agreeing:
@@ -359,6 +375,10 @@ def _candidates(
     if not found or found[0].evidence.share < _EXPLAINED:
         rivals = readings  # any of them may explain the boxes in a mirror or of other pictures
     found += _scored(likelihood, list(_questioned(rivals, pixels)), -RARE)
+    if open_.orders:
+        best = max(found, key=lambda one: one.score, default=None)
+        if best is None or best.prior < 0.0 or best.evidence.share < _PLAINLY:
+            found += _reassigned(likelihood, readings, each)
     found.sort(key=lambda one: -one.score)
     if open_.orders and found:
         starts = found[:1]
@@ -370,16 +390,34 @@ def _candidates(
     return found
 
 
+def _reassigned(
+    likelihood: Likelihood, readings: Many[Reading], each: float
+) -> list[Interpretation]:
+    """Interpretations with calibrations assigned anew, none of which need be its own camera's."""
+    if not _LEAST_REASSIGNED <= len(likelihood.judge.cameras) <= MOST_CAMERAS:
+        return []
+    orders = sorted(
+        ((score, order, reading) for reading in readings
+         for score, order in likelihood.likely_orders(reading)), key=lambda one: -one[0],
+    )  # fmt: skip
+    found = []
+    for _, order, reading in orders[:_RIVALS]:
+        if moved := _moved(order):
+            found += _scored(likelihood, [replace(reading, order=order)], -each * moved)
+    return found
+
+
 def _compared(likelihood: Likelihood, first: Many[Interpretation]) -> list[Interpretation]:
     """By all moments those that are not far behind by some of them, the likeliest first."""
     found: dict[Reading, Interpretation] = {}
     near = [one for one in first if not _far_behind(first[0], one)][:_MOST_COMPARED]
     for one in sorted(near, key=lambda one: one.reading.order is not None):
         parent = found.get(replace(one.reading, order=None))
-        if one.reading.order is not None and parent is not None:
+        own: Interpretation | None
+        if one.reading.order and parent is not None and parent.evidence.share >= _PLAINLY:
             own = _exchanged(likelihood, parent, one.reading.order, one.prior)
         else:
-            own = likelihood.score(likelihood.judge.turned(one.reading), one.prior)
+            own = likelihood.score(likelihood.judge.turned(one.reading), one.prior, axes=True)
         if own is not None:
             found[one.reading] = own
     return sorted(found.values(), key=lambda one: -one.score)
@@ -415,16 +453,16 @@ def _with_orders(likelihood: Likelihood, best: Interpretation, each: float) -> l
     """The best reading with calibrations exchanged; a camera that keeps its own has a prior."""
     count = len(likelihood.judge.cameras)
     found: list[Interpretation] = []
-    start = tuple(range(count))
+    start = best.reading.order or tuple(range(count))
     known = {start}
-    base = best.prior
+    base = best.prior + each * _moved(start)
     for _ in range(1 if count <= _EVERY_ORDER else count):
         better: Interpretation | None = None
         for order in _orders(start, count):
             if order in known:
                 continue
             known.add(order)
-            prior = base - each * sum(own != camera for camera, own in enumerate(order))
+            prior = base - each * _moved(order)
             other = _exchanged(likelihood, best, order, prior)
             if other is None:
                 continue
@@ -436,6 +474,11 @@ def _with_orders(likelihood: Likelihood, best: Interpretation, each: float) -> l
         best = better
         start = best.reading.order or start
     return found
+
+
+def _moved(order: Many[int]) -> int:
+    """The number of cameras that have the calibration of another one."""
+    return sum(own != camera for camera, own in enumerate(order))
 
 
 def _exchanged(

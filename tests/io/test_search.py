@@ -1,0 +1,68 @@
+"""The search for how files are meant: what is decided, and that it does not hang on the order."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.random_rooms import random_room
+from tracker.io.checks.boxes import raw_cameras
+from tracker.io.checks.reading import FLIP, Reading
+from tracker.io.checks.readings import Open, Seen
+from tracker.io.conventions.search import Verdict, find_reading
+from tracker.io.read.pieces import Convention, RawCamera
+from tracker.sequences.sequence import Sequence
+
+
+def given(sequence: Sequence) -> tuple[list[RawCamera], list[Seen | None]]:
+    seen: list[Seen | None] = [
+        None if v.detections is None else Seen(v.detections.frames, v.detections.boxes)
+        for v in sequence.views
+    ]
+    return list(raw_cameras(sequence)), seen
+
+
+def found(cameras: list[RawCamera], seen: list[Seen | None], tried: Open | None = None) -> Verdict:
+    verdict = find_reading(cameras, seen, fps=10.0, tried=tried, names="order")
+    assert verdict is not None
+    return verdict
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_calibrations_in_any_order_are_assigned(seed: int) -> None:
+    cameras, seen = given(random_room(seed, cameras=5, people=3))
+    rng = np.random.default_rng(seed)
+    moved = np.roll(np.arange(5), int(rng.integers(1, 5)))  # none has its own
+    stated = Convention(direction="world-to-camera", axes="opencv")
+    shuffled = [replace(cameras[own], convention=stated) for own in moved]
+    verdict = found(shuffled, seen, Open(layouts=("ltwh",), normalised=(False,)))
+    assert verdict.best.reading.order == tuple(np.argsort(moved).tolist())
+    assert verdict.kind == "decided"
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("axis", range(3))
+def test_the_vertical_is_found_along_any_axis_and_with_any_convention(seed: int, axis: int) -> None:
+    cameras, seen = given(random_room(seed, cameras=3, people=3))
+    turn = np.roll(np.eye(3), axis, axis=0)
+    inverted = []
+    for camera in cameras:
+        assert camera.rotation is not None
+        assert camera.translation is not None
+        rotation = camera.rotation @ turn.T
+        inverted.append(
+            replace(
+                camera,
+                rotation=rotation.T @ FLIP,
+                translation=-100.0 * rotation.T @ camera.translation,
+            )
+        )
+    verdict = found(inverted, seen, Open(orders=False))
+    right = Reading(direction="camera-to-world", axes="opengl")
+    assert verdict.kind == "decided"
+    assert replace(verdict.best.reading, unit="m", up="z") == right
+    rise = verdict.best.scene.rise / np.linalg.norm(verdict.best.scene.rise)
+    assert rise @ turn @ [0.0, 0.0, 1.0] > 0.99
+    assert 130.0 < np.linalg.norm(verdict.best.scene.rise) < 210.0
