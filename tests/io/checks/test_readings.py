@@ -13,9 +13,10 @@ from tracker.geometry.consistency.suggestion import consensus_of_cameras, sugges
 from tracker.io.checks import check
 from tracker.io.checks.boxes import listen, raw_cameras
 from tracker.io.checks.reading import FLIP, Reading, pose, read_boxes, to_camera, upright
-from tracker.io.checks.readings import Seen, find_meaning
+from tracker.io.checks.readings import Seen
 from tracker.io.checks.sizes import likely_unit
 from tracker.io.checks.timing import check_counting
+from tracker.io.conventions.search import as_meant, find_reading
 from tracker.io.read.pieces import METRES, RawCamera
 from tracker.sequences.sequence import Sequence
 
@@ -83,12 +84,13 @@ def test_all_at_once_is_found_out(seed: int) -> None:
         for own in seen(sequence)
         if own is not None
     ]
-    found = find_meaning(cameras, corners)
-    assert found is not None
-    expected = Reading("camera-to-world", "opengl", "xyxy", False, "cm", "y")
-    assert found.reading == expected
-    assert found.height == pytest.approx(1.7, rel=0.12)
-    again = to_camera(cameras[0], found.reading, sequence.cameras[0].image_size)
+    verdict = find_reading(cameras, corners, fps=sequence.fps)
+    assert verdict is not None
+    assert verdict.kind == "decided"
+    judged, reading = as_meant(verdict, None)
+    assert reading == Reading("camera-to-world", "opengl", "xyxy", False, "cm", "y")
+    assert judged.consensus.height == pytest.approx(170.0, rel=0.12)
+    again = to_camera(cameras[0], reading, sequence.cameras[0].image_size)
     np.testing.assert_allclose(again.centre, sequence.cameras[0].centre, atol=1e-9)
     np.testing.assert_allclose(again.rotation, sequence.cameras[0].rotation, atol=1e-9)
 
@@ -99,9 +101,9 @@ def test_boxes_of_nobody_prove_nothing() -> None:
     noise = [
         Seen(np.repeat(np.arange(200), 3), rng.uniform(10, 300, (600, 4))) for _ in sequence.views
     ]
-    found = find_meaning(raw_cameras(sequence), noise)
+    found = find_reading(raw_cameras(sequence), noise, fps=sequence.fps)
     assert found is not None
-    assert not found.certain
+    assert found.kind == "none"
 
 
 def test_too_few_boxes_are_no_reason_for_an_alarm() -> None:
@@ -115,15 +117,14 @@ def test_a_convention_that_a_file_states_is_not_questioned() -> None:
         replace(raw, convention=replace(raw.convention, direction="camera-to-world", unit="mm"))
         for raw in raw_cameras(sequence)
     ]
-    found = find_meaning(stated, seen(sequence))
+    found = find_reading(stated, seen(sequence), fps=sequence.fps)
     assert found is not None
-    assert found.reading.direction == "camera-to-world"
-    assert found.reading.unit == "mm"
+    assert found.best.reading.direction == "camera-to-world"
 
 
 def test_one_camera_alone_tells_nothing() -> None:
     sequence = random_room(0, cameras=2)
-    assert find_meaning(raw_cameras(sequence), [seen(sequence)[0], None]) is None
+    assert find_reading(raw_cameras(sequence), [seen(sequence)[0], None], fps=10.0) is None
     alone = replace(sequence, views=sequence.views[:1])
     assert listen(alone) is None
     assert {each.status for each in check(alone)} <= {"good", "absent"}
@@ -196,17 +197,6 @@ def test_without_boxes_the_room_is_where_views_overlap() -> None:
     assert (found.minimum[:2] < middle).all()
     assert (found.maximum[:2] > middle).all()
     assert found.people == 0
-
-
-def test_with_an_exchange_everything_else_is_tried_again_and_once() -> None:
-    """What boxes are taken for may have looked best for want of the exchange."""
-    sequence = MISTAKES["exchanged"][0](random_room(0, steps=100))
-    meaning = find_meaning(raw_cameras(sequence), seen(sequence))
-    assert meaning is not None
-    tried = [one.reading for one in meaning.tried]
-    assert len(set(tried)) == len(tried)
-    layouts = {one.layout for one in tried if one.order == meaning.reading.order}
-    assert layouts == {"ltwh", "cxcywh"}  # corners would lie before the boxes' beginnings
 
 
 def test_boxes_a_step_before_the_truth_are_counted_from_0() -> None:

@@ -14,18 +14,9 @@ from tracker.geometry.consistency.observed import pose_of
 from tracker.geometry.consistency.suggestion import LEAST_AGREEING, Suggestion, stands, suggest
 from tracker.io.checks.level import confirmed, upwards
 from tracker.io.checks.reading import Reading, exchanged, exchanges
-from tracker.io.checks.readings import (
-    CLEARLY,
-    LEAST_SHARE,
-    Judge,
-    Judged,
-    Meaning,
-    Open,
-    Seen,
-    clearly_better,
-    find_meaning,
-)
+from tracker.io.checks.readings import LEAST_SHARE, Judge, Judged, Open, Seen
 from tracker.io.checks.sizes import likely_unit
+from tracker.io.conventions.search import Verdict, as_meant, find_reading
 from tracker.io.read.pieces import METRES, RawCamera
 from tracker.sequences.finding import Check, Remedy, absent, good, percent, warning
 from tracker.sequences.sequence import Sequence, View
@@ -53,10 +44,15 @@ class BoxesTell:
 
     given: Judged
     """With the calibration and the boxes as the file has them."""
-    meaning: Meaning
-    """The best reading."""
+    reading: Reading
+    """The one that is likelier than all others, with unit and way up; that of the file where
+    none is."""
+    chosen: Judged
+    """With this reading."""
     mistaken: bool
-    """Whether another reading is clearly better than that of the file."""
+    """Whether this is another reading than that of the file."""
+    verdict: Verdict
+    """Of all readings."""
     suggestion: Suggestion | None
     """Room and size, where the file is read rightly."""
 
@@ -93,29 +89,25 @@ def listen(sequence: Sequence, *, exchanges: bool = True) -> BoxesTell | None:
         kept = own.scores >= SCORE_THRESHOLD
         seen.append(Seen(own.frames[kept], own.boxes[kept]))
     cameras = raw_cameras(sequence)
-    judge = Judge(cameras, seen)
-    if not judge.possible:
+    verdict = find_reading(cameras, seen, fps=sequence.fps, tried=Open(orders=exchanges))
+    if verdict is None:
         return None
-    given = judge.righted(judge(AS_GIVEN), AS_GIVEN.up)
-    meaning = find_meaning(cameras, seen, tried=Open(orders=exchanges))
-    assert meaning is not None
-    best = meaning.best
-    otherwise = replace(best.reading, unit="m", up="z") != AS_GIVEN
-    enough = best.consensus.agreeing >= LEAST_AGREEING and best.consensus.share >= LEAST_SHARE
-    alone = all(best.score > CLEARLY * other.score for other in meaning.tried[1:])
-    mistaken = enough and alone and otherwise and clearly_better(best, given)
-    chosen = judge.righted(best, AS_GIVEN.up) if mistaken else given
+    judge = Judge(cameras, seen)
+    standing = judge.along(AS_GIVEN, np.array([0.0, 0.0, 1.0]))
+    given = max(judge(AS_GIVEN), standing, key=lambda one: one.score)
+    given = judge.righted(given, AS_GIVEN.up)
+    mistaken = verdict.kind == "decided" and verdict.best.reading != AS_GIVEN
+    chosen = as_meant(verdict, AS_GIVEN.up)[0] if mistaken else given
     known = 2.0 * float(sequence.target_half_extents[2])
     unit = likely_unit(judge.away(chosen), chosen.consensus)
     if _fits(chosen.consensus.height, known) and known < _TALLEST_TARGET:
         unit = "m"  # as tall as the file says
     up = upwards(chosen.consensus.rise)
     reading = replace(chosen.reading, unit=unit, up=up)
-    meaning = Meaning(replace(chosen, reading=reading), meaning.tried)
-    agreed = chosen.consensus.agreeing >= LEAST_AGREEING
+    agreed = mistaken or chosen.consensus.agreeing >= LEAST_AGREEING
     right = reading == AS_GIVEN and agreed
     suggestion = suggest(sequence.cameras, given.consensus) if right else None
-    return BoxesTell(given, meaning, agreed and reading != AS_GIVEN, suggestion)
+    return BoxesTell(given, reading, chosen, agreed and reading != AS_GIVEN, verdict, suggestion)
 
 
 def _fits(height: float, known: float) -> bool:
@@ -164,7 +156,7 @@ def check_boxes(sequence: Sequence, told: BoxesTell | None) -> Iterator[Check]:
 
 def _mistake(sequence: Sequence, told: BoxesTell) -> Check:
     """The one reading that lets boxes meet, and how far that of the file is off."""
-    reading, agreed = told.meaning.reading, told.meaning.best.consensus
+    reading, agreed = told.reading, told.chosen.consensus
     names = [camera.name for camera in sequence.cameras]
     words: list[str] = []
     remedies: list[Remedy] = []
@@ -185,6 +177,10 @@ def _mistake(sequence: Sequence, told: BoxesTell) -> Check:
         pairs = exchanged(reading.order, names)
         words.append(f"the calibrations exchanged ({pairs})")
         remedies += [Remedy("--swap", f"{a}={b}") for a, b in exchanges(reading.order, names)]
+    if reading.mirrored:
+        words.append("a left-handed world")
+    if reading.flipped:
+        words.append("left and right of the pictures exchanged")
     shared = told.given.consensus.share
     if words:
         sentence = (
@@ -216,8 +212,8 @@ def _mistake(sequence: Sequence, told: BoxesTell) -> Check:
 
 def _nothing_meets(told: BoxesTell) -> Check:
     agreed = told.given.consensus
-    best = told.meaning.tried[0].consensus
-    if agreed.possible < 3 * LEAST_AGREEING or best.agreeing >= LEAST_AGREEING:
+    few = agreed.possible < 3 * LEAST_AGREEING
+    if few or told.verdict.kind in ("open", "unproven"):
         return absent(
             "boxes meet in 3D", "too few boxes meet to tell how calibration and boxes are meant"
         )

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from collections.abc import Sequence as Many
 from dataclasses import dataclass, replace
 from typing import get_args
@@ -30,7 +30,6 @@ from tracker.io.checks.reading import (
     lens_of,
     likely_size,
     pose,
-    turns_of,
     upright,
     with_pixels,
 )
@@ -51,20 +50,8 @@ broad people are agrees between cameras too, but of fewer."""
 _LEAST_BREADTH = -0.2
 """Logarithm: who lies across the picture is not so much taller there than broad."""
 
-_REFINED = 8
-"""Of so many readings, the best, heads and feet are found exactly."""
-
-LEAST_AGREEING = 20
-"""Fewer pairs that agree prove nothing."""
-
 LEAST_SHARE = 0.05
 """A smaller share of agreeing pairs proves nothing."""
-
-CLEARLY = 1.3
-"""A reading is better than another where its score is so many times the other's, and"""
-
-SIGMAS = 4.0
-"""so many standard deviations of a count above it."""
 
 EVERY_ORDER = 4
 """Up to so many cameras every exchange is tried, above that one pair at a time."""
@@ -109,95 +96,6 @@ class Judged:
     cameras, and in worlds that lean."""
     turns: tuple[int, ...]
     """Where heads are in boxes, as :func:`tracker.geometry.consistency.standing.sides` counts."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Meaning:
-    """How calibration and boxes are meant, as far as the boxes tell."""
-
-    best: Judged
-    tried: tuple[Judged, ...]
-    """All that were tried, the best first."""
-
-    @property
-    def reading(self) -> Reading:
-        """The best one."""
-        return self.best.reading
-
-    @property
-    def certain(self) -> bool:
-        """Whether enough boxes meet, and clearly fewer with any other reading."""
-        agreed = self.best.consensus
-        return (
-            agreed.agreeing >= LEAST_AGREEING
-            and agreed.share >= LEAST_SHARE
-            and all(clearly_better(self.best, other) for other in self.tried[1:])
-        )
-
-    @property
-    def height(self) -> float:
-        """Of the usual person's box, metres."""
-        return METRES[self.reading.unit] * self.best.consensus.height
-
-
-def clearly_better(one: Judged, other: Judged) -> bool:
-    """Whether a reading fits so much better than another that chance is no explanation.
-
-    Of a sum of the weights of things that are there by chance, independent of each other, the
-    variance is the sum of their squares.
-    """
-    squares = sum(float(np.square(each.consensus.fits).sum()) for each in (one, other))
-    spread = math.sqrt(max(squares, 1.0))
-    return one.score > CLEARLY * other.score and one.score - other.score > SIGMAS * spread
-
-
-def find_meaning(
-    cameras: Many[RawCamera],
-    seen: Many[Seen | None],
-    *,
-    tried: Open | None = None,
-    unit: Unit | None = None,
-    up: Up | None = None,
-    height: float | None = None,
-) -> Meaning | None:
-    """Find out how a calibration and its boxes are meant.
-
-    What a camera's :class:`~tracker.io.read.pieces.Convention` states is not questioned.
-
-    Args:
-        cameras: As their files give them; each needs a lens and a pose.
-        seen: The boxes of each, None for a camera without any.
-        tried: What is to be found out; everything where it is None.
-        unit: Of the poses, where it is known.
-        up: The world's axis that points up, where it is known.
-        height: Of what is tracked, metres, where it is known.
-
-    Returns:
-        None where fewer than two cameras have boxes at the same steps.
-
-    Raises:
-        ValueError: If a camera has no lens or no pose.
-    """
-    judge = Judge(cameras, seen)
-    if not judge.possible:
-        return None
-    open_ = restricted(tried or Open(), cameras, seen)
-    parts = (open_.directions, open_.axes, open_.layouts, open_.normalised, turns_of(cameras))
-    judged = [
-        judge.turned(Reading(direction, axes, layout, normalised, turns=turns))
-        for direction, axes, layout, normalised, turns in itertools.product(*parts)
-    ]
-    judged.sort(key=lambda one: -one.score)
-    if open_.orders:
-        judged = _with_orders(judge, judged)
-    judged[:_REFINED] = [judge.refined(one) for one in judged[:_REFINED]]
-    judged.sort(key=lambda one: -one.score)
-    conventions = [camera.convention for camera in cameras]
-    unit = unit or next((c.unit for c in conventions if c.unit is not None), None)
-    up = up or next((c.up for c in conventions if c.up is not None), None)
-    best = judge.righted(judged[0], up, unit, height)
-    reading = judge.meant(best, up, unit, height)
-    return Meaning(replace(best, reading=reading), (*judged,))
 
 
 class Judge:
@@ -414,43 +312,6 @@ def _in_pairs(camera: int, pairs: Mapping[tuple[int, int], PairsOfBoxes]) -> Int
     first = [found.first for (one, _), found in pairs.items() if one == camera]
     second = [found.second for (_, other), found in pairs.items() if other == camera]
     return np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *first, *second]))
-
-
-def _with_orders(judge: Judge, judged: list[Judged]) -> list[Judged]:
-    """With calibrations exchanged, where that fits better than what fits best without."""
-    count = len(judge.cameras)
-    found = {one.reading: one for one in judged}
-
-    def turned(reading: Reading) -> Judged:
-        if reading not in found:
-            found[reading] = judge.turned(reading)
-        return found[reading]
-
-    # an exchange and a wrong pose together: the poses' readings are all near nothing then
-    for start in judged[:1] if judged[0].consensus.share >= LEAST_SHARE else judged[:_REFINED]:
-        best = start
-        for _ in range(1 if count <= EVERY_ORDER else count):
-            own = [turned(replace(best.reading, order=order)) for order in _orders(best, count)]
-            better = max(own, key=lambda one: one.score, default=best)
-            if better.score <= best.score:
-                break
-            best = better
-        if best is not start:
-            # what fitted best without the exchange may have done so for want of it
-            for other in judged[:_REFINED]:
-                turned(replace(other.reading, order=best.reading.order))
-    return sorted(found.values(), key=lambda one: -one.score)
-
-
-def _orders(best: Judged, count: int) -> Iterable[tuple[int, ...]]:
-    own = best.reading.order or tuple(range(count))
-    if count <= EVERY_ORDER:
-        yield from (order for order in itertools.permutations(range(count)) if order != own)
-        return
-    for a, b in itertools.combinations(range(count), 2):
-        changed = list(own)
-        changed[a], changed[b] = changed[b], changed[a]
-        yield tuple(changed)
 
 
 def restricted(tried: Open, cameras: Many[RawCamera], seen: Many[Seen | None]) -> Open:

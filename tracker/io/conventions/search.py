@@ -31,10 +31,11 @@ from tracker.geometry.consistency.likelihood import (
 )
 from tracker.geometry.consistency.observed import Pose, Rays, rays_of
 from tracker.geometry.consistency.odds import DECISIVE, log_odds
+from tracker.io.checks.level import upwards
 from tracker.io.checks.reading import Reading, boxes_by, turns_of
 from tracker.io.checks.readings import Judge, Judged, Open, Seen, restricted
 from tracker.io.conventions.orders import MOST_CAMERAS, likely_orders
-from tracker.io.read.pieces import RawCamera
+from tracker.io.read.pieces import RawCamera, Unit, Up
 
 MOST_MOMENTS = 120
 """Number of steps whose boxes are compared."""
@@ -225,6 +226,12 @@ class Likelihood:
                 best = found
         return best
 
+    def unmet(self, reading: Reading) -> Interpretation:
+        """A reading by which no boxes meet."""
+        nothing = Evidence({}, {}, len(self.judge.cameras), len(self.moments))
+        judged = self.judge.turned(reading)
+        return Interpretation(reading, judged, Scene(np.zeros(3), 0.0, 0.0), nothing, 0.0)
+
     def at(self, judged: Judged, scene: Scene, prior: float) -> Interpretation:
         """Compute E of a reading with a given scene.
 
@@ -339,7 +346,10 @@ def find_reading(
     first = _candidates(likelihood.thinned(), open_, NAME_PRIOR[names], pixels)
     found = _compared(likelihood, first)
     if not found:
-        return None
+        kind: Literal["unproven", "none"] = "none"
+        if likelihood.boxes < _MANY_BOXES:
+            kind = "unproven"
+        return Verdict(kind, likelihood.unmet(next(_readings(open_, cameras))), judge)
     best = found[0]
     others = [one for one in found[1:] if not same_scene(judge, best, one)]
     odds = [
@@ -356,8 +366,8 @@ def find_reading(
         return Verdict("unproven", best, judge, rival, least, confirmed, clocks)
     if best.evidence.share < _LEAST_SHARE or nothing < DECISIVE:
         return Verdict("none", best, judge, rival, least, confirmed, clocks)
-    kind: Literal["decided", "open"] = "decided" if least >= DECISIVE else "open"
-    return Verdict(kind, best, judge, rival, least, confirmed, clocks)
+    sure: Literal["decided", "open"] = "decided" if least >= DECISIVE else "open"
+    return Verdict(sure, best, judge, rival, least, confirmed, clocks)
 
 
 def _candidates(
@@ -484,7 +494,7 @@ def _moved(order: Many[int]) -> int:
 def _exchanged(
     likelihood: Likelihood, best: Interpretation, order: tuple[int, ...], prior: float
 ) -> Interpretation | None:
-    reading = replace(best.reading, order=order)
+    reading = replace(best.reading, order=order if _moved(order) else None)
     judged = replace(best.judged, reading=reading)
     found = likelihood.at(judged, best.scene, prior)
     # the scene of a wrong order is wrong, unless most cameras are right
@@ -522,6 +532,23 @@ def same_scene(judge: Judge, one: Interpretation, other: Interpretation) -> bool
     if size == 0.0 or other_size == 0.0:
         return size == other_size
     return float(np.abs(centres / size - others / other_size).max()) < _SAME_SCENE
+
+
+def as_meant(
+    verdict: Verdict, claimed: Up | None, up: Up | None = None, unit: Unit | None = None
+) -> tuple[Judged, Reading]:
+    """The likeliest reading with heads above feet, and with the way up and the unit.
+
+    Args:
+        verdict: What the boxes tell.
+        claimed: The axis that the file claims to point up, which cameras may contradict.
+        up: The axis that points up, where that is known.
+        unit: The unit, where that is known.
+    """
+    best = verdict.judge.righted(verdict.best.judged, claimed, unit)
+    rise = verdict.best.scene.rise
+    up = up or upwards(rise if rise @ best.consensus.rise >= 0.0 else -rise)
+    return best, verdict.judge.meant(best, up, unit)
 
 
 def confirm_moments(likelihood: Likelihood, best: Interpretation) -> dict[int, float]:

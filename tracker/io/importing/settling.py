@@ -17,7 +17,7 @@ from tracker.geometry.consistency.suggestion import (
     consensus_of_cameras,
     suggest,
 )
-from tracker.io.checks.level import lean_of, upwards
+from tracker.io.checks.level import lean_of
 from tracker.io.checks.reading import Reading, read_boxes, to_camera
 from tracker.io.checks.readings import Open, Seen
 from tracker.io.conventions.questions import (
@@ -27,7 +27,7 @@ from tracker.io.conventions.questions import (
     rearranged,
     told_of_moments,
 )
-from tracker.io.conventions.search import find_reading
+from tracker.io.conventions.search import as_meant, find_reading
 from tracker.io.importing.arriving import short_videos
 from tracker.io.importing.finding.angles import check_turns, chosen_turns, turns_in_words
 from tracker.io.importing.finding.calibrations import camera_sets
@@ -399,10 +399,8 @@ def _read(
         why = "from where the cameras look; the boxes do not tell"
         best = None
     else:
-        best = verdict.judge.righted(verdict.best.judged, convention.up, convention.unit)
-        rise = verdict.best.scene.rise
-        up = convention.up or upwards(rise if rise @ best.consensus.rise >= 0.0 else -rise)
-        reading = replace(verdict.judge.meant(best, up, convention.unit), flipped=False)
+        best, reading = as_meant(verdict, convention.up, convention.up, convention.unit)
+        reading = replace(reading, flipped=False)
         for camera, clock in verdict.clocks.items():
             if raws[camera].name in options.offsets:
                 continue  # what is stated is not questioned
@@ -411,6 +409,7 @@ def _read(
                 how = f"{clock.late / times.fps:.2f} s late ({clock.late} steps, within 1)"
                 found.append((f"{raws[camera].name} clock", f"{how}, since boxes meet so"))
         # boxes lean in rolled cameras; where people along an axis are likelier, the world is level
+        rise = verdict.best.scene.rise
         along = float(np.abs(rise).max() / np.linalg.norm(rise))
         if convention.up is None and along < _ALONG_AXIS:
             poses = verdict.judge.poses(reading)
