@@ -89,14 +89,16 @@ def listen(sequence: Sequence, *, exchanges: bool = True) -> BoxesTell | None:
         kept = own.scores >= SCORE_THRESHOLD
         seen.append(Seen(own.frames[kept], own.boxes[kept]))
     cameras = raw_cameras(sequence)
-    verdict = find_reading(cameras, seen, fps=sequence.fps, tried=Open(orders=exchanges))
+    tried = Open(orders=exchanges)
+    verdict = find_reading(cameras, seen, fps=sequence.fps, tried=tried, names="number")
     if verdict is None:
         return None
     judge = Judge(cameras, seen)
     standing = judge.along(AS_GIVEN, np.array([0.0, 0.0, 1.0]))
     given = max(judge(AS_GIVEN), standing, key=lambda one: one.score)
     given = judge.righted(given, AS_GIVEN.up)
-    mistaken = verdict.kind == "decided" and verdict.best.reading != AS_GIVEN
+    met = verdict.kind in ("decided", "open")
+    mistaken = met and verdict.best.reading != AS_GIVEN and verdict.excludes(AS_GIVEN)
     chosen = as_meant(verdict, AS_GIVEN.up)[0] if mistaken else given
     known = 2.0 * float(sequence.target_half_extents[2])
     unit = likely_unit(judge.away(chosen), chosen.consensus)

@@ -110,6 +110,16 @@ class Verdict:
     """Log odds by camera that its boxes are of the same moments as those of the others."""
     clocks: Mapping[int, ClockFit] = field(default_factory=dict)
     """Cameras whose clock is not that of the others."""
+    compared: tuple[Interpretation, ...] = ()
+    """Those that were compared by all moments; all others were far behind."""
+
+    def excludes(self, reading: Reading) -> bool:
+        """Whether the best one is decided over a reading."""
+        return all(
+            log_odds(self.best.evidence.by_moment, one.evidence.by_moment) >= DECISIVE
+            for one in self.compared
+            if one.reading == reading
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -363,11 +373,11 @@ def find_reading(
     clocks = fit_clocks(likelihood, best, confirmed)
     nothing = log_odds(best.evidence.by_moment, np.zeros(len(likelihood.moments)))
     if likelihood.boxes < _MANY_BOXES and nothing < DECISIVE:
-        return Verdict("unproven", best, judge, rival, least, confirmed, clocks)
+        return Verdict("unproven", best, judge, rival, least, confirmed, clocks, (*found,))
     if best.evidence.share < _LEAST_SHARE or nothing < DECISIVE:
-        return Verdict("none", best, judge, rival, least, confirmed, clocks)
+        return Verdict("none", best, judge, rival, least, confirmed, clocks, (*found,))
     sure: Literal["decided", "open"] = "decided" if least >= DECISIVE else "open"
-    return Verdict(sure, best, judge, rival, least, confirmed, clocks)
+    return Verdict(sure, best, judge, rival, least, confirmed, clocks, (*found,))
 
 
 def _candidates(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -129,15 +129,13 @@ def settle(taken: Sequence[ParsedFiles], options: ImportOptions | None = None) -
     times = settle_times(cameras, matched.truths, options, found)
     boxes = _boxes(cameras, sizes, times, options, found, told)
     arbitrary = matched.format.startswith(_WITHOUT_UNIT)
-    offsets: dict[str, float] = {}
+    late: dict[str, int] = {}
     reading, raws, boxes, factor = _read(
-        raws, plain, cameras, boxes, times, arbitrary, options, found, told, offsets
+        raws, plain, cameras, boxes, times, arbitrary, options, found, told, late
     )
-    if offsets:
-        both = {name: offsets.get(name, 0.0) + options.offsets.get(name, 0.0)
-                for name in (*offsets, *options.offsets)}  # fmt: skip
-        options = replace(options, offsets=both)
-        times = settle_times(cameras, matched.truths, options, [])
+    if late:
+        shifted = _shifted(options, late, times.fps)
+        times = settle_times(cameras, matched.truths, shifted, [])
     sizes = [raw.image_size or size for raw, size in zip(raws, sizes, strict=True)]
     settled = [to_camera(raw, reading, size) for raw, size in zip(raws, sizes, strict=True)]
     check_places(settled, matched.format)
@@ -153,8 +151,12 @@ def settle(taken: Sequence[ParsedFiles], options: ImportOptions | None = None) -
     if not times.stated:
         fps, why = rate_of(settled, at_steps)
         found.append(("fps", f"{fps:g}, {why}, since no file says it; --fps"))
-        times = settle_times(cameras, matched.truths, replace(options, fps=fps), [])
+        shifted = replace(_shifted(options, late, fps), fps=fps)
+        times = settle_times(cameras, matched.truths, shifted, [])
         at_steps = _at_steps(detections, times)
+    for name, steps in late.items():
+        how = f"{steps / times.fps:.2f} s late ({steps} steps, within 1)"
+        found.append((f"{name} clock", f"{how}, since boxes meet so"))
     looked_at = _looked_at(detections, [camera.name for camera in settled], found)
     suggested = _room(settled, at_steps, found)
     room = _as_told(suggested, options)
@@ -190,6 +192,12 @@ def settle(taken: Sequence[ParsedFiles], options: ImportOptions | None = None) -
         tuple(told),
         "; ".join(words for name, words in found if name == ACCEPTED),
     )
+
+
+def _shifted(options: ImportOptions, late: Mapping[str, int], fps: float) -> ImportOptions:
+    """With the offsets of cameras that are late by so many steps; what is stated is kept."""
+    found = {name: -steps / fps for name, steps in late.items() if name not in options.offsets}
+    return replace(options, offsets={**found, **options.offsets})
 
 
 _GAPS = {2: "second", 3: "third", 4: "fourth", 5: "fifth", 10: "tenth"}
@@ -359,7 +367,7 @@ def _read(
     options: ImportOptions,
     found: list[tuple[str, str]],
     told: list[str],
-    offsets: dict[str, float],
+    late: dict[str, int],
 ) -> tuple[Reading, list[RawCamera], list[_Boxes | None], float | None]:
     """How poses and boxes are meant: by flags, formats, the boxes and the poses, in this order.
 
@@ -405,9 +413,7 @@ def _read(
             if raws[camera].name in options.offsets:
                 continue  # what is stated is not questioned
             if clock.late and clock.steady:
-                offsets[raws[camera].name] = -clock.late / times.fps
-                how = f"{clock.late / times.fps:.2f} s late ({clock.late} steps, within 1)"
-                found.append((f"{raws[camera].name} clock", f"{how}, since boxes meet so"))
+                late[raws[camera].name] = clock.late
         # boxes lean in rolled cameras; where people along an axis are likelier, the world is level
         rise = verdict.best.scene.rise
         along = float(np.abs(rise).max() / np.linalg.norm(rise))
