@@ -71,7 +71,6 @@ _LEAST_SHARE = 0.1  # of a camera's boxes that another one explains, below which
 _MANY_BOXES = 200  # least number of boxes that have to be explained
 _COARSE, _NEAR, _WIDEST = 0.2, 3.0, 10.0  # seconds between lags, and to the farthest of them
 _PLAINLY = 0.4  # share of boxes from which nobody asks whether all calibrations are exchanged
-_LEAST_REASSIGNED = 3  # cameras: two are exchanged by trying it
 _EXPLAINED = 0.3  # share of boxes with which the calibration is read nearly rightly
 _EVERY_ORDER = 4  # number of cameras up to which every order is tried
 _SAME_SCENE = 0.03  # difference of two scenes, in radians and in the size of the rig
@@ -414,8 +413,11 @@ def _reassigned(
     likelihood: Likelihood, readings: Many[Reading], each: float
 ) -> list[Interpretation]:
     """Interpretations with calibrations assigned anew, none of which need be its own camera's."""
-    if not _LEAST_REASSIGNED <= len(likelihood.judge.cameras) <= MOST_CAMERAS:
+    count = len(likelihood.judge.cameras)
+    if count > MOST_CAMERAS:
         return []
+    if count == 2:
+        return _scored(likelihood, [replace(one, order=(1, 0)) for one in readings], -2.0 * each)
     orders = sorted(
         ((score, order, reading) for reading in readings
          for score, order in likelihood.likely_orders(reading)), key=lambda one: -one[0],
