@@ -99,6 +99,14 @@ class Evidence:
         total = np.sum(rows, axis=0) if rows else np.zeros(self.moments)
         return np.asarray(total / max(self.cameras - 1, 1))
 
+    def of_cameras(self) -> dict[int, float]:
+        """The mean share of the boxes of each camera's pairs that are explained, 0 … 1."""
+        cameras = {camera for pair in self.explained for camera in pair}
+        return {
+            camera: float(np.mean([q for pair, q in self.explained.items() if camera in pair]))
+            for camera in cameras
+        }
+
     @property
     def share(self) -> float:
         """The mean share of a camera's boxes that another one explains, 0 … 1."""

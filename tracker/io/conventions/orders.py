@@ -32,7 +32,11 @@ _ORDERS = 3  # number of assignments returned
 
 
 def likely_orders(
-    judge: Judge, seen: Many[Seen | None], moments: Int[ndarray, " M"], reading: Reading
+    judge: Judge,
+    seen: Many[Seen | None],
+    moments: Int[ndarray, " M"],
+    reading: Reading,
+    axes: Many[int] = (0, 1, 2),
 ) -> list[tuple[float, tuple[int, ...]]]:
     """Find the assignments of calibrations to cameras with which most boxes meet.
 
@@ -41,6 +45,7 @@ def likely_orders(
         seen: Boxes of each camera.
         moments: Steps that are looked at.
         reading: How calibrations and boxes are meant.
+        axes: Of the world, along which people may stand.
 
     Returns:
         Score and assignment of the best ones, the best first: the calibration of each camera.
@@ -48,7 +53,7 @@ def likely_orders(
     count = len(judge.cameras)
     orders = np.array(list(itertools.permutations(range(count))))
     found: dict[tuple[int, ...], float] = {}
-    for axis in np.eye(3):
+    for axis in np.eye(3)[list(axes)]:
         pairs = _by_height(judge, seen, moments, reading, axis)
         pairs = pairs[..., :-1] + pairs[..., 1:]
         most = sum(

@@ -25,6 +25,18 @@ ACCEPT = "--accept-best"
 ACCEPTED = "accepted"
 """What a finding is called that was taken though nothing proves it."""
 
+OF_TWO = (
+    "boxes of two cameras alone do not tell whether one of them was turned or moved, nor which is "
+    "which where they stand alike: a third camera would"
+)
+"""What is said of every import of two cameras."""
+
+OF_ONE = (
+    "boxes of one camera alone confirm nothing of its calibration: neither its pose, which way is "
+    "up, nor its unit"
+)
+"""What is said of an import of one camera with boxes."""
+
 _LAYOUTS = {"ltwh": "left, top and size", "xyxy": "two corners", "cxcywh": "centre and size"}
 
 
@@ -221,6 +233,8 @@ def told_of_moments(verdict: Verdict, names: Sequence[str]) -> list[str]:
         for camera, fit in verdict.clocks.items()
         if not fit.steady
     ]
+    if len(confirmed) == 2 and verdict.kind == "decided":
+        told.append(OF_TWO)
     failing = [camera for camera, odds in confirmed.items() if odds < DECISIVE]
     evidence = verdict.best.evidence
     nothing = np.zeros(evidence.moments)

@@ -71,6 +71,7 @@ _LEAST_SHARE = 0.1  # of a camera's boxes that another one explains, below which
 _MANY_BOXES = 200  # least number of boxes that have to be explained
 _COARSE, _NEAR, _WIDEST = 0.2, 3.0, 10.0  # seconds between lags, and to the farthest of them
 _PLAINLY = 0.4  # share of boxes from which nobody asks whether all calibrations are exchanged
+_WELL = 0.7  # share of a camera's boxes from which no mirror is looked for
 _EXPLAINED = 0.3  # share of boxes with which the calibration is read nearly rightly
 _EVERY_ORDER = 4  # number of cameras up to which every order is tried
 _SAME_SCENE = 0.03  # difference of two scenes, in radians and in the size of the rig
@@ -284,9 +285,11 @@ class Likelihood:
             rows.append(evidence(boxes, poses, best.scene, among=among).of_camera(camera))
         return np.array(rows)
 
-    def likely_orders(self, reading: Reading) -> list[tuple[float, tuple[int, ...]]]:
+    def likely_orders(
+        self, reading: Reading, axes: Many[int]
+    ) -> list[tuple[float, tuple[int, ...]]]:
         """The assignments of calibrations with which most boxes meet, the best first."""
-        return likely_orders(self.judge, self._seen, self.moments, reading)
+        return likely_orders(self.judge, self._seen, self.moments, reading, axes)
 
     def _rises(self, judged: Judged, axes: bool) -> Iterator[tuple[Judged, Float[ndarray, " 3"]]]:
         """The common rise, and the same turned to the nearest axis of the world."""
@@ -406,26 +409,41 @@ def _candidates(
         for start in starts:
             found += _with_orders(likelihood, start, each)
         found.sort(key=lambda one: -one.score)
+        worst = min(found[0].evidence.of_cameras().values(), default=0.0)
+        if worst < _WELL and each < NAME_PRIOR["name"]:
+            # a mirror and an exchange together: most cameras of a regular rig agree without both
+            own, up = replace(found[0].reading, order=None), np.abs(found[0].scene.rise)
+            mirrors = [
+                replace(own, flipped=not own.flipped),
+                replace(own, mirrored=not own.mirrored),
+            ]
+            found += _reassigned(likelihood, mirrors, each, -RARE, (int(np.argmax(up)),))
+            found.sort(key=lambda one: -one.score)
     return found
 
 
 def _reassigned(
-    likelihood: Likelihood, readings: Many[Reading], each: float
+    likelihood: Likelihood,
+    readings: Many[Reading],
+    each: float,
+    base: float = 0.0,
+    axes: Many[int] = (0, 1, 2),
 ) -> list[Interpretation]:
     """Interpretations with calibrations assigned anew, none of which need be its own camera's."""
     count = len(likelihood.judge.cameras)
     if count > MOST_CAMERAS:
         return []
     if count == 2:
-        return _scored(likelihood, [replace(one, order=(1, 0)) for one in readings], -2.0 * each)
+        exchanged = [replace(one, order=(1, 0)) for one in readings]
+        return _scored(likelihood, exchanged, base - 2.0 * each)
     orders = sorted(
         ((score, order, reading) for reading in readings
-         for score, order in likelihood.likely_orders(reading)), key=lambda one: -one[0],
+         for score, order in likelihood.likely_orders(reading, axes)), key=lambda one: -one[0],
     )  # fmt: skip
     found = []
     for _, order, reading in orders[:_RIVALS]:
         if moved := _moved(order):
-            found += _scored(likelihood, [replace(reading, order=order)], -each * moved)
+            found += _scored(likelihood, [replace(reading, order=order)], base - each * moved)
     return found
 
 

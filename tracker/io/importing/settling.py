@@ -22,6 +22,7 @@ from tracker.io.checks.reading import Reading, read_boxes, to_camera
 from tracker.io.checks.readings import Open, Seen
 from tracker.io.conventions.questions import (
     ACCEPTED,
+    OF_ONE,
     check_verdict,
     matched_by,
     rearranged,
@@ -400,6 +401,8 @@ def _read(
         unproved = check_verdict(verdict, raws, options, stated, otherwise)
         if unproved:
             found.append((ACCEPTED, unproved))
+    if sum(own is not None for own in seen) == 1:
+        told.append(OF_ONE)
     enough = verdict is not None and verdict.kind in ("decided", "open")
     if verdict is None or not enough:
         check_turns(raws)
