@@ -30,6 +30,14 @@ def _people(plan: ImportPlan) -> int:
 HOLD: dict[str, Callable[[ImportPlan], bool]] = {
     "boxes-of-larger-pictures": lambda plan: plan.views[0].camera.image_size[0] == 1920,
     "comma-yolo": lambda plan: _counts(plan) == [118, 117, 115, 116],
+    "camera-without-pose": lambda plan: (
+        [view.camera.name for view in plan.views] == ["cam1", "cam2", "cam4"]
+        and any("cam3: no pose" in told for told in plan.told)
+    ),
+    "coco-frame-step": lambda plan: (
+        any("taken for the number of the frame" in told for told in plan.told)
+        and all(view.looked_at is not None and view.looked_at[1] == 5 for view in plan.views)
+    ),
     "dropped-frames": lambda plan: any("cam2: about step 1" in told for told in plan.told),
     "every-second-frame": lambda plan: all(
         view.looked_at is not None and (view.looked_at % 2 == 0).all() for view in plan.views
@@ -39,6 +47,11 @@ HOLD: dict[str, Callable[[ImportPlan], bool]] = {
     "mot-labels": lambda plan: _counts(plan) == [300] * 4 and len(plan.told) == 4,
     "mot-none-counts": lambda plan: min(_counts(plan)) > 220,
     "nan-people": lambda plan: min(_counts(plan)) > 110,
+    "sparse-truth": lambda plan: (
+        plan.truth is not None
+        and plan.truth.known is not None
+        and np.flatnonzero(plan.truth.known).tolist() == list(range(0, 100, 5))
+    ),
     "trc-of-several": lambda plan: _people(plan) == 3,
     "truth-elsewhere": lambda plan: "0 % of its places lie in boxes" in _found(plan, "truth"),
 }

@@ -372,6 +372,28 @@ def test_a_step_has_a_thousand_boxes_at_most() -> None:
 
 
 @pytest.mark.parametrize(
+    ("frames", "known"),
+    [
+        (range(3, 33, 3), range(0, 35, 3)),
+        (range(4, 54, 5), range(4, 54, 5)),
+        (range(0, 27, 3), None),  # nine steps tell no gap
+        ([*range(0, 30, 3), 31], None),
+    ],
+)
+def test_a_truth_of_every_third_step_knows_these_alone(
+    tmp_path: Path, frames: range | list[int], known: range | None
+) -> None:
+    file = tmp_path / "truth.csv"
+    rows = [f"{frame},1,0,0,0" for frame in frames]
+    file.write_text("\n".join(["frame,id,x,y,z", *rows]) + "\n", encoding="utf-8")
+    steps = 35 if max(frames) < 35 else 54
+    found = truth_of(file, "truth.csv", steps).known
+    assert (found is None) == (known is None)
+    if known is not None and found is not None:
+        assert_array_equal(np.flatnonzero(found), known)
+
+
+@pytest.mark.parametrize(
     ("ranges", "known"),
     [
         ("# steps = 0-1 3", [1, 1, 0, 1, 0]),

@@ -31,6 +31,9 @@ KNOWN_STEPS = "steps"
 LONGEST = 4096
 """Largest length of an appearance vector; re-identification networks give 128 to 2048 numbers."""
 
+_LEAST_REGULAR = 10
+"""Frames with rows by which a regular gap is known."""
+
 _AT_ONCE = 4096
 """The number of rows that are held in memory in full precision."""
 
@@ -286,7 +289,8 @@ def truth_of(path: Path, where: str, frames: int) -> GroundTruth:
 
     Args:
         path: A table with the columns ``frame, id, x, y, z`` and optionally ``valid``. A comment
-            before the header may state which steps it covers; see :data:`KNOWN_STEPS`.
+            before the header may state which steps it covers; see :data:`KNOWN_STEPS`. Else it
+            covers all, or every second, third … one where it has rows of these alone.
         where: The file's name, for messages.
         frames: The number of steps of the sequence.
 
@@ -302,7 +306,29 @@ def truth_of(path: Path, where: str, frames: int) -> GroundTruth:
     order = columns.one_row_each(steps, ids, "person")
     positions = columns.stacked("x", "y", "z")
     known = _known_steps(path, where, frames)
+    if known is None:
+        known = covered_steps(steps, frames)
     return GroundTruth(steps[order], ids[order], positions[order], valid[order] == 1, known)
+
+
+def regular_gap(frames: Int[ndarray, " G"]) -> int:
+    """The gap between the frames of rows, if these are every second, third … frame, else 1.
+
+    A frame without a row may be one in which nobody was; frames between which there never is a row
+    are those that nobody looked at.
+    """
+    distinct = np.unique(frames)
+    return int(np.gcd.reduce(np.diff(distinct))) if len(distinct) >= _LEAST_REGULAR else 1
+
+
+def covered_steps(frames: Int[ndarray, " G"], steps: int) -> Bool[ndarray, " F"] | None:
+    """The steps that the rows of a truth cover by their regular gap; None if these are all."""
+    gap = regular_gap(frames)
+    if gap == 1:
+        return None
+    covered = np.zeros(steps, dtype=bool)
+    covered[int(frames.min()) % gap :: gap] = True
+    return covered
 
 
 def _known_steps(path: Path, where: str, frames: int) -> Bool[ndarray, " F"] | None:

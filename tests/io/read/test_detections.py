@@ -94,6 +94,20 @@ def test_a_coco_data_set_has_a_camera_a_folder(tmp_path: Path) -> None:
     assert pieces[0].image_size == (640, 480)
 
 
+@pytest.mark.parametrize(("faulty", "frames"), [(4, [0, 5, 10, 15, 20]), (1, [0, 1, 2, 3])])
+def test_annotations_of_no_image_are_said(tmp_path: Path, faulty: int, frames: list[int]) -> None:
+    """Where most ids are of no image they are numbers of frames; else what has none is left out."""
+    images = [{"id": n, "file_name": f"frame_{n:06}.png"} for n in range(5)]
+    ids = [0, 5, 10, 15, 20] if faulty > 1 else [0, 1, 2, 3, 99]
+    annotations = [{"image_id": one, "bbox": [one, 0, 10, 20]} for one in ids]
+    path = tmp_path / "annotations.json"
+    path.write_text(json.dumps({"images": images, "annotations": annotations}))
+    (piece,) = (p for p in read(path)[1] if isinstance(p, DetectionPiece))
+    assert piece.frames.tolist() == frames
+    assert piece.boxes[:, 0].tolist() == frames
+    assert ("80 %" if faulty > 1 else "1 of 5") in piece.left_out
+
+
 def test_yolo_text_a_file_a_frame(tmp_path: Path) -> None:
     files = []
     for frame in np.unique(FRAMES):

@@ -50,11 +50,12 @@ from tracker.io.importing.finding.times import (
     settle_times,
     told_beyond,
 )
-from tracker.io.importing.finding.truths import settle_truth
+from tracker.io.importing.finding.truths import in_gaps, settle_truth
 from tracker.io.importing.gathering import ParsedFiles
 from tracker.io.importing.options import ImportOptions
 from tracker.io.read.pieces import FormatError, Layout, RawCamera
 from tracker.sequences.sequence import Detections, Entrance, GroundTruth
+from tracker.sequences.tables import regular_gap
 
 ROOM_MARGIN = 1.0
 """Metres on each side: a room that is too large costs little, who is outside is lost."""
@@ -201,29 +202,20 @@ def _shifted(options: ImportOptions, late: Mapping[str, int], fps: float) -> Imp
     return replace(options, offsets={**found, **options.offsets})
 
 
-_GAPS = {2: "second", 3: "third", 4: "fourth", 5: "fifth", 10: "tenth"}
-_LEAST_LISTED = 10
-"""Frames with boxes by which a regular gap is known."""
-
-
 def _looked_at(
     detections: Sequence[Detections | None], names: Sequence[str], found: list[tuple[str, str]]
 ) -> list[Int[ndarray, " K"] | None]:
-    """The frames at which detectors ran, where these are every second, third … one.
-
-    A frame without a box may be one in which nobody was; frames between which there never is a
-    box are those that nobody looked at.
-    """
+    """The frames at which detectors ran, where these are every second, third … one."""
     result: list[Int[ndarray, " K"] | None] = []
     gaps: dict[int, list[str]] = {}
     for name, own in zip(names, detections, strict=True):
-        frames = np.unique(own.frames) if own is not None else np.zeros(0, dtype=np.int64)
-        gap = int(np.gcd.reduce(np.diff(frames))) if len(frames) >= _LEAST_LISTED else 1
-        result.append(None if gap < 2 else np.arange(frames[0] % gap, frames[-1] + 1, gap))
+        gap = 1 if own is None else regular_gap(own.frames)
+        first, last = (0, 0) if own is None or gap == 1 else (own.frames[0], own.frames[-1])
+        result.append(None if gap == 1 else np.arange(first % gap, last + 1, gap))
         if gap > 1:
             gaps.setdefault(gap, []).append(name)
     for gap, own_names in gaps.items():
-        every = f"every {_GAPS.get(gap, f'{gap}th')} frame"
+        every = in_gaps(gap)
         found.append(
             ("detector", f"ran at {every} of {', '.join(own_names)}; others were not looked at")
         )

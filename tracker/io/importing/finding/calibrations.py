@@ -63,18 +63,38 @@ def camera_sets(taken: Sequence[ParsedFiles]) -> tuple[list[CameraSet], list[str
             f"{one.label}: are other lenses of the same cameras; name only one of both to use it"
             for one in joined[:-1]
         ]
-    told += [
-        f"{lens.label}: has lenses, but no file has the poses of these cameras"
-        for lens in lenses
-        if lens.label not in used and not poses
-    ]
-    told += [_mixed(one) for one in sets if not one.posed and not one.lensed]
+    for one in sets:
+        if one in complete or one in poses or one.label in used:
+            continue
+        whole = _whole(one)
+        if whole is not None:
+            complete.append(whole)
+            lacking = [c.name for c in one.cameras if c not in whole.cameras]
+            told.append(
+                f"{one.label}: {', '.join(lacking)}: no pose and lens, as the others have; "
+                "left out with what it saw"
+            )
+        elif one in lenses:
+            if not poses:
+                told.append(f"{one.label}: has lenses, but no file has the poses of these cameras")
+        else:
+            told.append(_mixed(one))
     for one in complete:
         names = [camera.name for camera in one.cameras]
         twice = next((name for name in names if names.count(name) > 1), None)
         if twice is not None:
             raise FormatError(f'{one.label}: two cameras have the name "{twice}"; rename one')
     return sorted(complete, key=lambda one: -len(one.cameras)), told
+
+
+def _whole(one: CameraSet) -> CameraSet | None:
+    """The cameras of a set that have a lens and a pose, where these are at least two."""
+    whole = tuple(
+        c
+        for c in one.cameras
+        if c.projection is not None or (c.rotation is not None and c.intrinsics is not None)
+    )
+    return replace(one, cameras=whole) if len(whole) > 1 else None
 
 
 def _mixed(one: CameraSet) -> str:

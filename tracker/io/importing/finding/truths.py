@@ -13,6 +13,7 @@ from tracker.io.checks.reading import Reading, levelled, upright
 from tracker.io.importing.finding.grids import feet_on_floor, infer_grid
 from tracker.io.read.pieces import GRIDS, METRES, TruthPiece, Unit
 from tracker.sequences.sequence import Detections, GroundTruth
+from tracker.sequences.tables import covered_steps, regular_gap
 
 _SAMPLED = 300
 """Places that are held against the boxes."""
@@ -117,12 +118,23 @@ def settle_truth(
     order = np.lexsort([all_ids, all_steps])
     pairs = np.column_stack([all_steps, all_ids])[order]
     order = order[np.concatenate([[True], (np.diff(pairs, axis=0) != 0).any(axis=1)])]
+    known = covered_steps(all_steps, frames)
+    if known is not None:
+        gap = in_gaps(regular_gap(all_steps))
+        found.append(("truth", f"knows {gap}; others are not scored"))
     return GroundTruth(
         all_steps[order],
         all_ids[order],
         np.concatenate(places)[order],
         np.concatenate(valid)[order],
+        known,
     )
+
+
+def in_gaps(gap: int) -> str:
+    """Every so many frames, in words."""
+    names = {2: "second", 3: "third", 4: "fourth", 5: "fifth", 10: "tenth"}
+    return f"every {names.get(gap, f'{gap}th')} frame"
 
 
 def _ways(piece: TruthPiece, reading: Reading) -> Iterator[tuple[float, Float[ndarray, "3 3"]]]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -55,13 +56,34 @@ def read(file: SourceFile) -> Iterator[Piece]:
         records = values
     if not is_list_of_tables(records):
         raise file.error(f"expected a list of tables, found {shown(records)}")
+    unknown = [r for r in records if r.get("image_id") not in images] if images else []
+    left_out = ""
+    if 2 * len(unknown) > len(records):
+        # a known fault of exporters: the number of the frame stands in place of the image's id
+        share = 100.0 * len(unknown) / len(records)
+        left_out = (
+            f"{file.path.name}: the image_id of {share:.0f} % of the annotations is no id of an "
+            "image; it is taken for the number of the frame"
+        )
+        first = next(iter(images.values()))
+        camera = camera_of(str(first.get("file_name", "")))
+        rows = [(str(record.get("image_id")), first, record) for record in records]
+        yield replace(_piece(file, camera, rows, classes), left_out=left_out)
+        return
+    if unknown:
+        left_out = (
+            f"{file.path.name}: {len(unknown)} of {len(records)} annotations are of no image of "
+            "the file; they are left out"
+        )
+        records = [record for record in records if record.get("image_id") in images]
     by_camera: dict[str, list[Any]] = {}
     for record in records:
         image = images.get(record.get("image_id"), {})
         name = str(image.get("file_name", record.get("image_id")))
         by_camera.setdefault(camera_of(name), []).append((name, image, record))
     for camera, rows in (by_camera or {"": []}).items():
-        yield _piece(file, camera, rows, classes)
+        piece = _piece(file, camera, rows, classes)
+        yield replace(piece, left_out=" ".join(filter(None, (piece.left_out, left_out))))
 
 
 def _piece(
