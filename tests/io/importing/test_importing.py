@@ -419,3 +419,19 @@ def test_more_cameras_than_anybody_has_are_refused_at_once(tmp_path: Path) -> No
     (tmp_path / "rig.json").write_text(json.dumps({f"c{n}": table for n in range(1001)}))
     with pytest.raises(FormatError, match=r"rig\.json: has 1,001 cameras, expected at most 1000"):
         settled_of(tmp_path)
+
+
+def test_boxes_of_larger_pictures_than_the_videos_are_made_smaller(tmp_path: Path) -> None:
+    """Videos were made smaller after the calibration and the detector had seen them."""
+    toml(tmp_path)
+    detections(tmp_path)
+    videos(tmp_path, size=(SIZE[0] // 4, SIZE[1] // 4), frames=60)
+    settled = settled_of(tmp_path)
+    assert any("4 times as wide" in words for name, words in settled.found if name == "boxes")
+    for view, camera in zip(settled.views, cameras(), strict=True):
+        assert view.camera.image_size == (SIZE[0] // 4, SIZE[1] // 4)
+        assert view.detections is not None
+        expected = boxes(camera, PLACES)[1]
+        corners = (expected[:, :2] + 0.5) / 4.0 - 0.5
+        np.testing.assert_allclose(view.detections.boxes[:, :2], corners, atol=1e-3)
+        np.testing.assert_allclose(view.detections.boxes[:, 2:], expected[:, 2:] / 4.0, atol=1e-3)

@@ -125,18 +125,21 @@ def _check(
 ) -> None:
     names = [camera.name for camera in cameras]
     best = verdict.best.reading
-    if verdict.kind == "none":
-        mended = (
-            "check that calibration and boxes belong together and are of the same moments"
-            if otherwise is None
-            else f"without {stated} {in_words(otherwise.best.reading, names)} explains "
-            f"{100.0 * otherwise.best.evidence.share:.0f} %"
+    share = 100.0 * verdict.best.evidence.share
+    if verdict.kind == "none" and otherwise is not None:
+        other = otherwise.best.reading
+        raise Unexplained(
+            f"with {stated} {share:.0f} % of a camera's boxes are explained by another camera's, "
+            f"without it {100.0 * otherwise.best.evidence.share:.0f} % "
+            f"({in_words(other, names, _differing(other, best))}); {ACCEPT} imports them as they "
+            "are"
         )
+    if verdict.kind == "none":
         raise Unexplained(
             f"no interpretation{f' with {stated}' if stated else ''} explains these boxes; the "
-            f"closest, {in_words(best, names)}, explains "
-            f"{100.0 * verdict.best.evidence.share:.0f} % of a camera's boxes by another camera's: "
-            f"{mended}; {ACCEPT} imports them as they are"
+            f"closest, {in_words(best, names)}, explains {share:.0f} % of a camera's boxes by "
+            "another camera's: check that calibration and boxes belong together and are of the "
+            f"same moments; {ACCEPT} imports them as they are"
         )
     if best.flipped:
         raise Unexplained(
@@ -148,10 +151,15 @@ def _check(
         raise Undecided(_open(best, verdict.rival.reading, verdict.odds, names))
 
 
+def _differing(one: Reading, other: Reading) -> list[str]:
+    """The parts in which two readings differ."""
+    parts = ("direction", "axes", "layout", "turns", "order", "mirrored", "flipped", "pixels")
+    return [part for part in parts if getattr(one, part) != getattr(other, part)]
+
+
 def _open(best: Reading, rival: Reading, odds: float, names: Sequence[str]) -> Question:
     sure = "as likely" if odds < math.log(2.0) else f"{math.exp(min(odds, 7.0)):.0f} : 1"
-    parts = ("direction", "axes", "layout", "turns", "order", "mirrored", "flipped", "pixels")
-    differing = [part for part in parts if getattr(best, part) != getattr(rival, part)]
+    differing = _differing(best, rival)
     words = {"layout": "boxes", "order": "which calibration is whose", "turns": "angles",
              "direction": "where R and t lead", "axes": "axes of cameras",
              "mirrored": "handedness of the world", "flipped": "left and right of the pictures",

@@ -382,7 +382,7 @@ def _read(
         fps=times.fps,
         tried=Open(layouts=layouts, normalised=(False,), orders=free),
         names=matched_by(cameras),
-        pixels=_pixels(raws, seen) if all(c.picture_size is None for c in cameras) else (),
+        pixels=_other_pixels(cameras, raws, seen),
     )
     verdict = find(raws)
     if verdict is not None:
@@ -395,6 +395,7 @@ def _read(
             found.append((ACCEPTED, unproved))
     if sum(own is not None for own in seen) == 1:
         told.append(OF_ONE)
+    larger = 1.0
     enough = verdict is not None and verdict.kind in ("decided", "open")
     if verdict is None or not enough:
         check_turns(raws)
@@ -420,6 +421,11 @@ def _read(
         why = f"since {share:.0f} % of the boxes meet so"
         if unknown:
             found.append(("boxes", f"{reading.layout}, {why}; --boxes"))
+        if any(camera.picture_size is not None for camera in cameras):
+            larger, reading = reading.pixels, replace(reading, pixels=1.0)
+            if larger != 1.0:
+                how = f"of pictures {larger:.4g} times as wide, as the calibration's"
+                found.append(("boxes", f"{how}, {why}"))
         raws, told_ = rearranged(raws, reading)
         found += told_
         told += told_of_moments(verdict, [raw.name for raw in raws])
@@ -443,6 +449,10 @@ def _read(
         if own is not None and own[1] is None:
             four = read_boxes(own[0].boxes, reading.layout)
             own = (replace(own[0], boxes=four), reading.layout)
+        if own is not None and larger != 1.0:
+            corners = (own[0].boxes[:, :2] + 0.5) / larger - 0.5
+            four = np.column_stack([corners, own[0].boxes[:, 2:] / larger])
+            own = (replace(own[0], boxes=four), own[1])
         changed.append(own)
     if best is not None and arbitrary and convention.unit is None:
         size = options.half_extents
@@ -456,6 +466,21 @@ def _stated(options: ImportOptions) -> str:
     """The flags that state how poses are meant."""
     flags = (("pose", options.pose), ("axes", options.axes), ("euler", options.turns))
     return " ".join(f"--{name} {value}" for name, value in flags if value is not None)
+
+
+def _other_pixels(
+    cameras: Sequence[MatchedCamera], raws: Sequence[RawCamera], seen: Sequence[Seen | None]
+) -> tuple[float, ...]:
+    """Widths of pictures that the boxes may be of, in that which is known or taken."""
+    if all(camera.picture_size is None for camera in cameras):
+        return _pixels(raws, seen)
+    # pictures may be smaller than those that were calibrated and detected in
+    ratios = {
+        camera.raw.image_size[0] / camera.picture_size[0]
+        for camera in cameras
+        if camera.picture_size is not None and camera.raw.image_size is not None
+    }
+    return tuple(ratios - {1.0}) if len(ratios) == 1 else ()
 
 
 def _pixels(raws: Sequence[RawCamera], seen: Sequence[Seen | None]) -> tuple[float, ...]:
