@@ -19,7 +19,6 @@ from itertools import pairwise
 import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
-from scipy.optimize import minimize
 
 from tracker.filters.models import Motion
 from tracker.kernels.smoothing.innovations import (
@@ -153,6 +152,8 @@ def estimate_noise(
         noise_scales: Factor on the process noise of the step to each row.
         step_time: Time between two steps, seconds.
     """
+    from scipy.optimize import minimize  # half a second that a server starts without
+
     windows = _windows(paths, rows, seen, motion.transition, noise_scales)
     dimension, size = paths.states.shape[1], seen.residuals.shape[1]
     prior = np.diag(np.repeat([_DEVIATION**2, _DEVIATION_VELOCITY**2], 3)[:dimension])
