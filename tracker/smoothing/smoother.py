@@ -20,6 +20,8 @@ from numpy import ndarray
 from tracker.corrections import Correction
 from tracker.corrections.lookup import TrackIndex
 from tracker.fusion.model import FusionModel
+from tracker.fusion.target_model import ExpectedBoxes
+from tracker.kernels.gating import Measurements
 from tracker.kernels.measurement import ExpectedBoxes as SeenBoxes
 from tracker.kernels.smoothing import evidence, passes
 from tracker.kernels.smoothing.passes import SmoothedRows, drives, sums_around
@@ -559,17 +561,12 @@ class Smoother:
             own: Their links to the camera's boxes.
             learnt: The calibration before.
         """
-        owners, parts = paths.owners, []
-        for first in range(0, max(len(own.rows), 1), _AT_ONCE):
-            rows, boxes = own.rows[first : first + _AT_ONCE], own.boxes[first : first + _AT_ONCE]
-            expected = self.model.target.expected(
-                self.model.cameras[camera], paths.states[rows], paths.covariances[rows]
-            )
-            measured = self.cameras[camera].measurements(boxes)
-            half = np.maximum((expected.boxes[:, 3] - expected.boxes[:, 1]) / 2.0, 1.0)
-            plain = measured.values - expected.expected.values
+        parts = []
+        for rows, expected, measured, half, plain, rest in self._compared(
+            camera, paths, own, learnt
+        ):
+            left = rest / half[:, None]
             whole = expected.valid & free(expected).all(axis=1)
-            left = (plain - learnt.shift(camera, owners[rows], expected)) / half[:, None]
             # a box of another posture does not show the person's height
             whole &= (np.abs(left) < ODD).all(axis=1)
             h = expected.jacobians[whole][:, :, :3]
@@ -621,23 +618,47 @@ class Smoother:
         self, paths: Paths, links: Links, learnt: Calibration
     ) -> Iterator[tuple[ndarray, ...]]:
         """The columns of :class:`tracker.smoothing.noise.SureBoxes`, some boxes at a time."""
-        owners = paths.owners
         for camera in range(len(self.cameras)):
             own = links.take(links.cameras == camera)
-            for first in range(0, max(len(own.rows), 1), _AT_ONCE):
-                rows = own.rows[first : first + _AT_ONCE]
-                boxes = own.boxes[first : first + _AT_ONCE]
-                expected = self.model.target.expected(
-                    self.model.cameras[camera], paths.states[rows], paths.covariances[rows]
-                )
-                half = np.maximum((expected.boxes[:, 3] - expected.boxes[:, 1]) / 2.0, 1.0)
-                left = self.cameras[camera].measurements(boxes).values - expected.expected.values
-                left -= learnt.shift(camera, owners[rows], expected)
+            for rows, expected, _, half, _, left in self._compared(camera, paths, own, learnt):
                 whole = expected.valid & free(expected).all(axis=1)
                 whole &= (np.abs(left) < half[:, None]).all(axis=1)
                 jacobians = expected.jacobians[whole][:, :, :3]
                 of_camera = np.full(int(whole.sum()), camera)
                 yield of_camera, rows[whole], left[whole], jacobians, half[whole]
+
+    def _compared(
+        self, camera: int, paths: Paths, own: Links, learnt: Calibration
+    ) -> Iterator[tuple[ndarray, ExpectedBoxes, Measurements, ndarray, ndarray, ndarray]]:
+        """Compare one camera's boxes with those that are expected of paths, some at a time.
+
+        Args:
+            camera: Index of the camera.
+            paths: The paths.
+            own: Their links to the camera's boxes.
+            learnt: The self-calibration of the boxes.
+
+        Yields:
+            The rows, the expected boxes, the measurements, the half heights of the expected boxes,
+            and the measurements less what is expected without and with the calibration, pixels.
+        """
+        owners = paths.owners
+        for first in range(0, max(len(own.rows), 1), _AT_ONCE):
+            rows, boxes = own.rows[first : first + _AT_ONCE], own.boxes[first : first + _AT_ONCE]
+            expected = self.model.target.expected(
+                self.model.cameras[camera], paths.states[rows], paths.covariances[rows]
+            )
+            measured = self.cameras[camera].measurements(boxes)
+            half = np.maximum((expected.boxes[:, 3] - expected.boxes[:, 1]) / 2.0, 1.0)
+            plain = measured.values - expected.expected.values
+            yield (
+                rows,
+                expected,
+                measured,
+                half,
+                plain,
+                plain - learnt.shift(camera, owners[rows], expected),
+            )
 
     def with_shifts(self, paths: Paths, learnt: Calibration) -> Calibration:
         """Add to a calibration the shifts that hand-marked boxes show.

@@ -174,7 +174,7 @@ class Draft:
         self._stop.set()
         stop = self._stop = threading.Event()
         phase: Phase = "settled" if self._gathered and self._known.settled else "reading"
-        self._tell(phase=phase, busy=True, error="", undecided="", waiting="")
+        self._tell(phase=phase, busy=True, error="", undecided="", question=None, waiting="")
         threading.Thread(target=self._look, args=(stop,), name="importing", daemon=True).start()
 
     def _look(self, stop: threading.Event) -> None:

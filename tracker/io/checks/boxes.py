@@ -52,7 +52,7 @@ class BoxesTell:
     mistaken: bool
     """Whether this is another reading than that of the file."""
     verdict: Verdict
-    """Of all readings."""
+    """What the search over all readings tells."""
     suggestion: Suggestion | None
     """Room and size, where the file is read rightly."""
 

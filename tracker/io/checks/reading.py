@@ -153,15 +153,21 @@ def lens_of(camera: RawCamera, image_size: tuple[int, int]) -> Camera:
 
 
 def with_pixels(raw: RawCamera, factor: float) -> RawCamera:
-    """The camera for pictures so many times as wide: pixels' corners, not centres, are scaled."""
+    """The camera for pictures so many times as wide."""
     if factor == 1.0:
         return raw
-    half = 0.5 * factor - 0.5
-    scale = np.array([[factor, 0.0, half], [0.0, factor, half], [0.0, 0.0, 1.0]])
     size = raw.image_size
+    larger = None if size is None else (round(factor * size[0]), round(factor * size[1]))
+    return replace(stretched(raw, factor, factor), image_size=larger)
+
+
+def stretched(raw: RawCamera, across: float, down: float) -> RawCamera:
+    """The lens for stretched pictures: pixels' corners, not centres, are scaled."""
+    scale = np.array(
+        [[across, 0.0, 0.5 * across - 0.5], [0.0, down, 0.5 * down - 0.5], [0.0, 0.0, 1.0]]
+    )
     return replace(
         raw,
-        image_size=None if size is None else (round(factor * size[0]), round(factor * size[1])),
         projection=None if raw.projection is None else scale @ raw.projection,
         intrinsics=None if raw.intrinsics is None else scale @ raw.intrinsics,
     )

@@ -257,7 +257,7 @@ class Judge:
         return [pose(self.cameras[own], reading) for own in self.order(reading)]
 
     def order(self, reading: Reading) -> tuple[int, ...]:
-        """Whose calibration is that of each camera's boxes."""
+        """The index of the calibration of each camera's boxes."""
         return reading.order or tuple(range(len(self.cameras)))
 
     def _of(

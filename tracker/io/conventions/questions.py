@@ -144,7 +144,7 @@ def _check(
     if best.flipped:
         raise Unexplained(
             "the boxes are of pictures whose left and right are exchanged: with them mirrored "
-            f"{100.0 * verdict.best.evidence.share:.0f} % are explained by another camera's; "
+            f"{share:.0f} % are explained by another camera's; "
             f"mirror pictures and boxes; {ACCEPT} imports them as they are"
         )
     if verdict.kind == "open" and verdict.rival is not None:

@@ -33,7 +33,7 @@ from tracker.geometry.consistency.observed import Pose, Rays, rays_of
 from tracker.geometry.consistency.odds import DECISIVE, log_odds
 from tracker.io.checks.level import upwards
 from tracker.io.checks.reading import Reading, boxes_by, turns_of
-from tracker.io.checks.readings import Judge, Judged, Open, Seen, restricted
+from tracker.io.checks.readings import EVERY_ORDER, Judge, Judged, Open, Seen, restricted
 from tracker.io.conventions.orders import MOST_CAMERAS, likely_orders
 from tracker.io.read.pieces import RawCamera, Unit, Up
 
@@ -63,17 +63,13 @@ RARE = 7.0
 _MOST_PAIRS, _MOST_PAIRS_FIRST = 2000, 600  # of boxes of two cameras, in all and at first
 _MOST_COMPARED = 16  # interpretations that are compared by all moments
 _LEAST_FIRST = 20  # moments that are compared first, one for each block of time
-_LEAST_RIVALS, _RIVALS = (
-    2,
-    4,
-)  # readings whose pixels, handedness and order are questioned
+_LEAST_RIVALS, _RIVALS = 2, 4  # readings whose pixels, handedness and order are questioned
 _LEAST_SHARE = 0.1  # of a camera's boxes that another one explains, below which none is explained
 _MANY_BOXES = 200  # least number of boxes that have to be explained
 _COARSE, _NEAR, _WIDEST = 0.2, 3.0, 10.0  # seconds between lags, and to the farthest of them
 _PLAINLY = 0.4  # share of boxes from which nobody asks whether all calibrations are exchanged
 _WELL = 0.7  # share of a camera's boxes from which no mirror is looked for
 _EXPLAINED = 0.3  # share of boxes with which the calibration is read nearly rightly
-_EVERY_ORDER = 4  # number of cameras up to which every order is tried
 _SAME_SCENE = 0.03  # difference of two scenes, in radians and in the size of the rig
 
 
@@ -404,7 +400,7 @@ def _candidates(
     found.sort(key=lambda one: -one.score)
     if open_.orders and found:
         starts = found[:1]
-        if found[0].evidence.share < _EXPLAINED and len(cameras) < _EVERY_ORDER:
+        if found[0].evidence.share < _EXPLAINED and len(cameras) < EVERY_ORDER:
             starts = found[:_RIVALS]  # of few cameras nothing agrees before they are exchanged
         for start in starts:
             found += _with_orders(likelihood, start, each)
@@ -496,7 +492,7 @@ def _with_orders(likelihood: Likelihood, best: Interpretation, each: float) -> l
     start = best.reading.order or tuple(range(count))
     known = {start}
     base = best.prior + each * _moved(start)
-    for _ in range(1 if count <= _EVERY_ORDER else count):
+    for _ in range(1 if count <= EVERY_ORDER else count):
         better: Interpretation | None = None
         for order in _orders(start, count):
             if order in known:
@@ -528,7 +524,7 @@ def _exchanged(
     judged = replace(best.judged, reading=reading)
     found = likelihood.at(judged, best.scene, prior)
     # the scene of a wrong order is wrong, unless most cameras are right
-    if len(order) <= _EVERY_ORDER and best.evidence.share < _EXPLAINED:
+    if len(order) <= EVERY_ORDER and best.evidence.share < _EXPLAINED:
         own = likelihood.score(likelihood.judge.turned(reading), prior)
         if own is not None and own.score > found.score:
             return own
@@ -536,7 +532,7 @@ def _exchanged(
 
 
 def _orders(own: tuple[int, ...], count: int) -> Iterator[tuple[int, ...]]:
-    if count <= _EVERY_ORDER:
+    if count <= EVERY_ORDER:
         yield from itertools.permutations(range(count))
         return
     for a, b in itertools.combinations(range(count), 2):

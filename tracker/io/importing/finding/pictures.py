@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from tracker.io.checks.reading import lens_of, read_boxes
+from tracker.io.checks.reading import lens_of, read_boxes, stretched
 from tracker.io.importing.finding.matching import MatchedCamera, same_aspect
 from tracker.io.read.pieces import DetectionPiece, FormatError, RawCamera
 
@@ -72,17 +72,11 @@ def _size(camera: MatchedCamera, found: list[tuple[str, str]]) -> tuple[int, int
 
 
 def scaled(raw: RawCamera, size: tuple[int, int]) -> RawCamera:
-    """The camera for pictures of another size: pixels' corners, not centres, are scaled."""
+    """The camera for pictures of another size."""
     if raw.image_size is None or raw.image_size == size:
         return replace(raw, image_size=size)
     across, down = size[0] / raw.image_size[0], size[1] / raw.image_size[1]
-    scale = np.array(
-        [[across, 0.0, 0.5 * across - 0.5], [0.0, down, 0.5 * down - 0.5], [0.0, 0.0, 1.0]]
-    )
-    if raw.projection is not None:
-        return replace(raw, image_size=size, projection=scale @ raw.projection)
-    assert raw.intrinsics is not None
-    return replace(raw, image_size=size, intrinsics=scale @ raw.intrinsics)
+    return replace(stretched(raw, across, down), image_size=size)
 
 
 def _likely(cameras: Sequence[MatchedCamera]) -> tuple[int, int]:
