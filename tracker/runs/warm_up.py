@@ -50,8 +50,8 @@ MAKERS: dict[MethodKey, Callable[[Method], Callable[..., Any]]] = {
 }
 """The function that imports a method of each stage."""
 
-STEPS = 36
-"""The number of steps of the synthetic recording."""
+STEPS = 44
+"""The number of steps of the synthetic recording: enough boxes for their noise to be estimated."""
 
 EMPTY = 12
 """The number of steps before people appear, from which the background is learnt."""
