@@ -351,17 +351,23 @@ def test_corrections_give_the_track_file_that_they_gave(
         ("6", ["--preset", "published"]),
     ],
 )  # fmt: skip
-def test_corrections_give_the_tracks_that_they_gave_bit_for_bit(
+def test_corrections_give_the_tracks_that_they_gave(
     home: Home, capsys: pytest.CaptureFixture[str], number: str, words: list[str]
 ) -> None:
     library = home.folder / "again.sqlite3"
     places = ("-o", home.folder / "again.csv", "--library", library)
     status, _, error = command(capsys, "track", home.crossing, *places, *words)
     assert status == 0, error
-    with Library(library) as again:
-        found, given = facts_of(again.result(1))["tracks"], RUNS[number]["tracks"]
-    # how sure a position is was estimated from the recording only later
-    assert {**found, "sigmas": None} == {**given, "sigmas": None}
+    with Library(library) as again, Library(home.library) as before:
+        found, given = again.result(1).kept, before.result(int(number)).kept
+    for name in ("frames", "ids", "seen"):
+        np.testing.assert_array_equal(getattr(found.tracks, name), getattr(given.tracks, name))
+    # the examples were made on another machine, and linear algebra rounds by the processor; how
+    # sure a position is was estimated from the recording only later
+    np.testing.assert_allclose(found.tracks.positions, given.tracks.positions, atol=1e-9)
+    np.testing.assert_allclose(found.tracks.existences, given.tracks.existences, atol=1e-6)
+    probabilities = found.detection_probabilities, given.detection_probabilities
+    np.testing.assert_allclose(*probabilities, atol=0.0011)  # stored in thousandths
 
 
 def test_what_was_said_last_can_be_taken_back_after_a_start(home: Home) -> None:

@@ -20,6 +20,13 @@ TOLERANCE = 1e-6
 LEAST = 1e-9
 """Absolute, for sums that are nothing."""
 
+OF_DEVIATIONS = 0.05
+"""Relative, for the deviations of tracks: the likelihood of the noise they follow from is flat
+around its maximum, and which point of it the search ends at depends on the last bits."""
+
+DEVIATIONS = "tracks", "deviation"
+"""Stage and column of :data:`OF_DEVIATIONS`."""
+
 Fingerprints = dict[str, Fingerprint]
 """By combination."""
 
@@ -66,7 +73,7 @@ def differences(name: str, expected: Fingerprints, found: Fingerprints) -> list[
                 place = f"{name} / {run} / {stage} / {step}"
                 told += _of_row(
                     place,
-                    COLUMNS[stage.split()[0]],
+                    stage.split()[0],
                     before.get(stage, {}).get(step),
                     after.get(stage, {}).get(step),
                 )
@@ -77,20 +84,19 @@ def _keys(before: dict[str, Any], after: dict[str, Any]) -> list[str]:
     return list(dict.fromkeys([*before, *after]))
 
 
-def _of_row(
-    place: str, columns: tuple[str, ...], before: Row | None, after: Row | None
-) -> list[str]:
+def _of_row(place: str, stage: str, before: Row | None, after: Row | None) -> list[str]:
+    columns = COLUMNS[stage]
     if before is None or after is None or not len(columns) == len(before) == len(after):
         return [f"{place}: expected {before}, found {after}"]
     return [
         f"{place} / {column}: expected {old}, found {new}"
         for column, old, new in zip(columns, before, after, strict=True)
-        if not same(old, new)
+        if not same(old, new, OF_DEVIATIONS if (stage, column) == DEVIATIONS else TOLERANCE)
     ]
 
 
-def same(old: float | None, new: float | None) -> bool:
+def same(old: float | None, new: float | None, tolerance: float = TOLERANCE) -> bool:
     """Whether two numbers agree within the tolerance."""
     if old is None or new is None:
         return old is new
-    return math.isclose(old, new, rel_tol=TOLERANCE, abs_tol=LEAST)
+    return math.isclose(old, new, rel_tol=tolerance, abs_tol=LEAST)
