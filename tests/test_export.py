@@ -44,6 +44,7 @@ def tracks_of(rows: list[tuple[int, int, tuple[float, float, float]]]) -> Trajec
         sigmas=np.abs(positions) / 10.0,
         seen=np.ones((count, len(SEQUENCE.views)), dtype=bool),
         components=np.zeros(count, dtype=np.int64),
+        covariances_xy=np.linspace(-0.01, 0.01, count),
     )
 
 
@@ -72,7 +73,8 @@ def test_the_columns_are_those_of_the_format() -> None:
     assert header[:10] == "frame,time,id,x,y,z,existence,sigma_x,sigma_y,sigma_z".split(",")
     names = [camera.name for camera in SEQUENCE.cameras]
     assert header[10:] == [
-        f"{name}_{side}" for name in names for side in ("left", "top", "width", "height")
+        *(f"{name}_{side}" for name in names for side in ("left", "top", "width", "height")),
+        "covariance_xy",
     ]
     assert {len(row) for row in rows} == {len(header)}
     assert rows[1][:10] == [
@@ -125,6 +127,8 @@ def test_what_is_read_is_what_was_written(tmp_path: Path) -> None:
     np.testing.assert_allclose(read.positions, TRACKS.positions, atol=0.5001e-4)
     np.testing.assert_allclose(read.existences, TRACKS.existences, atol=0.5001e-4)
     np.testing.assert_allclose(read.sigmas, TRACKS.sigmas, atol=0.5001e-4)
+    assert read.covariances_xy is not None
+    np.testing.assert_allclose(read.covariances_xy, TRACKS.covariances_xy, atol=0.5001e-6)
     for camera in SEQUENCE.cameras:
         boxes, visible = camera.project_boxes(TRACKS.positions, SEQUENCE.target_half_extents)
         np.testing.assert_array_equal(np.isnan(read.boxes[camera.name]).all(axis=1), ~visible)

@@ -397,6 +397,7 @@ def tracks(
         seen=np.ones((count, cameras), dtype=bool),
         components=np.arange(count) - np.searchsorted(steps[order], steps[order]),
         labels=names[people][order],
+        covariances_xy=np.zeros(count),
     )
 
 

@@ -23,15 +23,18 @@ def tracks(steps: int = 40, people: int = 3, *, cameras: int = 2, seed: int = 0)
     count = steps * people
     ways = rng.normal(0.0, 0.02, (steps, people, 3)).cumsum(axis=0)
     ways[:, :, 2] += 0.9
+    sigmas = rng.uniform(0.02, 0.06, (count, 3))
+    correlations = np.repeat(0.6 * np.sin(np.arange(steps) / 50.0), people)
     rows = Trajectories(
         frames=np.repeat(np.arange(steps), people),
         ids=np.tile(np.arange(1, people + 1), steps),
         positions=ways.reshape(-1, 3),
         existences=1.0 - 10.0 ** rng.uniform(-9.0, -1.0, count),
-        sigmas=rng.uniform(0.02, 0.06, (count, 3)),
+        sigmas=sigmas,
         seen=rng.random((count, cameras)) > 0.1,
         components=np.tile(np.arange(people), steps),
         labels=np.tile(np.arange(people) + 40, steps),
+        covariances_xy=correlations * sigmas[:, 0] * sigmas[:, 1],
     )
     probabilities = np.where(rng.random((count, cameras)) < 0.7, 0.95, rng.random((count, cameras)))
     return KeptTracks(rows, probabilities.round(3))

@@ -22,6 +22,8 @@ def test_positions_and_ids_come_back_exactly() -> None:
         np.testing.assert_array_equal(getattr(back.tracks, name), getattr(KEPT.tracks, name))
     np.testing.assert_allclose(back.tracks.existences, KEPT.tracks.existences, rtol=1e-7)
     np.testing.assert_allclose(back.tracks.sigmas, KEPT.tracks.sigmas, rtol=1e-7)
+    allowed = 5.1e-4 * np.prod(KEPT.tracks.sigmas[:, :2], axis=1)
+    assert (np.abs(back.tracks.covariances_xy - KEPT.tracks.covariances_xy) <= allowed).all()
     np.testing.assert_allclose(
         back.detection_probabilities, KEPT.detection_probabilities, atol=5e-4
     )

@@ -48,6 +48,7 @@ def written(steps: int = STEPS) -> ExportedRun:
         seen=rng.random((count, len(of.views))) > 0.2,
         components=np.zeros(count, dtype=np.int64),
         labels=ids[order] + 40,
+        covariances_xy=rng.uniform(-4e-4, 4e-4, count),
     )
     parameters = with_values(RunParameters(), {"fusion.survival_probability": 0.97})
     return ExportedRun(of, tracks, parameters, seed=5)

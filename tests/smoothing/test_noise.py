@@ -225,6 +225,7 @@ def covered(sequence: Sequence, *, smoothed: bool) -> float:
         tracks = run.filtered
         frames, places = tracks.frames, tracks.positions[:, :2]
         spreads = tracks.sigmas[:, :2, None] ** 2 * np.eye(2)
+        spreads[:, [0, 1], [1, 0]] = tracks.covariances_xy[:, None]
     within = []
     for frame, place in zip(truth.frames, truth.positions[:, :2], strict=True):
         rows = np.flatnonzero(frames == frame)

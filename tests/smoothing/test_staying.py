@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from tracker.smoothing.identity.association import chains, join
 from tracker.smoothing.identity.constraints import LinkConstraints
 from tracker.smoothing.identity.identities import PriorLinks
+from tracker.smoothing.identity.solver import TrackletGraph, link_tracklets
 from tracker.smoothing.identity.tracklets import Pairs
 from tracker.smoothing.paths import Paths
 
@@ -27,9 +27,9 @@ PAIRS = Pairs(EARLIER, LATER, np.full(5, 2), np.array([5.0, 5.0, 5.0, 5.5, 5.5])
 
 
 def joined(gains: np.ndarray, constraints: LinkConstraints) -> list[list[int]]:
-    alone = np.full(PIECES, -1.0)
-    following, used = join(np.full(PIECES, 9.0), alone, alone, EARLIER, LATER, gains, constraints)
-    return chains(following, used)
+    alone = np.full(PIECES, 1.0)
+    graph = TrackletGraph(np.full(PIECES, -9.0), alone, alone, EARLIER, LATER, -gains)
+    return link_tracklets(graph, constraints)
 
 
 def test_who_is_parted_takes_nobody_elses_place() -> None:

@@ -8,18 +8,14 @@ import numpy as np
 import pytest
 from numpy import ndarray
 
-from tests.smoothing.test_joining import worth_of
-from tracker.smoothing.identity.association import chains, join
+from tests.smoothing.test_joining import chains, graph_of, value_of, worth_of
 from tracker.smoothing.identity.constraints import Constraint, LinkConstraints, possible
+from tracker.smoothing.identity.solver import TrackletGraph, link_tracklets
 
 
 def obeys(following: tuple[int, ...], used: tuple[bool, ...], constraints: LinkConstraints) -> bool:
     """Whether chains are as constraints want them."""
-    of = {
-        piece: number
-        for number, chain in enumerate(chains(np.array(following), np.array(used)))
-        for piece in chain
-    }
+    of = {piece: number for number, chain in enumerate(chains(following, used)) for piece in chain}
     followed = {j for j in following if j >= 0}
     direct = {(i, j) for i, j in enumerate(following) if j >= 0}
     tied = set(constraints.must_link)
@@ -73,11 +69,7 @@ def test_the_best_of_all_ways_that_obey(seed: int) -> None:
         np.triu(rng.random((count, count)) < 0.8, 1), rng.normal(-3.0, 5.0, (count, count)), -np.inf
     )
     constraints = drawn_ties(rng, count)
-    earlier, later = np.nonzero(np.isfinite(gain))
-    following, used = join(
-        numbers["worths"], numbers["births"], numbers["deaths"], earlier, later,
-        gain[earlier, later], constraints,
-    )  # fmt: skip
+    found = link_tracklets(graph_of(numbers, gain), constraints)
     for i, j in constraints.must_link:  # what no pair connects may be, with no odds of its own
         if not np.isfinite(gain[i, j]):
             gain[i, j] = numbers["deaths"][i] + numbers["births"][j]
@@ -89,19 +81,26 @@ def test_the_best_of_all_ways_that_obey(seed: int) -> None:
         and all(there[i] and there[j] for i, j in enumerate(one) if j >= 0)
         and obeys(one, there, constraints)
     )
-    assert obeys(tuple(following.tolist()), tuple(used.tolist()), constraints)
-    found = worth_of(tuple(following.tolist()), tuple(used.tolist()), numbers, gain)
-    assert found == pytest.approx(best, abs=1e-6)
+    following = {i: j for chain in found for i, j in itertools.pairwise(chain)}
+    used = {piece for chain in found for piece in chain}
+    assert obeys(
+        tuple(following.get(i, -1) for i in range(count)),
+        tuple(i in used for i in range(count)),
+        constraints,
+    )
+    assert value_of(found, numbers, gain) == pytest.approx(best, abs=1e-6)
 
 
 def test_what_lies_between_two_who_are_one_leads_from_the_one_to_the_other() -> None:
     """The first would go on as the second and end, and the third come and go on as the last."""
     gains = {(0, 1): 10.0, (2, 3): 10.0, (0, 2): -8.0, (1, 3): -7.0, (1, 2): -30.0, (0, 3): -20.0}
     alone, (earlier, later) = np.full(4, -1.0), np.array(list(gains)).T
-    plain = np.full(4, 9.0), alone, alone, earlier, later, np.array(list(gains.values()))
-    assert chains(*join(*plain)) == [[0, 1], [2, 3]]
-    assert chains(*join(*plain, LinkConstraints(must_link=((0, 3),)))) == [[0, 1, 3], [2]]
-    assert chains(*join(*plain, LinkConstraints(cannot_link=((0, 1),)))) == [[0], [1], [2, 3]]
+    plain = TrackletGraph(
+        np.full(4, -9.0), -alone, -alone, earlier, later, -np.array(list(gains.values()))
+    )
+    assert link_tracklets(plain) == [[0, 1], [2, 3]]
+    assert link_tracklets(plain, LinkConstraints(must_link=((0, 3),))) == [[0, 1, 3], [2]]
+    assert link_tracklets(plain, LinkConstraints(cannot_link=((0, 1),))) == [[0], [1], [2, 3]]
 
 
 def test_the_earlier_of_two_that_cannot_both_be_counts() -> None:

@@ -76,6 +76,8 @@ class TrackOfFile(_Model):
     estimate weights, which may exceed 1."""
     sigmas: list[tuple[float, float, float]]
     """The standard deviations of the position along x, y and z, metres."""
+    covariance_xy: list[float]
+    """The covariance of the position along x and y, square metres."""
     seen: dict[str, list[bool]]
     """For each camera by name: whether a box of the camera updated the track at this step."""
     correction: list[str] | None = None
@@ -160,6 +162,7 @@ def _track(run: ExportedRun, number: int) -> TrackOfFile:
         positions=tracks.positions[rows].tolist(),
         existences=tracks.existences[rows].tolist(),
         sigmas=tracks.sigmas[rows].tolist(),
+        covariance_xy=tracks.covariances_xy[rows].tolist(),
         seen={c.name: tracks.seen[rows, k].tolist() for k, c in enumerate(cameras)},
         correction=[run.row_corrections[k] for k in rows.tolist()] if run.row_corrections else None,
         boxes={

@@ -40,6 +40,10 @@ BOX = ("left", "top", "width", "height")
 COLUMNS = ("frame", "time", "id", "x", "y", "z", "existence", "sigma_x", "sigma_y", "sigma_z")
 """The columns of every track file before those of boxes."""
 
+COVARIANCE = "covariance_xy"
+"""The name of the last column, which files of earlier versions lack: the covariance of the position
+along x and y. It follows the boxes so that columns keep their places."""
+
 CORRECTION = "correction"
 """The name of the column of a corrected run: the id of the correction that a row depends on, or
 empty."""
@@ -73,6 +77,8 @@ class TrackFile:
     settings: Mapping[str, str]
     """The values of the comment lines ``# key = value`` (sequence, seed, methods, parameters), by
     key."""
+    covariances_xy: Float[ndarray, " N"] | None = None
+    """Covariance of the position along x and y, square metres; None where the file has none."""
     done: int | None = None
     """The number of steps computed, if the file states that these are not all; else None."""
     remarks: tuple[str, ...] = ()
@@ -96,7 +102,7 @@ def write_tracks_csv(
 ) -> None:
     """Write the track file.
 
-    Positions have 4 decimals (a tenth of a millimetre), boxes 2, times 6.
+    Positions have 4 decimals (a tenth of a millimetre), boxes 2, times and covariances 6.
 
     Args:
         stream: A text stream, opened with ``newline=""``; lines end with a single line feed.
@@ -120,6 +126,7 @@ def write_tracks_csv(
         *([NAME] if names else []),
         *([CORRECTION] if row_corrections else []),
         *map(guarded, boxes),
+        COVARIANCE,
     ]
     csv.writer(stream, lineterminator="\n").writerow(head)
     called = {track: _cell(name) for track, name in names.items()}
@@ -139,6 +146,7 @@ def write_tracks_csv(
         for camera in cameras:
             pixels, visible = camera.project_boxes(positions, sequence.target_half_extents)
             columns += _fixed(np.where(visible[:, None], pixels, np.nan), 2)
+        columns += _fixed(tracks.covariances_xy[some, None], 6)
         stream.writelines(",".join(row) + "\n" for row in zip(*columns, strict=True))
 
 
@@ -243,6 +251,7 @@ def read_tracks_csv(path: Path | str) -> TrackFile:
         path,
         path.name,
         needed=(*COLUMNS, *(s for s in sides if s not in header)),
+        optional={COVARIANCE: 0.0},
         blank=sides,
         called=unguarded,
     )
@@ -261,6 +270,7 @@ def read_tracks_csv(path: Path | str) -> TrackFile:
             for camera in cameras
         },
         settings=_settings(path),
+        covariances_xy=columns.values[COVARIANCE][order] if COVARIANCE in header else None,
         done=_done(path),
         remarks=_remarks(path),
     )

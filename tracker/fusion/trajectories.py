@@ -49,6 +49,8 @@ class Trajectories:
     """Index of the component in the step's posterior; -1 where smoothed tracks have none."""
     labels: Int[ndarray, " N"]
     """The label of the component, for which the filter's id is the short form; -1 for none."""
+    covariances_xy: Float[ndarray, " N"]
+    """Covariance of the position along x and y, square metres."""
 
     def __len__(self) -> int:
         return len(self.frames)
@@ -74,6 +76,7 @@ class Trajectories:
             seen=np.zeros((0, cameras), dtype=bool),
             components=np.zeros(0, dtype=np.int64),
             labels=np.zeros(0, dtype=np.int64),
+            covariances_xy=np.zeros(0),
         )
 
 
@@ -164,16 +167,17 @@ def _extracted(
     sizes = [result.posterior.size for result in results]
     starts = np.cumsum([0, *sizes[:-1]])
     sources = np.concatenate([result.sources for result in results], axis=1)
-    variances = np.diagonal(targets.covariances[chosen], axis1=1, axis2=2)
+    covariances = targets.covariances[chosen]
     return Trajectories(
         frames=first_frame + of_step,
         ids=numbers[order],
         positions=targets.means[chosen, :3],
         existences=targets.weights[chosen],
-        sigmas=np.sqrt(variances[:, :3]),
+        sigmas=np.sqrt(np.diagonal(covariances, axis1=1, axis2=2)[:, :3]),
         seen=(sources[:, starts[of_step] + components] >= 0).T,
         components=components,
         labels=of_label,
+        covariances_xy=covariances[:, 0, 1],
     )
 
 

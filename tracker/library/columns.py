@@ -3,8 +3,8 @@
 Rows are sorted by track and then step, so that neighbours differ little; each number is replaced
 by its difference from the previous one (delta encoding), and the bytes of all differences are
 grouped by significance (byte shuffling). zlib's checksum detects damage. Positions are exact;
-existence probabilities and standard deviations are rounded to float32, and detection probabilities
-to a thousandth.
+existence probabilities and standard deviations are rounded to float32, detection probabilities and
+the correlation of x and y to a thousandth. Earlier versions stored no correlation; it is 0 there.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from numpy import ndarray
 
 from tracker.fusion.trajectories import Trajectories
 
-_MAGIC = b"MVT1"
-"""The first bytes, which identify format and version."""
+_MAGIC, _WITHOUT_COVARIANCES = b"MVT2", b"MVT1"
+"""The first bytes, which identify format and version, and those of the version before."""
 
 _HEAD = struct.Struct("<4sIH")
 """The header: :data:`_MAGIC`, the number of rows and the number of cameras."""
@@ -31,7 +31,7 @@ _LEVEL = 6
 182 kB in 9 ms, level 9 makes 176 kB in 59 ms."""
 
 _THOUSANDTHS = 1000.0
-"""Detection probabilities are stored as multiples of one over this."""
+"""Detection probabilities and correlations are stored as multiples of one over this."""
 
 _COLUMNS = (
     ("ids", 1, np.int32, np.int32), ("frames", 1, np.int32, np.int32),
@@ -68,6 +68,9 @@ def pack(kept: KeptTracks) -> bytes:
     ]
     parts += [np.packbits(column).tobytes() for column in tracks.seen[order].T]
     parts += [_planes(np.ascontiguousarray(column)) for column in probabilities.T]
+    products = np.prod(tracks.sigmas[order, :2], axis=1)
+    correlations = tracks.covariances_xy[order] / np.where(products > 0.0, products, 1.0)
+    parts.append(_planes(np.rint(correlations * _THOUSANDTHS).astype(np.int16)))
     return _HEAD.pack(_MAGIC, rows, cameras) + zlib.compress(b"".join(parts), _LEVEL)
 
 
@@ -79,7 +82,7 @@ def unpack(data: bytes) -> KeptTracks:
     """
     try:
         magic, rows, cameras = _HEAD.unpack_from(data)
-        if magic != _MAGIC or rows > _MOST_ROWS:
+        if magic not in (_MAGIC, _WITHOUT_COVARIANCES) or rows > _MOST_ROWS:
             raise ValueError("they do not begin as they should")
         raw = io.BytesIO(zlib.decompress(data[_HEAD.size :]))
         columns = {
@@ -88,6 +91,9 @@ def unpack(data: bytes) -> KeptTracks:
         }
         seen = [_bits(raw, rows) for _ in range(cameras)]
         probabilities = [_integers(raw, rows, np.int16) for _ in range(cameras)]
+        correlations = np.zeros(rows, dtype=np.int16)
+        if magic == _MAGIC:
+            correlations = _integers(raw, rows, np.int16)
         if raw.read(1):
             raise ValueError("there are more of them than there should be")
     except (ValueError, struct.error, zlib.error) as error:
@@ -95,16 +101,18 @@ def unpack(data: bytes) -> KeptTracks:
     order = np.lexsort((columns["ids"][0], columns["frames"][0]))
     (ids,), (frames,), (labels,), positions, (existences,), sigmas = columns.values()
     frames = frames[order].astype(np.int64)
+    deviations = _beside(sigmas, rows, np.float64)[order]
     return KeptTracks(
         Trajectories(
             frames=frames,
             ids=ids[order].astype(np.int64),
             positions=_beside(positions, rows, np.float64)[order],
             existences=existences[order].astype(np.float64),
-            sigmas=_beside(sigmas, rows, np.float64)[order],
+            sigmas=deviations,
             seen=_beside(seen, rows, np.bool_)[order],
             components=np.arange(rows) - np.searchsorted(frames, frames),
             labels=labels[order],
+            covariances_xy=correlations[order] / _THOUSANDTHS * np.prod(deviations[:, :2], axis=1),
         ),
         _beside(probabilities, rows, np.int16)[order] / _THOUSANDTHS,
     )

@@ -179,7 +179,7 @@ class Identities(Positions):
         )
         learnt, first = start.learnt, start.first
         del start
-        found, key = identities.link_tracklets(tracked, p, seen, corrections, earlier)
+        found, key = identities.resolve_identities(tracked, p, seen, corrections, earlier)
         check()
         begin.replace(found.paths, np.where(found.had, 1.0, lifetimes.UNSURE), found.links)
         gone = np.flatnonzero(~np.isin(first.paths.labels, found.names)).tolist()
@@ -207,7 +207,7 @@ class Identities(Positions):
         for _ in range(p.rounds - 1):
             tracked = Tracked(smoother, fitted, shared, contested, had, names)
             del fitted, shared
-            found, _key = identities.link_tracklets(tracked, p, seen)
+            found, _key = identities.resolve_identities(tracked, p, seen)
             del tracked
             check()
             had, names = found.had, found.names

@@ -44,16 +44,17 @@ def tracks_of(
     rows = rows[np.lexsort((numbers, smoothed.frames[rows]))]
     numbers = np.array([known[label] for label in smoothed.labels[rows].tolist()], dtype=np.int64)
     components, labels = _components(smoothed, rows, fused, near)
-    variances = np.diagonal(smoothed.covariances[rows], axis1=1, axis2=2)[:, :3]
+    covariances = smoothed.covariances[rows]
     return Trajectories(
         frames=smoothed.frames[rows],
         ids=numbers,
         positions=smoothed.means[rows, :3],
         existences=smoothed.existences[rows],
-        sigmas=np.sqrt(variances),
+        sigmas=np.sqrt(np.diagonal(covariances, axis1=1, axis2=2)[:, :3]),
         seen=smoothed.seen[rows],
         components=components,
         labels=labels,
+        covariances_xy=covariances[:, 0, 1],
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 import numpy as np
 import viser
@@ -134,7 +135,7 @@ class PeopleNodes:
         )
         posterior = GaussianMixture.empty(3)
         if run is not None and not run.only_tracks:
-            posterior = run.fused[step].posterior
+            posterior = _reported(run, step)
         recent = slice(
             int(np.searchsorted(tracks.frames, step - round(trail.seconds * sequence.fps))),
             now.stop,
@@ -294,6 +295,16 @@ class PeopleNodes:
         self._component_ids = numbers
         self._reach = geometry.surfaces(mixture.means[:, :3], wxyzs, axes)
         self._ellipsoids.show(mixture.means[:, :3], axes, shades, opacities, wxyzs, about=middle)
+
+
+def _reported(run: Run, step: int) -> GaussianMixture:
+    """The posterior of a step, with the covariance of what all cameras err alike added."""
+    posterior: GaussianMixture = run.fused[step].posterior
+    if run.smoothed is None or not run.smoothed.common:
+        return posterior
+    covariances = posterior.covariances.copy()
+    covariances[:, [0, 1], [0, 1]] += run.smoothed.common
+    return replace(posterior, covariances=covariances)
 
 
 def middle_of(room: Room) -> Float[ndarray, " 3"]:

@@ -49,6 +49,7 @@ def tracks(ids: list[list[int]]) -> Trajectories:
         seen=np.ones((count, 1), dtype=bool),
         components=np.full(count, -1),
         labels=names,
+        covariances_xy=np.zeros(count),
     )
 
 

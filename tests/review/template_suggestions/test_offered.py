@@ -99,6 +99,7 @@ def tracked(
         np.array([seen(k % 2, k // 2) for k in range(2 * STEPS)], dtype=bool),
         np.full(2 * STEPS, -1),
         ids,
+        np.zeros(2 * STEPS),
     )
     return run
 

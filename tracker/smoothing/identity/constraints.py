@@ -43,6 +43,28 @@ class LinkConstraints:
         return bool(self.must_link or self.cannot_link or self.targets or self.clutter
                     or self.firsts or self.lasts)  # fmt: skip
 
+    def within(self, nodes: Int[ndarray, " K"]) -> LinkConstraints:
+        """Restrict the constraints to K tracklets, renumbered by their place among these.
+
+        Args:
+            nodes: Indices of the K tracklets.
+        """
+        if not self:
+            return self
+        place = {tracklet: k for k, tracklet in enumerate(nodes.tolist())}
+
+        def pairs(of: tuple[tuple[int, int], ...]) -> tuple[tuple[int, int], ...]:
+            return tuple((place[i], place[j]) for i, j in of if i in place and j in place)
+
+        def tracklets(of: frozenset[int]) -> frozenset[int]:
+            return frozenset(place[i] for i in of if i in place)
+
+        return LinkConstraints(
+            pairs(self.must_link),
+            pairs(self.cannot_link),
+            *map(tracklets, (self.targets, self.clutter, self.firsts, self.lasts)),
+        )
+
     def parted(self, tracklets: Paths, longest: int) -> tuple[LinkConstraints, LinkConstraints]:
         """Split the constraints into those for links over short gaps and those over long ones.
 

@@ -21,12 +21,12 @@ from tracker.corrections.kinds import leeway as corrections_leeway
 from tracker.corrections.outcomes import outcomes
 from tracker.geometry.assignment import names_by_majority
 from tracker.parameters.groups.smoothing import SmoothingParams
-from tracker.smoothing.identity import association, odds, splitting
+from tracker.smoothing.identity import odds, splitting
 from tracker.smoothing.identity.constraints import ConstraintResolver, LinkConstraints
 from tracker.smoothing.identity.ends import Ends
-from tracker.smoothing.identity.integer_program import Cut
 from tracker.smoothing.identity.people import Seen, template_log_odds
 from tracker.smoothing.identity.people import of_chains as people_of_chains
+from tracker.smoothing.identity.solver import TrackletGraph, link_tracklets
 from tracker.smoothing.identity.splitting import Tracked
 from tracker.smoothing.identity.tracklets import (
     Pairs,
@@ -39,9 +39,6 @@ from tracker.smoothing.paths import Links, Paths
 from tracker.smoothing.protocol import EmptyStore, ResultStore
 from tracker.smoothing.result import Decision, Joined
 from tracker.smoothing.smoother import BoxAssociations
-
-_SURE = 1e6
-"""Log odds of chains that were accepted in the first linking."""
 
 _CAREFUL = 3
 """Number of rounds in which an unmet correction is enforced only if no earlier unmet one refers to
@@ -87,7 +84,7 @@ class LinkedTracks:
     """The label of each row before the splits, -1 where no track has it."""
 
 
-def link_tracklets(
+def resolve_identities(
     tracked: Tracked,
     parameters: SmoothingParams,
     seen: Seen,
@@ -219,15 +216,12 @@ def _linked(
     people = template_log_odds(refitted.paths, links, smoother, seen, parameters.appearance)
     longest = max(round(parameters.longest / smoother.model.step_time), 1)
     now, later = constraints.parted(tracklets, longest)
-    cuts: list[Cut] = []
 
     def best_chains(pairs: Pairs, constraints: LinkConstraints) -> list[list[int]]:
         """Find the most likely chains of tracklets under some constraints."""
         gains = prior_links.gains(pairs, tracklets, source_rows)
-        following, used = association.join(
-            worths, births, deaths, pairs.earlier, pairs.later, gains, constraints, people, cuts
-        )
-        return association.chains(following, used)
+        graph = TrackletGraph(-worths, -births, -deaths, pairs.earlier, pairs.later, -gains, people)
+        return link_tracklets(graph, constraints)
 
     first = best_chains(pairs, now)
     for _ in range(_TURNS):  # the links improve the estimates at the ends of the tracklets
@@ -253,14 +247,14 @@ def _linked(
         )
     # chains linked by motion have better embeddings than single tracklets
     back = odds.long_gap_odds(smoother, refitted.paths, links, first, parameters, seen.embeddings)
-    following, _ = association.join(
-        np.full(len(first), _SURE), births[[c[0] for c in first]], deaths[[c[-1] for c in first]],
-        back.earlier, back.later, back.gains, of_chains,
-        people_of_chains(people, first),
+    of_firsts = TrackletGraph(
+        np.zeros(len(first)), -births[[c[0] for c in first]], -deaths[[c[-1] for c in first]],
+        back.earlier, back.later, -back.gains, people_of_chains(people, first),
     )  # fmt: skip
+    of_chains = replace(of_chains, targets=frozenset(range(len(first))))  # accepted above
     chains = [
         [tracklet for number in numbers for tracklet in first[number]]
-        for numbers in association.chains(following, np.ones(len(first), dtype=bool))
+        for numbers in link_tracklets(of_firsts, of_chains)
     ]
     pairs = pairs.with_more(back.of_ends(first))
     labels = _labels(tracklets, chains)

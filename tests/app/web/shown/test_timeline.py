@@ -36,6 +36,7 @@ def run_of(frames: int, rows: list[tuple[int, int, bool]]) -> Run:
         seen=np.array([[row[2], False, False] for row in rows], dtype=bool).reshape(count, 3),
         components=np.zeros(count, dtype=np.int64),
         labels=np.zeros(count, dtype=np.int64),
+        covariances_xy=np.zeros(count),
     )
     run.done = frames
     return run
