@@ -9,8 +9,8 @@ import pytest
 
 from tests.random_rooms import random_room
 from tracker.io.checks.boxes import raw_cameras
-from tracker.io.checks.reading import FLIP, Reading
-from tracker.io.checks.readings import Open, Seen
+from tracker.io.conventions.reading import FLIP, Reading
+from tracker.io.conventions.readings import Open, Seen
 from tracker.io.conventions.search import Verdict, find_reading
 from tracker.io.read.pieces import Convention, RawCamera
 from tracker.sequences.sequence import Sequence

@@ -14,9 +14,9 @@ from tracker.geometry.consistency.entrances import Door
 from tracker.io.checks import Check
 from tracker.io.checks.boxes import check_boxes, listen
 from tracker.io.checks.cameras import check_lenses, check_places
-from tracker.io.checks.readings import EVERY_ORDER
 from tracker.io.checks.synchronisation import CameraOffset, synchronise
 from tracker.io.checks.timing import check_counting, check_time
+from tracker.io.conventions.readings import EVERY_ORDER
 from tracker.io.importing.preview import as_sequence
 from tracker.io.importing.remedies import for_import
 from tracker.io.importing.settling import ImportPlan

@@ -9,6 +9,7 @@ from pydantic import Field
 from app.models.base import GivenPath, Model, Vector
 from app.state.importing.draft import Phase
 from tracker.io.checks import Status
+from tracker.io.conventions.questions import Part
 from tracker.io.read.pieces import Axes, Direction, Layout, Unit, Up
 from tracker.parameters import MethodKey
 
@@ -160,7 +161,8 @@ class ImportedPlan(Model):
 class ImportQuestion(Model):
     """What is asked where the files leave open how they are meant."""
 
-    code: Literal["convention", "moments"]
+    code: Part
+    """The first part of the interpretation that differs."""
     interpretations: tuple[str, str]
     """In words, the likelier one first."""
     difference: str

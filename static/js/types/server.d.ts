@@ -534,7 +534,8 @@ declare namespace Server {
 
 	/** What is asked where the files leave open how they are meant. */
 	interface ImportQuestion {
-		code: "convention" | "moments";
+		/** The first part of the interpretation that differs. */
+		code: "direction" | "axes" | "layout" | "turns" | "order" | "mirrored" | "flipped" | "pixels" | "scene";
 		/** In words, the likelier one first. */
 		interpretations: [string, string];
 		difference: string;

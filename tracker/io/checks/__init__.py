@@ -12,8 +12,8 @@ import numpy as np
 
 from tracker.io.checks.boxes import check_boxes, listen
 from tracker.io.checks.cameras import check_lenses, check_places
-from tracker.io.checks.readings import EVERY_ORDER
 from tracker.io.checks.timing import check_counting, check_time
+from tracker.io.conventions.readings import EVERY_ORDER
 from tracker.sequences.finding import Check, Remedy, Status
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Detections, Sequence

@@ -5,19 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal
+from typing import Literal, get_args
 
 import numpy as np
 
 from tracker.geometry.consistency.odds import DECISIVE, log_odds
-from tracker.io.checks.reading import Reading, exchanged, exchanges, with_pixels
+from tracker.io.conventions.reading import Reading, exchanged, exchanges, with_pixels
 from tracker.io.conventions.search import Verdict
 from tracker.io.read.pieces import FormatError, RawCamera
 from tracker.sequences.finding import Remedy
-
-if TYPE_CHECKING:
-    from tracker.io.importing.finding.matching import MatchedCamera
-    from tracker.io.importing.options import ImportOptions
 
 ACCEPT = "--accept-best"
 """The flag that takes the likelier interpretation."""
@@ -37,6 +33,11 @@ OF_ONE = (
 )
 """What is said of an import of one camera with boxes."""
 
+Part = Literal[
+    "direction", "axes", "layout", "turns", "order", "mirrored", "flipped", "pixels", "scene"
+]
+"""What two interpretations may differ in; the scene where none of the others does."""
+
 _LAYOUTS = {"ltwh": "left, top and size", "xyxy": "two corners", "cxcywh": "centre and size"}
 
 
@@ -44,7 +45,8 @@ _LAYOUTS = {"ltwh": "left, top and size", "xyxy": "two corners", "cxcywh": "cent
 class Question:
     """What is open: two interpretations, what differs and the flags that decide."""
 
-    code: Literal["convention", "moments"]
+    code: Part
+    """The first part of the interpretation that differs."""
     interpretations: tuple[str, str]
     """In words, the likelier one first."""
     difference: str
@@ -81,16 +83,10 @@ class Unexplained(FormatError):
     """No interpretation explains the boxes."""
 
 
-def matched_by(cameras: Sequence[MatchedCamera]) -> Literal["name", "number", "order"]:
-    """By what the boxes of cameras were matched, the weakest of all."""
-    ways = {camera.how.get("detections", "name") for camera in cameras}
-    return "order" if "order" in ways else "number" if "number" in ways else "name"
-
-
 def check_verdict(
     verdict: Verdict,
     cameras: Sequence[RawCamera],
-    options: ImportOptions,
+    accept_best: bool = False,
     stated: str = "",
     otherwise: Verdict | None = None,
 ) -> str:
@@ -99,7 +95,7 @@ def check_verdict(
     Args:
         verdict: What they tell.
         cameras: As they are given.
-        options: Whether the likelier interpretation is to be taken all the same.
+        accept_best: Whether the likelier interpretation is to be taken all the same.
         stated: The flags that leave no interpretation that explains the boxes.
         otherwise: What the boxes tell without these.
 
@@ -114,7 +110,7 @@ def check_verdict(
     try:
         _check(verdict, cameras, stated, otherwise)
     except (Undecided, Unexplained) as error:
-        if not options.accept_best:
+        if not accept_best:
             raise
         return f"by {ACCEPT}: {error}"
     return ""
@@ -151,9 +147,9 @@ def _check(
         raise Undecided(_open(best, verdict.rival.reading, verdict.odds, names))
 
 
-def _differing(one: Reading, other: Reading) -> list[str]:
+def _differing(one: Reading, other: Reading) -> list[Part]:
     """The parts in which two readings differ."""
-    parts = ("direction", "axes", "layout", "turns", "order", "mirrored", "flipped", "pixels")
+    parts = (part for part in get_args(Part) if part != "scene")
     return [part for part in parts if getattr(one, part) != getattr(other, part)]
 
 
@@ -166,7 +162,7 @@ def _open(best: Reading, rival: Reading, odds: float, names: Sequence[str]) -> Q
              "pixels": "size of the pictures"}  # fmt: skip
     what = " and ".join(words[part] for part in differing) or "the scene"
     return Question(
-        "convention",
+        differing[0] if differing else "scene",
         (in_words(best, names, differing), in_words(rival, names, differing)),
         f"the files leave open {what} ({sure})",
         (_flags(best, rival, names), _flags(rival, best, names)),

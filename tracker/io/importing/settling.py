@@ -17,17 +17,16 @@ from tracker.geometry.consistency.suggestion import (
     consensus_of_cameras,
     suggest,
 )
-from tracker.io.checks.level import lean_of
-from tracker.io.checks.reading import Reading, read_boxes, to_camera
-from tracker.io.checks.readings import Open, Seen
+from tracker.io.conventions.level import lean_of
 from tracker.io.conventions.questions import (
     ACCEPTED,
     OF_ONE,
     check_verdict,
-    matched_by,
     rearranged,
     told_of_moments,
 )
+from tracker.io.conventions.reading import Reading, read_boxes, to_camera
+from tracker.io.conventions.readings import Open, Seen
 from tracker.io.conventions.search import as_meant, find_reading
 from tracker.io.importing.arriving import short_videos
 from tracker.io.importing.finding.angles import check_turns, chosen_turns, turns_in_words
@@ -36,6 +35,7 @@ from tracker.io.importing.finding.geometry import check_places, read_poses
 from tracker.io.importing.finding.matching import (
     MatchedCamera,
     match_all,
+    matched_by,
     nothing_of,
     same_aspect,
 )
@@ -390,7 +390,7 @@ def _read(
         otherwise = find(plain) if stated else None
         if otherwise is not None and otherwise.kind not in ("decided", "open"):
             otherwise = None
-        unproved = check_verdict(verdict, raws, options, stated, otherwise)
+        unproved = check_verdict(verdict, raws, options.accept_best, stated, otherwise)
         if unproved:
             found.append((ACCEPTED, unproved))
     if sum(own is not None for own in seen) == 1:

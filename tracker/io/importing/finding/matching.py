@@ -61,6 +61,12 @@ class Matched:
     """Sentences about what is not used."""
 
 
+def matched_by(cameras: Sequence[MatchedCamera]) -> How:
+    """By what the boxes of cameras were matched, the weakest of all."""
+    ways = {camera.how.get("detections", "name") for camera in cameras}
+    return "order" if "order" in ways else "number" if "number" in ways else "name"
+
+
 def match_all(
     taken: Sequence[ParsedFiles],
     sets: Sequence[CameraSet],
