@@ -9,7 +9,7 @@ import pytest
 
 from tests.random_rooms import random_room
 from tracker.io.checks.boxes import raw_cameras
-from tracker.io.conventions.reading import FLIP, Reading
+from tracker.io.conventions.reading import FLIP, Reading, with_pixels
 from tracker.io.conventions.readings import Open, Seen
 from tracker.io.conventions.search import Verdict, find_reading
 from tracker.io.read.pieces import Convention, RawCamera
@@ -66,3 +66,24 @@ def test_the_vertical_is_found_along_any_axis_and_with_any_convention(seed: int,
     rise = verdict.best.scene.rise / np.linalg.norm(verdict.best.scene.rise)
     assert rise @ turn @ [0.0, 0.0, 1.0] > 0.99
     assert 130.0 < np.linalg.norm(verdict.best.scene.rise) < 210.0
+
+
+def test_boxes_are_read_anew_where_order_and_pictures_were_found_with_others() -> None:
+    cameras, seen = given(random_room(4, cameras=6, people=4))
+    stated = Convention(direction="world-to-camera", axes="opencv")
+    moved = np.array([0, 2, 3, 4, 5, 1])
+    smaller = [with_pixels(replace(cameras[own], convention=stated), 0.5) for own in moved]
+    corners = [
+        None
+        if own is None
+        else Seen(own.frames, np.column_stack([own.four[:, :2], own.four[:, :2] + own.four[:, 2:]]))
+        for own in seen
+    ]
+    verdict = find_reading(
+        smaller, corners, fps=10.0, tried=Open(normalised=(False,)), names="order", pixels=(2.0,)
+    )
+    assert verdict is not None
+    assert verdict.kind == "decided"
+    best = verdict.best.reading
+    assert (best.layout, best.pixels) == ("xyxy", 2.0)
+    assert best.order == tuple(np.argsort(moved).tolist())

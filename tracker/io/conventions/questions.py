@@ -38,6 +38,12 @@ Part = Literal[
 ]
 """What two interpretations may differ in; the scene where none of the others does."""
 
+UNPROVEN = (
+    "too few boxes of several cameras meet to confirm the calibration, which camera is which, how "
+    "boxes are meant or that all show the same moments"
+)
+"""What is said of an import whose boxes prove nothing."""
+
 _LAYOUTS = {"ltwh": "left, top and size", "xyxy": "two corners", "cxcywh": "centre and size"}
 
 

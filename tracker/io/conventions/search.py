@@ -415,7 +415,29 @@ def _candidates(
             ]
             found += _reassigned(likelihood, mirrors, each, -RARE, (int(np.argmax(up)),))
             found.sort(key=lambda one: -one.score)
+    if again := _reread(likelihood, readings, found):
+        found = sorted((*found, *again), key=lambda one: -one.score)
+        if open_.orders and found[0] is again[0]:
+            found += _with_orders(likelihood, found[0], each)
+            found.sort(key=lambda one: -one.score)
     return found
+
+
+def _reread(
+    likelihood: Likelihood, readings: Many[Reading], found: Many[Interpretation]
+) -> list[Interpretation]:
+    """Every reading with what the likeliest one alone was questioned in, the likeliest first.
+
+    An exchange and another size of the pictures let many boxes meet although they are read
+    wrongly; it is not before these are right that the right reading of the boxes is the likeliest.
+    """
+    if not found:
+        return []
+    best, known = found[0], {one.reading for one in found}
+    parts = ("order", "pixels", "mirrored", "flipped")
+    questioned = {part: getattr(best.reading, part) for part in parts}
+    others = [replace(reading, **questioned) for reading in readings]
+    return _scored(likelihood, [one for one in others if one not in known], best.prior)
 
 
 def _reassigned(

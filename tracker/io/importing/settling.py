@@ -21,6 +21,7 @@ from tracker.io.conventions.level import lean_of
 from tracker.io.conventions.questions import (
     ACCEPTED,
     OF_ONE,
+    UNPROVEN,
     check_verdict,
     rearranged,
     told_of_moments,
@@ -402,6 +403,8 @@ def _read(
         reading = read_poses(raws, boxes=any(own is not None for own in boxes))
         why = "from where the cameras look; the boxes do not tell"
         best = None
+        if verdict is not None and verdict.kind == "unproven":
+            told.append(UNPROVEN)
     else:
         best, reading = as_meant(verdict, convention.up, convention.up, convention.unit)
         reading = replace(reading, flipped=False)
