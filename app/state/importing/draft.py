@@ -25,10 +25,9 @@ from tracker.sequences.reader import FILE
 
 if TYPE_CHECKING:
     from app.state.importing.looking import Looked
-    from tracker.io.conventions.questions import Question, Undecided, Unexplained
+    from tracker.io.conventions.questions import Question
     from tracker.io.importing.arriving import Footprint
     from tracker.io.importing.gathering import ParsedFiles
-    from tracker.io.importing.options import ImportOptions
     from tracker.io.importing.settling import ImportPlan, PlannedView
 
 logger = logging.getLogger("app")
@@ -188,6 +187,7 @@ class Draft:
         from app.state.importing.looking import look_into
         from tracker.io.conventions.questions import Undecided
         from tracker.io.importing.arriving import gather_whole
+        from tracker.io.importing.settling import settle
 
         def sleep(seconds: float) -> None:
             if stop.wait(seconds):
@@ -202,7 +202,9 @@ class Draft:
                 with self._lock:
                     tell(taken=taken, waiting="")
                     self._gathered, self._read = True, read
-            settled, open_ = _settle(taken, options_of(wish, taken))
+            options = options_of(wish, taken)
+            settled = settle(taken, replace(options, accept_best=True))
+            open_ = None if options.accept_best else settled.open
             question = open_.question if isinstance(open_, Undecided) else None
             undecided = "" if open_ is None else sentence(open_)
             tell(settled=settled, phase="settled", error="", undecided=undecided, question=question)
@@ -336,19 +338,6 @@ class Draft:
 def folder_name(name: str) -> str:
     """A name as a folder's: letters, digits, blanks, dashes and dots."""
     return re.sub(r"[^\w\- .]+", "-", name).strip(" .-")[:80] or "recording"
-
-
-def _settle(
-    taken: tuple[ParsedFiles, ...], options: ImportOptions
-) -> tuple[ImportPlan, Undecided | Unexplained | None]:
-    """Settle the likeliest interpretation, and why it may not be taken without a decision."""
-    from tracker.io.conventions.questions import Undecided, Unexplained
-    from tracker.io.importing.settling import settle
-
-    try:
-        return settle(taken, options), None
-    except (Undecided, Unexplained) as open_:
-        return settle(taken, replace(options, accept_best=True)), open_
 
 
 def _middle(view: PlannedView) -> bytes | None:

@@ -18,9 +18,6 @@ from tracker.sequences.finding import Remedy
 ACCEPT = "--accept-best"
 """The flag that takes the likelier interpretation."""
 
-ACCEPTED = "accepted"
-"""What a finding is called that was taken though nothing proves it."""
-
 OF_TWO = (
     "boxes of two cameras alone do not tell whether one of them was turned or moved, nor which is "
     "which where they stand alike: a third camera would"
@@ -92,65 +89,44 @@ class Unexplained(FormatError):
 def check_verdict(
     verdict: Verdict,
     cameras: Sequence[RawCamera],
-    accept_best: bool = False,
     stated: str = "",
     otherwise: Verdict | None = None,
-) -> str:
-    """Ask or refuse where the boxes do not decide.
+) -> Undecided | Unexplained | None:
+    """Return what is to be asked, or why to refuse, where the boxes do not decide.
 
     Args:
         verdict: What they tell.
         cameras: As they are given.
-        accept_best: Whether the likelier interpretation is to be taken all the same.
         stated: The flags that leave no interpretation that explains the boxes.
         otherwise: What the boxes tell without these.
-
-    Returns:
-        What is taken though the boxes do not prove it; empty where they do.
-
-    Raises:
-        Undecided: If two interpretations are left, or nothing tells whether the cameras show the
-            same moments.
-        Unexplained: If no interpretation explains the boxes.
     """
-    try:
-        _check(verdict, cameras, stated, otherwise)
-    except (Undecided, Unexplained) as error:
-        if not accept_best:
-            raise
-        return f"by {ACCEPT}: {error}"
-    return ""
-
-
-def _check(
-    verdict: Verdict, cameras: Sequence[RawCamera], stated: str, otherwise: Verdict | None
-) -> None:
     names = [camera.name for camera in cameras]
     best = verdict.best.reading
     share = 100.0 * verdict.best.evidence.share
     if verdict.kind == "none" and otherwise is not None:
         other = otherwise.best.reading
-        raise Unexplained(
+        return Unexplained(
             f"with {stated} {share:.0f} % of a camera's boxes are explained by another camera's, "
             f"without it {100.0 * otherwise.best.evidence.share:.0f} % "
             f"({in_words(other, names, _differing(other, best))}); {ACCEPT} imports them as they "
             "are"
         )
     if verdict.kind == "none":
-        raise Unexplained(
+        return Unexplained(
             f"no interpretation{f' with {stated}' if stated else ''} explains these boxes; the "
             f"closest, {in_words(best, names)}, explains {share:.0f} % of a camera's boxes by "
             "another camera's: check that calibration and boxes belong together and are of the "
             f"same moments; {ACCEPT} imports them as they are"
         )
     if best.flipped:
-        raise Unexplained(
+        return Unexplained(
             "the boxes are of pictures whose left and right are exchanged: with them mirrored "
             f"{share:.0f} % are explained by another camera's; "
             f"mirror pictures and boxes; {ACCEPT} imports them as they are"
         )
     if verdict.kind == "open" and verdict.rival is not None:
-        raise Undecided(_open(best, verdict.rival.reading, verdict.odds, names))
+        return Undecided(_open(best, verdict.rival.reading, verdict.odds, names))
+    return None
 
 
 def _differing(one: Reading, other: Reading) -> list[Part]:

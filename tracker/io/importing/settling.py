@@ -19,9 +19,11 @@ from tracker.geometry.consistency.suggestion import (
 )
 from tracker.io.conventions.level import lean_of
 from tracker.io.conventions.questions import (
-    ACCEPTED,
+    ACCEPT,
     OF_ONE,
     UNPROVEN,
+    Undecided,
+    Unexplained,
     check_verdict,
     rearranged,
     told_of_moments,
@@ -105,8 +107,8 @@ class ImportPlan:
     """What was not in the files or had to be chosen, and why it is so."""
     told: tuple[str, ...]
     """Sentences about what is not used or odd."""
-    accepted: str = ""
-    """What was taken though nothing proves it; empty where nothing was."""
+    open: Undecided | Unexplained | None = None
+    """What is left open though the likeliest interpretation was accepted."""
 
 
 def settle(taken: Sequence[ParsedFiles], options: ImportOptions | None = None) -> ImportPlan:
@@ -115,6 +117,8 @@ def settle(taken: Sequence[ParsedFiles], options: ImportOptions | None = None) -
     Raises:
         FormatError: If there is no calibration, or files contradict each other; the sentence
             says which and what to do.
+        Undecided, Unexplained: If the boxes leave open how the files are meant, and the likeliest
+            interpretation is not to be accepted.
     """
     options = options or ImportOptions()
     sets, told = camera_sets(taken)
@@ -133,8 +137,9 @@ def settle(taken: Sequence[ParsedFiles], options: ImportOptions | None = None) -
     boxes = _boxes(cameras, sizes, times, options, found, told)
     arbitrary = matched.format.startswith(_WITHOUT_UNIT)
     late: dict[str, int] = {}
+    open_: list[Undecided | Unexplained] = []
     reading, raws, boxes, factor = _read(
-        raws, plain, cameras, boxes, times, arbitrary, options, found, told, late
+        raws, plain, cameras, boxes, times, arbitrary, options, found, told, late, open_
     )
     if late:
         shifted = _shifted(options, late, times.fps)
@@ -193,7 +198,7 @@ def settle(taken: Sequence[ParsedFiles], options: ImportOptions | None = None) -
         reading,
         tuple(found),
         tuple(told),
-        "; ".join(words for name, words in found if name == ACCEPTED),
+        open_[0] if open_ else None,
     )
 
 
@@ -362,6 +367,7 @@ def _read(
     found: list[tuple[str, str]],
     told: list[str],
     late: dict[str, int],
+    open_: list[Undecided | Unexplained],
 ) -> tuple[Reading, list[RawCamera], list[_Boxes | None], float | None]:
     """How poses and boxes are meant: by flags, formats, the boxes and the poses, in this order.
 
@@ -391,9 +397,12 @@ def _read(
         otherwise = find(plain) if stated else None
         if otherwise is not None and otherwise.kind not in ("decided", "open"):
             otherwise = None
-        unproved = check_verdict(verdict, raws, options.accept_best, stated, otherwise)
-        if unproved:
-            found.append((ACCEPTED, unproved))
+        question = check_verdict(verdict, raws, stated, otherwise)
+        if question is not None and not options.accept_best:
+            raise question
+        if question is not None:
+            open_.append(question)
+            found.append(("accepted", f"by {ACCEPT}: {question}"))
     if sum(own is not None for own in seen) == 1:
         told.append(OF_ONE)
     larger = 1.0
