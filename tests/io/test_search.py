@@ -87,3 +87,17 @@ def test_boxes_are_read_anew_where_order_and_pictures_were_found_with_others() -
     best = verdict.best.reading
     assert (best.layout, best.pixels) == ("xyxy", 2.0)
     assert best.order == tuple(np.argsort(moved).tolist())
+
+
+def test_a_calibration_without_boxes_is_that_of_boxes_without_their_own() -> None:
+    """Of six calibrations two are of cameras that left no boxes; it is not known of which."""
+    cameras, seen = given(random_room(2, cameras=6, people=4))
+    stated = Convention(direction="world-to-camera", axes="opencv")
+    moved = [4, 1, 5, 3, 0, 2]
+    shuffled = [replace(cameras[own], convention=stated) for own in moved]
+    boxes = [*seen[:4], None, None]
+    verdict = found(shuffled, boxes, Open(layouts=("ltwh",), normalised=(False,)))
+    assert verdict.kind == "decided"
+    order = verdict.best.reading.order
+    assert order is not None
+    assert [moved[own] for own in order[:4]] == [0, 1, 2, 3]

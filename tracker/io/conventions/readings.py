@@ -151,6 +151,11 @@ class Judge:
         }
 
     @property
+    def has_boxes(self) -> list[bool]:
+        """Whether each camera has boxes at a step at which another one has some."""
+        return [own is not None and len(own.frames) > 0 for own in self._paired]
+
+    @property
     def possible(self) -> int:
         """How many pairs of boxes could be of one person."""
         return sum(own.most for own in self.pairs.values())

@@ -564,11 +564,14 @@ def _orders(own: tuple[int, ...], count: int) -> Iterator[tuple[int, ...]]:
 
 
 def same_scene(judge: Judge, one: Interpretation, other: Interpretation) -> bool:
-    """Whether two interpretations differ by a turn, shift or scale of the world alone."""
+    """Whether the cameras with boxes differ by a turn, shift or scale of the world alone."""
     parts = ("layout", "pixels", "flipped", "mirrored")
     if any(getattr(one.reading, part) != getattr(other.reading, part) for part in parts):
         return False
-    first, second = judge.poses(one.reading), judge.poses(other.reading)
+    first, second = (
+        [own for own, has in zip(judge.poses(each.reading), judge.has_boxes, strict=True) if has]
+        for each in (one, other)
+    )
     turn = first[0].rotation.T @ second[0].rotation
     away = [a.rotation.T @ b.rotation - turn for a, b in zip(first, second, strict=True)]
     if max(float(np.abs(own).max()) for own in away) > _SAME_SCENE:

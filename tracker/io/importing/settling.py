@@ -18,6 +18,7 @@ from tracker.geometry.consistency.suggestion import (
     suggest,
 )
 from tracker.io.conventions.level import lean_of
+from tracker.io.conventions.orders import MOST_CAMERAS
 from tracker.io.conventions.questions import (
     ACCEPT,
     OF_ONE,
@@ -36,6 +37,7 @@ from tracker.io.importing.finding.angles import check_turns, chosen_turns, turns
 from tracker.io.importing.finding.calibrations import camera_sets
 from tracker.io.importing.finding.geometry import check_places, read_poses
 from tracker.io.importing.finding.matching import (
+    Matched,
     MatchedCamera,
     match_all,
     matched_by,
@@ -131,6 +133,7 @@ def settle(taken: Sequence[ParsedFiles], options: ImportOptions | None = None) -
     sizes = picture_sizes(cameras, found)
     plain = [scaled(camera.raw, size) for camera, size in zip(cameras, sizes, strict=True)]
     raws = [_told(raw, options) for raw in plain]
+    spare = [_told(raw, options) for raw in _spare(matched)]
     if not any(c.video or c.images or c.detections is not None for c in cameras):
         raise nothing_of(cameras, taken, told)
     times = settle_times(cameras, matched.truths, options, found)
@@ -139,7 +142,7 @@ def settle(taken: Sequence[ParsedFiles], options: ImportOptions | None = None) -
     late: dict[str, int] = {}
     open_: list[Undecided | Unexplained] = []
     reading, raws, boxes, factor = _read(
-        raws, plain, cameras, boxes, times, arbitrary, options, found, told, late, open_
+        raws, plain, spare, cameras, boxes, times, arbitrary, options, found, told, late, open_
     )
     if late:
         shifted = _shifted(options, late, times.fps)
@@ -200,6 +203,13 @@ def settle(taken: Sequence[ParsedFiles], options: ImportOptions | None = None) -
         tuple(told),
         open_[0] if open_ else None,
     )
+
+
+def _spare(matched: Matched) -> list[RawCamera]:
+    """Calibrations without files that may be those of boxes which no name gave to a camera."""
+    known = [camera for camera in matched.spare if camera.raw.image_size is not None]
+    few = len(matched.cameras) + len(known) <= MOST_CAMERAS
+    return [camera.raw for camera in known] if few and matched_by(matched.cameras) != "name" else []
 
 
 def _shifted(options: ImportOptions, late: Mapping[str, int], fps: float) -> ImportOptions:
@@ -359,6 +369,7 @@ def _boxes(
 def _read(
     raws: list[RawCamera],
     plain: Sequence[RawCamera],
+    spare: Sequence[RawCamera],
     cameras: Sequence[MatchedCamera],
     boxes: list[_Boxes | None],
     times: Times,
@@ -385,19 +396,19 @@ def _read(
     free = not options.swap and not options.cameras
     find = partial(
         find_reading,
-        seen=seen,
+        seen=[*seen, *[None] * len(spare)],
         fps=times.fps,
         tried=Open(layouts=layouts, normalised=(False,), orders=free),
         names=matched_by(cameras),
         pixels=_other_pixels(cameras, raws, seen),
     )
-    verdict = find(raws)
+    verdict = find([*raws, *spare])
     if verdict is not None:
         stated = _stated(options) if verdict.kind == "none" else ""
-        otherwise = find(plain) if stated else None
+        otherwise = find([*plain, *spare]) if stated else None
         if otherwise is not None and otherwise.kind not in ("decided", "open"):
             otherwise = None
-        question = check_verdict(verdict, raws, stated, otherwise)
+        question = check_verdict(verdict, [*raws, *spare], stated, otherwise)
         if question is not None and not options.accept_best:
             raise question
         if question is not None:
@@ -438,7 +449,8 @@ def _read(
             if larger != 1.0:
                 how = f"of pictures {larger:.4g} times as wide, as the calibration's"
                 found.append(("boxes", f"{how}, {why}"))
-        raws, told_ = rearranged(raws, reading)
+        every, told_ = rearranged([*raws, *spare], reading)
+        raws = every[: len(raws)]
         found += told_
         told += told_of_moments(verdict, [raw.name for raw in raws])
     if any(raw.turns for raw in raws):

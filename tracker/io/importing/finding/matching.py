@@ -59,6 +59,8 @@ class Matched:
     truths: list[tuple[str, TruthPiece]]
     told: list[str]
     """Sentences about what is not used."""
+    spare: list[MatchedCamera] = field(default_factory=list)
+    """Cameras of the calibration without any file."""
 
 
 def matched_by(cameras: Sequence[MatchedCamera]) -> How:
@@ -114,7 +116,8 @@ def match_all(
             f"{len(left)} cameras of {chosen.label} have neither video nor boxes and are left out: "
             f"{', '.join(left[:8])}{' …' if len(left) > 8 else ''}"
         )
-    return Matched(used or cameras, chosen.format, truths, told)
+    spare = [c for c in cameras if used and c not in used]
+    return Matched(used or cameras, chosen.format, truths, told, spare)
 
 
 _Pictures = list[tuple[str, VideoPiece | ImagesPiece]]
