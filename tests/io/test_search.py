@@ -101,3 +101,19 @@ def test_a_calibration_without_boxes_is_that_of_boxes_without_their_own() -> Non
     order = verdict.best.reading.order
     assert order is not None
     assert [moved[own] for own in order[:4]] == [0, 1, 2, 3]
+
+
+def test_clocks_are_compared_anew_once_the_rate_is_known() -> None:
+    """At a supposed 25 steps a second, lags are so far apart that three lost frames hide."""
+    cameras, seen = given(random_room(3, cameras=4, people=5, fps=4.0, steps=60))
+    own = seen[1]
+    assert own is not None
+    kept = (own.frames < 30) | (own.frames >= 33)
+    frames = own.frames - 3 * (own.frames >= 33)
+    seen[1] = Seen(frames[kept], own.four[kept])
+    verdict = find_reading(cameras, seen, fps=25.0, tried=Open(orders=False))
+    assert verdict is not None
+    assert 1 not in verdict.clocks
+    clock = verdict.clocks_at(4.0)[1]
+    assert not clock.steady
+    assert clock.ends - clock.begins == pytest.approx(-3, abs=1)

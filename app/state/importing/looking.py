@@ -106,7 +106,8 @@ def look_into(settled: ImportPlan, name: str, cancelled: Callable[[], bool]) -> 
         if len(sequence.views) > 1:
             offsets = synchronise(sequence, reader=reader, most_steps=MOST_STEPS)
         _stop_if(cancelled)
-        timing = list(check_time(sequence, found=offsets))
+        clocks = None if told is None else told.verdict.clocks
+        timing = list(check_time(sequence, found=offsets, clocks=clocks))
         found = _for_import((*checks, *timing, *counting), settled)
         looked = replace(looked, checks=found, offsets=offsets, under_way="first tracks")
         if agreed is not None and sequence.has_detections:

@@ -48,7 +48,8 @@ def check(
         return [*found, lenses, check_counting(sequence, places=False)]
     found += [lenses, *check_places(sequence.cameras, sequence.room)]
     if not quick and (sequence.has_detections or pictures):
-        found += check_time(sequence, reader)
+        clocks = None if told is None else told.verdict.clocks
+        found += check_time(sequence, reader, clocks=clocks)
     if told is not None:
         found.append(check_counting(sequence))
     return found

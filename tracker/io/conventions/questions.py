@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from tracker.geometry.consistency.odds import DECISIVE, log_odds
 from tracker.io.conventions.reading import Reading, exchanged, exchanges, with_pixels
-from tracker.io.conventions.search import Verdict
+from tracker.io.conventions.search import ClockFit, Verdict
 from tracker.io.read.pieces import FormatError, RawCamera
 from tracker.sequences.finding import Remedy
 
@@ -209,16 +209,21 @@ def rearranged(
     return [replace(raw, name=name) for raw, name in zip(changed, names, strict=True)], found
 
 
-def told_of_moments(verdict: Verdict, names: Sequence[str]) -> list[str]:
-    """Cameras whose boxes nothing confirms to be of the same moments as those of the others."""
-    confirmed = verdict.confirmed
-    told = [
+def told_of_clocks(clocks: Mapping[int, ClockFit], names: Sequence[str]) -> list[str]:
+    """Cameras whose clocks jump or drift."""
+    return [
         f"{names[camera]}: about step {fit.jump} its clock jumps by {fit.ends - fit.begins} steps, "
         f"or it drifts: it is {fit.begins} steps late in the first third of the recording and "
         f"{fit.ends} in the last; frames were lost, or its rate is another one"
-        for camera, fit in verdict.clocks.items()
+        for camera, fit in clocks.items()
         if not fit.steady
     ]
+
+
+def told_of_moments(verdict: Verdict, names: Sequence[str]) -> list[str]:
+    """Cameras whose boxes nothing confirms to be of the same moments as those of the others."""
+    confirmed = verdict.confirmed
+    told = []
     if len(confirmed) == 2 and verdict.kind == "decided":
         told.append(OF_TWO)
     failing = [camera for camera, odds in confirmed.items() if odds < DECISIVE]

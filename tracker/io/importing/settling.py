@@ -27,11 +27,12 @@ from tracker.io.conventions.questions import (
     Unexplained,
     check_verdict,
     rearranged,
+    told_of_clocks,
     told_of_moments,
 )
 from tracker.io.conventions.reading import Reading, read_boxes, to_camera
 from tracker.io.conventions.readings import Open, Seen
-from tracker.io.conventions.search import as_meant, find_reading
+from tracker.io.conventions.search import ClockFit, Verdict, as_meant, find_reading
 from tracker.io.importing.arriving import short_videos
 from tracker.io.importing.finding.angles import check_turns, chosen_turns, turns_in_words
 from tracker.io.importing.finding.calibrations import camera_sets
@@ -139,11 +140,13 @@ def settle(taken: Sequence[ParsedFiles], options: ImportOptions | None = None) -
     times = settle_times(cameras, matched.truths, options, found)
     boxes = _boxes(cameras, sizes, times, options, found, told)
     arbitrary = matched.format.startswith(_WITHOUT_UNIT)
-    late: dict[str, int] = {}
     open_: list[Undecided | Unexplained] = []
-    reading, raws, boxes, factor = _read(
-        raws, plain, spare, cameras, boxes, times, arbitrary, options, found, told, late, open_
+    reading, raws, boxes, factor, verdict = _read(
+        raws, plain, spare, cameras, boxes, times, arbitrary, options, found, told, open_
     )
+    names = [raw.name for raw in raws]
+    clocks = {} if verdict is None else verdict.clocks
+    late = _late(clocks, names, options)
     if late:
         shifted = _shifted(options, late, times.fps)
         times = settle_times(cameras, matched.truths, shifted, [])
@@ -162,9 +165,13 @@ def settle(taken: Sequence[ParsedFiles], options: ImportOptions | None = None) -
     if not times.stated:
         fps, why = rate_of(settled, at_steps)
         found.append(("fps", f"{fps:g}, {why}, since no file says it; --fps"))
+        if verdict is not None:
+            clocks = verdict.clocks_at(fps)
+            late = _late(clocks, names, options)
         shifted = replace(_shifted(options, late, fps), fps=fps)
         times = settle_times(cameras, matched.truths, shifted, [])
         at_steps = _at_steps(detections, times)
+    told += told_of_clocks(clocks, names)
     for name, steps in late.items():
         how = f"{steps / times.fps:.2f} s late ({steps} steps, within 1)"
         found.append((f"{name} clock", f"{how}, since boxes meet so"))
@@ -210,6 +217,17 @@ def _spare(matched: Matched) -> list[RawCamera]:
     known = [camera for camera in matched.spare if camera.raw.image_size is not None]
     few = len(matched.cameras) + len(known) <= MOST_CAMERAS
     return [camera.raw for camera in known] if few and matched_by(matched.cameras) != "name" else []
+
+
+def _late(
+    clocks: Mapping[int, ClockFit], names: Sequence[str], options: ImportOptions
+) -> dict[str, int]:
+    """Steps by which cameras are late; what is stated is not questioned."""
+    return {
+        names[camera]: clock.late
+        for camera, clock in clocks.items()
+        if clock.late and clock.steady and names[camera] not in options.offsets
+    }
 
 
 def _shifted(options: ImportOptions, late: Mapping[str, int], fps: float) -> ImportOptions:
@@ -377,14 +395,14 @@ def _read(
     options: ImportOptions,
     found: list[tuple[str, str]],
     told: list[str],
-    late: dict[str, int],
     open_: list[Undecided | Unexplained],
-) -> tuple[Reading, list[RawCamera], list[_Boxes | None], float | None]:
+) -> tuple[Reading, list[RawCamera], list[_Boxes | None], float | None, Verdict | None]:
     """How poses and boxes are meant: by flags, formats, the boxes and the poses, in this order.
 
     Returns:
-        The reading; cameras and boxes as they are by it; and by how much the cameras' unit was
-        made larger so that people are as tall as they are said to be, or as people who stand.
+        The reading; cameras and boxes as they are by it; by how much the cameras' unit was made
+        larger so that people are as tall as they are said to be, or as people who stand; and what
+        the boxes tell, where they tell anything.
     """
     seen = [
         None if own is None else _seen(own[0], time)
@@ -428,11 +446,6 @@ def _read(
     else:
         best, reading = as_meant(verdict, convention.up, convention.up, convention.unit)
         reading = replace(reading, flipped=False)
-        for camera, clock in verdict.clocks.items():
-            if raws[camera].name in options.offsets:
-                continue  # what is stated is not questioned
-            if clock.late and clock.steady:
-                late[raws[camera].name] = clock.late
         # boxes lean in rolled cameras; where people along an axis are likelier, the world is level
         rise = verdict.best.scene.rise
         along = float(np.abs(rise).max() / np.linalg.norm(rise))
@@ -483,7 +496,7 @@ def _read(
         factor = (PERSON if size is None else 2.0 * size[2]) / best.consensus.height
         raws = [_resized(raw, factor) for raw in raws]
     reading = replace(reading, layout="ltwh", order=None, pixels=1.0)
-    return reading, raws, changed, factor
+    return reading, raws, changed, factor, verdict if enough else None
 
 
 def _stated(options: ImportOptions) -> str:
