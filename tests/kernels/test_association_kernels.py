@@ -9,7 +9,7 @@ from numpy import ndarray
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.optimize import linear_sum_assignment
 
-from tracker.kernels.association.belief_propagation import Settling, belief_propagation
+from tracker.kernels.association.belief_propagation import Convergence, belief_propagation
 from tracker.kernels.association.disjoint import disjoint_matchings
 from tracker.kernels.association.matchings import assign, augment
 
@@ -17,18 +17,18 @@ seeds = st.integers(0, 2**32 - 1)
 
 
 def messages(
-    missed: ndarray, detected: ndarray, unexplained: ndarray, settling: Settling
+    missed: ndarray, detected: ndarray, unexplained: ndarray, convergence: Convergence
 ) -> tuple[ndarray, ndarray, int]:
     """Rows (n, 1 + M), columns (M,), and how many rounds it took."""
     there, totals, rounds = detected > 0.0, unexplained, 0
     to_target = there / unexplained
-    for _ in range(settling.iterations):
+    for _ in range(convergence.iterations):
         rest = missed[:, None] + (detected * to_target).sum(axis=1)[:, None] - detected * to_target
         to_measurement = detected / rest
         totals = unexplained + to_measurement.sum(axis=0)
         before, to_target = to_target, there / (totals - to_measurement)
         rounds += 1
-        if (np.abs(to_target - before) * unexplained).max(initial=0.0) < settling.tolerance:
+        if (np.abs(to_target - before) * unexplained).max(initial=0.0) < convergence.tolerance:
             break
     rows = np.column_stack([missed, detected * to_target])
     return rows / rows.sum(axis=1)[:, None], unexplained / totals, rounds
@@ -44,9 +44,9 @@ def test_messages_pass_until_they_settle(
     rng = np.random.default_rng(seed)
     missed, unexplained = rng.uniform(0.02, 1.0, targets), rng.lognormal(-1.0, 2.0, count)
     detected = rng.lognormal(0.0, 2.0, (targets, count)) * (rng.random((targets, count)) < 0.7)
-    settling = Settling(tolerance, most)
-    rows, columns, rounds = messages(missed, detected, unexplained, settling)
-    found = belief_propagation(missed, detected, unexplained, settling)
+    convergence = Convergence(tolerance, most)
+    rows, columns, rounds = messages(missed, detected, unexplained, convergence)
+    found = belief_propagation(missed, detected, unexplained, convergence)
     assert_allclose(found.rows, rows, rtol=1e-9)
     assert_allclose(found.unexplained, columns, rtol=1e-9)
     assert rounds <= most

@@ -13,7 +13,7 @@ from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion.target_model import TargetModel
 from tracker.fusion.visibility import inside_probability, visibility
 from tracker.kernels import linear_algebra
-from tracker.kernels.association.belief_propagation import Settling
+from tracker.kernels.association.belief_propagation import Convergence
 from tracker.kernels.gating import Measurements
 from tracker.kernels.kalman import Expected
 from tracker.kernels.labelled import camera_update, marginals
@@ -213,7 +213,7 @@ def test_a_track_that_must_have_been_seen_and_was_not_keeps_a_faint_existence() 
     found = marginals.bernoulli_update(
         mixture.gaussians, Expected.of(np.zeros((1, 2)), np.eye(2, 3)[None]),
         Measurements(np.zeros((0, 2)), np.eye(2)[None]), np.ones(1), np.zeros(0),
-        np.ones((0, 0)), 9.0, Settling(1e-6, 9),
+        np.ones((0, 0)), 9.0, Convergence(1e-6, 9),
     )  # fmt: skip
     assert found.existences.tolist() == [1e-12]
     assert_allclose(found.covariances, mixture.covariances)

@@ -197,7 +197,7 @@ def test_the_warm_up_calls_every_kernel_that_a_run_may_call() -> None:
     )
     # these are for those who use the engine as a library: no method of a run calls them
     library_only = {
-        *("report", "pay_for_measurements", "subset_marginals"),
+        *("report", "allocate_weights", "subset_marginals"),
         *("cell_means", "_mean"),
         *("best_matchings", "assign", "augment"),
         *("disjoint_matchings", "_nearest", "_augment", "_push", "_pop"),

@@ -191,7 +191,7 @@ def test_prediction_is_the_formula(seed: int, size: int, shared: bool) -> None:
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(0, 5), st.sampled_from((0.3, 0.5)))
-def test_measurements_are_paid_for_by_their_components_the_surest_first(
+def test_components_share_their_weight_among_measurements_the_surest_first(
     seed: int, count: int, threshold: float
 ) -> None:
     rng = np.random.default_rng(seed)
@@ -246,7 +246,7 @@ def pairs_of(
     )
 
 
-def test_a_false_alarm_beside_a_target_is_paid_for_by_nobody() -> None:
+def test_a_false_alarm_beside_a_target_gets_no_weight() -> None:
     predicted = random_mixture(np.random.default_rng(0), 2, 1)
     predicted = GaussianMixture(
         np.array([1.0, 0.3]), predicted.means, predicted.covariances, predicted.labels

@@ -14,7 +14,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from tests.filters.mixtures import random_covariances
 from tests.world import PERSON, ring
 from tracker.fusion.target_model import TargetModel
-from tracker.kernels.association.belief_propagation import Settling, belief_propagation
+from tracker.kernels.association.belief_propagation import Convergence, belief_propagation
 from tracker.kernels.boxes import Occlusion, hide, inside_probability
 from tracker.kernels.gating import Measurements
 from tracker.kernels.kalman import Expected
@@ -158,7 +158,7 @@ def test_sums_around_fade_to_both_sides_within_a_path(seed: int, kept: float) ->
 
 def score(states: tuple[int, ...], votes: ndarray, at_start: bool, at_end: bool) -> float:
     """log weight of a sequence of 1 (there), 0 (away in between) and −1 (not yet, or gone)."""
-    total, habits = 0.0, HABITS
+    total, transitions = 0.0, TRANSITIONS
     there = [k for k, state in enumerate(states) if state == 1]
     if not there:
         return 0.0 if set(states) <= {-1} else -np.inf
@@ -168,12 +168,14 @@ def score(states: tuple[int, ...], votes: ndarray, at_start: bool, at_end: bool)
             return -np.inf
         total += votes[k] if state == 1 else 0.0
     for one, other in zip(states[first:last], states[first + 1 : last + 1], strict=True):
-        total += habits.stay if one == other == 1 else habits.change if one != other else 0.0
-    total += 0.0 if first == 0 and at_start else habits.enter
-    return total + (0.0 if last == len(states) - 1 and at_end else habits.enter)
+        total += (
+            transitions.stay if one == other == 1 else transitions.change if one != other else 0.0
+        )
+    total += 0.0 if first == 0 and at_start else transitions.enter
+    return total + (0.0 if last == len(states) - 1 and at_end else transitions.enter)
 
 
-HABITS = presence.Habits(stay=-0.1, enter=-1.3, change=-0.9)
+TRANSITIONS = presence.ExistenceTransitions(stay=-0.1, enter=-1.3, change=-0.9)
 
 
 @given(seeds, st.integers(1, 5), st.sampled_from((-2, 0, 1)), st.integers(-1, 1))
@@ -183,7 +185,7 @@ def test_presence_is_the_best_of_all_sequences(
     votes = np.random.default_rng(seed).normal(0.0, 2.0, count + 1)
     end = first + count - 1 + beyond
     found = presence.presence(
-        np.array([0, count, count + 1]), np.array([first, 99]), votes, HABITS, end
+        np.array([0, count, count + 1]), np.array([first, 99]), votes, TRANSITIONS, end
     )
     best = {}
     for states in product((-1, 0, 1), repeat=count):
@@ -197,14 +199,14 @@ def test_presence_is_the_best_of_all_sequences(
         chance = 1.0 / (1.0 + np.exp(best[k, False] - best[k, True]))
         assert found.probabilities[k] == pytest.approx(chance)
     # a path of one row that neither begins nor ends the recording comes and goes
-    leaves = 0.0 if end <= 99 else HABITS.enter
-    assert found.odds[1] == pytest.approx(HABITS.enter + votes[count] + leaves)
+    leaves = 0.0 if end <= 99 else TRANSITIONS.enter
+    assert found.odds[1] == pytest.approx(TRANSITIONS.enter + votes[count] + leaves)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_however_sure_the_votes_a_probability_is_a_number(sign: float) -> None:
     found = presence.presence(
-        np.array([0, 2]), np.array([0]), np.full(2, sign * 3000.0), HABITS, 1
+        np.array([0, 2]), np.array([0]), np.full(2, sign * 3000.0), TRANSITIONS, 1
     ).probabilities
     assert_allclose(found, 1.0 / (1.0 + np.exp(-sign * 500.0)), rtol=1e-9)
 
@@ -314,7 +316,7 @@ def test_who_made_which_box_is_the_association_at_each_step(
                         weights[i, k] += scene.existences[j] * chances[i] * share * likelihood
         rows = belief_propagation(
             1.0 - scene.existences[own] * chances, weights, scene.clutter[boxes],
-            Settling(1e-9, 500),
+            Convergence(1e-9, 500),
         ).rows  # fmt: skip
         assert_allclose(found.detection_probabilities[own], chances)
         assert_allclose(found.missed[own], rows[:, 0])

@@ -88,7 +88,7 @@ def test_shared_boxes(seed: int, size: int, boxes: int) -> None:
         births.stop,
         PairOdds(parents, measured, log_odds, boxes),
         600.0,
-        association.SETTLING,
+        association.CONVERGENCE,
     )
     expected = reference_shares(weights, labels, p_d, births, parents, measured, log_odds, boxes)
     assert_allclose(factors, expected[0], rtol=1e-9)

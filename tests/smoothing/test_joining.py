@@ -9,7 +9,7 @@ import pytest
 from numpy import ndarray
 from numpy.testing import assert_allclose
 
-from tracker.kernels.smoothing.presence import Habits, presence
+from tracker.kernels.smoothing.presence import ExistenceTransitions, presence
 from tracker.smoothing.identity.association import chains, join
 from tracker.smoothing.identity.tracklets import contested, split_paths
 from tracker.smoothing.paths import Links, Paths
@@ -97,7 +97,11 @@ def test_when_somebody_was_there_is_the_best_of_all_sequences(seed: int) -> None
     ways = {there: score(there) for there in itertools.product((False, True), repeat=count)}
     best = max(ways, key=lambda there: ways[there])
     chances, odds = presence(
-        np.array([0, count]), np.array([begin]), votes, Habits(stay, enter, change), end
+        np.array([0, count]),
+        np.array([begin]),
+        votes,
+        ExistenceTransitions(stay, enter, change),
+        end,
     )
     assert (chances > 0.5).tolist() == list(best)
     assert odds[0] == pytest.approx(max(v for there, v in ways.items() if any(there)))

@@ -74,7 +74,7 @@ def update(
         unexplained_intensity,
         np.ones((0, len(measurements))) if resemblance is None else resemblance,
         gate,
-        association.SETTLING,
+        association.CONVERGENCE,
     )
     rows = updated.rows
     return PmbUpdate(

@@ -341,7 +341,7 @@ def share_boxes(
         births.stop,
         PairOdds(owner, box, updated.log_odds, boxes),
         _LARGEST_LOG_ODDS,
-        association.SETTLING,
+        association.CONVERGENCE,
     )
     labels = np.where(shared.of_people, predicted.labels[owner], next_label + box)
     posterior = GaussianMixture(

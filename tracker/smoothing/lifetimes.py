@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
 from tracker.geometry.boxes import Boxes, paired_overlaps
-from tracker.kernels.smoothing.presence import Habits, presence
+from tracker.kernels.smoothing.presence import ExistenceTransitions, presence
 from tracker.parameters.groups.smoothing import SmoothingParams
 from tracker.smoothing.paths import Paths
 from tracker.smoothing.smoother import BoxAssociations, Smoother
@@ -93,13 +93,15 @@ def lifetimes(
     steps = 1.0 / weight
     come = float(np.log(min(p.birth_rate * steps * smoother.model.step_time, 1.0)))
     leave = float(np.log1p(-(survival**steps)))
-    habits = Habits(float(np.log(survival)), (come + leave) / 4.0, -parameters.change)
+    transitions = ExistenceTransitions(
+        float(np.log(survival)), (come + leave) / 4.0, -parameters.change
+    )
     with_place, against = smoother.rows_with_places(paths)[0], misses(shared)
 
     def by(votes: Float[ndarray, " N"]) -> tuple[Float[ndarray, " N"], Float[ndarray, " n"]]:
         votes[with_place] += _CONSTRAINT_VOTES
         found = presence(
-            paths.starts, paths.firsts, weight * (votes + against), habits, smoother.frames - 1
+            paths.starts, paths.firsts, weight * (votes + against), transitions, smoother.frames - 1
         )
         return found.probabilities, found.odds
 

@@ -21,8 +21,8 @@ data association", patent CN101783020A, 2010.
 from __future__ import annotations
 
 from tracker.filters.association.belief_propagation import (
+    CONVERGENCE,
     ITERATIONS,
-    SETTLING,
     TOLERANCE,
     Marginals,
     marginals,
@@ -38,9 +38,9 @@ from tracker.filters.association.exact import MOST_ITEMS, exact_marginals
 from tracker.filters.association.validation import clusters, validation_matrix
 
 __all__ = [
+    "CONVERGENCE",
     "ITERATIONS",
     "MOST_ITEMS",
-    "SETTLING",
     "TOLERANCE",
     "JointEvents",
     "Marginals",

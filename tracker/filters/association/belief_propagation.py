@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from tracker.kernels.association.belief_propagation import Settling, belief_propagation
+from tracker.kernels.association.belief_propagation import Convergence, belief_propagation
 
 TOLERANCE = 1e-6
 """Default criterion of convergence: the largest |Δν_ji| ρ_j of an iteration. It is far below the
@@ -22,7 +22,7 @@ precision to which an association probability matters."""
 ITERATIONS = 200
 """Default largest number of iterations, if the messages do not converge before."""
 
-SETTLING = Settling(TOLERANCE, ITERATIONS)
+CONVERGENCE = Convergence(TOLERANCE, ITERATIONS)
 """Tolerance and number of iterations, in the form that the kernels take."""
 
 
@@ -65,6 +65,6 @@ def marginals(
         np.ascontiguousarray(missed, dtype=float),
         np.ascontiguousarray(detected, dtype=float),
         np.ascontiguousarray(unexplained, dtype=float),
-        Settling(tolerance, iterations),
+        Convergence(tolerance, iterations),
     )
     return Marginals(found.rows[:, 1:], found.rows[:, 0], found.unexplained)

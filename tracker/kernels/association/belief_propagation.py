@@ -14,7 +14,7 @@ from numpy import ndarray
 from tracker.kernels.compilation import kernel
 
 
-class Settling(NamedTuple):
+class Convergence(NamedTuple):
     """The criterion by which the iteration of the messages ends."""
 
     tolerance: float
@@ -35,7 +35,7 @@ class Marginals(NamedTuple):
 
 @kernel
 def belief_propagation(
-    missed: ndarray, detected: ndarray, unexplained: ndarray, settling: Settling
+    missed: ndarray, detected: ndarray, unexplained: ndarray, convergence: Convergence
 ) -> Marginals:
     """Compute association marginals by messages between targets and measurements.
 
@@ -44,7 +44,7 @@ def belief_propagation(
         detected: w_ij (n, M), weight of each target having made each measurement, 0 outside the
             gate.
         unexplained: ρ_j (M,), intensity of clutter and new targets at each measurement, > 0.
-        settling: The criterion of convergence.
+        convergence: The criterion of convergence.
     """
     targets, count = detected.shape
     # only pairs inside a gate exchange messages: listed row by row, with measurement and weight
@@ -68,7 +68,7 @@ def belief_propagation(
                 to_target[pair] = 1.0 / unexplained[j]
                 pair += 1
     totals = unexplained.copy()
-    for _ in range(settling.iterations):
+    for _ in range(convergence.iterations):
         totals[:] = unexplained
         for i in range(targets):
             total = missed[i]
@@ -90,7 +90,7 @@ def belief_propagation(
             new = 1.0 / max(rest, 1e-300)
             change = max(change, abs(new - to_target[pair]) * unexplained[j])
             to_target[pair] = new
-        if change < settling.tolerance:
+        if change < convergence.tolerance:
             break
     for i in range(targets):
         total = missed[i]

@@ -16,10 +16,10 @@ from tracker.kernels.intensity.phd import UpdatedIntensity
 from tracker.kernels.linear_algebra import merge_moments
 
 
-class Payments(NamedTuple):
+class AllocatedWeights(NamedTuple):
     """The weight that P pairs of a component and a measurement contribute to extracted targets."""
 
-    spent: ndarray
+    weights: ndarray
     """(P,), the part of each pair's weight that counts for the target of its measurement; 0 where
     the measurement is not reported."""
     places: ndarray
@@ -42,7 +42,7 @@ class Reported(NamedTuple):
 
 
 @kernel
-def pay_for_measurements(
+def allocate_weights(
     left: ndarray,
     weights: ndarray,
     parents: ndarray,
@@ -50,7 +50,7 @@ def pay_for_measurements(
     log_odds: ndarray,
     sums: ndarray,
     threshold: float,
-) -> Payments:
+) -> AllocatedWeights:
     """Determine the measurements that components can explain, by decreasing log odds of their
     pairs.
 
@@ -68,7 +68,7 @@ def pay_for_measurements(
         threshold: Expected number of targets from which a measurement is reported.
     """
     count = len(sums)
-    spent = np.zeros(len(weights))
+    shares = np.zeros(len(weights))
     group = np.full(len(weights), -1, dtype=np.int64)
     starts = np.zeros(count + 1, dtype=np.int64)
     surest = np.full(count, -np.inf)
@@ -86,11 +86,11 @@ def pay_for_measurements(
         if total <= threshold:
             continue
         for pair in range(starts[z], starts[z + 1]):
-            spent[pair] = min(weights[pair], left[parents[pair]])
-            left[parents[pair]] -= spent[pair]
+            shares[pair] = min(weights[pair], left[parents[pair]])
+            left[parents[pair]] -= shares[pair]
             group[pair] = reported
         reported += 1
-    return Payments(spent, group, reported)
+    return AllocatedWeights(shares, group, reported)
 
 
 @kernel
@@ -108,7 +108,7 @@ def report(
     """
     size = len(predicted)
     weights, means, covariances = updated.weights, updated.means, updated.covariances
-    paid = pay_for_measurements(
+    allocated = allocate_weights(
         np.maximum(predicted, 1.0) + spare,
         weights[size:],
         updated.parents[size:],
@@ -117,8 +117,10 @@ def report(
         updated.sums,
         threshold,
     )
-    found = merge_moments(paid.spent, means[size:], covariances[size:], paid.places, paid.reported)
-    heaviest = size + heaviest_of_groups(paid.spent, paid.places, paid.reported)
+    found = merge_moments(
+        allocated.weights, means[size:], covariances[size:], allocated.places, allocated.reported
+    )
+    heaviest = size + heaviest_of_groups(allocated.weights, allocated.places, allocated.reported)
     missed = np.flatnonzero(weights[:size] > threshold)
     if len(missed) == 0:
         return Reported(found.weights, found.means, found.covariances, heaviest)

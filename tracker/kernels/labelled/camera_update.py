@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy import ndarray
 
-from tracker.kernels.association.belief_propagation import Settling
+from tracker.kernels.association.belief_propagation import Convergence
 from tracker.kernels.boxes import Occlusion, hide, inside_probability
 from tracker.kernels.compilation import kernel
 from tracker.kernels.gating import Measurements
@@ -51,7 +51,7 @@ class CameraRule(NamedTuple):
     reporting_share: float
     tolerance: float
     """This and the next field are those of
-    :class:`tracker.kernels.association.belief_propagation.Settling`."""
+    :class:`tracker.kernels.association.belief_propagation.Convergence`."""
     iterations: int
     reporting_threshold: float
     """Association probability from which a pair is reported."""
@@ -212,7 +212,7 @@ def update_by_camera(
         clutter / (1.0 - newcomer),
         resemblance,
         rule.gate,
-        Settling(rule.tolerance, rule.iterations),
+        Convergence(rule.tolerance, rule.iterations),
     )
     likeliest = _likeliest(updated.rows)
     return CameraUpdate(

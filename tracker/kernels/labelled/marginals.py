@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy import ndarray
 
-from tracker.kernels.association.belief_propagation import Settling, belief_propagation
+from tracker.kernels.association.belief_propagation import Convergence, belief_propagation
 from tracker.kernels.compilation import kernel
 from tracker.kernels.gating import Measurements
 from tracker.kernels.kalman import Expected, kalman_pairs
@@ -74,7 +74,7 @@ def bernoulli_update(
     unexplained: ndarray,
     resemblance: ndarray,
     gate: float,
-    settling: Settling,
+    convergence: Convergence,
 ) -> UpdatedBernoullis:
     """Update Bernoulli tracks by one measurement set, with association marginals.
 
@@ -87,7 +87,7 @@ def bernoulli_update(
         resemblance: (k, M) with k up to n, likelihood ratio of each measurement's appearance for
             the first k tracks, of the track against any target; 1 for the other tracks.
         gate: Squared Mahalanobis distance of the gate.
-        settling: Convergence criterion of the belief propagation.
+        convergence: Convergence criterion of the belief propagation.
     """
     existences, means, covariances = tracks.weights, tracks.means, tracks.covariances
     size, dimension = means.shape
@@ -110,7 +110,7 @@ def bernoulli_update(
         if i < len(resemblance):
             terms[pair] *= resemblance[i, measured[pair]]
         detected[i, measured[pair]] += terms[pair]
-    marginals = belief_propagation(missed, detected, unexplained, settling)
+    marginals = belief_propagation(missed, detected, unexplained, convergence)
     rows = marginals.rows
 
     weights = np.empty(size + pairs)
@@ -142,7 +142,7 @@ def share_boxes(
     last_birth: int,
     odds_of_pairs: PairOdds,
     largest_odds: float,
-    settling: Settling,
+    convergence: Convergence,
 ) -> SharedBoxes:
     """Compute weights of a PHD update in which a label stands for one target.
 
@@ -152,7 +152,7 @@ def share_boxes(
         last_birth: Label after the last of the births.
         odds_of_pairs: Log odds of each pair against clutter.
         largest_odds: Log odds at which they are clipped.
-        settling: Convergence criterion of the belief propagation.
+        convergence: Convergence criterion of the belief propagation.
     """
     weights, labels = people.weights, people.labels
     parents, measured = odds_of_pairs.parents, odds_of_pairs.measured
@@ -180,7 +180,7 @@ def share_boxes(
         else:
             unassigned[measured[pair]] += odds[pair]
     persons = np.flatnonzero(person)
-    marginals = belief_propagation(missed[persons], table[persons], unassigned, settling)
+    marginals = belief_propagation(missed[persons], table[persons], unassigned, convergence)
     rows, columns = marginals.rows, marginals.unexplained
     row = np.full(count, -1, dtype=np.int64)
     factors = scale.copy()

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy import ndarray
 
-from tracker.kernels.association.belief_propagation import Settling, belief_propagation
+from tracker.kernels.association.belief_propagation import Convergence, belief_propagation
 from tracker.kernels.boxes import Occlusion, hide, inside_probability
 from tracker.kernels.compilation import kernel
 from tracker.kernels.gating import Measurements
@@ -325,7 +325,7 @@ def share_camera(
             1.0 - weights * chances_here,
             detected,
             camera.clutter[first : first + count],
-            Settling(rule.tolerance, rule.iterations),
+            Convergence(rule.tolerance, rule.iterations),
         ).rows
         for i in range(len(own)):
             missed[own[i]] = marginals[i, 0]

@@ -11,7 +11,7 @@ from numpy import ndarray
 from tracker.kernels.compilation import kernel
 
 
-class Habits(NamedTuple):
+class ExistenceTransitions(NamedTuple):
     """The transition model of existence, as log probabilities."""
 
     stay: float
@@ -34,7 +34,7 @@ class Presence(NamedTuple):
 
 @kernel
 def presence(
-    starts: ndarray, firsts: ndarray, votes: ndarray, habits: Habits, end: int
+    starts: ndarray, firsts: ndarray, votes: ndarray, transitions: ExistenceTransitions, end: int
 ) -> Presence:
     """Compare, for each path and step, the best sequences of presence with and without the step.
 
@@ -48,11 +48,11 @@ def presence(
         firsts: (n,), first step of each path.
         votes: (N,), log likelihood ratio of each row's evidence: the track exists against it does
             not.
-        habits: The transition model of all paths.
+        transitions: The transition model of all paths.
         end: Last step of the recording: a track that exists at it has not died, and one that
             exists at step 0 was not born.
     """
-    stay, enter, change = habits
+    stay, enter, change = transitions
     chances = np.zeros(len(votes))
     odds = np.full(len(starts) - 1, -np.inf)
     for path in range(len(starts) - 1):
