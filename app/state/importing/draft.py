@@ -17,7 +17,7 @@ import numpy as np
 
 from app.errors import sentence
 from app.state.importing.uploads import Upload
-from app.state.importing.wish import Wish, looks_alike, options_of
+from app.state.importing.wish import ImportWish, looks_alike, options_of
 from tracker.io.read.pieces import FormatError, ImagesPiece, VideoPiece
 from tracker.runs.pipeline import Cancelled
 from tracker.sequences.pictures.video import VideoDecoder, VideoError, index_video, read_image
@@ -47,7 +47,7 @@ class Known:
     """What is known of a draft at one moment."""
 
     phase: Phase
-    wish: Wish
+    wish: ImportWish
     version: int = 0
     """Grows with every change."""
     taken: tuple[ParsedFiles, ...] = ()
@@ -93,7 +93,7 @@ class Draft:
             self.upload.folder.mkdir()
         self.source = source or self.folder / FILES
         self._lock = threading.RLock()
-        self._known = Known("uploading" if source is None else "reading", Wish(name=name))
+        self._known = Known("uploading" if source is None else "reading", ImportWish(name=name))
         self._gathered = False
         self._read: Footprint = {}
         self._stop = threading.Event()
@@ -120,7 +120,7 @@ class Draft:
             for path in one.files
         )
 
-    def wish(self, wish: Wish) -> None:
+    def wish(self, wish: ImportWish) -> None:
         """Have it otherwise; what follows is found out anew, where it is more than the name."""
         with self._lock:
             if self._known.phase in _BEGUN:
@@ -203,7 +203,7 @@ class Draft:
                     tell(taken=taken, waiting="")
                     self._gathered, self._read = True, read
             options = options_of(wish, taken)
-            settled = settle(taken, replace(options, accept_best=True))
+            settled = settle(taken, options.model_copy(update={"accept_best": True}))
             open_ = None if options.accept_best else settled.open
             question = open_.question if isinstance(open_, Undecided) else None
             undecided = "" if open_ is None else sentence(open_)
@@ -283,7 +283,7 @@ class Draft:
     def _write(
         self,
         taken: tuple[ParsedFiles, ...],
-        wish: Wish,
+        wish: ImportWish,
         place: Path,
         then: Callable[[Path], object],
     ) -> None:
@@ -307,7 +307,7 @@ class Draft:
                 if self._given_up:
                     shutil.rmtree(self.folder, ignore_errors=True)
             return
-        if not wish.copy or self.upload is not None or not links_in(place):
+        if not wish.copy_files or self.upload is not None or not links_in(place):
             self._tell(phase="written", folder=place, told=tuple(told))
             then(place)
             return

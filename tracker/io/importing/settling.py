@@ -168,7 +168,7 @@ def settle(taken: Sequence[ParsedFiles], options: ImportOptions | None = None) -
         if verdict is not None:
             clocks = verdict.clocks_at(fps)
             late = _late(clocks, names, options)
-        shifted = replace(_shifted(options, late, fps), fps=fps)
+        shifted = _shifted(options, late, fps).model_copy(update={"fps": fps})
         times = settle_times(cameras, matched.truths, shifted, [])
         at_steps = _at_steps(detections, times)
     told += told_of_clocks(clocks, names)
@@ -233,7 +233,7 @@ def _late(
 def _shifted(options: ImportOptions, late: Mapping[str, int], fps: float) -> ImportOptions:
     """With the offsets of cameras that are late by so many steps; what is stated is kept."""
     found = {name: -steps / fps for name, steps in late.items() if name not in options.offsets}
-    return replace(options, offsets={**found, **options.offsets})
+    return options.model_copy(update={"offsets": {**found, **options.offsets}})
 
 
 def _looked_at(
