@@ -9,7 +9,7 @@ import numpy as np
 from numpy import ndarray
 
 from tracker.geometry.camera import Camera
-from tracker.io.checks.reading import FLIP, upright
+from tracker.io.conventions.reading import FLIP, upright
 from tracker.sequences.sequence import Detections, Sequence
 
 

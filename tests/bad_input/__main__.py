@@ -1,5 +1,8 @@
 """Damage recordings for some minutes: ``python3 -m tests.bad_input MINUTES [--seed N]``.
 
+With ``--cases 20000 --resume FILE`` it ends after so many, and goes on where the file says that it
+was ended before.
+
 Every worker is a process of its own, so that a crash is reported as any other failure: with the
 lines that the corpus takes (``tests/bad_input/corpus.json``), reduced to the damage that it needs.
 """
@@ -23,6 +26,7 @@ from collections import Counter
 from pathlib import Path
 from random import Random
 
+from tracker.files.atomic import write_whole
 from tracker.files.folders import cache_folder
 
 HANG_SECONDS = 30.0
@@ -43,6 +47,8 @@ def main() -> int:
     parser.add_argument(
         "--bounds", action="store_true", help="the kernels check every index, and are slower"
     )
+    parser.add_argument("--cases", type=int, default=None, help="end after so many")
+    parser.add_argument("--resume", type=Path, default=None, help="keeps where it was ended")
     parser.add_argument("--work", type=int, default=None, help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     if arguments.work is not None:
@@ -58,10 +64,13 @@ def main() -> int:
         print("fuzz: a good recording does not run", flush=True)
         return 1
     deadline = time.monotonic() + 60.0 * arguments.minutes
-    counts: Counter[str] = Counter()
+    progress = Progress(
+        [seed + 10**12 * k for k in range(arguments.workers)], arguments.cases, arguments.resume
+    )
+    counts = progress.counts
     threads = [
-        threading.Thread(target=watch, args=(seed + 10**12 * k, deadline, counts))
-        for k in range(arguments.workers)
+        threading.Thread(target=watch, args=(k, deadline, progress))
+        for k in range(len(progress.seeds))
     ]
     for thread in threads:
         thread.start()
@@ -72,27 +81,55 @@ def main() -> int:
     return 1 if counts["fell"] else 0
 
 
-def watch(seed: int, deadline: float, counts: Counter[str]) -> None:
+class Progress:
+    """The next case of each worker and the number of outcomes, kept in a file if there is one."""
+
+    def __init__(self, seeds: list[int], cases: int | None, file: Path | None) -> None:
+        self.seeds = seeds
+        self.counts: Counter[str] = Counter()
+        self._cases, self._file = cases, file
+        self._lock = threading.Lock()
+        if file is not None and file.exists():
+            stored = json.loads(file.read_text(encoding="utf-8"))
+            self.seeds, self.counts = stored["seeds"], Counter(stored["counts"])
+            print(f"fuzz: goes on after {sum(self.counts.values())} cases", flush=True)
+
+    @property
+    def complete(self) -> bool:
+        """Whether there were as many cases as are wanted."""
+        return self._cases is not None and sum(self.counts.values()) >= self._cases
+
+    def add(self, outcome: str) -> None:
+        """Count a case."""
+        with self._lock:
+            self.counts[outcome] += 1
+            if self._file is not None:
+                stored = {"seeds": self.seeds, "counts": self.counts}
+                write_whole(self._file, json.dumps(stored).encode())
+
+
+def watch(number: int, deadline: float, progress: Progress) -> None:
     """Keep one worker running; a death of it is a finding, and the next case goes on."""
-    while time.monotonic() < deadline - 1.0:
+    while time.monotonic() < deadline - 1.0 and not progress.complete:
         with tempfile.TemporaryFile("w+") as errors:
             left = (deadline - time.monotonic()) / 60.0
-            line = [sys.executable, "-m", "tests.bad_input", str(left), "--work", str(seed)]
+            seed = str(progress.seeds[number])
+            line = [sys.executable, "-m", "tests.bad_input", str(left), "--work", seed]
             worker = subprocess.Popen(line, stdout=subprocess.PIPE, stderr=errors, text=True)
-            seed, current = hear(worker, seed, counts)
+            current = hear(worker, number, progress)
             status = worker.wait()
-            if status != 0 and time.monotonic() < deadline:
-                counts["fell"] += 1
+            if status != 0 and time.monotonic() < deadline and not progress.complete:
+                progress.add("fell")
                 errors.seek(0)
                 said = "  ".join(errors.readlines()[-25:])
                 tell_all(f"FELL: a worker ended with status {status} at\n  {current}\n  {said}")
 
 
-def hear(worker: subprocess.Popen[str], seed: int, counts: Counter[str]) -> tuple[int, str]:
+def hear(worker: subprocess.Popen[str], number: int, progress: Progress) -> str:
     """Count what a worker tells until it ends, and end one that tells nothing any more.
 
     Returns:
-        The next seed, and the case that was begun last.
+        The case that was begun last.
     """
     assert worker.stdout is not None
     current = ""
@@ -103,12 +140,15 @@ def hear(worker: subprocess.Popen[str], seed: int, counts: Counter[str]) -> tupl
             if told["is"] != "good":
                 dog.has_compiled()
             current = text.strip() if told["is"] == "begun" else current
-            seed = told.get("next", seed)
+            progress.seeds[number] = told.get("next", progress.seeds[number])
             if told["is"] in ("refused", "ran", "fell"):
-                counts[told["is"]] += 1
+                progress.add(told["is"])
             if told["is"] == "fell":
                 tell_all(f"FELL: {told['why']}\n  {json.dumps(told['case'])}")
-    return seed, current
+            if progress.complete:
+                worker.terminate()
+                break
+    return current
 
 
 class Watchdog:

@@ -14,9 +14,15 @@ from pathlib import Path
 from app.command.terminal import CommandError
 from tests.app.folders import write_crossing
 from tests.bad_input.drawing import Damage, damage
+from tests.io.read.recorded import detections, toml
 from tests.synthetic import write_sequence
 from tracker.export import tracks_csv
 from tracker.io.checks import check
+from tracker.io.importing.gathering import gather
+from tracker.io.importing.options import ImportOptions
+from tracker.io.importing.settling import settle
+from tracker.io.importing.writing import write
+from tracker.io.read.pieces import FormatError
 from tracker.parameters.values import with_values
 from tracker.runs import gaps, pipeline
 from tracker.sequences import library
@@ -42,11 +48,16 @@ def make_bases(folder: Path) -> dict[str, Path]:
             folder / "images", frames=STEPS, container="images", detections=True
         ),
         "bare": write_crossing(folder / "bare", STEPS),
+        "files of other programs": folder / "files of other programs",
     }
-    toml = bases["bare"] / FILE
-    text = toml.read_text(encoding="utf-8")
+    others = bases["files of other programs"]
+    others.mkdir()
+    toml(others)
+    detections(others)
+    file = bases["bare"] / FILE
+    text = file.read_text(encoding="utf-8")
     begin, end = text.index("[room]"), text.index("[[camera]]")
-    toml.write_text(text[:begin] + text[end:], encoding="utf-8")
+    file.write_text(text[:begin] + text[end:], encoding="utf-8")
     return bases
 
 
@@ -75,9 +86,15 @@ def try_case(base: Path, damages: Many[Damage], work: Path, longest: float = mat
         library.available(work)
         with warnings.catch_warnings():
             warnings.simplefilter("error", RuntimeWarning)  # what overflows is a fault
-            sequence = read_sequence(place)
-            _run(sequence)
+            if (base / FILE).exists():
+                _run(read_sequence(place))
+            else:
+                _import(place, work / "case written")
         told = ""
+    except FormatError as error:
+        told = str(error)
+        if not told.isprintable() or len(told) > LONGEST_SENTENCE:
+            raise Fell(f"a poor sentence: {told[:400]!r}") from None
     except SequenceError as error:
         told = str(error)
         if "case" not in told or not told.isprintable() or len(told) > LONGEST_SENTENCE:
@@ -88,6 +105,18 @@ def try_case(base: Path, damages: Many[Damage], work: Path, longest: float = mat
     if seconds > longest:
         raise Fell(f"it took {seconds:.1f} s")
     return told
+
+
+def _import(place: Path, target: Path) -> None:
+    """Import what is not refused; what is written opens, else nothing of it is there."""
+    shutil.rmtree(target, ignore_errors=True)
+    try:
+        write(settle(gather([place]), ImportOptions(fps=10.0)), target, "case")
+    except FormatError:
+        if (target / FILE).exists():
+            raise Fell("a refused import is written") from None
+        raise
+    _run(read_sequence(target))
 
 
 def _run(sequence: Sequence) -> None:

@@ -81,13 +81,13 @@ def _of_parquet(path: Path) -> Rows:
 
 
 def _of_motchallenge(path: Path) -> Rows:
-    """The places of the ground plane; and in each camera the boxes, in pixels from 1."""
+    """The places of the ground plane; and in each camera the boxes."""
     for number, camera in enumerate(SEQUENCE.cameras):
         (file,) = path.glob(f"trackers/**/*-{camera.name}.txt")
         (piece,) = (own for own in read(file)[1] if isinstance(own, DetectionPiece))
         boxes, visible = RUN.boxes[number]
         np.testing.assert_array_equal(piece.frames - 1, RUN.tracks.frames[visible])
-        np.testing.assert_allclose(piece.boxes - [1, 1, 0, 0], boxes[visible], atol=1e-6)
+        np.testing.assert_allclose(piece.boxes, boxes[visible], atol=1e-6)
     (file,) = path.glob("trackers/**/*-ground-plane.txt")
     return _of_truth(file)
 

@@ -22,7 +22,7 @@ from scipy.spatial.transform import Rotation
 from tests.io.read.rig import FLIP
 from tests.random_rooms import Walkers, looking_camera, random_walkers
 from tracker.geometry.camera import Camera
-from tracker.io.checks.reading import upright
+from tracker.io.conventions.reading import upright
 from tracker.io.importing.options import ImportOptions
 from tracker.io.importing.settling import ImportPlan
 from tracker.io.read.pieces import METRES, Unit, Up

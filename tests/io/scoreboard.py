@@ -18,7 +18,7 @@ import numpy as np
 
 from tests.io.folders import MOST_FRAMES, Known, judge, make_folder
 from tracker.io.checks import check
-from tracker.io.conventions.questions import OF_ONE, OF_TWO
+from tracker.io.conventions.questions import OF_ONE, OF_TWO, UNPROVEN
 from tracker.io.importing.gathering import gather
 from tracker.io.importing.preview import as_sequence
 from tracker.io.importing.settling import settle
@@ -37,8 +37,8 @@ def outcome(folder: Path, known: Known, *, checked: bool) -> tuple[str, str]:
     wrong = judge(plan, known)
     if not wrong:
         return "right", ""
-    if {OF_ONE, OF_TWO} & set(plan.told):
-        return "asked", f"{wrong}; what one or two cameras cannot tell is said"
+    if {OF_ONE, OF_TWO, UNPROVEN} & set(plan.told):
+        return "asked", f"{wrong}; that nothing confirms it is said"
     if not checked:
         return "silent", wrong
     checks = check(as_sequence(plan, "generated"), pictures=False)

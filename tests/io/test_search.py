@@ -9,8 +9,8 @@ import pytest
 
 from tests.random_rooms import random_room
 from tracker.io.checks.boxes import raw_cameras
-from tracker.io.checks.reading import FLIP, Reading
-from tracker.io.checks.readings import Open, Seen
+from tracker.io.conventions.reading import FLIP, Reading, with_pixels
+from tracker.io.conventions.readings import Open, Seen
 from tracker.io.conventions.search import Verdict, find_reading
 from tracker.io.read.pieces import Convention, RawCamera
 from tracker.sequences.sequence import Sequence
@@ -66,3 +66,54 @@ def test_the_vertical_is_found_along_any_axis_and_with_any_convention(seed: int,
     rise = verdict.best.scene.rise / np.linalg.norm(verdict.best.scene.rise)
     assert rise @ turn @ [0.0, 0.0, 1.0] > 0.99
     assert 130.0 < np.linalg.norm(verdict.best.scene.rise) < 210.0
+
+
+def test_boxes_are_read_anew_where_order_and_pictures_were_found_with_others() -> None:
+    cameras, seen = given(random_room(4, cameras=6, people=4))
+    stated = Convention(direction="world-to-camera", axes="opencv")
+    moved = np.array([0, 2, 3, 4, 5, 1])
+    smaller = [with_pixels(replace(cameras[own], convention=stated), 0.5) for own in moved]
+    corners = [
+        None
+        if own is None
+        else Seen(own.frames, np.column_stack([own.four[:, :2], own.four[:, :2] + own.four[:, 2:]]))
+        for own in seen
+    ]
+    verdict = find_reading(
+        smaller, corners, fps=10.0, tried=Open(normalised=(False,)), names="order", pixels=(2.0,)
+    )
+    assert verdict is not None
+    assert verdict.kind == "decided"
+    best = verdict.best.reading
+    assert (best.layout, best.pixels) == ("xyxy", 2.0)
+    assert best.order == tuple(np.argsort(moved).tolist())
+
+
+def test_a_calibration_without_boxes_is_that_of_boxes_without_their_own() -> None:
+    """Of six calibrations two are of cameras that left no boxes; it is not known of which."""
+    cameras, seen = given(random_room(2, cameras=6, people=4))
+    stated = Convention(direction="world-to-camera", axes="opencv")
+    moved = [4, 1, 5, 3, 0, 2]
+    shuffled = [replace(cameras[own], convention=stated) for own in moved]
+    boxes = [*seen[:4], None, None]
+    verdict = found(shuffled, boxes, Open(layouts=("ltwh",), normalised=(False,)))
+    assert verdict.kind == "decided"
+    order = verdict.best.reading.order
+    assert order is not None
+    assert [moved[own] for own in order[:4]] == [0, 1, 2, 3]
+
+
+def test_clocks_are_compared_anew_once_the_rate_is_known() -> None:
+    """At a supposed 25 steps a second, lags are so far apart that three lost frames hide."""
+    cameras, seen = given(random_room(3, cameras=4, people=5, fps=4.0, steps=60))
+    own = seen[1]
+    assert own is not None
+    kept = (own.frames < 30) | (own.frames >= 33)
+    frames = own.frames - 3 * (own.frames >= 33)
+    seen[1] = Seen(frames[kept], own.four[kept])
+    verdict = find_reading(cameras, seen, fps=25.0, tried=Open(orders=False))
+    assert verdict is not None
+    assert 1 not in verdict.clocks
+    clock = verdict.clocks_at(4.0)[1]
+    assert not clock.steady
+    assert clock.ends - clock.begins == pytest.approx(-3, abs=1)

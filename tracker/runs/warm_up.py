@@ -116,6 +116,26 @@ def compile_kernels(
                     ready()
         for parameters in _ways(half):
             pipeline.compute(recording, parameters)
+        if half == HALVES[0]:  # no run waits for what an import needs
+            _import(recording)
+
+
+def _import(recording: Sequence) -> None:
+    """Judge how calibration and boxes are meant, compare clocks, and assign calibrations."""
+    # who only waits for the kernels does not load the import
+    from tracker.io.checks import check
+    from tracker.io.checks.boxes import raw_cameras
+    from tracker.io.conventions.reading import Reading
+    from tracker.io.conventions.readings import Seen
+    from tracker.io.conventions.search import Likelihood
+
+    check(recording, pictures=False)
+    seen = [
+        None if own is None else Seen(own.frames, own.boxes)
+        for own in (view.detections for view in recording.views)
+    ]
+    likelihood = Likelihood(raw_cameras(recording), seen, recording.fps)
+    likelihood.likely_orders(Reading(), (2,))
 
 
 def _ways(half: str) -> Iterable[RunParameters]:

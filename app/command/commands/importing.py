@@ -126,41 +126,40 @@ def _not_inside(files: Any, sources: Sequence[Path]) -> list[Path]:
 
 
 def _options(command: Import) -> Any:
+    from pydantic import ValidationError
+
     from tracker.io.importing.options import ImportOptions
 
-    unit: Any = command.unit
-    if unit is not None and unit not in ("m", "cm", "mm"):
-        try:
-            unit = float(unit)
-        except ValueError:
-            unit = -1.0
-        if not 0.0 < unit < 1e6:
-            raise ParameterError(
-                "--unit", f"expected m, cm, mm or metres in one unit, got {command.unit!r}"
-            )
-    if command.first_index not in (None, 0, 1):
-        raise ParameterError("--first-index", f"expected 0 or 1, got {command.first_index}")
-    if command.fps is not None and not 0.0 < command.fps <= 1000.0:
-        raise ParameterError(
-            "--fps", f"expected a rate above 0 and up to 1000, got {command.fps:g}"
-        )
-    first: Any = command.first_index
     layout, _, normalised = (command.boxes or "").partition("-")
-    boxes: Any = layout or None
-    return ImportOptions(
-        unit=unit,
-        up=command.up,
-        pose=command.pose,
-        axes=command.axes,
-        turns=command.euler,
-        boxes=boxes,
-        normalised=True if normalised else None,
-        first_index=first,
-        fps=command.fps,
-        accept_best=command.accept_best,
-        cameras=tuple((a, Path(b)) for a, b in _pairs("--camera", "NAME=FILE", command.camera)),
-        swap=tuple(_pairs("--swap", "NAME=NAME", command.swap)),
-    )
+    values = {
+        "unit": command.unit,
+        "up": command.up,
+        "pose": command.pose,
+        "axes": command.axes,
+        "turns": command.euler,
+        "boxes": layout or None,
+        "normalised": True if normalised else None,
+        "first_index": command.first_index,
+        "fps": command.fps,
+        "accept_best": command.accept_best,
+        "cameras": tuple(_pairs("--camera", "NAME=FILE", command.camera)),
+        "swap": tuple(_pairs("--swap", "NAME=NAME", command.swap)),
+    }
+    try:
+        return ImportOptions.model_validate(values)
+    except ValidationError as error:
+        name = str(error.errors()[0]["loc"][0])
+        flag, expected = _EXPECTED[name]
+        raise ParameterError(flag, f"expected {expected}, got {values[name]!r}") from None
+
+
+_EXPECTED = {
+    "unit": ("--unit", "m, cm, mm or metres in one unit"),
+    "turns": ("--euler", "three axes"),
+    "first_index": ("--first-index", "0 or 1"),
+    "fps": ("--fps", "a rate above 0 and up to 1000"),
+}
+"""The flag of each option that takes any text or number, and what it takes."""
 
 
 def _pairs(flag: str, form: str, items: Sequence[str]) -> Iterator[tuple[str, str]]:

@@ -17,7 +17,7 @@ import numpy as np
 
 from app.errors import sentence
 from app.state.importing.uploads import Upload
-from app.state.importing.wish import Wish, looks_alike, options_of
+from app.state.importing.wish import ImportWish, looks_alike, options_of
 from tracker.io.read.pieces import FormatError, ImagesPiece, VideoPiece
 from tracker.runs.pipeline import Cancelled
 from tracker.sequences.pictures.video import VideoDecoder, VideoError, index_video, read_image
@@ -25,10 +25,9 @@ from tracker.sequences.reader import FILE
 
 if TYPE_CHECKING:
     from app.state.importing.looking import Looked
-    from tracker.io.conventions.questions import Question, Undecided, Unexplained
+    from tracker.io.conventions.questions import Question
     from tracker.io.importing.arriving import Footprint
     from tracker.io.importing.gathering import ParsedFiles
-    from tracker.io.importing.options import ImportOptions
     from tracker.io.importing.settling import ImportPlan, PlannedView
 
 logger = logging.getLogger("app")
@@ -48,7 +47,7 @@ class Known:
     """What is known of a draft at one moment."""
 
     phase: Phase
-    wish: Wish
+    wish: ImportWish
     version: int = 0
     """Grows with every change."""
     taken: tuple[ParsedFiles, ...] = ()
@@ -94,7 +93,7 @@ class Draft:
             self.upload.folder.mkdir()
         self.source = source or self.folder / FILES
         self._lock = threading.RLock()
-        self._known = Known("uploading" if source is None else "reading", Wish(name=name))
+        self._known = Known("uploading" if source is None else "reading", ImportWish(name=name))
         self._gathered = False
         self._read: Footprint = {}
         self._stop = threading.Event()
@@ -121,7 +120,7 @@ class Draft:
             for path in one.files
         )
 
-    def wish(self, wish: Wish) -> None:
+    def wish(self, wish: ImportWish) -> None:
         """Have it otherwise; what follows is found out anew, where it is more than the name."""
         with self._lock:
             if self._known.phase in _BEGUN:
@@ -188,6 +187,7 @@ class Draft:
         from app.state.importing.looking import look_into
         from tracker.io.conventions.questions import Undecided
         from tracker.io.importing.arriving import gather_whole
+        from tracker.io.importing.settling import settle
 
         def sleep(seconds: float) -> None:
             if stop.wait(seconds):
@@ -202,7 +202,9 @@ class Draft:
                 with self._lock:
                     tell(taken=taken, waiting="")
                     self._gathered, self._read = True, read
-            settled, open_ = _settle(taken, options_of(wish, taken))
+            options = options_of(wish, taken)
+            settled = settle(taken, options.model_copy(update={"accept_best": True}))
+            open_ = None if options.accept_best else settled.open
             question = open_.question if isinstance(open_, Undecided) else None
             undecided = "" if open_ is None else sentence(open_)
             tell(settled=settled, phase="settled", error="", undecided=undecided, question=question)
@@ -281,7 +283,7 @@ class Draft:
     def _write(
         self,
         taken: tuple[ParsedFiles, ...],
-        wish: Wish,
+        wish: ImportWish,
         place: Path,
         then: Callable[[Path], object],
     ) -> None:
@@ -305,7 +307,7 @@ class Draft:
                 if self._given_up:
                     shutil.rmtree(self.folder, ignore_errors=True)
             return
-        if not wish.copy or self.upload is not None or not links_in(place):
+        if not wish.copy_files or self.upload is not None or not links_in(place):
             self._tell(phase="written", folder=place, told=tuple(told))
             then(place)
             return
@@ -336,19 +338,6 @@ class Draft:
 def folder_name(name: str) -> str:
     """A name as a folder's: letters, digits, blanks, dashes and dots."""
     return re.sub(r"[^\w\- .]+", "-", name).strip(" .-")[:80] or "recording"
-
-
-def _settle(
-    taken: tuple[ParsedFiles, ...], options: ImportOptions
-) -> tuple[ImportPlan, Undecided | Unexplained | None]:
-    """Settle the likeliest interpretation, and why it may not be taken without a decision."""
-    from tracker.io.conventions.questions import Undecided, Unexplained
-    from tracker.io.importing.settling import settle
-
-    try:
-        return settle(taken, options), None
-    except (Undecided, Unexplained) as open_:
-        return settle(taken, replace(options, accept_best=True)), open_
 
 
 def _middle(view: PlannedView) -> bytes | None:

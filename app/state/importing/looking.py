@@ -14,9 +14,9 @@ from tracker.geometry.consistency.entrances import Door
 from tracker.io.checks import Check
 from tracker.io.checks.boxes import check_boxes, listen
 from tracker.io.checks.cameras import check_lenses, check_places
-from tracker.io.checks.readings import EVERY_ORDER
 from tracker.io.checks.synchronisation import CameraOffset, synchronise
 from tracker.io.checks.timing import check_counting, check_time
+from tracker.io.conventions.readings import EVERY_ORDER
 from tracker.io.importing.preview import as_sequence
 from tracker.io.importing.remedies import for_import
 from tracker.io.importing.settling import ImportPlan
@@ -106,7 +106,8 @@ def look_into(settled: ImportPlan, name: str, cancelled: Callable[[], bool]) -> 
         if len(sequence.views) > 1:
             offsets = synchronise(sequence, reader=reader, most_steps=MOST_STEPS)
         _stop_if(cancelled)
-        timing = list(check_time(sequence, found=offsets))
+        clocks = None if told is None else told.verdict.clocks
+        timing = list(check_time(sequence, found=offsets, clocks=clocks))
         found = _for_import((*checks, *timing, *counting), settled)
         looked = replace(looked, checks=found, offsets=offsets, under_way="first tracks")
         if agreed is not None and sequence.has_detections:

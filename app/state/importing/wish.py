@@ -3,102 +3,61 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from tracker.io.importing.options import Corner, ImportOptions
+from pydantic import ConfigDict, Field
+
+from app.described import Described
+from tracker.io.importing.options import ImportOptions, StatedOptions
 from tracker.io.read.pieces import (
     METRES,
-    Axes,
     DetectionPiece,
-    Direction,
     FormatError,
     ImagesPiece,
-    Layout,
     Piece,
-    Unit,
-    Up,
     VideoPiece,
 )
+from tracker.parameters import MethodKey
 from tracker.sequences.finding import Remedy
 
 if TYPE_CHECKING:
     from tracker.io.importing.gathering import ParsedFiles
 
 
-@dataclass(frozen=True, slots=True)
-class Wish:
-    """None and empty: as it was found out."""
+class ImportWish(StatedOptions, Described):
+    """What somebody knows better than the files; null and empty: as it was found out."""
 
-    name: str = ""
-    unit: Unit | None = None
-    up: Up | None = None
-    pose: Direction | None = None
-    axes: Axes | None = None
-    boxes: Layout | None = None
-    normalised: bool | None = None
-    accept_best: bool = False
-    first_index: int | None = None
-    turns: str | None = None
-    """How rotations given by three angles are composed."""
-    fps: float | None = None
-    swap: tuple[tuple[str, str], ...] = ()
-    left_out: tuple[str, ...] = ()
-    names: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
-    offsets: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
-    """Seconds, by camera."""
-    files: tuple[tuple[str, str], ...] = ()
+    model_config = ConfigDict(json_schema_serialization_defaults_required=True)
+
+    name: str = Field(default="", max_length=120)
+    files: tuple[tuple[str, str], ...] = Field(default=(), max_length=400)
     """A camera, and the label of a file that is its."""
-    room: tuple[Corner, Corner] | None = None
-    half_extents: Corner | None = None
-    entrances: tuple[tuple[Corner, Corner], ...] = ()
-    """Of each the position and the standard deviations, metres."""
-    methods: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
-    """What it is to be tracked with, by the parameter that chooses a method."""
-    copy: bool = False
+    methods: Mapping[MethodKey, str | None] = {}
+    """What it is to be tracked with; null, or not there: what fits."""
+    copy_files: bool = False
+    """Whether what lies elsewhere on the disk is copied, not linked."""
 
 
-WORDS = tuple(one.name for one in fields(Wish))
+_OWN = set(ImportWish.model_fields) - set(StatedOptions.model_fields)
 
 
-def looks_alike(one: Wish, other: Wish) -> bool:
+def looks_alike(one: ImportWish, other: ImportWish) -> bool:
     """Whether the files say the same under both wishes."""
-    later = {"name": "", "copy": False, "methods": {}, "entrances": ()}
-    return replace(one, **later) == replace(other, **later)  # type: ignore[arg-type]
+    later = {"name", "copy_files", "methods", "entrances"}
+    return one.model_dump(exclude=later) == other.model_dump(exclude=later)
 
 
-def options_of(wish: Wish, taken: Sequence[ParsedFiles]) -> ImportOptions:
+def options_of(wish: ImportWish, taken: Sequence[ParsedFiles]) -> ImportOptions:
     """The same as the import takes it.
 
     Raises:
         FormatError: If it names a file that is not there.
     """
-    first: Any = wish.first_index
-    return ImportOptions(
-        unit=wish.unit,
-        up=wish.up,
-        pose=wish.pose,
-        axes=wish.axes,
-        boxes=wish.boxes,
-        normalised=wish.normalised,
-        accept_best=wish.accept_best,
-        first_index=first,
-        turns=wish.turns,
-        fps=wish.fps,
-        cameras=_files(wish, taken),
-        swap=wish.swap,
-        left_out=frozenset(wish.left_out),
-        names=wish.names,
-        offsets=wish.offsets,
-        room=wish.room,
-        half_extents=wish.half_extents,
-        entrances=wish.entrances,
-    )
+    return ImportOptions(**wish.model_dump(exclude=_OWN), cameras=_files(wish, taken))
 
 
-def _files(wish: Wish, taken: Sequence[ParsedFiles]) -> tuple[tuple[str, Path], ...]:
+def _files(wish: ImportWish, taken: Sequence[ParsedFiles]) -> tuple[tuple[str, Path], ...]:
     known = places(taken)
     for _, label in wish.files:
         if label not in known:
@@ -129,7 +88,7 @@ def _place(piece: Piece) -> Path | None:
     return None
 
 
-def mended(wish: Wish, remedies: Sequence[Remedy]) -> dict[str, Any]:
+def mended(wish: ImportWish, remedies: Sequence[Remedy]) -> dict[str, Any]:
     """What remedies change of a wish; nothing where the page cannot mend it."""
     own = {called: name for name, called in wish.names.items()}  # checks call cameras as shown
     changes: dict[str, Any] = {}

@@ -8,9 +8,9 @@ from pydantic import Field
 
 from app.models.base import GivenPath, Model, Vector
 from app.state.importing.draft import Phase
+from app.state.importing.wish import ImportWish
 from tracker.io.checks import Status
-from tracker.io.read.pieces import Axes, Direction, Layout, Unit, Up
-from tracker.parameters import MethodKey
+from tracker.io.conventions.questions import Part
 
 
 class AnnouncedFile(Model):
@@ -38,40 +38,6 @@ class WriteRequest(Model):
 
     open: bool = True
     """Open it when it is written, and so track."""
-
-
-class ImportWish(Model):
-    """What somebody knows better than the files; null and empty: as it was found out."""
-
-    name: str = Field(default="", max_length=120)
-    unit: Unit | None = None
-    up: Up | None = None
-    pose: Direction | None = None
-    axes: Axes | None = None
-    boxes: Layout | None = None
-    normalised: bool | None = None
-    accept_best: bool = False
-    """Whether the likeliest interpretation is taken where the files leave it open."""
-    first_index: Literal[0, 1] | None = None
-    turns: str | None = Field(default=None, max_length=40)
-    """How rotations given by three angles are composed."""
-    fps: float | None = Field(default=None, gt=0.0, le=1000.0)
-    swap: list[tuple[str, str]] = Field(default_factory=list, max_length=200)
-    left_out: list[str] = Field(default_factory=list, max_length=200)
-    names: dict[str, str] = Field(default_factory=dict, max_length=200)
-    """By the camera's name in the calibration."""
-    offsets: dict[str, float] = Field(default_factory=dict, max_length=200)
-    """Seconds that are added to the time of every frame, by camera."""
-    files: list[tuple[str, str]] = Field(default_factory=list, max_length=400)
-    """A camera, and the label of a file that is its."""
-    room: tuple[Vector, Vector] | None = None
-    half_extents: Vector | None = None
-    entrances: list[tuple[Vector, Vector]] = Field(default_factory=list, max_length=50)
-    """Of each the position and the standard deviations, metres."""
-    methods: dict[MethodKey, str | None] = Field(default_factory=dict)
-    """What it is to be tracked with; null, or not there: what fits."""
-    copy_files: bool = False
-    """Whether what lies elsewhere on the disk is copied, not linked."""
 
 
 class ImportedFile(Model):
@@ -160,7 +126,8 @@ class ImportedPlan(Model):
 class ImportQuestion(Model):
     """What is asked where the files leave open how they are meant."""
 
-    code: Literal["convention", "moments"]
+    code: Part
+    """The first part of the interpretation that differs."""
     interpretations: tuple[str, str]
     """In words, the likelier one first."""
     difference: str

@@ -15,20 +15,20 @@ from app.errors import ApiError, sentence
 from app.state.importing.desk import Desk
 from app.state.importing.draft import Draft
 from app.state.importing.uploads import Announced, UploadError
+from app.state.importing.wish import ImportWish
 from app.state.kept.recents import Recents, thumbnail
 from app.web.dependencies import ERRORS, Bench, Work
 from app.web.importing.models import (
     AnnouncedFiles,
     Begun,
     ImportInfo,
-    ImportWish,
     PathRequest,
     RecordingCard,
     Recordings,
     WriteRequest,
 )
 from app.web.importing.sheet.start import start_sheet
-from app.web.importing.views import info_of, wish_of
+from app.web.importing.views import info_of
 from tracker.io.read.pieces import FormatError
 from tracker.parameters.catalogue import RunParameters
 from tracker.parameters.values import ParameterError, with_values
@@ -198,7 +198,8 @@ def arrived(draft: Own) -> ImportInfo:
 @router.put("/import/{key}/wish")
 def wish(told: ImportWish, draft: Own) -> ImportInfo:
     """Have it otherwise."""
-    draft.wish(wish_of(told))
+    methods = {key: method for key, method in told.methods.items() if method}
+    draft.wish(told.model_copy(update={"name": told.name.strip(), "methods": methods}))
     return info_of(draft)
 
 
@@ -214,7 +215,7 @@ def picture(draft: Own, camera: Annotated[str, Query(max_length=4096)]) -> Respo
 @router.post("/import/{key}/write")
 def write(told: WriteRequest, draft: Own, bench: Bench, jobs: Work) -> ImportInfo:
     """Write the recording, and open it; it is tracked with the methods that are wished."""
-    methods = draft.known.wish.methods
+    methods = {str(key): method for key, method in draft.known.wish.methods.items()}
     with _complaining():
         with_values(RunParameters(), methods)
 

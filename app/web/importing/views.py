@@ -12,7 +12,7 @@ import numpy as np
 
 from app.models.base import Vector
 from app.state.importing.draft import Draft, Known
-from app.state.importing.wish import WORDS, Wish, mended, places
+from app.state.importing.wish import ImportWish, mended, places
 from app.web.importing.models import (
     ImportedCamera,
     ImportedCheck,
@@ -22,7 +22,6 @@ from app.web.importing.models import (
     ImportedPlan,
     ImportInfo,
     ImportQuestion,
-    ImportWish,
 )
 from app.web.importing.sheet.draft import draft_sheet
 from tracker.io.checks import Check
@@ -43,24 +42,8 @@ MOST_LISTED = 200
 """Files that are named one by one."""
 
 
-def wish_of(told: ImportWish) -> Wish:
-    """As the draft takes it."""
-    values = {name: getattr(told, name) for name in WORDS if name != "copy"}
-    for name in ("swap", "left_out", "files", "entrances"):
-        values[name] = tuple(values[name])
-    values["methods"] = {key: method for key, method in told.methods.items() if method}
-    values["name"] = told.name.strip()
-    return Wish(**values, copy=told.copy_files)
-
-
-def _wish_info(wish: Wish, changes: Mapping[str, Any] | None = None) -> ImportWish:
-    values: dict[str, Any] = {name: getattr(wish, name) for name in WORDS} | dict(changes or {})
-    values["copy_files"] = values.pop("copy")
-    for name in ("swap", "left_out", "files", "entrances"):
-        values[name] = list(values[name])
-    for name in ("names", "offsets", "methods"):
-        values[name] = dict(values[name])
-    return ImportWish(**values)
+def _changed(wish: ImportWish, changes: Mapping[str, Any]) -> ImportWish:
+    return ImportWish(**{**wish.model_dump(), **changes})
 
 
 def info_of(draft: Draft) -> ImportInfo:
@@ -81,7 +64,7 @@ def _info(draft: Draft) -> ImportInfo:
         error=known.error,
         undecided=known.undecided,
         question=None if known.question is None else _question(known.question, known.wish),
-        wish=_wish_info(known.wish),
+        wish=known.wish,
         received=draft.size if upload is None else upload.received,
         bytes=draft.size,
         files=_files(known),
@@ -213,8 +196,8 @@ def _offset(one: CameraOffset) -> ImportedOffset:
     )
 
 
-def _question(question: Question, wish: Wish) -> ImportQuestion:
-    wishes = [_wish_info(wish, mended(wish, own)) for own in question.remedies]
+def _question(question: Question, wish: ImportWish) -> ImportQuestion:
+    wishes = [_changed(wish, mended(wish, own)) for own in question.remedies]
     return ImportQuestion(
         code=question.code,
         interpretations=question.interpretations,
@@ -224,14 +207,14 @@ def _question(question: Question, wish: Wish) -> ImportQuestion:
     )
 
 
-def _check(one: Check, wish: Wish) -> ImportedCheck:
+def _check(one: Check, wish: ImportWish) -> ImportedCheck:
     changes = mended(wish, one.remedies)
     return ImportedCheck(
         name=one.name,
         status=one.status,
         sentence=one.sentence,
         remedy=" ".join(str(remedy) for remedy in one.remedies),
-        mend=_wish_info(wish, changes) if changes else None,
+        mend=_changed(wish, changes) if changes else None,
     )
 
 
@@ -257,7 +240,7 @@ def _speed(known: Known) -> float:
     return round(known.copied / 1e6 / seconds, 1) if known.copied and seconds > 0.0 else 0.0
 
 
-def _plan(looked: Looked, wish: Wish) -> ImportedPlan:
+def _plan(looked: Looked, wish: ImportWish) -> ImportedPlan:
     plan = looked.plan
     doors = wish.entrances or [_door(one) for one in looked.doors]
     return ImportedPlan(

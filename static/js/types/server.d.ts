@@ -534,7 +534,8 @@ declare namespace Server {
 
 	/** What is asked where the files leave open how they are meant. */
 	interface ImportQuestion {
-		code: "convention" | "moments";
+		/** The first part of the interpretation that differs. */
+		code: "direction" | "axes" | "layout" | "turns" | "order" | "mirrored" | "flipped" | "pixels" | "scene";
 		/** In words, the likelier one first. */
 		interpretations: [string, string];
 		difference: string;
@@ -546,31 +547,46 @@ declare namespace Server {
 
 	/** What somebody knows better than the files; null and empty: as it was found out. */
 	interface ImportWish {
-		name: string;
-		unit: "m" | "cm" | "mm" | null;
+		/** Of the calibration; a number is metres in one of its units. */
+		unit: "m" | "cm" | "mm" | number | null;
+		/** The world's axis that points up. */
 		up: "x" | "y" | "z" | "-x" | "-y" | "-z" | null;
+		/** Where R and t lead. */
 		pose: "world-to-camera" | "camera-to-world" | null;
+		/** Of a camera. */
 		axes: "opencv" | "opengl" | null;
-		boxes: "ltwh" | "xyxy" | "cxcywh" | null;
-		normalised: boolean | null;
-		/** Whether the likeliest interpretation is taken where the files leave it open. */
-		accept_best: boolean;
-		first_index: 0 | 1 | null;
-		/** How rotations given by three angles are composed. */
+		/** How rotations given by three angles are composed: ``zyx`` is R_z R_y R_x. */
 		turns: string | null;
+		/** What the four numbers of a box mean. */
+		boxes: "ltwh" | "xyxy" | "cxcywh" | null;
+		/** Whether boxes are parts of the picture's size. */
+		normalised: boolean | null;
+		/** The number of the first frame in detections and truth. */
+		first_index: 0 | 1 | null;
+		/** Steps a second. */
 		fps: number | null;
+		/**
+		 * Whether the likeliest interpretation is taken where the files leave open how they are meant,
+		 * or where none explains the boxes.
+		 */
+		accept_best: boolean;
+		/** Two cameras each whose calibrations are exchanged, one exchange after the other. */
 		swap: [string, string][];
+		/** Cameras of the calibration that are not wanted. */
 		left_out: string[];
-		/** By the camera's name in the calibration. */
+		/** What cameras are to be called, by their name in the calibration. */
 		names: Record<string, string>;
 		/** Seconds that are added to the time of every frame, by camera. */
 		offsets: Record<string, number>;
-		/** A camera, and the label of a file that is its. */
-		files: [string, string][];
+		/** The room's lowest and highest corner. */
 		room: [[number, number, number], [number, number, number]] | null;
+		/** Half width, depth and height of what is tracked, metres. */
 		half_extents: [number, number, number] | null;
 		/** Of each the position and the standard deviations, metres. */
 		entrances: [[number, number, number], [number, number, number]][];
+		name: string;
+		/** A camera, and the label of a file that is its. */
+		files: [string, string][];
 		/** What it is to be tracked with; null, or not there: what fits. */
 		methods: Record<"single_view" | "fusion_method" | "smoothing_method", string | null>;
 		/** Whether what lies elsewhere on the disk is copied, not linked. */

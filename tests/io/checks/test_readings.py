@@ -12,11 +12,11 @@ from tests.random_rooms import random_room
 from tracker.geometry.consistency.suggestion import consensus_of_cameras, suggest
 from tracker.io.checks import check
 from tracker.io.checks.boxes import listen, raw_cameras
-from tracker.io.checks.reading import FLIP, Reading, pose, read_boxes, to_camera, upright
-from tracker.io.checks.readings import Seen
-from tracker.io.checks.sizes import likely_unit
 from tracker.io.checks.timing import check_counting
+from tracker.io.conventions.reading import FLIP, Reading, pose, read_boxes, to_camera, upright
+from tracker.io.conventions.readings import Seen
 from tracker.io.conventions.search import as_meant, find_reading
+from tracker.io.conventions.sizes import likely_unit
 from tracker.io.read.pieces import METRES, RawCamera
 from tracker.sequences.sequence import Sequence
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from tests.random_rooms import looking_camera, random_room, random_walkers
 from tracker.geometry.camera import Camera
 from tracker.io.checks import check
 from tracker.io.checks.synchronisation import CameraOffset, synchronise
-from tracker.sequences.sequence import Room, Sequence, View
+from tracker.sequences.sequence import Detections, Room, Sequence, View
 
 STEPS = [-25.0, -7.0, -0.5, 0.0, 0.5, 3.0, 12.0, 40.0]
 
@@ -52,6 +53,24 @@ def test_a_late_camera_is_told_with_its_remedy_and_nothing_is_applied() -> None:
     assert remedy.flag == "camera.time_offset"
     assert float(remedy.value) == pytest.approx(-12 / 25, abs=0.04)
     assert sequence.views[2].clock is None
+
+
+@pytest.mark.parametrize("camera", [0, 2])
+def test_lost_frames_are_a_warning_with_their_number_and_step(camera: int) -> None:
+    sequence = random_room(5, cameras=4, fps=10.0, steps=300, people=3)
+    view = sequence.views[camera]
+    own = view.detections
+    assert own is not None
+    frames = own.frames - 12 * (own.frames >= 162)
+    kept = (own.frames < 150) | (own.frames >= 162)
+    lost = Detections(frames[kept], own.boxes[kept], own.scores[kept])
+    views = tuple(replace(one, detections=lost) if one is view else one for one in sequence.views)
+    told = [each for each in check(replace(sequence, views=views)) if each.status == "warning"]
+    (words,) = (each.sentence for each in told if "jumps" in each.sentence)
+    assert words.startswith(view.camera.name)
+    jump = re.search(r"jumps by (-?\d+) steps", words)
+    assert jump is not None
+    assert int(jump[1]) == pytest.approx(-12, abs=2)
 
 
 def test_the_curve_has_its_peak_at_the_offset() -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.io.read.recorded import detections, settled_of, toml
 from tests.io.read.rig import boxes, cameras, walks
 from tracker.export.calibration import save_calibration
 from tracker.io.importing.gathering import gather
@@ -69,3 +70,20 @@ def test_a_series_of_which_most_is_spoilt_is_not_used(
     else:
         assert "45 of 60 files cannot be read, so the others are not used" in complaints[0]
         assert "keypoints: expected numbers" in complaints[0]
+
+
+@pytest.mark.parametrize("spoilt", range(4))
+def test_the_others_of_a_spoilt_file_keep_their_numbers(tmp_path: Path, spoilt: int) -> None:
+    """Cameras count from 1, files from 0: without one of these no number is moved."""
+    toml(tmp_path)
+    detections(tmp_path)
+    for number in range(4):
+        (tmp_path / f"cam{number + 1}.csv").rename(tmp_path / f"{number}.csv")
+    path = tmp_path / f"{spoilt}.csv"
+    path.write_bytes(path.read_bytes()[:500] + b"\xff\x00,nan,{{" * 3)
+    pairs = {
+        view.camera.name: view.matched.detections.source.stem
+        for view in settled_of(tmp_path, ImportOptions(fps=25.0)).views
+        if view.matched.detections is not None
+    }
+    assert pairs == {f"cam{n + 1}": str(n) for n in range(4) if n != spoilt}

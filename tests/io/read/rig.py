@@ -8,7 +8,7 @@ import numpy as np
 from numpy import ndarray
 
 from tracker.geometry.camera import Camera
-from tracker.io.checks.reading import Reading, to_camera
+from tracker.io.conventions.reading import Reading, to_camera
 from tracker.io.read.pieces import METRES, CalibrationPiece, Piece, RawCamera
 from tracker.io.read.registry import recognise
 from tracker.io.read.source import SourceFile

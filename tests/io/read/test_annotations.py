@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tests.io.read.rig import SIZE, boxes, cameras, read, walks
-from tracker.io.checks.reading import read_boxes
+from tracker.io.conventions.reading import read_boxes
 from tracker.io.read.pieces import DetectionPiece, FormatError
 from tracker.io.read.registry import recognise
 from tracker.io.read.source import SourceFile

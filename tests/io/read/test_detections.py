@@ -11,7 +11,7 @@ import pytest
 from numpy import ndarray
 
 from tests.io.read.rig import SIZE, boxes, cameras, read, walks
-from tracker.io.checks.reading import read_boxes
+from tracker.io.conventions.reading import read_boxes
 from tracker.io.read.pieces import DetectionPiece, FormatError, TruthPiece
 from tracker.io.read.registry import recognise
 from tracker.io.read.source import SourceFile

@@ -12,7 +12,7 @@ from numpy import ndarray
 from tests.io.read.rig import SIZE, cameras, raw_cameras
 from tracker.export.calibration import Form, save_calibration
 from tracker.geometry.camera import Camera, stacked
-from tracker.io.checks.reading import Reading, to_camera
+from tracker.io.conventions.reading import Reading, to_camera
 
 RATIONAL = np.array([0.2, -0.05, 0.001, -0.0005, 0.01, 0.35, -0.02, 0.005])
 FISHEYE = np.array([-0.02, 0.01, -0.004, 0.0008])

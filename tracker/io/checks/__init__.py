@@ -12,8 +12,8 @@ import numpy as np
 
 from tracker.io.checks.boxes import check_boxes, listen
 from tracker.io.checks.cameras import check_lenses, check_places
-from tracker.io.checks.readings import EVERY_ORDER
 from tracker.io.checks.timing import check_counting, check_time
+from tracker.io.conventions.readings import EVERY_ORDER
 from tracker.sequences.finding import Check, Remedy, Status
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Detections, Sequence
@@ -48,7 +48,8 @@ def check(
         return [*found, lenses, check_counting(sequence, places=False)]
     found += [lenses, *check_places(sequence.cameras, sequence.room)]
     if not quick and (sequence.has_detections or pictures):
-        found += check_time(sequence, reader)
+        clocks = None if told is None else told.verdict.clocks
+        found += check_time(sequence, reader, clocks=clocks)
     if told is not None:
         found.append(check_counting(sequence))
     return found

@@ -12,11 +12,11 @@ from numpy import ndarray
 from tracker.geometry.consistency.consensus import Consensus
 from tracker.geometry.consistency.observed import pose_of
 from tracker.geometry.consistency.suggestion import LEAST_AGREEING, Suggestion, stands, suggest
-from tracker.io.checks.level import confirmed, upwards
-from tracker.io.checks.reading import Reading, exchanged, exchanges
-from tracker.io.checks.readings import LEAST_SHARE, Judge, Judged, Open, Seen
-from tracker.io.checks.sizes import likely_unit
+from tracker.io.conventions.level import confirmed, upwards
+from tracker.io.conventions.reading import Reading, exchanged, exchanges
+from tracker.io.conventions.readings import LEAST_SHARE, Judge, Judged, Open, Seen
 from tracker.io.conventions.search import Verdict, as_meant, find_reading
+from tracker.io.conventions.sizes import likely_unit
 from tracker.io.read.pieces import METRES, RawCamera
 from tracker.sequences.finding import Check, Remedy, absent, good, percent, warning
 from tracker.sequences.sequence import Sequence, View
@@ -203,7 +203,7 @@ def _mistake(sequence: Sequence, told: BoxesTell) -> Check:
         sentence += f"; people stand along {reading.up} of the world, which should be z"
         remedies.append(Remedy("--up", reading.up))
     return warning(
-        "calibration and boxes are read rightly",
+        "interpretation of calibration and boxes",
         sentence,
         *remedies,
         share=agreed.share,

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
 from tracker.io.checks.synchronisation import CameraOffset, synchronise
+from tracker.io.conventions.questions import told_of_clocks
+from tracker.io.conventions.search import ClockFit
 from tracker.sequences.finding import Check, Remedy, absent, good, warning
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
@@ -20,6 +22,7 @@ def check_time(
     sequence: Sequence,
     reader: FrameReader | None = None,
     found: tuple[CameraOffset, ...] | None = None,
+    clocks: Mapping[int, ClockFit] | None = None,
 ) -> Iterator[Check]:
     """Is any camera late; from the boxes, or from the motion in the pictures where there are none.
 
@@ -27,6 +30,7 @@ def check_time(
         sequence: Read rightly: with a wrong calibration nothing can be said.
         reader: Of the pictures.
         found: What :func:`synchronise` found, where it is known.
+        clocks: Of cameras whose boxes were compared by parts of the recording.
     """
     name = "cameras show the same moments"
     if len(sequence.views) < 2:
@@ -36,6 +40,9 @@ def check_time(
     if not found:
         yield absent(name, "neither boxes nor pictures of two cameras can be compared")
         return
+    uneven = told_of_clocks(clocks or {}, [camera.name for camera in sequence.cameras])
+    for sentence in uneven:
+        yield warning(name, sentence)
     late = [offset for offset in found if offset.sure]
     for offset in late:
         yield warning(
@@ -46,7 +53,7 @@ def check_time(
             seconds=offset.seconds,
             sharpness=offset.sharpness,
         )
-    if not late:
+    if not late and not uneven:
         yield good(name, _agreeing(found))
 
 

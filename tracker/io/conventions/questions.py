@@ -3,27 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal
+from typing import Literal, get_args
 
 import numpy as np
 
 from tracker.geometry.consistency.odds import DECISIVE, log_odds
-from tracker.io.checks.reading import Reading, exchanged, exchanges, with_pixels
-from tracker.io.conventions.search import Verdict
+from tracker.io.conventions.reading import Reading, exchanged, exchanges, with_pixels
+from tracker.io.conventions.search import ClockFit, Verdict
 from tracker.io.read.pieces import FormatError, RawCamera
 from tracker.sequences.finding import Remedy
 
-if TYPE_CHECKING:
-    from tracker.io.importing.finding.matching import MatchedCamera
-    from tracker.io.importing.options import ImportOptions
-
 ACCEPT = "--accept-best"
 """The flag that takes the likelier interpretation."""
-
-ACCEPTED = "accepted"
-"""What a finding is called that was taken though nothing proves it."""
 
 OF_TWO = (
     "boxes of two cameras alone do not tell whether one of them was turned or moved, nor which is "
@@ -37,6 +30,17 @@ OF_ONE = (
 )
 """What is said of an import of one camera with boxes."""
 
+Part = Literal[
+    "direction", "axes", "layout", "turns", "order", "mirrored", "flipped", "pixels", "scene"
+]
+"""What two interpretations may differ in; the scene where none of the others does."""
+
+UNPROVEN = (
+    "too few boxes of several cameras meet to confirm the calibration, which camera is which, how "
+    "boxes are meant or that all show the same moments"
+)
+"""What is said of an import whose boxes prove nothing."""
+
 _LAYOUTS = {"ltwh": "left, top and size", "xyxy": "two corners", "cxcywh": "centre and size"}
 
 
@@ -44,7 +48,8 @@ _LAYOUTS = {"ltwh": "left, top and size", "xyxy": "two corners", "cxcywh": "cent
 class Question:
     """What is open: two interpretations, what differs and the flags that decide."""
 
-    code: Literal["convention", "moments"]
+    code: Part
+    """The first part of the interpretation that differs."""
     interpretations: tuple[str, str]
     """In words, the likelier one first."""
     difference: str
@@ -81,79 +86,52 @@ class Unexplained(FormatError):
     """No interpretation explains the boxes."""
 
 
-def matched_by(cameras: Sequence[MatchedCamera]) -> Literal["name", "number", "order"]:
-    """By what the boxes of cameras were matched, the weakest of all."""
-    ways = {camera.how.get("detections", "name") for camera in cameras}
-    return "order" if "order" in ways else "number" if "number" in ways else "name"
-
-
 def check_verdict(
     verdict: Verdict,
     cameras: Sequence[RawCamera],
-    options: ImportOptions,
     stated: str = "",
     otherwise: Verdict | None = None,
-) -> str:
-    """Ask or refuse where the boxes do not decide.
+) -> Undecided | Unexplained | None:
+    """Return what is to be asked, or why to refuse, where the boxes do not decide.
 
     Args:
         verdict: What they tell.
         cameras: As they are given.
-        options: Whether the likelier interpretation is to be taken all the same.
         stated: The flags that leave no interpretation that explains the boxes.
         otherwise: What the boxes tell without these.
-
-    Returns:
-        What is taken though the boxes do not prove it; empty where they do.
-
-    Raises:
-        Undecided: If two interpretations are left, or nothing tells whether the cameras show the
-            same moments.
-        Unexplained: If no interpretation explains the boxes.
     """
-    try:
-        _check(verdict, cameras, stated, otherwise)
-    except (Undecided, Unexplained) as error:
-        if not options.accept_best:
-            raise
-        return f"by {ACCEPT}: {error}"
-    return ""
-
-
-def _check(
-    verdict: Verdict, cameras: Sequence[RawCamera], stated: str, otherwise: Verdict | None
-) -> None:
     names = [camera.name for camera in cameras]
     best = verdict.best.reading
     share = 100.0 * verdict.best.evidence.share
     if verdict.kind == "none" and otherwise is not None:
         other = otherwise.best.reading
-        raise Unexplained(
+        return Unexplained(
             f"with {stated} {share:.0f} % of a camera's boxes are explained by another camera's, "
             f"without it {100.0 * otherwise.best.evidence.share:.0f} % "
             f"({in_words(other, names, _differing(other, best))}); {ACCEPT} imports them as they "
             "are"
         )
     if verdict.kind == "none":
-        raise Unexplained(
+        return Unexplained(
             f"no interpretation{f' with {stated}' if stated else ''} explains these boxes; the "
             f"closest, {in_words(best, names)}, explains {share:.0f} % of a camera's boxes by "
             "another camera's: check that calibration and boxes belong together and are of the "
             f"same moments; {ACCEPT} imports them as they are"
         )
     if best.flipped:
-        raise Unexplained(
+        return Unexplained(
             "the boxes are of pictures whose left and right are exchanged: with them mirrored "
             f"{share:.0f} % are explained by another camera's; "
             f"mirror pictures and boxes; {ACCEPT} imports them as they are"
         )
     if verdict.kind == "open" and verdict.rival is not None:
-        raise Undecided(_open(best, verdict.rival.reading, verdict.odds, names))
+        return Undecided(_open(best, verdict.rival.reading, verdict.odds, names))
+    return None
 
 
-def _differing(one: Reading, other: Reading) -> list[str]:
+def _differing(one: Reading, other: Reading) -> list[Part]:
     """The parts in which two readings differ."""
-    parts = ("direction", "axes", "layout", "turns", "order", "mirrored", "flipped", "pixels")
+    parts = (part for part in get_args(Part) if part != "scene")
     return [part for part in parts if getattr(one, part) != getattr(other, part)]
 
 
@@ -166,7 +144,7 @@ def _open(best: Reading, rival: Reading, odds: float, names: Sequence[str]) -> Q
              "pixels": "size of the pictures"}  # fmt: skip
     what = " and ".join(words[part] for part in differing) or "the scene"
     return Question(
-        "convention",
+        differing[0] if differing else "scene",
         (in_words(best, names, differing), in_words(rival, names, differing)),
         f"the files leave open {what} ({sure})",
         (_flags(best, rival, names), _flags(rival, best, names)),
@@ -231,16 +209,21 @@ def rearranged(
     return [replace(raw, name=name) for raw, name in zip(changed, names, strict=True)], found
 
 
-def told_of_moments(verdict: Verdict, names: Sequence[str]) -> list[str]:
-    """Cameras whose boxes nothing confirms to be of the same moments as those of the others."""
-    confirmed = verdict.confirmed
-    told = [
+def told_of_clocks(clocks: Mapping[int, ClockFit], names: Sequence[str]) -> list[str]:
+    """Cameras whose clocks jump or drift."""
+    return [
         f"{names[camera]}: about step {fit.jump} its clock jumps by {fit.ends - fit.begins} steps, "
         f"or it drifts: it is {fit.begins} steps late in the first third of the recording and "
         f"{fit.ends} in the last; frames were lost, or its rate is another one"
-        for camera, fit in verdict.clocks.items()
+        for camera, fit in clocks.items()
         if not fit.steady
     ]
+
+
+def told_of_moments(verdict: Verdict, names: Sequence[str]) -> list[str]:
+    """Cameras whose boxes nothing confirms to be of the same moments as those of the others."""
+    confirmed = verdict.confirmed
+    told = []
     if len(confirmed) == 2 and verdict.kind == "decided":
         told.append(OF_TWO)
     failing = [camera for camera, odds in confirmed.items() if odds < DECISIVE]

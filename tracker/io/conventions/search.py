@@ -11,9 +11,10 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from collections.abc import Sequence as Many
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -31,10 +32,10 @@ from tracker.geometry.consistency.likelihood import (
 )
 from tracker.geometry.consistency.observed import Pose, Rays, rays_of
 from tracker.geometry.consistency.odds import DECISIVE, log_odds
-from tracker.io.checks.level import upwards
-from tracker.io.checks.reading import Reading, boxes_by, turns_of
-from tracker.io.checks.readings import EVERY_ORDER, Judge, Judged, Open, Seen, restricted
+from tracker.io.conventions.level import upwards
 from tracker.io.conventions.orders import MOST_CAMERAS, likely_orders
+from tracker.io.conventions.reading import Reading, boxes_by, turns_of
+from tracker.io.conventions.readings import EVERY_ORDER, Judge, Judged, Open, Seen, restricted
 from tracker.io.read.pieces import RawCamera, Unit, Up
 
 MOST_MOMENTS = 120
@@ -108,6 +109,8 @@ class Verdict:
     """Cameras whose clock is not that of the others."""
     compared: tuple[Interpretation, ...] = ()
     """Those that were compared by all moments; all others were far behind."""
+    clocks_at: Callable[[float], Mapping[int, ClockFit]] = lambda fps: {}
+    """The clocks by the number of steps a second, where that becomes known later."""
 
     def excludes(self, reading: Reading) -> bool:
         """Whether the best one is decided over a reading."""
@@ -353,10 +356,9 @@ def find_reading(
     open_ = restricted(tried or Open(), cameras, seen)
     first = _candidates(likelihood.thinned(), open_, NAME_PRIOR[names], pixels)
     found = _compared(likelihood, first)
+    kind: Literal["decided", "open", "none", "unproven"]
     if not found:
-        kind: Literal["unproven", "none"] = "none"
-        if likelihood.boxes < _MANY_BOXES:
-            kind = "unproven"
+        kind = "unproven" if likelihood.boxes < _MANY_BOXES else "none"
         return Verdict(kind, likelihood.unmet(next(_readings(open_, cameras))), judge)
     best = found[0]
     others = [one for one in found[1:] if not same_scene(judge, best, one)]
@@ -368,14 +370,15 @@ def find_reading(
     rival = others[nearest] if others else None
     least = odds[nearest] if odds else math.inf
     confirmed = confirm_moments(likelihood, best)
-    clocks = fit_clocks(likelihood, best, confirmed)
+    clocks_at = partial(_clocks_at, likelihood, best, dict(confirmed))
+    clocks = fit_clocks(likelihood, best, confirmed, fps)
     nothing = log_odds(best.evidence.by_moment, np.zeros(len(likelihood.moments)))
+    kind = "decided" if least >= DECISIVE else "open"
     if likelihood.boxes < _MANY_BOXES and nothing < DECISIVE:
-        return Verdict("unproven", best, judge, rival, least, confirmed, clocks, (*found,))
-    if best.evidence.share < _LEAST_SHARE or nothing < DECISIVE:
-        return Verdict("none", best, judge, rival, least, confirmed, clocks, (*found,))
-    sure: Literal["decided", "open"] = "decided" if least >= DECISIVE else "open"
-    return Verdict(sure, best, judge, rival, least, confirmed, clocks, (*found,))
+        kind = "unproven"
+    elif best.evidence.share < _LEAST_SHARE or nothing < DECISIVE:
+        kind = "none"
+    return Verdict(kind, best, judge, rival, least, confirmed, clocks, (*found,), clocks_at)
 
 
 def _candidates(
@@ -415,7 +418,29 @@ def _candidates(
             ]
             found += _reassigned(likelihood, mirrors, each, -RARE, (int(np.argmax(up)),))
             found.sort(key=lambda one: -one.score)
+    if again := _reread(likelihood, readings, found):
+        found = sorted((*found, *again), key=lambda one: -one.score)
+        if open_.orders and found[0] is again[0]:
+            found += _with_orders(likelihood, found[0], each)
+            found.sort(key=lambda one: -one.score)
     return found
+
+
+def _reread(
+    likelihood: Likelihood, readings: Many[Reading], found: Many[Interpretation]
+) -> list[Interpretation]:
+    """Every reading with what the likeliest one alone was questioned in, the likeliest first.
+
+    An exchange and another size of the pictures let many boxes meet although they are read
+    wrongly; it is not before these are right that the right reading of the boxes is the likeliest.
+    """
+    if not found:
+        return []
+    best, known = found[0], {one.reading for one in found}
+    parts = ("order", "pixels", "mirrored", "flipped")
+    questioned = {part: getattr(best.reading, part) for part in parts}
+    others = [replace(reading, **questioned) for reading in readings]
+    return _scored(likelihood, [one for one in others if one not in known], best.prior)
 
 
 def _reassigned(
@@ -542,11 +567,14 @@ def _orders(own: tuple[int, ...], count: int) -> Iterator[tuple[int, ...]]:
 
 
 def same_scene(judge: Judge, one: Interpretation, other: Interpretation) -> bool:
-    """Whether two interpretations differ by a turn, shift or scale of the world alone."""
+    """Whether the cameras with boxes differ by a turn, shift or scale of the world alone."""
     parts = ("layout", "pixels", "flipped", "mirrored")
     if any(getattr(one.reading, part) != getattr(other.reading, part) for part in parts):
         return False
-    first, second = judge.poses(one.reading), judge.poses(other.reading)
+    first, second = (
+        [own for own, has in zip(judge.poses(each.reading), judge.has_boxes, strict=True) if has]
+        for each in (one, other)
+    )
     turn = first[0].rotation.T @ second[0].rotation
     away = [a.rotation.T @ b.rotation - turn for a, b in zip(first, second, strict=True)]
     if max(float(np.abs(own).max()) for own in away) > _SAME_SCENE:
@@ -593,8 +621,14 @@ def confirm_moments(likelihood: Likelihood, best: Interpretation) -> dict[int, f
     return found
 
 
+def _clocks_at(
+    likelihood: Likelihood, best: Interpretation, confirmed: Mapping[int, float], fps: float
+) -> dict[int, ClockFit]:
+    return fit_clocks(likelihood, best, dict(confirmed), fps)
+
+
 def fit_clocks(
-    likelihood: Likelihood, best: Interpretation, confirmed: dict[int, float]
+    likelihood: Likelihood, best: Interpretation, confirmed: dict[int, float], fps: float
 ) -> dict[int, ClockFit]:
     """Find the cameras that are late, or whose clocks jump or drift, by the same evidence.
 
@@ -605,9 +639,10 @@ def fit_clocks(
         likelihood: Of the boxes.
         best: The reading.
         confirmed: Log odds by camera; those of a camera that is shifted are set to its own.
+        fps: Steps a second.
     """
     found: dict[int, ClockFit] = {}
-    coarse = max(1, round(_COARSE * likelihood.fps))
+    coarse = max(1, round(_COARSE * fps))
     third = len(likelihood.moments) // 3
     # of two cameras either may be meant
     by_doubt = sorted(confirmed, key=lambda one: (len(confirmed) > 2) * confirmed[one] - 1e-6 * one)
@@ -615,7 +650,7 @@ def fit_clocks(
         if not third or len(found) > (len(confirmed) - 1) // 2:
             break
         late = {other: fit.late for other, fit in found.items()}
-        reach = round((_NEAR if confirmed[camera] >= DECISIVE else _WIDEST) * likelihood.fps)
+        reach = round((_NEAR if confirmed[camera] >= DECISIVE else _WIDEST) * fps)
         lags = coarse * np.arange(-(reach // coarse), reach // coarse + 1)
         nats = likelihood.of_camera(best, camera, likelihood.moments + lags[:, None], late)
         usual = np.mean(nats, axis=0)

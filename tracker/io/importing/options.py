@@ -1,24 +1,34 @@
-"""What whoever imports knows better than the files: each overrules one guess."""
+"""What whoever imports knows better than the files: each overrules one guess.
+
+Defined once: the engine takes :class:`ImportOptions`, the page's wish and the flags of the command
+line are checked by it.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
-from types import MappingProxyType
-from typing import Literal
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
 
 from tracker.io.read.pieces import Axes, Direction, Layout, Unit, Up
 
 Corner = tuple[float, float, float]
 """x, y, z in metres."""
 
+MOST = 200
+"""Cameras of which something may be stated."""
 
-@dataclass(frozen=True, slots=True)
-class ImportOptions:
-    """None: to be found out."""
 
-    unit: Unit | float | None = None
+class StatedOptions(BaseModel):
+    """What can be stated of any import; None and empty: to be found out."""
+
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True
+    )
+
+    unit: Unit | Annotated[float, Field(gt=0.0, lt=1e6)] | None = None
     """Of the calibration; a number is metres in one of its units."""
     up: Up | None = None
     """The world's axis that points up."""
@@ -26,7 +36,7 @@ class ImportOptions:
     """Where R and t lead."""
     axes: Axes | None = None
     """Of a camera."""
-    turns: str | None = None
+    turns: Annotated[str, Field(max_length=40)] | None = None
     """How rotations given by three angles are composed: ``zyx`` is R_z R_y R_x."""
     boxes: Layout | None = None
     """What the four numbers of a box mean."""
@@ -34,24 +44,29 @@ class ImportOptions:
     """Whether boxes are parts of the picture's size."""
     first_index: Literal[0, 1] | None = None
     """The number of the first frame in detections and truth."""
-    fps: float | None = None
+    fps: Annotated[float, Field(gt=0.0, le=1000.0)] | None = None
     """Steps a second."""
     accept_best: bool = False
     """Whether the likeliest interpretation is taken where the files leave open how they are meant,
     or where none explains the boxes."""
-    cameras: tuple[tuple[str, Path], ...] = ()
-    """Video, pictures or boxes that belong to a camera of the calibration: its name, and what."""
-    swap: tuple[tuple[str, str], ...] = ()
+    swap: tuple[tuple[str, str], ...] = Field(default=(), max_length=MOST)
     """Two cameras each whose calibrations are exchanged, one exchange after the other."""
-    left_out: frozenset[str] = frozenset()
+    left_out: tuple[str, ...] = Field(default=(), max_length=MOST)
     """Cameras of the calibration that are not wanted."""
-    names: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
+    names: Mapping[str, str] = Field(default={}, max_length=MOST)
     """What cameras are to be called, by their name in the calibration."""
-    offsets: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
-    """Seconds that are added to the time of every frame of a camera."""
+    offsets: Mapping[str, float] = Field(default={}, max_length=MOST)
+    """Seconds that are added to the time of every frame, by camera."""
     room: tuple[Corner, Corner] | None = None
     """The room's lowest and highest corner."""
     half_extents: Corner | None = None
     """Half width, depth and height of what is tracked, metres."""
-    entrances: tuple[tuple[Corner, Corner], ...] = ()
+    entrances: tuple[tuple[Corner, Corner], ...] = Field(default=(), max_length=50)
     """Of each the position and the standard deviations, metres."""
+
+
+class ImportOptions(StatedOptions):
+    """What is stated of an import, with files of cameras by their path."""
+
+    cameras: tuple[tuple[str, Path], ...] = ()
+    """Video, pictures or boxes that belong to a camera of the calibration: its name, and what."""

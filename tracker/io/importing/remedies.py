@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from tracker.io.checks import Check, Remedy
-from tracker.io.checks.level import upwards
-from tracker.io.checks.reading import UPS, Reading, upright
+from tracker.io.conventions.level import upwards
+from tracker.io.conventions.reading import UPS, Reading, upright
 from tracker.io.read.pieces import METRES, Unit, Up
 from tracker.sequences.finding import warning
 

@@ -17,25 +17,31 @@ from tracker.geometry.consistency.suggestion import (
     consensus_of_cameras,
     suggest,
 )
-from tracker.io.checks.level import lean_of
-from tracker.io.checks.reading import Reading, read_boxes, to_camera
-from tracker.io.checks.readings import Open, Seen
+from tracker.io.conventions.level import lean_of
+from tracker.io.conventions.orders import MOST_CAMERAS
 from tracker.io.conventions.questions import (
-    ACCEPTED,
+    ACCEPT,
     OF_ONE,
+    UNPROVEN,
+    Undecided,
+    Unexplained,
     check_verdict,
-    matched_by,
     rearranged,
+    told_of_clocks,
     told_of_moments,
 )
-from tracker.io.conventions.search import as_meant, find_reading
+from tracker.io.conventions.reading import Reading, read_boxes, to_camera
+from tracker.io.conventions.readings import Open, Seen
+from tracker.io.conventions.search import ClockFit, Verdict, as_meant, find_reading
 from tracker.io.importing.arriving import short_videos
 from tracker.io.importing.finding.angles import check_turns, chosen_turns, turns_in_words
 from tracker.io.importing.finding.calibrations import camera_sets
 from tracker.io.importing.finding.geometry import check_places, read_poses
 from tracker.io.importing.finding.matching import (
+    Matched,
     MatchedCamera,
     match_all,
+    matched_by,
     nothing_of,
     same_aspect,
 )
@@ -104,8 +110,8 @@ class ImportPlan:
     """What was not in the files or had to be chosen, and why it is so."""
     told: tuple[str, ...]
     """Sentences about what is not used or odd."""
-    accepted: str = ""
-    """What was taken though nothing proves it; empty where nothing was."""
+    open: Undecided | Unexplained | None = None
+    """What is left open though the likeliest interpretation was accepted."""
 
 
 def settle(taken: Sequence[ParsedFiles], options: ImportOptions | None = None) -> ImportPlan:
@@ -114,6 +120,8 @@ def settle(taken: Sequence[ParsedFiles], options: ImportOptions | None = None) -
     Raises:
         FormatError: If there is no calibration, or files contradict each other; the sentence
             says which and what to do.
+        Undecided, Unexplained: If the boxes leave open how the files are meant, and the likeliest
+            interpretation is not to be accepted.
     """
     options = options or ImportOptions()
     sets, told = camera_sets(taken)
@@ -126,15 +134,19 @@ def settle(taken: Sequence[ParsedFiles], options: ImportOptions | None = None) -
     sizes = picture_sizes(cameras, found)
     plain = [scaled(camera.raw, size) for camera, size in zip(cameras, sizes, strict=True)]
     raws = [_told(raw, options) for raw in plain]
+    spare = [_told(raw, options) for raw in _spare(matched)]
     if not any(c.video or c.images or c.detections is not None for c in cameras):
         raise nothing_of(cameras, taken, told)
     times = settle_times(cameras, matched.truths, options, found)
     boxes = _boxes(cameras, sizes, times, options, found, told)
     arbitrary = matched.format.startswith(_WITHOUT_UNIT)
-    late: dict[str, int] = {}
-    reading, raws, boxes, factor = _read(
-        raws, plain, cameras, boxes, times, arbitrary, options, found, told, late
+    open_: list[Undecided | Unexplained] = []
+    reading, raws, boxes, factor, verdict = _read(
+        raws, plain, spare, cameras, boxes, times, arbitrary, options, found, told, open_
     )
+    names = [raw.name for raw in raws]
+    clocks = {} if verdict is None else verdict.clocks
+    late = _late(clocks, names, options)
     if late:
         shifted = _shifted(options, late, times.fps)
         times = settle_times(cameras, matched.truths, shifted, [])
@@ -153,9 +165,13 @@ def settle(taken: Sequence[ParsedFiles], options: ImportOptions | None = None) -
     if not times.stated:
         fps, why = rate_of(settled, at_steps)
         found.append(("fps", f"{fps:g}, {why}, since no file says it; --fps"))
-        shifted = replace(_shifted(options, late, fps), fps=fps)
+        if verdict is not None:
+            clocks = verdict.clocks_at(fps)
+            late = _late(clocks, names, options)
+        shifted = _shifted(options, late, fps).model_copy(update={"fps": fps})
         times = settle_times(cameras, matched.truths, shifted, [])
         at_steps = _at_steps(detections, times)
+    told += told_of_clocks(clocks, names)
     for name, steps in late.items():
         how = f"{steps / times.fps:.2f} s late ({steps} steps, within 1)"
         found.append((f"{name} clock", f"{how}, since boxes meet so"))
@@ -192,14 +208,32 @@ def settle(taken: Sequence[ParsedFiles], options: ImportOptions | None = None) -
         reading,
         tuple(found),
         tuple(told),
-        "; ".join(words for name, words in found if name == ACCEPTED),
+        open_[0] if open_ else None,
     )
+
+
+def _spare(matched: Matched) -> list[RawCamera]:
+    """Calibrations without files that may be those of boxes which no name gave to a camera."""
+    known = [camera for camera in matched.spare if camera.raw.image_size is not None]
+    few = len(matched.cameras) + len(known) <= MOST_CAMERAS
+    return [camera.raw for camera in known] if few and matched_by(matched.cameras) != "name" else []
+
+
+def _late(
+    clocks: Mapping[int, ClockFit], names: Sequence[str], options: ImportOptions
+) -> dict[str, int]:
+    """Steps by which cameras are late; what is stated is not questioned."""
+    return {
+        names[camera]: clock.late
+        for camera, clock in clocks.items()
+        if clock.late and clock.steady and names[camera] not in options.offsets
+    }
 
 
 def _shifted(options: ImportOptions, late: Mapping[str, int], fps: float) -> ImportOptions:
     """With the offsets of cameras that are late by so many steps; what is stated is kept."""
     found = {name: -steps / fps for name, steps in late.items() if name not in options.offsets}
-    return replace(options, offsets={**found, **options.offsets})
+    return options.model_copy(update={"offsets": {**found, **options.offsets}})
 
 
 def _looked_at(
@@ -353,6 +387,7 @@ def _boxes(
 def _read(
     raws: list[RawCamera],
     plain: Sequence[RawCamera],
+    spare: Sequence[RawCamera],
     cameras: Sequence[MatchedCamera],
     boxes: list[_Boxes | None],
     times: Times,
@@ -360,13 +395,14 @@ def _read(
     options: ImportOptions,
     found: list[tuple[str, str]],
     told: list[str],
-    late: dict[str, int],
-) -> tuple[Reading, list[RawCamera], list[_Boxes | None], float | None]:
+    open_: list[Undecided | Unexplained],
+) -> tuple[Reading, list[RawCamera], list[_Boxes | None], float | None, Verdict | None]:
     """How poses and boxes are meant: by flags, formats, the boxes and the poses, in this order.
 
     Returns:
-        The reading; cameras and boxes as they are by it; and by how much the cameras' unit was
-        made larger so that people are as tall as they are said to be, or as people who stand.
+        The reading; cameras and boxes as they are by it; by how much the cameras' unit was made
+        larger so that people are as tall as they are said to be, or as people who stand; and what
+        the boxes tell, where they tell anything.
     """
     seen = [
         None if own is None else _seen(own[0], time)
@@ -378,21 +414,24 @@ def _read(
     free = not options.swap and not options.cameras
     find = partial(
         find_reading,
-        seen=seen,
+        seen=[*seen, *[None] * len(spare)],
         fps=times.fps,
         tried=Open(layouts=layouts, normalised=(False,), orders=free),
         names=matched_by(cameras),
         pixels=_other_pixels(cameras, raws, seen),
     )
-    verdict = find(raws)
+    verdict = find([*raws, *spare])
     if verdict is not None:
         stated = _stated(options) if verdict.kind == "none" else ""
-        otherwise = find(plain) if stated else None
+        otherwise = find([*plain, *spare]) if stated else None
         if otherwise is not None and otherwise.kind not in ("decided", "open"):
             otherwise = None
-        unproved = check_verdict(verdict, raws, options, stated, otherwise)
-        if unproved:
-            found.append((ACCEPTED, unproved))
+        question = check_verdict(verdict, [*raws, *spare], stated, otherwise)
+        if question is not None and not options.accept_best:
+            raise question
+        if question is not None:
+            open_.append(question)
+            found.append(("accepted", f"by {ACCEPT}: {question}"))
     if sum(own is not None for own in seen) == 1:
         told.append(OF_ONE)
     larger = 1.0
@@ -402,14 +441,11 @@ def _read(
         reading = read_poses(raws, boxes=any(own is not None for own in boxes))
         why = "from where the cameras look; the boxes do not tell"
         best = None
+        if verdict is not None and verdict.kind == "unproven":
+            told.append(UNPROVEN)
     else:
         best, reading = as_meant(verdict, convention.up, convention.up, convention.unit)
         reading = replace(reading, flipped=False)
-        for camera, clock in verdict.clocks.items():
-            if raws[camera].name in options.offsets:
-                continue  # what is stated is not questioned
-            if clock.late and clock.steady:
-                late[raws[camera].name] = clock.late
         # boxes lean in rolled cameras; where people along an axis are likelier, the world is level
         rise = verdict.best.scene.rise
         along = float(np.abs(rise).max() / np.linalg.norm(rise))
@@ -426,7 +462,8 @@ def _read(
             if larger != 1.0:
                 how = f"of pictures {larger:.4g} times as wide, as the calibration's"
                 found.append(("boxes", f"{how}, {why}"))
-        raws, told_ = rearranged(raws, reading)
+        every, told_ = rearranged([*raws, *spare], reading)
+        raws = every[: len(raws)]
         found += told_
         told += told_of_moments(verdict, [raw.name for raw in raws])
     if any(raw.turns for raw in raws):
@@ -459,7 +496,7 @@ def _read(
         factor = (PERSON if size is None else 2.0 * size[2]) / best.consensus.height
         raws = [_resized(raw, factor) for raw in raws]
     reading = replace(reading, layout="ltwh", order=None, pixels=1.0)
-    return reading, raws, changed, factor
+    return reading, raws, changed, factor, verdict if enough else None
 
 
 def _stated(options: ImportOptions) -> str:

@@ -11,6 +11,7 @@ from jaxtyping import Float, Int
 from numpy import ndarray
 
 from tracker.files.atomic import replacing, write_whole
+from tracker.io.conventions.questions import ACCEPT
 from tracker.io.importing.bringing import Told, bring, bring_images
 from tracker.io.importing.settling import ImportPlan, PlannedView
 from tracker.io.read.pieces import FormatError
@@ -58,7 +59,7 @@ def write(
         _write_truth(folder / "ground_truth.csv", settled.truth)
         truth = '\n[ground_truth]\nfile = "ground_truth.csv"\n'
     head = [
-        *([f"# {settled.accepted}"] if settled.accepted else []),
+        *([] if settled.open is None else [f"# by {ACCEPT}: {settled.open}"]),
         "format = 1",
         f"name = {_text(name)}",
         f"fps = {_number(settled.fps)}",

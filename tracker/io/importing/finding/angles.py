@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from jaxtyping import Float
 from numpy import ndarray
 
-from tracker.io.checks.reading import turns_of
+from tracker.io.conventions.reading import turns_of
 from tracker.io.read.pieces import IN_DEGREES, INVERSE, FormatError, RawCamera
 
 VECTOR = "vector"

@@ -10,8 +10,8 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from tracker.geometry.camera import Camera
-from tracker.io.checks.level import LEVEL, horizon, leaning, upwards
-from tracker.io.checks.reading import Reading, pose, turns_of, upright
+from tracker.io.conventions.level import LEVEL, horizon, leaning, upwards
+from tracker.io.conventions.reading import Reading, pose, turns_of, upright
 from tracker.io.read.pieces import METRES, Axes, Direction, FormatError, RawCamera, Unit
 from tracker.sequences.fields import LARGEST
 

@@ -59,6 +59,14 @@ class Matched:
     truths: list[tuple[str, TruthPiece]]
     told: list[str]
     """Sentences about what is not used."""
+    spare: list[MatchedCamera] = field(default_factory=list)
+    """Cameras of the calibration without any file."""
+
+
+def matched_by(cameras: Sequence[MatchedCamera]) -> How:
+    """By what the boxes of cameras were matched, the weakest of all."""
+    ways = {camera.how.get("detections", "name") for camera in cameras}
+    return "order" if "order" in ways else "number" if "number" in ways else "name"
 
 
 def match_all(
@@ -91,7 +99,7 @@ def match_all(
     cameras = [MatchedCamera(raw) for raw in chosen.cameras]
     _by_flag(cameras, videos, detections, options)
     _match_pictures(cameras, videos, told)
-    _match_boxes(cameras, detections, told)
+    _match_boxes(cameras, detections, _spoilt(taken), told)
     _match_times(cameras, _times(taken), told)
     _exchange(cameras, options)
     wanted = [c for c in cameras if c.raw.name not in options.left_out]
@@ -108,7 +116,8 @@ def match_all(
             f"{len(left)} cameras of {chosen.label} have neither video nor boxes and are left out: "
             f"{', '.join(left[:8])}{' …' if len(left) > 8 else ''}"
         )
-    return Matched(used or cameras, chosen.format, truths, told)
+    spare = [c for c in cameras if used and c not in used]
+    return Matched(used or cameras, chosen.format, truths, told, spare)
 
 
 _Pictures = list[tuple[str, VideoPiece | ImagesPiece]]
@@ -284,8 +293,27 @@ def same_aspect(one: tuple[int, int], other: tuple[int, int]) -> bool:
     return abs(one[0] * other[1] / (one[1] * other[0]) - 1.0) <= ASPECT_TOLERANCE
 
 
-def _match_boxes(cameras: list[MatchedCamera], boxes: _Boxes, told: list[str]) -> None:
-    """Boxes of one format together; of several formats the one that serves most cameras."""
+def _spoilt(taken: Sequence[ParsedFiles]) -> list[tuple[str, str]]:
+    """Label and ending of each file that begins as something known but cannot be read."""
+    return [
+        (one.label.removesuffix(path.suffix), path.suffix)
+        for one in taken
+        if one.complaint and not one.pieces
+        for path in one.files[:1]
+    ]
+
+
+def _match_boxes(
+    cameras: list[MatchedCamera],
+    boxes: _Boxes,
+    spoilt: Sequence[tuple[str, str]],
+    told: list[str],
+) -> None:
+    """Boxes of one format together; of several formats the one that serves most cameras.
+
+    A file that cannot be read counts where its name belongs to a camera as those of the others do:
+    without it the numbers and the order of the others would be those of other cameras.
+    """
     families: dict[str, _Boxes] = {}
     for row in boxes:
         families.setdefault(row[1].format, []).append(row)
@@ -293,7 +321,11 @@ def _match_boxes(cameras: list[MatchedCamera], boxes: _Boxes, told: list[str]) -
     results: list[tuple[int, bool, dict[int, int], How, _Boxes]] = []
     for format_, rows in families.items():
         labels = [label for label, _ in rows]
-        found = match([c.raw.name for c in free], labels) if free else None
+        endings = {piece.source.suffix for _, piece in rows}
+        others = [label for label, ending in spoilt if ending in endings]
+        found = match([c.raw.name for c in free], labels + others) if free and others else None
+        if found is None or len(found[0]) < len(rows) + len(others):
+            found = match([c.raw.name for c in free], labels) if free else None
         if found is None or (len(found[0]) < len(rows) and found[1] != "name"):
             found = _by_pictures(free, labels) or found
         if found is None and len(cameras) == len(rows) == 1:

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from tracker.io.checks.reading import lens_of, read_boxes, stretched
+from tracker.io.conventions.reading import lens_of, read_boxes, stretched
 from tracker.io.importing.finding.matching import MatchedCamera, same_aspect
 from tracker.io.read.pieces import DetectionPiece, FormatError, RawCamera
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from tracker.geometry.camera import Camera
 from tracker.geometry.consistency.pace import WALKING, pace
-from tracker.io.checks.sizes import USUAL_HEIGHTS
+from tracker.io.conventions.sizes import USUAL_HEIGHTS
 from tracker.io.importing.finding.people import rays_of_all
 from tracker.sequences.sequence import Detections
 

@@ -9,7 +9,7 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from tracker.geometry.camera import Camera
-from tracker.io.checks.reading import Reading, levelled, upright
+from tracker.io.conventions.reading import Reading, levelled, upright
 from tracker.io.importing.finding.grids import feet_on_floor, infer_grid
 from tracker.io.read.pieces import GRIDS, METRES, TruthPiece, Unit
 from tracker.sequences.sequence import Detections, GroundTruth

@@ -1,7 +1,9 @@
 """MOTChallenge's det.txt, gt.txt and track files: frame, id, left, top, width, height, …
 
 Frames count from 1. Det files end with confidence and x, y, z (−1 where unknown); ground
-truth from 2016 on with a flag (0: not counted), a class and the visible part.
+truth from 2016 on with a flag (0: not counted), a class and the visible part. Pixels of the
+challenge's own files count from 1 too (sec. 4.2), those of the detectors and annotation tools that
+borrow the form from 0.
 
 Source: Milan et al., "MOT16: A benchmark for multi-object tracking", arXiv 1603.00831, 2016.
 """
@@ -29,6 +31,9 @@ PEOPLE = (1, 2, 7)
 
 LABELS = "labels.txt"
 """The names of the classes beside the ground truth, one a line, as annotation tools write them."""
+
+SEQUENCE = "seqinfo.ini"
+"""The description that lies beside the folders ``gt`` and ``det`` of the challenge's sequences."""
 
 _PEOPLE_WORDS = ("person", "people", "pedestrian", "human", "man", "woman", "player")
 _MOST_LABELS = 2**16  # bytes
@@ -68,6 +73,11 @@ def read(file: SourceFile) -> Iterator[Piece]:
         if not scores.any():  # a tracker that writes none
             scores = np.ones(len(table))
     first = 0 if len(frames) and frames.min() == 0 else 1
+    placed = np.zeros(len(table), dtype=bool)
+    if columns == 10:
+        placed = (table[:, 7:10] != -1.0).any(axis=1) & (ids >= 0)
+    if placed.any() or (file.path.parent.parent / SEQUENCE).is_file():
+        boxes = boxes - [1.0, 1.0, 0.0, 0.0]
     yield DetectionPiece(
         source=file.path,
         format="MOTChallenge ground truth" if is_truth else "MOTChallenge detections",
@@ -79,9 +89,6 @@ def read(file: SourceFile) -> Iterator[Piece]:
         first_index=1 if first else 0,
         left_out=_left_out(file, table, keep),
     )
-    placed = np.zeros(len(table), dtype=bool)
-    if columns == 10:
-        placed = (table[:, 7:10] != -1.0).any(axis=1) & (ids >= 0)
     if placed.any():
         yield TruthPiece(
             source=file.path,

@@ -23,8 +23,8 @@ from tracker.geometry.camera import Camera
 from tracker.geometry.consistency.consensus import Consensus, consensus
 from tracker.geometry.consistency.observed import PairsOfBoxes, Pose, Rays, pair_up, rays_of, uncut
 from tracker.geometry.consistency.standing import turn_of
-from tracker.io.checks.level import upwards
-from tracker.io.checks.reading import (
+from tracker.io.conventions.level import upwards
+from tracker.io.conventions.reading import (
     Reading,
     boxes_by,
     lens_of,
@@ -33,8 +33,8 @@ from tracker.io.checks.reading import (
     upright,
     with_pixels,
 )
-from tracker.io.checks.sizes import likely_unit
-from tracker.io.checks.standing import reversed_, standing, turns_tried, upside_down
+from tracker.io.conventions.sizes import likely_unit
+from tracker.io.conventions.standing import reversed_, standing, turns_tried, upside_down
 from tracker.io.read.pieces import METRES, Axes, Direction, Layout, RawCamera, Unit, Up
 
 MOST_PAIRS = 6000
@@ -149,6 +149,11 @@ class Judge:
             )
             for (a, b), found in pairs.items()
         }
+
+    @property
+    def has_boxes(self) -> list[bool]:
+        """Whether each camera has boxes at a step at which another one has some."""
+        return [own is not None and len(own.frames) > 0 for own in self._paired]
 
     @property
     def possible(self) -> int:

@@ -10,7 +10,7 @@ from numpy import ndarray
 
 from tracker.geometry.consistency.consensus import Consensus
 from tracker.geometry.consistency.observed import Pose
-from tracker.io.checks.reading import UPS, upright
+from tracker.io.conventions.reading import UPS, upright
 from tracker.io.read.pieces import Up
 
 LEVEL = 6.0

@@ -18,7 +18,7 @@ from numpy import ndarray
 from tracker.geometry.consistency.consensus import Consensus
 from tracker.geometry.consistency.observed import Pose
 from tracker.geometry.consistency.standing import turn_of
-from tracker.io.checks.level import horizon
+from tracker.io.conventions.level import horizon
 
 _NEAR = np.cos(np.radians(40.0))  # boxes lean as much as cameras are rolled, or look down
 _BELOW = 0.75  # heights of a person, and
