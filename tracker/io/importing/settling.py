@@ -36,7 +36,7 @@ from tracker.io.conventions.search import ClockFit, Verdict, as_meant, find_read
 from tracker.io.importing.arriving import short_videos
 from tracker.io.importing.finding.angles import check_turns, chosen_turns, turns_in_words
 from tracker.io.importing.finding.calibrations import camera_sets
-from tracker.io.importing.finding.geometry import check_places, read_poses
+from tracker.io.importing.finding.geometry import check_lenses, check_places, read_poses
 from tracker.io.importing.finding.matching import (
     Matched,
     MatchedCamera,
@@ -132,6 +132,7 @@ def settle(taken: Sequence[ParsedFiles], options: ImportOptions | None = None) -
     for way in sorted({how for camera in cameras for how in camera.how.values()} - {"name"}):
         found.append(("matching", f"pictures and boxes go to the cameras by {way}"))
     sizes = picture_sizes(cameras, found)
+    check_lenses([camera.raw for camera in cameras + matched.spare], matched.format)
     plain = [scaled(camera.raw, size) for camera, size in zip(cameras, sizes, strict=True)]
     raws = [_told(raw, options) for raw in plain]
     spare = [_told(raw, options) for raw in _spare(matched)]

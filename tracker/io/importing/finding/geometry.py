@@ -38,6 +38,26 @@ def check_places(cameras: Sequence[Camera], calibration: str) -> None:
             )
 
 
+def check_lenses(cameras: Sequence[RawCamera], calibration: str) -> None:
+    """Refuse lenses with numbers so large that no sequence takes them.
+
+    Args:
+        cameras: As the file has them.
+        calibration: What their file was recognised as.
+
+    Raises:
+        FormatError: Naming the camera.
+    """
+    for camera in cameras:
+        for what, given in (("K", camera.intrinsics), ("distortion", camera.distortion)):
+            largest = 0.0 if given is None else float(np.abs(given).max(initial=0.0))
+            if not largest <= LARGEST:
+                raise FormatError(
+                    f"{calibration}, {camera.name}: expected numbers of at most {LARGEST:g} in "
+                    f"its {what}, found {largest:.4g}"
+                )
+
+
 def read_poses(cameras: Sequence[RawCamera], *, boxes: bool) -> Reading:
     """The reading in which cameras look at one place in front of all of them.
 
