@@ -1,4 +1,8 @@
-"""Appearance models of tracklets, learnt from the recording, and their likelihood ratio."""
+"""Appearance of tracklets as a likelihood: two-covariance PLDA, learnt from the recording.
+
+[SW10] Brümmer, de Villiers, "The speaker partitioning problem", Odyssey 2010: the two-covariance
+model.
+"""
 
 from __future__ import annotations
 
@@ -13,67 +17,59 @@ from tracker.kernels import boxes as box_kernels
 from tracker.smoothing.paths import Links, Paths
 from tracker.smoothing.recording import CameraBoxes
 
+WINDOW = 4.0
+"""Duration of the parts of tracklets of which the model is learnt, seconds: whole tracklets are too
+few."""
+
+DIMENSIONS = 24
+"""Number of principal components of the embeddings."""
+
 _OWN = 0.7
-"""Least association probability of a box that contributes to an appearance model."""
+"""Least association probability of a box by which people with templates are told apart."""
 
-_ENOUGH = 0.2
-"""Seconds of boxes in one camera that a model needs, at least :data:`_FEWEST` boxes."""
+_FEWEST = 5
+"""Least number of parts, and of pairs of each kind, from which anything is learnt."""
 
-_FEWEST = 3
-"""Least number of boxes of a model."""
+_CORRELATION = 0.3
+"""Correlation of the boxes of one tracklet, by which n boxes tell as much as n / (1 + 0.3 (n − 1)).
+"""
 
-_APART = 0.25
-"""Seconds between the middle of a tracklet and each of its halves that are compared."""
+_DRIFT = 0.15
+"""Variance of one person's appearance between tracklets, in that between persons."""
 
-_OUTLIERS = 0.02
-"""Probability that the appearance is uninformative."""
-
-_LATER = 0.1
-"""Additional distance of one person's embeddings between tracklets, against within one."""
-
-_NARROWEST = 0.1
-"""Least standard deviation of the distances."""
-
-_SAME, _OTHER = (0.15, 0.15), (0.8, 0.15)
-"""Median and standard deviation of the distances where a recording has too few."""
-
-_COMPARED = 5
-"""Least number of distances of each kind for using those of the recording."""
-
-_AT_ONCE = 2048
-"""Number of pairs that are compared at once, which bounds the memory for long recordings."""
+_MOST = 6.0
+"""Bound of the log ratio of a pair."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Models:
-    """The mean embeddings of n tracklets in each of C cameras."""
+class Means:
+    """The mean embeddings of n tracklets in D dimensions, and how well they are known."""
 
-    vectors: Float[ndarray, "n C A"]
-    """Unit vectors, after the mean over all tracklets is subtracted; 0 where there is none."""
-    known: Bool[ndarray, "n C"]
-    """Whether a tracklet has an embedding in a camera."""
+    values: Float[ndarray, "n D"]
+    counts: Float[ndarray, " n"]
+    """Weighted number of boxes, 0 without any."""
 
-    def distances(self, one: ndarray, other: ndarray) -> Float[ndarray, "P C"]:
-        """The distance (1 − cos) / 2 of pairs in each camera: 0 if equal, 1 if opposite."""
-        cosines = np.empty((len(one), self.vectors.shape[1]))
-        for first in range(0, len(one), _AT_ONCE):
-            some = slice(first, first + _AT_ONCE)
-            cosines[some] = np.einsum(
-                "pca,pca->pc", self.vectors[one[some]], self.vectors[other[some]]
-            )
-        return np.asarray((1.0 - cosines) / 2.0)
+    @property
+    def variances(self) -> Float[ndarray, " n"]:
+        """Variance of a mean in units of that of one box, 1/n*; 1 without a box."""
+        counts = np.where(self.counts > 0.0, self.counts, 1.0)
+        return np.asarray((1.0 + _CORRELATION * (counts - 1.0)) / counts)
 
 
-class Appearance:
-    """A likelihood ratio of two tracklets having the same person, calibrated on the recording.
+class AppearanceModel:
+    """The log likelihood ratio of two tracklets having the same person, learnt from the recording.
 
-    The embedding of a tracklet in a camera is the mean of the unit vectors of its boxes that no
-    other box overlaps, less the mean over all tracklets. Two tracklets are compared by the angle
-    between their embeddings, in the cameras that have both. The distribution of one person's
-    distances is estimated from the two halves of tracklets, that of two persons' from tracklets
-    that exist at the same time; both are Gaussians of median and robust spread. Each camera's
-    likelihood ratio includes a probability of being uninformative, so that no camera outweighs
-    all others.
+    The two-covariance model [SW10]: embeddings, less the camera's mean, in the coordinates of their
+    principal components in which those of one tracklet within some seconds have the covariance I,
+    and those of different people N(0, B) with a diagonal B. The mean y of a tracklet over all its
+    boxes, which count the less the more of them another box covers, has the variance
+    v = 0.15 B + 1/n* for a person's own appearance, and
+
+        log ratio = α Σ_d log N([y_i, y_j]; 0, [[B + v_i, B], [B, B + v_j]])
+                            / N(y_i; 0, B + v_i) N(y_j; 0, B + v_j)
+
+    with α by logistic regression between the halves of tracklets and tracklets that exist at the
+    same time. Where a recording has too few of these, nothing is learnt and every ratio is 0.
     """
 
     def __init__(
@@ -84,7 +80,7 @@ class Appearance:
         embeddings: Many[Float[ndarray, "B A"]],
         step_time: float,
     ) -> None:
-        """Compute the embeddings of all tracklets, and the distributions of their distances.
+        """Learn the model, and compute the mean embeddings of all tracklets.
 
         Args:
             tracklets: The n tracklets.
@@ -93,32 +89,30 @@ class Appearance:
             embeddings: A unit vector for each box of each camera, 0 where there is none.
             step_time: Time between two steps, seconds.
         """
-        fewest = max(_FEWEST, round(_ENOUGH / step_time))
-        seen = [np.asarray(vectors.any(axis=1)) for vectors in embeddings]
-        own = links.take(clean(links, cameras, seen))
-        steps, owners = tracklets.steps[own.rows], tracklets.owners[own.rows]
-        middle = ((tracklets.firsts + tracklets.lasts) / 2.0)[owners]
-        apart = _APART / step_time
-        size = (len(tracklets.labels), len(cameras))
-        whole = _gather(own, owners, embeddings, size, fewest)
-        early = steps < middle - apart
-        late = steps > middle + apart
-        first = _gather(own.take(early), owners[early], embeddings, size, fewest)
-        second = _gather(own.take(late), owners[late], embeddings, size, fewest)
-        common = whole.vectors.sum(axis=0) / np.maximum(whole.known.sum(axis=0), 1)[:, None]
-        self._models = _less(whole, common)
-        halves = Models(
-            np.concatenate([_less(first, common).vectors, _less(second, common).vectors]),
-            np.concatenate([first.known, second.known]),
-        )
-        one = np.arange(size[0])
-        both = first.known & second.known
-        same = halves.distances(one, one + size[0])[both]
+        count = len(tracklets.labels)
+        self._between, self._weight = np.zeros(0), 0.0
+        self._means = Means(np.zeros((count, 0)), np.zeros(count))
+        looks, weights, rows = _collect(links, cameras, embeddings)
+        owners, steps = tracklets.owners[rows], tracklets.steps[rows]
+        width = max(round(WINDOW / step_time), 1)
+        parts = np.unique(
+            owners * (int(steps.max(initial=0)) // width + 1) + steps // width, return_inverse=True
+        )[1]
+        learnt = _learn(looks, weights, parts)
+        if learnt is None:
+            return
+        into, self._between = learnt
+        looks = looks @ into
+        self._means = _mean(looks, weights, owners, count)
+        late = steps > ((tracklets.firsts + tracklets.lasts) / 2.0)[owners]
+        halves = [_mean(looks[own], weights[own], owners[own], count) for own in (~late, late)]
+        both = np.flatnonzero((halves[0].counts > 0.0) & (halves[1].counts > 0.0))
+        same = self._ratio(*halves, both, both)
         i, j = _together(tracklets)
-        other = self._models.distances(i, j)[whole.known[i] & whole.known[j]]
-        middle_same, spread_same = _median(same, _SAME)
-        self._same = middle_same + _LATER / 2.0, float(np.hypot(spread_same, _LATER))
-        self._other = _median(other, _OTHER)
+        seen = (self._means.counts[i] > 0.0) & (self._means.counts[j] > 0.0)
+        other = self._ratio(self._means, self._means, i[seen], j[seen])
+        if min(len(same), len(other)) >= _FEWEST:
+            self._weight = _logistic(same, other)
 
     def log_ratio(
         self, earlier: Int[ndarray, " P"], later: Int[ndarray, " P"]
@@ -130,84 +124,119 @@ class Appearance:
             later: Index of the second.
 
         Returns:
-            The log ratio, 0 where no camera has both, and whether any camera has both.
+            The log ratio, 0 where nothing is known of either, and whether both are known.
         """
-        known = self._models.known[earlier] & self._models.known[later]
-        (low, narrow), (high, wide) = self._same, self._other
-        if not high > low:  # appearance does not distinguish people here
-            return np.zeros(len(earlier)), np.zeros(len(earlier), dtype=bool)
-        # beyond the two medians a distance has the likelihood ratio of the median
-        distances = np.clip(self._models.distances(earlier, later), low, high)
-        one = np.exp(-0.5 * ((distances - low) / narrow) ** 2) / narrow
-        two = np.exp(-0.5 * ((distances - high) / wide) ** 2) / wide
-        ratio = np.log(
-            ((1.0 - _OUTLIERS) * one + _OUTLIERS * two)
-            / (_OUTLIERS * one + (1.0 - _OUTLIERS) * two)
-        )
-        return np.asarray((ratio * known).sum(axis=1)), known.any(axis=1)
+        counts = self._means.counts
+        known = (counts[earlier] > 0.0) & (counts[later] > 0.0) & (self._weight > 0.0)
+        ratio = self._weight * self._ratio(self._means, self._means, earlier, later)
+        return np.where(known, np.clip(ratio, -_MOST, _MOST), 0.0), known
+
+    def _ratio(
+        self, one: Means, other: Means, i: Int[ndarray, " P"], j: Int[ndarray, " P"]
+    ) -> Float[ndarray, " P"]:
+        """The log ratio of pairs of means, with α = 1."""
+        total = np.zeros(len(i))
+        precision = [one.variances[i], other.variances[j]]
+        for d, between in enumerate(self._between.tolist()):
+            first, second = ((1.0 + _DRIFT) * between + variance for variance in precision)
+            x, y = one.values[i, d], other.values[j, d]
+            rest = first * second - between**2  # the determinant
+            total -= 0.5 * np.log(rest / (first * second))
+            total -= 0.5 * (x**2 * second + y**2 * first - 2.0 * between * x * y) / rest
+            total += 0.5 * (x**2 / first + y**2 / second)
+        return total
 
 
-def clean(
-    links: Links, cameras: Many[CameraBoxes], seen: Many[Bool[ndarray, " B"]] | None = None
-) -> Bool[ndarray, " L"]:
+def _collect(
+    links: Links, cameras: Many[CameraBoxes], embeddings: Many[Float[ndarray, "B A"]]
+) -> tuple[Float[ndarray, "K A"], Float[ndarray, " K"], Int[ndarray, " K"]]:
+    """The embeddings of links less each camera's mean, their weights a (1 − o)² and their rows."""
+    looks, weights, rows = [], [], []
+    for c, camera in enumerate(cameras):
+        own = links.take(links.cameras == c)
+        own = own.take(np.asarray(embeddings[c].any(axis=1))[own.boxes])
+        covered = box_kernels.covered(camera.boxes, camera.starts)[own.boxes]
+        found = np.asarray(embeddings[c], dtype=float)[own.boxes]
+        weight = own.shares * (1.0 - covered) ** 2
+        total = weight.sum()
+        looks.append(found - (weight @ found) / (total if total > 0.0 else 1.0))
+        weights.append(weight)
+        rows.append(own.rows)
+    return np.concatenate(looks), np.concatenate(weights), np.concatenate(rows)
+
+
+def _learn(
+    looks: Float[ndarray, "K A"], weights: Float[ndarray, " K"], parts: Int[ndarray, " K"]
+) -> tuple[Float[ndarray, "A D"], Float[ndarray, " D"]] | None:
+    """The map to the model's coordinates, and B in these; None where there are too few parts.
+
+    Args:
+        looks: Embeddings, less the mean.
+        weights: Their weights.
+        parts: The part of a tracklet that each belongs to.
+    """
+    several = np.bincount(parts, weights) > 1.0
+    if several.sum() <= _FEWEST:
+        return None
+    _, axes = np.linalg.eigh((looks * weights[:, None]).T @ looks)
+    into = axes[:, : -1 - min(DIMENSIONS, several.sum() - 1) : -1]
+    found = _mean(looks @ into, weights, parts, len(several))
+    apart = looks @ into - found.values[parts]
+    freedom = (found.counts[several] - 1.0).sum()
+    chosen = np.where(several[parts], weights, 0.0)
+    within = (apart * chosen[:, None]).T @ apart / freedom
+    sizes, axes = np.linalg.eigh(within)
+    into = into @ (axes / np.sqrt(np.maximum(sizes, 1e-3 * sizes.max())))
+    found = _mean(looks @ into, weights, parts, len(several))
+    means = found.values[several]
+    sizes, axes = np.linalg.eigh(means.T @ means / len(means))
+    between = sizes - found.variances[several].mean()
+    good = between > 0.0
+    return into @ axes[:, good], between[good]
+
+
+def _mean(
+    looks: Float[ndarray, "K D"], weights: Float[ndarray, " K"], of: Int[ndarray, " K"], count: int
+) -> Means:
+    """The weighted mean of embeddings for each of some tracklets."""
+    counts = np.bincount(of, weights, count)
+    values = np.zeros((count, looks.shape[1]))
+    np.add.at(values, of, weights[:, None] * looks)
+    return Means(values / np.where(counts > 0.0, counts, 1.0)[:, None], counts)
+
+
+def _logistic(same: Float[ndarray, " S"], other: Float[ndarray, " O"]) -> float:
+    """α by logistic regression of both kinds, which count alike, between 0 and 1."""
+    ratios = np.concatenate([same, other])
+    signs = np.repeat([1.0, -1.0], [len(same), len(other)])
+    shares = np.repeat([1.0 / len(same), 1.0 / len(other)], [len(same), len(other)])
+
+    def slope(weight: float) -> float:
+        """The derivative of the log likelihood, which decreases with the weight."""
+        wrong = 1.0 / (1.0 + np.exp(np.clip(weight * ratios * signs, -500.0, 500.0)))
+        return float((shares * signs * ratios * wrong).sum())
+
+    low, high = 0.0, 1.0
+    if slope(high) >= 0.0:
+        return high
+    for _ in range(30):
+        middle = (low + high) / 2.0
+        low, high = (middle, high) if slope(middle) > 0.0 else (low, middle)
+    return low
+
+
+def clean(links: Links, cameras: Many[CameraBoxes]) -> Bool[ndarray, " L"]:
     """Select the links of boxes with a clear association that overlap no other box.
 
     Args:
         links: L associations of rows and boxes.
         cameras: The boxes of each camera.
-        seen: Whether each box of each camera has an embedding; None for all.
     """
     found = links.shares > _OWN
     for c, camera in enumerate(cameras):
-        good = box_kernels.alone(camera.boxes, camera.starts)
-        if seen is not None:
-            good &= seen[c]
         own = links.cameras == c
-        found[own] &= good[links.boxes[own]]
+        found[own] &= box_kernels.alone(camera.boxes, camera.starts)[links.boxes[own]]
     return np.asarray(found)
-
-
-def _gather(
-    links: Links,
-    owners: Int[ndarray, " L"],
-    embeddings: Many[Float[ndarray, "B A"]],
-    size: tuple[int, int],
-    fewest: int,
-) -> Models:
-    """Compute the mean embedding of each tracklet and camera, of unit length.
-
-    Args:
-        links: L associations of rows and boxes.
-        owners: Tracklet of each association.
-        embeddings: A unit vector for each box of each camera.
-        size: Number of tracklets and of cameras.
-        fewest: Least number of boxes of an embedding.
-    """
-    vectors = np.zeros((*size, embeddings[0].shape[1]))
-    counts = np.zeros(size, dtype=np.int64)
-    for c in range(size[1]):
-        own = links.cameras == c
-        rows = owners[own]
-        order = np.argsort(rows, kind="stable")
-        sorted_rows = rows[order]
-        begins = np.flatnonzero(np.diff(sorted_rows, prepend=-1))
-        if len(begins):
-            vectors[sorted_rows[begins], c] = np.add.reduceat(
-                embeddings[c][links.boxes[own][order]].astype(float), begins
-            )
-        counts[:, c] = np.bincount(rows, minlength=size[0])
-    known = counts >= fewest
-    return Models(_unit(vectors) * known[..., None], known)
-
-
-def _less(models: Models, common: Float[ndarray, "C A"]) -> Models:
-    """Subtract the mean over all tracklets from each embedding, and normalise."""
-    return Models(_unit(models.vectors - common) * models.known[..., None], models.known)
-
-
-def _unit(vectors: ndarray) -> ndarray:
-    lengths = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return np.asarray(vectors / np.maximum(lengths, 1e-9))
 
 
 def _together(tracklets: Paths) -> tuple[Int[ndarray, " P"], Int[ndarray, " P"]]:
@@ -216,11 +245,3 @@ def _together(tracklets: Paths) -> tuple[Int[ndarray, " P"], Int[ndarray, " P"]]
     lasts = tracklets.lasts
     overlap = np.minimum(lasts[i], lasts[j]) > np.maximum(tracklets.firsts[i], tracklets.firsts[j])
     return i[overlap], j[overlap]
-
-
-def _median(values: ndarray, otherwise: tuple[float, float]) -> tuple[float, float]:
-    """The median and the standard deviation estimated from absolute deviations."""
-    if len(values) < _COMPARED:
-        return otherwise
-    middle = float(np.median(values))
-    return middle, max(1.4826 * float(np.median(np.abs(values - middle))), _NARROWEST)
