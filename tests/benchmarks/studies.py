@@ -43,7 +43,7 @@ PARAMETERS: dict[str, Any] = {
 def run(short: bool) -> Iterator[Measurement]:
     """A study of three recordings on two workers, then its runs in a loop written by hand."""
     if all((DATA / name).is_dir() for name in RECORDINGS):
-        yield from _real(12 if short else 300)
+        yield from _real(6 if short else 300)
 
 
 def crowd(short: bool) -> Iterator[Measurement]:

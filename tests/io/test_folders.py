@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from tests.io.scoreboard import score
 
 SEED = 7
@@ -10,6 +12,7 @@ SILENT = 2
 """Of these so many are wrong without a word: fewer is progress, more is a fault."""
 
 
+@pytest.mark.full
 def test_no_more_folders_are_silently_wrong_than_before() -> None:
     found = [score(SEED, number, most_frames=200) for number in range(FOLDERS)]
     silent = [

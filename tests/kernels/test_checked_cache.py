@@ -176,6 +176,7 @@ def stored(tmp_path: Path, name: str) -> list[Path]:
     return sorted((tmp_path / "kernels").rglob(f"many.{name}-*.nbc"))
 
 
+@pytest.mark.full
 def test_a_large_kernel_is_stored_once_and_its_caller_refers_to_it(
     called: Callable[[], list[str]], tmp_path: Path
 ) -> None:
@@ -185,6 +186,7 @@ def test_a_large_kernel_is_stored_once_and_its_caller_refers_to_it(
     assert called() == ["True", "0 0"]
 
 
+@pytest.mark.full
 def test_a_caller_whose_large_kernel_was_lost_works_and_both_are_whole_again(
     called: Callable[[], list[str]], tmp_path: Path
 ) -> None:

@@ -20,6 +20,8 @@ from tests.rooms.walls.background import Tracer
 from tests.rooms.walls.interior import furnish
 from tracker.sequences.reader import read_sequence
 
+pytestmark = pytest.mark.full  # the generator is no part of the program
+
 
 @pytest.fixture(scope="module")
 def scenes() -> dict[str, Scene]:
@@ -104,7 +106,6 @@ def test_constant_velocity_is_kept_in_time() -> None:
 # ── occlusion ─────────────────────────────────────────────────────────────────
 
 
-@pytest.mark.full
 @pytest.mark.parametrize("step", [264, 280, 295])
 def test_person_2_hides_3_in_both_cameras(studio: Studio, step: int) -> None:
     visible = studio.draw(step, step + 1).visible[0]
@@ -212,7 +213,6 @@ def test_shadows_are_dark_under_the_ball_only() -> None:
 # ── the folder ────────────────────────────────────────────────────────────────
 
 
-@pytest.mark.full
 def test_the_folder_is_an_ordinary_sequence(rendered: Path, scenes: dict[str, Scene]) -> None:
     sequence = read_sequence(rendered)
     assert sequence.name == "room24-2p"
@@ -260,7 +260,6 @@ def test_visibility_has_a_row_for_every_true_position(rendered: Path) -> None:
     assert np.nanmedian(visible) > 0.9
 
 
-@pytest.mark.full
 def test_the_same_seed_gives_the_same_files(tmp_path: Path) -> None:
     for name, seed in (("a", 3), ("b", 3), ("c", 4)):
         render("room35-2p", tmp_path / name, frames=3, cameras=3, seed=seed)
@@ -282,7 +281,6 @@ def test_the_same_seed_gives_the_same_files(tmp_path: Path) -> None:
     assert read_visibility(tmp_path / "a").size == 0
 
 
-@pytest.mark.full
 def test_progress_is_told_and_cancelling_leaves_nothing(tmp_path: Path) -> None:
     told: list[tuple[int, int]] = []
     render(

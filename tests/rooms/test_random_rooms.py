@@ -26,6 +26,8 @@ from tests.rooms.walls.background import Background
 from tracker.geometry.camera import Camera
 from tracker.sequences.reader import read_sequence
 
+pytestmark = pytest.mark.full  # the generator is no part of the program
+
 SEED = 71
 STEPS = 70
 """A small room, and its first steps: three people who come and go, and a screen."""
@@ -66,7 +68,6 @@ def test_a_room_has_only_so_many_steps(tmp_path: Path) -> None:
         render_random(SEED, tmp_path / "room", frames=9999)
 
 
-@pytest.mark.full
 def test_pictures_and_files_are_the_same_again(tmp_path: Path, rendered: Path) -> None:
     render_random(SEED, tmp_path / "again", frames=STEPS)
     """But for a detector's boxes, which are there only when they are asked for."""
@@ -79,7 +80,6 @@ def test_pictures_and_files_are_the_same_again(tmp_path: Path, rendered: Path) -
     assert not read_sequence(tmp_path / "again").has_detections
 
 
-@pytest.mark.full
 def test_a_room_opens_as_any_sequence(rendered: Path) -> None:
     sequence, choices = read_sequence(rendered), choose(SEED)
     assert len(sequence.views) == choices.cameras
@@ -217,7 +217,6 @@ def test_boxes_are_cut_at_the_border_and_absent_outside() -> None:
     assert seen.framed[0, 1, 0] == 0.0
 
 
-@pytest.mark.full
 def test_who_sits_and_who_lies_is_lower_than_who_stands() -> None:
     choices = replace(
         choose(8), cameras=2, image_size=(320, 240), behaviours=("rises", "sits", "lies", "walks")

@@ -16,6 +16,8 @@ from tracker.sequences import built_in
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.reader import FILE, read_sequence
 
+pytestmark = pytest.mark.full  # the generator is no part of the program
+
 MOST_DIFFERENT = 4.0
 """Mean difference in grey levels that compression may leave."""
 
@@ -53,7 +55,6 @@ def difference(studio: Studio, reader: FrameReader, step: int) -> float:
     return max(float(np.abs(one[0].astype(float) - other).mean()) for one, other in pairs)
 
 
-@pytest.mark.full
 def test_templates_are_chosen_as_the_generator_chooses_them(tmp_path: Path) -> None:
     render("room24-2p", tmp_path / "room24-2p", frames=STEPS)
     text = (tmp_path / "room24-2p" / FILE).read_text(encoding="utf-8")
