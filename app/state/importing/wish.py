@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from pydantic import ConfigDict, Field
 
 from app.described import Described
-from tracker.io.importing.options import ImportOptions, CommonImportOptions
+from tracker.io.importing.options import CommonImportOptions, ImportOptions
 from tracker.io.read.pieces import (
     METRES,
     DetectionPiece,
