@@ -44,6 +44,7 @@ def _tracks() -> Trajectories:
         positions=places,
         existences=np.linspace(0.5, 1.0, len(ids)),
         sigmas=np.full((len(ids), 3), 0.05),
+        covariances_xy=np.linspace(-0.002, 0.002, len(ids)),
         seen=np.ones((len(ids), cameras), dtype=bool),
         components=np.zeros(len(ids), dtype=np.int64),
     )

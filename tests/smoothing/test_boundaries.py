@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from numpy import ndarray
@@ -11,9 +9,7 @@ from numpy.testing import assert_allclose
 from scipy.stats import multivariate_normal
 
 from tracker.filters.models import Motion
-from tracker.kernels.gating import Measurements
 from tracker.parameters.groups.fusion import FusionParams
-from tracker.smoothing.identity.appearance import Appearance
 from tracker.smoothing.identity.constraints import Constraint, LinkConstraints, possible
 from tracker.smoothing.identity.ends import Ends
 from tracker.smoothing.identity.tracklets import (
@@ -24,8 +20,7 @@ from tracker.smoothing.identity.tracklets import (
     same_label,
 )
 from tracker.smoothing.lifetimes import independence
-from tracker.smoothing.paths import Links, Paths
-from tracker.smoothing.recording import CameraBoxes
+from tracker.smoothing.paths import Paths
 from tracker.smoothing.smoother import Fitted
 
 PRIOR = np.diag([100.0] * 3 + [0.49] * 3)
@@ -174,69 +169,3 @@ def test_the_share_of_new_evidence_is_a_steps_time_over_the_memory(
     step_time: float, memory: float, share: float
 ) -> None:
     assert independence(step_time, memory) == pytest.approx(share)
-
-
-# ── embeddings
-
-
-def looking(angles: list[list[float]], first: int = 0) -> tuple[Paths, Links, CameraBoxes, ndarray]:
-    """Pieces side by side, of whose boxes each looks in its direction, radians."""
-    steps = len(angles[0])
-    paths = standing(*((k, first, first + steps - 1, 3.0 * k) for k in range(len(angles))))
-    boxes = np.array(
-        [[100.0 * k, 50.0, 5.0, 10.0] for _ in range(steps) for k in range(len(angles))]
-    )
-    starts = np.arange(steps + 1) * len(angles)
-
-    def nothing(*_: ndarray) -> Measurements:
-        return Measurements(np.zeros((0, 3)), np.zeros((0, 3, 3)))
-
-    camera = CameraBoxes(
-        starts, np.zeros(steps, bool), boxes, np.ones_like(boxes), np.ones(len(boxes)), nothing
-    )
-    rows = np.arange(len(boxes))
-    of = np.array([step * len(angles) + k for k in range(len(angles)) for step in range(steps)])
-    links = Links(np.zeros(len(rows), dtype=np.int64), rows, of, np.ones(len(rows)))
-    embeddings = np.array([[np.cos(angles[k][s]), np.sin(angles[k][s])] for s in range(steps)
-                      for k in range(len(angles))])  # fmt: skip
-    return paths, links, camera, embeddings
-
-
-def test_looks_are_compared_by_the_medians_of_the_recording() -> None:
-    """Of few pieces the medians are 0.15 + 0.05 for one person and 0.8 for two: between these the
-    ratio is that of the two normal densities, with a doubt of 0.02 on either side."""
-    paths, links, camera, embeddings = looking([[0.0] * 4, [2.0] * 4, [4.0] * 4])
-    found = Appearance(paths, links, [camera], [embeddings], 0.1)
-    ratio, known = found.log_ratio(np.array([0, 0, 1]), np.array([1, 2, 2]))
-    assert known.all()
-    common = embeddings[:3].mean(axis=0)
-    own = embeddings[:3] - common
-    own /= np.linalg.norm(own, axis=1, keepdims=True)
-    for (i, j), value in zip(((0, 1), (0, 2), (1, 2)), ratio, strict=True):
-        d = np.clip((1.0 - own[i] @ own[j]) / 2.0, 0.2, 0.8)
-        wide = np.hypot(0.15, 0.1)
-        one = np.exp(-0.5 * ((d - 0.2) / wide) ** 2) / wide
-        two = np.exp(-0.5 * ((d - 0.8) / 0.15) ** 2) / 0.15
-        assert value == pytest.approx(
-            np.log((0.98 * one + 0.02 * two) / (0.02 * one + 0.98 * two)), abs=1e-9
-        )
-
-
-@pytest.mark.parametrize(
-    ("steps", "step_time", "known"),
-    [(2, 0.1, False), (3, 0.1, True), (4, 0.04, False), (5, 0.04, True)],
-)
-def test_looks_need_three_boxes_and_a_fifth_of_a_second(
-    steps: int, step_time: float, known: bool
-) -> None:
-    paths, links, camera, embeddings = looking([[0.0] * steps, [2.0] * steps])
-    found = Appearance(paths, links, [camera], [embeddings], step_time)
-    assert found.log_ratio(np.array([0]), np.array([1]))[1].tolist() == [known]
-
-
-@pytest.mark.parametrize(("share", "known"), [(0.7, False), (0.7 + 1e-9, True)])
-def test_a_box_that_is_hardly_ones_own_tells_nothing_of_looks(share: float, known: bool) -> None:
-    paths, links, camera, embeddings = looking([[0.0] * 4, [2.0] * 4])
-    less = replace(links, shares=np.full(len(links.shares), share))
-    found = Appearance(paths, less, [camera], [embeddings], 0.1)
-    assert found.log_ratio(np.array([0]), np.array([1]))[1].tolist() == [known]

@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from tests.smoothing.test_boundaries import PRIOR, fitted, looking, standing
+from tests.smoothing.test_appearance import noisy, recording
+from tests.smoothing.test_boundaries import PRIOR, fitted, standing
 from tracker.filters.models import Motion
 from tracker.parameters.groups.fusion import FusionParams
 from tracker.parameters.groups.smoothing import SmoothingParams
 from tracker.smoothing.identity import identities, odds
-from tracker.smoothing.identity.appearance import Appearance
+from tracker.smoothing.identity.appearance import AppearanceModel
 from tracker.smoothing.identity.ends import Ends
 from tracker.smoothing.identity.tracklets import Pairs, motion_gains
 from tracker.smoothing.paths import Links
@@ -98,18 +99,21 @@ def test_who_comes_back_is_one_of_those_who_left() -> None:
 
 @pytest.mark.parametrize("weight", [1.0, 0.5])
 def test_looks_weigh_in_a_link_and_in_a_return(weight: float) -> None:
-    _, links, camera, embeddings = looking([[0.0] * 4, [2.0] * 4, [0.1] * 4])
-    # the third comes after both
-    later = standing((0, 0, 3, 0.0), (1, 0, 3, 3.0), (2, 4, 7, 0.1))
+    _, links, camera, embeddings = recording(noisy(7))
+    # the last comes after all others
+    pieces = [(k, 0, 7, 3.0 * k) for k in range(6)]
+    later = standing(*pieces, (6, 9, 16, 0.1))
     p = SmoothingParams(appearance=weight, memory=0.25)
-    alike = Appearance(later, links, [camera], [embeddings], STEP)
-    ratio, known = alike.log_ratio(np.array([0, 1]), np.array([2, 2]))
+    alike = AppearanceModel(later, links, [camera], [embeddings], STEP)
+    ratio, known = alike.log_ratio(np.arange(6), np.full(6, 6))
     assert known.all()
-    assert ratio[0] > ratio[1]
-    found = odds.long_gap_odds(smoother(camera), later, links, [[0], [1], [2]], p, [embeddings])
+    assert ratio[::2].min() > ratio[1::2].max()
+    chains = [[k] for k in range(7)]
+    found = odds.long_gap_odds(smoother(camera), later, links, chains, p, [embeddings])
     newcomer = np.log(BIRTH * STEP * (1.0 - SURVIVAL))
-    assert_allclose(found.gains, newcomer - np.log(2.0) + weight * ratio)
-    assert list(zip(found.earlier.tolist(), found.later.tolist(), strict=True)) == [(0, 2), (1, 2)]
+    assert_allclose(found.gains, newcomer - np.log(6.0) + weight * ratio)
+    assert found.earlier.tolist() == list(range(6))
+    assert found.later.tolist() == [6] * 6
 
 
 # ── what is told of them

@@ -260,3 +260,30 @@ def alone(boxes: ndarray, starts: ndarray) -> ndarray:
                     result[i] = False
                     result[j] = False
     return result
+
+
+@kernel
+def covered(boxes: ndarray, starts: ndarray) -> ndarray:
+    """The largest share of each of a camera's boxes that another box of its step covers, 0 … 1.
+
+    Args:
+        boxes: (B, 4) centre and half sizes, pixels.
+        starts: (T + 1,), index of each step's first box, and B.
+    """
+    result = np.zeros(len(boxes))
+    for step in range(len(starts) - 1):
+        for i in range(starts[step], starts[step + 1]):
+            for j in range(starts[step], starts[step + 1]):
+                if i == j:
+                    continue
+                share = 1.0
+                for axis in range(2):
+                    low = max(
+                        boxes[i, axis] - boxes[i, axis + 2], boxes[j, axis] - boxes[j, axis + 2]
+                    )
+                    high = min(
+                        boxes[i, axis] + boxes[i, axis + 2], boxes[j, axis] + boxes[j, axis + 2]
+                    )
+                    share *= max(high - low, 0.0) / max(2.0 * boxes[i, axis + 2], 1e-9)
+                result[i] = max(result[i], min(share, 1.0))
+    return result

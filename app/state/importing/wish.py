@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from pydantic import ConfigDict, Field
 
 from app.described import Described
-from tracker.io.importing.options import ImportOptions, StatedOptions
+from tracker.io.importing.options import CommonImportOptions, ImportOptions
 from tracker.io.read.pieces import (
     METRES,
     DetectionPiece,
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from tracker.io.importing.gathering import ParsedFiles
 
 
-class ImportWish(StatedOptions, Described):
+class ImportWish(CommonImportOptions, Described):
     """What somebody knows better than the files; null and empty: as it was found out."""
 
     model_config = ConfigDict(json_schema_serialization_defaults_required=True)
@@ -39,7 +39,7 @@ class ImportWish(StatedOptions, Described):
     """Whether what lies elsewhere on the disk is copied, not linked."""
 
 
-_OWN = set(ImportWish.model_fields) - set(StatedOptions.model_fields)
+_OWN = set(ImportWish.model_fields) - set(CommonImportOptions.model_fields)
 
 
 def looks_alike(one: ImportWish, other: ImportWish) -> bool:

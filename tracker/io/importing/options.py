@@ -21,7 +21,7 @@ MOST = 200
 """Cameras of which something may be stated."""
 
 
-class StatedOptions(BaseModel):
+class CommonImportOptions(BaseModel):
     """What can be stated of any import; None and empty: to be found out."""
 
     model_config = ConfigDict(
@@ -65,7 +65,7 @@ class StatedOptions(BaseModel):
     """Of each the position and the standard deviations, metres."""
 
 
-class ImportOptions(StatedOptions):
+class ImportOptions(CommonImportOptions):
     """What is stated of an import, with files of cameras by their path."""
 
     cameras: tuple[tuple[str, Path], ...] = ()

@@ -1,4 +1,10 @@
-"""Appearance models of tracklets, learnt from the recording, and their likelihood ratio."""
+"""Appearance of tracklets as a likelihood: probabilistic linear discriminant analysis (PLDA).
+
+[PE07] Prince, Elder, "Probabilistic linear discriminant analysis for inferences about identity",
+ICCV 2007.
+[BV10] Brümmer, de Villiers, "The speaker partitioning problem", Odyssey 2010: the two-covariance
+model.
+"""
 
 from __future__ import annotations
 
@@ -13,67 +19,59 @@ from tracker.kernels import boxes as box_kernels
 from tracker.smoothing.paths import Links, Paths
 from tracker.smoothing.recording import CameraBoxes
 
-_OWN = 0.7
-"""Least association probability of a box that contributes to an appearance model."""
+_WINDOW = 4.0
+"""Duration of the parts of tracklets from which the model is learnt, seconds: whole tracklets are
+too few."""
 
-_ENOUGH = 0.2
-"""Seconds of boxes in one camera that a model needs, at least :data:`_FEWEST` boxes."""
+_DIMENSIONS = 24
+"""Largest number of principal components of the embeddings."""
 
-_FEWEST = 3
-"""Least number of boxes of a model."""
+_FEWEST = 5
+"""Least number of parts, and of pairs of each kind, from which anything is learnt."""
 
-_APART = 0.25
-"""Seconds between the middle of a tracklet and each of its halves that are compared."""
+_CORRELATION = 0.3
+"""Correlation of the boxes of one tracklet: n boxes have the information of n / (1 + 0.3 (n − 1))
+independent ones."""
 
-_OUTLIERS = 0.02
-"""Probability that the appearance is uninformative."""
+_DRIFT = 0.15
+"""Variance of one person's appearance between tracklets, as a share of that between persons."""
 
-_LATER = 0.1
-"""Additional distance of one person's embeddings between tracklets, against within one."""
+_ROUNDING = 1e-6
+"""Least variance within a tracklet: that of unit vectors in half precision, 2⁻¹⁰ squared."""
 
-_NARROWEST = 0.1
-"""Least standard deviation of the distances."""
-
-_SAME, _OTHER = (0.15, 0.15), (0.8, 0.15)
-"""Median and standard deviation of the distances where a recording has too few."""
-
-_COMPARED = 5
-"""Least number of distances of each kind for using those of the recording."""
-
-_AT_ONCE = 2048
-"""Number of pairs that are compared at once, which bounds the memory for long recordings."""
+_MOST = 6.0
+"""Bound of the log ratio of a pair: however many boxes there are, the model is an approximation."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Models:
-    """The mean embeddings of n tracklets in each of C cameras."""
+class Means:
+    """The mean embeddings of n tracklets in D dimensions, and the number of boxes of each."""
 
-    vectors: Float[ndarray, "n C A"]
-    """Unit vectors, after the mean over all tracklets is subtracted; 0 where there is none."""
-    known: Bool[ndarray, "n C"]
-    """Whether a tracklet has an embedding in a camera."""
+    values: Float[ndarray, "n D"]
+    counts: Float[ndarray, " n"]
+    """Weighted number of boxes; 0 without any."""
 
-    def distances(self, one: ndarray, other: ndarray) -> Float[ndarray, "P C"]:
-        """The distance (1 − cos) / 2 of pairs in each camera: 0 if equal, 1 if opposite."""
-        cosines = np.empty((len(one), self.vectors.shape[1]))
-        for first in range(0, len(one), _AT_ONCE):
-            some = slice(first, first + _AT_ONCE)
-            cosines[some] = np.einsum(
-                "pca,pca->pc", self.vectors[one[some]], self.vectors[other[some]]
-            )
-        return np.asarray((1.0 - cosines) / 2.0)
+    @property
+    def variances(self) -> Float[ndarray, " n"]:
+        """Variance of each mean in units of that of one box; 1 without a box."""
+        counts = np.where(self.counts > 0.0, self.counts, 1.0)
+        return np.asarray((1.0 + _CORRELATION * (counts - 1.0)) / counts)
+
+    def take(self, chosen: ndarray) -> Means:
+        """Select the means of some tracklets, by mask or index."""
+        return Means(self.values[chosen], self.counts[chosen])
 
 
-class Appearance:
-    """A likelihood ratio of two tracklets having the same person, calibrated on the recording.
+class AppearanceModel:
+    """The log likelihood ratio of two tracklets being of one person, learnt from the recording.
 
-    The embedding of a tracklet in a camera is the mean of the unit vectors of its boxes that no
-    other box overlaps, less the mean over all tracklets. Two tracklets are compared by the angle
-    between their embeddings, in the cameras that have both. The distribution of one person's
-    distances is estimated from the two halves of tracklets, that of two persons' from tracklets
-    that exist at the same time; both are Gaussians of median and robust spread. Each camera's
-    likelihood ratio includes a probability of being uninformative, so that no camera outweighs
-    all others.
+    The model is PLDA [PE07] in the two-covariance form [BV10]. The mean of each camera is
+    subtracted from its embeddings, which are mapped to coordinates in which those of one tracklet
+    within some seconds have the covariance I, and the means of persons the distribution N(0, B)
+    with a diagonal B. A tracklet is represented by the weighted mean of all its boxes, and a pair
+    has the ratio of :func:`log_ratio_of` times β, clipped to ±6. β, at most 1, is the slope of a
+    logistic regression between halves of one tracklet and tracklets that exist at the same time.
+    Where a recording has too few of these, nothing is learnt and every ratio is 0.
     """
 
     def __init__(
@@ -84,7 +82,7 @@ class Appearance:
         embeddings: Many[Float[ndarray, "B A"]],
         step_time: float,
     ) -> None:
-        """Compute the embeddings of all tracklets, and the distributions of their distances.
+        """Learn the model, and compute the mean embeddings of all tracklets.
 
         Args:
             tracklets: The n tracklets.
@@ -93,121 +91,173 @@ class Appearance:
             embeddings: A unit vector for each box of each camera, 0 where there is none.
             step_time: Time between two steps, seconds.
         """
-        fewest = max(_FEWEST, round(_ENOUGH / step_time))
-        seen = [np.asarray(vectors.any(axis=1)) for vectors in embeddings]
-        own = links.take(clean(links, cameras, seen))
-        steps, owners = tracklets.steps[own.rows], tracklets.owners[own.rows]
-        middle = ((tracklets.firsts + tracklets.lasts) / 2.0)[owners]
-        apart = _APART / step_time
-        size = (len(tracklets.labels), len(cameras))
-        whole = _gather(own, owners, embeddings, size, fewest)
-        early = steps < middle - apart
-        late = steps > middle + apart
-        first = _gather(own.take(early), owners[early], embeddings, size, fewest)
-        second = _gather(own.take(late), owners[late], embeddings, size, fewest)
-        common = whole.vectors.sum(axis=0) / np.maximum(whole.known.sum(axis=0), 1)[:, None]
-        self._models = _less(whole, common)
-        halves = Models(
-            np.concatenate([_less(first, common).vectors, _less(second, common).vectors]),
-            np.concatenate([first.known, second.known]),
+        count = len(tracklets.labels)
+        self._between, self._slope = np.zeros(0), 0.0
+        self._means = Means(np.zeros((count, 0)), np.zeros(count))
+        vectors, weights, rows = _weighted_embeddings(links, cameras, embeddings)
+        owners, steps = tracklets.owners[rows], tracklets.steps[rows]
+        windows = steps // max(round(_WINDOW / step_time), 1)
+        parts = np.unique(owners * (windows.max(initial=0) + 1) + windows, return_inverse=True)[1]
+        learnt = learn_covariances(vectors, weights, parts)
+        if learnt is None:
+            return
+        projection, self._between = learnt
+        vectors = vectors @ projection
+        self._means = _means(vectors, weights, owners, count)
+        late = steps > ((tracklets.firsts + tracklets.lasts) / 2.0)[owners]
+        first, second = (
+            _means(vectors[half], weights[half], owners[half], count) for half in (~late, late)
         )
-        one = np.arange(size[0])
-        both = first.known & second.known
-        same = halves.distances(one, one + size[0])[both]
+        both = (first.counts > 0.0) & (second.counts > 0.0)
+        same = log_ratio_of(self._between, first.take(both), second.take(both))
         i, j = _together(tracklets)
-        other = self._models.distances(i, j)[whole.known[i] & whole.known[j]]
-        middle_same, spread_same = _median(same, _SAME)
-        self._same = middle_same + _LATER / 2.0, float(np.hypot(spread_same, _LATER))
-        self._other = _median(other, _OTHER)
+        seen = (self._means.counts[i] > 0.0) & (self._means.counts[j] > 0.0)
+        one, two = self._means.take(i[seen]), self._means.take(j[seen])
+        other = log_ratio_of(self._between, one, two)
+        if min(len(same), len(other)) >= _FEWEST:
+            self._slope = logistic_slope(same, other)
 
     def log_ratio(
         self, earlier: Int[ndarray, " P"], later: Int[ndarray, " P"]
     ) -> tuple[Float[ndarray, " P"], Bool[ndarray, " P"]]:
-        """The log likelihood ratio of pairs of tracklets being of one person against two.
+        """Compute the log likelihood ratio of pairs of tracklets.
 
         Args:
-            earlier: Index of the first tracklet of each pair.
+            earlier: Index of the first of each of P pairs.
             later: Index of the second.
 
         Returns:
-            The log ratio, 0 where no camera has both, and whether any camera has both.
+            The log ratio, 0 where either has no embedding or nothing was learnt, and whether both
+            have embeddings and something was learnt.
         """
-        known = self._models.known[earlier] & self._models.known[later]
-        (low, narrow), (high, wide) = self._same, self._other
-        if not high > low:  # appearance does not distinguish people here
-            return np.zeros(len(earlier)), np.zeros(len(earlier), dtype=bool)
-        # beyond the two medians a distance has the likelihood ratio of the median
-        distances = np.clip(self._models.distances(earlier, later), low, high)
-        one = np.exp(-0.5 * ((distances - low) / narrow) ** 2) / narrow
-        two = np.exp(-0.5 * ((distances - high) / wide) ** 2) / wide
-        ratio = np.log(
-            ((1.0 - _OUTLIERS) * one + _OUTLIERS * two)
-            / (_OUTLIERS * one + (1.0 - _OUTLIERS) * two)
-        )
-        return np.asarray((ratio * known).sum(axis=1)), known.any(axis=1)
+        one, two = self._means.take(earlier), self._means.take(later)
+        known = (one.counts > 0.0) & (two.counts > 0.0) & (self._slope > 0.0)
+        ratio = np.clip(self._slope * log_ratio_of(self._between, one, two), -_MOST, _MOST)
+        return np.where(known, ratio, 0.0), known
 
 
-def clean(
-    links: Links, cameras: Many[CameraBoxes], seen: Many[Bool[ndarray, " B"]] | None = None
-) -> Bool[ndarray, " L"]:
-    """Select the links of boxes with a clear association that overlap no other box.
+def log_ratio_of(between: Float[ndarray, " D"], one: Means, other: Means) -> Float[ndarray, " P"]:
+    """Compute the log likelihood ratio of one person against two for P pairs of means.
+
+    With the variance v = 0.15 B + 1/n* of a mean y, of a person's change of appearance and of the
+    n* independent boxes that it is worth, the ratio is
+
+        Σ_d log N([y_i, y_j]; 0, [[B + v_i, B], [B, B + v_j]])
+                / N(y_i; 0, B + v_i) N(y_j; 0, B + v_j)
 
     Args:
-        links: L associations of rows and boxes.
-        cameras: The boxes of each camera.
-        seen: Whether each box of each camera has an embedding; None for all.
+        between: B, the variances between persons, in units of that within tracklets.
+        one: Mean embeddings of the first of each pair.
+        other: Mean embeddings of the second.
     """
-    found = links.shares > _OWN
+    total = np.zeros(len(one.counts))
+    variances = one.variances, other.variances
+    # dimension by dimension: of many pairs all dimensions at once need much memory
+    for d, shared in enumerate(between.tolist()):
+        first, second = ((1.0 + _DRIFT) * shared + variance for variance in variances)
+        x, y = one.values[:, d], other.values[:, d]
+        determinant = first * second - shared**2
+        total -= 0.5 * np.log(determinant / (first * second))
+        total -= 0.5 * (x**2 * second + y**2 * first - 2.0 * shared * x * y) / determinant
+        total += 0.5 * (x**2 / first + y**2 / second)
+    return total
+
+
+def learn_covariances(
+    vectors: Float[ndarray, "K A"], weights: Float[ndarray, " K"], parts: Int[ndarray, " K"]
+) -> tuple[Float[ndarray, "A D"], Float[ndarray, " D"]] | None:
+    """Estimate the covariances within and between the parts of tracklets.
+
+    Args:
+        vectors: Embeddings of K boxes, less the mean.
+        weights: Weight of each, 0 … 1.
+        parts: Index of the part of a tracklet that each belongs to.
+
+    Returns:
+        The projection to coordinates in which the covariance within parts is I and that between
+        them diagonal, and its diagonal B > 0; None if too few parts have more than one box, or if
+        these do not differ.
+    """
+    several = np.bincount(parts, weights) > 1.0
+    if several.sum() < _FEWEST:
+        return None
+    _, axes = np.linalg.eigh((vectors * weights[:, None]).T @ vectors)
+    projection = axes[:, : -1 - min(_DIMENSIONS, several.sum() - 1) : -1]
+    means = _means(vectors @ projection, weights, parts, len(several))
+    residuals = vectors @ projection - means.values[parts]
+    used = np.where(several[parts], weights, 0.0)
+    within = (residuals * used[:, None]).T @ residuals / (means.counts[several] - 1.0).sum()
+    sizes, axes = np.linalg.eigh(within)
+    sizes = np.maximum(sizes, max(1e-3 * sizes.max(), _ROUNDING))
+    projection = projection @ (axes / np.sqrt(sizes))
+    means = _means(vectors @ projection, weights, parts, len(several)).take(several)
+    sizes, axes = np.linalg.eigh(means.values.T @ means.values / len(means.counts))
+    between = sizes - means.variances.mean()
+    good = between > 0.0
+    return (projection @ axes[:, good], between[good]) if good.any() else None
+
+
+def logistic_slope(same: Float[ndarray, " S"], other: Float[ndarray, " O"]) -> float:
+    """Calibrate log ratios by logistic regression without an offset; both kinds count alike.
+
+    Args:
+        same: Log ratios of S pairs of one person.
+        other: Log ratios of O pairs of two persons.
+
+    Returns:
+        The factor of the log ratios, 0 … 1: a model that is too sure of itself is corrected, one
+        that is too cautious is not.
+    """
+    margins = np.concatenate([same, -other])
+    shares = np.repeat([1.0 / len(same), 1.0 / len(other)], [len(same), len(other)])
+
+    def derivative(slope: float) -> float:
+        """The derivative of the log likelihood, which decreases with the slope."""
+        wrong = 1.0 / (1.0 + np.exp(np.clip(slope * margins, -500.0, 500.0)))
+        return float((shares * margins * wrong).sum())
+
+    low, high = 0.0, 1.0
+    if derivative(high) >= 0.0:
+        return high
+    for _ in range(30):
+        middle = (low + high) / 2.0
+        low, high = (middle, high) if derivative(middle) > 0.0 else (low, middle)
+    return low
+
+
+def _weighted_embeddings(
+    links: Links, cameras: Many[CameraBoxes], embeddings: Many[Float[ndarray, "B A"]]
+) -> tuple[Float[ndarray, "K A"], Float[ndarray, " K"], Int[ndarray, " K"]]:
+    """The embeddings of links less each camera's mean, their weights and their rows.
+
+    The weight is the association probability times (1 − o)², o being the largest share of the box
+    that another box covers.
+    """
+    vectors, weights, rows = [], [], []
     for c, camera in enumerate(cameras):
-        good = box_kernels.alone(camera.boxes, camera.starts)
-        if seen is not None:
-            good &= seen[c]
-        own = links.cameras == c
-        found[own] &= good[links.boxes[own]]
-    return np.asarray(found)
+        own = links.take(links.cameras == c)
+        own = own.take(np.asarray(embeddings[c].any(axis=1))[own.boxes])
+        covered = box_kernels.covered(camera.boxes, camera.starts)[own.boxes]
+        values = np.asarray(embeddings[c], dtype=float)[own.boxes]
+        weight = own.shares * (1.0 - covered) ** 2
+        total = weight.sum()
+        vectors.append(values - weight @ values / (total if total > 0.0 else 1.0))
+        weights.append(weight)
+        rows.append(own.rows)
+    return np.concatenate(vectors), np.concatenate(weights), np.concatenate(rows)
 
 
-def _gather(
-    links: Links,
-    owners: Int[ndarray, " L"],
-    embeddings: Many[Float[ndarray, "B A"]],
-    size: tuple[int, int],
-    fewest: int,
-) -> Models:
-    """Compute the mean embedding of each tracklet and camera, of unit length.
-
-    Args:
-        links: L associations of rows and boxes.
-        owners: Tracklet of each association.
-        embeddings: A unit vector for each box of each camera.
-        size: Number of tracklets and of cameras.
-        fewest: Least number of boxes of an embedding.
-    """
-    vectors = np.zeros((*size, embeddings[0].shape[1]))
-    counts = np.zeros(size, dtype=np.int64)
-    for c in range(size[1]):
-        own = links.cameras == c
-        rows = owners[own]
-        order = np.argsort(rows, kind="stable")
-        sorted_rows = rows[order]
-        begins = np.flatnonzero(np.diff(sorted_rows, prepend=-1))
-        if len(begins):
-            vectors[sorted_rows[begins], c] = np.add.reduceat(
-                embeddings[c][links.boxes[own][order]].astype(float), begins
-            )
-        counts[:, c] = np.bincount(rows, minlength=size[0])
-    known = counts >= fewest
-    return Models(_unit(vectors) * known[..., None], known)
-
-
-def _less(models: Models, common: Float[ndarray, "C A"]) -> Models:
-    """Subtract the mean over all tracklets from each embedding, and normalise."""
-    return Models(_unit(models.vectors - common) * models.known[..., None], models.known)
-
-
-def _unit(vectors: ndarray) -> ndarray:
-    lengths = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return np.asarray(vectors / np.maximum(lengths, 1e-9))
+def _means(
+    vectors: Float[ndarray, "K D"],
+    weights: Float[ndarray, " K"],
+    of: Int[ndarray, " K"],
+    count: int,
+) -> Means:
+    """The weighted mean of the vectors of each of ``count`` tracklets; 0 where there are none."""
+    counts = np.bincount(of, weights, count)
+    values = np.zeros((count, vectors.shape[1]))
+    np.add.at(values, of, weights[:, None] * vectors)
+    return Means(values / np.where(counts > 0.0, counts, 1.0)[:, None], counts)
 
 
 def _together(tracklets: Paths) -> tuple[Int[ndarray, " P"], Int[ndarray, " P"]]:
@@ -216,11 +266,3 @@ def _together(tracklets: Paths) -> tuple[Int[ndarray, " P"], Int[ndarray, " P"]]
     lasts = tracklets.lasts
     overlap = np.minimum(lasts[i], lasts[j]) > np.maximum(tracklets.firsts[i], tracklets.firsts[j])
     return i[overlap], j[overlap]
-
-
-def _median(values: ndarray, otherwise: tuple[float, float]) -> tuple[float, float]:
-    """The median and the standard deviation estimated from absolute deviations."""
-    if len(values) < _COMPARED:
-        return otherwise
-    middle = float(np.median(values))
-    return middle, max(1.4826 * float(np.median(np.abs(values - middle))), _NARROWEST)

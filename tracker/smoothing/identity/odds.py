@@ -12,7 +12,7 @@ from tracker.fusion import visibility
 from tracker.kernels.smoothing import evidence
 from tracker.parameters.groups.smoothing import SmoothingParams
 from tracker.smoothing.identity import tracklets
-from tracker.smoothing.identity.appearance import Appearance
+from tracker.smoothing.identity.appearance import AppearanceModel
 from tracker.smoothing.identity.ends import Ends
 from tracker.smoothing.identity.tracklets import Pairs, join_chains, same_label
 from tracker.smoothing.lifetimes import independence, misses
@@ -98,7 +98,9 @@ class ShortGapOdds:
         self._empty = _seen_empty(smoother, paths, near, p.memory)
         self._alike = np.zeros(len(near.earlier))
         if embeddings is not None:
-            alike = Appearance(paths, links, smoother.cameras, embeddings, smoother.model.step_time)
+            alike = AppearanceModel(
+                paths, links, smoother.cameras, embeddings, smoother.model.step_time
+            )
             self._alike = p.appearance * alike.log_ratio(near.earlier, near.later)[0]
 
     def pairs(self, known: Ends) -> Pairs:
@@ -150,7 +152,7 @@ def long_gap_odds(
     if embeddings is not None:
         whole, rows = join_chains(paths, chains, list(range(len(chains))))
         own = tracklets.renumber_rows(links, rows)
-        alike = Appearance(whole, own, smoother.cameras, embeddings, smoother.model.step_time)
+        alike = AppearanceModel(whole, own, smoother.cameras, embeddings, smoother.model.step_time)
         before = lasts[:, None] < firsts[None, :]
         gone = np.maximum(before.sum(axis=0), 1)
         earlier, later = np.nonzero(before)

@@ -7,18 +7,22 @@ from collections.abc import Sequence as Many
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from numpy import ndarray
 
+from tracker.kernels import boxes as box_kernels
 from tracker.parameters.groups.fusion import FusionParams
 from tracker.single_view.protocol import ViewResult
-from tracker.smoothing.identity import appearance
 from tracker.smoothing.paths import Links, Paths
+from tracker.smoothing.recording import CameraBoxes
 from tracker.smoothing.smoother import Smoother
 from tracker.steps import Steps
 
 _AS_THE_FILTER = FusionParams()
 """The filter's default parameters, by which colours are weighted whatever the filter is set to."""
+
+_OWN = 0.7
+"""Least association probability of a box whose colours count."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -104,7 +108,7 @@ def template_log_odds(
     """
     if seen.likenesses is None:
         return np.zeros((len(tracklets.labels), 1))
-    own = links.take(appearance.clean(links, smoother.cameras))
+    own = links.take(_clear(links, smoother.cameras))
     owners = tracklets.owners[own.rows]
     people = seen.likenesses[0].shape[1]
     scores = np.zeros((len(tracklets.labels), people))
@@ -116,6 +120,15 @@ def template_log_odds(
         share = fresh * own.shares[of_camera]
         np.add.at(scores, owners[of_camera], share[:, None] * odds)
     return np.asarray(scores - scores.max(axis=1, keepdims=True))
+
+
+def _clear(links: Links, cameras: Many[CameraBoxes]) -> Bool[ndarray, " L"]:
+    """Select the links of boxes with a clear association that overlap no other box."""
+    result = links.shares > _OWN
+    for c, camera in enumerate(cameras):
+        own = links.cameras == c
+        result[own] &= box_kernels.alone(camera.boxes, camera.starts)[links.boxes[own]]
+    return np.asarray(result)
 
 
 def of_chains(scores: Float[ndarray, "n G"], chains: Many[Many[int]]) -> Float[ndarray, "m G"]:
