@@ -10,7 +10,7 @@ import cv2
 import httpx2
 import numpy as np
 from numpy import ndarray
-from playwright.sync_api import Error, FloatRect, Frame, Page
+from playwright.sync_api import Error, FloatRect, Frame, Locator, Page
 
 from tests.browser.serving import Server
 from tests.conftest import PATIENCE
@@ -109,6 +109,15 @@ def ask(server: Server, method: str, path: str, body: dict | None = None) -> dic
     assert answer.status_code == 200, answer.text
     state: dict = answer.json()
     return state
+
+
+def still(locator: Locator) -> FloatRect:
+    """Where an element is once it stands still: a note that arrives moves the panes."""
+    before, box = None, locator.bounding_box()
+    while box is None or box != before:
+        locator.page.wait_for_timeout(300)
+        before, box = box, locator.bounding_box()
+    return box
 
 
 def as_at_first(server: Server) -> None:

@@ -15,7 +15,7 @@ from playwright.sync_api import Page, expect
 from app.scene import framing
 from app.scene.scene import _margin_around
 from tests.browser.conftest import Server
-from tests.browser.looking import as_at_first, ask, by_palette, readout, until, viser
+from tests.browser.looking import as_at_first, ask, by_palette, readout, still, until, viser
 from tracker.export.tracks_csv import read_tracks_csv
 from tracker.runs import pipeline
 from tracker.sequences.reader import FILE, read_sequence
@@ -131,8 +131,7 @@ def test_the_field_of_a_new_name_is_no_trap(flat_page: Page, server: Server) -> 
     def draw(left: float) -> None:
         if "drawing" not in (page.locator(".mosaic").get_attribute("class") or ""):
             page.keyboard.press("c")
-        box = page.locator(".cam").first.bounding_box()
-        assert box is not None
+        box = still(page.locator(".cam").first)
         scale = box["width"] / 192
         x, y = box["x"] + left * scale, box["y"] + 30 * scale
         drag(page, (x, y), (x + 24 * scale, y + 48 * scale))
