@@ -1,7 +1,7 @@
 """Damage recordings for some minutes: ``python3 -m tests.bad_input MINUTES [--seed N]``.
 
 With ``--cases 20000 --resume FILE`` it ends after so many, and goes on where the file says that it
-was ended before.
+was ended before; with ``--imports`` files of other programs are damaged and imported, too.
 
 Every worker is a process of its own, so that a crash is reported as any other failure: with the
 lines that the corpus takes (``tests/bad_input/corpus.json``), reduced to the damage that it needs.
@@ -47,12 +47,17 @@ def main() -> int:
     parser.add_argument(
         "--bounds", action="store_true", help="the kernels check every index, and are slower"
     )
+    parser.add_argument(
+        "--imports", action="store_true", help="files of other programs are damaged too"
+    )
     parser.add_argument("--cases", type=int, default=None, help="end after so many")
     parser.add_argument("--resume", type=Path, default=None, help="keeps where it was ended")
     parser.add_argument("--work", type=int, default=None, help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     if arguments.work is not None:
         return work(arguments.work, time.monotonic() + 60.0 * arguments.minutes)
+    if arguments.imports:
+        os.environ["MULTIVIEW_PHD_DAMAGED_IMPORTS"] = "1"
     if arguments.bounds:  # machine code of its own, kept for the next time
         os.environ["NUMBA_BOUNDSCHECK"] = "1"
         os.environ["NUMBA_CACHE_DIR"] = str(cache_folder() / "kernels-with-bounds")
@@ -191,7 +196,7 @@ def tell_all(words: str) -> None:
 
 def work(seed: int, deadline: float) -> int:
     """One worker: a case a seed, told as a line of JSON before and after."""
-    from tests.bad_input.cases import LONGEST_SECONDS, Fell, make_bases, try_case
+    from tests.bad_input.cases import FOREIGN, LONGEST_SECONDS, Fell, make_bases, try_case
     from tests.bad_input.drawing import Damage, drawn
 
     faulthandler.enable()
@@ -211,6 +216,8 @@ def work(seed: int, deadline: float) -> int:
             try_case(base, [], place)
             tell(**{"is": "good"})
         usual = memory()
+        imports = "MULTIVIEW_PHD_DAMAGED_IMPORTS" in os.environ
+        drawn_from = [name for name in bases if imports or name != FOREIGN]
 
         def fault(base: str, damages: list[Damage]) -> str | None:
             try:
@@ -226,7 +233,7 @@ def work(seed: int, deadline: float) -> int:
 
         while time.monotonic() < deadline:
             random = Random(seed)
-            base, damages = random.choice(list(bases)), drawn(random)
+            base, damages = random.choice(drawn_from), drawn(random)
             case = {"base": base, "damages": [one.to_json() for one in damages]}
             tell(**{"is": "begun", "case": case, "next": seed + 1})
             outcome: list[str] = []

@@ -39,6 +39,10 @@ class Fell(AssertionError):
     """What must not be."""
 
 
+FOREIGN = "files of other programs"
+"""The recording that is imported."""
+
+
 def make_bases(folder: Path) -> dict[str, Path]:
     """Good folders of every kind."""
     bases = {
@@ -48,9 +52,9 @@ def make_bases(folder: Path) -> dict[str, Path]:
             folder / "images", frames=STEPS, container="images", detections=True
         ),
         "bare": write_crossing(folder / "bare", STEPS),
-        "files of other programs": folder / "files of other programs",
+        FOREIGN: folder / FOREIGN,
     }
-    others = bases["files of other programs"]
+    others = bases[FOREIGN]
     others.mkdir()
     toml(others)
     detections(others)

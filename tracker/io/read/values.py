@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
+from tracker.files.text import visible
 from tracker.io.read.pieces import Lens
 from tracker.io.read.source import SourceFile
 
@@ -198,8 +199,8 @@ def number(file: SourceFile, field: str, value: Any) -> float:
 
 
 def shown(value: Any) -> str:
-    """A value as a message shows it: short."""
-    text = f'"{value}"' if isinstance(value, str) else repr(value)
+    """A value as a message shows it: short, on one line."""
+    text = f'"{visible(value)}"' if isinstance(value, str) else repr(value)
     return text if len(text) <= 60 else f"{text[:57]}…"
 
 
