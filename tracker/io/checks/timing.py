@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from tracker.io.checks.synchronisation import CameraOffset, synchronise
-from tracker.io.conventions.questions import told_of_clocks
+from tracker.io.conventions.questions import describe_clocks
 from tracker.io.conventions.search import ClockFit
 from tracker.sequences.finding import Check, Remedy, absent, good, warning
 from tracker.sequences.pictures.frames import FrameReader
@@ -30,7 +30,7 @@ def check_time(
         sequence: Read rightly: with a wrong calibration nothing can be said.
         reader: Of the pictures.
         found: What :func:`synchronise` found, where it is known.
-        clocks: Of cameras whose boxes were compared by parts of the recording.
+        clocks: The clocks of the cameras whose boxes were compared by parts of the recording.
     """
     name = "cameras show the same moments"
     if len(sequence.views) < 2:
@@ -40,7 +40,7 @@ def check_time(
     if not found:
         yield absent(name, "neither boxes nor pictures of two cameras can be compared")
         return
-    uneven = told_of_clocks(clocks or {}, [camera.name for camera in sequence.cameras])
+    uneven = describe_clocks(clocks or {}, [camera.name for camera in sequence.cameras])
     for sentence in uneven:
         yield warning(name, sentence)
     late = [offset for offset in found if offset.sure]

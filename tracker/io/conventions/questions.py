@@ -209,8 +209,8 @@ def rearranged(
     return [replace(raw, name=name) for raw, name in zip(changed, names, strict=True)], found
 
 
-def told_of_clocks(clocks: Mapping[int, ClockFit], names: Sequence[str]) -> list[str]:
-    """Cameras whose clocks jump or drift."""
+def describe_clocks(clocks: Mapping[int, ClockFit], names: Sequence[str]) -> list[str]:
+    """Return a sentence for each camera whose clock jumps or drifts."""
     return [
         f"{names[camera]}: about step {fit.jump} its clock jumps by {fit.ends - fit.begins} steps, "
         f"or it drifts: it is {fit.begins} steps late in the first third of the recording and "
@@ -220,8 +220,8 @@ def told_of_clocks(clocks: Mapping[int, ClockFit], names: Sequence[str]) -> list
     ]
 
 
-def told_of_moments(verdict: Verdict, names: Sequence[str]) -> list[str]:
-    """Cameras whose boxes nothing confirms to be of the same moments as those of the others."""
+def describe_moments(verdict: Verdict, names: Sequence[str]) -> list[str]:
+    """Return sentences on cameras whose boxes nothing confirms to show the others' moments."""
     confirmed = verdict.confirmed
     told = []
     if len(confirmed) == 2 and verdict.kind == "decided":

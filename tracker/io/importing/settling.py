@@ -26,9 +26,9 @@ from tracker.io.conventions.questions import (
     Undecided,
     Unexplained,
     check_verdict,
+    describe_clocks,
+    describe_moments,
     rearranged,
-    told_of_clocks,
-    told_of_moments,
 )
 from tracker.io.conventions.reading import Reading, read_boxes, to_camera
 from tracker.io.conventions.readings import Open, Seen
@@ -172,7 +172,7 @@ def settle(taken: Sequence[ParsedFiles], options: ImportOptions | None = None) -
         shifted = _shifted(options, late, fps).model_copy(update={"fps": fps})
         times = settle_times(cameras, matched.truths, shifted, [])
         at_steps = _at_steps(detections, times)
-    told += told_of_clocks(clocks, names)
+    told += describe_clocks(clocks, names)
     for name, steps in late.items():
         how = f"{steps / times.fps:.2f} s late ({steps} steps, within 1)"
         found.append((f"{name} clock", f"{how}, since boxes meet so"))
@@ -466,7 +466,7 @@ def _read(
         every, told_ = rearranged([*raws, *spare], reading)
         raws = every[: len(raws)]
         found += told_
-        told += told_of_moments(verdict, [raw.name for raw in raws])
+        told += describe_moments(verdict, [raw.name for raw in raws])
     if any(raw.turns for raw in raws):
         found.append(("angles", f"{turns_in_words(reading.turns)}, {why}; --euler"))
     if reading.lean != (0.0, 0.0):
