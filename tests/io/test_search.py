@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from tests.random_rooms import random_room
 from tracker.io.checks.boxes import raw_cameras
@@ -117,3 +118,20 @@ def test_clocks_are_compared_anew_once_the_rate_is_known() -> None:
     clock = verdict.clocks_at(4.0)[1]
     assert not clock.steady
     assert clock.ends - clock.begins == pytest.approx(-3, abs=1)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_camera_that_was_turned_after_its_calibration_is_named(seed: int) -> None:
+    cameras, seen = given(random_room(seed, cameras=4, people=3))
+    assert found(cameras, seen, Open(orders=False)).moved == {}
+    own, angle = seed % 4, np.radians(12.0)
+    camera = cameras[own]
+    assert camera.rotation is not None
+    assert camera.translation is not None
+    turn = Rotation.from_rotvec([0.0, angle, 0.0]).as_matrix()
+    cameras[own] = replace(
+        camera, rotation=turn @ camera.rotation, translation=turn @ camera.translation
+    )
+    moved = found(cameras, seen, Open(orders=False)).moved
+    assert list(moved) == [own]
+    assert moved[own] == pytest.approx(angle, abs=np.radians(2.0))

@@ -13,6 +13,7 @@ from tracker.geometry.consistency.consensus import Consensus
 from tracker.geometry.consistency.observed import pose_of
 from tracker.geometry.consistency.suggestion import LEAST_AGREEING, Suggestion, stands, suggest
 from tracker.io.conventions.level import confirmed, upwards
+from tracker.io.conventions.questions import describe_moved
 from tracker.io.conventions.reading import Reading, exchanged, exchanges
 from tracker.io.conventions.readings import LEAST_SHARE, Judge, Judged, Open, Seen
 from tracker.io.conventions.search import Verdict, as_meant, find_reading
@@ -152,6 +153,7 @@ def check_boxes(sequence: Sequence, told: BoxesTell | None) -> Iterator[Check]:
     )
     yield _tilt(sequence, told)
     yield from _stray_cameras(sequence, told)
+    yield _where_calibrated(sequence, told)
     yield _size(sequence, told)
     yield _inside(sequence, told)
 
@@ -332,6 +334,16 @@ def _stray_cameras(sequence: Sequence, told: BoxesTell) -> Iterator[Check]:
             )
     if shares and min(shares.values()) >= _OWN_SHARE:
         yield good("every camera agrees with another", "each one's boxes meet others'")
+
+
+def _where_calibrated(sequence: Sequence, told: BoxesTell) -> Check:
+    """A camera whose boxes meet the others' better once it is turned."""
+    moved = told.verdict.moved
+    name = "cameras are where they were calibrated"
+    sentences = describe_moved(moved, [camera.name for camera in sequence.cameras])
+    if sentences:
+        return warning(name, "; ".join(sentences), degrees=float(np.degrees(max(moved.values()))))
+    return good(name, "no camera's boxes meet the others' decisively better if it is turned")
 
 
 def _found_where_expected(view: View, index: int, agreed: Consensus) -> Bool[ndarray, " E"]:

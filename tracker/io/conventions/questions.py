@@ -226,7 +226,11 @@ def describe_moments(verdict: Verdict, names: Sequence[str]) -> list[str]:
     told = []
     if len(confirmed) == 2 and verdict.kind == "decided":
         told.append(OF_TWO)
-    failing = [camera for camera, odds in confirmed.items() if odds < DECISIVE]
+    failing = [
+        camera
+        for camera, odds in confirmed.items()
+        if odds < DECISIVE and camera not in verdict.moved
+    ]
     evidence = verdict.best.evidence
     nothing = np.zeros(evidence.moments)
     alone = [c for c in failing if log_odds(evidence.of_camera(c), nothing) < DECISIVE]
@@ -240,3 +244,12 @@ def describe_moments(verdict: Verdict, names: Sequence[str]) -> list[str]:
     if rest := [names[c] for c in failing if c not in alone]:
         told.append(f"{', '.join(rest)}: nothing confirms that these show the same moments")
     return told
+
+
+def describe_moved(moved: Mapping[int, float], names: Sequence[str]) -> list[str]:
+    """Return a sentence for each camera that was turned since it was calibrated."""
+    return [
+        f"{names[camera]}: its boxes would meet those of the other cameras better if it were "
+        f"turned by {np.degrees(angle):.0f}°: it was moved after it was calibrated"
+        for camera, angle in moved.items()
+    ]

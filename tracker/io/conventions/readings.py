@@ -195,8 +195,8 @@ class Judge:
         if key not in self._breadths:
             size = self.lens_at(calibration, reading)[0].image_size
             boxes = boxes_by(own.four, reading, size)
-            sides = boxes[uncut(boxes, size), 2:]
-            broad = float(np.median(np.log(sides[:, 0] / sides[:, 1]))) if len(sides) else 0.0
+            sides = np.log(boxes[uncut(boxes, size), 2:])
+            broad = float(np.median(sides[:, 0] - sides[:, 1])) if len(sides) else 0.0
             self._breadths[key] = broad
         return self._breadths[key]
 

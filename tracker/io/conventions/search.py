@@ -20,6 +20,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
+from scipy.spatial.transform import Rotation
 
 from tracker.geometry.consistency.likelihood import (
     Evidence,
@@ -69,8 +70,9 @@ _LEAST_SHARE = 0.1  # of a camera's boxes that another one explains, below which
 _MANY_BOXES = 200  # least number of boxes that have to be explained
 _COARSE, _NEAR, _WIDEST = 0.2, 3.0, 10.0  # seconds between lags, and to the farthest of them
 _PLAINLY = 0.4  # share of boxes from which nobody asks whether all calibrations are exchanged
-_WELL = 0.7  # share of a camera's boxes from which no mirror is looked for
+_WELL = 0.7  # share of a camera's boxes from which neither mirror nor turn is looked for
 _EXPLAINED = 0.3  # share of boxes with which the calibration is read nearly rightly
+_TURNS = (0.32, 0.16, 0.08, 0.04, 0.02)  # radians to and fro about each axis of a camera
 _SAME_SCENE = 0.03  # difference of two scenes, in radians and in the size of the rig
 
 
@@ -107,6 +109,8 @@ class Verdict:
     """Log odds by camera that its boxes are of the same moments as those of the others."""
     clocks: Mapping[int, ClockFit] = field(default_factory=dict)
     """Cameras whose clock is not that of the others."""
+    moved: Mapping[int, float] = field(default_factory=dict)
+    """Angles, radians, by which cameras have to be turned for their boxes to meet the others'."""
     compared: tuple[Interpretation, ...] = ()
     """Those that were compared by all moments; all others were far behind."""
     clocks_at: Callable[[float], Mapping[int, ClockFit]] = lambda fps: {}
@@ -284,6 +288,21 @@ class Likelihood:
             rows.append(evidence(boxes, poses, best.scene, among=among).of_camera(camera))
         return np.array(rows)
 
+    def of_poses(
+        self, best: Interpretation, camera: int, poses: Many[Pose]
+    ) -> Float[ndarray, " M"]:
+        """Evidence of the pairs with one camera where the cameras stand otherwise.
+
+        Args:
+            best: The reading.
+            camera: Which camera.
+            poses: Of all cameras.
+        """
+        among = np.zeros((len(poses), len(poses)), dtype=bool)
+        among[camera], among[:, camera] = True, True
+        boxes = self.boxes_at(best.reading, poses, best.scene, [None] * len(poses))
+        return evidence(boxes, poses, best.scene, among=among).of_camera(camera)
+
     def likely_orders(
         self, reading: Reading, axes: Many[int]
     ) -> list[tuple[float, tuple[int, ...]]]:
@@ -378,7 +397,8 @@ def find_reading(
         kind = "unproven"
     elif best.evidence.share < _LEAST_SHARE or nothing < DECISIVE:
         kind = "none"
-    return Verdict(kind, best, judge, rival, least, confirmed, clocks, (*found,), clocks_at)
+    moved = find_moved(likelihood, best) if kind == "decided" else {}
+    return Verdict(kind, best, judge, rival, least, confirmed, clocks, moved, (*found,), clocks_at)
 
 
 def _candidates(
@@ -619,6 +639,77 @@ def confirm_moments(likelihood: Likelihood, best: Interpretation) -> dict[int, f
         nats = likelihood.of_camera(best, camera, rolled)
         found[camera] = log_odds(nats[0], nats[1:].mean(axis=0)) if turns else 0.0
     return found
+
+
+def find_moved(likelihood: Likelihood, best: Interpretation) -> dict[int, float]:
+    """Find the cameras that were turned since they were calibrated, by the same evidence.
+
+    Each camera whose boxes are not well explained is turned about each of its axes to and fro, and
+    from the best of these poses in ever smaller steps. It was turned where the evidence of its
+    pairs is decisively greater then, which pays the logarithm of the number of poses tried, and
+    where the scene is another one. The camera that gains most is turned first, and the others are
+    looked at again.
+
+    Args:
+        likelihood: Of the boxes.
+        best: The reading.
+
+    Returns:
+        The angle of each such camera, radians.
+    """
+    poses = likelihood.judge.poses(best.reading)
+    shares = best.evidence.of_cameras()
+    cameras = sorted(camera for camera, share in shares.items() if share < _WELL)
+    found: dict[int, float] = {}
+    while len(found) <= (len(shares) - 1) // 2:
+        gains: dict[int, tuple[float, Pose, float]] = {}
+        for camera in cameras:
+            if camera not in found and (turned := _turned(likelihood, best, camera, poses)):
+                gains[camera] = turned
+        if not gains:
+            break
+        camera = max(gains, key=lambda one: gains[one][0])
+        _, poses[camera], found[camera] = gains[camera]
+    return found
+
+
+def _turned(
+    likelihood: Likelihood, best: Interpretation, camera: int, poses: Many[Pose]
+) -> tuple[float, Pose, float] | None:
+    """How many nats a camera gains if it is turned, its pose then, and the angle, radians."""
+
+    def nats(turn: Float[ndarray, " 3"]) -> Float[ndarray, " M"]:
+        own = list(poses)
+        own[camera] = turn_pose(poses[camera], turn)
+        return likelihood.of_poses(best, camera, own)
+
+    given = nats(np.zeros(3))
+    turn, gained, tried = np.zeros(3), given, 0
+    for step in _TURNS:
+        centre, peak = turn, gained
+        for axis in np.eye(3):
+            for size in (-step, step):
+                tried += 1
+                other = nats(centre + size * axis)
+                if other.sum() > peak.sum():
+                    turn, peak = centre + size * axis, other
+        gained = peak
+    angle = float(np.linalg.norm(turn))
+    clear = log_odds(gained, given) >= DECISIVE + math.log(tried)
+    if angle <= _SAME_SCENE or not clear:
+        return None
+    return float((gained - given).sum()), turn_pose(poses[camera], turn), angle
+
+
+def turn_pose(own: Pose, turn: Float[ndarray, " 3"]) -> Pose:
+    """Turn a camera where it stands.
+
+    Args:
+        own: Its pose.
+        turn: Rotation vector in its own axes, radians.
+    """
+    rotation = Rotation.from_rotvec(turn).as_matrix() @ own.rotation
+    return replace(own, rotation=rotation)
 
 
 def _clocks_at(

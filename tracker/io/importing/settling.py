@@ -28,6 +28,7 @@ from tracker.io.conventions.questions import (
     check_verdict,
     describe_clocks,
     describe_moments,
+    describe_moved,
     rearranged,
 )
 from tracker.io.conventions.reading import Reading, read_boxes, to_camera
@@ -467,6 +468,7 @@ def _read(
         raws = every[: len(raws)]
         found += told_
         told += describe_moments(verdict, [raw.name for raw in raws])
+        told += describe_moved(verdict.moved, [raw.name for raw in raws])
     if any(raw.turns for raw in raws):
         found.append(("angles", f"{turns_in_words(reading.turns)}, {why}; --euler"))
     if reading.lean != (0.0, 0.0):
