@@ -3,6 +3,7 @@ ground truth."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,6 +13,7 @@ from jaxtyping import Bool, Float, Float16, Int
 from numpy import ndarray
 
 from tracker.files.text import shown
+from tracker.geometry.consistency.odds import DECISIVE
 from tracker.sequences.clock import Clock
 from tracker.sequences.csv_columns import Columns, read_columns
 from tracker.sequences.errors import SequenceError
@@ -30,9 +32,6 @@ KNOWN_STEPS = "steps"
 
 LONGEST = 4096
 """Largest length of an appearance vector; re-identification networks give 128 to 2048 numbers."""
-
-_LEAST_REGULAR = 10
-"""Frames with rows by which a regular gap is known."""
 
 _AT_ONCE = 4096
 """The number of rows that are held in memory in full precision."""
@@ -311,14 +310,31 @@ def truth_of(path: Path, where: str, frames: int) -> GroundTruth:
     return GroundTruth(steps[order], ids[order], positions[order], valid[order] == 1, known)
 
 
-def regular_gap(frames: Int[ndarray, " G"]) -> int:
+def regular_gap(frames: Int[ndarray, " G"], *others: Int[ndarray, " H"]) -> int:
     """The gap between the frames of rows, if these are every second, third … frame, else 1.
 
     A frame without a row may be one in which nobody was; frames between which there never is a row
-    are those that nobody looked at.
+    are those that nobody looked at. Of n frames at random the first two make any gap g, and the
+    others are as far apart by chance with the probability g⁻⁽ⁿ⁻²⁾: a gap is decided at 1000 : 1.
+
+    Args:
+        frames: With rows, in any order.
+        others: Frames with rows of other files, which count where their gap is the same.
     """
+    gap, odds = _gap(frames)
+    if gap == 1:
+        return 1
+    odds += sum(more for other, more in map(_gap, others) if other == gap)
+    return gap if odds >= DECISIVE else 1
+
+
+def _gap(frames: Int[ndarray, " G"]) -> tuple[int, float]:
+    """The greatest common divisor of the differences of frames, and its log odds."""
     distinct = np.unique(frames)
-    return int(np.gcd.reduce(np.diff(distinct))) if len(distinct) >= _LEAST_REGULAR else 1
+    if len(distinct) < 3:
+        return 1, 0.0
+    gap = int(np.gcd.reduce(np.diff(distinct)))
+    return gap, (len(distinct) - 2) * math.log(gap)
 
 
 def covered_steps(frames: Int[ndarray, " G"], steps: int) -> Bool[ndarray, " F"] | None:

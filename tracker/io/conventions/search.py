@@ -723,8 +723,9 @@ def fit_clocks(
 ) -> dict[int, ClockFit]:
     """Find the cameras that are late, or whose clocks jump or drift, by the same evidence.
 
-    A camera whose moments are confirmed is searched 3 s around, the others 10 s. Every camera that
-    is shifted pays the logarithm of the number of lags, and at most half of them are shifted.
+    A camera whose moments are confirmed is searched 3 s around, the others 10 s, none by more than
+    a third of the recording: of a longer lag a third has nothing to compare. Every camera that is
+    shifted pays the logarithm of the number of lags, and at most half of them are shifted.
 
     Args:
         likelihood: Of the boxes.
@@ -742,6 +743,7 @@ def fit_clocks(
             break
         late = {other: fit.late for other, fit in found.items()}
         reach = round((_NEAR if confirmed[camera] >= DECISIVE else _WIDEST) * fps)
+        reach = min(reach, int(np.ptp(likelihood.moments)) // 3)
         lags = coarse * np.arange(-(reach // coarse), reach // coarse + 1)
         nats = likelihood.of_camera(best, camera, likelihood.moments + lags[:, None], late)
         usual = np.mean(nats, axis=0)

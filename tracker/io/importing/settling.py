@@ -244,8 +244,10 @@ def _looked_at(
     """The frames at which detectors ran, where these are every second, third … one."""
     result: list[Int[ndarray, " K"] | None] = []
     gaps: dict[int, list[str]] = {}
+    every_camera = [own.frames for own in detections if own is not None]
     for name, own in zip(names, detections, strict=True):
-        gap = 1 if own is None else regular_gap(own.frames)
+        others = [frames for frames in every_camera if own is None or frames is not own.frames]
+        gap = 1 if own is None else regular_gap(own.frames, *others)
         first, last = (0, 0) if own is None or gap == 1 else (own.frames[0], own.frames[-1])
         result.append(None if gap == 1 else np.arange(first % gap, last + 1, gap))
         if gap > 1:
