@@ -9,7 +9,8 @@ where it is gone, that is reported, and the list is to be brought up to date.
 runs the tests of the package that each belongs to, up to the first that fails. Rows of the list
 with ``equivalent = "why"`` have no effect that a test could see: they are never drawn.
 
-Kernels are not compiled for either: on so few numbers the interpreter is sooner done.
+Kernels are not compiled for either, but for tests of whole recordings (``COMPILED``): on few
+numbers the interpreter is sooner done.
 """
 
 from __future__ import annotations
@@ -69,6 +70,9 @@ NOT_DRAWN = (
 )
 NOT_RUN = ("test_compilation.py", "test_checked_cache.py", "test_robustness.py")
 """Tests of compiled kernels alone, and of many or large pictures, which take long interpreted."""
+
+COMPILED = ("tests/io/",)
+"""Tests that compare so many boxes that kernels are compiled for them."""
 
 SORTS = ("bound", "sign", "off by one", "factor", "swapped", "and/or", "negated")
 
@@ -401,11 +405,23 @@ def copy(folder: Path) -> Path:
 
 def outcome(root: Path, tests: tuple[str, ...], seconds: float = SECONDS) -> tuple[int, str]:
     """pytest's status in a copy of the tree, and what it printed."""
+    status, printed = PASSED, ""
+    for compiled in (False, True):
+        own = tuple(test for test in tests if test.startswith(COMPILED) == compiled)
+        if own and status == PASSED:
+            status, printed = _outcome(root, own, seconds, compiled=compiled)
+    return status, printed
+
+
+def _outcome(
+    root: Path, tests: tuple[str, ...], seconds: float, *, compiled: bool
+) -> tuple[int, str]:
+    """The same, with kernels compiled or interpreted."""
     environment = {
         **os.environ,
         "PYTHONPATH": str(root),
         "PYTHONDONTWRITEBYTECODE": "1",
-        "NUMBA_DISABLE_JIT": "1",
+        "NUMBA_DISABLE_JIT": "0" if compiled else "1",
         "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1",  # a fifth of the time of a small test
         "OMP_NUM_THREADS": "1",
     }
