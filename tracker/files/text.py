@@ -24,7 +24,7 @@ def shown(value: Any) -> str:
     except ValueError:  # Python refuses to write integers of thousands of digits
         return "a number with thousands of digits"
     if isinstance(value, str):
-        text = f'"{value}"'
+        text = f'"{visible(value)}"'
     return text if len(text) <= 60 else f"{text[:57]}…"
 
 

@@ -17,10 +17,10 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
+from tracker.files.text import shown
 from tracker.io.read.picture_names import camera_of, number_in
 from tracker.io.read.pieces import DetectionPiece, Layout, Piece, TruthPiece, Unit
 from tracker.io.read.source import SourceFile
-from tracker.io.read.values import shown
 
 WORDS: dict[str, tuple[str, ...]] = {
     "frame": ("frame", "frameid", "frameindex", "framenumber", "frameno", "frameidx", "framenr",

@@ -15,11 +15,11 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
+from tracker.files.text import shown
 from tracker.io.read import values
 from tracker.io.read.pieces import CalibrationPiece, Convention, Piece, RawCamera
 from tracker.io.read.protocol import Certainty, Kind
 from tracker.io.read.source import SourceFile
-from tracker.io.read.values import shown
 
 Syntax = Literal["json", "yaml", "toml", "xml"]
 

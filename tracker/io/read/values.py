@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from tracker.files.text import visible
+from tracker.files.text import shown
 from tracker.io.read.pieces import Lens
 from tracker.io.read.source import SourceFile
 
@@ -196,12 +196,6 @@ def number(file: SourceFile, field: str, value: Any) -> float:
         FormatError: If it is none.
     """
     return float(vector(file, field, [value], 1, "one number")[0])
-
-
-def shown(value: Any) -> str:
-    """A value as a message shows it: short, on one line."""
-    text = f'"{visible(value)}"' if isinstance(value, str) else repr(value)
-    return text if len(text) <= 60 else f"{text[:57]}…"
 
 
 def need(file: SourceFile, table: Any, names: Iterable[str], where: str = "") -> None:

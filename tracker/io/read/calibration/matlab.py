@@ -17,11 +17,12 @@ from typing import Any
 
 import numpy as np
 
+from tracker.files.text import shown
 from tracker.io.read.calibration.camera_fields import cameras, has_cameras
 from tracker.io.read.pieces import CalibrationPiece, Convention, Piece, RawCamera, Unit
 from tracker.io.read.protocol import Certainty, Kind
 from tracker.io.read.source import SourceFile
-from tracker.io.read.values import intrinsics, lens, matrix, numbers, rotation, shown, vector
+from tracker.io.read.values import intrinsics, lens, matrix, numbers, rotation, vector
 
 NAME = "MATLAB .mat of cameras"
 KIND: Kind = "calibration"

@@ -16,11 +16,12 @@ from typing import Any
 
 import numpy as np
 
+from tracker.files.text import shown
 from tracker.io.read.calibration.camera_fields import cameras, has_cameras
 from tracker.io.read.pieces import CalibrationPiece, Convention, Piece
 from tracker.io.read.protocol import Certainty, Kind
 from tracker.io.read.source import SourceFile
-from tracker.io.read.values import numbers, shown
+from tracker.io.read.values import numbers
 
 NAME = "OpenCV FileStorage"
 KIND: Kind = "calibration"

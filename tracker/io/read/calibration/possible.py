@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from tracker.files.text import shown
 from tracker.geometry.camera import Camera
 from tracker.io.read.pieces import CalibrationPiece, RawCamera
 from tracker.io.read.source import SourceFile
-from tracker.io.read.values import shown
 from tracker.sequences.calibration import LEAST_FOCAL
 from tracker.sequences.fields import LARGEST, LARGEST_IN_MATRIX, LONGEST_NAME
 

@@ -15,13 +15,14 @@ from typing import Any
 
 import numpy as np
 
+from tracker.files.text import shown
 from tracker.io.read.columns import only_people, to_unit
 from tracker.io.read.detections.body import read_people
 from tracker.io.read.picture_names import camera_of, number_in
 from tracker.io.read.pieces import DetectionPiece, Piece
 from tracker.io.read.protocol import Certainty, Kind
 from tracker.io.read.source import SourceFile
-from tracker.io.read.values import is_list_of_tables, numbers, shown
+from tracker.io.read.values import is_list_of_tables, numbers
 
 NAME = "COCO results or annotations JSON"
 KIND: Kind = "detections"

@@ -15,11 +15,12 @@ from typing import Any
 
 import numpy as np
 
+from tracker.files.text import shown
 from tracker.io.read.columns import people, read_table
 from tracker.io.read.pieces import DetectionPiece, Piece, TruthPiece
 from tracker.io.read.protocol import Certainty, Kind
 from tracker.io.read.source import SourceFile
-from tracker.io.read.values import is_list_of_tables, need, number, shown, vector
+from tracker.io.read.values import is_list_of_tables, need, number, vector
 
 NAME = "SceneScape JSON lines"
 KIND: Kind = "detections"

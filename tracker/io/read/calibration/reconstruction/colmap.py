@@ -17,10 +17,11 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
+from tracker.files.text import shown
 from tracker.io.read.pieces import CalibrationPiece, Convention, Lens, Piece, RawCamera
 from tracker.io.read.protocol import Certainty, Kind
 from tracker.io.read.source import SourceFile
-from tracker.io.read.values import focal_and_centre, image_size, numbers, shown
+from tracker.io.read.values import focal_and_centre, image_size, numbers
 
 NAME = "COLMAP text model"
 KIND: Kind = "calibration"

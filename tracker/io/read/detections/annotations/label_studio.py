@@ -14,12 +14,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from tracker.files.text import shown
 from tracker.io.read.columns import only_people
 from tracker.io.read.picture_names import camera_of, number_in
 from tracker.io.read.pieces import DetectionPiece, Piece
 from tracker.io.read.protocol import Certainty, Kind
 from tracker.io.read.source import SourceFile
-from tracker.io.read.values import is_list_of_tables, numbers, shown
+from tracker.io.read.values import is_list_of_tables, numbers
 
 NAME = "Label Studio JSON"
 KIND: Kind = "detections"

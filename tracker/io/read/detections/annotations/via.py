@@ -15,12 +15,13 @@ from typing import Any
 
 import numpy as np
 
+from tracker.files.text import shown
 from tracker.io.read.columns import only_people
 from tracker.io.read.picture_names import camera_of, number_in
 from tracker.io.read.pieces import DetectionPiece, Piece
 from tracker.io.read.protocol import Certainty, Kind
 from tracker.io.read.source import SourceFile
-from tracker.io.read.values import number, numbers, shown
+from tracker.io.read.values import number, numbers
 
 NAME = "VGG Image Annotator JSON or CSV"
 KIND: Kind = "detections"
