@@ -44,6 +44,7 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 _LIBRARY = tempfile.TemporaryDirectory(prefix="multiview-phd-library-")
 os.environ["MULTIVIEW_PHD_LIBRARY"] = str(Path(_LIBRARY.name) / "library.sqlite3")
 os.environ["MULTIVIEW_PHD_STUDIES"] = str(Path(_LIBRARY.name) / "studies")
+os.environ["MULTIVIEW_PHD_DETECTORS"] = str(Path(_LIBRARY.name) / "detectors")
 os.environ["MULTIVIEW_PHD_SETTINGS"] = str(Path(_LIBRARY.name) / "settings")
 
 

@@ -16,6 +16,7 @@ import tyro
 from tyro.conf import FlagCreatePairsOff, Positional, UseAppendAction, arg, subcommand
 
 from app.command.arguments.corrections import Corrections, LogFile
+from app.command.arguments.detector import Detector
 from app.command.arguments.importing import Check, ExportCalibration, Formats, Import
 from app.command.arguments.library import Bundle, FormatName, LibraryCommand, LibraryFile, Runs
 from app.command.arguments.listing import Benchmark, Parameters, Sequences
@@ -84,7 +85,8 @@ class Serve:
     data: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="(optional)")] = None
     """Folder whose folders are sequences that can be chosen on the page."""
     detector: Annotated[Path | None, arg(metavar="MODEL", help_behavior_hint="(optional)")] = None
-    """A detection network of your own, as ONNX: the method onnx_detector runs it on pictures."""
+    """A detection network of your own, as ONNX, which onnx_detector runs on pictures instead of the
+    fetched one."""
     library: LibraryFile = None
     """The file that finished runs are kept in."""
     keep: Annotated[int, arg(metavar="INT")] = KEEP
@@ -144,7 +146,8 @@ class Track:
     """Seed of all randomness; the same seed gives the same tracks, but for the last digits on
     processors without fused multiply-add."""
     detector: Annotated[Path | None, arg(metavar="MODEL", help_behavior_hint="(optional)")] = None
-    """A detection network of your own, as ONNX: the method onnx_detector runs it on pictures."""
+    """A detection network of your own, as ONNX, which onnx_detector runs on pictures instead of the
+    fetched one."""
     corrections: LogFile = None
     """What was put right by hand: the run obeys it."""
     no_corrections: FlagCreatePairsOff[bool] = False
@@ -193,10 +196,12 @@ class Detect:
     sequence: Annotated[
         Positional[str], arg(metavar="SEQUENCE", help="A built-in room's name or a folder.")
     ]
-    model: Annotated[Path, arg(metavar="MODEL")]
-    """An ONNX file; its layout is found out from the shapes of what it gives."""
     output: Annotated[Path, arg(aliases=["-o"], metavar="FOLDER")]
     """Where `CAMERA.csv` is written for each camera, as `detections` of a sequence.toml."""
+    model: Annotated[
+        Path | None, arg(metavar="MODEL", help_behavior_hint="(default: the fetched one)")
+    ] = None
+    """An ONNX file; its layout is found out from the shapes of what it gives."""
     set: Annotated[
         UseAppendAction[tuple[str, ...]],
         arg(metavar="KEY=VALUE", help_behavior_hint="(repeatable)"),
@@ -305,6 +310,7 @@ Arguments = (
     Serve
     | Track
     | Detect
+    | Detector
     | Evaluate
     | Benchmark
     | Import
@@ -358,6 +364,7 @@ def parse(arguments: list[str] | None = None) -> Arguments:
         Annotated[Serve, subcommand("serve")]
         | Annotated[track, subcommand("track")]
         | Annotated[Detect, subcommand("detect")]
+        | Annotated[Detector, subcommand("detector")]
         | Annotated[evaluate, subcommand("evaluate")]
         | Annotated[Benchmark, subcommand("benchmark")]
         | Annotated[Import, subcommand("import")]

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 from app.command import supervision
 from app.command.allocator import return_large_arrays
 from app.command.arguments.corrections import Corrections
+from app.command.arguments.detector import Detector
 from app.command.arguments.importing import Check, ExportCalibration, Formats, Import
 from app.command.arguments.library import Bundle, LibraryCommand, OpenRun, Runs
 from app.command.arguments.listing import Benchmark, Parameters, Sequences
@@ -83,6 +84,10 @@ def _run(command: Arguments) -> int:
             from app.command.commands.detect import detect
 
             detect(command)
+        case Detector():
+            from app.command.commands.detector import detector
+
+            detector(command)
         case Evaluate():
             from app.command.commands.evaluate import evaluate
 

@@ -25,7 +25,8 @@ def command_line(snapshot: Snapshot) -> str:
     words += ["--single-view", parameters.single_view, "--fusion", parameters.fusion_method]
     if parameters.smoothing_method != snapshot.defaults.smoothing_method:
         words += ["--smoothing", parameters.smoothing_method]
-    if sequence.detector is not None and parameters.single_view == "onnx_detector":
+    named = sequence.detector is not None and sequence.detector.named
+    if named and sequence.detector is not None and parameters.single_view == "onnx_detector":
         words += ["--detector", str(sequence.detector.path.absolute())]
     for key, value in changed_values(parameters, snapshot.defaults).items():
         if key not in METHODS:

@@ -214,8 +214,8 @@ def test_a_method_that_cannot_work_is_known_with_the_reason(recording: Sequence)
     assert unfit_methods(recording, defaults) == {key: {} for key in METHODS}
     own = unfit_methods(replace(recording, detector=None), defaults)["single_view"]
     assert own == {
-        "onnx_detector": "onnx_detector runs a detection network, and none is named; start the "
-        "program with --detector model.onnx."
+        "onnx_detector": "onnx_detector runs a detection network, and none is at hand; fetch one by "
+        "`multiview-phd detector get`, or start the program with --detector model.onnx."
     }
     dark = unfit_methods(without(recording, "pictures"), defaults)["single_view"]
     assert set(dark) >= {"colour_phd", "jpda", "pseudo_particle", "association_matrix"}

@@ -22,6 +22,7 @@ from tracker.geometry.camera import Camera
 from tracker.parameters.catalogue import RunParameters
 from tracker.parameters.values import with_values
 from tracker.runs import pipeline
+from tracker.runs.gaps import gaps
 from tracker.runs.run import stage_keys
 from tracker.sequences.errors import SequenceError
 from tracker.sequences.library import with_detector
@@ -146,6 +147,27 @@ def centre_net() -> dict[str, ndarray]:
     return {"hm": heat, "wh": wh, "reg": offset}
 
 
+def nano_det() -> dict[str, ndarray]:
+    """A person in the cell at row 3, column 4 of stride 8; where another class is likelier, none.
+
+    A distance of 1.75 strides lies between bins 1 and 2, with three quarters of the latter.
+    """
+    outputs = {}
+    for stride, cells in ((8, 64), (16, 16), (32, 4)):
+        outputs[f"cls_pred_stride_{stride}"] = np.zeros((1, cells, 3), np.float32)
+        outputs[f"dis_pred_stride_{stride}"] = np.full((1, cells, 16), -30.0, np.float32)
+    outputs["cls_pred_stride_16"][0, 5] = 0.8, 0.81, 0.0
+    cell = 3 * 8 + 4
+    outputs["cls_pred_stride_8"][0, cell] = 0.9, 0.1, 0.2
+    for side, (corner, centre) in enumerate(zip(CORNERS, (36.0, 28.0) * 2, strict=True)):
+        distance = abs(corner - centre) / 8.0
+        lower = int(distance)
+        upper = outputs["dis_pred_stride_8"][0, cell, 4 * side + lower : 4 * side + lower + 2]
+        with np.errstate(divide="ignore"):
+            upper[:] = np.log([lower + 1.0 - distance, distance - lower]).clip(-30.0)
+    return outputs
+
+
 LAYOUTS: dict[str, Mapping[str, ndarray]] = {
     "YOLOv8": {"output0": yolo_8()},
     "YOLOv8 with masks": {"output0": yolo_8(), "output1": np.zeros((1, 32, 16, 16))},
@@ -160,6 +182,7 @@ LAYOUTS: dict[str, Mapping[str, ndarray]] = {
     "SSD": {"detection_out": ssd()},
     "SSD by class": ssd_by_class(),
     "CenterNet": centre_net(),
+    "NanoDet": nano_det(),
 }
 
 
@@ -184,10 +207,48 @@ def test_the_person_is_found_in_every_layout(name: str) -> None:
 @pytest.mark.parametrize("name", LAYOUTS)
 def test_every_layout_passes_through_opencv(name: str, tmp_path: Path) -> None:
     network = Network(answering(tmp_path / "model.onnx", LAYOUTS[name]), Settings())
-    assert network.size == SIZE
+    assert network.size_for(640, 480) == SIZE
     found = network.look(np.zeros((64, 64, 3), np.uint8))
     assert len(found.boxes) == 1
     np.testing.assert_allclose(found.boxes[0], [21.5, 9.5, 20.0, 40.0], atol=0.02)
+
+
+@pytest.mark.parametrize("size", [(64, 64), (96, 32), (32, 128)])
+def test_nano_det_against_plain_loops(size: tuple[int, int]) -> None:
+    """Every cell where the class is the best: its box by the expected distances, [LWW20]."""
+    rng = np.random.default_rng(7)
+    outputs, expected = {}, []
+    for stride in (8, 16, 32):
+        across, down = size[0] // stride, size[1] // stride
+        classes = rng.uniform(size=(1, across * down, 4)).astype(np.float32)
+        sides = rng.normal(0.0, 2.0, (1, across * down, 4 * 7)).astype(np.float32)
+        outputs[f"dis_pred_stride_{stride}"] = sides
+        outputs[f"cls_pred_stride_{stride}"] = classes
+        for row in range(down):
+            for column in range(across):
+                cell = row * across + column
+                if int(classes[0, cell].argmax()) != 2:
+                    continue
+                distances = []
+                for side in range(4):
+                    weights = [float(np.exp(v)) for v in sides[0, cell, 7 * side : 7 * side + 7]]
+                    mean = sum(n * w for n, w in enumerate(weights)) / sum(weights)
+                    distances.append(stride * mean)
+                x, y = (column + 0.5) * stride, (row + 0.5) * stride
+                left, top, right, bottom = distances
+                corners = [x - left, y - top, x + right, y + bottom]
+                expected.append([*corners, classes[0, cell, 2]])
+    found = proposals(outputs, size, 2)
+    rows = np.array(expected).reshape(-1, 5)
+    assert len(rows) > 3
+    np.testing.assert_allclose(found.corners, rows[:, :4], rtol=1e-4, atol=1e-4)
+    np.testing.assert_allclose(found.scores, rows[:, 4])
+    assert not found.suppressed
+
+
+def test_nano_det_of_another_size_is_refused() -> None:
+    with pytest.raises(ValueError, match="stride 8 have 64 and 64 rows; expected 96, one for each"):
+        proposals(nano_det(), (96, 64))
 
 
 def test_another_class_is_asked_for() -> None:
@@ -242,11 +303,38 @@ def test_it_sees_what_is_in_the_picture(tmp_path: Path) -> None:
 def test_sizes_that_are_left_open_and_channels_last(tmp_path: Path) -> None:
     path = tmp_path / "model.onnx"
     answering(path, {"output0": yolo_8()}, open_sizes=True)
-    assert Network(path, Settings(side=96)).size == (96, 96)
+    assert Network(path, Settings(side=96)).size_for(50, 50) == (96, 96)
     answering(path, {"output0": yolo_8()}, channels_last=True)
     network = Network(path, Settings())
-    assert network.size == SIZE
+    assert network.size_for(640, 480) == SIZE
     assert len(network.look(np.zeros((64, 64, 3), np.uint8)).boxes) == 1
+
+
+@pytest.mark.parametrize(
+    ("picture", "side", "expected"),
+    [
+        ((1920, 1080), 416, (416, 256)),  # 234 rows, rounded up to whole cells
+        ((1088, 1920), 416, (256, 416)),
+        ((800, 600), 640, (640, 480)),
+        ((1000, 10), 416, (416, 32)),
+        ((100, 100), 0, (640, 640)),
+    ],
+)
+def test_open_sizes_are_in_the_pictures_proportions(
+    picture: tuple[int, int], side: int, expected: tuple[int, int], tmp_path: Path
+) -> None:
+    path = answering(tmp_path / "m.onnx", {"output0": end_to_end()}, open_sizes=True)
+    network = Network(path, Settings(side=side))
+    assert network.size_for(*picture) == expected
+    # a box of the network's picture, in the picture that is scaled into its middle
+    found = network.look(np.zeros((picture[1], picture[0], 3), np.uint8))
+    scale = min(expected[0] / picture[0], expected[1] / picture[1])
+    inner = np.maximum(1, np.round(np.array(picture) * scale))
+    shift = (np.array(expected) - inner) // 2
+    corners = (np.array(CORNERS).reshape(2, 2) - shift) / (inner / picture) - 0.5
+    corners = np.clip(corners, -0.5, np.array(picture) - 0.5)
+    np.testing.assert_allclose(found.boxes[0, :2], corners[0], atol=1e-3)
+    np.testing.assert_allclose(found.boxes[0, 2:], corners[1] - corners[0], atol=1e-3)
 
 
 @pytest.mark.parametrize("kind", [TensorProto.INT64, TensorProto.FLOAT])
@@ -258,7 +346,15 @@ def test_a_network_that_asks_for_the_size_is_told_it(kind: int, tmp_path: Path) 
 
 
 @pytest.mark.parametrize(
-    ("values", "mean"), [("unit", 0.4), ("bytes", 102.0), ("signed", -0.2), ("imagenet", -0.2159)]
+    ("values", "mean"),
+    [
+        ("file", 0.4),
+        ("unit", 0.4),
+        ("bytes", 102.0),
+        ("signed", -0.2),
+        ("imagenet", -0.2159),
+        ("imagenet_bgr", -0.2159),
+    ],
 )
 def test_what_a_pictures_bytes_become(values: str, mean: float, tmp_path: Path) -> None:
     """The score of the answer is the mean of what the network is given."""
@@ -268,8 +364,18 @@ def test_what_a_pictures_bytes_become(values: str, mean: float, tmp_path: Path) 
         answering(tmp_path / "m.onnx", {"out": table}, score_is={"out": (0, 0, 4)}),
         Settings(values=values, score=0.0),  # type: ignore[arg-type]
     )
-    outputs = network._forward(network._fed(np.full((64, 64, 3), 102, np.uint8)))
+    outputs = network._forward(network._fed(np.full((64, 64, 3), 102, np.uint8)), SIZE)
     assert outputs["out"][0, 0, 4] == pytest.approx(1.0 + mean, abs=2e-3)
+
+
+def test_blue_comes_first_where_the_network_wants_it(tmp_path: Path) -> None:
+    path = answering(tmp_path / "m.onnx", {"output0": end_to_end()})
+    blue = np.zeros((64, 64, 3), np.uint8)
+    blue[..., 0] = 255
+    fed = Network(path, Settings(values="imagenet_bgr"))._fed(blue)[0].mean(axis=(1, 2))
+    # NanoDet's own means and deviations, in bytes: blue, green, red
+    means, deviations = np.array([103.53, 116.28, 123.675]), np.array([57.375, 57.12, 58.395])
+    np.testing.assert_allclose(fed, ([255.0, 0.0, 0.0] - means) / deviations, rtol=1e-4)
 
 
 def test_score_and_overlap(tmp_path: Path) -> None:
@@ -371,6 +477,40 @@ def test_a_rolled_camera_is_looked_at_upright(tmp_path: Path) -> None:
         apart = np.abs(expected[:, None, :2] - b.measurements[None, :, :2]).max(axis=2)
         assert apart.min(axis=0).max() < 13.0
         assert (b.measurements[:, 2] > b.measurements[:, 3]).all()
+
+
+def test_every_second_picture_is_seen(tmp_path: Path) -> None:
+    """Steps between are without a frame, which is no missing picture; the others are as before."""
+    model = pooling(tmp_path / "model.onnx", 256)
+    sequence = red_head(tmp_path / "level", look_at("level", (0.0, -4.0, 1.2)), model)
+    values = parameters(score_threshold=0.25, room_tolerance=100.0)
+    whole = pipeline.compute(sequence, values)
+    half = pipeline.compute(sequence, with_values(values, {"onnx_detector.every": 2}))
+    for step, ((a,), (b,)) in enumerate(zip(whole.views, half.views, strict=True)):
+        assert b.blind == bool(step % 2)
+        if not b.blind:
+            assert len(b.boxes)
+            np.testing.assert_array_equal(a.boxes, b.boxes)
+        else:
+            assert not len(b.boxes)
+    assert gaps(half) == []
+    keys = [stage_keys(sequence, p, 0)["single_view"] for p in (values, half.parameters)]
+    assert keys[0] != keys[1]
+
+
+def test_it_sees_the_full_picture(tmp_path: Path) -> None:
+    """However the other methods' pictures are reduced, its boxes are the same."""
+    model = pooling(tmp_path / "model.onnx", 256)
+    sequence = red_head(tmp_path / "level", look_at("level", (0.0, -4.0, 1.2)), model)
+    values = parameters(score_threshold=0.25, room_tolerance=100.0)
+    reduced = with_values(values, {"pictures.lines": 120})
+    for one, other in zip(
+        pipeline.compute(sequence, values).views,
+        pipeline.compute(sequence, reduced).views,
+        strict=True,
+    ):
+        np.testing.assert_array_equal(one[0].measurements, other[0].measurements)
+    assert stage_keys(sequence, values, 0) == stage_keys(sequence, reduced, 0)
 
 
 def test_what_is_kept_depends_on_the_models_content(tmp_path: Path) -> None:

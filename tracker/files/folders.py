@@ -115,6 +115,14 @@ def library_file() -> Path:
     return data_folder() / "library.sqlite3"
 
 
+def detectors_folder() -> Path:
+    """Return ``$MULTIVIEW_PHD_DETECTORS``, else ``detectors`` in :func:`data_folder`."""
+    own = os.environ.get("MULTIVIEW_PHD_DETECTORS")
+    if own:
+        return Path(own).expanduser().absolute()
+    return data_folder() / "detectors"
+
+
 def files_matching(folder: Path, pattern: str) -> list[Path]:
     """Return the files below a folder that match a glob pattern, sorted.
 

@@ -55,6 +55,8 @@ class Uses:
     """Whether every camera must have an outside detector's boxes."""
     detector: bool = False
     """Whether a detection network must be named, which the method runs itself."""
+    every: int = 1
+    """The method sees every n-th step; the steps between are without a frame."""
     templates: Literal["no", "if there", "needed"] = "no"
     """Whether the method uses the colour templates, and whether it needs at least one."""
     reads: tuple[Reads, ...] = ()

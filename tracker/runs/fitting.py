@@ -18,7 +18,7 @@ def default_parameters(sequence: Sequence) -> RunParameters:
         ValueError: If the sequence has neither pictures nor detections.
     """
     defaults = RunParameters()
-    if sequence.detector is not None and sequence.has_pictures:
+    if sequence.detector is not None and sequence.detector.named and sequence.has_pictures:
         return defaults.model_copy(update={"single_view": "onnx_detector"})
     for name in FOLLOWING:
         if _lacks(sequence, defaults, "single_view", name, bool(sequence.templates)) is None:
@@ -68,8 +68,8 @@ def _lacks(
         )
     if used.detector and sequence.detector is None:
         return (
-            f"{name} runs a detection network, and none is named; start the program with "
-            "--detector model.onnx."
+            f"{name} runs a detection network, and none is at hand; fetch one by `multiview-phd "
+            "detector get`, or start the program with --detector model.onnx."
         )
     if used.templates == "needed" and not templates:
         return (

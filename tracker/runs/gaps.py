@@ -26,7 +26,7 @@ class Gap:
     camera: str
     """The name of the camera."""
     asked: int
-    """The number of computed steps at which the camera's clock has a frame."""
+    """The number of computed steps at which the camera's clock has a frame that the method sees."""
     missing: int
     """The number of these steps without a picture."""
     unexpected: tuple[int, ...]
@@ -38,14 +38,16 @@ class Gap:
 
 def gaps(run: Run) -> list[Gap]:
     """Return the gaps of all cameras with missing pictures; none if the method uses no pictures."""
-    if not run.parameters.method("single_view").used(run.parameters).pictures:
+    used = run.parameters.method("single_view").used(run.parameters)
+    if not used.pictures:
         return []
     found = []
     steps = len(run.views)
+    seen = np.arange(steps) % used.every == 0
     for number, view in enumerate(run.sequence.views):
         if not view.has_pictures:
             continue
-        asked = view.frames_due(steps)
+        asked = view.frames_due(steps) & seen
         blind = np.fromiter(run.views.values("blind", number, last=steps), bool, steps)
         missing = asked & blind
         if missing.any():

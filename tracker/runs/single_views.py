@@ -126,6 +126,7 @@ class _CameraWorker:
         self._frames = run.sequence.frames
         self._seed = run.seed
         self._stopped = stopped
+        self._every = run.parameters.method("single_view").used(run.parameters).every
         pictures = _uses_pictures(run)
         self._shake = working.shake(camera) if pictures else 0.0
         self._pictures = working.reader.iterate(camera, self._frame) if pictures else None
@@ -136,7 +137,8 @@ class _CameraWorker:
         done: list[tuple[ViewResult, Any]] = []
         while len(done) < steps and self._frame < self._frames and not self._stopped():
             picture = next(self._pictures, None) if self._pictures is not None else None
-            if self._pictures is None and not self._view.detector_ran_at(self._frame):
+            without = self._pictures is None and not self._view.detector_ran_at(self._frame)
+            if without or self._frame % self._every:
                 done.append((ViewResult.of_no_frame(), self._state))
                 self._frame += 1
                 continue

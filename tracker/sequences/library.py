@@ -11,6 +11,7 @@ from typing import Literal
 
 from tracker.files.atomic import size_of
 from tracker.sequences.built_in import BUILT_IN, ROOMS, cached_rooms
+from tracker.sequences.detectors import detector_at_hand
 from tracker.sequences.errors import SequenceError
 from tracker.sequences.fields import did_you_mean, listed
 from tracker.sequences.reader import FILE, given_folder, read_sequence, read_summary
@@ -100,7 +101,7 @@ def _cached(name: str) -> Path | None:
 
 
 def open_sequence(name_or_folder: str | Path) -> Sequence:
-    """Open a recording by its name, or a sequence folder.
+    """Open a recording by its name, or a sequence folder, with the detection network at hand.
 
     A folder with the name of a built-in recording is opened by a path with a separator, for
     instance ``./room44-3p``.
@@ -111,6 +112,12 @@ def open_sequence(name_or_folder: str | Path) -> Sequence:
     Raises:
         SequenceError: If there is no such sequence, or it cannot be read.
     """
+    sequence = _read(name_or_folder)
+    return replace(sequence, detector=detector_at_hand()) if sequence.has_pictures else sequence
+
+
+def _read(name_or_folder: str | Path) -> Sequence:
+    """Read a recording by its name, or a sequence folder."""
     name = str(name_or_folder)
     if name in BUILT_IN:
         return read_sequence(ROOMS / name)
@@ -144,7 +151,8 @@ def with_detector(sequence: Sequence, path: Path | None) -> Sequence:
 
     Args:
         sequence: The sequence.
-        path: The network's ONNX file; if None, the sequence is returned unchanged.
+        path: The network's ONNX file; if None, the sequence is returned unchanged, with the fetched
+            network if one is at hand.
 
     Raises:
         SequenceError: If the file cannot be read.

@@ -223,12 +223,16 @@ class FileState:
 
 @dataclass(frozen=True, slots=True)
 class DetectorFile:
-    """A detection network of the user."""
+    """A detection network: one that the user named, or one that the program fetched."""
 
     path: Path
     """The ONNX file."""
     digest: str
     """The hash of its content, for cache keys."""
+    name: str = ""
+    """The name of a fetched one."""
+    named: bool = True
+    """Whether the user named it for this recording; False for one that is at hand for all."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -39,6 +39,11 @@ def detect(command: Detect) -> None:
     sequence = library.with_detector(sequence, command.model)
     if not sequence.has_pictures:
         raise CommandError(f"{sequence.name}: a detector needs pictures of every camera")
+    if sequence.detector is None:
+        raise CommandError(
+            "no detector is at hand: `multiview-phd detector get` fetches one, or name an ONNX "
+            "file by --model"
+        )
     parameters = with_values(RunParameters(), {**changes, "single_view": "onnx_detector"})
     with Bar("detecting", "step") as bar, closing(Compiling(say)) as compiling:
         bar.at(0, sequence.frames)

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from tracker.parameters.definition import ui
 from tracker.parameters.groups.detections import DetectionBoxParams
-from tracker.parameters.method import Method, Reads, Uses
+from tracker.parameters.method import Method, Reads, Uses, Values
 
 
 class OnnxDetectorParams(DetectionBoxParams):
@@ -28,22 +28,42 @@ class OnnxDetectorParams(DetectionBoxParams):
     """Which of the network's classes are people, counted from 0; -1: by the kind of network."""
 
     input_side: Annotated[
-        int, Field(ge=64, le=2048), ui("n_in", unit="px", step=32, advanced=True)
-    ] = 640
-    """Side of the network's picture, where its file leaves that open."""
+        int, Field(ge=0, le=2048), ui("n_in", unit="px", step=32, advanced=True)
+    ] = 0
+    """Longer side of the network's picture, where its file leaves that open; 0: as the file says,
+    416 for the fetched network, or else 640. The more, the smaller people may be, and the longer it
+    takes."""
+
+    every: Annotated[int, Field(ge=1, le=10), ui("n_e", unit="steps", step=1)] = 1
+    """The network looks at every n-th picture; those between are no evidence for or against
+    people."""
 
     pixel_values: Annotated[
-        Literal["unit", "imagenet", "signed", "bytes"], ui("v", advanced=True)
-    ] = "unit"
-    """Range of the network's input: 0 … 1 (YOLO, RT-DETR), ImageNet's (DETR), −1 … 1, or 0 …
-    255."""
+        Literal["file", "unit", "imagenet", "signed", "bytes", "imagenet_bgr"],
+        ui("v", advanced=True),
+    ] = "file"
+    """Range of the network's input: as its file says, or else 0 … 1; 0 … 1 (YOLO, RT-DETR),
+    ImageNet's (DETR), −1 … 1, 0 … 255, or ImageNet's with blue first (NanoDet)."""
 
 
-_PICTURES = Reads("pictures", without=frozenset({"steady_from"}))  # needs no fixed background
+_PICTURES = Reads(
+    "pictures", without=frozenset({"lines", "target_height", "least_height", "steady_from"})
+)
+"""The network's input is scaled from the full picture, and it needs no fixed background."""
+
+
+def _uses(values: Values) -> Uses:
+    return Uses(
+        pictures=True,
+        detector=True,
+        every=values.of(OnnxDetectorParams).every,
+        reads=(Reads("onnx_detector"), _PICTURES),
+    )
+
 
 METHOD = Method(
     name="onnx_detector",
-    help="The boxes of a detection network of your own (ONNX), without a filter in the picture.",
-    uses=Uses(pictures=True, detector=True, reads=(Reads("onnx_detector"), _PICTURES)),
+    help="The boxes of a detection network (ONNX), without a filter in the picture.",
+    uses=_uses,
     parameters=OnnxDetectorParams,
 )

@@ -7,10 +7,10 @@ only the few fields that are needed are parsed here.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-_GRAPH = 7
+_GRAPH, _METADATA = 7, 14
 _INITIALIZER, _INPUT, _OUTPUT = 5, 11, 12
 _TENSOR_NAME = 8
 _VARINT, _FIXED64, _BYTES, _FIXED32 = 0, 1, 2, 5
@@ -33,10 +33,12 @@ class Port:
 
 @dataclass(frozen=True, slots=True)
 class Ports:
-    """The inputs that are not weights of the network, and the outputs."""
+    """The inputs that are not weights of the network, its outputs, and the file's metadata."""
 
     inputs: tuple[Port, ...]
     outputs: tuple[Port, ...]
+    metadata: Mapping[str, str]
+    """The ``metadata_props``: texts by key."""
 
 
 def ports_of(data: bytes) -> Ports:
@@ -46,7 +48,9 @@ def ports_of(data: bytes) -> Ports:
         ValueError: If the data are no ONNX model.
     """
     try:
-        graph = next(value for field, value in _fields(memoryview(data)) if field == _GRAPH)
+        parts = list(_fields(memoryview(data)))
+        graph = next(value for field, value in parts if field == _GRAPH)
+        metadata = dict(_entry(_message(value)) for field, value in parts if field == _METADATA)
         inputs, outputs, weights = [], [], set()
         for field, value in _fields(_message(graph)):
             if field == _INPUT:
@@ -59,7 +63,7 @@ def ports_of(data: bytes) -> Ports:
         raise ValueError("it is not an ONNX model") from error
     if not inputs or not outputs:
         raise ValueError("it is an ONNX model without inputs or outputs")
-    return Ports(tuple(p for p in inputs if p.name not in weights), tuple(outputs))
+    return Ports(tuple(p for p in inputs if p.name not in weights), tuple(outputs), metadata)
 
 
 def _fields(message: memoryview) -> Iterator[tuple[int, int | memoryview]]:
@@ -103,6 +107,12 @@ def _message(value: int | memoryview) -> memoryview:
 
 def _text(value: int | memoryview) -> str:
     return bytes(_message(value)).decode()
+
+
+def _entry(message: memoryview) -> tuple[str, str]:
+    """Read a ``StringStringEntryProto``: key 1, value 2."""
+    fields = dict(_fields(message))
+    return _text(fields.get(1, memoryview(b""))), _text(fields.get(2, memoryview(b"")))
 
 
 def _port(message: memoryview) -> Port:

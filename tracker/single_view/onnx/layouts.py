@@ -9,13 +9,18 @@ The known layouts are, with C classes and N proposed boxes:
 - DETR [CMS20] and similar: logits (1, N, C) and boxes (1, N, 4) as shares of the image; RT-DETR
   [ZLX24] also as one (1, N, 4 + C), or as labels, boxes and scores;
 - SSD [LAE16]: (1, 1, N, 7): picture, class, score, two corners; or boxes and scores by class;
-- CenterNet [ZWK19]: heat map (1, C, h, w), sizes (1, 2, h, w) and offsets (1, 2, h, w).
+- CenterNet [ZWK19]: heat map (1, C, h, w), sizes (1, 2, h, w) and offsets (1, 2, h, w);
+- NanoDet: for each stride s of 8, 16 and 32 the scores ``cls_pred_stride_s`` (1, h w / s², C) and
+  the distances ``dis_pred_stride_s`` (1, h w / s², 4 n), each a distribution over n values
+  [LWW20].
 
 [JCS22] Jocher et al., "ultralytics/yolov5", 2022.
 [CMS20] Carion et al., "End-to-End Object Detection with Transformers", ECCV 2020.
 [ZLX24] Zhao et al., "DETRs Beat YOLOs on Real-time Object Detection", CVPR 2024.
 [LAE16] Liu et al., "SSD: Single Shot MultiBox Detector", ECCV 2016.
 [ZWK19] Zhou, Wang, Krähenbühl, "Objects as Points", 2019.
+[LWW20] Li et al., "Generalized Focal Loss: Learning Qualified and Distributed Bounding Boxes for
+Dense Object Detection", NeurIPS 2020.
 """
 
 from __future__ import annotations
@@ -63,7 +68,8 @@ def proposals(
     """
     arrays = {name: np.asarray(a, dtype=np.float32) for name, a in outputs.items()}
     found = (
-        _centre_net(arrays, size, wanted)
+        _nano_det(arrays, size, wanted)
+        or _centre_net(arrays, size, wanted)
         or _named(arrays, size, wanted)
         or _boxes_and_scores(arrays, size, wanted)
         or _one_output(arrays, size, wanted)
@@ -72,7 +78,7 @@ def proposals(
         shapes = ", ".join(f"{name} {tuple(a.shape)}" for name, a in arrays.items())
         raise ValueError(
             f"its outputs {shapes} are of no known layout; expected those of YOLO, DETR, RT-DETR, "
-            "SSD or CenterNet"
+            "SSD, CenterNet or NanoDet"
         )
     return found
 
@@ -240,6 +246,47 @@ def _boxes_and_scores(
     return Proposals(
         _in_pixels(_from_centres(tables[boxes]), size), _column(values, _class(wanted, usual)), True
     )
+
+
+_CLASSES, _DISTANCES = "cls_pred_stride_", "dis_pred_stride_"
+"""Beginnings of the names of NanoDet's outputs; the stride follows."""
+
+
+def _nano_det(
+    arrays: Mapping[str, ndarray], size: tuple[int, int], wanted: int
+) -> Proposals | None:
+    """Read the cells of each stride where no other class has a higher score.
+
+    With P_k(n) the distribution of the distance from the centre of a cell, in strides, to side k of
+    the box (left, top, right, bottom), that side lies at s sum_n n P_k(n) from the centre, equation
+    (5) of [LWW20]_.
+
+    Raises:
+        ValueError: If the outputs of a stride do not have a row for each of its cells.
+    """
+    names = [n.removeprefix(_CLASSES) for n in arrays if n.startswith(_CLASSES)]
+    strides = sorted(int(name) for name in names if name.isdecimal() and int(name) > 0)
+    if not strides or any(f"{_DISTANCES}{s}" not in arrays for s in strides):
+        return None
+    corners, scores = [np.zeros((0, 4), np.float32)], [np.zeros(0, np.float32)]
+    for stride in strides:
+        classes, sides = arrays[f"{_CLASSES}{stride}"][0], arrays[f"{_DISTANCES}{stride}"][0]
+        across, down = size[0] // stride, size[1] // stride
+        if not len(classes) == len(sides) == across * down:
+            raise ValueError(
+                f"its outputs of stride {stride} have {len(classes)} and {len(sides)} rows; "
+                f"expected {across * down}, one for each cell of {size[0]} x {size[1]} pixels"
+            )
+        own = _column(classes, _class(wanted, 0))
+        cells = np.flatnonzero(own >= classes.max(axis=1))
+        values = sides[cells].reshape(len(cells), 4, sides.shape[1] // 4)
+        shares = np.exp(values - values.max(axis=2, keepdims=True))
+        shares /= shares.sum(axis=2, keepdims=True)
+        left, top, right, bottom = stride * (shares @ np.arange(values.shape[2])).T
+        x, y = (cells % across + 0.5) * stride, (cells // across + 0.5) * stride
+        corners.append(np.stack([x - left, y - top, x + right, y + bottom], axis=1))
+        scores.append(own[cells])
+    return Proposals(np.concatenate(corners), np.concatenate(scores), False)
 
 
 def _centre_net(

@@ -42,8 +42,8 @@ class OnnxDetector:
         model = sequence.detector
         if model is None:
             raise ValueError(
-                f"{sequence.name} has no detector; start with --detector model.onnx, or choose "
-                "another single_view"
+                f"{sequence.name} has no detector; fetch one by `multiview-phd detector get`, "
+                "start with --detector model.onnx, or choose another single_view"
             )
         if not sequence.views[camera_index].has_pictures:
             name = sequence.views[camera_index].camera.name

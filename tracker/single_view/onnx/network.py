@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import copy
 import errno
+import math
 import threading
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Literal, cast, get_args
 
 import cv2
 import numpy as np
@@ -18,7 +20,17 @@ from tracker.files.atomic import size_of
 from tracker.single_view.onnx.file import INT64, UINT8, Port, ports_of
 from tracker.single_view.onnx.layouts import FOUND_OUT, proposals
 
-Values = Literal["unit", "imagenet", "signed", "bytes"]
+Values = Literal["unit", "imagenet", "signed", "bytes", "imagenet_bgr"]
+
+INPUT_SIDE, PIXEL_VALUES = "input_side", "pixel_values"
+"""Keys of an ONNX file's metadata by which it says how it wants its pictures; as the parameters."""
+
+_SIDE = 640
+"""Longer side of a network's picture where neither file nor parameter says it, pixels: YOLO's."""
+MOST_SIDE = 2048
+"""Largest side that metadata or the parameter may ask for, pixels."""
+_CELL = 32
+"""Sides that are left open are multiples of this, the known layouts' largest stride, pixels."""
 
 MOST_BYTES = 2**31
 """Largest size of a Protocol Buffers message, and so of an ONNX file, bytes."""
@@ -49,10 +61,11 @@ class Settings:
     """Score below which boxes are left out, 0 … 1."""
     overlap: float = 0.6
     """Intersection over union above which the weaker box is dropped, 0 … 1."""
-    side: int = 640
-    """Side of the network's input image, where the file has a variable size, pixels."""
-    values: Values = "unit"
-    """Scaling of an image's bytes for the network."""
+    side: int = 0
+    """Longer side of the network's input image, where the file has a variable size, pixels; 0 for
+    what the file's metadata say."""
+    values: Values | Literal["file"] = "file"
+    """Scaling of an image's bytes for the network; "file" for what the file's metadata say."""
 
 
 _REMEDY = "export it to ONNX again with one picture at a time"
@@ -90,6 +103,7 @@ class Network:
         except cv2.error as error:
             raise ValueError(self._message(f"cannot be used: {_words(error)}")) from error
         self._picture = self._picture_port(ports.inputs)
+        self._own_side, self._own_values = _own(ports.metadata)
         self._sizes = [p for p in ports.inputs if p is not self._picture]
         self._names = [port.name for port in ports.outputs]
         self._lock = threading.Lock()
@@ -102,8 +116,7 @@ class Network:
             ValueError: In the cases of the constructor and of :meth:`look`.
         """
         network = cls(path, Settings())
-        width, height = network.size
-        network.look(np.full((height, width, 3), _GREY, np.uint8))
+        network.look(np.full((_SIDE, _SIDE, 3), _GREY, np.uint8))
         return network
 
     def with_settings(self, settings: Settings) -> Network:
@@ -112,12 +125,23 @@ class Network:
         other._settings = settings
         return other
 
-    @property
-    def size(self) -> tuple[int, int]:
-        """Width and height of the network's input image, pixels."""
+    def size_for(self, columns: int, rows: int) -> tuple[int, int]:
+        """The width and height of the network's input for a picture, pixels.
+
+        Sides that the file leaves open are in the picture's proportions, the longer one as the
+        settings or the file say, both rounded up to whole cells.
+
+        Args:
+            columns: Width of the picture, pixels.
+            rows: Height of the picture, pixels.
+        """
         shape = self._picture.shape
         height, width = shape[1:3] if self._channels_last else shape[2:4]
-        return width or self._settings.side, height or self._settings.side
+        side = self._settings.side or self._own_side
+        if not width and not height:
+            scale = side / max(columns, rows)
+            return _whole_cells(columns * scale), _whole_cells(rows * scale)
+        return width or side, height or side
 
     @property
     def _channels_last(self) -> bool:
@@ -150,8 +174,8 @@ class Network:
         Raises:
             ValueError: If the network cannot run on it, or its outputs have no known layout.
         """
-        width, height = self.size
         rows, columns = picture.shape[:2]
+        width, height = self.size_for(columns, rows)
         scale = min(width / columns, height / rows)
         inner = max(1, round(columns * scale)), max(1, round(rows * scale))
         shift = np.array([(width - inner[0]) // 2, (height - inner[1]) // 2])
@@ -160,7 +184,7 @@ class Network:
         framed[shift[1] : shift[1] + inner[1], shift[0] : shift[0] + inner[0]] = cv2.resize(
             picture, inner, interpolation=flags
         )
-        outputs = self._forward(self._fed(framed))
+        outputs = self._forward(self._fed(framed), (width, height))
         s = self._settings
         try:
             found = proposals(outputs, (width, height), s.person)
@@ -187,8 +211,9 @@ class Network:
     def _fed(self, framed: UInt8[ndarray, "h w 3"]) -> ndarray:
         """Return the picture as the input of the network."""
         coloured = framed[:, :, ::-1]
+        values = self._settings.values
         if self._picture.kind != UINT8:
-            match self._settings.values:
+            match self._own_values if values == "file" else values:
                 case "unit":
                     coloured = coloured.astype(np.float32) / 255.0
                 case "imagenet":
@@ -199,22 +224,45 @@ class Network:
                     coloured = coloured.astype(np.float32) / 127.5 - 1.0
                 case "bytes":
                     coloured = coloured.astype(np.float32)
+                case "imagenet_bgr":
+                    coloured = (framed.astype(np.float32) / 255.0 - _IMAGENET_MEAN[::-1]) / (
+                        _IMAGENET_DEVIATION[::-1]
+                    )
         if not self._channels_last:
             coloured = coloured.transpose(2, 0, 1)
         return np.ascontiguousarray(coloured[None])
 
-    def _forward(self, fed: ndarray) -> dict[str, ndarray]:
-        """Run the network, and return its outputs by name."""
+    def _forward(self, fed: ndarray, size: tuple[int, int]) -> dict[str, ndarray]:
+        """Run the network, and return its outputs by name.
+
+        Args:
+            fed: The input of the network.
+            size: Its width and height, pixels.
+        """
         try:
             with self._lock:
                 self._net.setInput(fed, self._picture.name)
                 for port in self._sizes:  # the size to which boxes are scaled, for RT-DETR
                     kind = np.int64 if port.kind == INT64 else np.float32
-                    self._net.setInput(np.array([self.size], kind), port.name)
+                    self._net.setInput(np.array([size], kind), port.name)
                 outputs = self._net.forward(self._names)
                 return {n: np.array(o) for n, o in zip(self._names, outputs, strict=True)}
         except cv2.error as error:
             raise ValueError(self._message(f"cannot be run: {_words(error)}")) from error
+
+
+def _own(metadata: Mapping[str, str]) -> tuple[int, Values]:
+    """Read the side and the scaling that a file's metadata say; else YOLO's."""
+    side, values = metadata.get(INPUT_SIDE, ""), metadata.get(PIXEL_VALUES, "")
+    return (
+        int(side) if side.isdecimal() and 0 < int(side) <= MOST_SIDE else _SIDE,
+        cast(Values, values) if values in get_args(Values) else "unit",
+    )
+
+
+def _whole_cells(length: float) -> int:
+    """Round a length up to whole cells; what is above by less than a pixel is rounding."""
+    return max(1, math.ceil(length / _CELL - 1.0 / _CELL)) * _CELL
 
 
 def _content(path: Path) -> bytes:

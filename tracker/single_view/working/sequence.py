@@ -46,10 +46,15 @@ class Working:
         used = parameters.method("single_view").used(parameters)
         if not used.pictures:
             return Working(sequence, reader, views)
-        if used.reads_parameter("pictures", "lines"):
+        if used.reads_parameter("pictures", "level_from"):
+            reduced = used.reads_parameter("pictures", "lines")
             views = tuple(
                 working_view(
-                    camera, sequence.room, sequence.target_half_extents, parameters.pictures
+                    camera,
+                    sequence.room,
+                    sequence.target_half_extents,
+                    parameters.pictures,
+                    reduced=reduced,
                 )
                 for camera in sequence.cameras
             )

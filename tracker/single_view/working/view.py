@@ -157,7 +157,12 @@ class WorkingView:
 
 
 def working_view(
-    camera: Camera, room: Room, half_extents: Float[ndarray, " 3"], parameters: PictureParams
+    camera: Camera,
+    room: Room,
+    half_extents: Float[ndarray, " 3"],
+    parameters: PictureParams,
+    *,
+    reduced: bool = True,
 ) -> WorkingView | None:
     """The conversion of a camera for stage 1; None where its own images are suitable.
 
@@ -166,8 +171,9 @@ def working_view(
         room: The tracked volume.
         half_extents: Half width, depth and height of a target, metres.
         parameters: The resolution, and the least roll that is compensated.
+        reduced: Whether the images are reduced to that resolution.
     """
-    scale = _scale(camera, room, half_extents, parameters)
+    scale = _scale(camera, room, half_extents, parameters) if reduced else 1.0
     roll = _roll(camera)
     turned = abs(roll) > parameters.level_from and _can_turn(camera)
     if scale > _SMALLER and not turned:
@@ -180,10 +186,10 @@ def working_view(
     intrinsics = camera.intrinsics.copy()
     intrinsics[:2, :2] *= factors[:, None]
     intrinsics[:2, 2] = (intrinsics[:2, 2] + 0.5) * factors - 0.5
-    reduced = replace(camera, intrinsics=intrinsics, image_size=(int(size[0]), int(size[1])))
+    smaller = replace(camera, intrinsics=intrinsics, image_size=(int(size[0]), int(size[1])))
     if not turned:
-        return WorkingView(reduced, camera, factors, None, 0.0)
-    return _turned(reduced, camera, factors, roll)
+        return WorkingView(smaller, camera, factors, None, 0.0)
+    return _turned(smaller, camera, factors, roll)
 
 
 def _reduced(full: UInt8[ndarray, "h w 3"], size: tuple[int, int]) -> UInt8[ndarray, "h2 w2 3"]:
