@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from tests.single_view.networks import answering
+from tracker.geometry.camera import Camera
 from tracker.parameters.catalogue import (
     FOLLOWING,
     METHODS,
@@ -31,7 +32,7 @@ from tracker.parameters.values import (
     with_values,
 )
 from tracker.runs import pipeline, warm_up
-from tracker.runs.fitting import default_parameters, unfit_methods
+from tracker.runs.fitting import advice, default_parameters, unfit_methods
 from tracker.runs.run import Run
 from tracker.runs.warm_up import MAKERS
 from tracker.sequences.library import with_detector
@@ -214,8 +215,8 @@ def test_a_method_that_cannot_work_is_known_with_the_reason(recording: Sequence)
     assert unfit_methods(recording, defaults) == {key: {} for key in METHODS}
     own = unfit_methods(replace(recording, detector=None), defaults)["single_view"]
     assert own == {
-        "onnx_detector": "onnx_detector runs a detection network, and none is at hand; fetch one by "
-        "`multiview-phd detector get`, or start the program with --detector model.onnx."
+        "onnx_detector": "onnx_detector runs a detection network, and none is at hand; fetch one "
+        "by `multiview-phd detector get`, or start the program with --detector model.onnx."
     }
     dark = unfit_methods(without(recording, "pictures"), defaults)["single_view"]
     assert set(dark) >= {"colour_phd", "jpda", "pseudo_particle", "association_matrix"}
@@ -260,3 +261,42 @@ def test_the_default_follows_the_recording_and_nothing_else_does(recording: Sequ
         assert set(changed_values(found)) <= {"single_view"}
     untaught = without(without(recording, "templates"), "detections")
     assert default_parameters(untaught) == RunParameters(single_view=third)
+
+
+def test_a_fetched_network_is_the_default_for_large_standing_people(recording: Sequence) -> None:
+    """It is at hand for every recording, and named for none: templates and boxes come first."""
+    assert recording.detector is not None
+    fetched = replace(recording.detector, named=False)
+    large = replace(
+        recording,
+        detector=fetched,
+        target_half_extents=np.array([0.3, 0.3, 0.85]),
+        views=tuple(replace(v, camera=scaled(v.camera, 4.0)) for v in recording.views),
+    )
+    assert default_parameters(large).single_view == "colour_phd"
+    assert default_parameters(without(large, "templates")).single_view == "none"
+    untaught = without(without(large, "templates"), "detections")
+    assert default_parameters(untaught).single_view == "onnx_detector"
+    assert default_parameters(replace(untaught, detector=None)).single_view == "shapes"
+    # one camera that sees them small is enough, and so are heads
+    far = (replace(untaught.views[0], camera=scaled(untaught.views[0].camera, 0.1)),)
+    small = replace(untaught, views=(*far, *untaught.views[1:]))
+    heads = replace(untaught, target_half_extents=np.array([0.1, 0.1, 0.15]))
+    for other in (small, heads):
+        assert default_parameters(other).single_view == "shapes"
+        assert advice(replace(other, detector=None), RunParameters(single_view="shapes")) is None
+    without_any = replace(untaught, detector=None)
+    words = advice(without_any, RunParameters(single_view="shapes"))
+    assert words is not None
+    assert "`multiview-phd detector get` fetches one" in words
+    assert advice(without_any, RunParameters(single_view="jpda")) is None
+    assert advice(untaught, RunParameters(single_view="shapes")) is None
+
+
+def scaled(camera: Camera, factor: float) -> Camera:
+    """The same camera with larger pictures."""
+    intrinsics = camera.intrinsics.copy()
+    intrinsics[:2] *= factor
+    width, height = camera.image_size
+    size = (round(width * factor), round(height * factor))
+    return replace(camera, intrinsics=intrinsics, image_size=size)

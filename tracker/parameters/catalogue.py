@@ -75,11 +75,12 @@ that have the old ones are read as before."""
 
 FOLLOWING = ("colour_phd", "none", "shapes")
 """Candidates for the default of ``single_view``: the first whose requirements the recording
-meets is chosen."""
+meets is chosen, or a fetched detection network instead of shapes."""
 
 FOLLOWS = (
     "follows the recording: onnx_detector where a detector is named, else colour_phd with "
-    "pictures and templates, else none with detections, else shapes"
+    "pictures and templates, else none with detections, else onnx_detector where one was fetched "
+    "and standing people are 100 pixels high in every camera, else shapes"
 )
 """The same rule as text for help messages."""
 

@@ -2,9 +2,21 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from tracker.parameters import MethodKey
 from tracker.parameters.catalogue import FOLLOWING, METHODS, RunParameters, method_of
 from tracker.sequences.sequence import Sequence
+from tracker.single_view.box_sizes import BoxSizes
+
+_STANDING = (0.6, 1.1)
+"""Half heights of targets that are whole people who stand, metres: children and tall adults. The
+networks' classes are of whole people; a head alone is none."""
+
+_LEAST_PIXELS = 100.0
+"""Least height of the median target in each camera's picture for the fetched network to be the
+default, pixels. Its input is about half of a picture of 800 x 600; of rendered people who were 90
+pixels high there it had 80 %, and by shape more were found."""
 
 
 def default_parameters(sequence: Sequence) -> RunParameters:
@@ -12,7 +24,8 @@ def default_parameters(sequence: Sequence) -> RunParameters:
 
     That is the detection network, if one is named and there are pictures; else the first of
     :data:`tracker.parameters.catalogue.FOLLOWING` for which the recording has the pictures,
-    templates and detections that it needs.
+    templates and detections that it needs, where the fetched network takes the place of shapes
+    if one is at hand and people are large enough for it.
 
     Raises:
         ValueError: If the sequence has neither pictures nor detections.
@@ -22,10 +35,44 @@ def default_parameters(sequence: Sequence) -> RunParameters:
         return defaults.model_copy(update={"single_view": "onnx_detector"})
     for name in FOLLOWING:
         if _lacks(sequence, defaults, "single_view", name, bool(sequence.templates)) is None:
+            if name == "shapes" and sequence.detector is not None and suits_detector(sequence):
+                name = "onnx_detector"
             return defaults.model_copy(update={"single_view": name})
     raise ValueError(
         f"{sequence.name}: every camera needs pictures (video or images), or every camera "
         "needs detections; add what is missing to sequence.toml"
+    )
+
+
+def suits_detector(sequence: Sequence) -> bool:
+    """Whether the pictures show standing people who are large enough for a fetched network.
+
+    Args:
+        sequence: The recording; calibration, room and target tell how large people are.
+    """
+    half_extents = sequence.target_half_extents
+    if not sequence.has_pictures or not _STANDING[0] <= half_extents[2] <= _STANDING[1]:
+        return False
+    for camera in sequence.cameras:
+        half_heights = BoxSizes.of(camera, sequence.room, half_extents).sizes[:, 1]
+        if not len(half_heights) or 2.0 * np.median(half_heights) < _LEAST_PIXELS:
+            return False
+    return True
+
+
+def advice(sequence: Sequence, parameters: RunParameters) -> str | None:
+    """Say that a detection network can be fetched, where it would be the default method.
+
+    Args:
+        sequence: The recording.
+        parameters: The parameters of the run.
+    """
+    by_shape = parameters.single_view == default_parameters(sequence).single_view == "shapes"
+    if not by_shape or sequence.detector is not None or not suits_detector(sequence):
+        return None
+    return (
+        "people are found by shape, which misses some who keep still; a detection network finds "
+        "them too: `multiview-phd detector get` fetches one"
     )
 
 

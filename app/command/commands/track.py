@@ -37,6 +37,7 @@ def track(command: Track) -> int:
     from app.state.workers.compiling import Compiling
     from tracker.io.checks import check
     from tracker.runs import gaps, pipeline
+    from tracker.runs.fitting import advice
     from tracker.runs.gates import notices
     from tracker.runs.outcome import why_no_tracks
     from tracker.runs.run import given_names, row_corrections
@@ -58,6 +59,8 @@ def track(command: Track) -> int:
         if found.status == "warning" and str(found) not in sequence.warnings:
             say(str(found))
     parameters = with_values(pipeline.default_parameters(sequence), changes)
+    if (words := advice(sequence, parameters)) is not None:
+        say(words)
     told_by_hand = of_run(sequence, command.corrections, none=command.no_corrections)
     begin, began = time.perf_counter(), time.time()
     stages: set[Stage] = set()
