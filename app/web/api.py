@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import io
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from fastapi import APIRouter, Query, Request, Response
+from fastapi import APIRouter, Depends, Query, Request, Response
 
 from app import models
 from app.errors import ApiError
 from app.state.kept.history import History
+from app.state.snapshot import Snapshot
 from app.state.teaching import Teaching
 from app.state.workers.sensitivity import Sensitivity
 from app.web.dependencies import (
@@ -33,6 +35,9 @@ from tracker.runs.run import given_names, row_corrections
 from tracker.sequences import library
 
 router = APIRouter(prefix="/api", responses=ERRORS)
+
+MOST_STEPS = 64
+"""Steps that one request may ask for."""
 
 
 @router.get("/state")
@@ -217,29 +222,52 @@ async def picture(
     return Response(jpeg, media_type="image/jpeg", headers=headers)
 
 
+@dataclass(frozen=True)
+class StepDetails:
+    """What of a step is told besides what is always told."""
+
+    samples: Annotated[bool, Query(description="With samples and what was dropped.")] = False
+    trails: Annotated[bool, Query(description="With the tracks' ways in the pictures.")] = False
+    seconds: Annotated[float, Query(ge=0.5, le=600.0, description="How far back.")] = 4.0
+
+    def of(self, snapshot: Snapshot, step: int) -> models.Step:
+        """The message of one step.
+
+        Raises:
+            ApiError: If no sequence is open, or it has no such step.
+        """
+        sequence = snapshot.sequence
+        if sequence is None:
+            raise nothing_open()
+        if not 0 <= step < sequence.frames:
+            raise ApiError(
+                404,
+                "no_step",
+                f"There is no step {step}: {sequence.name} has 0 … {sequence.frames - 1}.",
+                field="step",
+            )
+        trails = self.seconds if self.trails else 0.0
+        return steps.step_of(sequence, snapshot.run, step, with_samples=self.samples, trails=trails)
+
+
+Details = Annotated[StepDetails, Depends()]
+
+
 @router.get("/step/{step}")
-async def step(
-    step: int,
-    bench: Bench,
-    samples: Annotated[bool, Query(description="With samples and what was dropped.")] = False,
-    trails: Annotated[bool, Query(description="With the tracks' ways in the pictures.")] = False,
-    seconds: Annotated[float, Query(ge=0.5, le=600.0, description="How far back.")] = 4.0,
-) -> models.Step:
+async def step(step: int, bench: Bench, details: Details) -> models.Step:
     """One step of the shown run: what each camera found, the targets, the truth."""
+    return details.of(bench.snapshot(), step)
+
+
+@router.get("/steps")
+def several_steps(
+    step: Annotated[list[int], Query(max_length=MOST_STEPS, description="Once for each step.")],
+    bench: Bench,
+    details: Details,
+) -> list[models.Step]:
+    """Several steps of the shown run at once, as ``/api/step/{step}`` has each."""
     snapshot = bench.snapshot()
-    sequence = snapshot.sequence
-    if sequence is None:
-        raise nothing_open()
-    if not 0 <= step < sequence.frames:
-        raise ApiError(
-            404,
-            "no_step",
-            f"There is no step {step}: {sequence.name} has 0 … {sequence.frames - 1}.",
-            field="step",
-        )
-    return steps.step_of(
-        sequence, snapshot.run, step, with_samples=samples, trails=seconds if trails else 0.0
-    )
+    return [details.of(snapshot, one) for one in step]
 
 
 @router.get("/timeline")

@@ -181,6 +181,15 @@ class EvaluationSeries(Model):
     switches: list[Switch]
 
 
+class Scores(Model):
+    """What the page shows of a run against the truth: figures, and what lies over time."""
+
+    evaluation: EvaluationInfo
+    series: EvaluationSeries
+    reference: EvaluationSeries | None
+    """Of the run that it is compared with; null where there is none."""
+
+
 class ComparedRun(Model):
     """One side of a comparison."""
 

@@ -71,6 +71,24 @@ def series(
     return messages.series_of(run, evaluated, of, part.window(run.sequence.frames))
 
 
+@router.get("/evaluation/curves")
+def curves(bench: Bench, part: Part) -> models.Scores:
+    """The figures and the series of the run scored last, and the series of the run it is compared
+    with, all of the same moment."""
+    snapshot = bench.snapshot()
+    run, evaluated = _evaluated(snapshot, snapshot.scores.shown)
+    window = part.window(run.sequence.frames)
+    against, other = snapshot.scores.reference or (None, None)
+    reference = None
+    if against is not None and other is not None and other.evaluation is not None:
+        reference = messages.series_of(other, other.evaluation, against, window)
+    return models.Scores(
+        evaluation=messages.evaluation_of(run, evaluated),
+        series=messages.series_of(run, evaluated, "shown", window),
+        reference=reference,
+    )
+
+
 @router.get("/evaluation/comparison")
 def comparison(bench: Bench, evaluator: Scorer) -> models.Comparison | None:
     """The run scored last, B, against the pinned or else the previous finished one, A.

@@ -167,6 +167,8 @@ function createCheck({ store, actions, playback }) {
 	store.watch(["run"], ({ run }) => {
 		const now = `${run?.key} ${run?.state}`;
 		if (!run || (now === ended && run.state !== "computing")) return;
+		// In Tune nobody looks at what a run under way leaves open.
+		if (run.state === "computing" && store.get().place !== "check") return;
 		ended = now;
 		clearTimeout(waiting);
 		const rest = run.state === "computing" ? OFTEN - (performance.now() - asked) : 100;

@@ -5,11 +5,11 @@
  * pictures and its result are there: all cameras, overlays, readout and playhead in one
  * animation frame. Until then the last whole step stays.
  */
-import { getJson } from "../state/api.js";
 import { shownVersion, versionOf } from "../state/events.js";
 import { createCache } from "./cache.js";
 import { advance, clampStep, playedRange, prefetchWindow, restAfter3d, restOf3d } from "./clock.js";
 import { createPictures, mapNames, pictureName, standIn, PICTURE_BUDGET } from "./pictures.js";
+import { createStepLoader } from "./steps.js";
 
 const RESULTS_KEPT = 600;
 
@@ -22,6 +22,9 @@ const STILL = 200;
 const SLOW_3D = 1000;
 /** Where it is slow it waits so long after another run or place came in sight, milliseconds. */
 const LAST_3D = 400;
+
+/** Steps that one request brings. */
+const STEPS_AT_ONCE = 24;
 
 /** How many steps of the shown run are there. @param {Readonly<PageState>} state */
 export function shownDone({ basis, run, timeline }) {
@@ -56,18 +59,18 @@ export function createPlayback(store, sendSeek) {
 		ask();
 	});
 
+	const loadStep = createStepLoader();
 	const results = createCache({
 		load: async (name, signal) => {
 			const [, step, query] = name.split("/");
-			/** @type {Server.Step} */
-			const result = await getJson(`/api/step/${step}${query}`, { signal });
+			const result = await loadStep(Number(step), query, signal);
 			const told = resultName(versionOf(result), result.step, query);
 			if (name !== told) throw new Error(`asked for ${name}, the server shows ${told} by now`);
 			return result;
 		},
 		sizeOf: () => 1,
 		budget: RESULTS_KEPT,
-		parallel: 2,
+		parallel: STEPS_AT_ONCE,
 		arrived: (name) => {
 			if (Number(name.split("/")[1]) === store.get().step) dirty = true;
 			const { foreground, likelihood } = store.get().layers2d;
@@ -92,7 +95,7 @@ export function createPlayback(store, sendSeek) {
 		const { layers2d, server } = store.get();
 		const { samples, trails } = layers2d;
 		const long = trails ? `&seconds=${server?.trail.seconds}` : "";
-		return samples || trails ? `?samples=${Boolean(samples)}&trails=${Boolean(trails)}${long}` : "";
+		return samples || trails ? `&samples=${Boolean(samples)}&trails=${Boolean(trails)}${long}` : "";
 	};
 
 	/** Try again after something failed that may come back. @param {number} [soon]  milliseconds */

@@ -54,8 +54,9 @@ export async function sendJson(method, path, body = {}) {
 /**
  * Fetch the newest: never twice at once, and once more where there was news meanwhile.
  * @param {() => Promise<void>} work
+ * @param {() => number} [rest]  the least time between two, by now, milliseconds
  */
-export function fetcher(work) {
+export function fetcher(work, rest = () => 150) {
 	let busy = false;
 	let again = false;
 	return async () => {
@@ -69,7 +70,9 @@ export function fetcher(work) {
 			} catch {
 				// The socket tells whether the server is there, and brings the next news.
 			}
-			await new Promise((resolve) => setTimeout(resolve, 150));
+			// What the rest depends on may change while it lasts.
+			for (const since = performance.now(); performance.now() - since < rest();)
+				await new Promise((resolve) => setTimeout(resolve, 100));
 		}
 		busy = false;
 	};

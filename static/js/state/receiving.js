@@ -127,26 +127,25 @@ export function createReceiver({ store, playback, actions, address, isOld }) {
 		return `first=${Math.max(0, Math.floor(first - beside))}&last=${Math.ceil(last + beside)}`;
 	}
 
+	/** While a run goes on, lanes that are there grow once a second. */
+	const rest = () => {
+		const { run, timeline } = store.get();
+		return timeline && run?.state === "computing" ? 1000 : 150;
+	};
+
 	const fetchTimeline = fetcher(async () => {
 		if (!store.get().sequence) return;
 		const timeline = await getJson(`/api/timeline?${part()}`);
 		// Lanes of another run would mix the two; its own news is on the way.
 		if (timeline.run === store.get().basis) store.set({ timeline });
-	});
+	}, rest);
 
 	const fetchScores = fetcher(async () => {
 		const { sequence, run } = store.get();
 		// A run without a step has no figures; they come with its first news.
 		if (!sequence?.has_truth || (!run?.done && run?.state !== "failed")) return;
-		const told = (/** @type {string} */ what) => getJson(`/api/evaluation${what}`);
-		const [evaluation, series, comparison] = await Promise.all([
-			told(""),
-			told(`/series?${part()}`),
-			told("/comparison"),
-		]);
-		const reference = comparison && (await told(`/series?of=${comparison.against}&${part()}`));
-		if (store.get().sequence?.key === sequence.key)
-			store.set({ scores: { evaluation, series, reference } });
+		const scores = await getJson(`/api/evaluation/curves?${part()}`);
+		if (store.get().sequence?.key === sequence.key) store.set({ scores });
 	});
 
 	const fetchSequences = fetcher(async () =>

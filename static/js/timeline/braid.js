@@ -24,7 +24,7 @@ export function strands(people, switches) {
  * A line a person, at the height of the track that follows him and in the colour of the track
  * that stands for him: where two exchange their tracks, their lines cross.
  * @param {Pen} pen
- * @param {Scores} scores
+ * @param {Server.Scores} scores
  * @param {Server.TrackLife[]} tracks  in the order of the lanes
  * @param {number | null} selection  whose strands stand out
  */

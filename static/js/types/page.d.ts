@@ -137,7 +137,7 @@ interface PageState {
 	/** Whether all figures are compared, or the headlines. */
 	every: boolean;
 	/** Of the run that was set against the truth last. */
-	scores: Scores | null;
+	scores: Server.Scores | null;
 	/** Of the run whose identities were checked without truth last. */
 	identity: Server.IdentityInfo | null;
 	/** Layouts of somebody's own, by name. */
@@ -172,12 +172,6 @@ interface PageState {
 
 /** Metres over the steps; null where there is no pair. */
 type Course = { first: number; values: (number | null)[] };
-
-type Scores = {
-	evaluation: Server.EvaluationInfo;
-	series: Server.EvaluationSeries;
-	reference: Server.EvaluationSeries | null;
-};
 
 /** A file that somebody dropped or chose; its path from the dropped folder. */
 type Dropped = { path: string; file: File };

@@ -1031,6 +1031,14 @@ declare namespace Server {
 		switches: number;
 	}
 
+	/** What the page shows of a run against the truth: figures, and what lies over time. */
+	interface Scores {
+		evaluation: EvaluationInfo;
+		series: EvaluationSeries;
+		/** Of the run that it is compared with; null where there is none. */
+		reference: EvaluationSeries | null;
+	}
+
 	/** A sequence that can be opened. */
 	interface SequenceEntryInfo {
 		name: string;

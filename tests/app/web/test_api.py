@@ -153,8 +153,17 @@ def test_steps_equal_the_engines(client: TestClient, crossing: Path) -> None:
     assert asked["cameras"][0]["dropped"] == []
 
 
+@pytest.mark.parametrize("details", ["", "&samples=1&trails=1&seconds=2"])
+def test_several_steps_are_those_that_are_asked_for(client: TestClient, details: str) -> None:
+    several = client.get(f"/api/steps?step=7&step=3&step=7{details}").json()
+    assert several == [client.get(f"/api/step/{k}?{details}").json() for k in (7, 3, 7)]
+
+
 def test_a_step_that_is_not_there(client: TestClient) -> None:
     assert_error(client.get("/api/step/120"), 404, "no_step", "0 … 119")
+    assert_error(client.get("/api/steps?step=3&step=120"), 404, "no_step", "0 … 119")
+    assert_error(client.get("/api/steps"), 422, "bad_request", "step")
+    assert_error(client.get("/api/steps?" + "&step=1" * 65), 422, "bad_request", "step")
     assert_error(client.get("/api/step/-1"), 404, "no_step")
     assert_error(client.get("/api/step/now"), 422, "bad_request", "step")
 

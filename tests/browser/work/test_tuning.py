@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from urllib.parse import urlsplit
+
 from playwright.sync_api import Page, expect
 
 from app.web.tables.markup import number
@@ -55,6 +57,35 @@ def test_a_pinned_run_is_compared_with_the_engines_figures(flat_page: Page, serv
         verdicts.add(wanted.verdict)
     assert {"worse", "same"} <= verdicts, "the change makes a difference"
     expect(page.get_by_role("button", name="run A")).to_be_visible()  # its layer in 3D
+    as_at_first(server)
+
+
+MOST_ASKED = 12
+"""Requests that follow a moved slider: the steps around the shown one, lanes and figures while the
+run goes on and at its end, who corrected what, which places are in doubt."""
+
+
+def test_after_a_move_of_a_slider_the_page_asks_for_nothing_twice(
+    flat_page: Page, server: Server
+) -> None:
+    page = flat_page
+    as_at_first(server)
+    server.wait_for_run()
+    page.wait_for_timeout(2_000)  # what was begun before is there
+    asked: list[str] = []
+    page.on("request", lambda request: asked.append(urlsplit(request.url).path))
+    page.evaluate(
+        """(changes) => fetch("/api/parameters", {
+            method: "PATCH",
+            headers: { "Content-Type": "application/json" },
+            body: JSON.stringify({ changes }),
+        })""",
+        {P_D: 0.6},
+    )
+    server.wait_for_run()
+    page.wait_for_timeout(3_000)
+    assert {"/api/steps", "/api/timeline", "/api/evaluation/curves"} <= set(asked)
+    assert len(asked) <= MOST_ASKED, asked
     as_at_first(server)
 
 

@@ -123,6 +123,7 @@ def test_an_axis_ends_at_a_round_number_above_nearly_all() -> None:
 def test_a_run_is_set_against_the_one_before_it(client: TestClient, crossing: Path) -> None:
     assert client.get("/api/evaluation/comparison").json() is None
     assert client.get("/api/evaluation/series?of=previous").status_code == 409
+    assert get(client, "/api/evaluation/curves")["reference"] is None
     change(client, **{P_D: 0.05})
     found = get(client, "/api/evaluation/comparison")
     before, after = engine(crossing), engine(crossing, **{P_D: 0.05})
@@ -136,6 +137,11 @@ def test_a_run_is_set_against_the_one_before_it(client: TestClient, crossing: Pa
     assert {"better", "worse"} & {row[3] for row in rows}
     series = get(client, "/api/evaluation/series?of=previous")
     assert (series["run"], series["of"]) == (before.key, "previous")
+    assert get(client, "/api/evaluation/curves") == {
+        "evaluation": get(client, "/api/evaluation"),
+        "series": get(client, "/api/evaluation/series"),
+        "reference": series,
+    }
 
 
 @pytest.mark.full
@@ -171,7 +177,13 @@ def test_another_sequence_forgets_runs_and_pin(client: TestClient) -> None:
 def test_what_is_not_there_is_said(data: Path, tmp_path: Path) -> None:
     app = create_app(Settings(data=data, with_viser=False))
     with TestClient(app, base_url=ADDRESS) as client:
-        paths = ("evaluation", "evaluation/series", "evaluation/comparison", "export/report.html")
+        paths = (
+            "evaluation",
+            "evaluation/series",
+            "evaluation/comparison",
+            "evaluation/curves",
+            "export/report.html",
+        )
         for path in paths:
             assert client.get(f"/api/{path}").json()["code"] == "nothing_open"
         assert client.post("/api/run/pin").json()["code"] == "nothing_open"
