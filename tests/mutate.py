@@ -71,8 +71,8 @@ NOT_DRAWN = (
 NOT_RUN = ("test_compilation.py", "test_checked_cache.py", "test_robustness.py")
 """Tests of compiled kernels alone, and of many or large pictures, which take long interpreted."""
 
-COMPILED = ("tests/io/", "tests/single_view/test_onnx_detector.py")
-"""Tests that compare so many boxes, or render a room, that kernels are compiled for them."""
+COMPILED = ("tests/io/", "tests/single_view/")
+"""Tests of so many boxes or pixels that kernels are compiled for them."""
 
 SORTS = ("bound", "sign", "off by one", "factor", "swapped", "and/or", "negated")
 
