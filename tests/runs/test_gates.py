@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,10 +11,11 @@ import pytest
 
 from tests.engine.painted import GREEN, RED, painted_sequence
 from tests.engine.synthetic import walk
-from tracker.parameters.catalogue import RunParameters
+from tracker.parameters.catalogue import METHODS, PARAMETERS, RunParameters
 from tracker.parameters.values import with_values
 from tracker.runs import pipeline
-from tracker.runs.gates import count_gates, notices
+from tracker.runs.gates import _NO_CANDIDATES, _SLIDERS, count_gates, decisive_gate, notices
+from tracker.runs.outcome import why_no_tracks
 from tracker.runs.run import Run
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import upright_boxes
@@ -85,3 +87,50 @@ def test_of_the_foreground_alone_tops_are_counted(tmp_path: Path) -> None:
     (told,) = count_gates(run)
     assert told.candidates > 0.5
     assert told.dropped["foreground"] > 0.5
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        (
+            {"single_view": "jpda", "jpda__least_inside": 1.0},
+            r"candidates a picture fell for foreground: lower jpda\.least_inside",
+        ),
+        (
+            {"single_view": "association_matrix", "association_matrix__acceptance": 0.0},
+            r"fell for outline: lower association_matrix\.acceptance",
+        ),
+        (
+            {"stays": True, "single_view": "jpda"},
+            r"0\.00 candidates a picture: lower foreground\.threshold",
+        ),
+        (
+            {"colour_phd__acceptance_distance": 0.05},
+            r"fell for colour: raise colour_phd\.acceptance_distance",
+        ),
+    ],
+)
+def test_a_run_without_tracks_names_gate_and_value(
+    changes: dict[str, object], words: str, tmp_path: Path
+) -> None:
+    stays = bool(changes.get("stays"))
+    values = {name: value for name, value in changes.items() if name != "stays"}
+    run = run_of(film(tmp_path, stays=stays), **values)
+    told = why_no_tracks(run)
+    assert told is not None
+    assert told.startswith("no tracks: 10 pictures")
+    assert re.search(words, told), told
+
+
+def test_where_candidates_pass_no_gate_is_named(tmp_path: Path) -> None:
+    assert decisive_gate(run_of(film(tmp_path, stays=False))) is None
+
+
+def test_what_is_advised_exists() -> None:
+    for (method, gate), advice in _SLIDERS.items():
+        assert method in METHODS["single_view"]
+        assert gate in GATES
+        assert all(key in PARAMETERS for key in re.findall(r"\w+\.\w+", advice))
+    for method, advice in _NO_CANDIDATES.items():
+        assert method in METHODS["single_view"]
+        assert all(key in PARAMETERS for key in re.findall(r"\w+\.\w+", advice))

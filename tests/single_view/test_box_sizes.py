@@ -277,4 +277,5 @@ def test_boxes_of_a_detector_pass_from_their_least_score_on_with_what_is_told_of
     _, result = method.step(None, 0, None, np.random.default_rng(0))
     assert_array_equal(result.weights, [0.9])
     assert_array_equal(result.measurement_scores, [0.7, 0.9])
-    assert result.information == {"boxes outside the room": 1.0}
+    assert result.information["dropped for a place outside the room"] == 1.0
+    assert len(result.dropped.boxes) == 1

@@ -79,7 +79,7 @@ def test_a_step_is_bayes_rule_with_a_clutter_that_falls_with_the_score() -> None
     missed = 0.95 * (1.0 - 0.8) * 1.5
     assert after.mixture.cardinality == pytest.approx(missed + weights.sum(), abs=1e-6)
     assert result.information == {
-        "boxes outside the room": 0.0, "cardinality": after.mixture.cardinality,
+        "candidates": 3.0, "cardinality": after.mixture.cardinality,
     }  # fmt: skip
     assert_array_equal(result.measurements, SEEN)
     assert_array_equal(result.measurement_scores, SCORES)

@@ -6,6 +6,7 @@ each gate rejected; this module averages the counts over a run and describes the
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
 
 from tracker.runs.run import Run
@@ -16,6 +17,41 @@ _HALF = 0.5
 """Trust in the foreground below which people are not detected by it; uncertainty of the
 background above which a notice is given."""
 
+
+_SLIDERS = {
+    ("colour_phd", "colour"): "raise colour_phd.acceptance_distance, or add a template",
+    ("colour_phd", "foreground"): "lower colour_phd.acceptance_foreground",
+    ("colour_phd", "surroundings"): "lower colour_phd.surroundings_weight",
+    ("colour_phd", "shape"): "lower colour_phd.shape_odds",
+    ("shapes", "shape"): "lower shapes.passed_odds",
+    ("jpda", "colour"): "raise colour_phd.acceptance_distance, or add a template",
+    ("jpda", "foreground"): "lower jpda.least_inside",
+    ("jpda", "surroundings"): "raise jpda.most_above or jpda.most_beside",
+    ("jpda", "another's shoulders"): "lower jpda.shoulder_across",
+    ("jpda", "a place outside the room"): "raise detection_boxes.room_tolerance",
+    ("association_matrix", "outline"): "lower association_matrix.acceptance",
+    ("onnx_detector", "a place outside the room"): "raise onnx_detector.room_tolerance",
+    ("detection_phd", "a place outside the room"): "raise detection_phd.room_tolerance",
+    ("none", "a place outside the room"): "raise detection_boxes.room_tolerance",
+}
+"""What lets more candidates through, by method and gate; at other gates it is no single value."""
+
+_NO_CANDIDATES = {
+    "colour_phd": "raise colour_phd.samples, or add a template",
+    "shapes": "lower shapes.passed_odds",
+    "jpda": "lower foreground.threshold",
+    "association_matrix": "lower foreground.threshold",
+    "onnx_detector": "lower onnx_detector.score_threshold",
+    "detection_phd": "lower detection_phd.score_threshold",
+    "none": "lower detection_boxes.score_threshold",
+}
+"""What gives more candidates, by method."""
+
+_RARE = 0.05
+"""Candidates in a picture, on average, below which there are too few for any gate to matter."""
+
+_MOST = 0.5
+"""Share of the candidates that a gate rejects from which it is named."""
 
 _EMPTY = (
     "better is a picture, or some steps, of the scene without anybody: background of the camera "
@@ -87,6 +123,33 @@ def count_gates(run: Run) -> list[Gates]:
 
 def _mean(counts: list[dict[str, float]], name: str, otherwise: float = 0.0) -> float:
     return sum(one.get(name, otherwise) for one in counts) / len(counts)
+
+
+def decisive_gate(run: Run) -> str | None:
+    """Describe the gate that rejected most of a run's candidates, and the value that it depends on.
+
+    Returns:
+        A clause with the counts, the gate and the parameter's key; None if no gate rejected half of
+        the candidates, or the method reports none.
+    """
+    cameras = count_gates(run)
+    method = run.parameters.single_view
+    if not cameras:
+        return None
+    candidates = sum(one.candidates for one in cameras) / len(cameras)
+    if candidates < _RARE:
+        more = _NO_CANDIDATES.get(method)
+        return f"{candidates:.2f} candidates a picture" + (f": {more}" if more else "")
+    totals: Counter[str] = Counter()
+    for one in cameras:
+        totals.update({gate: count / len(cameras) for gate, count in one.dropped.items()})
+    gate, count = max(totals.items(), key=lambda item: item[1], default=("", 0.0))
+    if count < _MOST * candidates:
+        return None
+    more = _SLIDERS.get((method, gate))
+    return f"{count:.1f} of {candidates:.1f} candidates a picture fell for {gate}" + (
+        f": {more}" if more else ""
+    )
 
 
 def notices(run: Run) -> list[str]:

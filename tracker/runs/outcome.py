@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tracker.runs.gates import decisive_gate
 from tracker.runs.run import Run
 
 
@@ -48,10 +49,17 @@ def count_stages(run: Run) -> StageCounts:
 
 
 def why_no_tracks(run: Run) -> str | None:
-    """Explain in a sentence which stage of a run lost all people; None if the run has tracks."""
+    """Explain in a sentence which stage of a run lost all people, and at which gate most candidates
+    of stage 1 fell; None if the run has tracks."""
     if len(run.tracks):
         return None
     n = count_stages(run)
+    gate = decisive_gate(run) if n.frames else None
+    return _losing_stage(run, n) + (f"; in the cameras {gate}" if gate is not None else "")
+
+
+def _losing_stage(run: Run, n: StageCounts) -> str:
+    """Explain which stage of a run without tracks lost all people."""
     kind = "pictures" if run.costly else "frames of boxes"
     if not n.frames:
         return f"no tracks: not one of the {kind} could be read; see that the files are there"

@@ -166,8 +166,9 @@ class DetectionPhd:
             estimate_labels=labels,
             measurements=found.boxes,
             measurement_scores=found.scores,
+            dropped=found.dropped,
             information={
-                "boxes outside the room": float((~found.plausible).sum()),
+                **found.dropped.information(int(found.plausible.sum())),
                 "cardinality": mixture.cardinality,
             },
             embeddings=embeddings,

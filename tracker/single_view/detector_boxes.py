@@ -12,6 +12,7 @@ from tracker.geometry.boxes import Boxes
 from tracker.geometry.camera import Camera
 from tracker.parameters.groups.detections import DetectionBoxParams
 from tracker.sequences.sequence import Room, Sequence
+from tracker.single_view.dropped import Dropped
 
 _AT_ONCE = 4096
 """Number of boxes whose places in the room are in memory at a time."""
@@ -40,6 +41,11 @@ class Detected:
         return Detected(
             self.boxes[rows], self.scores[rows], self.sigmas[rows], self.plausible[rows], embeddings
         )
+
+    @property
+    def dropped(self) -> Dropped:
+        """The boxes that contradict the room."""
+        return Dropped.of(self.boxes, {"a place outside the room": ~self.plausible})
 
     def embeddings_of(
         self, chosen: slice | Bool[ndarray, " N"] | Int[ndarray, " K"]

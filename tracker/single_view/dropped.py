@@ -15,6 +15,7 @@ the number that it rejected."""
 
 GATES = (
     "colour", "foreground", "surroundings", "shape", "another at its place", "another's shoulders",
+    "outline", "a place outside the room",
 )  # fmt: skip
 """All gates that methods may have, by number."""
 

@@ -48,12 +48,12 @@ class DetectionBoxes:
         found = self._boxes.at(frame)
         good = found.plausible
         result = ViewResult.of_boxes(found.boxes[good], found.scores[good], found.sigmas[good])
-        result = replace(result, embeddings=found.embeddings_of(good))
-        if good.all():
-            return None, result
+        dropped = found.dropped
         return None, replace(
             result,
+            embeddings=found.embeddings_of(good),
             measurements=found.boxes,
             measurement_scores=found.scores,
-            information={"boxes outside the room": float((~good).sum())},
+            information=dropped.information(int(good.sum())),
+            dropped=dropped,
         )

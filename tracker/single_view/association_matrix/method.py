@@ -22,6 +22,7 @@ from tracker.single_view.association_matrix.following import follow, object_hist
 from tracker.single_view.association_matrix.handing_over import advance
 from tracker.single_view.association_matrix.moving_objects import MovingObject, Situation
 from tracker.single_view.association_matrix.silhouettes import Fits, Silhouettes
+from tracker.single_view.dropped import Dropped
 from tracker.single_view.pictures import colour
 from tracker.single_view.pictures.blobs import Blobs, blobs
 from tracker.single_view.pictures.colour import BINS
@@ -150,9 +151,12 @@ class AssociationMatrix:
             fits = self._silhouettes.fit(mask, seen, wanted, p)
             boxes, weights = fits.boxes, np.exp(np.minimum(fits.scores, 0.0))
             labels = _labels_of_fits(fits, situation)
+            unfit = np.isin(np.arange(seen.size), fits.owners, invert=True)
         else:
             boxes, labels = _apart(situation)
             weights = np.ones(len(boxes))
+            unfit = np.zeros(seen.size, dtype=bool)
+        dropped = Dropped.of(seen.boxes, {"outline": unfit})
         estimates, estimate_labels = _estimates(situation, p.confirmation_steps)
         return ViewResult(
             boxes=boxes,
@@ -165,11 +169,13 @@ class AssociationMatrix:
             measurements=seen.boxes,
             measurement_scores=np.ones(seen.size),
             information={
+                **dropped.information(seen.size - len(dropped.gates)),
                 "objects": float(len(objects)),
                 "merged objects": float(sum(len(one.labels) > 1 for one in objects)),
                 "interrupted": float(len(situation.lost)),
                 "foreground share": float(mask.mean()),
             },
+            dropped=dropped,
             events=tuple(events),
             gates=self._gates(objects),
             foreground=pack(mask),

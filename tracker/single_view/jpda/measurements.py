@@ -269,7 +269,8 @@ class _Detector:
             boxes * [1.0, 1.0, self._cover, self._cover],
             shown=found.boxes,
             shown_scores=found.scores,
-            information={"boxes outside the room": float((~good).sum())},
+            information=found.dropped.information(int(good.sum())),
+            dropped=found.dropped,
         )
 
     def sigmas(self, boxes: Float[ndarray, "N 4"]) -> Float[ndarray, "N 4"]:

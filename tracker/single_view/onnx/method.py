@@ -75,9 +75,11 @@ class OnnxDetector:
         found = judged(self._sequence, self._camera, seen.boxes, seen.scores, self._parameters)
         good = found.plausible
         result = ViewResult.of_boxes(found.boxes[good], found.scores[good], found.sigmas[good])
+        dropped = found.dropped
         return None, replace(
             result,
             measurements=found.boxes,
             measurement_scores=found.scores,
-            information={"boxes outside the room": float((~good).sum())},
+            information=dropped.information(int(good.sum())),
+            dropped=dropped,
         )
