@@ -88,7 +88,7 @@ class RunInfo(Model):
     steps_per_second: float
     seconds_left: float | None
     message: str
-    """The stage that takes the time."""
+    """The stage under way, and how long nothing was heard of it."""
     error: str | None
     kept: int | None
     """Its number in the library that it was taken from; what the cameras found is not there."""

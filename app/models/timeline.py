@@ -10,7 +10,7 @@ Span = tuple[int, int, Literal["seen", "coasting", "long miss"]]
 """First step, last step, and whether any camera saw the target; a long miss is coasting too."""
 
 LaneEvent = tuple[int, int, Literal["birth", "death", "long miss", "cut", "joined", "removed"]]
-"""Step, track and what happened to it; the last three by hindsight."""
+"""Step, track and what happened to it; the last three by smoothing."""
 
 
 class TrackLife(Model):
@@ -62,7 +62,7 @@ class PinnedTimeline(Model):
 
 
 class Decided(Model):
-    """What hindsight made otherwise than the filter, and why."""
+    """What smoothing made otherwise than the filter, and why."""
 
     step: int
     track: int
@@ -95,6 +95,6 @@ class Timeline(Model):
     events: list[LaneEvent]
     """Of all steps, also of those not asked for, in their order."""
     decisions: list[Decided]
-    """What hindsight changed, by its step; empty for the filter alone."""
+    """What smoothing changed, by its step; empty for the filter alone."""
     left_out: int
     """How many more live there: the shorter ones, where they are very many."""

@@ -90,13 +90,15 @@ test("a key event finds its command", () => {
   assert.equal(find("y", { ctrlKey: true }), undefined);
 });
 
-test("a key of Check means what it says there, and what it meant before elsewhere", () => {
+test("a key of Check means what it says there, and what it meant before elsewhere; tracks are put right anywhere", () => {
   const find = (key, place) => commandFor(key, true, place)?.name;
   assert.equal(find("y", "check"), "check-next");
   assert.equal(find("y", "tune"), "hindsight");
   assert.equal(find("Ctrl+z", "check"), "check-undo");
   assert.equal(find("Ctrl+z", "tune"), "undo");
-  assert.equal(find("Delete", "tune"), undefined);
+  assert.equal(find("Delete", "tune"), "check-nobody");
+  assert.equal(find("Shift+F10", "tune"), "check-menu");
+  assert.equal(find("Enter", "tune"), undefined);
   assert.equal(find("Space", "check"), "play");
 });
 

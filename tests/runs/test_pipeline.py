@@ -236,7 +236,10 @@ def test_progress_only_grows(earlier: RunParameters | None, stage: str, fresh: i
 
     previous = compute(WHOLE, earlier) if earlier is not None else None
     compute(WHOLE, BOXES, previous=previous, on_progress=note)
-    assert {progress.stage for progress in told} == {stage}
+    stages = list(dict.fromkeys(progress.stage for progress in told))
+    assert stages[0] == stage
+    assert stages[-1] == ("tracks" if stage == "tracks" else "smoothing")
+    assert len(stages) <= 2
     assert {progress.total for progress in told} == {STEPS}
     done, seconds = [p.done for p in told], [p.seconds for p in told]
     assert done == sorted(done)

@@ -139,6 +139,11 @@ class _Reporter:
         if len(run.views) >= total:
             self._stage = "fusion" if len(run.fused) < total else _last_stage(run)
 
+    def fused(self) -> None:
+        """Report that all steps are fused, and which stage is left."""
+        self._stage = _last_stage(self._run)
+        self.now()
+
     def after_step(self) -> None:
         """Report if the interval has passed, or if the displayed step is computed."""
         run, now = self._run, time.perf_counter()
@@ -220,7 +225,7 @@ def _fuse(
             run.fused.append(result)
             run.fusion_state = state
             reporter.after_step()
-    reporter.now()
+    reporter.fused()
 
 
 def _last_stage(run: Run) -> Stage:

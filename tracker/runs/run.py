@@ -35,7 +35,8 @@ class Progress:
     """The progress of a run."""
 
     stage: Stage
-    """The first stage that had to be computed, which takes most of the time."""
+    """The stage under way: the first that had to be computed, which takes most of the time, until
+    all steps are fused; then the one that is left, smoothing or tracks."""
     done: int
     """The number of steps whose tracks are ready, from step 0 on."""
     total: int

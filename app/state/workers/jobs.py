@@ -372,10 +372,10 @@ class Jobs:
 
 
 def silence(now: RunState, seconds: float) -> str:
-    """What is said of a run of which nothing was heard for so long: after its last step it looks
-    back over all of them.
+    """What is said of a run of which nothing was heard for so long: after its last step the tracks
+    are smoothed.
     """
-    what = "hindsight" if 0 < now.total == now.done else "no new step"
+    what = "smoothing" if 0 < now.total == now.done else "no new step"
     return f"{what} for {seconds:.0f} s"
 
 

@@ -45,7 +45,7 @@ def event_table(
     bench: Bench,
     kind: Annotated[Kind | None, Query(description="Only these.")] = None,
 ) -> str:
-    """Births, deaths, switches, long misses, what hindsight changed, and what is doubtful where
+    """Births, deaths, switches, long misses, what smoothing changed, and what is doubtful where
     somebody had identities checked; each can be gone to."""
     snapshot = bench.snapshot()
     sequence, run = snapshot.sequence, snapshot.run

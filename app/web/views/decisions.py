@@ -1,4 +1,4 @@
-"""What hindsight made otherwise than the filter: tracks that were cut, joined or removed."""
+"""What smoothing made otherwise than the filter: tracks that were cut, joined or removed."""
 
 from __future__ import annotations
 

@@ -192,7 +192,7 @@ class Timelines:
         done, count = 0, np.zeros(0, dtype=np.int64)
         lives: list[models.TrackLife] = []
         events: list[models.LaneEvent] = []
-        hindsight: list[Named] = []
+        decisions: list[Named] = []
         left_out = 0
         if run is not None:
             done = run.done
@@ -211,8 +211,8 @@ class Timelines:
             shortest = math.ceil(LONG_MISS * sequence.fps)
             lives, left_out = _lives(spans, window, shortest)
             events = _events(spans, done, shortest)
-            hindsight = decided(run)
-            found = [(one.step, one.track, one.decision.kind) for one in hindsight]
+            decisions = decided(run)
+            found = [(one.step, one.track, one.decision.kind) for one in decisions]
             events = sorted([*events, *found], key=lambda e: e[:2])[:MOST_EVENTS]
             # what somebody said goes before what the colours say
             said = given_names(run)
@@ -236,7 +236,7 @@ class Timelines:
                 models.Decided(
                     step=one.step, track=one.track, kind=one.decision.kind, words=one.words
                 )
-                for one in hindsight[:MOST_EVENTS]
+                for one in decisions[:MOST_EVENTS]
             ],
             left_out=left_out,
         )

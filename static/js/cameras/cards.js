@@ -11,7 +11,7 @@ const about = (number, text) => [show(Number(number.toFixed(2))), h("small", {},
  * @param {HTMLElement} card
  * @param {Server.CameraTrack} track
  * @param {Server.Track | undefined} whole
- * @param {Server.Decided[]} decisions  what hindsight made otherwise of it, the nearest first
+ * @param {Server.Decided[]} decisions  what smoothing made otherwise of it, the nearest first
  */
 export function fillTrackCard(card, track, whole, decisions) {
 	const {
@@ -57,7 +57,7 @@ export function fillTrackCard(card, track, whole, decisions) {
 				),
 			whole && row("±", whole.sigma.map((v) => v.toFixed(2)).join("  "), h("small", {}, " m")),
 		),
-		decisions.slice(0, 2).map(({ words }) => h("p", { class: "hindsight" }, words)),
+		decisions.slice(0, 2).map(({ words }) => h("p", { class: "decision" }, words)),
 	);
 }
 

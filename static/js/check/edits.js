@@ -70,7 +70,7 @@ export function mountCorrecting(context, timeline) {
 	function exchange(one, other, step = shown()) {
 		return say(
 			{ kind: "exchanged", step, tracks: [one, other] },
-			`${one} and ${other} exchanged from step ${step} on`,
+			`Tracks ${one} and ${other} exchanged from step ${step} on`,
 		);
 	}
 
@@ -83,13 +83,13 @@ export function mountCorrecting(context, timeline) {
 		const both = a && b && Math.max(a.first, b.first) <= Math.min(a.last, b.last);
 		return say(
 			{ kind: "same", tracks: [one, other], ...(both && { step: shown() }) },
-			`${one} and ${other} are one person`,
+			`Tracks ${one} and ${other} are one person`,
 		);
 	}
 
 	/** @param {number} track @param {string} name */
 	function name(track, name) {
-		return say({ kind: "name", step: shown(), tracks: [track], name }, `${track} is ${name}`);
+		return say({ kind: "name", step: shown(), tracks: [track], name }, `Track ${track} is ${name}`);
 	}
 
 	/** An exchange whose ends somebody changed, else the answer of the queue. @param {number} which */
@@ -132,7 +132,7 @@ export function mountCorrecting(context, timeline) {
 		const track = who();
 		if (track === null) return;
 		const step = kind === "nobody" ? {} : { step: shown() };
-		return say({ kind, tracks: [track], ...step }, `${track} ${words}`);
+		return say({ kind, tracks: [track], ...step }, `Track ${track} ${words}`);
 	}
 
 	/** @type {Record<Correcting, () => void | Promise<any>>} */

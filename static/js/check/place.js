@@ -50,7 +50,7 @@ const sentence = (words) => words.charAt(0).toUpperCase() + words.slice(1);
 function placingWords({ track, step, clicks }) {
 	if (clicks.length === 1) return "One picture: feet on the floor. Enter says it, Esc leaves it.";
 	if (clicks.length) return "Two pictures. Enter says it, Esc leaves it.";
-	const who = track === null ? "somebody stands" : `${track} stands`;
+	const who = track === null ? "somebody stands" : `track ${track} stands`;
 	return `Click where ${who} at step ${step}, in one picture or in two. Esc leaves it.`;
 }
 
@@ -144,7 +144,7 @@ export function mountPlace(root, { store, actions, playback }, check, crops) {
 					{},
 					queue?.doubts.length
 						? "Y goes to the next one."
-						: "Corrections can be made anywhere: select a track, then Shift F10 or its menu.",
+						: `Corrections can be made anywhere: select a track, then ${keyLabel(commandOf("check-menu").keys[0])} or its menu.`,
 				),
 			);
 			return;

@@ -159,7 +159,7 @@ export function drawLanes(
 }
 
 /**
- * What hindsight made otherwise: a link where pieces were joined, two edges where one was cut, and
+ * What smoothing made otherwise: a link where pieces were joined, two edges where one was cut, and
  * over the lanes a small ring where somebody was taken away who has no lane any more.
  * @param {Pen} pen @param {Server.Decided["kind"]} kind @param {number} x @param {number} y
  */

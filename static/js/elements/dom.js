@@ -65,6 +65,17 @@ export const parts = (root) =>
 	Object.fromEntries(all("[data-ref]", root).map((element) => [element.dataset.ref, element]));
 
 /**
+ * Let a button or a link be pressed, or not: then its tip says why.
+ * @param {Part} control
+ * @param {string} why  empty where it can be
+ */
+export function allow(control, why) {
+	if (control.matches("a")) control.ariaDisabled = why ? "true" : null;
+	else control.disabled = Boolean(why);
+	control.ariaDescription = why || null;
+}
+
+/**
  * @param {Element & { value: string }} select
  * @param {[string | number, string][]} choices  values and words
  * @param {string | number} chosen

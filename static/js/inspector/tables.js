@@ -3,8 +3,8 @@
  * something that they tell of is new. Their buttons name an action and its value.
  */
 import { fetcher, request } from "../state/api.js";
-import { eventsNow } from "../state/events.js";
-import { all, choices, one, parts, write } from "../elements/dom.js";
+import { eventsNow, scoresOf } from "../state/events.js";
+import { all, allow, choices, one, parts, write } from "../elements/dom.js";
 
 /**
  * What a panel tells of, and where it comes from.
@@ -45,6 +45,7 @@ export function mountTables(root, { store, actions }) {
 		place,
 		more,
 		resetAll,
+		report,
 	} = parts(root);
 	for (const [name, { keys, path }] of Object.entries(TABLES)) {
 		const body = one(`#panel-${name} [data-fill]`, root);
@@ -104,7 +105,8 @@ export function mountTables(root, { store, actions }) {
 	removePreset.addEventListener("click", () => actions.removePreset(presets.value));
 
 	function controls() {
-		const { server, sequence, schema, run, link, every } = store.get();
+		const state = store.get();
+		const { server, sequence, schema, run, link, every } = state;
 		const changed = server?.changed ?? [];
 		const locked = link !== "open" || !sequence;
 		const [own, now] = [server?.presets ?? [], server?.preset ?? ""];
@@ -121,11 +123,31 @@ export function mountTables(root, { store, actions }) {
 		resetAll.disabled = locked || changed.length === 0;
 		write(code, server?.command ?? "");
 		unpin.hidden = swap.hidden = !server?.pinned;
-		swap.disabled = locked || run?.state !== "done" || !server?.pinned?.differs.length;
-		pin.disabled = locked || run?.state !== "done" || server?.pinned?.key === run.key;
+		const unfinished = locked
+			? "There is no run."
+			: run?.state === "done"
+				? ""
+				: "This run is not finished.";
+		allow(
+			swap,
+			unfinished || (server?.pinned?.differs.length ? "" : "A and B have the same values."),
+		);
+		allow(pin, unfinished || (server?.pinned?.key === run?.key ? "This run is A." : ""));
+		const scored = scoresOf(state)?.series.partial === false;
+		allow(
+			report,
+			sequence && !sequence.has_truth
+				? "A report compares with the truth, and this recording has none."
+				: unfinished || (scored ? "" : "This run is not scored yet."),
+		);
+		if (report.ariaDisabled) report.removeAttribute("href");
+		else report.setAttribute("href", "/api/export/report.html");
 		write(more, every ? "Headlines" : "All figures");
 	}
-	store.watch(["server", "schema", "link", "run", "every", "sequence"], controls);
+	store.watch(
+		["server", "schema", "link", "run", "every", "sequence", "scores", "basis"],
+		controls,
+	);
 	store.watch(["shown", "timeline", "scores", "eventKind"], (state) => {
 		const events = eventsNow(state);
 		const past = events.filter(({ step }) => step <= state.shown).length;

@@ -1,5 +1,5 @@
 /** The top bar: what is open, which methods run, how far they are. */
-import { fill, h, parts, write } from "../elements/dom.js";
+import { allow, fill, h, one, parts, write } from "../elements/dom.js";
 
 /** @type {Pane} */
 export function mountTop(root, { store, actions }) {
@@ -13,6 +13,7 @@ export function mountTop(root, { store, actions }) {
 		word,
 		bar,
 		number,
+		left,
 		rate,
 		cancel,
 		again,
@@ -29,7 +30,8 @@ export function mountTop(root, { store, actions }) {
 
 	function lists() {
 		const { server, sequences, schema, link } = store.get();
-		const open = server?.opening?.name ?? server?.sequence?.name ?? "";
+		// What is shown, until another is there in its place.
+		const open = server?.sequence?.name ?? server?.opening?.name ?? "";
 		const option = (
 			/** @type {Server.SequenceEntryInfo} */ { name, description, cameras, frames, kind, error },
 		) => {
@@ -94,32 +96,40 @@ export function mountTop(root, { store, actions }) {
 			write(word, text);
 			write(spoken, text);
 		};
-		csv.disabled = link !== "open" || !run?.done;
+		allow(csv, link === "open" && run?.done ? "" : "There are no tracks yet.");
 		bar.hidden = link === "lost" || !(opening || run?.state === "computing");
 		cancel.hidden = link !== "open" || run?.state !== "computing" || Boolean(opening);
 		again.hidden = link !== "open" || run?.state !== "cancelled" || Boolean(opening);
-		number.hidden = rate.hidden = link === "lost" || !(opening || run?.total);
+		number.hidden = left.hidden = rate.hidden = link === "lost" || !(opening || run?.total);
 		const [kind, text] =
 			link === "lost"
 				? ["bad", "not connected"]
 				: !server
 					? ["", "connecting"]
 					: opening
-						? ["busy", "opening"]
+						? ["busy", server.sequence ? `opening ${opening.name}` : "opening"]
 						: server.sequence && run
-							? runWords(run)
+							? WORDS[run.state]
 							: ["", "nothing open"];
 		say(kind, text);
 		const { done, total } = (!opening && run) || { done: 0, total: 0 };
+		// After its last step a run is smoothed, and nobody knows how long that takes.
+		const endless = Boolean(opening) || (total > 0 && done === total);
+		bar.classList.toggle("endless", endless);
 		bar.style.setProperty("--part", String(total > 0 ? done / total : 0));
-		bar.setAttribute("aria-valuemax", String(total));
-		bar.setAttribute("aria-valuenow", String(done));
+		bar.ariaValueMax = String(total);
+		bar.ariaValueNow = endless ? null : String(done);
 		fill(number, total > 0 && [h("b", {}, done), `/${total}`]);
-		write(rate, opening ? "reading" : run ? rateText(run) : "");
+		write(left, opening ? "reading" : run ? leftText(run) : "");
+		write(rate, !opening && run ? rateText(run) : "");
 	}
 
 	store.watch(["server", "sequences", "schema", "link"], lists);
 	store.watch(["server", "run", "link"], status);
+	// What stands there is of what was open before, and goes.
+	store.watch(["server"], ({ server }) =>
+		one(".app").classList.toggle("leaving", Boolean(server?.opening && server.sequence)),
+	);
 }
 
 /** @type {Record<Server.RunInfo["state"], [string, string]>} */
@@ -131,18 +141,14 @@ const WORDS = {
 	idle: ["", "ready"],
 };
 
-/** @param {Server.RunInfo} run  @returns {[string, string]} sign and word */
-export const runWords = ({ state, smoothed }) =>
-	state === "done" && smoothed ? ["good", "smoothed"] : WORDS[state];
-
-/** @param {Server.RunInfo} run  @returns {string} speed and time left, or why it does not begin */
-export function rateText({ state, message, steps_per_second: speed, seconds_left: left }) {
-	if (!speed) return message;
-	const rate = `${speed < 10 ? speed.toFixed(1) : Math.round(speed)} steps/s`;
-	if (state !== "computing" || left === null) return rate;
-	const time =
-		left < 60
-			? `${left.toFixed(left < 10 ? 1 : 0)} s`
-			: `${Math.floor(left / 60)} min ${Math.round(left % 60)} s`;
-	return `${rate} · ${time} left`;
+/** @param {Server.RunInfo} run  @returns {string} the time left, or the stage where that is unknown */
+function leftText({ state, message, done, total, steps_per_second: speed, seconds_left: left }) {
+	if (state !== "computing" || !speed || left === null || done === total) return message;
+	return left < 60
+		? `${left.toFixed(left < 10 ? 1 : 0)} s left`
+		: `${Math.floor(left / 60)} min ${Math.round(left % 60)} s left`;
 }
+
+/** @param {Server.RunInfo} run  @returns {string} */
+const rateText = ({ steps_per_second: speed }) =>
+	speed ? `${speed < 10 ? speed.toFixed(1) : Math.round(speed)} steps/s` : "";

@@ -51,7 +51,7 @@ export function createActions({ store, seek, send, receive }) {
 	/** Layers that were on in pictures and off in 3D, or the other way round, before their key. */
 	/** @type {Record<string, (boolean | undefined)[]>} */
 	const mixed = {};
-	/** How hindsight looked before it was switched off. @type {string | undefined} */
+	/** The method of smoothing before it was switched off. @type {string | undefined} */
 	let smoothing;
 	const frames = () => store.get().frames;
 

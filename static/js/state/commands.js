@@ -81,8 +81,8 @@ export function commandFor(key, singleKeys = true, place = "") {
 	);
 }
 
-/** What a group is looked for by besides its name. @type {Partial<Record<Command["group"], string>>} */
-const ALSO = { Check: "correct correction corrections" };
+/** What commands of an action are looked for by besides their words. @type {Record<string, string>} */
+const ALSO = { correct: "correct correction corrections" };
 
 /**
  * Commands whose title has all words of a text: those that begin with it first, then those that
@@ -91,8 +91,8 @@ const ALSO = { Check: "correct correction corrections" };
  */
 export function search(text) {
 	const words = text.toLowerCase().split(/\s+/).filter(Boolean);
-	const found = COMMANDS.filter(({ title, group }) =>
-		words.every((word) => `${title} ${group} ${ALSO[group] ?? ""}`.toLowerCase().includes(word)),
+	const found = COMMANDS.filter(({ title, group, action }) =>
+		words.every((word) => `${title} ${group} ${ALSO[action] ?? ""}`.toLowerCase().includes(word)),
 	);
 	const late = (/** @type {Command} */ { title }) => {
 		const own = ` ${title.toLowerCase()}`;

@@ -1,6 +1,6 @@
 /** Tracks and what happens to them, as the lanes, the tables and the keys need them. */
 
-/** What tells results of one run apart: before hindsight and after it they are of other people. @param {{run: string, revision: number}} shown */
+/** What tells results of one run apart: before smoothing and after it they are of other people. @param {{run: string, revision: number}} shown */
 export const versionOf = ({ run, revision }) => `${run || "none"} ${revision}`;
 
 /** Of the run that the server shows. @param {Readonly<PageState>} state */
@@ -59,7 +59,7 @@ export function eventsNow(state) {
 }
 
 /**
- * What hindsight decided of a track, nearest to a step first.
+ * What smoothing decided of a track, nearest to a step first.
  * @param {Readonly<PageState>} state @param {number} id @param {number} step
  */
 export const decisionsOf = ({ timeline }, id, step) =>

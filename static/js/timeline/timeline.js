@@ -11,6 +11,8 @@ import { mountTransport } from "./transport.js";
 
 /** CSS pixels from the playhead to the edge of its plate, and of the rim around that. */
 const PLATE = 20;
+/** What is said of steps that have tracks and no figures. */
+const UNSCORED = "not scored yet";
 
 /**
  * @param {HTMLElement} root
@@ -188,20 +190,28 @@ export function mountTimeline(root, context) {
 			seam.braid?.(row(token("h-strip")), scores, sorted.tracks, selection);
 		const counts = row(token("h-strip"));
 		if (timeline) drawCardinality(counts, timeline);
+		/** The rows of the scores. @type {Pen["row"] | null} */
+		let plotted = null;
 		if (!scored.hidden) {
 			const [costs, distances] = [0, 1].map(() => row(token("h-strip")));
+			plotted = { y: costs.row.y, height: costs.row.height + distances.row.height };
 			if (series) drawParts(costs, series, reference ?? null, name);
 			if (series) drawErrors(distances, series, selection);
 		}
 		for (const drawRow of seam.rows) drawRow(row(token("h-strip")));
-		if (done < frames) {
-			const x = Math.max(0, xOf(done, view));
-			hatch(
-				g,
-				[{ x, y: top, width: Math.max(0, view.width - x), height: Math.max(0, height - top - 2) }],
-				ink.get("line"),
-				6,
-			);
+		/** Hatch steps of which something is not known. @param {number} from @param {number} to @param {Pen["row"]} where */
+		const open = (from, to, { y, height }) => {
+			const [x, end] = [from, to].map((step) => Math.max(0, Math.min(view.width, xOf(step, view))));
+			hatch(g, [{ x, y, width: end - x, height }], ink.get("line"), 6);
+			return { x, width: end - x };
+		};
+		if (done < frames) open(done, frames, { y: top, height: Math.max(0, height - top - 2) });
+		const last = series?.steps ?? 0;
+		if (plotted && last < done) {
+			const { x, width } = open(last, done, plotted);
+			g.fillStyle = ink.get("ink-3");
+			g.font = `${ink.get("fs-0")} ${ink.font}`;
+			if (width > g.measureText(UNSCORED).width + 16) g.fillText(UNSCORED, x + 8, plotted.y + 12);
 		}
 	}
 

@@ -62,7 +62,7 @@ export function mountTransport(root, { store, playback }) {
 	store.watch(["server", "link"], ({ server, link }) => {
 		const method = server?.parameters.smoothing_method;
 		hindsight.disabled = !method || link !== "open";
-		write(hindsight, method === "none" ? "filter alone" : "with hindsight");
+		write(hindsight, `smoothing ${method === "none" ? "off" : "on"}`);
 		hindsight.ariaPressed = String(method !== "none");
 	});
 	store.watch(["realTime", "turn"], ({ realTime, turn: how }) => {

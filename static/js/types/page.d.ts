@@ -244,7 +244,7 @@ interface Actions {
 	useAgain: (number: string) => void;
 	runAgain: () => void;
 	pin: (on: boolean) => void;
-	/** The tracks with hindsight, or those of the filter alone. */
+	/** Smoothing on or off. */
 	hindsight: () => void;
 	/** Of the shown run, without truth. */
 	checkIdentities: (what: "start" | "stop") => void;

@@ -244,7 +244,7 @@ declare namespace Server {
 		courses: TrackCourse[];
 	}
 
-	/** What hindsight made otherwise than the filter, and why. */
+	/** What smoothing made otherwise than the filter, and why. */
 	interface Decided {
 		step: number;
 		track: number;
@@ -979,7 +979,7 @@ declare namespace Server {
 		total: number;
 		steps_per_second: number;
 		seconds_left: number | null;
-		/** The stage that takes the time. */
+		/** The stage under way, and how long nothing was heard of it. */
 		message: string;
 		error: string | null;
 		/** Its number in the library that it was taken from; what the cameras found is not there. */
@@ -1277,7 +1277,7 @@ declare namespace Server {
 		pinned: PinnedTimeline | null;
 		/** Of all steps, also of those not asked for, in their order. */
 		events: ([number, number, "birth" | "death" | "long miss" | "cut" | "joined" | "removed"])[];
-		/** What hindsight changed, by its step; empty for the filter alone. */
+		/** What smoothing changed, by its step; empty for the filter alone. */
 		decisions: Decided[];
 		/** How many more live there: the shorter ones, where they are very many. */
 		left_out: number;

@@ -216,7 +216,7 @@ def test_a_run_that_is_silent_has_no_speed_and_says_what_it_does(bench: Workbenc
     bench.run_begins(run.key)
     bench.run_progresses(run, progress(60))
     assert bench.snapshot().run_state.steps_per_second > 0.0
-    for done, words in ((60, "no new step for 7 s"), (120, "hindsight for 7 s")):
+    for done, words in ((60, "no new step for 7 s"), (120, "smoothing for 7 s")):
         bench.run_progresses(run, progress(done))
         bench.run_waits(run.key, silence(bench.snapshot().run_state, 7.2))
         state = bench.snapshot().run_state

@@ -60,7 +60,7 @@ def test_a_note_under_the_pointer_stays_while_a_run_goes_on(
     ask(server, "PATCH", "parameters", {"changes": {P_D: 0.6}})
     expect(page.locator("#tab-changes .count")).to_have_text("1")
     server.wait_for_run()
-    expect(page.locator(".status")).to_contain_text("smoothed")
+    expect(page.locator(".status")).to_contain_text("computed")
     assert close.evaluate("button => button.isTheOne")
     close.click()
     expect(close).to_have_count(0)

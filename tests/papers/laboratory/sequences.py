@@ -24,7 +24,7 @@ FIGURES = ("mota", "idf1", "hota", "ospa", "position_error")
 SHOWN = (*FIGURES, "found_share")
 
 FILTER, SMOOTHED = "filter", "smoothed"
-"""What a live system would see, and what hindsight makes of it."""
+"""What a live system would see, and what smoothing makes of it."""
 
 FOUND = 0.9
 """Share of all positions from which the people of a scene count as tracked."""
@@ -74,7 +74,8 @@ def run(context: Context) -> Result:
         f"{settings.in_words(('distance', 'gate'))}; "
         f"OSPA {settings.in_words(('cutoff', 'order'))}; "
         f"found {settings.in_words(('near',))}. Steps a second with all cores of this machine. "
-        "Filter: step by step, as a live system would see it; smoothed: with hindsight, stage 3."
+        "Filter: step by step, as a live system would see it; smoothed: after stage 3, over the "
+        "whole recording."
     )
     return Result(
         head=(

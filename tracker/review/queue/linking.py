@@ -56,6 +56,8 @@ class Move:
 
     why: str = ""
     """The reason for the move, in words; empty if the odds of the links are the reason."""
+    title: str = ""
+    """What was measured at the place, in words; empty if the odds of the links are the reason."""
 
     @property
     def joins(self) -> bool:

@@ -69,12 +69,13 @@ def meetings(run: Run, track_rows: TrackRows) -> Iterator[Move]:
             wrong = max(_EXCHANGED * float(np.exp(-apart / width)), 0.1 * (draw > _EVEN))
             log_odds = float(np.log(wrong) - np.log1p(-wrong))
             log_odds += _straight_on(track_rows, one, other, nearest, step_time)
-            why = f"{apart:.2f} m apart at step {nearest}"
+            title = f"Tracks {one} and {other} pass within {apart:.2f} m"
+            why = f"nearest at step {nearest}"
             if draw > _EVEN:
                 why += f", and {100 * draw:.0f} % of their boxes fit either"
             for i, j in ((mine, its), (its, mine)):
-                yield Move((i, j), (i, j), "crossing", log_odds, why)
-                yield Move((i,), (i, j), "crossing", log_odds - _ALONE, why)
+                yield Move((i, j), (i, j), "crossing", log_odds, why, title)
+                yield Move((i,), (i, j), "crossing", log_odds - _ALONE, why, title)
 
 
 def _near(

@@ -411,29 +411,25 @@ def words_of(run: Run, move: Move) -> tuple[str, str]:
     """Return the title of a move's item, and the reason as a sentence without a full stop."""
     i, j = move.earlier[0], move.later[-1]
     far = _far(run, i.track, j.track, i.last, j.first)
-    if move.kind == "gap":
-        seconds = (j.first - i.last) * run.sequence.step_time
-        return f"{i.track} is gone for {seconds:.1f} s", move.why
-    if move.kind == "fast":
-        return f"{i.track} jumps", move.why
-    if move.kind == "crossing":
-        return f"{i.track} and {j.track} pass closely", move.why
+    if move.title:
+        return move.title, move.why
     if move.joins:
-        return f"{i.track} goes on as {j.track}?", f"{i.track} ends and {j.track} begins {far}"
+        title = f"Track {i.track} goes on as track {j.track}?"
+        return title, f"track {i.track} ends and track {j.track} begins {far}"
     if move.kind == "cut":
-        return f"{i.track} is two people?", f"after step {i.last} it goes on {far}"
+        return f"Track {i.track} is two people?", f"after step {i.last} it goes on {far}"
     others = [one.track for one in (*move.earlier, *move.later) if one.track != i.track]
     if not others:
-        return f"{i.track} goes on elsewhere?", f"another piece of {i.track} fits, {far}"
+        return f"Track {i.track} goes on elsewhere?", f"another piece of track {i.track} fits, {far}"
     if i.track != j.track:
         return (
-            f"{i.track} and {j.track} exchanged?",
-            f"{j.track} is where {i.track} may have gone on, {far}",
+            f"Tracks {i.track} and {j.track} exchanged?",
+            f"track {j.track} is where track {i.track} may have gone on, {far}",
         )
     other = others[0]
     return (
-        f"{i.track} and {other} exchanged?",
-        f"{other} fits what {i.track} does from step {j.first} on",
+        f"Tracks {i.track} and {other} exchanged?",
+        f"track {other} fits what track {i.track} does from step {j.first} on",
     )
 
 

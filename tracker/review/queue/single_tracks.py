@@ -67,7 +67,7 @@ def _clutter(run: Run, track_rows: TrackRows, track: int) -> Iterator[ReviewItem
     if one_alone:
         how += " by one camera alone"
     yield ReviewItem(
-        "short", f"{track} is nobody?", how, first, last, (track,), (places[0], places[-1]),
+        "short", f"Track {track} is nobody?", how, first, last, (track,), (places[0], places[-1]),
         wrong, len(rows),
         (
             Alternative("as it is", 1.0 - wrong, proposed("same", (places[0], places[-1]))),
@@ -88,11 +88,12 @@ def _unseen(run: Run, track_rows: TrackRows, track: int) -> Iterator[Move]:
         seconds = (after.step - before.step) * run.sequence.step_time
         if seconds <= _UNSEEN:
             continue
+        title = f"Track {track} is gone for {seconds:.1f} s"
         why = f"no camera has it from step {before.step + 1} to {after.step - 1}"
         wrong = 0.4 * (1.0 - np.exp(-seconds / 5.0))
         # stands for both tracklets: the earlier one ends before the cut, the later begins after it
         tracklet = Tracklet(track, begin=after, end=before)
-        yield Move((tracklet,), (tracklet,), "gap", _log_odds(wrong), why)
+        yield Move((tracklet,), (tracklet,), "gap", _log_odds(wrong), why, title)
 
 
 def _fast(run: Run, track_rows: TrackRows, track: int) -> Iterator[Move]:
@@ -110,10 +111,10 @@ def _fast(run: Run, track_rows: TrackRows, track: int) -> Iterator[Move]:
         before, after = track_rows.of_row(int(rows[k])), track_rows.of_row(int(rows[k + 1]))
         # stands for both tracklets: the earlier one ends before the cut, the later begins after it
         tracklet = Tracklet(track, begin=after, end=before)
-        why = f"{speed[k]:.1f} m/s at step {after.step}"
-        yield Move(
-            (tracklet,), (tracklet,), "fast", _log_odds(min(0.3 * speed[k] / _FASTEST, 0.9)), why
-        )
+        title = f"Track {track} jumps: {speed[k]:.1f} m/s at step {after.step}"
+        log_odds = _log_odds(min(0.3 * speed[k] / _FASTEST, 0.9))
+        why = f"people walk at most {_FASTEST:g} m/s"
+        yield Move((tracklet,), (tracklet,), "fast", log_odds, why, title)
 
 
 def _log_odds(probability: float) -> float:

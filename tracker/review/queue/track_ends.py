@@ -133,8 +133,8 @@ def _edge(run: Run, track_rows: TrackRows, track: int, *, before: bool) -> Itera
     now = proposed("came" if before else "left", (place,))
     word, was = ("begins", "there before") if before else ("ends", "there after")
     yield ReviewItem(
-        "begins" if before else "ends", f"{track} {word} here?",
-        f"{track} {word} {metres:.1f} m from where people {'come' if before else 'leave'}, "
+        "begins" if before else "ends", f"Track {track} {word} here?",
+        f"{word} {metres:.1f} m from where people {'come' if before else 'leave'}, "
         f"in sight of {'a camera' if cameras == 1 else f'{cameras} cameras'}",
         place.step, place.step, (track,), (place,), wrong, stake,
         (Alternative("as it is", 1.0 - wrong, now), Alternative(was, wrong, here)),

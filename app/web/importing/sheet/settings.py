@@ -38,7 +38,7 @@ MOST_WORST = 8
 STAGES: dict[MethodKey, str] = {
     "single_view": "In each camera",
     "fusion_method": "Fusion",
-    "smoothing_method": "Hindsight",
+    "smoothing_method": "Smoothing",
 }
 
 SIGNS = {"good": ("tick", "good"), "warning": ("warn", "warn"), "absent": ("minus", "none")}
