@@ -2,6 +2,7 @@
 import { mountCameras } from "./cameras/cameras.js";
 import { one } from "./elements/dom.js";
 import { mountSide } from "./inspector/side.js";
+import { mountTips } from "./elements/tips.js";
 import { mountDoor } from "./opening/door.js";
 import { mountControls, pressed } from "./panes/controls.js";
 import { mountLayout } from "./panes/layout.js";
@@ -63,6 +64,7 @@ mountCameras(one(".cams"), context);
 mountSide(one(".side"), context);
 const timeline = mountTimeline(one(".time"), context);
 mountDoor(context);
+mountTips();
 mountLayout(context);
 // The rest is read once the page stands; what it brings may be asked for before.
 /** @type {Promise<void> | undefined} */

@@ -62,9 +62,9 @@ def opened(browser: Browser, server: Server, *, flat: bool = False) -> Iterator[
     )
     if flat:
         context.route("**/viser/**", lambda route: route.abort())
-    # what is said once to a new person covers nothing, but moves the panes
+    # what is said once to a new person lies over the 3D view
     context.add_init_script(
-        "try { localStorage.page ??= JSON.stringify({ dismissed: ['software', 'tour'] }) } catch {}"
+        "try { localStorage.page ??= JSON.stringify({ dismissed: ['tour'] }) } catch {}"
     )
     page = context.new_page()
     errors: list[str] = []

@@ -38,8 +38,6 @@ DIGITS = 2
 FACE_HANDLE, ENTRANCE_HANDLE = 0.16, 0.2
 """Lengths of the handles as shares of the room's shorter side, metres at most."""
 
-FIRST_ENTRANCES = 4
-
 
 @dataclass(frozen=True, slots=True)
 class Face:
@@ -77,7 +75,7 @@ class RoomEditing:
         self.handles: dict[Grip, viser.TransformControlsHandle] = {}
         """By what they move; those of entrances are made as they are needed."""
         self._box = Lines(server, "/editing/box", 2.0)
-        self._words = Tags(server, "/editing/words", len(FACES) + FIRST_ENTRANCES, 0.85)
+        self._words = Tags(server, "/editing/words", 1, 0.85)
         self._worker = LatestWorker("room editing", self._work)
         for face in FACES:
             self._make(face)
@@ -191,7 +189,8 @@ class RoomEditing:
                 with self._lock:
                     if grip in places and not self._held:
                         handle.position = places[grip]
-            self._words.show([_words(grip, place) for grip, place in places.items()])
+            # what is not dragged has its numbers in Teach; here they would lie over each other
+            self._words.show([_words(grip, places[grip]) for grip in held if grip in places])
         self._server.flush()
 
 

@@ -23,12 +23,7 @@ export function mountMarks({ store }, timeline, check) {
 	timeline.plot.append(row);
 	const tip = h("div", { class: "card mark-card", hidden: true });
 	timeline.plot.append(tip);
-	const legend = h(
-		"span",
-		{ class: "up end", "data-tip": "Corrected" },
-		icon("i-pin", "s"),
-		"corrected",
-	);
+	const legend = h("span", { "data-tip": "Corrected" }, icon("i-pin", "s"), "corrected");
 	legend.hidden = true;
 	one(".legend").append(legend);
 	/** @type {HTMLElement[]} */

@@ -40,7 +40,7 @@ const OF_OTHERS = ["check-exchange", "check-split"];
 /** The kinds of doubt about somebody who is not there. */
 const OF_NOBODY = ["missing", "begins", "ends"];
 /** So many alternatives stand side by side, and in a pane narrower than that; others are in a list. */
-const BESIDE = { wide: 3, narrow: 2, below: 500 };
+const BESIDE = { wide: 3, narrow: 2, below: 460 };
 
 /** @param {string} words */
 const sentence = (words) => words.charAt(0).toUpperCase() + words.slice(1);
@@ -83,7 +83,7 @@ export function mountPlace(root, { store, actions, playback }, check, crops) {
 		return h(
 			"button",
 			{
-				class: `btn up ${main ? "main" : "box"}${SHORT.includes(name) ? " short end" : ""}`,
+				class: `btn ${main ? "main" : "box"}${SHORT.includes(name) ? " short" : ""}`,
 				"data-tip": command.title,
 				onclick: () => perform(command, actions),
 			},
@@ -157,7 +157,6 @@ export function mountPlace(root, { store, actions, playback }, check, crops) {
 		fill(
 			head,
 			h("span", { class: "qn on", "aria-hidden": "true" }, number || "–"),
-			h("b", { title: chosen.title }, chosen.title),
 			h("span", { class: "q" }, "steps"),
 			...(isOfTwo(chosen)
 				? [
@@ -237,7 +236,8 @@ export function mountPlace(root, { store, actions, playback }, check, crops) {
 		why.title = chosen.why;
 		fill(
 			why,
-			`${unbroken(sentence(chosen.why))}.`,
+			h("b", {}, unbroken(chosen.title)),
+			`${chosen.title.endsWith("?") ? "" : "."} ${unbroken(sentence(chosen.why))}.`,
 			h(
 				"span",
 				{ class: "q" },

@@ -18,7 +18,7 @@ export function mountQueue(root, { store, actions }, check, crops) {
 	let byTime = false;
 	const sub = h("span", { class: "sub", role: "status" });
 	const order = h("button", {
-		class: "btn end",
+		class: "btn",
 		"data-tip": "Order: what is most at stake first, or as they come",
 		onclick: () => ((byTime = !byTime), list()),
 	});
@@ -35,7 +35,7 @@ export function mountQueue(root, { store, actions }, check, crops) {
 		h(
 			"button",
 			{
-				class: "btn icon end up",
+				class: "btn icon",
 				"aria-label": commandOf(`check-${what}`).title,
 				"data-key": commandOf(`check-${what}`).keys.map(keyLabel).join(),
 				onclick: () => actions.correct(what),
@@ -46,7 +46,7 @@ export function mountQueue(root, { store, actions }, check, crops) {
 	const file = h(
 		"button",
 		{
-			class: "btn end up",
+			class: "btn",
 			"data-tip": "What is checked, as ground truth for an evaluation",
 			onclick: () => actions.correct("truth"),
 		},

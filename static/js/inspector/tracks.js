@@ -112,7 +112,7 @@ export function mountTracks(root, { store, actions, playback }) {
 	});
 	root.prepend(table.element);
 	const buttons = KINDS.map(([name, , tip]) =>
-		h("button", { class: "up start", "data-tip": tip, onclick: () => store.set({ listed: name }) }),
+		h("button", { "data-tip": tip, onclick: () => store.set({ listed: name }) }),
 	);
 	fill(listed, buttons);
 

@@ -101,7 +101,7 @@ export function pressed(event, store, actions) {
 	const open = document.querySelector("dialog[open]");
 	if (open && !(open.matches(".help") ? key === "?" : key === "Ctrl+k")) return false;
 	// An open menu is closed by it, by the browser.
-	if (key === "Escape" && document.querySelector(":popover-open")) return false;
+	if (key === "Escape" && document.querySelector(":popover-open:not(.tip)")) return false;
 	const types = target.matches?.(TYPING);
 	if (types && !ALWAYS.includes(key)) return false;
 	// In a list letters and arrows choose.

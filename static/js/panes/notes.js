@@ -27,7 +27,7 @@ export function mountNotes(root, { store, actions, retry }) {
 	const close = (/** @type {() => void} */ onclick) =>
 		h(
 			"button",
-			{ class: "btn icon end", "aria-label": "Dismiss", "data-tip": "Dismiss", onclick },
+			{ class: "btn icon", "aria-label": "Dismiss", "data-tip": "Dismiss", onclick },
 			icon("i-close"),
 		);
 
@@ -75,12 +75,9 @@ export function mountNotes(root, { store, actions, retry }) {
 			render();
 		};
 		if (odd && odd !== heard) all.push(note("warn", "Worth knowing", odd, [close(hide)]));
-		for (const { id, level, title, text, remedy, once } of notes) {
+		for (const { id, level, title, text, remedy } of notes) {
 			const kind = { error: "bad", warn: "warn", info: "busy" }[level];
-			const gone = () => {
-				store.set({ notes: store.get().notes.filter((other) => other.id !== id) });
-				if (once) store.set({ dismissed: [...store.get().dismissed, once] });
-			};
+			const gone = () => store.set({ notes: store.get().notes.filter((other) => other.id !== id) });
 			const mend = () => {
 				gone();
 				remedy?.act();

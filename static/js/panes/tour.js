@@ -1,6 +1,6 @@
 /**
- * What is seen, and three things to try: a strip under the top bar, until it is closed or all
- * three were done. Help shows it again.
+ * What is seen, and three things to try: a card in the 3D view, until it is closed or all three
+ * were done. Help shows it again.
  */
 import { fill, h, icon } from "../elements/dom.js";
 import { keyLabel } from "../state/commands.js";
@@ -71,23 +71,34 @@ export function mountTour(root, { store }) {
 		if (done.every(Boolean)) return close();
 		const count = sequence?.cameras.length ?? 0;
 		const cameras = count === 1 ? "One camera watches" : `${count} cameras watch`;
+		const next = done.indexOf(false);
 		fill(
 			root,
 			h(
 				"div",
-				{},
+				{ class: "tour-head" },
 				h("h2", {}, "What you see"),
 				h(
-					"p",
-					{},
-					`${cameras} one room. A coloured body is a person the filter believes in, the line on `,
-					"the floor where it came from; dashed in the pictures is the truth.",
+					"button",
+					{
+						class: "btn icon",
+						"aria-label": "Close for good; Help shows it again",
+						"data-tip": "Close for good; Help shows it again",
+						onclick: close,
+					},
+					icon("i-close"),
 				),
 			),
-			...THINGS.map(({ word, key: name, text }, index) =>
+			h(
+				"p",
+				{},
+				`${cameras} one room. A coloured body is a person the filter believes in, the line on `,
+				"the floor where it came from; dashed in the pictures is the truth.",
+			),
+			THINGS.map(({ word, key: name, text }, index) =>
 				h(
 					"div",
-					{ class: done[index] ? "done" : "" },
+					{ class: done[index] ? "thing done" : "thing" },
 					h("span", { class: "step" }, done[index] ? icon("i-tick", "s") : index + 1),
 					h(
 						"h3",
@@ -96,18 +107,8 @@ export function mountTour(root, { store }) {
 						name ? key(name) : "",
 						done[index] && h("span", { class: "vh" }, "done"),
 					),
-					h("p", {}, ...text(state)),
+					index === next && h("p", {}, ...text(state)),
 				),
-			),
-			h(
-				"button",
-				{
-					class: "btn icon end",
-					"aria-label": "Close for good; Help shows it again",
-					"data-tip": "Close for good; Help shows it again",
-					onclick: close,
-				},
-				icon("i-close"),
 			),
 		);
 	}

@@ -17,7 +17,7 @@ const LATEST = 3000;
 
 /** @type {Pane} */
 export function mountView3d(root, { store, actions, playback, retry, press }) {
-	const { views, frame, blank, trail } = parts(root);
+	const { views, frame, blank, trail, software } = parts(root);
 	let path = "";
 	let reachable = false;
 	let tries = 0;
@@ -33,13 +33,7 @@ export function mountView3d(root, { store, actions, playback, retry, press }) {
 			playback.onPaint(() => resolve(undefined));
 			setTimeout(resolve, LATEST);
 		});
-		actions.note(
-			"info",
-			"The 3D view is drawn without a graphics card",
-			"While it plays it follows about once a second; pictures, timeline and tables keep their speed.",
-			undefined,
-			"software",
-		);
+		software.hidden = false;
 	}
 
 	/**
@@ -128,7 +122,6 @@ export function mountView3d(root, { store, actions, playback, retry, press }) {
 					h(
 						"button",
 						{
-							class: "start",
 							"data-tip": tip,
 							"data-key": key,
 							onclick: () => actions.lookThrough(view),

@@ -70,13 +70,12 @@ export function createActions({ store, seek, send, receive }) {
 
 	/** @type {Actions} */
 	const actions = {
-		note(level, title, text, remedy, once, about) {
-			if (once && store.get().dismissed.includes(once)) return;
+		note(level, title, text, remedy, about) {
 			const id = (noteId += 1);
 			// The same thing said twice is one note.
 			const others = store.get().notes.filter((other) => other.title !== title);
-			store.set({ notes: [...others.slice(-3), { id, level, title, text, remedy, once, about }] });
-			if (level === "info" && !once)
+			store.set({ notes: [...others.slice(-3), { id, level, title, text, remedy, about }] });
+			if (level === "info")
 				setTimeout(
 					() => store.set({ notes: store.get().notes.filter((other) => other.id !== id) }),
 					6000,
@@ -86,7 +85,7 @@ export function createActions({ store, seek, send, receive }) {
 			if (!(error instanceof ApiError)) throw error;
 			// This the socket tells, to all tabs.
 			if (error.code === "cannot_open") return;
-			actions.note("error", error.message, error.hint ?? "", undefined, undefined, about);
+			actions.note("error", error.message, error.hint ?? "", undefined, about);
 		},
 		accepted(about) {
 			const { notes } = store.get();

@@ -14,7 +14,7 @@ export function mountPlots({ store, actions }, timeline) {
 	const button = h(
 		"button",
 		{
-			class: "btn up",
+			class: "btn",
 			"data-tip": "Plots of the selected track: height, speed, what each camera makes of it",
 			"aria-haspopup": "true",
 		},
@@ -93,7 +93,7 @@ export function mountPlots({ store, actions }, timeline) {
 			const [value, sub] = [h("span", { class: "r" }), h("span", { class: "lg" })];
 			const away = h(
 				"button",
-				{ class: "end", "aria-label": `Take ${word} away`, onclick: () => toggle(name) },
+				{ "aria-label": `Take ${word} away`, onclick: () => toggle(name) },
 				icon("i-close", "s"),
 			);
 			const element =

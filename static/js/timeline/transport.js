@@ -53,7 +53,8 @@ export function mountTransport(root, { store, playback }) {
 			frames,
 			speed: now,
 		} = store.get();
-		for (const control of all("button:not(.end), select", root)) control.disabled = !frames;
+		for (const control of all("button:not([data-command=maximise-time]), select", root))
+			control.disabled = !frames;
 		loop.ariaPressed = String(on);
 		write(range, from === null && to === null ? "all" : `${from ?? 0} – ${to ?? frames - 1}`);
 		speed.value = String(now);

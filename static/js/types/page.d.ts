@@ -58,8 +58,6 @@ type Note = {
 	title: string;
 	text: string;
 	remedy?: Remedy;
-	/** Once closed, it is not told again in this browser. */
-	once?: string;
 	/** What was refused: gone once the like is accepted. */
 	about?: string;
 };
@@ -196,7 +194,6 @@ interface Actions {
 		title: string,
 		text: string,
 		remedy?: Remedy,
-		once?: string,
 		/** Of what was refused: the first part of its path. */
 		about?: string,
 	) => void;

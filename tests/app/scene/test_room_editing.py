@@ -95,7 +95,7 @@ def test_a_face_is_shown_while_it_moves_and_taught_on_release(
     send(server, editing, RIGHT, [1.6, 0.3, 1.0], [1.8349, 0.3, 1.0])
     assert room(workbench)[3] == 1.5  # not yet
     words = [node.text for node in editing._words._nodes if node.visible]
-    assert "x 1.83 m" in words
+    assert words == ["x 1.83 m"]
     assert editing.handles[Face("min", 1)].position.tolist() == [0.0, -1.5, 1.0]
     let_go(server, editing, RIGHT)
     assert editing.handles[Face("min", 1)].position.tolist() == pytest.approx([0.165, -1.5, 1.0])

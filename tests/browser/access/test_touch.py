@@ -19,9 +19,7 @@ def touched(browser: Browser, server: Server) -> Iterator[Page]:
     context = browser.new_context(viewport={"width": 1280, "height": 800}, has_touch=True)
     context.set_default_timeout(60_000)
     context.route("**/viser/**", lambda route: route.abort())
-    context.add_init_script(
-        "localStorage.page ??= JSON.stringify({ dismissed: ['software', 'tour'] })"
-    )
+    context.add_init_script("localStorage.page ??= JSON.stringify({ dismissed: ['tour'] })")
     page = context.new_page()
     page.goto(f"{server.address}?step=45")
     page.wait_for_selector(".cam[data-overlay='45']")

@@ -41,9 +41,7 @@ def record() -> None:
             context = browser.new_context(
                 viewport={"width": 1600, "height": 1000}, color_scheme="dark"
             )
-            context.add_init_script(
-                "localStorage.page = JSON.stringify({ dismissed: ['software', 'tour'] })"
-            )
+            context.add_init_script("localStorage.page = JSON.stringify({ dismissed: ['tour'] })")
             page = context.new_page()
             page.goto(server.address)
             page.locator(".cam canvas").first.wait_for()

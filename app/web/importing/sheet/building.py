@@ -138,7 +138,7 @@ def small(text: Child, **attributes: Any) -> Markup:
 
 GROW = Markup('<span class="grow"></span>')
 CLOSE = Markup(
-    '<button class="btn icon end" aria-label="Close" data-do="close">'
+    '<button class="btn icon" aria-label="Close" data-do="close">'
     '<svg class="i"><use href="#i-close" /></svg></button>'
 )
 

@@ -108,7 +108,7 @@ def _lists(known: Recordings, open_as: Sequence[str]) -> Markup:
             own,
             open_as,
             GROW,
-            button("All in the library", "library", "end"),
+            button("All in the library", "library", ""),
         ),
         _cards(
             "Built-in rooms",
