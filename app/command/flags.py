@@ -5,6 +5,8 @@ Nothing here imports the engine: ``--help`` is there at once.
 
 from __future__ import annotations
 
+import functools
+import operator
 import os
 import sys
 from collections.abc import Iterable
@@ -346,7 +348,7 @@ def parse(arguments: list[str] | None = None) -> Arguments:
     """The command and its arguments. Wrong usage ends the program with status 2.
 
     Raises:
-        ParameterError: If the command is one that only a checkout has.
+        ParameterError: If there is no such command, or it is one that only a checkout has.
     """
     track: Any = _track_with_flags()
     # its settings come with the engine, which only who evaluates has to wait for
@@ -360,27 +362,35 @@ def parse(arguments: list[str] | None = None) -> Arguments:
     evaluate: Any = _evaluate_with_flags() if asked[:1] == ["evaluate"] else Evaluate
     if asked[:1] == ["study"] and asked[1:2] and asked[1].endswith(".toml"):
         asked = ["study", "run", *asked[1:]]  # `study STUDY.toml` runs it
-    commands: Any = (
-        Annotated[Serve, subcommand("serve")]
-        | Annotated[track, subcommand("track")]
-        | Annotated[Detect, subcommand("detect")]
-        | Annotated[Detector, subcommand("detector")]
-        | Annotated[evaluate, subcommand("evaluate")]
-        | Annotated[Benchmark, subcommand("benchmark")]
-        | Annotated[Import, subcommand("import")]
-        | Annotated[Check, subcommand("check")]
-        | Annotated[Formats, subcommand("formats")]
-        | Annotated[ExportCalibration, subcommand("export-calibration")]
-        | Annotated[Sequences, subcommand("sequences")]
-        | Annotated[Parameters, subcommand("parameters")]
-        | Annotated[Runs, subcommand("runs")]
-        | Annotated[Bundle, subcommand("bundle")]
-        | Annotated[LibraryCommand, subcommand("library")]
-        | Annotated[Study, subcommand("study")]
-        | Annotated[Batch, subcommand("batch")]
-        | Annotated[Tune, subcommand("tune")]
-        | Annotated[Corrections, subcommand("corrections")]
-        | Annotated[Templates, subcommand("templates")]
+    named: dict[str, Any] = {
+        "serve": Serve,
+        "track": track,
+        "detect": Detect,
+        "detector": Detector,
+        "evaluate": evaluate,
+        "benchmark": Benchmark,
+        "import": Import,
+        "check": Check,
+        "formats": Formats,
+        "export-calibration": ExportCalibration,
+        "sequences": Sequences,
+        "parameters": Parameters,
+        "runs": Runs,
+        "bundle": Bundle,
+        "library": LibraryCommand,
+        "study": Study,
+        "batch": Batch,
+        "tune": Tune,
+        "corrections": Corrections,
+        "templates": Templates,
+    }
+    if asked[:1] and not asked[0].startswith("-") and asked[0] not in named:
+        from tracker.sequences.fields import did_you_mean, listed
+
+        near = did_you_mean(asked[0], named)
+        raise ParameterError(asked[0], f"expected one of the commands {listed(named)}{near}")
+    commands: Any = functools.reduce(
+        operator.or_, (Annotated[kind, subcommand(name)] for name, kind in named.items())
     )
     parsed: Arguments = tyro.cli(
         commands,

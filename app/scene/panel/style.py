@@ -21,6 +21,10 @@ PANEL = """<style>
 .mvp-status span { float: right; font-size: 12px; }
 .mvp-status small { display: block; font-size: 10px; line-height: 14px; color: var(--mvp-ink-3); }
 .mvp-status[data-state="computing"] span { color: var(--mvp-busy); }
+/* inside the page, which says the step, and whether the server answers, by itself */
+.mvp-inside .mvp-status[data-step],
+.mvp-inside .mantine-Paper-root > div > div:first-child:has(> div > svg) {
+  display: none !important; }
 /* rows: label, slider, number */
 div:has(> .mantine-Flex-root > div > .mantine-Text-root > label[for]) {
   padding: 0 16px 2px 10px !important; }
@@ -29,7 +33,7 @@ div:has(> .mantine-Text-root > label[for]) { width: 128px !important; flex-shrin
   padding-right: 8px !important; }
 /* a slider lies under its words and as wide as they; its number stands beside them */
 .mantine-Flex-root:has(> div > .mantine-Text-root > label[for]):has(.mantine-Slider-root) {
-  flex-wrap: wrap; position: relative; min-height: 36px; }
+  flex-wrap: wrap; position: relative; min-height: 33px; }
 .mantine-Flex-root:has(.mantine-Slider-root) > div:has(> .mantine-Text-root > label[for]) {
   width: 100% !important; padding-right: 60px !important; white-space: nowrap; }
 .mantine-Flex-root:has(.mantine-Slider-root) > div:has(> .mantine-Text-root) + div {

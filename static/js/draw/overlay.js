@@ -13,6 +13,8 @@ const LONGEST = 16;
 const WHITE = "#f4f4f4";
 /** Of samples: no track and no line has it. */
 const SAMPLE = "#ffd84d";
+/** Height of the plate over a track's box, CSS pixels. */
+const PLATE = 16;
 
 /**
  * @param {Box} box
@@ -74,7 +76,7 @@ export function drawOverlay(g, view, scene) {
 	g.globalAlpha = opacity;
 	g.lineJoin = "miter";
 	if (layers.samples && view.samples) drawSamples(g, view.samples, scale);
-	if (layers.samples && view.dropped) drawDropped(g, view.dropped, scene, roomy);
+	if (layers.samples && view.dropped) drawDropped(g, view.dropped, tracks, scene);
 	if (layers.trails) drawTrails(g, tracks, scene);
 	if (layers.truth && roomy) {
 		for (const { box, valid } of view.truth) {
@@ -193,15 +195,16 @@ function drawSamples(g, samples, scale) {
 }
 
 /**
- * What was looked at and not believed: its box, and where there is room at which gate it fell.
+ * What was looked at and not believed: its box, and at which gate it fell, where neither another
+ * word nor a track's box and its plate lie over that.
  * @param {Brush} g
  * @param {Server.Candidate[]} dropped
+ * @param {{box: Box}[]} tracks
  * @param {Scene} scene
- * @param {boolean} roomy
  */
-function drawDropped(g, dropped, { scale, ink }, roomy) {
+function drawDropped(g, dropped, tracks, { scale, ink, width, height, layers }) {
 	for (const { box } of dropped) stroke(outline(g, box, scale), SAMPLE, 1, [2, 3], 0.35);
-	if (!roomy) return;
+	if (!isRoomy(width, height)) return;
 	Object.assign(g, {
 		font: `500 10px ${ink.font}`,
 		textAlign: "left",
@@ -210,14 +213,19 @@ function drawDropped(g, dropped, { scale, ink }, roomy) {
 		strokeStyle: "rgb(0 0 0 / .7)",
 		lineWidth: 3,
 	});
-	/** @type {[number, number, number][]} */
-	const placed = [];
+	/** What is taken: x, y, width, height. @type {number[][]} */
+	const taken = (layers.boxes ? tracks : []).map(({ box }) => {
+		const [x, y, wide, high] = box.map((value) => value * scale);
+		return [x, y - PLATE, wide, high + PLATE];
+	});
 	for (const { box, gate } of dropped) {
 		const [x, y] = [box[0] * scale + 3, box[1] * scale + 3];
 		const wide = g.measureText(gate).width + 4;
-		if (placed.some(([px, py, pw]) => Math.abs(y - py) < 12 && x < px + pw && px < x + wide))
+		if (
+			taken.some(([tx, ty, tw, th]) => x < tx + tw && tx < x + wide && y < ty + th && ty < y + 12)
+		)
 			continue;
-		placed.push([x, y, wide]);
+		taken.push([x, y, wide, 12]);
 		g.strokeText(gate, x, y);
 		g.fillText(gate, x, y);
 	}

@@ -62,6 +62,8 @@ export function mountView3d(root, { store, actions, playback, retry, press }) {
 		const view = frame.contentWindow;
 		if (!view) return;
 		pace(view, playback.after3d);
+		// Its panel leaves out what the page around it says already.
+		view.document.documentElement.classList.add("mvp-inside");
 		view.addEventListener(
 			"keydown",
 			(event) => {

@@ -191,6 +191,12 @@ def test_wrong_usage(run: Runs, arguments: list[str]) -> None:
     assert run(*arguments)[0] == 2
 
 
+def test_a_mistyped_command_is_told_the_nearest(run: Runs) -> None:
+    status, _, stderr = run("sequence")
+    assert (status, stderr.count("\n")) == (2, 1)
+    assert 'did you mean "sequences"?' in stderr
+
+
 @pytest.mark.full
 def test_a_failure_is_one_line(
     run: Runs, crossing: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -12,7 +12,7 @@ import cv2
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from tests.browser.looking import as_at_first, ask, by_palette, readout, until
+from tests.browser.looking import as_at_first, ask, by_palette, readout, until, viser
 from tests.browser.serving import Server
 
 SIZES = {"720p": (1280, 720), "laptop": (1440, 900), "wide": (2560, 1440)}
@@ -35,6 +35,14 @@ OUTSIDE = """() => {
     .map((e) => 'cut off: ' + e.ariaLabel);
   return [...outside, ...words];
 }"""
+
+
+SLIDERS = """() => [...document.querySelectorAll('.mantine-Slider-root')].filter((e) => {
+  const { x, y, width, height, bottom } = e.getBoundingClientRect();
+  const top = document.elementFromPoint(x + width / 2, y + height / 2);
+  return height > 0 && bottom <= innerHeight && e.contains(top);
+}).length"""
+"""How many sliders of viser's panel are wholly in sight."""
 
 
 def keep(page: Page, folder: Path | None, name: str, tmp_path: Path) -> None:
@@ -90,6 +98,12 @@ def states(page: Page, size: str, seen: Callable[[str], None]) -> None:
         page.get_by_role("tab", name="Step").click()
         expect(page.locator("#panel-step", has_text="x, y, z")).to_be_visible()
         page.get_by_role("tab", name="Tracks").click()
+        panel = viser(page)
+        until(page, lambda: panel.evaluate(SLIDERS) >= 8, "all essential sliders are in sight")
+        row = page.locator("#panel-tracks tbody tr").first
+        height = page.locator("#panel-tracks .scroll").evaluate("e => e.clientHeight")
+        assert height > 6 * row.evaluate("e => e.clientHeight"), "a head and five rows fit"
+        assert page.locator(".cam:visible").count() == 2
     else:
         head.scroll_into_view_if_needed()
         expect(head).to_be_in_viewport()

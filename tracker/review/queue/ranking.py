@@ -420,7 +420,8 @@ def words_of(run: Run, move: Move) -> tuple[str, str]:
         return f"Track {i.track} is two people?", f"after step {i.last} it goes on {far}"
     others = [one.track for one in (*move.earlier, *move.later) if one.track != i.track]
     if not others:
-        return f"Track {i.track} goes on elsewhere?", f"another piece of track {i.track} fits, {far}"
+        title = f"Track {i.track} goes on elsewhere?"
+        return title, f"another piece of track {i.track} fits, {far}"
     if i.track != j.track:
         return (
             f"Tracks {i.track} and {j.track} exchanged?",

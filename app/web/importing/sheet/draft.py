@@ -82,6 +82,8 @@ def _foot(info: ImportInfo) -> Markup:
     done = sum(ready(info, camera) for camera in info.cameras)
     odd = max(odd + bool(info.undecided), len(info.cameras) - done)
     things = f"{odd} thing{'' if odd == 1 else 's'} to decide" if odd else "nothing to decide"
+    if info.busy:  # what is odd is not known yet
+        things = f"looking at the {info.under_way}" if info.under_way else "looking again"
     words = {
         "uploading": "Uploading",
         "reading": info.under_way or "Reading the files",
@@ -92,7 +94,7 @@ def _foot(info: ImportInfo) -> Markup:
         f"{done} of {len(info.cameras)} cameras ready, {things}. Nothing is written before you "
         "import.",
     )
-    kind = "busy" if info.phase != "settled" else "warn" if odd else "good"
+    kind = "busy" if info.busy or info.phase != "settled" else "warn" if odd else "good"
     if info.error:
         words, kind = info.error[:1].upper() + info.error[1:], "bad"
     uploads = info.phase == "uploading"
