@@ -4,6 +4,7 @@ import { readdirSync, readFileSync, statSync } from "node:fs";
 import { join, relative } from "node:path";
 import { test } from "node:test";
 import { fileURLToPath } from "node:url";
+import { PLACES } from "../../static/js/state/places.js";
 
 const ROOT = fileURLToPath(new URL("../../static/", import.meta.url));
 const files = readdirSync(ROOT, { recursive: true })
@@ -87,5 +88,15 @@ test("every symbol that is used is in the page", () => {
     for (const [, symbol] of text.matchAll(/"#?((?:i|l)-[a-z]+)"/g))
       assert.ok(known.has(symbol), `${name} uses ${symbol}`);
   }
-  for (const [, symbol] of html.matchAll(/href="#([^"]+)"/g)) assert.ok(known.has(symbol), symbol);
+  for (const [, symbol] of html.matchAll(/<use href="#([^"]+)"/g))
+    assert.ok(known.has(symbol), symbol);
+});
+
+test("the places stand in the page before a module is read", () => {
+  const html = readFileSync(join(ROOT, "index.html"), "utf8");
+  const found = [...html.matchAll(/class="place" href="#([^"]+)"\s*>([^<]+)</g)];
+  assert.deepEqual(
+    found.map(([, name, word]) => [name, word]),
+    PLACES.map(({ name, word }) => [name, word]),
+  );
 });

@@ -102,6 +102,9 @@ test("how it is looked at: only what is not as at first is written, and it is re
   assert.equal(words.loop, "0-60");
   const back = { ...viewFrom(words), frames: 100 };
   assert.deepEqual(viewOf(back), words);
+  // the tab of Check is there alone
+  assert.deepEqual(viewOf({ ...state, tab: "place", place: "tune" }), {});
+  assert.deepEqual(viewOf({ ...state, tab: "place", place: "check" }), { tab: "place" });
   assert.deepEqual(back.span, [20, 80]);
   assert.deepEqual(back.zooms, other.zooms);
   assert.deepEqual(back.layers3d, other.layers3d);

@@ -3,6 +3,9 @@ import { COMMANDS, keyLabel, perform, search } from "../state/commands.js";
 import { all, fill, h, one, parts, symbolOf } from "../elements/dom.js";
 import { matching, offersOf, rangeOf, valueOf } from "./offers.js";
 
+/** So many commands that were used last come first in the palette. */
+const RECENT = 8;
+
 /** What a row of the palette says. @param {Offer} offer */
 function worded({ title, symbol }) {
 	if (!symbol) return [title];
@@ -71,11 +74,24 @@ export function mountSheets({ store, actions }) {
 	function offered() {
 		if (naming) return layoutOffers();
 		if (asked) return valueOffers(asked);
-		const commands = search(input.value).map((command) => ({
-			title: command.title,
-			keys: command.keys.slice(0, 1),
-			run: () => (perform(command, actions), enter(command)),
-		}));
+		const { used } = store.get();
+		const matched = search(input.value);
+		// Who has not typed yet most likely wants again what was wanted last.
+		const recent = input.value
+			? []
+			: used.flatMap((name) => matched.filter((one) => one.name === name));
+		const commands = [...recent, ...matched.filter((one) => !recent.includes(one))].map(
+			(command) => ({
+				title: command.title,
+				keys: command.keys.slice(0, 1),
+				run() {
+					const others = used.filter((name) => name !== command.name);
+					store.set({ used: [command.name, ...others].slice(0, RECENT) });
+					perform(command, actions);
+					enter(command);
+				},
+			}),
+		);
 		return [...commands, ...matching(offersOf(store.get(), actions, edit), input.value)];
 	}
 	/** Who asked for a table by its name goes on in it. @param {Command} command */

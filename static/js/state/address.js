@@ -212,6 +212,7 @@ export function createAddress(store, actions) {
 		"large",
 		"server",
 		"tab",
+		"place",
 		"span",
 		"loop",
 		"range",

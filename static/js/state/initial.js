@@ -15,6 +15,7 @@ const KEPT = /** @type {const} */ ([
 	"turn",
 	"plots",
 	"layouts",
+	"used",
 ]);
 
 /** @returns {Partial<PageState>} */
@@ -69,6 +70,7 @@ export function initialState() {
 		wished3d: {},
 		plots: [],
 		layouts: {},
+		used: [],
 		large: null,
 		tab: "tracks",
 		eventKind: "",

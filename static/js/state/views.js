@@ -61,7 +61,8 @@ function pair(text) {
 const KEYS = {
 	tab: {
 		first: { tab: "tracks" },
-		write: ({ tab }) => tab,
+		// That of Check is there alone.
+		write: ({ tab, place }) => (tab === "place" && place !== "check" ? "tracks" : tab),
 		read: (text) => (TABS.includes(text) ? { tab: /** @type {PageState["tab"]} */ (text) } : null),
 	},
 	zoom: {

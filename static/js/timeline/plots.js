@@ -36,14 +36,16 @@ export function mountPlots({ store, actions }, timeline) {
 		const { span } = store.get();
 		return span ? `first=${Math.floor(span[0])}&last=${Math.ceil(span[1])}` : "first=0";
 	};
+	/** Whose plots they are: the selected track's, or the last one's that was. @type {number | null} */
+	let whose = null;
 	const refresh = fetcher(async () => {
-		const { selection, plots, basis, sequence, timeline: lanes } = store.get();
-		if (!plots.length || selection === null || !sequence || !basis) {
+		const { plots, basis, sequence, timeline: lanes } = store.get();
+		if (!plots.length || whose === null || !sequence || !basis) {
 			if (told) ((told = null), (asked = ""), timeline.draw(), values());
 			return;
 		}
 		const wanted = plots.map((name) => `&kind=${name}`).join("");
-		const key = `${selection}?${part()}${wanted}`;
+		const key = `${whose}?${part()}${wanted}`;
 		const news = `${key} ${shownVersion(store.get())} ${lanes?.done} ${store.get().scores?.series.steps}`;
 		if (news === asked) return;
 		told = await getJson(`/api/courses/${key}`);
@@ -119,7 +121,7 @@ export function mountPlots({ store, actions }, timeline) {
 
 	/** What is at the playhead, beside its plot. */
 	function values() {
-		const { shown, selection } = store.get();
+		const { shown } = store.get();
 		for (const [name, { value, sub }] of rows) {
 			const course = courseOf(name);
 			const at = told ? bucketOf(Math.max(0, shown), told) : 0;
@@ -128,13 +130,13 @@ export function mountPlots({ store, actions }, timeline) {
 			write(value, course?.cameras.length ? "" : `${text(now[0] ?? null)} ${course?.unit ?? ""}`);
 			write(
 				sub,
-				selection === null
+				whose === null
 					? "select a track"
 					: !course
 						? "no such track here"
 						: course.cameras.length
 							? now.map((number, k) => `${k + 1}: ${text(number)}`).join("  ")
-							: `track ${selection} · ${course.low}–${course.high} ${course.unit}`,
+							: `track ${whose} · ${course.low}–${course.high} ${course.unit}`,
 			);
 		}
 	}
@@ -148,6 +150,8 @@ export function mountPlots({ store, actions }, timeline) {
 		else drawCurve(pen, told, course);
 	}
 
+	store.on(["sequence"], () => (whose = null));
+	store.watch(["selection"], ({ selection }) => (whose = selection ?? whose));
 	store.watch(["plots", "sequence"], list);
 	store.on(["selection", "basis", "revision", "timeline", "scores", "span"], refresh);
 	store.on(["selection", "shown"], values);

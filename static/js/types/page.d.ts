@@ -145,6 +145,8 @@ interface PageState {
 	/** What the timeline plots. */
 	measure: "ospa" | "gospa";
 	laneOrder: "longest" | "born";
+	/** Names of commands that were chosen in the palette, the last one first. */
+	used: string[];
 	/** Shares of the window, and the pane that is alone. */
 	layout: { right?: number; cams?: number; lanes?: number; max?: PaneName };
 	theme: "dark" | "light";

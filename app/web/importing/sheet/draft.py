@@ -58,7 +58,12 @@ def _head(info: ImportInfo) -> Markup:
 
 def _files(info: ImportInfo) -> Markup:
     rows = [
-        element("p", element("b", one.label), " ", one.complaint or one.format or "is not used")
+        element(
+            "p",
+            element("b", one.label),
+            " ",
+            one.complaint.removeprefix(f"{one.label}: ") or one.format or "is not used",
+        )
         for one in info.files
     ]
     rows += [
