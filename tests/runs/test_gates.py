@@ -101,6 +101,10 @@ def test_of_the_foreground_alone_tops_are_counted(tmp_path: Path) -> None:
             r"fell for outline: lower association_matrix\.acceptance",
         ),
         (
+            {"single_view": "association_matrix", "association_matrix__least_inside": 1.0},
+            r"fell for foreground: lower association_matrix\.least_inside",
+        ),
+        (
             {"stays": True, "single_view": "jpda"},
             r"0\.00 candidates a picture: lower foreground\.threshold",
         ),

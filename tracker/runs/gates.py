@@ -29,6 +29,7 @@ _SLIDERS = {
     ("jpda", "surroundings"): "raise jpda.most_above or jpda.most_beside",
     ("jpda", "another's shoulders"): "lower jpda.shoulder_across",
     ("jpda", "a place outside the room"): "raise detection_boxes.room_tolerance",
+    ("association_matrix", "foreground"): "lower association_matrix.least_inside",
     ("association_matrix", "outline"): "lower association_matrix.acceptance",
     ("onnx_detector", "a place outside the room"): "raise onnx_detector.room_tolerance",
     ("detection_phd", "a place outside the room"): "raise detection_phd.room_tolerance",

@@ -151,12 +151,13 @@ class AssociationMatrix:
             fits = self._silhouettes.fit(mask, seen, wanted, p)
             boxes, weights = fits.boxes, np.exp(np.minimum(fits.scores, 0.0))
             labels = _labels_of_fits(fits, situation)
-            unfit = np.isin(np.arange(seen.size), fits.owners, invert=True)
+            fitted = np.isin(np.arange(seen.size), fits.owners)
+            fell = {"foreground": ~fits.filled, "outline": fits.filled & ~fitted}
         else:
             boxes, labels = _apart(situation)
             weights = np.ones(len(boxes))
-            unfit = np.zeros(seen.size, dtype=bool)
-        dropped = Dropped.of(seen.boxes, {"outline": unfit})
+            fell = {}
+        dropped = Dropped.of(seen.boxes, fell)
         estimates, estimate_labels = _estimates(situation, p.confirmation_steps)
         return ViewResult(
             boxes=boxes,

@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int, UInt8
+from jaxtyping import Bool, Float, Int, UInt8
 from numpy import ndarray
 
 from tracker.geometry.camera import Camera
@@ -41,6 +41,8 @@ class Fits:
     """Log likelihood up to a constant, at most about 0."""
     owners: Int[ndarray, " N"]
     """Index of the foreground component of each box."""
+    filled: Bool[ndarray, " J"]
+    """Whether any box in each component has enough foreground inside."""
 
 
 class Silhouettes:
@@ -104,4 +106,5 @@ class Silhouettes:
             p.averaging_width,
             p.apart,
         )
-        return Fits(chosen.boxes, chosen.scores, chosen.owners)
+        filled = np.isin(np.arange(pieces.size), hanging.owners[good])
+        return Fits(chosen.boxes, chosen.scores, chosen.owners, filled)
