@@ -45,6 +45,8 @@ def tracks_of(rows: list[tuple[int, int, tuple[float, float, float]]]) -> Trajec
         seen=np.ones((count, len(SEQUENCE.views)), dtype=bool),
         components=np.zeros(count, dtype=np.int64),
         covariances_xy=np.linspace(-0.01, 0.01, count),
+        heights=np.where(np.arange(count) % 2, 1.7, np.nan),
+        sigma_heights=np.where(np.arange(count) % 2, 0.02, np.nan),
     )
 
 
@@ -75,6 +77,8 @@ def test_the_columns_are_those_of_the_format() -> None:
     assert header[10:] == [
         *(f"{name}_{side}" for name in names for side in ("left", "top", "width", "height")),
         "covariance_xy",
+        "height",
+        "sigma_height",
     ]
     assert {len(row) for row in rows} == {len(header)}
     assert rows[1][:10] == [
@@ -129,6 +133,10 @@ def test_what_is_read_is_what_was_written(tmp_path: Path) -> None:
     np.testing.assert_allclose(read.sigmas, TRACKS.sigmas, atol=0.5001e-4)
     assert read.covariances_xy is not None
     np.testing.assert_allclose(read.covariances_xy, TRACKS.covariances_xy, atol=0.5001e-6)
+    assert read.heights is not None
+    assert read.sigma_heights is not None
+    np.testing.assert_array_equal(read.heights, TRACKS.heights)  # empty where there is none
+    np.testing.assert_array_equal(read.sigma_heights, TRACKS.sigma_heights)
     for camera in SEQUENCE.cameras:
         boxes, visible = camera.project_boxes(TRACKS.positions, SEQUENCE.target_half_extents)
         np.testing.assert_array_equal(np.isnan(read.boxes[camera.name]).all(axis=1), ~visible)

@@ -398,6 +398,8 @@ def tracks(
         components=np.arange(count) - np.searchsorted(steps[order], steps[order]),
         labels=names[people][order],
         covariances_xy=np.zeros(count),
+        heights=np.full(count, np.nan),
+        sigma_heights=np.full(count, np.nan),
     )
 
 

@@ -130,6 +130,9 @@ class Track(Model):
     """Weight or probability of existence."""
     seen: list[bool]
     """By camera."""
+    height: tuple[float, float] | None = None
+    """Height of the person while standing and its standard deviation, metres; null where it is not
+    estimated."""
 
 
 class Truth(Model):

@@ -540,7 +540,8 @@ def test_a_track_file_is_read_back_row_for_row(
     ]  # fmt: skip
     read = read_tracks_csv(file)
     assert len(read) == len(rows) == RUNS[CORRECTED]["rows"]
-    assert read.covariances_xy is None  # which a later version added
+    assert read.covariances_xy is None  # which a later version added, as heights
+    assert read.heights is read.sigma_heights is None
     numbers = np.array([[float(cell or "nan") for cell in row[:10] + row[12:]] for row in rows])
     columns = [
         read.frames, read.times, read.ids, *read.positions.T, read.existences, *read.sigmas.T,

@@ -45,6 +45,8 @@ def _tracks() -> Trajectories:
         existences=np.linspace(0.5, 1.0, len(ids)),
         sigmas=np.full((len(ids), 3), 0.05),
         covariances_xy=np.linspace(-0.002, 0.002, len(ids)),
+        heights=np.linspace(1.5, 1.9, len(ids)),
+        sigma_heights=np.linspace(0.01, 0.05, len(ids)),
         seen=np.ones((len(ids), cameras), dtype=bool),
         components=np.zeros(len(ids), dtype=np.int64),
     )

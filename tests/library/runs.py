@@ -35,6 +35,8 @@ def tracks(steps: int = 40, people: int = 3, *, cameras: int = 2, seed: int = 0)
         components=np.tile(np.arange(people), steps),
         labels=np.tile(np.arange(people) + 40, steps),
         covariances_xy=correlations * sigmas[:, 0] * sigmas[:, 1],
+        heights=np.tile(np.linspace(1.5, 1.9, people), steps),
+        sigma_heights=np.tile(np.linspace(0.1, 0.01, people), steps),
     )
     probabilities = np.where(rng.random((count, cameras)) < 0.7, 0.95, rng.random((count, cameras)))
     return KeptTracks(rows, probabilities.round(3))

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import struct
+import zlib
 
 import numpy as np
 import pytest
@@ -22,11 +24,28 @@ def test_positions_and_ids_come_back_exactly() -> None:
         np.testing.assert_array_equal(getattr(back.tracks, name), getattr(KEPT.tracks, name))
     np.testing.assert_allclose(back.tracks.existences, KEPT.tracks.existences, rtol=1e-7)
     np.testing.assert_allclose(back.tracks.sigmas, KEPT.tracks.sigmas, rtol=1e-7)
+    for name in ("heights", "sigma_heights"):
+        np.testing.assert_allclose(
+            getattr(back.tracks, name), getattr(KEPT.tracks, name), rtol=1e-7
+        )
     allowed = 5.1e-4 * np.prod(KEPT.tracks.sigmas[:, :2], axis=1)
     assert (np.abs(back.tracks.covariances_xy - KEPT.tracks.covariances_xy) <= allowed).all()
     np.testing.assert_allclose(
         back.detection_probabilities, KEPT.detection_probabilities, atol=5e-4
     )
+
+
+def test_tracks_of_earlier_versions_have_no_heights() -> None:
+    """They end with the correlation, and the first bytes say so."""
+    whole = pack(KEPT)
+    rows = len(KEPT.tracks)
+    raw = zlib.decompress(whole[struct.calcsize("<4sIH") :])
+    earlier = b"MVT2" + whole[4 : struct.calcsize("<4sIH")] + zlib.compress(raw[: -8 * rows])
+    back = unpack(earlier).tracks
+    assert np.isnan(back.heights).all()
+    assert np.isnan(back.sigma_heights).all()
+    np.testing.assert_array_equal(back.positions, KEPT.tracks.positions)
+    assert (back.covariances_xy != 0.0).any()
 
 
 @pytest.mark.parametrize("cameras", [0, 1, 12])

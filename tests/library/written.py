@@ -49,6 +49,8 @@ def written(steps: int = STEPS) -> ExportedRun:
         components=np.zeros(count, dtype=np.int64),
         labels=ids[order] + 40,
         covariances_xy=rng.uniform(-4e-4, 4e-4, count),
+        heights=np.linspace(1.5, 1.9, count),
+        sigma_heights=np.linspace(0.1, 0.01, count),
     )
     parameters = with_values(RunParameters(), {"fusion.survival_probability": 0.97})
     return ExportedRun(of, tracks, parameters, seed=5)

@@ -20,6 +20,7 @@ def tracks(rows: list[tuple[int, int, float]]) -> Trajectories:
         frames=steps, ids=ids, positions=np.column_stack([x, np.zeros(count), np.ones(count)]),
         existences=np.ones(count), sigmas=np.ones((count, 3)), seen=np.ones((count, 1), bool),
         components=np.zeros(count, int), labels=ids, covariances_xy=np.zeros(count),
+        heights=np.full(count, np.nan), sigma_heights=np.full(count, np.nan),
     )  # fmt: skip
 
 

@@ -29,6 +29,7 @@ def tracks(ids: dict[int, list[int]]) -> Trajectories:
         frames=steps, ids=names, positions=np.column_stack([x, np.zeros(count), np.ones(count)]),
         existences=np.ones(count), sigmas=np.ones((count, 3)), seen=np.ones((count, 1), bool),
         components=np.zeros(count, int), labels=names, covariances_xy=np.zeros(count),
+        heights=np.full(count, np.nan), sigma_heights=np.full(count, np.nan),
     )  # fmt: skip
 
 

@@ -7,6 +7,8 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
 from pydantic import BaseModel, ConfigDict, Field
 
 from tracker import __version__
@@ -78,6 +80,11 @@ class TrackOfFile(_Model):
     """The standard deviations of the position along x, y and z, metres."""
     covariance_xy: list[float]
     """The covariance of the position along x and y, square metres."""
+    height: list[float | None]
+    """The height of the track's person while standing, above the floor, metres; null where it is
+    not estimated."""
+    sigma_height: list[float | None]
+    """The standard deviation of the height, metres; null where it is not estimated."""
     seen: dict[str, list[bool]]
     """For each camera by name: whether a box of the camera updated the track at this step."""
     correction: list[str] | None = None
@@ -163,6 +170,8 @@ def _track(run: ExportedRun, number: int) -> TrackOfFile:
         existences=tracks.existences[rows].tolist(),
         sigmas=tracks.sigmas[rows].tolist(),
         covariance_xy=tracks.covariances_xy[rows].tolist(),
+        height=_or_null(tracks.heights[rows]),
+        sigma_height=_or_null(tracks.sigma_heights[rows]),
         seen={c.name: tracks.seen[rows, k].tolist() for k, c in enumerate(cameras)},
         correction=[run.row_corrections[k] for k in rows.tolist()] if run.row_corrections else None,
         boxes={
@@ -177,6 +186,11 @@ def _track(run: ExportedRun, number: int) -> TrackOfFile:
             for k, camera in enumerate(cameras)
         },
     )
+
+
+def _or_null(values: Float[ndarray, " N"]) -> list[float | None]:
+    """Return numbers as JSON has them, None for NaN."""
+    return [value if value == value else None for value in values.tolist()]
 
 
 def _triple(values: Any) -> tuple[float, float, float]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from tracker import __version__
 from tracker.export.exported_run import ExportedRun, Options
-from tracker.export.tracks_csv import BOX, COVARIANCE
+from tracker.export.tracks_csv import BOX, COVARIANCE, HEIGHT
 
 _ROWS = 1 << 17
 """Number of rows of a row group, which is held in memory."""
@@ -45,6 +45,7 @@ def write(path: Path, run: ExportedRun, options: Options) -> None:
         for k, side in enumerate(BOX):
             columns[f"{camera.name}_{side}"] = np.where(visible, boxes[:, k], np.nan)
     columns[COVARIANCE] = tracks.covariances_xy
+    columns |= dict(zip(HEIGHT, (tracks.heights, tracks.sigma_heights), strict=True))
     kinds = {  # the type of a text column cannot be inferred when it has no rows
         name: pa.string() if values.dtype == object else pa.array(values[:0]).type
         for name, values in columns.items()

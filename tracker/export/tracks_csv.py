@@ -41,8 +41,11 @@ COLUMNS = ("frame", "time", "id", "x", "y", "z", "existence", "sigma_x", "sigma_
 """The columns of every track file before those of boxes."""
 
 COVARIANCE = "covariance_xy"
-"""The name of the last column, which files of earlier versions lack: the covariance of the position
-along x and y. It follows the boxes so that columns keep their places."""
+"""The name of the column of the covariance of the position along x and y. It and the next two
+follow the boxes so that columns keep their places; files of earlier versions lack them."""
+
+HEIGHT = ("height", "sigma_height")
+"""The names of the last columns: the height of the track's person and its standard deviation."""
 
 CORRECTION = "correction"
 """The name of the column of a corrected run: the id of the correction that a row depends on, or
@@ -79,6 +82,11 @@ class TrackFile:
     key."""
     covariances_xy: Float[ndarray, " N"] | None = None
     """Covariance of the position along x and y, square metres; None where the file has none."""
+    heights: Float[ndarray, " N"] | None = None
+    """Height of the track's person while standing, metres; NaN where it was not estimated, None
+    where the file has none."""
+    sigma_heights: Float[ndarray, " N"] | None = None
+    """Standard deviation of the height, metres, with the same exceptions."""
     done: int | None = None
     """The number of steps computed, if the file states that these are not all; else None."""
     remarks: tuple[str, ...] = ()
@@ -102,7 +110,8 @@ def write_tracks_csv(
 ) -> None:
     """Write the track file.
 
-    Positions have 4 decimals (a tenth of a millimetre), boxes 2, times and covariances 6.
+    Positions have 4 decimals (a tenth of a millimetre), heights too, boxes 2, times and covariances
+    6. The cells of a height that is not estimated are empty.
 
     Args:
         stream: A text stream, opened with ``newline=""``; lines end with a single line feed.
@@ -127,6 +136,7 @@ def write_tracks_csv(
         *([CORRECTION] if row_corrections else []),
         *map(guarded, boxes),
         COVARIANCE,
+        *HEIGHT,
     ]
     csv.writer(stream, lineterminator="\n").writerow(head)
     called = {track: _cell(name) for track, name in names.items()}
@@ -147,6 +157,8 @@ def write_tracks_csv(
             pixels, visible = camera.project_boxes(positions, sequence.target_half_extents)
             columns += _fixed(np.where(visible[:, None], pixels, np.nan), 2)
         columns += _fixed(tracks.covariances_xy[some, None], 6)
+        columns += _fixed(tracks.heights[some, None], 4)
+        columns += _fixed(tracks.sigma_heights[some, None], 4)
         stream.writelines(",".join(row) + "\n" for row in zip(*columns, strict=True))
 
 
@@ -251,8 +263,9 @@ def read_tracks_csv(path: Path | str) -> TrackFile:
         path,
         path.name,
         needed=(*COLUMNS, *(s for s in sides if s not in header)),
-        optional={COVARIANCE: 0.0},
-        blank=sides,
+        # where they are absent, a column of a camera may be called much the same
+        optional={COVARIANCE: 0.0, **{name: np.nan for name in HEIGHT if name in header}},
+        blank=(*sides, *HEIGHT),
         called=unguarded,
     )
     frames = columns.whole("frame", 0, None, "the step")
@@ -271,6 +284,8 @@ def read_tracks_csv(path: Path | str) -> TrackFile:
         },
         settings=_settings(path),
         covariances_xy=columns.values[COVARIANCE][order] if COVARIANCE in header else None,
+        heights=columns.values["height"][order] if "height" in header else None,
+        sigma_heights=columns.values["sigma_height"][order] if "sigma_height" in header else None,
         done=_done(path),
         remarks=_remarks(path),
     )

@@ -51,6 +51,11 @@ class Trajectories:
     """The label of the component, for which the filter's id is the short form; -1 for none."""
     covariances_xy: Float[ndarray, " N"]
     """Covariance of the position along x and y, square metres."""
+    heights: Float[ndarray, " N"]
+    """Height of the track's person while standing, metres; NaN where it is not estimated, as in
+    the filter's tracks."""
+    sigma_heights: Float[ndarray, " N"]
+    """Standard deviation of the height, metres; NaN where it is not estimated."""
 
     def __len__(self) -> int:
         return len(self.frames)
@@ -77,6 +82,8 @@ class Trajectories:
             components=np.zeros(0, dtype=np.int64),
             labels=np.zeros(0, dtype=np.int64),
             covariances_xy=np.zeros(0),
+            heights=np.zeros(0),
+            sigma_heights=np.zeros(0),
         )
 
 
@@ -178,6 +185,8 @@ def _extracted(
         components=components,
         labels=of_label,
         covariances_xy=covariances[:, 0, 1],
+        heights=np.full(len(chosen), np.nan),
+        sigma_heights=np.full(len(chosen), np.nan),
     )
 
 

@@ -3,8 +3,9 @@
 Rows are sorted by track and then step, so that neighbours differ little; each number is replaced
 by its difference from the previous one (delta encoding), and the bytes of all differences are
 grouped by significance (byte shuffling). zlib's checksum detects damage. Positions are exact;
-existence probabilities and standard deviations are rounded to float32, detection probabilities and
-the correlation of x and y to a thousandth. Earlier versions stored no correlation; it is 0 there.
+existence probabilities, standard deviations and heights are rounded to float32, detection
+probabilities and the correlation of x and y to a thousandth. Earlier versions stored no
+correlation, which is 0 there, and no heights, which are NaN.
 """
 
 from __future__ import annotations
@@ -20,8 +21,8 @@ from numpy import ndarray
 
 from tracker.fusion.trajectories import Trajectories
 
-_MAGIC, _WITHOUT_COVARIANCES = b"MVT2", b"MVT1"
-"""The first bytes, which identify format and version, and those of the version before."""
+_MAGIC, _WITHOUT_HEIGHTS, _WITHOUT_COVARIANCES = b"MVT3", b"MVT2", b"MVT1"
+"""The first bytes, which identify format and version, and those of the versions before."""
 
 _HEAD = struct.Struct("<4sIH")
 """The header: :data:`_MAGIC`, the number of rows and the number of cameras."""
@@ -71,6 +72,10 @@ def pack(kept: KeptTracks) -> bytes:
     products = np.prod(tracks.sigmas[order, :2], axis=1)
     correlations = tracks.covariances_xy[order] / np.where(products > 0.0, products, 1.0)
     parts.append(_planes(np.rint(correlations * _THOUSANDTHS).astype(np.int16)))
+    parts += [
+        _planes(np.ascontiguousarray(column[order], dtype=np.float32).view(np.int32))
+        for column in (tracks.heights, tracks.sigma_heights)
+    ]
     return _HEAD.pack(_MAGIC, rows, cameras) + zlib.compress(b"".join(parts), _LEVEL)
 
 
@@ -82,7 +87,7 @@ def unpack(data: bytes) -> KeptTracks:
     """
     try:
         magic, rows, cameras = _HEAD.unpack_from(data)
-        if magic not in (_MAGIC, _WITHOUT_COVARIANCES) or rows > _MOST_ROWS:
+        if magic not in (_MAGIC, _WITHOUT_HEIGHTS, _WITHOUT_COVARIANCES) or rows > _MOST_ROWS:
             raise ValueError("they do not begin as they should")
         raw = io.BytesIO(zlib.decompress(data[_HEAD.size :]))
         columns = {
@@ -92,8 +97,11 @@ def unpack(data: bytes) -> KeptTracks:
         seen = [_bits(raw, rows) for _ in range(cameras)]
         probabilities = [_integers(raw, rows, np.int16) for _ in range(cameras)]
         correlations = np.zeros(rows, dtype=np.int16)
-        if magic == _MAGIC:
+        if magic != _WITHOUT_COVARIANCES:
             correlations = _integers(raw, rows, np.int16)
+        heights = np.full((2, rows), np.nan)
+        if magic == _MAGIC:
+            heights[:] = [_integers(raw, rows, np.int32).view(np.float32) for _ in heights]
         if raw.read(1):
             raise ValueError("there are more of them than there should be")
     except (ValueError, struct.error, zlib.error) as error:
@@ -113,6 +121,8 @@ def unpack(data: bytes) -> KeptTracks:
             components=np.arange(rows) - np.searchsorted(frames, frames),
             labels=labels[order],
             covariances_xy=correlations[order] / _THOUSANDTHS * np.prod(deviations[:, :2], axis=1),
+            heights=heights[0, order],
+            sigma_heights=heights[1, order],
         ),
         _beside(probabilities, rows, np.int16)[order] / _THOUSANDTHS,
     )

@@ -89,6 +89,10 @@ class Smoothed:
     """The noise of the boxes, of which the covariances follow; None where it is not estimated."""
     common: float = 0.0
     """Part of the covariances along x and y: of errors that all cameras have in common, m²."""
+    heights: Float[ndarray, " N"] = field(default_factory=lambda: np.zeros(0))
+    """Height of the track's person while standing, metres; NaN where it is not estimated."""
+    sigma_heights: Float[ndarray, " N"] = field(default_factory=lambda: np.zeros(0))
+    """Standard deviation of the height, metres."""
 
     @staticmethod
     def empty(dimension: int, cameras: int) -> Smoothed:

@@ -42,6 +42,7 @@ from tracker.smoothing.calibration import (
     shifts,
     upright,
 )
+from tracker.smoothing.heights import BoxTops, standing_heights
 from tracker.smoothing.noise import (
     NoiseModel,
     PersistentErrors,
@@ -613,6 +614,48 @@ class Smoother:
         placed = self.rows_with_places(paths)[0]
         covariances[placed] = paths.covariances[placed]
         return noise, common, covariances
+
+    def heights(
+        self, paths: Paths, links: Links, learnt: Calibration, noise: NoiseModel
+    ) -> tuple[Float[ndarray, " n"], Float[ndarray, " n"]]:
+        """Estimate the heights of people above the floor, and their standard deviations, metres.
+
+        An offset that the boxes of all cameras have is not told from people's heights: only the
+        differences between cameras are subtracted. See
+        :func:`tracker.smoothing.heights.standing_heights`.
+
+        Args:
+            paths: n paths with the covariances that are reported.
+            links: Association probabilities of rows and boxes.
+            learnt: The self-calibration of the boxes.
+            noise: The noise of the boxes.
+        """
+        owners = paths.owners
+        half_height = float(self._sequence.target_half_extents[2])
+        offsets = learnt.offsets[:, 1] - learnt.offsets[:, 1].mean()
+        sure, parts = links.take(links.shares > _MAINLY), []
+        for camera in range(len(self.cameras)):
+            own = sure.take(sure.cameras == camera)
+            for rows, expected, _, half, plain, _ in self._compared(camera, paths, own, learnt):
+                slopes = expected.jacobians[:, 1, :3]
+                shown = expected.valid & (np.abs(slopes[:, 2]) > 0.0)
+                rows, half, slopes = rows[shown], half[shown], slopes[shown]
+                rest = plain[shown, 1] - half * (offsets[camera] + learnt.shifts[owners[rows]])
+                tops = paths.states[rows, 2] + half_height + rest / slopes[:, 2]
+                aside = np.einsum(
+                    "la,lab,lb->l", slopes[:, :2], paths.covariances[rows, :2, :2], slopes[:, :2]
+                )
+                spread = (noise.variances(half)[:, 1] + aside) / slopes[:, 2] ** 2
+                parts.append((rows, tops, spread))
+        return standing_heights(
+            paths,
+            BoxTops(*(np.concatenate(each) for each in zip(*parts, strict=True))),
+            noise,
+            offsets,
+            half_height=half_height,
+            floor=float(self._sequence.room.minimum[2]),
+            step_time=self.model.step_time,
+        )
 
     def _sure_boxes(
         self, paths: Paths, links: Links, learnt: Calibration

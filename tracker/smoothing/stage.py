@@ -338,6 +338,10 @@ def _finished(
     paths = fitted.places.lead(fitted.paths, smoother.model.step_time)
     noise, common, covariances = reported or (None, 0.0, paths.covariances)
     owners = paths.owners
+    heights = np.full((2, len(paths.labels)), np.nan)
+    if noise is not None:
+        certain = paths.with_states(paths.states, covariances)
+        heights[:] = smoother.heights(certain, shared.links, learnt, noise)
     present = odds > 0.0
     removed = [_removed(paths, path, odds[path]) for path in np.flatnonzero(~present).tolist()]
     links = shared.links
@@ -358,6 +362,7 @@ def _finished(
         decided.joined,
         noise,
         common,
+        *heights[:, owners[rows]],
     )
 
 

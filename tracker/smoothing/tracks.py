@@ -55,6 +55,8 @@ def tracks_of(
         components=components,
         labels=labels,
         covariances_xy=covariances[:, 0, 1],
+        heights=smoothed.heights[rows],
+        sigma_heights=smoothed.sigma_heights[rows],
     )
 
 

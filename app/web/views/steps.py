@@ -11,6 +11,7 @@ from app.state.pairs import pairs_at
 from app.web.pictures.likelihood import key_of
 from app.web.views.owners import tell_owners
 from tracker.fusion.protocol import FusionResult
+from tracker.fusion.trajectories import Trajectories
 from tracker.geometry.boxes import Boxes
 from tracker.parameters.groups.colour_phd import ColourPhdParams
 from tracker.runs.pipeline import Run
@@ -149,6 +150,12 @@ def _add_views(message: models.Step, run: Run, step: int, with_samples: bool) ->
             ]
 
 
+def _height(tracks: Trajectories, row: int) -> tuple[float, float] | None:
+    """The height of a row's person and its standard deviation; None where it is not estimated."""
+    height, sigma = float(tracks.heights[row]), float(tracks.sigma_heights[row])
+    return (height, sigma) if np.isfinite(height) else None
+
+
 def _add_tracks(message: models.Step, sequence: Sequence, run: Run, step: int) -> None:
     tracks = run.tracks
     rows = tracks.at(step)
@@ -163,6 +170,7 @@ def _add_tracks(message: models.Step, sequence: Sequence, run: Run, step: int) -
             sigma=_vector(tracks.sigmas[rows][i]),
             existence=float(tracks.existences[rows][i]),
             seen=seen[i].tolist(),
+            height=_height(tracks, rows.start + i),
         )
         for i in range(len(ids))
     ]

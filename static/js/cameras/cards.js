@@ -56,6 +56,12 @@ export function fillTrackCard(card, track, whole, decisions) {
 					h("small", {}, " m"),
 				),
 			whole && row("±", whole.sigma.map((v) => v.toFixed(2)).join("  "), h("small", {}, " m")),
+			whole?.height &&
+				row(
+					"height",
+					whole.height[0].toFixed(2),
+					h("small", {}, ` ± ${whole.height[1].toFixed(2)} m, standing`),
+				),
 		),
 		decisions.slice(0, 2).map(({ words }) => h("p", { class: "decision" }, words)),
 	);

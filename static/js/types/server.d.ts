@@ -1292,6 +1292,11 @@ declare namespace Server {
 		existence: number;
 		/** By camera. */
 		seen: boolean[];
+		/**
+		 * Height of the person while standing and its standard deviation, metres; null where it is not
+		 * estimated.
+		 */
+		height: [number, number] | null;
 	}
 
 	/** One curve, or one for each camera. */

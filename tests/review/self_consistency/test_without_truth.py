@@ -50,6 +50,8 @@ def tracks(ids: list[list[int]]) -> Trajectories:
         components=np.full(count, -1),
         labels=names,
         covariances_xy=np.zeros(count),
+        heights=np.full(count, np.nan),
+        sigma_heights=np.full(count, np.nan),
     )
 
 

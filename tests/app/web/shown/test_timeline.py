@@ -37,6 +37,8 @@ def run_of(frames: int, rows: list[tuple[int, int, bool]]) -> Run:
         components=np.zeros(count, dtype=np.int64),
         labels=np.zeros(count, dtype=np.int64),
         covariances_xy=np.zeros(count),
+        heights=np.full(count, np.nan),
+        sigma_heights=np.full(count, np.nan),
     )
     run.done = frames
     return run
