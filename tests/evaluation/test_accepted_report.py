@@ -43,6 +43,7 @@ def scene() -> tuple[Sequence, Trajectories, Trajectories]:
     tracks = Trajectories(
         frames, ids, places, np.linspace(0.5, 1.0, count), np.full((count, 3), 0.1),
         np.ones((count, 2), dtype=bool), np.zeros(count, dtype=np.int64), ids, np.zeros(count),
+        np.full(count, np.nan), np.full(count, np.nan),
     )  # fmt: skip
     sequence = Sequence(
         name="small & odd", folder=Path(), fps=12.5, frames=9,

@@ -95,6 +95,7 @@ def rows(places: list[tuple[int, int, float, float]]) -> Smoothed:
         np.array([row[0] for row in places]), np.array([row[1] for row in places]), means,
         np.tile(np.diag([1e-6, 4e-6, 9e-6, 1.0, 1.0, 1.0]), (count, 1, 1)),
         np.array([row[3] for row in places]), np.ones((count, 2), dtype=bool),
+        heights=1.7 + means[:, 0], sigma_heights=0.1 + means[:, 0],
     )  # fmt: skip
 
 
@@ -133,6 +134,8 @@ def test_a_label_keeps_its_number_and_others_get_the_next_ones() -> None:
     assert found.frames.tolist() == [0, 0, 1, 1]
     assert found.ids.tolist() == [4, 5, 1, 4]
     assert found.positions[:, 0].tolist() == [1.0, 0.0, -1.0, 1.0]
+    assert_allclose(found.heights, [2.7, 1.7, 0.7, 2.7])
+    assert_allclose(found.sigma_heights, [1.1, 0.1, -0.9, 1.1])
     assert told(smoothed, results([], []), {}).ids.tolist() == [1, 2, 2, 3]
     assert names_of(smoothed, found) == {8: 4, 9: 5, 2: 1}
     elsewhere = replace(smoothed, means=smoothed.means + 1e-3)

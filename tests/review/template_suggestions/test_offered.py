@@ -100,6 +100,8 @@ def tracked(
         np.full(2 * STEPS, -1),
         ids,
         np.zeros(2 * STEPS),
+        np.full(2 * STEPS, np.nan),
+        np.full(2 * STEPS, np.nan),
     )
     return run
 
