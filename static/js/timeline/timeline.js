@@ -211,6 +211,7 @@ export function mountTimeline(root, context) {
 			const { x, width } = open(last, done, plotted);
 			g.fillStyle = ink.get("ink-3");
 			g.font = `${ink.get("fs-0")} ${ink.font}`;
+			g.textAlign = "left";
 			if (width > g.measureText(UNSCORED).width + 16) g.fillText(UNSCORED, x + 8, plotted.y + 12);
 		}
 	}
