@@ -9,8 +9,8 @@ where it is gone, that is reported, and the list is to be brought up to date.
 runs the tests of the package that each belongs to, up to the first that fails. Rows of the list
 with ``equivalent = "why"`` have no effect that a test could see: they are never drawn.
 
-Kernels are not compiled for either, but for tests of whole recordings (``COMPILED``): on few
-numbers the interpreter is sooner done.
+Kernels are compiled for a sample alone: for the narrow tests of the list the interpreter is sooner
+done.
 """
 
 from __future__ import annotations
@@ -31,6 +31,7 @@ from collections.abc import Sequence as Many
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from queue import Queue
@@ -70,9 +71,6 @@ NOT_DRAWN = (
 )
 NOT_RUN = ("test_compilation.py", "test_checked_cache.py", "test_robustness.py")
 """Tests of compiled kernels alone, and of many or large pictures, which take long interpreted."""
-
-COMPILED = ("tests/io/", "tests/single_view/")
-"""Tests of so many boxes or pixels that kernels are compiled for them."""
 
 SORTS = ("bound", "sign", "off by one", "factor", "swapped", "and/or", "negated")
 
@@ -403,20 +401,10 @@ def copy(folder: Path) -> Path:
     return folder
 
 
-def outcome(root: Path, tests: tuple[str, ...], seconds: float = SECONDS) -> tuple[int, str]:
-    """pytest's status in a copy of the tree, and what it printed."""
-    status, printed = PASSED, ""
-    for compiled in (False, True):
-        own = tuple(test for test in tests if test.startswith(COMPILED) == compiled)
-        if own and status == PASSED:
-            status, printed = _outcome(root, own, seconds, compiled=compiled)
-    return status, printed
-
-
-def _outcome(
-    root: Path, tests: tuple[str, ...], seconds: float, *, compiled: bool
+def outcome(
+    root: Path, tests: tuple[str, ...], seconds: float = SECONDS, *, compiled: bool = False
 ) -> tuple[int, str]:
-    """The same, with kernels compiled or interpreted."""
+    """pytest's status in a copy of the tree, and what it printed."""
     environment = {
         **os.environ,
         "PYTHONPATH": str(root),
@@ -458,17 +446,18 @@ def is_killed(
         Unfit: If the tests did not run.
     """
     root, begin = copies.get(), time.monotonic()
+    drawn = isinstance(mutant, Drawn)
     try:
         status, printed = PASSED, ""
         with changed(mutant, root):
             for tests in filter(None, mutant.rounds):
-                status, printed = outcome(root, tests, seconds)
+                status, printed = outcome(root, tests, seconds, compiled=drawn)
                 if status != PASSED:
                     break
     finally:
         copies.put(root)
     # a drawn change may be one that nobody can even import; one of the list may not
-    killed = (FAILED, *BROKEN) if isinstance(mutant, Drawn) else (FAILED,)
+    killed = (FAILED, *BROKEN) if drawn else (FAILED,)
     if status not in (PASSED, *killed):
         raise Unfit(f"{mutant}: pytest ended with {status}:\n{printed[-2000:]}")
     return status in killed, time.monotonic() - begin
@@ -489,7 +478,8 @@ def try_all(mutants: Many[Mutant | Drawn], workers: int) -> list[Mutant | Drawn]
         roots = [Path(folder) / str(number) for number in range(len(shares))]
         begin = time.monotonic()
         limits = [len(every) * SECONDS] * len(shares)
-        for status, printed in pool.map(outcome, roots, shares, limits):
+        baseline = partial(outcome, compiled=any(isinstance(one, Drawn) for one in mutants))
+        for status, printed in pool.map(baseline, roots, shares, limits):
             if status != PASSED:
                 raise Unfit(f"the tests do not pass without a change:\n{printed[-4000:]}")
         # nothing that a change leaves alone takes so much longer than all of it together
