@@ -9,6 +9,7 @@ import pytest
 
 from tests.mistakes import MISTAKES
 from tests.random_rooms import random_room
+from tracker.geometry.consistency.consensus import Consensus
 from tracker.geometry.consistency.suggestion import consensus_of_cameras, suggest
 from tracker.io.checks import check
 from tracker.io.checks.boxes import listen, raw_cameras
@@ -209,3 +210,20 @@ def test_boxes_a_step_before_the_truth_are_counted_from_0() -> None:
     found = check_counting(replace(sequence, views=tuple(early)))
     assert [str(remedy) for remedy in found.remedies] == ["--first-index 0"]
     assert check_counting(sequence).status == "good"
+
+
+def test_a_room_of_seated_people_reaches_a_whole_size_above_and_below_them() -> None:
+    rng = np.random.default_rng(3)
+    feet = np.column_stack([rng.uniform(-3.0, 3.0, (200, 2)), np.full(200, 0.4)])
+    rises = np.tile([0.0, 0.0, 1.2], (200, 1))
+    none = np.zeros(200, dtype=int)
+    agreed = Consensus(
+        rises[0], 1.0, {(0, 1): 1.0}, 200, 200, none, feet, rises, np.zeros(200), np.ones(200),
+        np.tile([0, 1], (200, 1)),
+    )  # fmt: skip
+    found = suggest([], agreed)
+    assert found is not None
+    assert found.half_extents[2] == pytest.approx(0.6)
+    # middles at 1.0
+    assert found.floor == pytest.approx(-0.2)
+    assert (found.minimum[2], found.maximum[2]) == pytest.approx((-0.2, 2.2), abs=0.1001)
