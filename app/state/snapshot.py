@@ -25,7 +25,7 @@ from tracker.sequences.sequence import Sequence
 Change = Literal[
     "sequence", "opening", "parameters", "playhead", "selection", "layers", "view", "theme",
     "run", "progress", "evaluation", "pinned", "presets", "taught", "editing", "corrections",
-    "ghosts", "offers",
+    "ghosts", "offers", "fetching",
 ]  # fmt: skip
 """What is another now: ``run`` is a run's beginning and its end, ``progress`` its new steps,
 ``taught`` another room or other templates of the same recording."""
@@ -166,6 +166,8 @@ class Snapshot:
     ghosts: Ghosts | None = None
     offers: tuple[Suggestion, ...] | None = None
     """Templates cut from a run's tracks, once somebody asked for them."""
+    fetching: int | None = None
+    """Percentage of a detection network that is fetched; None while none is being fetched."""
     layers: Mapping[str, bool] = field(
         # the truth is in the pictures at first: in 3D twice as many boxes hide the people
         default_factory=lambda: MappingProxyType({name: name != "truth" for name in LAYERS})

@@ -271,6 +271,12 @@ class Workbench(ShownRun):
             if offers is not now.offers:
                 self._put("offers", offers=offers)
 
+    def show_fetching(self, percentage: int | None) -> None:
+        """Show how much of a detection network is fetched; None while none is being fetched."""
+        with self._edit() as now:
+            if percentage != now.fetching:
+                self._put("fetching", fetching=percentage)
+
     def set_theme(self, theme: Theme) -> None:
         """Have the 3D view dark or light."""
         with self._edit() as now:

@@ -24,6 +24,7 @@ from app.models.teaching import (
     ValueChange,
 )
 from app.state.teaching import Part, Side, Teaching
+from app.state.workers.fetching import DetectorFetching
 from app.web.dependencies import ERRORS, FOR_EVER, Bench, Work, nothing_open
 from app.web.opening import begun, told_in_the_answer
 from app.web.pictures.swatches import Swatches
@@ -193,6 +194,22 @@ async def use_detector(wish: DetectorRequest, bench: Bench, jobs: Work) -> model
             await asyncio.to_thread(Network.tried, model)
     with told_in_the_answer("the detector", field="model", hint=NOTHING_LOST):
         await begun(jobs.use_detector(model))
+    return results.state_of(bench.snapshot())
+
+
+@router.post("/detector/fetched")
+def fetch_detector(request: Request, bench: Bench) -> models.State:
+    """Fetch a detection network with npm, in the background, and use it for this recording."""
+    fetching: DetectorFetching = request.app.state.detector_fetching
+    fetching.start()
+    return results.state_of(bench.snapshot())
+
+
+@router.delete("/detector/fetched")
+def stop_fetching(request: Request, bench: Bench) -> models.State:
+    """Stop fetching a detection network; nothing of it is kept."""
+    fetching: DetectorFetching = request.app.state.detector_fetching
+    fetching.cancel()
     return results.state_of(bench.snapshot())
 
 

@@ -27,6 +27,7 @@ from app.state.workbench import Workbench
 from app.state.workers.compiling import Compiling
 from app.state.workers.evaluator import Evaluator
 from app.state.workers.exporter import Exporter
+from app.state.workers.fetching import DetectorFetching
 from app.state.workers.identity_check import IdentityCheck
 from app.state.workers.jobs import Jobs
 from app.state.workers.keeper import Keeper
@@ -97,6 +98,7 @@ async def lifespan(app: FastAPI) -> AsyncIterator[None]:
     evaluator = app.state.evaluator = Evaluator(workbench)
     identity_check = app.state.identity_check = IdentityCheck(workbench)
     exporter = app.state.exporter = Exporter()
+    detector_fetching = app.state.detector_fetching = DetectorFetching(workbench, jobs.use_detector)
     sensitivity = app.state.sensitivity = Sensitivity(workbench, settings.seed)
     keeper = app.state.keeper = Keeper(workbench, settings.library, settings.keep)
     study_desk = app.state.studies = StudyDesk(workbench, studies_folder())
@@ -142,6 +144,7 @@ async def lifespan(app: FastAPI) -> AsyncIterator[None]:
                 for part in (
                     identity_check,
                     exporter,
+                    detector_fetching,
                     keeper,
                     jobs,
                     evaluator,

