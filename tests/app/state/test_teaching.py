@@ -23,14 +23,7 @@ from app.web.views import results
 from tests.app.conftest import ADDRESS, connect, run_is, wait_until
 from tests.browser.walkers import write_walkers
 from tests.single_view.networks import answering, pooling
-from tests.single_view.test_detector_fetching import (  # noqa: F401
-    Npm,
-    files,
-    giving,
-    npm,
-    package,
-    source_of,
-)
+from tests.single_view.packages import Npm, files, giving, package, source_of
 from tracker.runs import pipeline
 from tracker.sequences.library import open_sequence
 from tracker.sequences.pictures.frames import FrameReader
