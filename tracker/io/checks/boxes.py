@@ -153,7 +153,7 @@ def check_boxes(sequence: Sequence, told: BoxesTell | None) -> Iterator[Check]:
     )
     yield _tilt(sequence, told)
     yield from _stray_cameras(sequence, told)
-    yield _where_calibrated(sequence, told)
+    yield from _moved_cameras(sequence, told)
     yield _size(sequence, told)
     yield _inside(sequence, told)
 
@@ -336,14 +336,16 @@ def _stray_cameras(sequence: Sequence, told: BoxesTell) -> Iterator[Check]:
         yield good("every camera agrees with another", "each one's boxes meet others'")
 
 
-def _where_calibrated(sequence: Sequence, told: BoxesTell) -> Check:
+def _moved_cameras(sequence: Sequence, told: BoxesTell) -> Iterator[Check]:
     """A camera whose boxes meet the others' better once it is turned."""
     moved = told.verdict.moved
-    name = "cameras are where they were calibrated"
     sentences = describe_moved(moved, [camera.name for camera in sequence.cameras])
     if sentences:
-        return warning(name, "; ".join(sentences), degrees=float(np.degrees(max(moved.values()))))
-    return good(name, "no camera's boxes meet the others' decisively better if it is turned")
+        yield warning(
+            "cameras are where they were calibrated",
+            "; ".join(sentences),
+            degrees=float(np.degrees(max(moved.values()))),
+        )
 
 
 def _found_where_expected(view: View, index: int, agreed: Consensus) -> Bool[ndarray, " E"]:
