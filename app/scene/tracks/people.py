@@ -52,6 +52,8 @@ class PeopleNodes:
         """
         self._on_pick = on_pick
         self._palette = PALETTES["dark"]
+        self._alone: tuple[Trajectories, int | None, Trajectories] | None = None
+        """All tracks, one of them, and its rows, which every step would have to look for."""
         self._reach: Float[ndarray, "N 3"] = np.zeros((0, 3))
         self._box_ids: Int[ndarray, " N"] = np.zeros(0, dtype=np.int64)
         self._component_ids: Int[ndarray, " J"] = np.zeros(0, dtype=np.int64)
@@ -115,7 +117,9 @@ class PeopleNodes:
         tracks = run.tracks if run is not None else Trajectories.empty(len(sequence.views))
         alone = selected is not None and not layers["others"]
         if alone:
-            tracks = tracks.take(tracks.ids == selected)
+            if self._alone is None or self._alone[0] is not tracks or self._alone[1] != selected:
+                self._alone = tracks, selected, tracks.take(tracks.ids == selected)
+            tracks = self._alone[2]
         now = tracks.at(step)
         ids, positions = tracks.ids[now], tracks.positions[now]
         half = sequence.target_half_extents

@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 import threading
 from collections.abc import Callable
-from pathlib import Path
 
 from app.errors import sentence
 from app.state.workbench import Workbench
@@ -17,15 +16,16 @@ logger = logging.getLogger("app")
 class DetectorFetching:
     """At most one fetching at a time, whose progress is part of the workbench's state."""
 
-    def __init__(self, workbench: Workbench, use: Callable[[Path], object]) -> None:
+    def __init__(self, workbench: Workbench, take_up: Callable[[], object]) -> None:
         """Fetch nothing yet.
 
         Args:
             workbench: Shows the progress, and says how it ended.
-            use: Called with the path of a network that was fetched.
+            take_up: Opens what is open again, with the network at hand: the method is the one that
+                then fits, which with marked people is still the one by their colours.
         """
         self._workbench = workbench
-        self._use = use
+        self._take_up = take_up
         self._lock = threading.Lock()
         self._cancelled = threading.Event()
         self._thread: threading.Thread | None = None
@@ -76,4 +76,4 @@ class DetectorFetching:
             self._workbench.show_fetching(None)
             self._workbench.notify("info", f"The detector {found.name} is at hand.")
             if not cancelled.is_set() and self._workbench.snapshot().sequence is not None:
-                self._use(found.path)
+                self._take_up()

@@ -98,7 +98,9 @@ async def lifespan(app: FastAPI) -> AsyncIterator[None]:
     evaluator = app.state.evaluator = Evaluator(workbench)
     identity_check = app.state.identity_check = IdentityCheck(workbench)
     exporter = app.state.exporter = Exporter()
-    detector_fetching = app.state.detector_fetching = DetectorFetching(workbench, jobs.use_detector)
+    detector_fetching = app.state.detector_fetching = DetectorFetching(
+        workbench, lambda: jobs.use_detector(None)
+    )
     sensitivity = app.state.sensitivity = Sensitivity(workbench, settings.seed)
     keeper = app.state.keeper = Keeper(workbench, settings.library, settings.keep)
     study_desk = app.state.studies = StudyDesk(workbench, studies_folder())

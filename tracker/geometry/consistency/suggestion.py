@@ -24,6 +24,7 @@ _USUAL_HEIGHT, _TRUST = 1.70, 0.3  # prior height, metres; weight of the boxes' 
 _USUAL_SLENDERNESS = 0.36  # ratio of width and height of a standing target
 _MARGIN = 0.5  # extent of the room beyond the places of people, metres
 _OUTLIERS = 0.01  # share of the places on either side that may be outside the room
+_NEAR_ZERO = 0.2  # of the boxes' height: feet as near to z = 0 stand on it
 _FARTHEST = 30.0  # largest distance between a camera and the overlap of views, metres
 
 
@@ -90,15 +91,21 @@ def suggest(
     middles = agreed.feet + agreed.rises / 2.0
     low, high = np.quantile(middles, [_OUTLIERS, 1.0 - _OUTLIERS], axis=0)
     floor = float(np.median(middles[:, 2])) - float(size[2])
+    foot = float(np.median(agreed.feet[:, 2]))
     if stands(agreed.height):
         bottom, top = floor, floor + max(2.0, 2.5 * float(size[2]))
+    elif abs(foot) < _NEAR_ZERO * agreed.height:  # they sit on the floor that the calibration has
+        floor = bottom = 0.0
+        top = high[2] + 2.0 * float(size[2])
     else:  # heads, people at tables: the distance of the floor below them is unknown
         floor = bottom = low[2] - 2.0 * float(size[2])
         top = high[2] + 2.0 * float(size[2])
     minimum = np.array([*(low[:2] - _MARGIN), bottom])
     maximum = np.array([*(high[:2] + _MARGIN), top])
+    lower = np.floor(minimum * 10.0) / 10.0
+    lower[2] = np.round(bottom, 1) + 0.0  # the floor itself: heights are measured from it
     return Suggestion(
-        np.floor(minimum * 10.0) / 10.0,
+        lower,
         np.ceil(maximum * 10.0) / 10.0,
         np.round(size, 3),
         floor,

@@ -14,7 +14,7 @@ from tracker.io.checks.boxes import check_boxes, listen
 from tracker.io.checks.cameras import check_lenses, check_places
 from tracker.io.checks.timing import check_counting, check_time
 from tracker.io.conventions.readings import EVERY_ORDER
-from tracker.sequences.finding import Check, Remedy, Status
+from tracker.sequences.finding import Check, Remedy, Status, absent
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Detections, Sequence
 
@@ -47,7 +47,9 @@ def check(
     if told is not None and told.mistaken:
         return [*found, lenses, check_counting(sequence, places=False)]
     found += [lenses, *check_places(sequence.cameras, sequence.room)]
-    if not quick and (sequence.has_detections or pictures):
+    if told is not None and told.verdict.moved:
+        found.append(absent("cameras show the same moments", "a camera that was moved comes first"))
+    elif not quick and (sequence.has_detections or pictures):
         clocks = None if told is None else told.verdict.clocks
         found += check_time(sequence, reader, clocks=clocks)
     if told is not None:

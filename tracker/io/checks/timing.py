@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from tracker.io.checks.synchronisation import CameraOffset, synchronise
+from tracker.io.checks.synchronisation import LEAST_STEPS, CameraOffset, synchronise
 from tracker.io.conventions.questions import describe_clocks
 from tracker.io.conventions.search import ClockFit
 from tracker.sequences.finding import Check, Remedy, absent, good, warning
@@ -54,14 +54,19 @@ def check_time(
             sharpness=offset.sharpness,
         )
     if not late and not uneven:
-        yield good(name, _agreeing(found))
+        yield _agreeing(name, found)
 
 
-def _agreeing(found: tuple[CameraOffset, ...]) -> str:
+def _agreeing(name: str, found: tuple[CameraOffset, ...]) -> Check:
     steps = max(abs(offset.steps) for offset in found)
     if min(offset.sharpness for offset in found) < 3.0:
-        return "no camera is seen to be late; too little moves to be sure of all of them"
-    return f"to within {max(steps, 0.1):.1f} frames"
+        told = "no camera is seen to be late; too little moves to be sure of all of them"
+        return good(name, told)
+    if steps >= LEAST_STEPS:
+        return absent(
+            name, f"they agree best {steps:.1f} frames apart, but not by enough to be sure"
+        )
+    return good(name, f"to within {max(steps, 0.1):.1f} frames")
 
 
 def check_counting(sequence: Sequence, *, places: bool = True) -> Check:

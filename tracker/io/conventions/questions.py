@@ -250,6 +250,7 @@ def describe_moved(moved: Mapping[int, float], names: Sequence[str]) -> list[str
     """Return a sentence for each camera that was turned since it was calibrated."""
     return [
         f"{names[camera]}: its boxes would meet those of the other cameras better if it were "
-        f"turned by {np.degrees(angle):.0f}°: it was moved after it was calibrated"
+        f"turned by about {np.degrees(angle):.0f}°: it was moved after it was calibrated, or its "
+        "calibration is another's; calibrate it anew, or leave it out"
         for camera, angle in moved.items()
     ]

@@ -17,10 +17,10 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Literal
 
+import cv2
 import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
-from scipy.spatial.transform import Rotation
 
 from tracker.geometry.consistency.likelihood import (
     Evidence,
@@ -289,19 +289,20 @@ class Likelihood:
         return np.array(rows)
 
     def of_poses(
-        self, best: Interpretation, camera: int, poses: Many[Pose]
-    ) -> Float[ndarray, " M"]:
-        """Evidence of the pairs with one camera where the cameras stand otherwise.
+        self, best: Interpretation, poses: Many[Pose], camera: int | None = None
+    ) -> Evidence:
+        """Compute E where the cameras stand otherwise.
 
         Args:
             best: The reading.
-            camera: Which camera.
             poses: Of all cameras.
+            camera: Whose pairs alone are compared; all where it is None.
         """
-        among = np.zeros((len(poses), len(poses)), dtype=bool)
-        among[camera], among[:, camera] = True, True
+        among = np.full((len(poses), len(poses)), camera is None)
+        if camera is not None:
+            among[camera], among[:, camera] = True, True
         boxes = self.boxes_at(best.reading, poses, best.scene, [None] * len(poses))
-        return evidence(boxes, poses, best.scene, among=among).of_camera(camera)
+        return evidence(boxes, poses, best.scene, among=among)
 
     def likely_orders(
         self, reading: Reading, axes: Many[int]
@@ -659,17 +660,18 @@ def find_moved(likelihood: Likelihood, best: Interpretation) -> dict[int, float]
     """
     poses = likelihood.judge.poses(best.reading)
     shares = best.evidence.of_cameras()
-    cameras = sorted(camera for camera, share in shares.items() if share < _WELL)
     found: dict[int, float] = {}
     while len(found) <= (len(shares) - 1) // 2:
         gains: dict[int, tuple[float, Pose, float]] = {}
-        for camera in cameras:
-            if camera not in found and (turned := _turned(likelihood, best, camera, poses)):
+        for camera, share in shares.items():
+            poor = share < _WELL and camera not in found
+            if poor and (turned := _turned(likelihood, best, camera, poses)):
                 gains[camera] = turned
         if not gains:
             break
         camera = max(gains, key=lambda one: gains[one][0])
         _, poses[camera], found[camera] = gains[camera]
+        shares = likelihood.of_poses(best, poses).of_cameras()
     return found
 
 
@@ -681,7 +683,7 @@ def _turned(
     def nats(turn: Float[ndarray, " 3"]) -> Float[ndarray, " M"]:
         own = list(poses)
         own[camera] = turn_pose(poses[camera], turn)
-        return likelihood.of_poses(best, camera, own)
+        return likelihood.of_poses(best, own, camera).of_camera(camera)
 
     given = nats(np.zeros(3))
     turn, gained, tried = np.zeros(3), given, 0
@@ -708,8 +710,7 @@ def turn_pose(own: Pose, turn: Float[ndarray, " 3"]) -> Pose:
         own: Its pose.
         turn: Rotation vector in its own axes, radians.
     """
-    rotation = Rotation.from_rotvec(turn).as_matrix() @ own.rotation
-    return replace(own, rotation=rotation)
+    return replace(own, rotation=cv2.Rodrigues(turn)[0] @ own.rotation)
 
 
 def _clocks_at(
