@@ -78,12 +78,12 @@ class TrackOfFile(_Model):
     estimate weights, which may exceed 1."""
     sigmas: list[tuple[float, float, float]]
     """The standard deviations of the position along x, y and z, metres."""
-    covariance_xy: list[float]
+    covariance_xy: list[float] = []
     """The covariance of the position along x and y, square metres."""
-    height: list[float | None]
+    height: list[float | None] = []
     """The height of the track's person while standing, above the floor, metres; null where it is
     not estimated."""
-    sigma_height: list[float | None]
+    sigma_height: list[float | None] = []
     """The standard deviation of the height, metres; null where it is not estimated."""
     seen: dict[str, list[bool]]
     """For each camera by name: whether a box of the camera updated the track at this step."""

@@ -39,17 +39,17 @@ class OnnxDetector:
         Raises:
             ValueError: If the sequence has no detector or no images, or it cannot be used.
         """
-        model = sequence.detector
-        if model is None:
-            raise ValueError(
-                f"{sequence.name} has no detector; fetch one by `multiview-phd detector get`, "
-                "start with --detector model.onnx, or choose another single_view"
-            )
         if not sequence.views[camera_index].has_pictures:
             name = sequence.views[camera_index].camera.name
             raise ValueError(
                 f'camera "{name}" of {sequence.name} has no pictures for a detector to look at; '
                 "give it a video or images in sequence.toml"
+            )
+        model = sequence.detector
+        if model is None:
+            raise ValueError(
+                f"{sequence.name} has no detector; fetch one by `multiview-phd detector get`, "
+                "start with --detector model.onnx, or choose another single_view"
             )
         p = self._parameters = parameters.of(OnnxDetectorParams)
         self._sequence, self._camera = sequence, sequence.views[camera_index].camera
