@@ -26,8 +26,8 @@ leads here.
 ## In which order
 
 1. **Choose what is measured.** With templates and pictures: `colour_phd`. With pictures alone:
-   `onnx_detector` where a network is at hand and people are at least 100 pixels high, else `shapes`,
-   or `jpda` and `association_matrix`, which look at the foreground. With a detector's
+   `onnx_detector` where a network is at hand and people are 100 pixels high or more, else
+   `shapes`, or `jpda` and `association_matrix`, which look at the foreground. With a detector's
    boxes: `none` or `detection_phd`.
 2. **Look at stage 1 first**: the boxes in the pictures. Somebody without a box in any camera
    cannot be found; boxes on furniture that stay at one place can become ghosts.
