@@ -25,9 +25,9 @@ def command_line(snapshot: Snapshot) -> str:
     words += ["--single-view", parameters.single_view, "--fusion", parameters.fusion_method]
     if parameters.smoothing_method != snapshot.defaults.smoothing_method:
         words += ["--smoothing", parameters.smoothing_method]
-    named = sequence.detector is not None and sequence.detector.named
-    if named and sequence.detector is not None and parameters.single_view == "onnx_detector":
-        words += ["--detector", str(sequence.detector.path.absolute())]
+    detector = sequence.detector
+    if detector is not None and detector.named and parameters.single_view == "onnx_detector":
+        words += ["--detector", str(detector.path.absolute())]
     for key, value in changed_values(parameters, snapshot.defaults).items():
         if key not in METHODS:
             words += ["--set", f"{key}={_written(value)}"]

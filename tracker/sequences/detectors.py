@@ -75,7 +75,7 @@ def write_record(folder: Path, name: str, licence: str, source: str) -> None:
     Raises:
         OSError: If the network cannot be read or the record cannot be written.
     """
-    record = DetectorRecord(name, licence, source, _sha256(folder / MODEL))
+    record = DetectorRecord(name, licence, source, sha256_of(folder / MODEL))
     write_json(folder / RECORD, asdict(record))
 
 
@@ -85,7 +85,7 @@ def fetched_detector(folder: Path) -> FetchedDetector:
     try:
         record = read_as(folder / RECORD, DetectorRecord)
         size = size_of(folder / MODEL)
-        same = _sha256(folder / MODEL) == record.sha256
+        same = sha256_of(folder / MODEL) == record.sha256
         damage = "" if same else f"is damaged: {MODEL} has another SHA-256 than was recorded"
     except (OSError, ValueError) as error:
         words = (error.strerror if isinstance(error, OSError) else None) or str(error)
@@ -107,6 +107,11 @@ def detector_at_hand() -> DetectorFile | None:
     return next((found.file for found in fetched_detectors() if not found.damage), None)
 
 
-def _sha256(path: Path) -> str:
+def sha256_of(path: Path) -> str:
+    """Return the SHA-256 of a file's content, in hexadecimal digits.
+
+    Raises:
+        OSError: If it cannot be read.
+    """
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 import re
 from dataclasses import dataclass, replace
@@ -11,7 +10,7 @@ from typing import Literal
 
 from tracker.files.atomic import size_of
 from tracker.sequences.built_in import BUILT_IN, ROOMS, cached_rooms
-from tracker.sequences.detectors import detector_at_hand
+from tracker.sequences.detectors import detector_at_hand, sha256_of
 from tracker.sequences.errors import SequenceError
 from tracker.sequences.fields import did_you_mean, listed
 from tracker.sequences.reader import FILE, given_folder, read_sequence, read_summary
@@ -161,8 +160,7 @@ def with_detector(sequence: Sequence, path: Path | None) -> Sequence:
         return sequence
     try:
         size_of(path)  # refuses a pipe, on which reading would block
-        with path.open("rb") as file:
-            digest = hashlib.file_digest(file, "sha256").hexdigest()[:16]
+        digest = sha256_of(path)[:16]
     except OSError as error:
         raise SequenceError(
             f"the detector {path} cannot be read ({error.strerror}); name an ONNX file"

@@ -187,7 +187,7 @@ class Scores(Model):
     evaluation: EvaluationInfo
     series: EvaluationSeries
     reference: EvaluationSeries | None
-    """Of the run that it is compared with; null where there is none."""
+    """The series of the run that it is compared with; null where there is none."""
 
 
 class ComparedRun(Model):

@@ -1035,7 +1035,7 @@ declare namespace Server {
 	interface Scores {
 		evaluation: EvaluationInfo;
 		series: EvaluationSeries;
-		/** Of the run that it is compared with; null where there is none. */
+		/** The series of the run that it is compared with; null where there is none. */
 		reference: EvaluationSeries | null;
 	}
 

@@ -295,8 +295,8 @@ class Likelihood:
 
         Args:
             best: The reading.
-            poses: Of all cameras.
-            camera: Whose pairs alone are compared; all where it is None.
+            poses: The poses of all cameras.
+            camera: The camera whose pairs alone are compared; None compares all pairs.
         """
         among = np.full((len(poses), len(poses)), camera is None)
         if camera is not None:
@@ -652,7 +652,7 @@ def find_moved(likelihood: Likelihood, best: Interpretation) -> dict[int, float]
     looked at again.
 
     Args:
-        likelihood: Of the boxes.
+        likelihood: The likelihood of the boxes.
         best: The reading.
 
     Returns:
