@@ -180,9 +180,9 @@ def test_runs(arguments: list[str]) -> dict[str, Check]:
     }
 
 
-def fuzzing(minutes: float, *how: str) -> tuple[str, ...]:
+def fuzzing(minutes: float, *how: str, workers: int = CORES) -> tuple[str, ...]:
     """Damaged recordings for some minutes, other ones each time."""
-    return (PYTHON, "-m", "tests.bad_input", f"{minutes:g}", "--workers", str(CORES), *how)
+    return (PYTHON, "-m", "tests.bad_input", f"{minutes:g}", "--workers", str(workers), *how)
 
 
 def digest() -> str:
@@ -216,10 +216,11 @@ def main() -> int:
     # at once for all processes that the tests start
     kernels = Check("kernels", ((PYTHON, "-m", "tracker.runs.warm_up"),))
     benchmarks = Check("benchmarks", ((PYTHON, "-m", "tests.benchmarks", "--short"),))
-    mutants = Check("mutants", ((PYTHON, "-m", "tests.mutate"),))
+    # these three go side by side with the benchmarks, which keep one core busy
+    mutants = Check("mutants", ((PYTHON, "-m", "tests.mutate", "--workers", "1"),))
     always = ("--seed", "20261122")  # the same cases; --fuzz draws others each time
-    fuzz = Check("fuzz", (fuzzing(0.7, *always),))
-    bounds = Check("bounds", (fuzzing(0.7, *always, "--bounds"),))
+    fuzz = Check("fuzz", (fuzzing(1.4, *always, workers=1),))
+    bounds = Check("bounds", (fuzzing(0.7, *always, "--bounds", workers=1),))
     names = [check.name for check in (*page, *code, kernels, *test_runs([]).values())]
 
     parser = argparse.ArgumentParser(
@@ -266,10 +267,11 @@ def main() -> int:
             if not failed and not arguments.pytest:
                 PASSED.write_text(before, encoding="utf-8")
         if arguments.all:
-            failed += [c.name for c in (full_tests, benchmarks) if not c.run(shown=True)]
-            with ThreadPoolExecutor(2) as lanes:  # kernels that check bounds compile on one core
-                checking = lanes.submit(in_order, [bounds])
-                failed += in_order([mutants, fuzz]) + checking.result()
+            failed += [] if full_tests.run(shown=True) else [full_tests.name]
+            with ThreadPoolExecutor(1) as lane:
+                checking = lane.submit(in_order, [bounds, mutants, fuzz])
+                failed += [] if benchmarks.run(shown=True) else [benchmarks.name]
+                failed += checking.result()
     if failed:
         print(f"failed: {', '.join(dict.fromkeys(failed))}", file=sys.stderr)
     return 1 if failed else 0

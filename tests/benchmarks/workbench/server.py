@@ -44,7 +44,7 @@ def run(short: bool) -> Iterator[Measurement]:
                 change = {"changes": {"colour_phd.detection_probability": 0.79}}
                 httpx2.patch(server.address + "api/parameters", json=change)
                 yield from _scrub(server, "during a run", 100)
-            yield from _kill(server, 4 if short else 10)
+            yield from _kill(server, 2 if short else 10)
         finally:
             yield Measurement("serve: ends after Ctrl-C", server.stop(), "s", "≤ 2 s")
 
