@@ -15,7 +15,7 @@ import pytest
 from starlette.testclient import TestClient
 
 from app.command.commands.studies import _trials as command_words
-from app.state.studies.desk import StudyDesk
+from app.state.studies import StudyDesk
 from app.web.server import Settings, create_app
 from app.web.studies import routes
 from tests.studies.small import Serial, made_up, recording, run

@@ -21,7 +21,7 @@ from app.state.kept.presets import OwnPresets
 from app.state.kept.recents import Recents
 from app.state.memory import Budget
 from app.state.snapshot import Notice
-from app.state.studies.desk import StudyDesk
+from app.state.studies import StudyDesk
 from app.state.teaching import Teaching
 from app.state.workbench import Workbench
 from app.state.workers.compiling import Compiling

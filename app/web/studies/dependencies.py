@@ -7,7 +7,7 @@ from typing import Annotated
 from fastapi import Depends, Request
 
 from app.errors import ApiError, sentence
-from app.state.studies.desk import StudyDesk
+from app.state.studies import StudyDesk
 from tracker.studies.errors import StudyError
 from tracker.studies.store import Store
 

@@ -9,7 +9,7 @@ from fastapi import APIRouter, Query
 
 from app.errors import ApiError, sentence
 from app.state.snapshot import Snapshot
-from app.state.studies.desk import StudyDesk
+from app.state.studies import StudyDesk
 from app.web.dependencies import ERRORS, Bench, nothing_open
 from app.web.studies import models, views
 from app.web.studies.dependencies import Desk, Named, no_study

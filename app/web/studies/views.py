@@ -6,7 +6,7 @@ from dataclasses import asdict
 from typing import Any
 
 from app.state.snapshot import Snapshot
-from app.state.studies.desk import StudyDesk
+from app.state.studies import StudyDesk
 from app.web.studies import models
 from tracker.files.folders import cache_folder
 from tracker.parameters.catalogue import METHODS, PARAMETERS
