@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,8 @@ from numpy import ndarray
 
 from tests.io.read.rig import SIZE, boxes, cameras, read, walks
 from tracker.io.conventions.reading import read_boxes
+from tracker.io.importing.finding.times import on_one_clock
+from tracker.io.importing.gathering import gather
 from tracker.io.read.pieces import DetectionPiece, FormatError, TruthPiece
 from tracker.io.read.registry import recognise
 from tracker.io.read.source import SourceFile
@@ -324,7 +327,7 @@ def test_times_in_place_of_frames(tmp_path: Path, name: str, scale: float, fps: 
 
 def test_times_that_are_none_since_a_beginning(tmp_path: Path) -> None:
     path = tmp_path / "cam1.csv"
-    path.write_text("time,left,top,width,height\n1.7e9,1,2,3,4\n1.7000001e9,1,2,3,4\n")
+    path.write_text("time,left,top,width,height\n1.7e7,1,2,3,4\n1.7000001e7,1,2,3,4\n")
     with pytest.raises(FormatError, match=r'cam1\.csv.*time.*since the beginning.*"frame"'):
         _detections(path)
 
@@ -406,7 +409,7 @@ def test_boxes_by_camera_and_frame(tmp_path: Path, content: object) -> None:
     path = tmp_path / "boxes.json"
     path.write_text(json.dumps(content))
     name, pieces = read(path)
-    assert name == "boxes by camera and frame (JSON)"
+    assert name == "boxes by camera and frame (JSON, XML)"
     first, second = (piece for piece in pieces if isinstance(piece, DetectionPiece))
     assert (first.camera, second.camera) == ("cam1", "cam2")
     for piece in (first, second):
@@ -415,6 +418,178 @@ def test_boxes_by_camera_and_frame(tmp_path: Path, content: object) -> None:
         found = read_boxes(piece.boxes[order], "xyxy", None)
         np.testing.assert_allclose(found, BOXES, atol=1e-9)
         np.testing.assert_array_equal(piece.scores, 0.75)
+
+
+CORNERS = [_corners(box) for box in BOXES]
+MIDDLES = [[left + w / 2, top + h / 2, w, h] for left, top, w, h in BOXES.tolist()]
+
+
+@pytest.mark.parametrize(
+    ("name", "rows"),
+    [
+        (
+            "names of another language and decimal commas",
+            [
+                ["Bild;Links;Oben;Breite;Hoehe;Wert"],
+                *(
+                    [";".join(str(v).replace(".", ",") for v in (int(f), *b, 0.75))]
+                    for f, b in zip(FRAMES, BOXES.tolist(), strict=True)
+                ),
+            ],
+        ),
+        (
+            "a score and no names",
+            [[f, *b, 0.75] for f, b in zip(FRAMES, BOXES.tolist(), strict=True)],
+        ),
+        (
+            "a person before the box and zeros behind it",
+            [
+                [f, 7 + n % 2, *b, *[0] * 5]
+                for n, (f, b) in enumerate(zip(FRAMES, BOXES.tolist(), strict=True))
+            ],
+        ),
+        (
+            "a person behind the box",
+            [
+                [f, *b, 7 + n % 2]
+                for n, (f, b) in enumerate(zip(FRAMES, BOXES.tolist(), strict=True))
+            ],
+        ),
+    ],
+)  # fmt: skip
+def test_rows_of_numbers_without_known_names(tmp_path: Path, name: str, rows: list[object]) -> None:
+    path = tmp_path / "cam1.tsv"
+    path.write_text("\n".join("\t".join(map(str, row)) for row in rows))  # type: ignore[call-overload]
+    piece = _detections(path)
+    assert piece.layout is None
+    assert (piece.scores == (0.75 if "comma" in name or "score" in name else 1.0)).all()
+    _assert_boxes(piece)
+
+
+def test_rows_of_a_sensor_are_no_boxes(tmp_path: Path) -> None:
+    """Numbers of both signs under names of an accelerometer."""
+    path = tmp_path / "imu.csv"
+    rows = np.random.default_rng(1).normal(0.0, 9.0, (50, 6))
+    lines = [",".join(map(str, (n, *row))) for n, row in enumerate(rows.tolist())]
+    path.write_text("\n".join(["tick,ax,ay,az,gx,gy,gz", *lines]))
+    assert recognise(SourceFile(path))[0] is None
+
+
+def test_rows_that_become_others_further_down_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "cam1.txt"
+    lines = [
+        "\t".join(map(str, (n // 2, 10 + n % 7, 20 + n % 5, 300 + n % 2, 400 + n % 3)))
+        for n in range(9000)
+    ]
+    path.write_text("\n".join([*lines, "1\t2"]))
+    with pytest.raises(FormatError, match=r"cam1\.txt: expected rows of the same count"):
+        _detections(path)
+
+
+def test_labels_of_kitti_s_tracking(tmp_path: Path) -> None:
+    path = tmp_path / "0000.txt"
+    rows = [
+        f"{f} 3 Pedestrian 0 0 -1.5 {' '.join(map(repr, c))} 1.7 .6 .8 1 2 9 -1.6"
+        for f, c in zip(FRAMES, CORNERS, strict=True)
+    ]
+    path.write_text("\n".join([*rows, "0 -1 DontCare -1 -1 -10 1 1 90 90 -1 -1 -1 -1 -1 -1 -1"]))
+    piece = _detections(path)
+    assert "1 of" in piece.left_out
+    _assert_boxes(piece)
+
+
+def test_text_of_vatic_leaves_out_who_is_out_of_sight(tmp_path: Path) -> None:
+    """Its ten columns end with a name, as those of COLMAP's poses do."""
+    path = tmp_path / "view1.txt"
+    rows = [
+        f'{n % 2} {" ".join(map(repr, c))} {f} 0 0 1 "PERSON"'
+        for n, (f, c) in enumerate(zip(FRAMES, CORNERS, strict=True))
+    ]
+    path.write_text("\n".join([*rows, '0 1 1 90 90 9 1 0 0 "PERSON"']))
+    assert read(path)[0] == "VATIC text"
+    _assert_boxes(_detections(path))
+
+
+@pytest.mark.parametrize("by", ["middle", "corner"])
+def test_boxes_in_xml_by_frame(tmp_path: Path, by: str) -> None:
+    """As of CAVIAR and PETS, and of UA-DETRAC; a frame of several and frames of one."""
+    objects: dict[int, str] = {}
+    for f, (cx, cy, w, h), (left, top, *_) in zip(FRAMES.tolist(), MIDDLES, CORNERS, strict=True):
+        box = (
+            f'<object id="1"><box xc="{cx!r}" yc="{cy!r}" w="{w!r}" h="{h!r}"/></object>'
+            if by == "middle"
+            else f'<target id="1"><box left="{left!r}" top="{top!r}" width="{w!r}" height="{h!r}"/>'
+            "</target>"
+        )
+        objects[f] = objects.get(f, "") + box
+    level, number = ("objectlist", "number") if by == "middle" else ("target_list", "num")
+    frames = "".join(
+        f'<frame {number}="{f}"><{level}>{own}</{level}></frame>' for f, own in objects.items()
+    )
+    path = tmp_path / "cam1.xml"
+    path.write_text(f'<?xml version="1.0"?><dataset name="a walk">{frames}</dataset>')
+    _assert_boxes(_detections(path), 1e-6)
+
+
+def test_a_time_that_all_boxes_of_a_file_share_is_no_frame(tmp_path: Path) -> None:
+    """How long the detector took, beside the boxes of a file a frame (Roboflow)."""
+    paths = []
+    for f in sorted(set(FRAMES.tolist())):
+        own = [m for g, m in zip(FRAMES, MIDDLES, strict=True) if g == f]
+        boxes_ = [
+            dict(zip(("x", "y", "width", "height"), m, strict=True), confidence=0.5) for m in own
+        ]
+        paths.append(tmp_path / f"frame_{f:05}.json")
+        paths[-1].write_text(json.dumps({"time": 0.1 + f / 1e3, "predictions": boxes_}))
+    piece = _detections(paths[0], *paths)
+    found = read_boxes(piece.boxes, "cxcywh", None)
+    np.testing.assert_array_equal(piece.frames, FRAMES)
+    np.testing.assert_allclose(found, BOXES, atol=1e-9)
+
+
+def test_a_file_a_camera_whose_boxes_have_times(tmp_path: Path) -> None:
+    """As of Rekognition: the numbers of the files are the cameras' and not those of frames."""
+    names = ("Left", "Top", "Width", "Height")
+    parts = (BOXES + np.array([0.5, 0.5, 0.0, 0.0])) / np.array(
+        [*SIZE, *SIZE]
+    )  # from the corner of a pixel
+    people = [
+        {"Timestamp": 40 * f, "Person": {"BoundingBox": dict(zip(names, b, strict=True))}}
+        for f, b in zip(FRAMES.tolist(), parts.tolist(), strict=True)
+    ]
+    paths = [tmp_path / f"cam{number}.json" for number in (1, 2)]
+    for path in paths:
+        path.write_text(json.dumps({"Persons": people}))
+    pieces = [p for p in read(paths[0], *paths)[1] if isinstance(p, DetectionPiece)]
+    assert [piece.source.name for piece in pieces] == ["cam1.json", "cam2.json"]
+    for piece in pieces:
+        assert piece.fps == pytest.approx(25.0)
+        _assert_boxes(piece, 1e-6)
+
+
+@pytest.mark.parametrize("written", ["iso", "s", "ms", "us", "ns"])
+def test_times_with_dates_are_counted_from_the_first_of_all_files(
+    tmp_path: Path, written: str
+) -> None:
+    """Two cameras, of which the second sees somebody a second later."""
+    paths = [tmp_path / f"cam{number}.csv" for number in (1, 2)]
+    begin = datetime(2024, 5, 1, 12, tzinfo=UTC)
+    parts = {"s": 1, "ms": 10**3, "us": 10**6, "ns": 10**9}.get(written, 1)
+    for path, later in zip(paths, (0, 25), strict=True):
+        whens = [begin + timedelta(milliseconds=40 * (int(f) + later)) for f in FRAMES]
+        times = [w.isoformat() if written == "iso" else w.timestamp() * parts for w in whens]
+        rows = [",".join(map(str, (w, *b))) for w, b in zip(times, BOXES.tolist(), strict=True)]
+        path.write_text("\n".join(["timestamp,left,top,width,height", *rows]))
+    first, second = (
+        piece
+        for one in on_one_clock(gather([tmp_path]))
+        for piece in one.pieces
+        if isinstance(piece, DetectionPiece)
+    )
+    assert first.fps == pytest.approx(25.0, rel=1e-3)
+    _assert_boxes(first)
+    _assert_boxes(second, first=25)
+    assert second.last_frame == FRAMES.max() + 25
 
 
 def test_boxes_by_frame_are_a_camera_a_file_or_a_frame_a_file(tmp_path: Path) -> None:

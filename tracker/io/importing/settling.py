@@ -54,6 +54,7 @@ from tracker.io.importing.finding.times import (
     Times,
     first_index,
     frames_of,
+    on_one_clock,
     settle_times,
     told_beyond,
 )
@@ -125,6 +126,7 @@ def settle(taken: Sequence[ParsedFiles], options: ImportOptions | None = None) -
             interpretation is not to be accepted.
     """
     options = options or ImportOptions()
+    taken = on_one_clock(taken)
     sets, told = camera_sets(taken)
     matched = match_all(taken, sets, options, told)
     told += matched.told + short_videos(taken)

@@ -11,7 +11,8 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from datetime import UTC, datetime
+from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -68,10 +69,19 @@ _OURS = "existence"
 _LONGEST = 1e6
 """Seconds: larger numbers are not times since a recording began."""
 
+_SELDOM = 5.0
+"""Seconds between two pictures of a recording that are more likely milliseconds."""
+
+_DATED = (5e8, 5e9)
+"""Seconds since the beginning of 1970 that are dates, of the years 1985 to 2128."""
+
+_PARTS_OF_SECONDS = (1.0, 1e3, 1e6, 1e9)
+"""How many of its units a second has in which dates are counted."""
+
 _LONGEST_BOX = 8
 """Numbers of a box that is a list: the four, a score, a class, a track, and one to spare."""
 
-_DECIMAL_COMMA = re.compile(r"[-+]?\d+,\d+(e[-+]?\d+)?", re.IGNORECASE)
+DECIMAL_COMMA = re.compile(r"[-+]?\d+,\d+(e[-+]?\d+)?", re.IGNORECASE)
 
 Column = Sequence[Any]
 
@@ -84,7 +94,7 @@ def plain(name: str) -> str:
 def decimal_points(line: str) -> str:
     """A row with blanks between its cells, decimal commas as points; any other row as it is."""
     words = line.split() if "," in line else []
-    if len(words) < 3 or not all("," not in w or _DECIMAL_COMMA.fullmatch(w) for w in words):
+    if len(words) < 3 or not all("," not in w or DECIMAL_COMMA.fullmatch(w) for w in words):
         return line
     return line.replace(",", ".")
 
@@ -149,11 +159,11 @@ def read_table(
     """
     found = meanings(list(columns))
     rows = len(next(iter(columns.values()), ()))
-    fps = None
+    when = _Times()
     if frame is None and "frame" not in found and "time" in found:
         column = found["time"]
         cells = [_seconds(cell) for cell in columns[column]]
-        frames, fps = _frames_of_times(file, column, _numbers(file, column, cells))
+        frames, when = _frames_of_times(file, column, _numbers(file, column, cells))
     elif frame is None and "frame" not in found:
         raise file.error(
             'expected a column "frame" (or a number in the name of a file a frame), found the '
@@ -168,13 +178,13 @@ def read_table(
         values, more = _fours(file, found["box"], columns[found["box"]], frames)
         new = {meaning: cells for meaning, cells in more.items() if meaning not in found}
         columns, found = {**columns, **new}, {**{meaning: meaning for meaning in new}, **found}
-        yield from _detections(file, name, columns, found, frames, values, boxes_layout, fps)
+        yield from _detections(file, name, columns, found, frames, values, boxes_layout, when)
     elif form is not None:
         layout, parts = form
         values = np.column_stack([_numbers(file, found[p], columns[found[p]]) for p in parts])
-        yield from _detections(file, name, columns, found, frames, values, layout, fps)
+        yield from _detections(file, name, columns, found, frames, values, layout, when)
     else:
-        yield _truth(file, name, columns, found, frames, fps)
+        yield _truth(file, name, columns, found, frames, when)
 
 
 def to_unit(scores: Float[ndarray, " D"]) -> Float[ndarray, " D"]:
@@ -204,7 +214,7 @@ def _detections(
     frames: Int[ndarray, " D"],
     boxes: Float[ndarray, "D 4"],
     layout: Layout | None,
-    fps: float | None,
+    when: _Times,
 ) -> Iterator[Piece]:
     scores = np.ones(len(frames))
     if "score" in found:
@@ -230,9 +240,10 @@ def _detections(
             scores=scores[rows],
             layout=layout,
             normalised=is_normalised(boxes[rows & keep]),
-            first_index=None if fps is None else 0,
+            first_index=None if when.fps is None else 0,
             last_frame=int(frames.max()) if len(frames) else None,
-            fps=fps,
+            fps=when.fps,
+            begins=when.begins,
         )
         yield only_people(file, piece, classes[rows].tolist(), wanted[rows])
 
@@ -304,7 +315,7 @@ def _truth(
     columns: Mapping[str, Column],
     found: Mapping[str, str],
     frames: Int[ndarray, " G"],
-    fps: float | None,
+    when: _Times,
 ) -> TruthPiece:
     axes = [axis for axis in "xyz" if axis in found]
     places = np.full((len(frames), 3), np.nan)
@@ -327,8 +338,9 @@ def _truth(
         positions=places[good],
         unit=unit,
         valid=None if valid is None else valid[good],
-        fps=fps,
-        first_index=None if fps is None else 0,
+        fps=when.fps,
+        begins=when.begins,
+        first_index=None if when.fps is None else 0,
     )
 
 
@@ -350,23 +362,42 @@ def _frames(file: SourceFile, name: str, cells: Column) -> Int[ndarray, " D"]:
     return values.astype(np.int64)
 
 
+class _Times(NamedTuple):
+    """What a column of times says of frames."""
+
+    fps: float | None = None
+    """How many frames there are a second; None if there are no times."""
+    begins: float | None = None
+    """The time of frame 0 since the beginning of 1970, seconds; None if there are no dates."""
+
+
 def _frames_of_times(
     file: SourceFile, name: str, times: Float[ndarray, " D"]
-) -> tuple[Int[ndarray, " D"], float]:
-    """Frames that are as far apart as the times, counted from time 0, and how many a second.
+) -> tuple[Int[ndarray, " D"], _Times]:
+    """Frames that are as far apart as the times, counted from time 0 or the first of dates.
 
-    Times are seconds, or milliseconds where the column is called so. The rate that fits all of
-    them is taken: times are rounded, and where nobody was seen there are none.
+    Times are seconds, or milliseconds where the column is called so or where whole numbers would be
+    :data:`_SELDOM` apart; since the beginning of 1970 they may be in milli-, micro- or nanoseconds
+    too. The rate that fits all of them is taken: times
+    are rounded, and where nobody was seen there are none.
     """
-    unit = 1e-3 if plain(name).endswith("ms") else 1.0
-    seconds = times * unit
-    if not np.isfinite(seconds).all():
+    if not np.isfinite(times).all():
         raise file.error("expected a time in every row", name)
+    apart = np.diff(np.unique(times))
+    seldom = len(apart) > 0 and float(np.median(apart)) >= _SELDOM and not (times % 1.0).any()
+    seconds = times * (1e-3 if seldom or plain(name).endswith("ms") else 1.0)
+    begins = None
+    if len(times):
+        first = times.min()
+        parts = next((p for p in _PARTS_OF_SECONDS if _DATED[0] < first / p < _DATED[1]), None)
+        if parts is not None:
+            begins = float(first / parts)
+            seconds = (times - first) / parts
     own = np.unique(seconds)
     if len(own) < 2 or own[0] < 0.0 or own[-1] > _LONGEST:
         raise file.error(
-            f"expected two or more times from 0 to {_LONGEST:g} s since the beginning, found "
-            f'{own[0]:g} … {own[-1]:g} s; have a column "frame" instead'
+            f"expected two or more times from 0 to {_LONGEST:g} s since the beginning, or with "
+            f'dates, found {own[0]:g} … {own[-1]:g} s; have a column "frame" instead'
             if len(own)
             else "expected times, found none",
             name,
@@ -374,16 +405,24 @@ def _frames_of_times(
     apart = np.diff(own)
     steps = np.round(apart / np.median(apart))
     fps = float(round(steps.sum() / apart[steps > 0].sum(), 3))
-    return np.round(seconds * fps).astype(np.int64), fps
+    return np.round(seconds * fps).astype(np.int64), _Times(fps, begins)
 
 
 def _seconds(cell: Any) -> Any:
-    """A time of day (``00:01:02.5``) as seconds; anything else as it is."""
-    parts = re.fullmatch(r"(?:(\d+):)?(\d+):(\d+(?:[.,]\d*)?)", str(cell).strip())
-    if parts is None:
+    """A time of day (``00:01:02.5``) or a date with a time (ISO 8601) as seconds, the latter since
+    the beginning of 1970; anything else as it is."""
+    words = str(cell).strip()
+    parts = re.fullmatch(r"(?:(\d+):)?(\d+):(\d+(?:[.,]\d*)?)", words)
+    if parts is not None:
+        hours, minutes, seconds = parts.groups(default="0")
+        return 3600.0 * float(hours) + 60.0 * float(minutes) + float(seconds.replace(",", "."))
+    if not re.match(r"\d{4}-?\d\d-?\d\d[T ]", words):
         return cell
-    hours, minutes, seconds = parts.groups(default="0")
-    return 3600.0 * float(hours) + 60.0 * float(minutes) + float(seconds.replace(",", "."))
+    try:
+        date = datetime.fromisoformat(words)
+    except ValueError:
+        return cell
+    return (date if date.tzinfo else date.replace(tzinfo=UTC)).timestamp()
 
 
 def _numbers(

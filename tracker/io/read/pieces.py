@@ -117,6 +117,8 @@ class DetectionPiece:
     """The last frame that the detector processed, if the file states it though it has no box."""
     fps: float | None = None
     """The frame rate, if the file has times, 1/s."""
+    begins: float | None = None
+    """The time of frame 0 since the beginning of 1970, if the file has dates, seconds."""
     keypoints: Float[ndarray, "D J 3"] | None = None
     """x, y in pixels and confidence of J joints; NaN for a joint that is not seen."""
     classes: tuple[str, ...] | None = None
@@ -165,6 +167,8 @@ class TruthPiece:
     unit: Unit | None = None
     up: Up | None = None
     fps: float | None = None
+    begins: float | None = None
+    """The time of frame 0 since the beginning of 1970, if the file has dates, seconds."""
     first_index: Literal[0, 1] | None = None
     valid: Bool[ndarray, " G"] | None = None
     cells: Int[ndarray, " G"] | None = None

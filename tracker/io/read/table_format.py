@@ -22,6 +22,11 @@ _WHOLE = ("frame", "id", "camera")
 ZERO = "0"
 """A column in which the program that writes the format has nothing but zeros."""
 
+LOST = "lost"
+"""A column that has 1 in rows whose box is out of sight, which are left out."""
+
+_UNREAD = ("", ZERO, LOST)
+
 
 @dataclass(frozen=True, slots=True)
 class TableFormat:
@@ -32,7 +37,7 @@ class TableFormat:
     NAME: str
     columns: tuple[str, ...]
     """The meaning of each column, as :data:`tracker.io.read.columns.WORDS` calls it; :data:`ZERO`;
-    or empty. A class that stands first may have several words."""
+    :data:`LOST`; or empty. A class that stands first may have several words, any class quotes."""
     optional: int = 0
     """How many of the last columns may be missing."""
     SERIES: bool = False
@@ -51,7 +56,7 @@ class TableFormat:
 
     def read(self, file: SourceFile) -> Iterator[Piece]:
         """One piece of boxes a camera, and the places; of a series all frames together."""
-        table: dict[str, list[Any]] = {name: [] for name in self.columns if name not in ("", ZERO)}
+        table: dict[str, list[Any]] = {name: [] for name in self.columns if name not in _UNREAD}
         if self.SERIES:
             table["frame"] = []
         for place, path in enumerate(file.series):
@@ -65,9 +70,11 @@ class TableFormat:
                     raise member.error(
                         f"line {line}: expected {len(self.columns)} columns, found {len(row)}"
                     )
+                if LOST in self.columns and row[self.columns.index(LOST)] == "1":
+                    continue
                 for name, cell in zip(self.columns, row, strict=False):
-                    if name not in ("", ZERO):
-                        table[name].append(cell)
+                    if name not in _UNREAD:
+                        table[name].append(cell.strip('"'))
                 if self.SERIES:
                     table["frame"].append(place if number is None else number)
         yield from self._pieces(file, table)

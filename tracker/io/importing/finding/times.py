@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Int
 from numpy import ndarray
 
 from tracker.io.importing.finding.matching import MatchedCamera
+from tracker.io.importing.gathering import ParsedFiles
 from tracker.io.importing.options import ImportOptions
-from tracker.io.read.pieces import DetectionPiece, FormatError, TruthPiece, VideoPiece
+from tracker.io.read.pieces import DetectionPiece, FormatError, Piece, TruthPiece, VideoPiece
 from tracker.sequences.clock import Clock, Timing
 
 USUAL_RATE = 25.0
@@ -46,6 +47,24 @@ class Times:
     frames: int
     """The number of steps."""
     cameras: tuple[CameraTime, ...]
+
+
+def on_one_clock(taken: Sequence[ParsedFiles]) -> list[ParsedFiles]:
+    """Count frames that have dates from the first of all files: of each alone they begin at 0."""
+    pieces = [p for one in taken for p in one.pieces if isinstance(p, DetectionPiece | TruthPiece)]
+    begin = min((piece.begins for piece in pieces if piece.begins is not None), default=0.0)
+    return [replace(one, pieces=tuple(_since(begin, p) for p in one.pieces)) for one in taken]
+
+
+def _since(begin: float, piece: Piece) -> Piece:
+    if not isinstance(piece, DetectionPiece | TruthPiece) or piece.begins is None:
+        return piece
+    later = round((piece.begins - begin) * (piece.fps or 0.0))
+    frames = piece.frames + later
+    if isinstance(piece, TruthPiece):
+        return replace(piece, frames=frames, begins=begin)
+    last = None if piece.last_frame is None else piece.last_frame + later
+    return replace(piece, frames=frames, last_frame=last, begins=begin)
 
 
 def settle_times(

@@ -1,10 +1,12 @@
-"""JSON of boxes by camera and frame, as one's own scripts write it.
+"""JSON or XML of boxes by camera and frame, as one's own scripts and data sets have it.
 
 ``{"cam1": {"0": [[x1, y1, x2, y2, score], …]}}``, the frames outside and the cameras inside,
 lists in place of either, boxes as tables of named fields, by a person's number, or as lists
 beside each other (``boxes``, ``scores``, ``labels``) as torchvision and mmdetection have them;
 one file, a file a camera, or a file a frame. Which level is which is told by its names: the
-frames are the numbers of which there are most.
+frames are the numbers of which there are most. In XML an element's attributes are its fields, as in
+``<frame number="0"><objectlist><object id="1"><box xc="…" yc="…" w="…" h="…"/>`` (CAVIAR, PETS) and
+``<frame num="1"><target_list><target id="1"><box left="…" …/>`` (UA-DETRAC).
 """
 
 from __future__ import annotations
@@ -14,6 +16,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import islice
 from typing import Any, NamedTuple
+from xml.etree import ElementTree
 
 import numpy as np
 
@@ -24,7 +27,7 @@ from tracker.io.read.pieces import DetectionPiece, Piece
 from tracker.io.read.protocol import Certainty, Kind
 from tracker.io.read.source import SourceFile
 
-NAME = "boxes by camera and frame (JSON)"
+NAME = "boxes by camera and frame (JSON, XML)"
 KIND: Kind = "detections"
 SERIES = True
 
@@ -38,6 +41,9 @@ _TOGETHER: dict[str, tuple[str, ...]] = {
 
 _SHARED = ("frame", "time", "camera")
 """Fields beside a list of boxes that hold for all of them."""
+
+_NUMBERED = ("number", "num", "no", "nr", "id", "index")
+"""Attributes of an XML element that say which one of its kind it is."""
 
 _DEEPEST = 8
 _LOOKED_AT = 300
@@ -70,10 +76,11 @@ class _Levels(NamedTuple):
 
 
 def recognise(file: SourceFile) -> Certainty:
-    """JSON in which lists of four to eight numbers, or boxes, lie under the numbers of frames."""
-    if file.head_text.lstrip()[:1] not in ("[", "{") or file.json_lines is not None:
+    """A tree in which lists of four to eight numbers, or boxes, lie under the numbers of frames."""
+    begins = file.head_text.lstrip()[:1]
+    if begins not in ("[", "{", "<") or (begins == "{" and file.json_lines is not None):
         return Certainty.NO
-    rows = list(islice(_rows(file.json, (), {}), _LOOKED_AT))
+    rows = list(islice(_rows(_tree(file), (), {}), _LOOKED_AT))
     boxes = [row for row in rows if not row.empty]
     levels = _levels(rows)
     if not boxes or levels is None:
@@ -93,7 +100,8 @@ def read(file: SourceFile) -> Iterator[Piece]:
     for path in file.series:
         member = file.member(path)
         own, empty = _records(member, number_in(path.name) if len(file.series) > 1 else None)
-        if len(file.series) > 1 and any(not from_name for *_, from_name in empty):
+        timed = any("frame" not in meanings(list(record)) for record in own)
+        if len(file.series) > 1 and (timed or any(not from_name for *_, from_name in empty)):
             yield from _pieces(member, own, [(c, f) for c, f, _ in empty])
             continue
         columns += own
@@ -123,7 +131,7 @@ def _records(
 ) -> tuple[list[dict[str, Any]], list[tuple[str, int, bool]]]:
     """The boxes of a file with camera and frame; and every camera's frames that are in it, and
     whether they are told by the file's name."""
-    rows = list(_rows(file.json, (), {}))
+    rows = list(_rows(_tree(file), (), {}))
     if all(row.empty for row in rows):
         return [], [] if number is None else [("", number, True)]
     levels = _levels(rows)
@@ -134,6 +142,8 @@ def _records(
         raise file.error("expected every box as many levels deep as the others")
     at = levels.frame
     several = at is not None and len({camera_of(str(row.path[at])) for row in rows}) > 1
+    # of a file a frame it is how long the detector took, or when the file was written
+    one_time = number is not None and len({_time_of(row) for row in rows if not row.empty}) == 1
     records: list[dict[str, Any]] = []
     looked_at: list[tuple[str, int, bool]] = []
     for row in rows:
@@ -147,7 +157,7 @@ def _records(
         if "frame" in found:
             own = _frame(str(fields[found["frame"]]))
             looked_at += [] if own is None else [(str(fields.get("camera", "")), own, False)]
-        elif "time" not in found:
+        elif "time" not in found or one_time:
             own = number if levels.frame is None else _frame(row.path[levels.frame])
             if own is None:
                 raise file.error(
@@ -159,6 +169,30 @@ def _records(
         if not row.empty:
             records.append(fields)
     return records, looked_at
+
+
+def _tree(file: SourceFile) -> Any:
+    """The content of a file; of XML an element's attributes, and its children by their tags."""
+    return _of_element(file.xml) if file.head_text.lstrip()[:1] == "<" else file.json
+
+
+def _of_element(element: ElementTree.Element) -> dict[str, Any]:
+    known = meanings([element.tag])
+    fields: dict[str, Any] = {}
+    for name, value in element.attrib.items():
+        is_number = plain(name) in _NUMBERED and not known.keys().isdisjoint(("frame", "camera"))
+        fields[element.tag if is_number else name] = value
+    children: dict[str, list[Any]] = {}
+    for child in element:
+        text = (child.text or "").strip()
+        alone = text and not child.attrib and not len(child)
+        children.setdefault(child.tag, []).append(text if alone else _of_element(child))
+    several = {tag: items[0] if len(items) == 1 else items for tag, items in children.items()}
+    return {**fields, **several}
+
+
+def _time_of(row: _Row) -> str:
+    return str(row.fields.get(meanings(list(row.fields)).get("time", "")))
 
 
 def _rows(value: Any, path: tuple[Key, ...], shared: Mapping[str, Any]) -> Iterator[_Row]:

@@ -16,7 +16,7 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from tracker.io.read.columns import Column, is_table, layout_of, meanings, read_table
+from tracker.io.read.columns import DECIMAL_COMMA, Column, is_table, layout_of, meanings, read_table
 from tracker.io.read.picture_names import is_camera_number, number_in
 from tracker.io.read.pieces import FormatError, Piece
 from tracker.io.read.protocol import Certainty, Kind
@@ -26,14 +26,6 @@ from tracker.io.read.values import is_list_of_tables
 NAME = "table of boxes or places (CSV, JSON)"
 KIND: Kind = "detections"
 SERIES = True
-
-
-_FIVE = ["frame", "1", "2", "3", "4"]
-"""The header that five columns are given which have none: the four numbers of a box, meant
-somehow."""
-
-
-_DECIMAL_COMMA = re.compile(r"\A(\s*-?\d+),(\d+\s*)\Z")
 
 
 def recognise(file: SourceFile) -> Certainty:
@@ -48,8 +40,6 @@ def recognise(file: SourceFile) -> Certainty:
         return Certainty.LIKELY if has_box or is_table(names) else Certainty.NO
     lines = _data_lines(file.head_text)
     names = _cells(lines[0], _delimiter(lines[0])) if lines else []
-    if names == _FIVE:
-        return Certainty.POSSIBLE
     return Certainty.LIKELY if len(names) > 3 and is_table(_flat_names(names)) else Certainty.NO
 
 
@@ -117,10 +107,14 @@ def _columns(file: SourceFile) -> tuple[dict[str, Column], list[int] | None]:
                 f"row {line}: expected {len(names)} columns as in the header, found {len(row)}"
             )
     if delimiter != ",":
-        rows = [[_DECIMAL_COMMA.sub(r"\1.\2", cell) for cell in row] for row in rows]
+        rows = [
+            [
+                cell.replace(",", ".") if DECIMAL_COMMA.fullmatch(cell.strip()) else cell
+                for cell in row
+            ]
+            for row in rows
+        ]
     cells = list(zip(*rows[1:], strict=True)) or [()] * len(names)
-    if names == _FIVE:
-        return {"frame": cells[0], "box": list(zip(*cells[1:], strict=True))}, None
     return _with_boxes(dict(zip(names, cells, strict=True))), None
 
 
@@ -195,16 +189,7 @@ def _data_lines(text: str) -> list[str]:
     lines = lines[first:]
     if lines and not any(sign in lines[0] for sign in ",;\t"):
         lines = [",".join(line.split()) for line in lines]
-    return [_delimiter(lines[0]).join(_FIVE), *lines] if lines and _is_five(lines[0]) else lines
-
-
-def _is_five(line: str) -> bool:
-    """Whether a line is the whole number of a frame and four numbers of pixels."""
-    try:
-        frame, *four = [float(cell) for cell in re.split("[,;\t]", line)]
-    except ValueError:
-        return False
-    return len(four) == 4 and frame == round(frame) and max(four) > 1.5
+    return lines
 
 
 def _delimiter(line: str) -> str:

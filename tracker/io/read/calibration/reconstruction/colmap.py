@@ -33,6 +33,9 @@ CORNER = 0.5
 MOST_IMAGES = 100
 """Cameras that stand still have one image each; a model of more is that of a moving camera."""
 
+_ROUNDED = 1e-3
+"""By how much the numbers of a rounded unit quaternion may exceed 1."""
+
 MODELS: dict[str, tuple[str, tuple[str, ...]]] = {
     "SIMPLE_PINHOLE": ("pinhole", ("f", "cx", "cy")),
     "PINHOLE": ("pinhole", ("fx", "fy", "cx", "cy")),
@@ -65,7 +68,13 @@ def recognise(file: SourceFile) -> Certainty:
     rows = _rows(file.head_text.splitlines()[:20])
     if not rows:
         return Certainty.NO
-    return Certainty.SURE if _POSE.fullmatch(rows[0]) or _LENS.fullmatch(rows[0]) else Certainty.NO
+    is_it = _LENS.fullmatch(rows[0]) or (_POSE.fullmatch(rows[0]) and _is_turned(rows[0]))
+    return Certainty.SURE if is_it else Certainty.NO
+
+
+def _is_turned(row: str) -> bool:
+    """Whether the four numbers after the first may be a unit quaternion, and are no box."""
+    return all(abs(float(number)) <= 1.0 + _ROUNDED for number in row.split()[1:5])
 
 
 def read(file: SourceFile) -> Iterator[Piece]:
