@@ -9,10 +9,10 @@ import functools
 import operator
 import os
 import sys
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field, make_dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, get_args, get_type_hints
 
 import tyro
 from tyro.conf import FlagCreatePairsOff, Positional, UseAppendAction, arg, subcommand
@@ -24,6 +24,8 @@ from app.command.arguments.library import Bundle, FormatName, LibraryCommand, Li
 from app.command.arguments.listing import Benchmark, Parameters, Sequences
 from app.command.arguments.studies import Batch, Study, Tune
 from app.command.arguments.templates import Templates
+from app.command.typed import WrongValue, registry
+from tracker import __version__
 from tracker.library import KEEP
 from tracker.parameters.catalogue import (
     FOLLOWS,
@@ -384,18 +386,48 @@ def parse(arguments: list[str] | None = None) -> Arguments:
         "corrections": Corrections,
         "templates": Templates,
     }
-    if asked[:1] and not asked[0].startswith("-") and asked[0] not in named:
-        from tracker.sequences.fields import did_you_mean, listed
-
-        near = did_you_mean(asked[0], named)
-        raise ParameterError(asked[0], f"expected one of the commands {listed(named)}{near}")
+    if asked[:1] == ["--version"]:
+        sys.stdout.write(f"multiview-phd {__version__}\n")
+        raise SystemExit(0)
+    _check_word(asked[:1], named, "")
+    if asked[:1] and asked[0] in named:
+        _check_word(asked[1:2], _actions(named[asked[0]]), f"{asked[0]} ")
     commands: Any = functools.reduce(
         operator.or_, (Annotated[kind, subcommand(name)] for name, kind in named.items())
     )
-    parsed: Arguments = tyro.cli(
-        commands,
-        prog="multiview-phd",
-        description="Track several people in 3D from calibrated cameras.",
-        args=asked,
-    )
+    try:
+        parsed: Arguments = tyro.cli(
+            commands,
+            prog="multiview-phd",
+            description="Track several people in 3D from calibrated cameras. --version says which "
+            "version this is.",
+            args=asked,
+            registry=registry(),
+        )
+    except WrongValue as wrong:
+        raise wrong.of(asked) from None
     return parsed
+
+
+def _actions(command: Any) -> list[str]:
+    """Return the names of a command's own commands: ``list``, ``show``, … of ``runs``."""
+    if "action" not in command.__annotations__:
+        return []
+    action = get_type_hints(command, include_extras=True)["action"]
+    kinds = get_args(get_args(action)[0] if hasattr(action, "__metadata__") else action)
+    return [one.__metadata__[0].name for one in kinds if hasattr(one, "__metadata__")]
+
+
+def _check_word(given: list[str], known: Collection[str], before: str) -> None:
+    """Check that the word that a command begins with, if there is one, is known.
+
+    Raises:
+        ParameterError: If not; its message names the nearest.
+    """
+    if known and given and not given[0].startswith("-") and given[0] not in known:
+        from tracker.sequences.fields import did_you_mean, listed
+
+        raise ParameterError(
+            f"{before}{given[0]}",
+            f"expected one of the commands {listed(known)}{did_you_mean(given[0], known)}",
+        )

@@ -107,7 +107,7 @@ def _run(command: Arguments) -> int:
         case Parameters():
             from app.command.commands.listing import parameters
 
-            parameters()
+            parameters(command)
         case Runs():
             from app.command.commands.runs import runs
 

@@ -44,7 +44,9 @@ def test_the_command_line_names_every_form() -> None:
 
 def test_the_form_follows_from_the_suffix_or_is_named() -> None:
     assert format_of(Path("a.PARQUET")).name == "parquet"
-    assert format_of(Path("a.txt")).name == "csv"
+    assert format_of(Path("a")).name == "csv"
+    with pytest.raises(ValueError, match=r"a\.xyz: .* ends in one of \.csv, \.json, .*'\.xyz'"):
+        format_of(Path("a.xyz"))
     assert format_of(Path("a.txt"), "trc").name == "trc"
     with pytest.raises(ValueError, match=r"expected one of csv, .* got 'mp5'"):
         format_of(Path("a"), "mp5")

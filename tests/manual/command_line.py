@@ -12,7 +12,9 @@ from tests.manual.places import ROOT
 INTRODUCTION = """# Command line
 
 This is what the program answers to `--help`. Status 0 means success, 1 a failure that is told
-in one line, 2 wrong usage, 130 that it was ended by Ctrl-C.
+in one line, 2 wrong usage, 130 that it was ended by Ctrl-C. Of `import`, 3 means that the files
+leave open how they are meant, and 4 that no interpretation explains the boxes: nothing is written,
+and what is printed names the flags that decide.
 
 ```sh
 multiview-phd serve [SEQUENCE] [--data DIR]           # the workbench; without SEQUENCE: room44-3p

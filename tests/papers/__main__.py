@@ -105,6 +105,7 @@ def run(given: Arguments) -> None:
         )
         for one in EXPERIMENTS.values() if given.all else [EXPERIMENTS[str(given.name)]]:
             begin = time.perf_counter()
+            _say(f"{one.name} …")
             try:
                 result = one.run(context)
             except Unavailable as missing:
@@ -150,6 +151,8 @@ class _Bars:
         """Show how much is done; other words begin another bar."""
         if self._bar is None or words != self._words:
             self.close()
+            if not sys.stderr.isatty():  # where there is no bar
+                _say(f"{words} …")
             self._words, self._bar = words, Bar(words, "step")
         self._bar.at(done, total)
 

@@ -59,7 +59,7 @@ def test_one(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
         f"better: claimed: it works; found: quick True, data {tmp_path}",
         "",
     ]
-    assert captured.err.startswith("tests.papers: works: 0 s, ")
+    assert captured.err.startswith("tests.papers: working …\ntests.papers: works: 0 s, ")
     assert json.loads((tmp_path / "out" / "works.json").read_text())["quick"]
 
 

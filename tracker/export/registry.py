@@ -127,13 +127,13 @@ def format_of(path: Path, name: str | None = None) -> Format:
     """Choose the format of a file.
 
     Args:
-        path: The file. If no name is given, its suffix chooses the format, and an unknown suffix
-            chooses CSV.
+        path: The file. If no name is given, its suffix chooses the format, and a name without a
+            suffix chooses CSV.
         name: The name of the format; None if the suffix chooses it.
 
     Raises:
-        ValueError: If there is no format of this name, or the suffix is the name of a format whose
-            files have another suffix (``.gltf``).
+        ValueError: If there is no format of this name or suffix, or the suffix is the name of a
+            format whose files have another suffix (``.gltf``).
     """
     if name is not None:
         if name not in FORMATS:
@@ -146,6 +146,12 @@ def format_of(path: Path, name: str | None = None) -> Format:
     if meant is not None and meant.suffix:
         raise ValueError(
             f"expected a name that ends in {meant.suffix} for {meant.word}, got {path.name!r}"
+        )
+    if meant is None and path.suffix:
+        known = ", ".join(form.suffix for form in FORMATS.values() if form.suffix)
+        raise ValueError(
+            f"{path.name}: expected a name that ends in one of {known}, got {path.suffix!r}; "
+            "rename it, or choose the format by --format"
         )
     return meant or FORMATS["csv"]
 

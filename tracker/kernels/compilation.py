@@ -28,7 +28,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from functools import cache, partial, wraps
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import Any, Literal, TypeVar, cast
 
 import numba
 import numpy as np
@@ -275,27 +275,40 @@ def _version() -> str:
     return _digest(p for p in _ROOT.rglob("*.py") if _is_compiled_in(p, p.read_bytes()))
 
 
-def _mark() -> Path:
-    """The path of a file that exists once all kernels were compiled.
+def _mark(of: Literal["complete", "pixels"]) -> Path:
+    """The path of a file that exists once all kernels, or the loops over pixels, were compiled.
 
     numba keeps machine code by the path of its source, so each installation has a file of its own.
     """
     name = hashlib.sha256(f"{_version()} {_ROOT}".encode()).hexdigest()[:16]
-    return kernel_folder() / f"{name}.complete"
+    return kernel_folder() / f"{name}.{of}"
 
 
 def is_compiled() -> bool:
     """Whether every kernel has been compiled on this machine."""
-    return _mark().is_file()
+    return _mark("complete").is_file()
+
+
+def are_pixels_compiled() -> bool:
+    """Whether the kernels that a first run cannot do without, the loops over pixels, have been
+    compiled on this machine."""
+    return _mark("pixels").is_file()
+
+
+def mark_pixels_compiled() -> None:
+    """Note that the loops over pixels were compiled."""
+    with contextlib.suppress(OSError):
+        _mark("pixels").parent.mkdir(parents=True, exist_ok=True)
+        _mark("pixels").touch()
 
 
 def mark_compiled() -> None:
     """Note that every kernel was compiled, and delete machine code long out of use."""
+    mark_pixels_compiled()
     with contextlib.suppress(OSError):
-        _mark().parent.mkdir(parents=True, exist_ok=True)
-        _mark().touch()
+        _mark("complete").touch()
         for other in kernel_folder().iterdir():
-            is_ours = re.fullmatch(r"[0-9a-f]{16}(\.complete)?", other.name)
+            is_ours = re.fullmatch(r"[0-9a-f]{16}(\.complete|\.pixels)?", other.name)
             if is_ours and time.time() - other.stat().st_mtime > _KEPT_SECONDS:
                 shutil.rmtree(other) if other.is_dir() else other.unlink()
 

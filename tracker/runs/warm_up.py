@@ -294,6 +294,7 @@ def _compile_in_processes(
             for line in process.stdout:
                 words = line.split()
                 if words == ["ready"]:
+                    compilation.mark_pixels_compiled()
                     ready()
                 elif len(words) == 2:
                     counts[half] = int(words[0]), int(words[1])

@@ -17,7 +17,7 @@ FormatName = Annotated[
     Literal["csv", "motchallenge", "json", "parquet", "trc", "gltf", "rerun", "html", "mp4"] | None,
     arg(
         metavar="csv|motchallenge|json|parquet|trc|gltf|rerun|html|mp4",
-        help_behavior_hint="(default: by the suffix, else csv)",
+        help_behavior_hint="(default: by the suffix, csv without one)",
     ),
 ]
 

@@ -42,3 +42,6 @@ class Benchmark:
 @dataclass
 class Parameters:
     """List every parameter with its range, unit, default and meaning."""
+
+    json: FlagCreatePairsOff[bool] = False
+    """Print everything as JSON ."""

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
+import textwrap
 from pathlib import Path
 
-from app.command.arguments.listing import Benchmark, Sequences
+from app.command.arguments.listing import Benchmark, Parameters, Sequences
 from app.command.flags import describe_range, show
-from app.command.terminal import CommandError, check_data, print_table
+from app.command.terminal import CommandError, check_data, print_json, print_table
 from tracker.parameters.catalogue import FOLLOWS, METHODS, PARAMETERS, RunParameters
+
+_INDENT = "    "
 
 
 def benchmark(command: Benchmark) -> int:
@@ -45,7 +49,7 @@ def sequences(command: Sequences) -> None:
     print_table(("name", "kind", "cameras", "steps", "description"), rows)
 
 
-def parameters() -> None:
+def parameters(command: Parameters) -> None:
     methods = {
         "single_view": "Method of stage 1 (--single-view).",
         "fusion_method": "Method of stage 2 (--fusion).",
@@ -65,4 +69,26 @@ def parameters() -> None:
         (p.key, p.symbol, describe_range(p), p.unit, show(p.default), p.help)
         for p in PARAMETERS.values()
     ]
-    print_table(("key", "symbol", "range", "unit", "default", "help"), rows)
+    head = ("key", "symbol", "range", "unit", "default", "help")
+    if command.json:
+        print_json([dict(zip(head, row, strict=True)) for row in rows])
+    else:
+        for row in rows:
+            _print_parameter(*row)
+
+
+def _print_parameter(
+    key: str, symbol: str, values: str, unit: str, default: str, meaning: str
+) -> None:
+    """Print a parameter's key, symbol, range and default, and below them what it means, in lines
+    that fit the terminal, also in a file."""
+    width = shutil.get_terminal_size().columns - 1
+    facts = [key, symbol, f"{values} {unit}".strip(), f"default {default}"]
+    line = "  ".join(fact for fact in facts if fact)
+    if len(line) > width:  # the bars of a choice are where it can be wrapped
+        line = line.replace("|", " | ")
+    for text, first in ((line, ""), (meaning, _INDENT)):
+        wrapped = textwrap.wrap(
+            text, width, initial_indent=first, subsequent_indent=_INDENT, break_on_hyphens=False
+        )
+        sys.stdout.write("\n".join(wrapped) + "\n")

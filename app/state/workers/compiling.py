@@ -8,6 +8,7 @@ from collections.abc import Callable
 
 from tracker.kernels import compilation
 from tracker.runs import warm_up
+from tracker.runs.warm_up import COMPILING
 
 logger = logging.getLogger("app")
 
@@ -28,9 +29,9 @@ class Compiling:
         """Begin, if there is anything to compile.
 
         Args:
-            say: Told of its beginning and its end.
+            say: Gets a sentence once a run has to wait for it, and then one at its end.
         """
-        self._say = say
+        self._say, self._waited_for = say, False
         self._ready, self._stopped = threading.Event(), threading.Event()
         self._counts = 0, 0
         self._thread = threading.Thread(target=self._compile, name="compiling", daemon=True)
@@ -38,6 +39,8 @@ class Compiling:
             self._ready.set()
             return
         compilation.while_compiling()
+        if compilation.are_pixels_compiled():
+            self._ready.set()
         self._thread.start()
 
     def wait(self, told: Callable[[int, int], None], cancelled: Callable[[], bool]) -> None:
@@ -48,6 +51,9 @@ class Compiling:
             cancelled: Asked as often.
         """
         while not cancelled() and not self._ready.wait(_LOOKS_SECONDS):
+            if not self._waited_for:
+                self._waited_for = True
+                self._say(COMPILING)
             told(*self._counts)
 
     def stop(self) -> None:
@@ -69,7 +75,6 @@ class Compiling:
     def _compile(self) -> None:
         try:
             status = warm_up.ensure_compiled(
-                self._say,
                 progress=self._progress,
                 ready=self._ready.set,
                 stopped=self._stopped.is_set,
@@ -78,7 +83,8 @@ class Compiling:
             logger.warning("the kernels are compiled when they are needed: %s", error)
         else:
             if status == 0:
-                self._say("the kernels are compiled")
+                if self._waited_for:
+                    self._say("the kernels are compiled")
             elif not self._stopped.is_set():
                 logger.warning("compiling ended with status %s", status)
         if not self._stopped.is_set():

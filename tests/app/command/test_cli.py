@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -16,6 +18,7 @@ from app.command.commands import listing
 from app.command.flags import Track, parse
 from tests.app.conftest import Runs
 from tests.app.folders import write_crossing
+from tracker import __version__
 from tracker.export import tracks_csv
 from tracker.kernels import compilation
 from tracker.parameters.catalogue import METHODS, PARAMETERS, PRESETS, RunParameters
@@ -197,6 +200,41 @@ def test_a_mistyped_command_is_told_the_nearest(run: Runs) -> None:
     assert 'did you mean "sequences"?' in stderr
 
 
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("runs lst", 'runs lst: expected one of the commands list, .*; did you mean "list"?'),
+        ("detector gt", 'detector gt: .*; did you mean "get"?'),
+        ("library chek", "library: expected one of check, got 'chek'; did you mean \"check\"?"),
+        ("import x --fps abc", "--fps: expected a number, got 'abc'"),
+        ("import x --fps=abc", "--fps: expected a number, got 'abc'"),
+        ("import x --first-index 1.5", "--first-index: expected a whole number, got '1.5'"),
+        ("import x --axes opengl_", "got 'opengl_'; did you mean \"opengl\"?"),
+        ("import x --up None", "--up: expected one of x, y, z, -x, -y, -z, got 'None'"),
+        ("serve --port http", "--port: expected a whole number, got 'http'"),
+        ("batch x --seeds two", "--seeds: expected a whole number, got 'two'"),
+        ("templates remove x abc", "templates: expected a whole number, got 'abc'"),
+    ],
+)
+def test_a_word_that_does_not_fit_is_one_sentence_with_its_flag(
+    run: Runs, line: str, words: str
+) -> None:
+    status, stdout, stderr = run(*line.split())
+    assert (status, stdout, stderr.count("\n")) == (2, "", 1)
+    assert re.search(re.escape(words).replace(r"\.\*", ".*"), stderr), stderr
+
+
+def test_the_version(run: Runs) -> None:
+    assert run("--version") == (0, f"multiview-phd {__version__}\n", "")
+
+
+def test_an_unknown_ending_is_told_before_anything_is_done(run: Runs, tmp_path: Path) -> None:
+    status, stdout, stderr = run("track", "room44-3p", "-o", tmp_path / "tracks.xyz")
+    assert (status, stdout, stderr.count("\n")) == (1, "", 1)
+    assert "ends in one of .csv, .json, .parquet, .trc, .glb, .rrd, .html, .mp4" in stderr
+    assert not (tmp_path / "tracks.xyz").exists()
+
+
 @pytest.mark.full
 def test_a_failure_is_one_line(
     run: Runs, crossing: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -338,15 +376,18 @@ def test_sequences(run: Runs, data: Path) -> None:
 def test_parameters(run: Runs) -> None:
     status, stdout, stderr = run("parameters")
     assert (status, stderr) == (0, "")
-    lines = stdout.splitlines()
-    assert lines[0].split() == ["key", "symbol", "range", "unit", "default", "help"]
-    table = {line.split()[0]: line for line in lines[1:]}
+    assert max(map(len, stdout.splitlines())) < 80, "what is no terminal has 80 columns"
+    entries = [" ".join(text.split()) for text in re.split(r"\n(?! )", stdout.rstrip())]
+    table = {text.split()[0]: text for text in entries}
     assert set(table) == {*PARAMETERS, *METHODS}
     for key, parameter in PARAMETERS.items():
         assert parameter.symbol in table[key]
-        assert parameter.help in table[key]
+        assert table[key].endswith(" ".join(parameter.help.split()))
         if parameter.minimum is not None:
             assert f"{parameter.minimum:g} … {parameter.maximum:g}" in table[key]
+    rows = json.loads(run("parameters", "--json")[1])
+    assert [row["key"] for row in rows] == [*METHODS, *PARAMETERS]
+    assert {row["key"]: row["help"] for row in rows}[P_D] == PARAMETERS[P_D].help
 
 
 def test_changes_of_a_flag_beat_those_of_a_preset() -> None:
@@ -393,7 +434,7 @@ def test_whoever_has_read_enough_is_no_failure() -> None:
         text=True,
     )
     assert done.stderr == ""
-    assert done.stdout.startswith("key")
+    assert done.stdout.startswith("single_view")
 
 
 @pytest.mark.full

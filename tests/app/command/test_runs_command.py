@@ -97,6 +97,15 @@ def test_a_kept_run_is_exported_as_track_writes_it(
     assert list(folder.rglob("gt.txt")) != []
 
 
+def test_a_run_is_not_exported_under_an_unknown_ending(
+    run: Runs, path: Path, tmp_path: Path
+) -> None:
+    filled(path, 1).close()
+    status, out, err = run("runs", "export", "1", "-o", tmp_path / "a.xyz", "--library", path)
+    assert (status, out) == (1, "")
+    assert "a.xyz: expected a name that ends in one of .csv, .json, .parquet" in err
+
+
 def test_what_a_form_needs_is_told_before_any_work(
     run: Runs, crossing: Path, path: Path, tmp_path: Path
 ) -> None:

@@ -24,6 +24,7 @@ from tracker.runs.warm_up import COMPILING
 def uncompiled(monkeypatch: pytest.MonkeyPatch) -> None:
     """A machine on which no kernel was compiled."""
     monkeypatch.setattr(compilation, "is_compiled", lambda: False)
+    monkeypatch.setattr(compilation, "are_pixels_compiled", lambda: False)
 
 
 def instead(monkeypatch: pytest.MonkeyPatch, code: str) -> list[subprocess.Popen[str]]:
@@ -73,7 +74,7 @@ def test_a_sequence_is_shown_at_once_and_run_when_its_loops_over_pixels_are_ther
     worker = Compiling(said.append)
     jobs = Jobs(bench, data=data, compiling=worker)
     jobs.open("crossing").result(30.0)
-    assert said == [COMPILING]
+    wait_until(lambda: said == [COMPILING])
     assert bench.snapshot().run_state.done == 0, "it is seen before it can be run"
     wait_until(lambda: bench.snapshot().run_state.state == "done")
     jobs.close()
@@ -95,6 +96,38 @@ def test_a_run_that_is_under_way_at_the_end_does_not_begin_to_compile(
     assert compilation._Elsewhere.compiles, "what runs as plain Python does so to its end"
     worker.close()
     assert not compilation._Elsewhere.compiles, "the next one compiles what it needs"
+
+
+def test_who_need_not_wait_is_not_told_of_compiling(
+    uncompiled: None, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    processes = instead(monkeypatch, SLOW.replace("SEEN", repr(str(tmp_path / "seen"))))
+    monkeypatch.setattr(compilation, "are_pixels_compiled", lambda: True)
+    said: list[str] = []
+    worker = Compiling(said.append)
+    wait_until(lambda: len(processes) == 2)
+    worker.wait(lambda done, total: said.append("waits"), lambda: False)
+    worker.close()
+    assert said == []
+
+
+def test_that_the_loops_over_pixels_are_there_is_remembered_by_the_next_command(
+    elsewhere: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """A command that ends before all kernels are compiled leaves the next one nothing to wait
+    for."""
+    seen = tmp_path / "seen"
+    seen.touch()
+    instead(monkeypatch, SLOW.replace("SEEN", repr(str(seen))))
+    said: list[str] = []
+    first = Compiling(said.append)
+    first.wait(lambda done, total: None, lambda: False)
+    first.close()
+    said.clear()
+    again = Compiling(said.append)
+    again.wait(lambda done, total: said.append("waits"), lambda: False)
+    again.close()
+    assert said == []
 
 
 def test_where_everything_is_compiled_nothing_starts(monkeypatch: pytest.MonkeyPatch) -> None:
