@@ -105,7 +105,6 @@ def run(given: Arguments) -> None:
         )
         for one in EXPERIMENTS.values() if given.all else [EXPERIMENTS[str(given.name)]]:
             begin = time.perf_counter()
-            _say(f"{one.name} …")
             try:
                 result = one.run(context)
             except Unavailable as missing:
