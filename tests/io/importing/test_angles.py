@@ -127,7 +127,7 @@ def test_an_order_that_is_stated_is_believed(tmp_path: Path) -> None:
 
 def test_without_boxes_the_order_is_asked_for(tmp_path: Path) -> None:
     lay_out(tmp_path, "into the camera", seen=False)
-    with pytest.raises(FormatError, match=r"in which order they turn; --euler says it \(zyx, "):
+    with pytest.raises(FormatError, match=r"their order; --euler says it \(zyx, "):
         settled_of(tmp_path)
     settled = settled_of(tmp_path, ImportOptions(turns="xzy-inverse", unit="m"))
     np.testing.assert_allclose(settled.views[0].camera.rotation[2, 2], rolled()[0].rotation[2, 2])

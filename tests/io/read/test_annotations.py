@@ -217,6 +217,7 @@ def test_parquet(tmp_path: Path) -> None:
     [
         ("params.pickle", pickle.dumps({"cam": 1}), "Python pickle.*run what is in it"),
         ("boxes.h5", b"\x89HDF\r\n\x1a\n" + bytes(64), "HDF5.*as CSV"),
+        ("a.txt", b"Homography matrix: 1 0 0;0 1 0;0 0 1\n", "homography.*solvePnP"),
         ("bundle.out", b"# Bundle file v0.3\n2 0\n", "Bundler.*COLMAP"),
         ("a.xcp", b'<Cameras SOURCE="Nexus"><Camera DEVICEID="21"/></Cameras>', "Vicon.*K, R and"),
         ("a.c3d", b"\x02\x50" + bytes(510), "C3D.*TRC"),

@@ -135,11 +135,11 @@ def test_cameras_in_one_json(tmp_path: Path, form: str) -> None:
         assert_same(raw, camera)
 
 
-def test_a_quaternion_must_say_its_order(tmp_path: Path) -> None:
+def test_a_quaternion_of_zeros_is_refused(tmp_path: Path) -> None:
     camera = cameras()[0]
-    table = {"K": camera.intrinsics.tolist(), "t": [0, 0, 1], "rotation": [1.0, 0.0, 0.0, 0.0]}
-    (tmp_path / "rig.json").write_text(json.dumps({"a": {**table, "quaternion": [1, 0, 0, 0]}}))
-    with pytest.raises(FormatError, match=r"quaternion_wxyz or quaternion_xyzw"):
+    table = {"K": camera.intrinsics.tolist(), "t": [0, 0, 1], "quaternion": [0.0] * 4}
+    (tmp_path / "rig.json").write_text(json.dumps({"a": table}))
+    with pytest.raises(FormatError, match=r"expected a quaternion, found one of zeros"):
         raw_cameras(tmp_path / "rig.json")
 
 
@@ -370,3 +370,49 @@ def test_tables_of_other_things_are_called_by_their_names(
     found, _, complaint = recognise(SourceFile(tmp_path / name))
     assert found is None
     assert words in str(complaint)
+
+
+@pytest.mark.parametrize("named", ["R.txt", "cam_rvec.txt"])
+def test_rotation_and_translation_in_files_of_their_own(tmp_path: Path, named: str) -> None:
+    """As NumPy saves them: K, R and t of a camera in a folder of its own."""
+    prefix = "" if named == "R.txt" else "cam_"
+    for camera in cameras():
+        folder = tmp_path / camera.name
+        folder.mkdir()
+        turned = (
+            camera.rotation
+            if named == "R.txt"
+            else Rotation.from_matrix(camera.rotation).as_rotvec()
+        )
+        np.savetxt(folder / f"{prefix}K.txt", camera.intrinsics)
+        np.savetxt(folder / named, turned)
+        np.savetxt(folder / (named.replace("R", "t").replace("rvec", "tvec")), camera.translation)
+    (found,), _ = camera_sets(gather([tmp_path]))
+    for raw, camera in zip(found.cameras, cameras(), strict=True):
+        assert raw.name == camera.name
+        np.testing.assert_allclose(raw.intrinsics, camera.intrinsics)
+        np.testing.assert_allclose(raw.rotation, camera.rotation, atol=1e-9)
+        np.testing.assert_allclose(raw.translation, camera.translation)
+
+
+@pytest.mark.parametrize("order", ["wxyz", "xyzw"])
+def test_a_quaternion_whose_order_no_name_says_may_be_either(tmp_path: Path, order: str) -> None:
+    """As nuScenes has it, under ``rotation``."""
+    path = tmp_path / "calibrated_sensor.json"
+    records = []
+    for camera in cameras():
+        x, y, z, w = quaternion(camera.rotation)
+        four = [w, x, y, z] if order == "wxyz" else [x, y, z, w]
+        records.append(
+            {
+                "name": camera.name,
+                "rotation": four,
+                "camera_intrinsic": camera.intrinsics.tolist(),
+                "translation": camera.translation.tolist(),
+            }
+        )
+    path.write_text(json.dumps(records))
+    (found,), _ = camera_sets(gather([path]))
+    for raw, camera in zip(found.cameras, cameras(), strict=True):
+        assert list(raw.turns) == ["wxyz", "xyzw"]
+        np.testing.assert_allclose(raw.turns[order], camera.rotation, atol=1e-9)

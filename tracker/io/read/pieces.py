@@ -78,8 +78,8 @@ class RawCamera:
     or the camera's position if the direction is camera-to-world."""
     convention: Convention = Convention()
     turns: Mapping[str, Float[ndarray, "3 3"]] = field(default_factory=lambda: MappingProxyType({}))
-    """For a rotation given by angles, all possible rotations by the name of the order of the
-    angles; ``rotation`` is the first of them."""
+    """For a rotation given by angles, or a quaternion of unknown order, all possible rotations by
+    the name of the order; ``rotation`` is the first of them."""
     projection: Float[ndarray, "3 4"] | None = None
     """The projection from world coordinates (in the convention's unit) to pixels, up to scale."""
 

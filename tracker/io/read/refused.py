@@ -75,6 +75,12 @@ _KNOWN: tuple[_Refused, ...] = (
         "save K, R and t of each camera as JSON, or a 3×4 projection matrix a camera as text",
     ),
     _Refused(
+        "a homography of the floor (as of AI City's 2019 calibrations)",
+        _holds(r"(?i)\Ahomography"),
+        "it does not tell how tall people are in a picture; give K and the pose, or a 3×4 projection "
+        "matrix, of each camera (OpenCV's solvePnP finds the pose from four points of the floor)",
+    ),
+    _Refused(
         "Bundler's model",
         _holds(r"\A# Bundle file"),
         "it has no sizes of pictures; export the same model for COLMAP (text) or Metashape (XML)",

@@ -1,4 +1,4 @@
-"""Rotations that a file gives by three angles without saying how these are composed."""
+"""Rotations given by three angles, or by a quaternion, without saying how these are meant."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def open_turns(cameras: Sequence[RawCamera]) -> tuple[str, ...]:
 def turns_in_words(name: str) -> str:
     """How angles are composed and measured, in words."""
     words = product_in_words(name)
-    if not name:
+    if not name or "w" in name:
         return words
     return words + (IN_DEGREES if name.endswith(IN_DEGREES) else " in radians")
 
@@ -34,6 +34,8 @@ def product_in_words(name: str) -> str:
     if product in ("", VECTOR):
         return "a rotation vector"
     leads = ", into the camera" if INVERSE in name else ""
+    if "w" in product:
+        return f"a quaternion {product}"
     if set(product) == set("xyz"):
         product = " ".join(f"R{axis}" for axis in product)
     return product + leads
@@ -62,7 +64,7 @@ def check_turns(cameras: Sequence[RawCamera]) -> None:
     names = open_turns(cameras)
     if len(names) > 1 and VECTOR not in names:
         raise FormatError(
-            f"{cameras[0].name}: its rotation is three angles, and neither their names nor boxes "
-            f"of people tell in which order they turn; --euler says it ({', '.join(names)}), "
+            f"{cameras[0].name}: its rotation is three angles or a quaternion, and neither their "
+            f"names nor boxes of people tell their order; --euler says it ({', '.join(names)}), "
             "where zyx is R = Rz Ry Rx; or give the 3×3 matrix"
         )

@@ -54,7 +54,7 @@ def by_camera(table: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
 def is_camera(fields: Mapping[str, Any]) -> bool:
     """Whether there is a lens or a pose among the fields, of the right count of numbers."""
     turned = (
-        count(fields.get("R")) in (3, 9)
+        count(fields.get("R")) in (3, 4, 9)
         or count(fields.get("quaternion")) == 4
         or any(count(fields.get(kind)) == 3 for kind in KINDS)
     )
@@ -135,12 +135,15 @@ def camera(
 def _turned(
     file: SourceFile, at: Callable[[str], str], fields: Mapping[str, Any], convention: Convention
 ) -> tuple[Mapping[str, Float[ndarray, "3 3"]], Float[ndarray, " 3"] | None, Convention]:
-    """The rotations that a camera's angles may be, and its place, where these are its pose."""
+    """The rotations that a camera's angles, or its quaternion, may be, and its place, where these
+    are its pose."""
     place = next((part for part in ("place", "centre", "T") if count(fields.get(part)) == 3), None)
     if place is None:
         return {}, None, convention
     named = next((kind for kind in NAMED_AXES if kind in fields), None)
-    by_angles = euler.turns(file, at("angles"), fields, inverse=place != "T")
+    by_angles = _of_quaternion(file, at, fields) or euler.turns(
+        file, at("angles"), fields, inverse=place != "T"
+    )
     if not by_angles:
         return {}, None, convention
     moved = vector(file, at(place), fields[place], 3, "x y z")
@@ -162,8 +165,8 @@ def _pose(
     turned = None
     if "R" in fields and count(fields["R"]) != 4:
         turned = rotation(file, at("R"), fields["R"])
-    elif "quaternion" in fields or "R" in fields:
-        turned = _of_quaternion(file, at, fields)
+    elif len(known := _of_quaternion(file, at, fields)) == 1:
+        (turned,) = known.values()
     if turned is not None and "T" in fields:
         return turned, vector(file, at("T"), fields["T"], 3, "x y z"), convention
     if part is not None:
@@ -191,26 +194,26 @@ def _pose(
 
 def _of_quaternion(
     file: SourceFile, at: Callable[[str], str], fields: Mapping[str, Any]
-) -> Float[ndarray, "3 3"]:
-    """The rotation of a quaternion whose order its name says.
+) -> dict[str, Float[ndarray, "3 3"]]:
+    """The rotations that a quaternion may be: one, or by its order two where its name has none.
 
     Raises:
-        FormatError: If it does not, or all four are zero.
+        FormatError: If all four numbers are zero.
     """
     from scipy.spatial.transform import Rotation  # a server starts without it
 
-    order = fields.get("quaternion order")
-    four = vector(file, at("rotation"), fields.get("quaternion", fields.get("R")), 4, "w x y z")
-    if order is None:
-        raise file.error(
-            "expected a 3×3 matrix, a rotation vector, or a quaternion whose name says its order "
-            "(quaternion_wxyz or quaternion_xyzw), found 4 numbers",
-            at("rotation"),
-        )
+    given = fields.get("quaternion", fields.get("R"))
+    if count(given) != 4:
+        return {}
+    four = vector(file, at("rotation"), given, 4, "w x y z")
     if not np.linalg.norm(four) > 1e-6:
         raise file.error("expected a quaternion, found one of zeros", at("rotation"))
-    xyzw = np.roll(four, -1) if order == "wxyz" else four
-    return np.asarray(Rotation.from_quat(xyzw).as_matrix())
+    order = fields.get("quaternion order")
+    return {
+        name: np.asarray(Rotation.from_quat(xyzw).as_matrix())
+        for name, xyzw in (("wxyz", np.roll(four, -1)), ("xyzw", four))
+        if order in (None, name)
+    }
 
 
 def _is_transposed(k: Any) -> bool:

@@ -17,7 +17,7 @@ from tracker.io.read.calibration.euler import KINDS, ORDERS
 
 MEANINGS: dict[str, tuple[str, ...]] = {
     "K": ("k", "m", "mtx", "cameramatrix", "cammatrix", "intrinsicmatrix", "intrinsics",
-          "intrinsic", "matrix", "intri", "calibrationmatrix"),
+          "intrinsic", "matrix", "intri", "calibrationmatrix", "cameraintrinsic"),
     "D": ("d", "dist", "distortion", "distortions", "distortioncoefficients", "distcoeffs",
           "distcoeff", "distcoef", "distcoefs", "distortioncoeffs", "kc", "distortionvector",
           "disccoef", "distortionparameters"),

@@ -2,7 +2,9 @@
 
 Text: twelve numbers a camera, in three lines or in one, with or without a name before them
 (KITTI's ``P0: …``). A left part that is a rotation makes it a pose without a lens; nine numbers
-that are a K make a lens without a pose.
+that are a K make a lens without a pose. A rotation in a file of its own, ``R.txt`` or
+``cam1_rvec.txt``, is a pose with the translation in the file beside it, ``t.txt`` or
+``cam1_tvec.txt``.
 """
 
 from __future__ import annotations
@@ -11,6 +13,7 @@ import io
 import re
 from collections.abc import Iterator
 
+import cv2
 import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
@@ -26,6 +29,13 @@ SERIES = False
 
 MOST_CAMERAS = 1000
 
+_TURNED = re.compile(r"(?<![A-Za-z])(r|rot|rotation|rvec|rotation_?matrix)$", re.IGNORECASE)
+_MOVED = re.compile(r"(?<![A-Za-z])(t|trans|translation|tvec)$", re.IGNORECASE)
+"""What the names of files of a rotation, and of a translation, end with."""
+
+_SHORT = 2000
+"""Bytes that up to nine numbers take."""
+
 _NPY = b"\x93NUMPY"
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _ROW = re.compile(
@@ -39,7 +49,8 @@ def recognise(file: SourceFile) -> Certainty:
         return Certainty.LIKELY if _shape(file) else Certainty.NO
     if file.size > 2**20 or not file.is_text:
         return Certainty.NO
-    return Certainty.LIKELY if _blocks(file.head_text) else Certainty.NO
+    known = _blocks(file.head_text) or _halves(file) is not None
+    return Certainty.LIKELY if known else Certainty.NO
 
 
 def read(file: SourceFile) -> Iterator[Piece]:
@@ -48,6 +59,11 @@ def read(file: SourceFile) -> Iterator[Piece]:
         array = np.load(io.BytesIO(file.bytes(2**20)), allow_pickle=False).astype(float)
         array = array.reshape(-1, *array.shape[-2:])[:, :3]
         found = [("" if len(array) == 1 else str(n), matrix) for n, matrix in enumerate(array)]
+    elif (halves := _halves(file)) is not None:
+        if not _MOVED.search(file.path.stem):  # the other half is read with it
+            camera = RawCamera("", rotation=halves[0], translation=halves[1])
+            yield CalibrationPiece(file.path, NAME, (camera,))
+        return
     else:
         found = _blocks(file.text(2**20)) or []
     yield CalibrationPiece(file.path, NAME, tuple(_camera(file, *item) for item in found))
@@ -67,6 +83,38 @@ def _camera(file: SourceFile, name: str, matrix: Float[ndarray, "3 n"]) -> RawCa
         return RawCamera(name, rotation=matrix[:, :3], translation=matrix[:, 3])
     convention = Convention(direction="world-to-camera", axes="opencv")
     return RawCamera(name, projection=matrix, convention=convention)
+
+
+def _halves(file: SourceFile) -> tuple[Float[ndarray, "3 3"], Float[ndarray, " 3"]] | None:
+    """Rotation and translation in two files, of which this is one; None for any other file."""
+    turned, moved = _TURNED.search(file.path.stem), _MOVED.search(file.path.stem)
+    if turned is None and moved is None:
+        return None
+    values = []
+    for own, other in ((_TURNED, _MOVED), (_MOVED, _TURNED)):
+        member = file
+        if own.search(file.path.stem) is None:
+            stem = other.sub("", file.path.stem)
+            beside = (
+                path
+                for path in sorted(file.path.parent.glob(f"*{file.path.suffix}"))
+                if own.search(path.stem)
+                and own.sub("", path.stem) == stem
+                and not path.is_symlink()
+            )
+            path = next(beside, None)
+            if path is None:
+                return None
+            member = file.member(path)
+        words = re.findall(_NUMBER, member.head_text) if member.size < _SHORT else []
+        if re.sub(rf"{_NUMBER}|[\s,;\[\]]", "", member.head_text) or len(words) not in (3, 9):
+            return None
+        values.append(np.array(words, dtype=float))
+    rotation, translation = values
+    if len(translation) != 3 or (len(rotation) == 9 and not is_rotation(rotation.reshape(3, 3))):
+        return None
+    matrix = cv2.Rodrigues(rotation)[0] if len(rotation) == 3 else rotation.reshape(3, 3)
+    return np.asarray(matrix), translation
 
 
 def _is_lens(matrix: Float[ndarray, "3 3"]) -> bool:
