@@ -44,7 +44,7 @@ def tracks_of(rows: list[tuple[int, int, tuple[float, float, float]]]) -> Trajec
         sigmas=np.abs(positions) / 10.0,
         seen=np.ones((count, len(SEQUENCE.views)), dtype=bool),
         components=np.zeros(count, dtype=np.int64),
-        covariances_xy=np.linspace(-0.01, 0.01, count),
+        covariances_xy=np.linspace(-0.9, 0.9, count) * np.prod(positions[:, :2], axis=1) / 100.0,
         heights=np.where(np.arange(count) % 2, 1.7, np.nan),
         sigma_heights=np.where(np.arange(count) % 2, 0.02, np.nan),
     )

@@ -223,8 +223,9 @@ class Evaluate:
     tracks: Annotated[
         Positional[Path | None],
         arg(
-            metavar="TRACKS.csv",
-            help="As `track` and the page write it. Without one nothing needs to be known of the "
+            metavar="TRACKS",
+            help="As `track` and the page write them: CSV, JSON, Parquet, TRC, or MOTChallenge's "
+            "ground plane (.txt). Without one nothing needs to be known of the "
             "truth: the sequence is tracked forward, backwards and without each camera.",
             help_behavior_hint="(optional)",
         ),

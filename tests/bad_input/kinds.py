@@ -28,6 +28,7 @@ from tests.test_export import PARAMETERS_OF_RUN, SEQUENCE, TRACKS
 from tracker.corrections import CorrectionError
 from tracker.corrections.log import read_log
 from tracker.export import tracks_csv
+from tracker.export.reading import read_tracks
 from tracker.io.importing.gathering import gather
 from tracker.io.read.pieces import FormatError
 from tracker.library.bundle import unpack_bundle, write_bundle
@@ -233,7 +234,7 @@ KINDS = {
             "tracks",
             "tracks.csv",
             track_file,
-            tracks_csv.read_tracks_csv,
+            read_tracks,
             ("evaluate", "CROSSING", "FILE"),
             may_be_a_pipe=True,
         ),

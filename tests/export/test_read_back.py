@@ -12,10 +12,9 @@ from numpy import ndarray
 
 from tests.engine import synthetic
 from tests.io.read.rig import raw_cameras, read
-from tracker.export import read_tracks_csv
 from tracker.export.calibration import save_calibration
 from tracker.export.exported_run import ExportedRun
-from tracker.export.json_file import TracksFile
+from tracker.export.reading import read_tracks
 from tracker.export.registry import FORMATS, save
 from tracker.fusion.trajectories import Trajectories
 from tracker.io.read.pieces import DetectionPiece, TruthPiece
@@ -65,22 +64,31 @@ def _of_truth(path: Path) -> Rows:
     return truth.frames - int(truth.first_index or 0), truth.ids, places
 
 
-def _of_csv(path: Path) -> Rows:
-    found = read_tracks_csv(path)
+def _of_tracks(path: Path) -> Rows:
+    """All columns of the formats that have them."""
+    found = read_tracks(path)
+    own = RUN.tracks
+    assert found.settings["sequence"] == SEQUENCE.name
+    assert found.settings["fusion.clutter_rate"] == str(RUN.settings["fusion.clutter_rate"])
+    for name, atol in (
+        ("existences", 0.5001e-4), ("sigmas", 0.5001e-4), ("covariances_xy", 0.5001e-6),
+        ("heights", 0.5001e-4), ("sigma_heights", 0.5001e-4),
+    ):  # fmt: skip
+        np.testing.assert_allclose(getattr(found, name), getattr(own, name), atol=atol)
+    for camera, (boxes, visible) in zip(SEQUENCE.cameras, RUN.boxes, strict=True):
+        expected = np.where(visible[:, None], boxes, np.nan)
+        np.testing.assert_allclose(found.boxes[camera.name], expected, atol=0.5001e-2)
     return found.frames, found.ids, found.positions
 
 
-def _of_json(path: Path) -> Rows:
-    tracks = TracksFile.model_validate_json(path.read_text()).tracks
-    ids = np.concatenate([np.full(len(track.frames), track.id) for track in tracks])
-    frames = np.concatenate([track.frames for track in tracks])
-    return frames, ids, np.concatenate([track.positions for track in tracks])
-
-
-def _of_parquet(path: Path) -> Rows:
-    table = pytest.importorskip("pyarrow.parquet").read_table(path).to_pydict()
-    places = np.column_stack([table[axis] for axis in "xyz"])
-    return np.array(table["frame"]), np.array(table["id"]), places
+def _of_trc(path: Path) -> Rows:
+    """As truth of an import, and as tracks to evaluate."""
+    found = read_tracks(path)
+    rows = _of_truth(path)
+    order = np.lexsort([rows[1], rows[0]])
+    for one, other in zip((found.frames, found.ids, found.positions), rows, strict=True):
+        np.testing.assert_array_equal(one, other[order])
+    return rows
 
 
 def _of_motchallenge(path: Path) -> Rows:
@@ -92,15 +100,15 @@ def _of_motchallenge(path: Path) -> Rows:
         np.testing.assert_array_equal(piece.frames - 1, RUN.tracks.frames[visible])
         np.testing.assert_allclose(piece.boxes, boxes[visible], atol=1e-6)
     (file,) = path.glob("trackers/**/*-ground-plane.txt")
-    return _of_truth(file)
+    return _of_trc(file)
 
 
 READERS: dict[str, Callable[[Path], Rows]] = {
-    "csv": _of_csv,
-    "json": _of_json,
+    "csv": _of_tracks,
+    "json": _of_tracks,
     "motchallenge": _of_motchallenge,
-    "parquet": _of_parquet,
-    "trc": _of_truth,
+    "parquet": _of_tracks,
+    "trc": _of_trc,
 }
 
 TO_LOOK_AT = {"gltf", "html", "mp4", "rerun"}

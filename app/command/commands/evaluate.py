@@ -15,7 +15,7 @@ from app.state.workers.compiling import Compiling
 from tracker import __version__
 from tracker.evaluation import Evaluation, EvaluationSettings, evaluate_sequence
 from tracker.evaluation.figures import number
-from tracker.export import tracks_csv
+from tracker.export.reading import read_tracks
 from tracker.export.tracks_csv import TrackFile
 from tracker.parameters.values import ParameterError
 from tracker.sequences import library
@@ -52,7 +52,7 @@ def evaluate(command: Evaluate) -> None:
     if command.truth is not None:
         truth = truth_of(command.truth, str(command.truth), sequence.frames)
         sequence = replace(sequence, ground_truth=truth)
-    tracks = tracks_csv.read_tracks_csv(command.tracks)
+    tracks = read_tracks(command.tracks)
     check_fit(sequence, tracks, str(command.tracks))
     for sentence in (*sequence.warnings, *tracks.remarks):
         say(sentence)

@@ -12,6 +12,8 @@ from tests.app.conftest import Runs
 from tests.app.folders import FRAMES, write_crossing
 from tracker.evaluation import EvaluationSettings, evaluate_sequence
 from tracker.export import tracks_csv
+from tracker.export.exported_run import ExportedRun
+from tracker.export.registry import FORMATS, save
 from tracker.runs import pipeline
 from tracker.sequences.reader import read_sequence
 
@@ -58,6 +60,27 @@ def test_json(run: Runs, crossing: Path, tracks: Path) -> None:
     expected = evaluate_sequence(sequence, tracks_csv.read_tracks_csv(tracks), settings).to_json()
     assert found["sequence"] == "crossing"
     assert {key: found[key] for key in expected} == json.loads(json.dumps(expected))
+
+
+@pytest.mark.parametrize("name", ["json", "parquet", "trc"])
+def test_other_forms_of_the_same_tracks_have_the_same_figures(
+    run: Runs, crossing: Path, tracks: Path, tmp_path: Path, name: str
+) -> None:
+    form = FORMATS[name]
+    if form.needs_package:
+        pytest.importorskip(form.needs_package)
+    sequence = read_sequence(crossing)
+    parameters = pipeline.default_parameters(sequence)
+    computed = pipeline.compute(sequence, parameters)
+    path = tmp_path / f"tracks{form.suffix}"
+    save(path, form, ExportedRun(sequence, computed.tracks, parameters))
+    figures = []
+    for file in (tracks, path):
+        status, stdout, stderr = run("evaluate", crossing, file, "--json")
+        assert status == 0, stderr
+        figures.append(json.loads(stdout)["figures"])
+    for one, other in zip(*figures, strict=True):
+        assert one == pytest.approx(other, abs=1e-3), "the CSV rounds to a tenth of a millimetre"
 
 
 def test_report(run: Runs, crossing: Path, tracks: Path, tmp_path: Path) -> None:

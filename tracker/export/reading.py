@@ -1,0 +1,326 @@
+"""The reading of tracks in every form that the program writes and that has numbers: CSV, JSON,
+Parquet, TRC, and MOTChallenge's file of the ground plane."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from numpy import ndarray
+from pydantic import ValidationError
+
+from tracker.export.json_file import TracksFile
+from tracker.export.tracks_csv import BOX, COLUMNS, COVARIANCE, HEIGHT, TrackFile, read_tracks_csv
+from tracker.io.read.pieces import FormatError, TruthPiece
+from tracker.io.read.registry import recognise
+from tracker.io.read.source import SourceFile
+from tracker.sequences.csv_columns import MOST_BYTES
+from tracker.sequences.errors import SequenceError
+
+_ROUNDING_SIGMA, _ROUNDING_COVARIANCE = 0.5e-4, 0.5e-6
+"""Half of the last decimal that a CSV track file has of σ, metres, and of the covariance."""
+
+_Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+"""Rotation from a world with y up to one with z up."""
+
+
+def read_tracks(path: Path | str) -> TrackFile:
+    """Read tracks, in the form that the name's ending states; any other ending is CSV.
+
+    TRC and MOTChallenge have places alone: existences are 1, and standard deviations NaN.
+
+    Raises:
+        SequenceError: If the file does not have valid tracks, or covariances and heights that
+            cannot be; the message names the file and what was expected and found.
+    """
+    path = Path(path)
+    form = {".json": _json, ".parquet": _parquet, ".trc": _places, ".txt": _places}
+    tracks = form.get(path.suffix.lower(), read_tracks_csv)(path)
+    _check(path.name, tracks)
+    return tracks
+
+
+def _check(where: str, tracks: TrackFile) -> None:
+    """Check what no column can tell by itself.
+
+    Raises:
+        SequenceError: At the first row that cannot be, with its step and track.
+    """
+
+    def require(
+        good: Bool[ndarray, " N"], field: str, expected: str, found: Float[ndarray, " N"]
+    ) -> None:
+        if not good.all():
+            row = int(np.argmin(good))
+            raise SequenceError(
+                f"{where}, step {tracks.frames[row]}, track {tracks.ids[row]}, {field}: expected "
+                f"{expected}, found {float(found[row]):.6g}"
+            )
+
+    for axis, sigmas in zip("xyz", tracks.sigmas.T, strict=True):
+        require(~(sigmas < 0.0), f"sigma_{axis}", "a standard deviation of at least 0 m", sigmas)
+    if tracks.covariances_xy is not None:
+        sigmas = tracks.sigmas[:, :2]
+        largest = np.prod(sigmas + _ROUNDING_SIGMA, axis=1) + _ROUNDING_COVARIANCE
+        require(
+            ~(np.abs(tracks.covariances_xy) > largest),
+            COVARIANCE,
+            "at most sigma_x · sigma_y in size (square metres)",
+            tracks.covariances_xy,
+        )
+    for field, values in zip(HEIGHT, (tracks.heights, tracks.sigma_heights), strict=True):
+        if values is not None:
+            require(~(values < 0.0), field, "at least 0 m, or nothing", values)
+
+
+def _in_order(
+    where: str, frames: Int[ndarray, " N"], ids: Int[ndarray, " N"]
+) -> Int[ndarray, " N"]:
+    """Return the order of the rows by step and id.
+
+    Raises:
+        SequenceError: If a step or id is negative, or a track has two rows at a step.
+    """
+    for field, values in (("frame", frames), ("id", ids)):
+        if (values < 0).any():
+            raise SequenceError(
+                f'{where}, "{field}": expected whole numbers from 0, found {values.min()}'
+            )
+    order = np.lexsort([ids, frames])
+    same = (np.diff(frames[order]) == 0) & (np.diff(ids[order]) == 0)
+    if same.any():
+        row = order[np.argmax(same)]
+        raise SequenceError(
+            f"{where}: expected one row a track a step, found two of track {ids[row]} at step "
+            f"{frames[row]}"
+        )
+    return order
+
+
+def _limited(path: Path, what: str) -> bytes:
+    """Return the bytes of a file within the limit.
+
+    Raises:
+        SequenceError: If it cannot be read, or is larger.
+    """
+    try:
+        size = path.stat().st_size
+        if size > MOST_BYTES:
+            raise SequenceError(
+                f"{path.name}: expected {what} of at most {MOST_BYTES / 2**20:.0f} MB, found "
+                f"{size / 2**20:,.0f} MB; write the tracks as CSV"
+            )
+        return path.read_bytes()
+    except OSError as error:
+        raise SequenceError(f"{path}: cannot be read ({error.strerror})") from None
+
+
+def _json(path: Path) -> TrackFile:
+    """Read tracks as ``tracks.schema.json`` has them."""
+    where = path.name
+    data = _limited(path, "JSON")
+    try:
+        file = TracksFile.model_validate_json(data)
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_input=False)[0]
+        at = ".".join(map(str, first["loc"]))
+        raise SequenceError(
+            f"{where}{f', field {at}' if at else ''}: expected tracks as `track -o tracks.json` "
+            f"writes them, found that {first['msg'][:1].lower()}{first['msg'][1:]}"
+        ) from None
+    names = [camera.name for camera in file.sequence.cameras]
+    for k, track in enumerate(file.tracks):
+        columns: dict[str, Any] = {
+            "positions": track.positions, "existences": track.existences, "sigmas": track.sigmas,
+            **{f"boxes.{name}": track.boxes.get(name, []) for name in names},
+        }  # fmt: skip
+        optional = {
+            "covariance_xy": track.covariance_xy, "height": track.height,
+            "sigma_height": track.sigma_height,
+        }  # fmt: skip
+        columns |= {name: values for name, values in optional.items() if values}
+        for name, values in columns.items():
+            if len(values) != len(track.frames):
+                raise SequenceError(
+                    f"{where}, field tracks.{k}.{name}: expected {len(track.frames)} rows as "
+                    f"tracks.{k}.frames has, found {len(values)}"
+                )
+    tracks = file.tracks
+
+    def column(name: str, shape: tuple[int, ...] = ()) -> ndarray:
+        rows = [row for track in tracks for row in getattr(track, name)]
+        return _finite(where, name, np.array(rows, dtype=np.float64).reshape(len(rows), *shape))
+
+    frames = np.array([step for one in tracks for step in one.frames], dtype=np.int64)
+    ids = np.array([one.id for one in tracks for _ in one.frames], dtype=np.int64)
+    order = _in_order(where, frames, ids)
+    has = {
+        name: all(len(getattr(one, name)) for one in tracks if one.frames)
+        for name in ("covariance_xy", "height", "sigma_height")
+    }
+    missing = [np.nan] * len(BOX)
+    return TrackFile(
+        frames=frames[order],
+        times=frames[order] / file.sequence.fps,
+        ids=ids[order],
+        positions=column("positions", (3,))[order],
+        existences=column("existences")[order],
+        sigmas=column("sigmas", (3,))[order],
+        boxes={
+            name: np.array(
+                [box or missing for one in tracks for box in one.boxes[name]], dtype=np.float64
+            ).reshape(-1, len(BOX))[order]
+            for name in names
+        },
+        settings={
+            "sequence": file.sequence.name,
+            "seed": str(file.run.seed),
+            **{key: str(value) for key, value in file.run.parameters.items()},
+        },
+        covariances_xy=column("covariance_xy")[order] if has["covariance_xy"] else None,
+        heights=_heights(tracks, "height")[order] if has["height"] else None,
+        sigma_heights=_heights(tracks, "sigma_height")[order] if has["sigma_height"] else None,
+        done=file.run.steps if file.run.steps < file.sequence.frames else None,
+        remarks=tuple(file.run.remarks),
+    )
+
+
+def _heights(tracks: list[Any], name: str) -> Float[ndarray, " N"]:
+    """Return the heights of all rows, NaN where they are not estimated."""
+    return np.array([value for one in tracks for value in getattr(one, name)], dtype=np.float64)
+
+
+def _finite(where: str, name: str, values: ndarray) -> ndarray:
+    """Return the values.
+
+    Raises:
+        SequenceError: If some are not finite.
+    """
+    if not np.isfinite(values).all():
+        raise SequenceError(f'{where}, "{name}": expected finite numbers, found some that are not')
+    return values
+
+
+def _parquet(path: Path) -> TrackFile:
+    """Read the columns of the track file from a Parquet table."""
+    where = path.name
+    try:
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+    except ImportError:
+        raise SequenceError(
+            f"{where}: Parquet needs pyarrow, which is not installed: "
+            'pip install "multiview-phd[parquet]"'
+        ) from None
+    data = _limited(path, "a table")
+    try:
+        table = pq.read_table(pa.BufferReader(data))
+    except (pa.ArrowException, OSError, ValueError) as error:
+        found = " ".join(str(error).split())[:100]
+        raise SequenceError(
+            f"{where}: expected a Parquet table, found what cannot be read as one ({found})"
+        ) from None
+    missing = [name for name in COLUMNS if name not in table.column_names]
+    if missing:
+        raise SequenceError(
+            f"{where}: expected the columns {','.join(COLUMNS)}, but {', '.join(missing)} "
+            f"{'is' if len(missing) == 1 else 'are'} missing"
+        )
+
+    def column(name: str) -> Float[ndarray, " N"]:
+        try:
+            own = table.column(name).cast(pa.float64())
+        except (pa.ArrowException, KeyError):
+            raise SequenceError(
+                f'{where}, column "{name}": expected one column of numbers, found '
+                f"{table.schema.field(name).type if name in table.column_names else 'none'}"
+            ) from None
+        return np.asarray(own.to_numpy(zero_copy_only=False), dtype=np.float64)
+
+    def whole(name: str) -> Int[ndarray, " N"]:
+        values: Float[ndarray, " N"] = _finite(where, name, column(name))
+        if (values != np.floor(values)).any() or (np.abs(values) > 2.0**53).any():
+            raise SequenceError(f'{where}, column "{name}": expected whole numbers')
+        return values.astype(np.int64)
+
+    def three(*names: str) -> Float[ndarray, "N 3"]:
+        values = np.column_stack([column(name) for name in names])
+        return np.asarray(_finite(where, names[0], values)[order])
+
+    frames, ids = whole("frame"), whole("id")
+    order = _in_order(where, frames, ids)
+    cameras = [name.removesuffix("_left") for name in table.column_names if name.endswith("_left")]
+    facts = _facts(table.schema.metadata or {})
+    optional = {
+        name: column(name)[order] if name in table.column_names else None
+        for name in (COVARIANCE, *HEIGHT)
+    }
+    return TrackFile(
+        frames=frames[order],
+        times=_finite(where, "time", column("time"))[order],
+        ids=ids[order],
+        positions=three("x", "y", "z"),
+        existences=_finite(where, "existence", column("existence"))[order],
+        sigmas=three("sigma_x", "sigma_y", "sigma_z"),
+        boxes={
+            camera: np.column_stack([column(f"{camera}_{side}") for side in BOX])[order]
+            for camera in cameras
+        },
+        settings=facts,
+        covariances_xy=optional[COVARIANCE],
+        heights=optional[HEIGHT[0]],
+        sigma_heights=optional[HEIGHT[1]],
+    )
+
+
+def _facts(metadata: dict[bytes, bytes]) -> dict[str, str]:
+    """Return what the table states of its run: sequence, seed and parameters."""
+    try:
+        stated = json.loads(metadata.get(b"multiview-phd", b"{}"))
+    except ValueError:
+        return {}
+    if not isinstance(stated, dict):
+        return {}
+    parameters = stated.get("parameters")
+    facts = dict(parameters) if isinstance(parameters, dict) else {}
+    facts |= {key: stated[key] for key in ("sequence", "seed") if key in stated}
+    return {str(key): str(value) for key, value in facts.items()}
+
+
+def _places(path: Path) -> TrackFile:
+    """Read places alone, as truth is read."""
+    where = path.name
+    _limited(path, "text")
+    file = SourceFile(path)
+    try:
+        form, _, complaint = recognise(file)
+        pieces = [] if form is None else list(form.read(file))
+    except FormatError as error:
+        raise SequenceError(f"{where}: {error}") from None
+    truths = [piece for piece in pieces if isinstance(piece, TruthPiece)]
+    if len(truths) != 1:
+        found = complaint or (f"{form.NAME} without places" if form else "none of both")
+        raise SequenceError(
+            f"{where}: expected places in metres as `track -o tracks.trc` or the ground plane of "
+            f"MOTChallenge has them, found {found}"
+        )
+    truth = truths[0]
+    if truth.unit not in (None, "m"):
+        raise SequenceError(f"{where}: expected places in metres, found them in {truth.unit}")
+    frames = truth.frames - int(truth.first_index or 0)
+    order = _in_order(where, frames, truth.ids)
+    places = truth.positions @ _Y_UP.T if truth.up == "y" else truth.positions
+    rows = len(order)
+    return TrackFile(
+        frames=frames[order],
+        times=np.full(rows, np.nan) if truth.fps is None else frames[order] / truth.fps,
+        ids=truth.ids[order],
+        positions=_finite(where, "places", places)[order],
+        existences=np.ones(rows),
+        sigmas=np.full((rows, 3), np.nan),
+        boxes={},
+        settings={},
+    )
