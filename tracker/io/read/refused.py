@@ -77,8 +77,8 @@ _KNOWN: tuple[_Refused, ...] = (
     _Refused(
         "a homography of the floor (as of AI City's 2019 calibrations)",
         _holds(r"(?i)\Ahomography"),
-        "it does not tell how tall people are in a picture; give K and the pose, or a 3×4 projection "
-        "matrix, of each camera (OpenCV's solvePnP finds the pose from four points of the floor)",
+        "it does not tell how tall people are in a picture; give K and the pose, or a 3×4 matrix "
+        "P, of each camera (OpenCV's solvePnP finds the pose from four points of the floor)",
     ),
     _Refused(
         "Bundler's model",
