@@ -279,14 +279,14 @@ def _parquet(path: Path) -> TrackFile:
 def _facts(metadata: dict[bytes, bytes]) -> dict[str, str]:
     """Return what the table states of its run: sequence, seed and parameters."""
     try:
-        stated = json.loads(metadata.get(b"multiview-phd", b"{}"))
+        run = json.loads(metadata.get(b"multiview-phd", b"{}"))
     except ValueError:
         return {}
-    if not isinstance(stated, dict):
+    if not isinstance(run, dict):
         return {}
-    parameters = stated.get("parameters")
+    parameters = run.get("parameters")
     facts = dict(parameters) if isinstance(parameters, dict) else {}
-    facts |= {key: stated[key] for key in ("sequence", "seed") if key in stated}
+    facts |= {key: run[key] for key in ("sequence", "seed") if key in run}
     return {str(key): str(value) for key, value in facts.items()}
 
 
