@@ -1,24 +1,19 @@
 /** Wires the page: one store, one socket, one playback, and the panes that look at them. */
 import { mountCameras } from "./cameras/cameras.js";
-import { one } from "./elements/dom.js";
+import { one, mountTips } from "./elements/dom.js";
 import { mountSide } from "./inspector/side.js";
-import { mountTips } from "./elements/tips.js";
-import { mountDoor } from "./opening/door.js";
-import { mountControls, pressed } from "./panes/controls.js";
+import { mountDoor, mountControls, pressed } from "./panes/controls.js";
 import { mountLayout } from "./panes/layout.js";
-import { mountNotes } from "./panes/notes.js";
-import { mountPlaces } from "./panes/places.js";
-import { mountTop } from "./panes/top.js";
-import { mountTour } from "./panes/tour.js";
+import { mountNotes, mountTour } from "./panes/notes.js";
+import { mountPlaces, mountTop } from "./panes/top.js";
 import { mountView3d } from "./panes/view3d.js";
 import { createPlayback } from "./play/playback.js";
 import { createActions } from "./state/actions.js";
 import { createAddress } from "./state/address.js";
 import { getJson, openStream } from "./state/api.js";
 import { register } from "./state/commands.js";
-import { initialState, remember } from "./state/initial.js";
+import { initialState, remember, createStore } from "./state/store.js";
 import { createReceiver } from "./state/receiving.js";
-import { createStore } from "./state/store.js";
 import { mountTimeline } from "./timeline/timeline.js";
 
 register(await getJson("/static/commands.json"));
@@ -66,33 +61,48 @@ const timeline = mountTimeline(one(".time"), context);
 mountDoor(context);
 mountTips();
 mountLayout(context);
-// The rest is read once the page stands; what it brings may be asked for before.
-/** @type {Promise<void> | undefined} */
-let rest;
-const readRest = () =>
-	(rest ??= import("./later.js").then(
-		({ mountLater }) => mountLater(context, timeline),
-		() => (rest = undefined),
-	));
+/**
+ * What is read after the first picture, or when it is first wanted; what it brings may be asked for
+ * before.
+ * @param {() => Promise<void>} read
+ */
+function later(read) {
+	/** @type {Promise<void> | undefined} */
+	let known;
+	return () => (known ??= read().catch(() => void (known = undefined)));
+}
+const readRest = later(() =>
+	import("./later.js").then(({ mountLater }) => mountLater(context, timeline)),
+);
+const readTeach = later(() =>
+	import("./inspector/teach.js").then(({ mountTeach }) => mountTeach(one(".mosaic"), context)),
+);
+const readSheets = later(() =>
+	import("./sheets/sheets.js").then(({ mountSheets }) => mountSheets(context)),
+);
+const readKeep = later(() =>
+	import("./sheets/keep.js").then(({ mountKeep }) => mountKeep(context)),
+);
 const brought = /** @type {const} */ ([
-	"help",
-	"bookmark",
-	"keepPicture",
-	"drawTemplate",
-	"checkIdentities",
-	"plot",
-	"correct",
-	"keepLayout",
+	["bookmark", readRest],
+	["checkIdentities", readRest],
+	["plot", readRest],
+	["correct", readRest],
+	["drawTemplate", readTeach],
+	["help", readSheets],
+	["keepLayout", readSheets],
+	["keepPicture", readKeep],
 ]);
-for (const name of brought) {
+for (const [name, read] of brought) {
 	const early = async (/** @type {any} */ what = undefined) => {
-		await readRest();
+		await read();
 		if (actions[name] === early)
 			return actions.note("error", "That is not read yet", "The server does not answer.");
 		await /** @type {any} */ (actions)[name](what);
 	};
 	actions[name] = early;
 }
+store.watch(["tab"], ({ tab }) => tab === "teach" && void readTeach());
 // What is typed before it can offer anything stands in its field, and Enter takes the first offer.
 const sought = /** @type {any} */ (one(".palette"));
 sought.addEventListener("keydown", (/** @type {KeyboardEvent} */ { key }) =>
@@ -101,7 +111,7 @@ sought.addEventListener("keydown", (/** @type {KeyboardEvent} */ { key }) =>
 actions.palette = () => {
 	if (sought.open) return sought.close();
 	sought.showModal();
-	void readRest();
+	void readSheets();
 };
 mountControls(context);
 void readRest();

@@ -2,8 +2,8 @@
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { test } from "node:test";
-import { readPlace, writePlace } from "../../static/js/state/url.js";
-import { viewFrom, viewOf } from "../../static/js/state/views.js";
+import { readPlace, writePlace } from "../../static/js/state/address.js";
+import { viewFrom, viewOf } from "../../static/js/state/address.js";
 
 const kept = JSON.parse(
   readFileSync(new URL("../compatibility/addresses.json", import.meta.url), "utf8"),

@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 import * as clock from "../../static/js/play/clock.js";
-import { pace } from "../../static/js/play/pace.js";
+import { pace } from "../../static/js/panes/view3d.js";
 
 const HOW = { fps: 25, speed: 1, direction: 1, first: 0, last: 99, loop: false };
 

@@ -4,7 +4,7 @@ import { readdirSync, readFileSync, statSync } from "node:fs";
 import { join, relative } from "node:path";
 import { test } from "node:test";
 import { fileURLToPath } from "node:url";
-import { PLACES } from "../../static/js/state/places.js";
+import { PLACES } from "../../static/js/state/address.js";
 
 const ROOT = fileURLToPath(new URL("../../static/", import.meta.url));
 const files = readdirSync(ROOT, { recursive: true })
@@ -16,7 +16,7 @@ const scripts = files.filter((name) => name.endsWith(".js"));
 function reached(name, later, known = new Set()) {
   known.add(name);
   const text = readFileSync(join(ROOT, name), "utf8");
-  const ways = [/from "([^"]+)"/g, ...(later ? [/(?:void|\?\?=|=>) import\("([^"]+)"\)/g] : [])];
+  const ways = [/from "([^"]+)"/g, ...(later ? [/(?:void|\?\?=|=>)\s+import\("([^"]+)"\)/g] : [])];
   for (const [, target] of ways.flatMap((way) => [...text.matchAll(way)])) {
     const other = relative(ROOT, join(ROOT, name, "..", target)).replaceAll("\\", "/");
     if (!known.has(other)) reached(other, later, known);

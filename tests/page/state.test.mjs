@@ -13,15 +13,15 @@ import {
   gateWords,
   viewWords,
 } from "../../static/js/state/events.js";
-import { lensOf } from "../../static/js/draw/picture.js";
-import { magnified } from "../../static/js/cameras/magnify.js";
-import { kindsOf } from "../../static/js/inspector/listed.js";
-import { strands } from "../../static/js/timeline/braid.js";
-import { matching, offersOf, valueOf } from "../../static/js/sheets/offers.js";
-import { mosaic } from "../../static/js/cameras/mosaic.js";
-import { viewFrom, viewOf } from "../../static/js/state/views.js";
+import { lensOf } from "../../static/js/draw/overlay.js";
+import { magnified } from "../../static/js/cameras/cameras.js";
+import { kindsOf } from "../../static/js/inspector/side.js";
+import { strands } from "../../static/js/timeline/reading.js";
+import { matching, offersOf, valueOf } from "../../static/js/sheets/sheets.js";
+import { mosaic } from "../../static/js/cameras/cameras.js";
+import { viewFrom, viewOf } from "../../static/js/state/address.js";
 import { createStore } from "../../static/js/state/store.js";
-import { readPlace, writePlace } from "../../static/js/state/url.js";
+import { readPlace, writePlace } from "../../static/js/state/address.js";
 
 const turn = () => new Promise((resolve) => setImmediate(resolve));
 

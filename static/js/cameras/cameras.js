@@ -1,13 +1,333 @@
-/** The cameras: pictures and what is drawn over them, painted together. */
-import { fill, h, icon, parts, write } from "../elements/dom.js";
-import { prepare } from "../draw/canvas.js";
-import { drawLoupe, drawPicture, lensOf } from "../draw/picture.js";
-import { isRoomy, visibleTracks } from "../draw/overlay.js";
-import { fillBoxCard, fillTrackCard } from "./cards.js";
-import { createFloor } from "./floor.js";
+/**
+ * The cameras: where each picture goes, how closely it is seen, what is drawn over it, painted
+ * together, and the cards beside its boxes.
+ */
+import { prepare, pictureInk } from "../draw/canvas.js";
+import {
+	drawLoupe,
+	drawPicture,
+	lensOf,
+	isRoomy,
+	visibleTracks,
+	createFloor,
+} from "../draw/overlay.js";
+import { fill, h, icon, parts, write, idTag, show } from "../elements/dom.js";
 import { decisionsOf, gateWords, isAlone, viewWords } from "../state/events.js";
-import { mosaic } from "./mosaic.js";
-import { pictureInk } from "../draw/colours.js";
+
+/* ---------- Cards beside the boxes of a picture: what a track is made of, and whose a box is. */
+
+/** @param {Child | Child[]} word @param {Child[]} value */
+const row = (word, ...value) => [h("dt", {}, word), h("dd", {}, ...value)];
+
+/** @param {number} number @param {string} text */
+const about = (number, text) => [show(Number(number.toFixed(2))), h("small", {}, text)];
+
+/**
+ * @param {HTMLElement} card
+ * @param {Server.CameraTrack} track
+ * @param {Server.Track | undefined} whole
+ * @param {Server.Decided[]} decisions  what smoothing made otherwise of it, the nearest first
+ */
+function fillTrackCard(card, track, whole, decisions) {
+	const {
+		id,
+		seen,
+		detection_probability: p,
+		hidden_by: front,
+		reason,
+		source,
+		fed_by: fed,
+	} = track;
+	fill(
+		card,
+		h("h3", {}, idTag(id), seen ? "seen" : "coasting"),
+		h(
+			"dl",
+			{},
+			whole && row("existence", whole.existence.toFixed(2)),
+			p !== null &&
+				row(
+					[h("i", {}, "p"), h("sub", {}, "D")],
+					show(Number(p.toFixed(3))),
+					h("small", {}, front !== null ? ` hidden by ${front}` : reason ? ` ${reason}` : ""),
+				),
+			row(
+				"fed by",
+				...(seen && fed
+					? [
+							`box ${source + 1}`,
+							h(
+								"small",
+								{},
+								`, ${Math.round(100 * fed.share)} % sure, score ${show(Number(fed.weight.toPrecision(2)))}`,
+							),
+						]
+					: ["no box here"]),
+			),
+			whole &&
+				row(
+					"at",
+					whole.position.map((v) => v.toFixed(2).replace("-", "−")).join("  "),
+					h("small", {}, " m"),
+				),
+			whole && row("±", whole.sigma.map((v) => v.toFixed(2)).join("  "), h("small", {}, " m")),
+			whole?.height &&
+				row(
+					"height",
+					whole.height[0].toFixed(2),
+					h("small", {}, ` ± ${whole.height[1].toFixed(2)} m, standing`),
+				),
+		),
+		decisions.slice(0, 2).map(({ words }) => h("p", { class: "decision" }, words)),
+	);
+}
+
+/**
+ * A box that the camera's filter was given.
+ * @param {HTMLElement} card
+ * @param {Server.Measurement} measurement
+ * @param {number} index
+ */
+function fillBoxCard(card, { score, track, nearest, sigmas, gate }, index) {
+	const beyond = sigmas !== null && gate !== null ? sigmas - gate : 0;
+	fill(
+		card,
+		h("h3", {}, `box ${index + 1}`, h("small", {}, track === null ? " nobody's" : " feeds")),
+		h(
+			"dl",
+			{},
+			row("score", ...about(score, "")),
+			track !== null && row("track", idTag(track)),
+			track === null &&
+				(nearest === null || sigmas === null
+					? row("nearest", "no track in this picture")
+					: row("nearest track", idTag(nearest), " ", ...about(sigmas, " σ away"))),
+			track === null &&
+				gate !== null &&
+				row(
+					"gate",
+					...about(gate, beyond > 0 ? ` σ: ${show(Number(beyond.toFixed(2)))} σ outside` : " σ"),
+				),
+		),
+	);
+}
+
+/* ---------- Where the camera pictures go: one large and the others in a column beside it, or
+   all alike. Every picture keeps its own shape. */
+
+/**
+ * @param {number[]} aspects  width by height of each camera
+ * @param {number | null} large  index of the large one; null for all alike
+ * @param {{width: number, most: number, gap: number, sparing?: boolean}} room  `most` is the height
+ * that may be used; sparing: what is not used of it is wanted elsewhere
+ * @returns {{cells: Cell[], height: number}} cells relative to the mosaic, its height with the gaps
+ * around
+ */
+export function mosaic(aspects, large, { width, most, gap, sparing }) {
+	if (aspects.length === 0) return { cells: [], height: 0 };
+	const inner = Math.max(1, width - 2 * gap);
+	const tall = Math.max(1, most - 2 * gap);
+	return large === null || aspects.length === 1 || large >= aspects.length
+		? alike(aspects, inner, tall, gap, sparing ? 1.3 : 1)
+		: oneLarge(aspects, large, inner, tall, gap);
+}
+
+/**
+ * In the number of columns that makes the pictures largest: side by side without gaps between
+ * them, the last row in the middle where it has fewer.
+ * @param {number[]} aspects
+ * @param {number} inner
+ * @param {number} tall
+ * @param {number} gap
+ * @param {number} worth  how many times larger pictures must be with another row of them
+ */
+function alike(aspects, inner, tall, gap, worth) {
+	const widest = Math.max(...aspects);
+	const grids = aspects.map((_, index) => {
+		const columns = index + 1;
+		const rows = Math.ceil(aspects.length / columns);
+		const width = (inner - gap * (columns - 1)) / columns;
+		return { columns, rows, height: Math.min((tall - gap * (rows - 1)) / rows, width / widest) };
+	});
+	const { columns, rows, height } = grids.reduceRight((best, grid) =>
+		grid.height > best.height * worth + 0.5 ? grid : best,
+	);
+	const width = height * widest;
+	const cells = aspects.map((aspect, index) => {
+		const row = Math.floor(index / columns);
+		const inRow = Math.min(columns, aspects.length - row * columns);
+		const left = (inner - inRow * width - (inRow - 1) * gap) / 2;
+		return fit(aspect, {
+			x: gap + left + (index % columns) * (width + gap),
+			y: gap + row * (height + gap),
+			width,
+			height,
+		});
+	});
+	return { cells, height: Math.round(rows * (height + gap) + gap) };
+}
+
+/**
+ * @param {number[]} aspects
+ * @param {number} large
+ * @param {number} inner
+ * @param {number} tall
+ * @param {number} gap
+ */
+function oneLarge(aspects, large, inner, tall, gap) {
+	const others = aspects.length - 1;
+	const rows = others <= 3 ? Math.max(2, others) : Math.ceil(others / 2);
+	const columns = Math.ceil(others / rows);
+	const small = Math.max(...aspects.filter((_, index) => index !== large));
+	// Width = a H + columns (gap + b h), with h = (H - gap (rows - 1)) / rows.
+	const wanted =
+		(inner - columns * gap + (columns * small * gap * (rows - 1)) / rows) /
+		(aspects[large] + (columns * small) / rows);
+	const height = Math.min(wanted, tall);
+	const cellHeight = (height - gap * (rows - 1)) / rows;
+	const bigWidth = aspects[large] * height;
+	// No wider than their pictures: what is left of the width lies around all of them.
+	const cellWidth = Math.min((inner - bigWidth - columns * gap) / columns, small * cellHeight);
+	const begin = gap + (inner - bigWidth - columns * (gap + cellWidth)) / 2;
+	const cells = aspects.map((aspect, index) => {
+		if (index === large) return fit(aspect, { x: begin, y: gap, width: bigWidth, height });
+		const place = index - Number(index > large);
+		const x = begin + bigWidth + gap + Math.floor(place / rows) * (cellWidth + gap);
+		return fit(aspect, {
+			x,
+			y: gap + (place % rows) * (cellHeight + gap),
+			width: cellWidth,
+			height: cellHeight,
+		});
+	});
+	return { cells, height: Math.round(height + 2 * gap) };
+}
+
+/**
+ * The largest picture of a shape in the middle of a frame, on whole pixels.
+ * @param {number} aspect
+ * @param {Cell} frame
+ */
+function fit(aspect, { x, y, width, height }) {
+	const w = Math.min(width, height * aspect);
+	const hgt = w / aspect;
+	return {
+		x: Math.round(x + (width - w) / 2),
+		y: Math.round(y + (height - hgt) / 2),
+		width: Math.round(w),
+		height: Math.round(hgt),
+	};
+}
+
+/* ---------- Looking closer at a picture: wheel or two fingers magnify at the pointer, a drag
+   moves what is magnified, a double click goes in and out. */
+
+const MOST = 24;
+/** What a double click magnifies by. */
+const CLOSER = 3;
+/** A press that moves less than this is a click, CSS pixels. */
+const STILL = 4;
+
+/**
+ * The magnification after a factor at a point that keeps its place.
+ * @param {Magnified | undefined} zoom
+ * @param {number} factor
+ * @param {{x: number, y: number, width: number, height: number}} spot  in its cell, CSS pixels
+ * @returns {Magnified | undefined} undefined: the whole picture
+ */
+export function magnified(zoom, factor, { x, y, width, height }) {
+	const { k, left, top } = lensOf(zoom, width, height);
+	const next = Math.min(MOST, k * factor);
+	if (next < 1.02) return undefined;
+	const centre = (
+		/** @type {number} */ at,
+		/** @type {number} */ gone,
+		/** @type {number} */ side,
+	) => (((at + gone) / k) * next - at + side / 2) / (next * side);
+	return [next, centre(x, left, width), centre(y, top, height)];
+}
+
+/** @param {HTMLElement} body  the pictures @param {Store<PageState>} store */
+function mountMagnifier(body, store) {
+	/** @type {Map<number, {x: number, y: number}>} */
+	const fingers = new Map();
+	let travelled = 0;
+
+	/** @param {MouseEvent} event */
+	function spotOf({ target, clientX, clientY }) {
+		const cam = /** @type {Element} */ (target).closest(".cam");
+		if (!cam) return null;
+		const { left, top, width, height } = cam.getBoundingClientRect();
+		const index = [...body.children].indexOf(cam);
+		return { cam, index, x: clientX - left, y: clientY - top, width, height };
+	}
+	/** @param {number} index @param {Magnified | undefined} zoom */
+	function put(index, zoom) {
+		const zooms = { ...store.get().zooms };
+		if (zoom) zooms[index] = zoom;
+		else delete zooms[index];
+		store.set({ zooms });
+	}
+
+	body.addEventListener(
+		"wheel",
+		(event) => {
+			const spot = spotOf(event);
+			if (!spot) return;
+			event.preventDefault();
+			put(
+				spot.index,
+				magnified(store.get().zooms[spot.index], Math.exp(-event.deltaY * 0.002), spot),
+			);
+		},
+		{ passive: false },
+	);
+	body.addEventListener("dblclick", (event) => {
+		const spot = spotOf(event);
+		if (!spot || event.shiftKey) return;
+		const zoom = store.get().zooms[spot.index];
+		put(spot.index, zoom ? undefined : magnified(zoom, CLOSER, spot));
+	});
+	body.addEventListener("pointerdown", (event) => {
+		if (event.button !== 0 || !spotOf(event)) return;
+		if (!fingers.size) travelled = 0;
+		fingers.set(event.pointerId, { x: event.clientX, y: event.clientY });
+	});
+	body.addEventListener("pointermove", (event) => {
+		// It may have been let go outside, before anything was captured.
+		if (!event.buttons) fingers.delete(event.pointerId);
+		const before = fingers.get(event.pointerId);
+		const spot = spotOf(event);
+		if (!before || !spot) return;
+		const now = { x: event.clientX, y: event.clientY };
+		const [dx, dy] = [now.x - before.x, now.y - before.y];
+		travelled += Math.hypot(dx, dy);
+		fingers.set(event.pointerId, now);
+		if (travelled < STILL) return;
+		// From now on it is no click, and it goes on where it leaves the picture.
+		spot.cam.setPointerCapture(event.pointerId);
+		const zoom = store.get().zooms[spot.index];
+		const other = [...fingers].find(([id]) => id !== event.pointerId)?.[1];
+		if (other) {
+			const far = (/** @type {{x: number, y: number}} */ at) =>
+				Math.max(20, Math.hypot(at.x - other.x, at.y - other.y));
+			put(spot.index, magnified(zoom, far(now) / far(before), spot));
+		} else if (zoom) {
+			const [k, x, y] = zoom;
+			put(spot.index, [k, x - dx / (k * spot.width), y - dy / (k * spot.height)]);
+		}
+	});
+	for (const kind of /** @type {const} */ (["pointerup", "pointercancel"]))
+		body.addEventListener(kind, ({ pointerId }) => fingers.delete(pointerId));
+	body.addEventListener(
+		"click",
+		(event) => {
+			if (travelled >= STILL) event.stopPropagation();
+			travelled = 0;
+		},
+		true,
+	);
+}
 
 /** A second click within this time makes it a double click, milliseconds. */
 const DOUBLE_CLICK = 220;
@@ -341,6 +661,7 @@ export function mountCameras(root, { store, actions, playback }) {
 		);
 	}
 
+	mountMagnifier(body, store);
 	playback.onPaint(paint);
 	build();
 	store.on(["sequence"], ({ sequence }) => (sequence?.key ?? "") !== sequenceKey && build());

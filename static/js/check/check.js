@@ -1,6 +1,6 @@
 /** The place Check: the workbench, with the queue where the sliders stand and the tab Place. */
 import { one } from "../elements/dom.js";
-import { OPENED_AT } from "../panes/places.js";
+import { OPENED_AT } from "../panes/top.js";
 import { createCrops } from "./crops.js";
 import { mountFeet } from "./feet.js";
 import { checkOf } from "./model.js";

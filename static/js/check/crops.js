@@ -3,7 +3,7 @@ import { drawEmptyPicture } from "../draw/overlay.js";
 import { prepare } from "../draw/canvas.js";
 import { getJson, request } from "../state/api.js";
 import { shownVersion, versionOf } from "../state/events.js";
-import { pictureName } from "../play/pictures.js";
+import { pictureName } from "../play/cache.js";
 
 /** Kept at most: results of steps, and decoded pictures. */
 const RESULTS = 240;

@@ -3,46 +3,13 @@
  * picture, to be dragged or moved by arrows; and while a person is placed, every picture takes a
  * click.
  */
-import { lensOf } from "../draw/picture.js";
+import { clickOf, pixelOf, scaleOf } from "./edits.js";
 import { colourIndex, h, one } from "../elements/dom.js";
 import { getJson } from "../state/api.js";
 import { shownVersion } from "../state/events.js";
 
 /** Of a press of an arrow, pixels of the picture. */
 const [SMALL, LARGE] = [1, 10];
-
-/** How a cell shows its picture. @param {Element} cell @param {number} camera @param {Readonly<PageState>} state */
-function scaleOf(cell, camera, { zooms, cameras }) {
-	const { clientWidth: width, clientHeight: height } = cell;
-	const lens = lensOf(zooms[camera], width, height);
-	return { ...lens, scale: (width * lens.k) / cameras[camera].width };
-}
-
-/**
- * The pixel under the pointer, and of which camera.
- * @param {MouseEvent} event @param {Readonly<PageState>} state
- * @param {Element | null} cell  that is meant, where it is not under the pointer
- * @returns {Spot | null}
- */
-export function pixelOf(
-	{ target, clientX, clientY },
-	state,
-	cell = /** @type {Element} */ (target).closest(".cam"),
-) {
-	const index = cell ? [...one(".mosaic").children].indexOf(cell) : -1;
-	if (!cell || !state.cameras[index]) return null;
-	const edge = cell.getBoundingClientRect();
-	const { left, top, scale } = scaleOf(cell, index, state);
-	return {
-		index,
-		camera: state.cameras[index].name,
-		x: (clientX - edge.left + left) / scale,
-		y: (clientY - edge.top + top) / scale,
-	};
-}
-
-/** As it is said. @param {Spot} spot @returns {Click} */
-export const clickOf = ({ camera, x, y }) => ({ camera, x, y });
 
 /** @param {Context} context @param {Check} check */
 export function mountFeet({ store, playback }, check) {

@@ -2,8 +2,7 @@
  * In the timeline: numbered places in a row under the ruler, how it would be as ghosts in the lanes,
  * and pins and brackets where something was put right.
  */
-import { faded } from "../draw/colours.js";
-import { stroke, trace } from "../draw/canvas.js";
+import { faded, stroke, trace } from "../draw/canvas.js";
 import { fill, h, icon, one, write } from "../elements/dom.js";
 import { xOf } from "../play/clock.js";
 import { clockOf, middleOf } from "./words.js";

@@ -150,19 +150,23 @@ function createCheck({ store, actions, playback }) {
 			placing: null,
 		});
 		store.set({ signs: { ...store.get().signs, check: "" } });
-		void refresh();
 	});
+	/** @type {Timer} */
+	let waiting;
+	/** What follows one another at once is asked about once. @param {number} rest  milliseconds */
+	function soon(rest) {
+		clearTimeout(waiting);
+		waiting = setTimeout(() => void refresh(), Math.max(0, rest));
+	}
 	let heard = "";
 	// Lanes of another run come first: who opens one waits for them.
 	store.on(["server", "timeline"], ({ server, timeline }) => {
 		const now = `${server?.corrections?.key} ${timeline?.run}`;
 		if (!timeline || now === heard) return;
 		heard = now;
-		void refresh();
+		soon(100);
 	});
 	store.on(["place"], ({ place }) => place === "check" && void refresh());
-	/** @type {Timer} */
-	let waiting;
 	let ended = "";
 	store.watch(["run"], ({ run }) => {
 		const now = `${run?.key} ${run?.state}`;
@@ -170,9 +174,7 @@ function createCheck({ store, actions, playback }) {
 		// In Tune nobody looks at what a run under way leaves open.
 		if (run.state === "computing" && store.get().place !== "check") return;
 		ended = now;
-		clearTimeout(waiting);
-		const rest = run.state === "computing" ? OFTEN - (performance.now() - asked) : 100;
-		waiting = setTimeout(() => void refresh(), Math.max(0, rest));
+		soon(run.state === "computing" ? OFTEN - (performance.now() - asked) : 100);
 	});
 
 	return {

@@ -1,10 +1,9 @@
 /** The inspector's tab Place: one doubtful moment in pictures, what it could be, what to do. */
-import { palette } from "../draw/colours.js";
+import { palette } from "../draw/canvas.js";
 import { all, choices, colourIndex, fill, h, icon, idTag } from "../elements/dom.js";
-import { scoresOf, shownVersion } from "../state/events.js";
 import { commandOf, keyLabel, perform } from "../state/commands.js";
+import { scoresOf, shownVersion } from "../state/events.js";
 import { drawCrop } from "./crops.js";
-import { camerasOf, fillSights } from "./sights.js";
 import {
 	camerasFor,
 	filmSteps,
@@ -15,6 +14,61 @@ import {
 	standsFor,
 	unbroken,
 } from "./words.js";
+
+/* ---------- The film of somebody who may be missing: where each camera would have him. */
+
+/** @typedef {Doubt["sights"]} Sights */
+
+/** A camera's, in the order of steps. @param {Sights} sights @param {number} camera */
+const of = (sights, camera) => sights.filter((one) => one.camera === camera);
+
+/** The cameras, those first that would have him at most of the steps. @param {Sights} sights @param {number} cameras */
+const camerasOf = (sights, cameras) =>
+	Array.from({ length: cameras }, (_, camera) => camera).sort(
+		(a, b) => of(sights, b).length - of(sights, a).length || a - b,
+	);
+
+/**
+ * Fill a film with what a camera shows there.
+ * @param {HTMLElement} film @param {Sights} sights @param {number} camera
+ * @param {{views: PageState["cameras"], crops: ReturnType<typeof import("./crops.js").createCrops>, seek: (step: number) => void}} page
+ * @returns {number[]} its steps
+ */
+function fillSights(film, sights, camera, { views, crops, seek }) {
+	const own = of(sights, camera);
+	const shown = filmSteps(0, own.length - 1, { frames: own.length, fps: 1 }).map((k) => own[k]);
+	const name = views[camera]?.name ?? "";
+	film.ariaLabel = `Pictures of who may be missing by ${name}`;
+	film.style.setProperty("--rows", "1");
+	const canvases = shown.map(() => h("canvas", { "aria-hidden": "true" }));
+	fill(
+		film,
+		...shown.map(({ step }, k) =>
+			h("span", { class: "fs in", "--column": k + 2, "data-at": step }, step),
+		),
+		h("span", { class: "fid", "--row": 2 }, "?"),
+		...shown.map(({ step }, k) =>
+			h(
+				"button",
+				{
+					class: "fr in",
+					"--row": 2,
+					"--column": k + 2,
+					"--c": "var(--warn)",
+					"data-at": step,
+					"aria-label": `Step ${step} by ${name}`,
+					onclick: () => seek(step),
+				},
+				canvases[k],
+			),
+		),
+	);
+	shown.forEach(async ({ step, box }, k) => {
+		const bitmap = await crops.pictureOf(camera, step);
+		if (canvases[k].isConnected) drawCrop(canvases[k], bitmap, box, palette().id(1));
+	});
+	return shown.map(({ step }) => step);
+}
 
 /** People whose pictures are shown. */
 const ROWS = 2;

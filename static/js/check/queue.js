@@ -4,7 +4,7 @@ import { commandOf, keyLabel } from "../state/commands.js";
 import { shownVersion } from "../state/events.js";
 import { drawCrop } from "./crops.js";
 import { ICONS, camerasFor, clockOf, middleOf, percent, stepsOf, unbroken } from "./words.js";
-import { palette } from "../draw/colours.js";
+import { palette } from "../draw/canvas.js";
 
 /** Places that are listed. */
 const MOST = 200;

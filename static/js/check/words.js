@@ -147,7 +147,7 @@ export function standsFor(preview, id, result) {
  * @param {Server.TrackLife[]} tracks
  * @param {number} step
  */
-export function neighbours(id, result, tracks, step) {
+function neighbours(id, result, tracks, step) {
 	const own = result?.tracks.find((track) => track.id === id)?.position;
 	const placeOf = (/** @type {number} */ other) =>
 		result?.tracks.find((track) => track.id === other)?.position;

@@ -1,10 +1,126 @@
 /**
- * What is drawn over a picture. Dashed means "not seen by the current run here": truth and
+ * A picture and what is drawn over it. Dashed means "not seen by the current run here": truth and
  * coasting. Colour is the id's; the number is printed as well, but for a crowd in a small picture,
  * which numbers would hide: there those alone that are pointed at or selected.
  */
-import { faded } from "./colours.js";
-import { stroke, trace } from "./canvas.js";
+import { getJson } from "../state/api.js";
+import { faded, stroke, trace } from "./canvas.js";
+
+/* ---------- The grid on the room's floor in the pictures: it lies there as the calibration
+   says. */
+
+const LINE = "rgb(244 244 244 / .62)";
+const EDGE = "#8ecbff";
+
+/**
+ * The open recording's grid, read when somebody first wants to see it.
+ * @param {Store<PageState>} store
+ * @param {() => void} repaint
+ */
+export function createFloor(store, repaint) {
+	/** @type {Server.Floor | null} */
+	let floor = null;
+	let known = "";
+	store.watch(["layers2d", "server", "sequence"], async ({ layers2d, sequence }) => {
+		if (!layers2d.floor || !sequence) return;
+		// Another room has another floor; what it is of is asked for once.
+		const wanted = JSON.stringify([sequence.key, sequence.room]);
+		if (wanted === known) return;
+		known = wanted;
+		floor = null;
+		const told = await getJson("/api/floor").catch(() => null);
+		if (known !== wanted) return;
+		if (told) floor = told;
+		else known = "";
+		repaint();
+	});
+	return {
+		/** @param {number} camera */
+		of: (camera) => (store.get().layers2d.floor ? floor?.cameras[camera] : undefined),
+		/** Its spacing, where it is drawn. */
+		words: () => (store.get().layers2d.floor && floor ? `floor grid ${floor.cell} m` : ""),
+	};
+}
+
+/** @param {Brush} g @param {Server.CameraFloor} floor @param {number} scale */
+function drawFloor(g, { lines, edges }, scale) {
+	// A pixel's whole numbers are its middle.
+	const path = (/** @type {[number, number][]} */ line) =>
+		trace(
+			g,
+			line.map(([x, y]) => [(x + 0.5) * scale, (y + 0.5) * scale]),
+		);
+	for (const line of lines) stroke(path(line), LINE, 1, [], 0.3);
+	for (const line of edges) stroke(path(line), EDGE, 1.75, [], 0.45);
+}
+
+/* ---------- One camera's picture with what lies over it, at any magnification. ---------- */
+
+/** Of the loupe, CSS pixels, and as a share of its cell where that is small. */
+const [RADIUS, OF_CELL] = [84, 0.42];
+
+/**
+ * What of a magnified picture is in its cell.
+ * @param {Magnified | undefined} zoom
+ * @param {number} width  of the cell, CSS pixels @param {number} height
+ * @returns {Lens}
+ */
+export function lensOf(zoom, width, height) {
+	const [k, x, y] = zoom ?? [1, 0.5, 0.5];
+	const cut = (/** @type {number} */ centre, /** @type {number} */ side) =>
+		Math.round(Math.max(0, Math.min((k - 1) * side, centre * k * side - side / 2)));
+	return { k, left: cut(x, width), top: cut(y, height) };
+}
+
+/**
+ * @param {Brush} g
+ * @param {{bitmap: CanvasImageSource | null | undefined, maps: Picture[], faint: boolean,
+ * floor: Server.CameraFloor | undefined, view: Server.CameraStep | undefined}} what
+ * @param {Scene} scene  of the picture as it is
+ * @param {Lens} lens
+ */
+export function drawPicture(g, { bitmap, maps, faint, floor, view }, scene, { k, left, top }) {
+	const [width, height] = [scene.width * k, scene.height * k];
+	g.save();
+	g.translate(-left, -top);
+	// Enlarged much, a pixel is a square: nothing is made up between two.
+	g.imageSmoothingEnabled = scene.scale * k < 4;
+	g.imageSmoothingQuality = "medium";
+	if (!bitmap || faint) drawEmptyPicture(g, width, height);
+	// One of another step, which stands for one that is missing, never passes for it.
+	g.globalAlpha = faint ? 0.4 : 1;
+	if (bitmap) g.drawImage(bitmap, 0, 0, width, height);
+	g.globalAlpha = 1;
+	for (const map of maps) if (map.bitmap) g.drawImage(map.bitmap, 0, 0, width, height);
+	if (floor) drawFloor(g, floor, scene.scale * k);
+	// The overlay is drawn at the scale that it is seen at: its lines stay thin.
+	if (view) drawOverlay(g, view, { ...scene, scale: scene.scale * k, width, height });
+	g.restore();
+}
+
+/**
+ * A round glass over the picture, around a point of its cell.
+ * @param {Brush} g
+ * @param {Parameters<typeof drawPicture>[1]} what
+ * @param {Scene} scene
+ * @param {Lens} lens  that the picture is seen with
+ * @param {{x: number, y: number}} point
+ */
+export function drawLoupe(g, what, scene, { k, left, top }, { x, y }) {
+	const more = Math.max(4, k * 2.5);
+	const radius = Math.min(RADIUS, OF_CELL * Math.min(scene.width, scene.height));
+	const cut = (/** @type {number} */ at, /** @type {number} */ gone) =>
+		Math.round(((at + gone) / k) * more - at);
+	g.save();
+	g.beginPath();
+	g.arc(x, y, radius, 0, 7);
+	g.clip();
+	drawPicture(g, what, scene, { k: more, left: cut(x, left), top: cut(y, top) });
+	g.restore();
+	g.beginPath();
+	g.arc(x, y, radius, 0, 7);
+	stroke(g, "#f4f4f4", 2, [], 0.6);
+}
 
 /** As many as this in a small picture are a crowd. */
 const CROWD = 9;

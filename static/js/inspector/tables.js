@@ -1,10 +1,149 @@
 /**
  * The panels whose tables the server writes: they are fetched while they are looked at, when
- * something that they tell of is new. Their buttons name an action and its value.
+ * something that they tell of is new. Their buttons name an action and its value. Beside them what two
+ * panels have of their own: the check of identities, and the steps that somebody marked.
  */
-import { fetcher, request } from "../state/api.js";
+import { all, allow, choices, one, parts, write, fill, h, icon } from "../elements/dom.js";
+import { fetcher, request, getJson } from "../state/api.js";
 import { eventsNow, scoresOf } from "../state/events.js";
-import { all, allow, choices, one, parts, write } from "../elements/dom.js";
+
+/* ---------- The check of identities without truth: begun, watched and stopped. ---------- */
+
+const ASKS_MS = 400;
+
+/** @param {Context} context */
+export function mountIdentity({ store, actions }) {
+	let watching = false;
+
+	async function watch() {
+		if (watching) return;
+		watching = true;
+		for (;;) {
+			/** @type {Server.IdentityInfo | null} */
+			const identity = await getJson("/api/identity").catch(() => null);
+			if (identity) store.set({ identity });
+			if (identity?.state !== "looking") break;
+			await new Promise((resolve) => setTimeout(resolve, ASKS_MS));
+		}
+		watching = false;
+	}
+
+	actions.checkIdentities = async (what) => {
+		const told = await actions.ask(what === "stop" ? "DELETE" : "POST", "identity");
+		if (!told) return;
+		store.set({ identity: told });
+		void watch();
+	};
+	// It may have been begun in another window, or before this page was loaded; lanes come first.
+	let heard = "";
+	store.watch(["timeline", "tab"], ({ timeline, tab }) => {
+		const now = `${timeline?.run} ${tab}`;
+		if (!timeline || now === heard) return;
+		heard = now;
+		void watch();
+	});
+}
+
+/* ---------- Steps that somebody marked, each with a note: kept in this browser for each
+   recording. */
+
+const nameOf = (/** @type {string} */ recording) => `bookmarks ${recording}`;
+
+/** @param {string} recording @returns {Bookmark[]} */
+function kept(recording) {
+	try {
+		return JSON.parse(localStorage.getItem(nameOf(recording)) ?? "[]");
+	} catch {
+		return [];
+	}
+}
+
+/** @param {HTMLElement} root @param {Context} context */
+export function mountBookmarks(root, { store, actions, playback }) {
+	let recording = "";
+
+	/** @param {number} step @param {string | null} note  null: it is taken away */
+	function put(step, note) {
+		const others = store.get().bookmarks.filter((mark) => mark.step !== step);
+		const all = note === null ? others : [...others, { step, note }];
+		store.set({ bookmarks: all.sort((a, b) => a.step - b.step) });
+	}
+
+	function list() {
+		const { bookmarks } = store.get();
+		root.hidden = bookmarks.length === 0;
+		// A note that was just written stands there already, and a list that is drawn anew takes the
+		// button away on which its writer is pressing.
+		const notes = all("input", root);
+		const same = (/** @type {Bookmark} */ { step, note }, /** @type {number} */ k) =>
+			notes[k].id === `note-${step}` && notes[k].value === note;
+		if (notes.length === bookmarks.length && bookmarks.every(same)) return;
+		const held = document.activeElement?.id;
+		fill(
+			root,
+			bookmarks.map(({ step, note }) =>
+				h(
+					"li",
+					{},
+					h(
+						"button",
+						{
+							class: "btn box",
+							"aria-label": `Go to step ${step}`,
+							onclick: () => playback.seek(step),
+						},
+						step,
+					),
+					h("input", {
+						id: `note-${step}`,
+						"aria-label": `Note of step ${step}`,
+						placeholder: "note",
+						value: note,
+						maxlength: 200,
+						onchange: (/** @type {Event} */ { target }) =>
+							put(step, /** @type {HTMLInputElement} */ (target).value),
+						onkeydown: (/** @type {KeyboardEvent} */ { key, target }) =>
+							["Enter", "Escape"].includes(key) && /** @type {HTMLElement} */ (target).blur(),
+					}),
+					h(
+						"button",
+						{
+							class: "btn icon",
+							"aria-label": `Forget step ${step}`,
+							onclick: () => put(step, null),
+						},
+						icon("i-close", "s"),
+					),
+				),
+			),
+		);
+		if (held?.startsWith("note-")) document.getElementById(held)?.focus();
+	}
+
+	store.watch(["sequence"], ({ sequence }) => {
+		if (!sequence || sequence.opened_as === recording) return;
+		recording = sequence.opened_as;
+		store.set({ bookmarks: kept(recording) });
+	});
+	store.on(["bookmarks"], ({ bookmarks }) => {
+		list();
+		if (!recording) return;
+		try {
+			localStorage.setItem(nameOf(recording), JSON.stringify(bookmarks));
+		} catch {
+			// Without storage they last as long as the page.
+		}
+	});
+	actions.bookmark = () => {
+		const { shown, bookmarks } = store.get();
+		actions.showTab("events");
+		if (shown >= 0 && !bookmarks.some(({ step }) => step === shown)) put(shown, "");
+		list();
+		// Once the panel is there.
+		requestAnimationFrame(() => document.getElementById(`note-${shown}`)?.focus());
+	};
+	list();
+}
 
 /**
  * What a panel tells of, and where it comes from.

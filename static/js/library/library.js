@@ -1,12 +1,210 @@
 /** The place Library: recordings, the runs of one, and one run in small. */
-import { fill, h, icon } from "../elements/dom.js";
+import { fill, h, icon, write } from "../elements/dom.js";
 import { getJson } from "../state/api.js";
 import { chosenBar } from "./chosen.js";
-import { lostRecording } from "./lost.js";
 import { preview } from "./preview.js";
 import { runsTable } from "./runs.js";
-import { shelf } from "./shelf.js";
-import { has, many, titleOf } from "./words.js";
+import { has, many, titleOf, factsOf, size, when } from "./words.js";
+
+/* ---------- A recording whose folder is gone: its runs stay readable, and somebody may say
+   where it is now. */
+
+/**
+ * @param {object} how
+ * @param {Actions} how.actions
+ * @param {(recording: Server.RecordingInfo) => void} how.moved
+ */
+function lostRecording({ actions, moved }) {
+	/** @type {Server.RecordingInfo | null} */
+	let now = null;
+	const why = h("span", {});
+	const place = h("input", {
+		class: "field",
+		placeholder: "folder where it lies now",
+		"aria-label": "Folder where the recording lies now",
+		onkeydown: (/** @type {KeyboardEvent} */ event) => event.key === "Enter" && void find(),
+	});
+	const element = h(
+		"div",
+		{ class: "lost", role: "status", hidden: true },
+		why,
+		place,
+		h("button", { class: "btn box", onclick: () => void find() }, "Find…"),
+	);
+
+	async function find() {
+		if (!now || now.id === null) return;
+		if (!place.value.trim()) return place.focus();
+		const told = await actions.ask("POST", `library/recordings/${now.id}/place`, {
+			place: place.value.trim(),
+		});
+		if (!told) return;
+		place.value = "";
+		moved(told);
+	}
+
+	return {
+		element,
+		/** @param {Server.RecordingInfo | null} recording */
+		show(recording) {
+			now = recording;
+			element.hidden = !recording?.missing || recording.id === null;
+			write(why, `${recording?.missing ?? ""}. Its runs stay readable.`);
+		},
+	};
+}
+
+/* ---------- The recordings of the library, own and rendered ones, as a list to choose from. */
+
+const KINDS = /** @type {const} */ ([
+	["Own", "folder"],
+	["Built-in rooms", "rendered"],
+]);
+
+/** What recordings are sorted by; as they come they are by when they were opened. */
+/** @type {Record<string, (a: Server.RecordingInfo, b: Server.RecordingInfo) => number>} */
+const ORDERS = {
+	"last opened": () => 0,
+	name: (a, b) => a.name.localeCompare(b.name, undefined, { numeric: true }),
+	"most runs": (a, b) => b.runs - a.runs,
+	longest: (a, b) => b.frames - a.frames,
+};
+
+/** Its own, once it was opened; else one of the list of what can be opened, if it has any. */
+/** @param {Server.RecordingInfo} one */
+function picture(one) {
+	const kept = one.id !== null;
+	if (one.boxes_only) return icon("i-boxes", "l");
+	if (one.missing || (kept && !one.has_thumbnail)) return icon("i-folder");
+	const src = kept
+		? `/api/library/thumbnail/${one.id}.jpg`
+		: `/api/recordings/picture?name=${encodeURIComponent(one.name)}`;
+	const image = h("img", { src, alt: "", loading: "lazy" });
+	image.onerror = () => image.replaceWith(icon("i-folder"));
+	return image;
+}
+
+/**
+ * @param {object} on
+ * @param {(recording: Server.RecordingInfo) => void} on.choose
+ * @param {(recording: Server.RecordingInfo) => void} on.open
+ * @param {() => void} on.add  another recording is wanted
+ * @param {() => void} on.find
+ */
+function shelf(on) {
+	const find = h("input", {
+		type: "search",
+		placeholder: "find",
+		title: "A recording, a run or a note",
+		"aria-label": "Find",
+		oninput: () => on.find(),
+	});
+	const order = h(
+		"select",
+		{ "aria-label": "Sort recordings by", onchange: () => on.find() },
+		Object.keys(ORDERS).map((word) => h("option", {}, word)),
+	);
+	const list = h("div", { class: "scroll list", role: "listbox", "aria-label": "Recordings" });
+	const foot = h("div", { class: "foot" });
+	const element = h(
+		"section",
+		{ class: "pane", "aria-label": "Recordings" },
+		h(
+			"div",
+			{ class: "pane-head" },
+			h("h2", { class: "pane-title" }, "Recordings"),
+			h("span", { class: "grow" }),
+			h("button", { class: "btn", "data-key": "Ctrl O", onclick: on.add }, "Open…"),
+		),
+		h("div", { class: "lib-find" }, icon("i-search", "s"), find, order),
+		list,
+		foot,
+	);
+
+	/** @param {Server.RecordingInfo} one @param {boolean} chosen */
+	const item = (one, chosen) =>
+		h(
+			"button",
+			{
+				class: `item${one.missing ? " bad" : ""}`,
+				role: "option",
+				"aria-selected": String(chosen),
+				tabindex: chosen ? 0 : -1,
+				title: one.place,
+				onclick: () => on.choose(one),
+				ondblclick: () => on.open(one),
+			},
+			h("span", { class: "th" }, picture(one)),
+			h(
+				"span",
+				{ class: "tx" },
+				h("b", {}, one.name),
+				h("span", { class: `small${one.missing ? " missing" : ""}` }, factsOf(one)),
+			),
+			h(
+				"span",
+				{ class: "en" },
+				h("b", {}, one.runs || ""),
+				h("span", { class: "small" }, one.opened ? when(one.opened) : ""),
+			),
+		);
+
+	return {
+		element,
+		/** Where somebody writes what is sought. */
+		find,
+		/** What is sought. */
+		text: () => find.value.trim(),
+		reveal: () =>
+			list.querySelector('[aria-selected="true"]')?.scrollIntoView({ block: "nearest" }),
+		/**
+		 * From one to the next by an arrow; whether the key was one of the list's.
+		 * @param {KeyboardEvent} event
+		 */
+		walk({ key, target }) {
+			const from = /** @type {HTMLElement} */ (target);
+			if (!list.contains(from) || !["ArrowDown", "ArrowUp"].includes(key)) return false;
+			const items = [...list.querySelectorAll("button")];
+			const next = items[items.indexOf(/** @type {any} */ (from)) + (key === "ArrowDown" ? 1 : -1)];
+			next?.focus();
+			next?.click();
+			return true;
+		},
+		/**
+		 * @param {Server.LibraryInfo} library
+		 * @param {Server.RecordingInfo | null} recording  whose runs are listed
+		 */
+		show(library, recording) {
+			const text = this.text();
+			const walked = list.contains(document.activeElement);
+			fill(
+				list,
+				KINDS.flatMap(([word, kind]) => {
+					const found = library.recordings
+						.toSorted(ORDERS[order.value] ?? (() => 0))
+						.filter(
+							(one) =>
+								one.kind === kind &&
+								(!text || has(text, [one.name, one.place]) || one.place === recording?.place),
+						);
+					const head = h("div", { class: "cap" }, h("span", {}, word), h("span", {}, "runs"));
+					const items = found.map((one) => item(one, one.place === recording?.place));
+					return found.length ? [head, ...items] : [];
+				}),
+			);
+			// The items are new: who walks through them by arrows goes on from the chosen one.
+			if (walked)
+				/** @type {HTMLElement | null} */ (list.querySelector('[aria-selected="true"]'))?.focus();
+			const kept = library.recordings.reduce((sum, one) => sum + one.runs, 0);
+			fill(
+				foot,
+				library.error ??
+					`${many(kept, "run")} · ${size(library.bytes)}${library.read_only ? " · read only" : ""}`,
+			);
+			foot.title = library.file;
+		},
+	};
+}
 
 /** A run that has just ended is kept a moment later. */
 const KEPT_MS = 1500;

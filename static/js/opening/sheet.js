@@ -1,8 +1,152 @@
 /** The sheet that opens recordings: by a key, by a drop anywhere, from files or from the disk. */
-import { all, h, one } from "../elements/dom.js";
+import { all, h, one, write } from "../elements/dom.js";
 import { ApiError, getJson, request, sendJson } from "../state/api.js";
-import { mountPlan } from "./plan.js";
-import { ANNOUNCED, announced, chosen, dropped, send } from "./upload.js";
+
+/* ---------- Files that a person drops or chooses, and the way of their bytes to the server. */
+
+/** Bytes of a piece: as much as the server takes at once. */
+const PIECE = 1 << 20;
+
+/** Files that are announced at once, so that their names fit into what the server takes. */
+const ANNOUNCED = 2000;
+
+/** Files on their way at once. */
+const AT_ONCE = 3;
+
+/** Files of the system and of editors, which nobody means. @param {string} path */
+const meant = (path) => !path.split("/").some((part) => part.startsWith("."));
+
+/** What was dropped, folders with all in them. @param {any[]} entries @returns {Promise<Dropped[]>} */
+async function dropped(entries) {
+	/** @type {Dropped[]} */
+	const found = [];
+	/** @param {any} entry @param {string} above */
+	async function walk(entry, above) {
+		const path = above + entry.name;
+		if (!meant(path)) return;
+		if (entry.isFile) {
+			const file = await new Promise((good, bad) => entry.file(good, bad));
+			found.push({ path, file });
+			return;
+		}
+		const reader = entry.createReader();
+		// A reader gives some at a time, and none at the end.
+		for (;;) {
+			const some = await new Promise((good, bad) => reader.readEntries(good, bad));
+			if (!some.length) return;
+			for (const one of some) await walk(one, `${path}/`);
+		}
+	}
+	for (const entry of entries) if (entry) await walk(entry, "");
+	return found;
+}
+
+/** What was chosen in a dialog. @param {FileList} files @returns {Dropped[]} */
+const chosen = (files) =>
+	[...files]
+		.map((file) => ({ path: file.webkitRelativePath || file.name, file }))
+		.filter(({ path }) => meant(path));
+
+/** What the server is told of them. @param {Dropped[]} files */
+const announced = (files) => ({
+	files: files.map(({ path, file }) => ({ path, bytes: file.size })),
+});
+
+/**
+ * Send files piece by piece.
+ * @param {string} key  of the import
+ * @param {number[]} numbers  of them, as the server counts
+ * @param {Dropped[]} files
+ * @param {AbortSignal} signal
+ * @param {(bytes: number) => void} tell  how many more are there
+ */
+async function send(key, numbers, files, signal, tell) {
+	let next = 0;
+	async function work() {
+		while (next < files.length) {
+			const number = next;
+			next += 1;
+			const { file } = files[number];
+			for (let offset = 0; offset < file.size; offset += PIECE) {
+				const body = file.slice(offset, offset + PIECE);
+				const path = `/api/import/${key}/files/${numbers[number]}?offset=${offset}`;
+				await request(path, { method: "PUT", body, signal });
+				tell(body.size);
+			}
+		}
+	}
+	await Promise.all(Array.from({ length: AT_ONCE }, work));
+}
+
+/* ---------- The room from above: the box around it, whose faces are dragged or moved by arrows. */
+
+/**
+ * @param {any} svg  as the server draws it, in metres
+ * @param {number[][]} room  lowest and highest corner
+ * @param {(room: any) => void} put  the corners, when they are let go
+ */
+function mountPlan(svg, room, put) {
+	const [left, bottom, high] = JSON.parse(svg.dataset.plan);
+	const at = (/** @type {number} */ x, /** @type {number} */ y) => [x - left, high - (y - bottom)];
+	/** @type {number[] | null} */
+	let held = null;
+
+	function place() {
+		const [[x, v], [u, y]] = [at(room[0][0], room[0][1]), at(room[1][0], room[1][1])];
+		const [width, height] = [u - x, v - y];
+		for (const [name, value] of Object.entries({ x, y, width, height }))
+			one(".box", svg).setAttribute(name, String(value));
+		for (const grip of all(".grip", svg)) {
+			const [axis, end] = (grip.dataset.face ?? "").split(" ").map(Number);
+			const to = axis ? [x + width / 2, end ? y : v] : [end ? u : x, y + height / 2];
+			grip.setAttribute("transform", `translate(${to})`);
+		}
+		all(".length", svg).forEach((text, axis) => {
+			write(text, `${(room[1][axis] - room[0][axis]).toFixed(2)} m`);
+			const to = axis ? [u - width * 0.16, y + height / 2] : [x + width / 2, y + height * 0.1];
+			text.setAttribute("transform", `translate(${to})`);
+		});
+	}
+
+	/** @param {number[]} face  axis and end @param {number} to */
+	function move([axis, end], to) {
+		const rounded = Math.round(to * 20) / 20;
+		if (end ? rounded > room[0][axis] : rounded < room[1][axis]) room[end][axis] = rounded;
+		place();
+	}
+	svg.onpointerdown = (/** @type {any} */ { target, pointerId }) => {
+		if (!target.dataset.face) return;
+		held = target.dataset.face.split(" ").map(Number);
+		svg.setPointerCapture(pointerId);
+		svg.dataset.held = "";
+	};
+	svg.onpointermove = (/** @type {PointerEvent} */ { clientX, clientY }) => {
+		if (!held) return;
+		const { x, y } = new DOMPoint(clientX, clientY).matrixTransform(svg.getScreenCTM().inverse());
+		move(held, [x + left, bottom + high - y][held[0]]);
+	};
+	svg.onpointerup = svg.onpointercancel = () => {
+		delete svg.dataset.held;
+		if (held) put(room);
+		held = null;
+	};
+	svg.onkeydown = (/** @type {KeyboardEvent} */ event) => {
+		const by = { ArrowLeft: -0.05, ArrowRight: 0.05, ArrowDown: -0.05, ArrowUp: 0.05 }[event.key];
+		if (!by) return;
+		event.preventDefault();
+		svg.dataset.held = "";
+		const [axis, end] = [/Left|Right/.test(event.key) ? 0 : 1, event.shiftKey ? 1 : 0];
+		move([axis, end], room[end][axis] + by);
+	};
+	svg.onkeyup = (/** @type {KeyboardEvent} */ { key }) => {
+		if (!key.startsWith("Arrow")) return;
+		delete svg.dataset.held;
+		put(room);
+	};
+	// The key may be let go elsewhere.
+	svg.onblur = () => delete svg.dataset.held;
+	place();
+}
 
 const ASK_AGAIN = 400;
 const CONTROLS = "button, input, select, [tabindex]";

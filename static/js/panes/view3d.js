@@ -1,7 +1,65 @@
 /** The 3D pane: viser's page inside ours, with its layers and view points. */
 import { drawing } from "../draw/canvas.js";
-import { all, fill, h, icon, parts } from "../elements/dom.js";
-import { pace } from "../play/pace.js";
+import { all, fill, h, icon, one, parts } from "../elements/dom.js";
+
+/* ---------- How often another document of this window draws: viser goes on drawing for a while
+   after each change, and where there is no graphics card each of its frames is one that pictures
+   and overlays have to wait for. */
+
+/** Who turns or moves the 3D view wants every frame, for so long after, milliseconds. */
+const TOUCHED = 400;
+
+/**
+ * Have a window's animation frames come no earlier than they may.
+ * @param {Window} view
+ * @param {(last: number, cost: number) => number} after  when, from when the last one was (the page's
+ * clock) and how long it was until the browser was ready for another
+ */
+export function pace(view, after) {
+	const ask = view.requestAnimationFrame.bind(view);
+	const cancel = view.cancelAnimationFrame.bind(view);
+	/** Those that wait, by a number of ours. @type {Map<number, Timer>} */
+	const waiting = new Map();
+	/** What the browser calls those that have waited. @type {Map<number, number>} */
+	const asked = new Map();
+	let [last, cost, touched, counted] = [0, 0, -Infinity, 2 ** 31];
+
+	for (const name of ["pointerdown", "pointermove", "wheel"])
+		view.addEventListener(
+			name,
+			(event) => {
+				if (name !== "pointermove" || /** @type {PointerEvent} */ (event).buttons)
+					touched = performance.now();
+			},
+			{ capture: true, passive: true },
+		);
+	view.requestAnimationFrame = (act) => {
+		const now = performance.now();
+		const rest = now - touched < TOUCHED ? 0 : after(last, cost) - now;
+		if (rest <= 0) return ask(drawn(act));
+		const own = (counted += 1);
+		const then = () => {
+			waiting.delete(own);
+			const known = ask((time) => (asked.delete(own), drawn(act)(time)));
+			asked.set(own, known);
+		};
+		waiting.set(own, setTimeout(then, rest));
+		return own;
+	};
+	view.cancelAnimationFrame = (number) => {
+		clearTimeout(waiting.get(number));
+		waiting.delete(number);
+		cancel(asked.get(number) ?? number);
+		asked.delete(number);
+	};
+	/** @param {FrameRequestCallback} act @returns {FrameRequestCallback} */
+	const drawn = (act) => (time) => {
+		const begun = (last = performance.now());
+		act(time);
+		// What was told to the graphics card is still to be drawn.
+		ask(() => (cost = performance.now() - begun));
+	};
+}
 
 /** What draws WebGL here where it is no graphics card; empty where it is one, or not told. */
 function softwareRenderer() {
@@ -36,31 +94,24 @@ export function mountView3d(root, { store, actions, playback, retry, press }) {
 		software.hidden = false;
 	}
 
-	/**
-	 * Load viser's page, but only once it answers: a browser's error page inside ours says nothing.
-	 */
 	async function load() {
 		clearTimeout(timer);
 		if (!path) return;
 		await painted;
-		reachable = await fetch(path, { cache: "no-store" }).then(
-			({ ok }) => ok,
-			() => false,
-		);
-		if (reachable) {
-			tries = 0;
-			frame.src = path;
-		} else {
-			tries += 1;
-			if (store.get().link === "open") timer = setTimeout(load, Math.min(8000, 1000 * 2 ** tries));
-		}
-		cover();
+		frame.src = path;
 	}
 	// After a click into 3D its document has the keys; ours come first, but for those that move its
 	// camera.
 	frame.addEventListener("load", () => {
 		const view = frame.contentWindow;
-		if (!view) return;
+		if (!view || !frame.src) return;
+		// A browser's error page, which is nobody's to read, or the server's word that 3D is not there.
+		reachable = Boolean(frame.contentDocument?.getElementById("root"));
+		tries = reachable ? 0 : tries + 1;
+		if (!reachable && store.get().link === "open")
+			timer = setTimeout(load, Math.min(8000, 1000 * 2 ** tries));
+		cover();
+		if (!reachable) return;
 		pace(view, playback.after3d);
 		// Its panel leaves out what the page around it says already.
 		view.document.documentElement.classList.add("mvp-inside");
@@ -103,6 +154,9 @@ export function mountView3d(root, { store, actions, playback, retry, press }) {
 
 	function header() {
 		const { server, cameras, link } = store.get();
+		one("[data-command=edit-room]", root).ariaPressed = String(
+			Boolean(server?.teaching.editing_room),
+		);
 		/** @type {[string, number | "top" | null, string, string][]} */
 		const points = [
 			["free", null, "Free view", "0"],

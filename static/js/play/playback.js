@@ -5,11 +5,58 @@
  * pictures and its result are there: all cameras, overlays, readout and playhead in one
  * animation frame. Until then the last whole step stays.
  */
+import { getJson } from "../state/api.js";
 import { shownVersion, versionOf } from "../state/events.js";
-import { createCache } from "./cache.js";
+import {
+	createCache,
+	createPictures,
+	mapNames,
+	pictureName,
+	standIn,
+	PICTURE_BUDGET,
+} from "./cache.js";
 import { advance, clampStep, playedRange, prefetchWindow, restAfter3d, restOf3d } from "./clock.js";
-import { createPictures, mapNames, pictureName, standIn, PICTURE_BUDGET } from "./pictures.js";
-import { createStepLoader } from "./steps.js";
+
+/* ---------- Results of steps from the server: those that are asked for at once come by one
+   request. */
+
+/** @typedef {{ resolve: (result: Server.Step) => void, reject: (error: unknown) => void }} Waiting */
+
+/** @returns {(step: number, query: string, signal: AbortSignal) => Promise<Server.Step>} */
+function createStepLoader() {
+	/** By what is asked for besides the step.  @type {Map<string, Map<number, Waiting>>} */
+	let asked = new Map();
+
+	function send() {
+		const now = asked;
+		asked = new Map();
+		for (const [query, waiting] of now) if (waiting.size) void load(query, waiting);
+	}
+
+	/** @param {string} query @param {Map<number, Waiting>} waiting */
+	async function load(query, waiting) {
+		const steps = [...waiting.keys()].map((step) => `step=${step}`);
+		try {
+			/** @type {Server.Step[]} */
+			const results = await getJson(`/api/steps?${steps.join("&")}${query}`);
+			for (const result of results) waiting.get(result.step)?.resolve(result);
+		} catch (error) {
+			for (const { reject } of waiting.values()) reject(error);
+		}
+	}
+
+	return (step, query, signal) =>
+		new Promise((resolve, reject) => {
+			if (asked.size === 0) setTimeout(send, 0);
+			const waiting = asked.get(query) ?? new Map();
+			asked.set(query, waiting);
+			waiting.set(step, { resolve, reject });
+			signal.addEventListener("abort", () => {
+				waiting.delete(step);
+				reject(signal.reason);
+			});
+		});
+}
 
 const RESULTS_KEPT = 600;
 
@@ -115,7 +162,7 @@ export function createPlayback(store, sendSeek) {
 	/** @param {PageState} state */
 	function refreshWindow(state) {
 		windowDirty = false;
-		const { sequence, step, speed, playing, layers2d, nearest } = state;
+		const { sequence, step, speed, playing, layers2d, nearest, moved } = state;
 		if (!sequence) {
 			pictures.want([]);
 			results.want([]);
@@ -135,8 +182,10 @@ export function createPlayback(store, sendSeek) {
 		around = step;
 		const still = playing || performance.now() - jumpedAt >= STILL;
 		const steps = still ? prefetchWindow(step, { ...how, most }) : [step];
+		// Of a recording at which somebody only looks no more pictures are read than are seen.
+		const seen = moved || playing ? steps : [step];
 		pictures.want(
-			steps.flatMap((k) => {
+			seen.flatMap((k) => {
 				const result = results.get(resultName(shownVersion(state), k, queryNow()));
 				const maps = result ? mapNames(sequence.key, result, layers2d).flat() : [];
 				return [
@@ -250,7 +299,7 @@ export function createPlayback(store, sendSeek) {
 		ask();
 	});
 	store.on(["nearest"], () => (dirty = true));
-	store.on(["step", "playing", "speed", "layers2d", "link", "nearest"], () => {
+	store.on(["step", "playing", "moved", "speed", "layers2d", "link", "nearest"], () => {
 		windowDirty = true;
 		ask();
 	});

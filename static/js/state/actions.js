@@ -180,7 +180,8 @@ export function createActions({ store, seek, send, receive }) {
 			actions.select(id);
 		},
 		clear() {
-			if (store.get().layout.max) actions.maximise(store.get().layout.max ?? null);
+			if (store.get().server?.teaching.editing_room) actions.editRoom();
+			else if (store.get().layout.max) actions.maximise(store.get().layout.max ?? null);
 			else actions.select(null);
 		},
 		exportTracks: () =>

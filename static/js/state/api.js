@@ -83,7 +83,7 @@ export function fetcher(work, rest = () => 150) {
  * @param {number} tries  failed so far
  * @returns {number} milliseconds
  */
-export function backoff(tries) {
+function backoff(tries) {
 	return Math.min(5000, 300 * 2 ** Math.min(10, tries));
 }
 

@@ -208,7 +208,8 @@ export function createReceiver({ store, playback, actions, address, isOld }) {
 		/** The socket is open: fetch what it does not bring. */
 		refresh() {
 			if (!store.get().schema) void fetchSchema();
-			void fetchSequences();
+			// The server's first word has it asked for.
+			if (store.get().server) void fetchSequences();
 			void fetchTimeline();
 			void fetchScores();
 		},

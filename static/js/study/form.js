@@ -1,14 +1,440 @@
 /** What a study tries: written down before it starts, locked afterwards. */
-import { choices, fill, h, icon } from "../elements/dom.js";
+import { choices, fill, h, icon, symbolOf } from "../elements/dom.js";
 import { getJson, sendJson } from "../state/api.js";
-import { SEARCHES, numberField, tag } from "./fields.js";
-import { lockedParts } from "./locked.js";
-import { objectiveCards } from "./objective.js";
-import { parameterRanges, rangeOf } from "./ranges.js";
 import { placeOf, runsOn } from "./where.js";
 import { nameOf, valueOf } from "./words.js";
 
-/** @import { Range } from "./ranges.js" */
+/* ---------- Small pieces of what is written down of a study. ---------- */
+
+/** @type {[string, string][]} */
+const SEARCHES = [
+	["auto", "narrowing"],
+	["tpe", "narrowing, one figure"],
+	["nsga2", "evolution"],
+	["random", "at random"],
+	["grid", "grid"],
+];
+
+/**
+ * @param {() => void} changed
+ * @param {string} label
+ * @param {number | null} value
+ * @param {(value: number | null) => void} set
+ * @param {object} [more]
+ */
+export function numberField(changed, label, value, set, more = {}) {
+	const field = h("input", {
+		type: "number",
+		step: "any",
+		class: "field",
+		value: value ?? "",
+		"aria-label": label,
+		...more,
+		oninput: () => {
+			set(field.value === "" ? null : Number(field.value));
+			changed();
+		},
+	});
+	return field;
+}
+
+/** @param {string} word @param {false | (() => void)} out @param {string} [title] */
+const tag = (word, out, title) =>
+	h(
+		"span",
+		{ class: "pc", title: title ?? word },
+		word,
+		out &&
+			h(
+				"button",
+				{ class: "btn icon", "aria-label": `Leave out ${word}`, onclick: out },
+				icon("i-close", "s"),
+			),
+	);
+
+/**
+ * Parameters and their ranges, a row each.
+ * @param {Child} count
+ * @param {Child[]} rows
+ * @param {string} [last]  what a further column is for
+ */
+const rangesBlock = (count, rows, last) => [
+	h(
+		"h3",
+		{ class: "h" },
+		"Parameters",
+		h("span", { class: "grow" }),
+		h("span", { class: "small" }, count),
+	),
+	h(
+		"table",
+		{ class: "pt" },
+		h(
+			"thead",
+			{},
+			h(
+				"tr",
+				{},
+				h("th", {}, "name"),
+				h("th", { class: "num" }, "from"),
+				h("th", { class: "num" }, "to"),
+				h("th", {}, "scale"),
+				last && h("th", {}, h("span", { class: "vh" }, last)),
+			),
+		),
+		h("tbody", {}, rows),
+	),
+];
+
+/**
+ * One of several cards, of which one is chosen.
+ * @param {boolean} on  whether it is this one
+ * @param {string} title
+ * @param {() => void} choose
+ * @param {boolean} can  whether it may be chosen
+ * @param {...Child} rest  what stands below its title
+ */
+export const choiceCard = (on, title, choose, can, ...rest) =>
+	h(
+		"div",
+		{ class: `choice${on ? " on" : ""}` },
+		h(
+			"button",
+			{
+				class: "as-text",
+				role: "radio",
+				"aria-checked": String(on),
+				disabled: !can,
+				onclick: choose,
+			},
+			h("b", {}, title),
+		),
+		rest,
+	);
+
+/* ---------- What a study that is there tries: it cannot change. ---------- */
+
+/** @param {Server.Study} study */
+function lockedParts(study) {
+	const { definition: told } = study;
+	/** @param {string} word @param {Child} value */
+	const line = (word, value) =>
+		h("div", { class: "pairline" }, h("span", {}, word), h("span", {}, value));
+	const seeds = Array.isArray(told.seeds) ? told.seeds.length : told.seeds;
+	return [
+		h(
+			"div",
+			{ class: "blk" },
+			h("h3", { class: "h" }, "Recordings"),
+			h(
+				"div",
+				{ class: "tags" },
+				told.recordings.map((/** @type {string} */ place) => tag(nameOf(place), false, place)),
+			),
+		),
+		h(
+			"div",
+			{ class: "blk" },
+			rangesBlock(
+				study.varied.length,
+				study.varied.map(({ label, symbol, help, low, high, log, choices: all }) =>
+					h(
+						"tr",
+						{},
+						h("td", { title: help }, h("span", { class: "lab" }, label), " ", symbolOf(symbol)),
+						all.length
+							? h("td", { class: "num", colspan: 3 }, all.map(valueOf).join(", "))
+							: [
+									h("td", { class: "num" }, valueOf(low)),
+									h("td", { class: "num" }, valueOf(high)),
+									h("td", {}, log ? "log" : "linear"),
+								],
+					),
+				),
+			),
+		),
+		h(
+			"div",
+			{ class: "blk" },
+			h("h3", { class: "h" }, "Search"),
+			line("trials", study.info.trials ?? "as many as fit"),
+			line("seeds", seeds),
+			line("search", SEARCHES.find(([key]) => key === told.search)?.[1] ?? told.search),
+			told.minutes && line("at most", `${told.minutes} min`),
+			line(
+				"best is",
+				study.objectives.map(({ name, higher }) => `${name} ${higher ? "↑" : "↓"}`).join(", "),
+			),
+		),
+	];
+}
+
+/* ---------- What trials are judged by: figures against the truth, or agreement where nobody
+   knows it. */
+
+/**
+ * @param {Wish} now
+ * @param {Server.ObjectiveInfo[]} figures  all that there are
+ * @param {{hasTruth: boolean, cameras: number}} of  the recording that is open
+ * @param {{changed: () => void, show: () => void}} on
+ */
+function objectiveCards(now, figures, { hasTruth, cameras }, { changed, show }) {
+	const leads = {
+		truth: figures.filter(({ of }) => of !== "agreement"),
+		agreement: figures.filter(({ of }) => of === "agreement"),
+	};
+	const byAgreement = leads.agreement.some(({ key }) => key === now.objectives[0]);
+	/** @param {string[]} next */
+	const set = (next) => {
+		now.objectives = [...new Set(next.filter(Boolean))];
+		show();
+		changed();
+	};
+
+	/** @param {number} place @param {string} word @param {Server.ObjectiveInfo[]} from */
+	const chooser = (place, word, from) => {
+		const free = from.filter(
+			({ key }) => now.objectives[place] === key || !now.objectives.includes(key),
+		);
+		const select = h("select", {
+			class: "field",
+			"aria-label": word,
+			onchange: () => set(now.objectives.with(place, select.value)),
+		});
+		if (place === now.objectives.length)
+			select.onchange = () => set([...now.objectives, select.value]);
+		choices(
+			select,
+			[
+				...(place ? [/** @type {[string, string]} */ (["", "nothing else"])] : []),
+				...free.map(
+					({ key, name, higher }) =>
+						/** @type {[string, string]} */ ([
+							key,
+							`${name}, ${higher ? "more" : "less"} is better`,
+						]),
+				),
+			],
+			now.objectives[place] ?? "",
+		);
+		return h("label", {}, h("span", {}, word), select);
+	};
+
+	/** @param {"truth" | "agreement"} kind @param {string} title @param {string} beside @param {...Child} rest */
+	const card = (kind, title, beside, ...rest) => {
+		const on = byAgreement === (kind === "agreement");
+		const can = leads[kind].length > 0 && (kind === "agreement" || hasTruth);
+		return choiceCard(
+			on,
+			title,
+			() => !on && set([usual(kind)]),
+			on || can,
+			h("span", { class: "small beside" }, beside),
+			...rest,
+		);
+	};
+	/** @param {"truth" | "agreement"} kind */
+	const usual = (kind) =>
+		(leads[kind].find(({ key }) => kind === "agreement" || key === "idf1") ?? leads[kind][0]).key;
+	const others = figures.filter(({ of }) => hasTruth || of !== "truth");
+	const lead = figures.find(({ key }) => key === now.objectives[0]);
+	const [known] = leads.agreement;
+
+	return h(
+		"div",
+		{ class: "blk" },
+		h("h3", { class: "h" }, "Objective"),
+		h(
+			"div",
+			{ role: "radiogroup", "aria-label": "Objective", class: "stack" },
+			card(
+				"truth",
+				"Truth",
+				hasTruth ? "" : "not there",
+				!byAgreement && chooser(0, "best is", leads.truth),
+				h(
+					"span",
+					{ class: "small", title: byAgreement ? null : lead?.help },
+					hasTruth
+						? "mean over recordings and seeds of a figure against the truth"
+						: "no one knows where people were in this recording",
+				),
+			),
+			card(
+				"agreement",
+				"Held-out camera",
+				"no truth needed",
+				h(
+					"span",
+					{ class: "small", title: known?.help },
+					cameras > 1
+						? "do runs backwards and without each camera find the same people? None is best whose people miss the boxes of a camera that was left out"
+						: "one camera cannot be left out: only the run backwards is held against it",
+				),
+				byAgreement &&
+					h(
+						"span",
+						{ class: "small warn" },
+						"a tracker can be consistently wrong: look at the best trial before you use it",
+					),
+			),
+		),
+		h(
+			"div",
+			{ class: "stack" },
+			now.objectives.length > 0 && chooser(1, "against", others),
+			now.objectives.length > 1 && chooser(2, "and", others),
+		),
+	);
+}
+
+/* ---------- How far each parameter is varied. ---------- */
+
+/** @typedef {{low: number | null, high: number | null, log: boolean, choices: any[] | null}} Range */
+/** @typedef {{changed: () => void, show: () => void, add: (key: string) => Promise<void>}} On */
+
+/** @param {Server.RangeInfo} range @returns {Range} */
+const rangeOf = ({ low, high, log, choices: all }) => ({
+	low,
+	high,
+	log,
+	choices: all.length ? [...all] : null,
+});
+
+/**
+ * The parameters that are varied, each with its range.
+ * @param {Wish} now
+ * @param {Server.RangeInfo[]} known  those that were ever chosen
+ * @param {Server.ParameterInfo[]} all
+ * @param {On} on
+ */
+function parameterRanges(now, known, all, on) {
+	const rest = all.filter(({ key }) => !(key in now.parameters));
+	const more = h("select", {
+		class: "field",
+		"aria-label": "Vary another parameter",
+		onchange: () => void on.add(more.value),
+	});
+	choices(
+		more,
+		[
+			["", "vary another…"],
+			...rest.map(
+				({ key, label, group }) => /** @type {[string, string]} */ ([key, `${label} · ${group}`]),
+			),
+		],
+		"",
+	);
+	return h(
+		"div",
+		{ class: "blk" },
+		rangesBlock(
+			`${Object.keys(now.parameters).length} of ${all.length}`,
+			Object.entries(now.parameters).map(([key, range]) => parameter(now, known, key, range, on)),
+			"leave out",
+		),
+		more,
+	);
+}
+
+/**
+ * @param {Wish} now
+ * @param {Server.RangeInfo[]} known
+ * @param {string} key
+ * @param {Range} range
+ * @param {On} on
+ */
+function parameter(now, known, key, range, { changed, show }) {
+	const found = known.find((one) => one.key === key);
+	const label = found?.label ?? key;
+	const out = h(
+		"button",
+		{
+			class: "btn icon",
+			"aria-label": `Leave out ${label}`,
+			onclick: () => {
+				delete now.parameters[key];
+				show();
+				changed();
+			},
+		},
+		icon("i-close", "s"),
+	);
+	const name = h(
+		"td",
+		{ title: found?.help ?? "" },
+		h("span", { class: "lab" }, label),
+		" ",
+		found && symbolOf(found.symbol),
+	);
+	if (range.choices)
+		return h(
+			"tr",
+			{},
+			name,
+			h(
+				"td",
+				{ colspan: 3, class: "num" },
+				(found?.choices ?? range.choices).map((one) =>
+					h(
+						"button",
+						{
+							class: "btn one",
+							"aria-pressed": String(range.choices?.includes(one)),
+							onclick: () => {
+								const left = range.choices?.includes(one)
+									? range.choices.filter((other) => other !== one)
+									: [...(range.choices ?? []), one];
+								range.choices = left;
+								show();
+								changed();
+							},
+						},
+						valueOf(one),
+					),
+				),
+			),
+			h("td", {}, out),
+		);
+	const ends = { min: found?.minimum, max: found?.maximum };
+	return h(
+		"tr",
+		{},
+		name,
+		h(
+			"td",
+			{ class: "num" },
+			numberField(changed, `${label} from`, tidy(range.low), (value) => (range.low = value), ends),
+		),
+		h(
+			"td",
+			{ class: "num" },
+			numberField(changed, `${label} to`, tidy(range.high), (value) => (range.high = value), ends),
+		),
+		h(
+			"td",
+			{},
+			h(
+				"button",
+				{
+					class: "btn scale",
+					"aria-label": `Scale of ${label}: ${range.log ? "logarithmic" : "linear"}`,
+					onclick: () => {
+						range.log = !range.log;
+						show();
+						changed();
+					},
+				},
+				range.log ? "log" : "linear",
+			),
+		),
+		h("td", {}, out),
+	);
+}
+
+/** @param {number | null} value */
+const tidy = (value) => (value === null ? null : Number(value.toPrecision(3)));
+
 /**
  * @typedef {object} Wish  what is sent, and what of it is only shown
  * @property {string} name

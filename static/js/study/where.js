@@ -1,7 +1,7 @@
 /** Where a study runs: on this machine, or on a cluster that exists. */
 import { fill, h } from "../elements/dom.js";
 import { sendJson } from "../state/api.js";
-import { choiceCard, numberField } from "./fields.js";
+import { choiceCard, numberField } from "./form.js";
 
 /** @typedef {{scheduler: string | null, workers: number}} Where */
 

@@ -51,7 +51,7 @@ export function differenceOf(value, from, { digits, higher }) {
 export const titledOf = ({ name, unit }) => (unit ? `${name} ${unit}` : name);
 
 /** @type {Record<Server.StudyInfo["state"], string>} */
-export const STATES = {
+const STATES = {
 	new: "not started",
 	running: "running",
 	stopped: "paused",

@@ -1,13 +1,162 @@
-/** The timeline: one axis for range bar, ruler, lanes and strips, and one playhead over them. */
-import { bucketOf, panned, secondsOf, stepAt, tickUnder, xOf, zoomed } from "../play/clock.js";
-import { fill, h, idTag, parts, write } from "../elements/dom.js";
-import { hatch, prepare } from "../draw/canvas.js";
-import { drawLanes, drawRange, drawRuler } from "../draw/lanes.js";
-import { drawCardinality, drawErrors, drawParts } from "../draw/strips.js";
-import { isAlone, ordered, resultOf, scoresOf, trueCount } from "../state/events.js";
-import { faded, palette } from "../draw/colours.js";
+/**
+ * The timeline: one axis for range bar, ruler, lanes and strips, one playhead over them, the buttons
+ * that move it, and what a pointer or two fingers ask of it.
+ */
+import { hatch, prepare, faded, palette } from "../draw/canvas.js";
+import {
+	drawLanes,
+	drawRange,
+	drawRuler,
+	drawCardinality,
+	drawErrors,
+	drawParts,
+} from "../draw/rows.js";
+import { fill, h, idTag, parts, write, all, choices } from "../elements/dom.js";
+import {
+	bucketOf,
+	panned,
+	secondsOf,
+	stepAt,
+	tickUnder,
+	xOf,
+	zoomed,
+	SPEEDS,
+	parseStep,
+} from "../play/clock.js";
 import { shownDone } from "../play/playback.js";
-import { mountTransport } from "./transport.js";
+import {
+	isAlone,
+	ordered,
+	resultOf,
+	scoresOf,
+	trueCount,
+	decisionsOf,
+	stateAt,
+} from "../state/events.js";
+
+/* ---------- Play, step, speed, loop and the readout. ---------- */
+
+/** @type {Pane} */
+function mountTransport(root, { store, playback }) {
+	const { play, read, step, of, seconds, typed, speed, loop, range, real, turn, hindsight } =
+		parts(root);
+	const close = () => {
+		typed.hidden = true;
+		read.hidden = false;
+	};
+	read.addEventListener("click", () => {
+		typed.value = String(store.get().shown);
+		typed.hidden = false;
+		read.hidden = true;
+		typed.select();
+	});
+	typed.addEventListener("blur", close);
+	typed.addEventListener("keydown", (event) => {
+		event.stopPropagation();
+		const { fps, frames } = store.get();
+		const wanted = event.key === "Enter" ? parseStep(typed.value, fps, frames) : null;
+		if (wanted !== null) playback.seek(wanted);
+		if (event.key === "Enter" || event.key === "Escape") close();
+	});
+	choices(
+		speed,
+		SPEEDS.map((value) => [value, `${value}×`]),
+		1,
+	);
+	speed.addEventListener("change", () => {
+		store.set({ speed: Number(speed.value) });
+		speed.blur();
+	});
+
+	store.on(["shown", "sequence"], ({ shown, frames, fps }) => {
+		write(step, String(Math.max(0, shown)));
+		write(of, `/ ${Math.max(0, frames - 1)}`);
+		write(seconds, secondsOf(Math.max(0, shown), fps));
+		// Room for the largest number, so that nothing moves sideways.
+		step.style.minWidth = `${String(frames).length}ch`;
+		seconds.style.minWidth = `${secondsOf(frames, fps).length}ch`;
+	});
+	store.on(["playing"], ({ playing }) => {
+		play.querySelector("use")?.setAttribute("href", playing ? "#i-pause" : "#i-play");
+		play.ariaLabel = playing ? "Pause" : "Play";
+	});
+	const marks = () => {
+		const {
+			loop: on,
+			range: [from, to],
+			frames,
+			speed: now,
+		} = store.get();
+		for (const control of all("button:not([data-command=maximise-time]), select", root))
+			control.disabled = !frames;
+		loop.ariaPressed = String(on);
+		write(range, from === null && to === null ? "all" : `${from ?? 0} – ${to ?? frames - 1}`);
+		speed.value = String(now);
+	};
+	store.watch(["loop", "range", "sequence", "speed"], marks);
+	store.watch(["server", "link"], ({ server, link }) => {
+		const method = server?.parameters.smoothing_method;
+		hindsight.disabled = !method || link !== "open";
+		write(hindsight, `smoothing ${method === "none" ? "off" : "on"}`);
+		hindsight.ariaPressed = String(method !== "none");
+	});
+	store.watch(["realTime", "turn"], ({ realTime, turn: how }) => {
+		write(real, realTime ? "real time" : "every step");
+		write(turn, { page: "turns pages", centre: "centred", off: "stays" }[how]);
+	});
+}
+
+/* ---------- Two fingers on the timeline: apart or together for fewer or more steps, both aside
+   to move. */
+
+/** Fingers nearer than this are one thick one, CSS pixels. */
+const NEAR = 20;
+
+/** @param {HTMLElement} plot @param {Store<PageState>} store */
+function mountFingers(plot, store) {
+	/** Where each is, from the plot's left edge. @type {Map<number, number>} */
+	const fingers = new Map();
+	const place = (/** @type {PointerEvent} */ event) =>
+		event.clientX - plot.getBoundingClientRect().left;
+
+	plot.addEventListener(
+		"pointerdown",
+		(event) => {
+			if (event.pointerType !== "touch") return;
+			fingers.set(event.pointerId, place(event));
+			// A second one does not seek.
+			if (fingers.size > 1) event.stopImmediatePropagation();
+		},
+		true,
+	);
+	plot.addEventListener(
+		"pointermove",
+		(event) => {
+			const other = [...fingers].find(([id]) => id !== event.pointerId)?.[1];
+			const before = fingers.get(event.pointerId);
+			if (before === undefined || other === undefined) return;
+			event.stopImmediatePropagation();
+			const now = place(event);
+			fingers.set(event.pointerId, now);
+			const { span, frames } = store.get();
+			const [first, last] = span ?? [0, Math.max(1, frames - 1)];
+			const far = (/** @type {number} */ at) => Math.max(NEAR, Math.abs(at - other));
+			const middle = (now + other) / 2;
+			const view = zoomed(
+				{ first, last, width: plot.clientWidth },
+				far(before) / far(now),
+				middle,
+				frames,
+			);
+			const aside = (middle - (before + other) / 2) / plot.clientWidth;
+			const seen = panned(view, -aside * (view.last - view.first), frames);
+			store.set({ span: [seen.first, seen.last] });
+		},
+		true,
+	);
+	for (const kind of /** @type {const} */ (["pointerup", "pointercancel"]))
+		plot.addEventListener(kind, ({ pointerId }) => fingers.delete(pointerId));
+}
 
 /** CSS pixels from the playhead to the edge of its plate, and of the rim around that. */
 const PLATE = 20;
@@ -46,6 +195,7 @@ export function mountTimeline(root, context) {
 		label: readout,
 	} = parts(root);
 	mountTransport(root, context);
+	mountFingers(plot, store);
 	order.addEventListener("click", () =>
 		store.set({ laneOrder: store.get().laneOrder === "longest" ? "born" : "longest" }),
 	);

@@ -325,7 +325,12 @@ interface TimelineSeam {
 	/** Draws doubtful places under the ruler, and what was put right over the lanes. */
 	marks?: (check: Pen, lanes: Pen, how: { tracks: Server.TrackLife[]; scroll: number }) => void;
 	/** Draws the braid of identities; read when the page is there. */
-	braid?: typeof import("../timeline/braid.js").drawBraid;
+	braid?: (
+		pen: Pen,
+		scores: NonNullable<PageState["scores"]>,
+		tracks: Server.TrackLife[],
+		selection: number | null,
+	) => void;
 }
 
 /** One of the places of the top bar. */

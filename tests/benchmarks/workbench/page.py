@@ -57,9 +57,8 @@ BY_JUMP = """(step) => window.stepTo(step, () => {
 })"""
 
 LANES = """async ([lanes, steps, runs]) => {
-  const { drawLanes, drawRange, drawRuler } = await import('/static/js/draw/lanes.js');
-  const { prepare } = await import('/static/js/draw/canvas.js');
-  const { palette } = await import('/static/js/draw/colours.js');
+  const { drawLanes, drawRange, drawRuler } = await import('/static/js/draw/rows.js');
+  const { palette, prepare } = await import('/static/js/draw/canvas.js');
   const kinds = ['seen', 'coasting', 'seen', 'long miss'];
   const tracks = Array.from({ length: lanes }, (_, lane) => {
     const spans = [];

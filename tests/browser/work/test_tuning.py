@@ -60,6 +60,27 @@ def test_a_pinned_run_is_compared_with_the_engines_figures(flat_page: Page, serv
     as_at_first(server)
 
 
+MOST_AT_FIRST = 60
+"""Requests that open a recording whose run is there: the page, its style sheets and modules, 3D, the
+step that is shown in all cameras, lanes, figures and what is in doubt."""
+
+
+def test_a_computed_recording_is_opened_by_few_requests(page: Page, server: Server) -> None:
+    as_at_first(server)
+    server.wait_for_run()
+    asked: list[str] = []
+    page.on("request", lambda request: asked.append(request.url))
+    page.goto(server.address)
+    page.locator(".cam canvas").first.wait_for()
+    page.frame_locator("iframe").locator("canvas").first.wait_for()
+    page.wait_for_timeout(3_000)  # what is read when the page is there, and what Check asks for
+    paths = [urlsplit(url).path for url in asked if url.startswith("http")]
+    assert {"/api/timeline", "/api/corrections/queue", "/viser/", "/static/js/later.js"} <= set(paths)
+    assert len(paths) <= MOST_AT_FIRST, paths
+    own = [url for url in asked if "/api/" in url]
+    assert sorted(own) == sorted(set(own)), "nothing is asked for twice"
+
+
 MOST_ASKED = 12
 """Requests that follow a moved slider: the steps around the shown one, lanes and figures while the
 run goes on and at its end, who corrected what, which places are in doubt."""

@@ -1,14 +1,160 @@
-/** Strips of the selected track, under the others of the timeline: added and taken away by a menu. */
-import { faded } from "../draw/colours.js";
-import { drawGround } from "../draw/strips.js";
-import { stroke, trace } from "../draw/canvas.js";
-import { all, fill, h, icon, one, write } from "../elements/dom.js";
-import { bucketOf, xOf } from "../play/clock.js";
+/** What is read off the timeline: the words under the pointer, the braid of identities, plots of a track. */
+import { faded, stroke, trace } from "../draw/canvas.js";
+import { drawGround } from "../draw/rows.js";
+import { all, fill, h, icon, idTag, one, write } from "../elements/dom.js";
+import { bucketOf, secondsOf, xOf } from "../play/clock.js";
 import { fetcher, getJson } from "../state/api.js";
-import { shownVersion } from "../state/events.js";
+import { decisionsOf, scoresOf, shownVersion, stateAt } from "../state/events.js";
+
+/* ---------- What the timeline's curves and lanes say under the pointer, in words beside it. */
+
+/**
+ * @param {Readonly<PageState>} state
+ * @param {number} step
+ * @param {Server.TrackLife | undefined} track  whose lane is pointed at
+ * @returns {(Node | string)[][]} lines
+ */
+function hintLines(state, step, track) {
+	const { timeline, fps, measure, span, frames } = state;
+	/** Within which a mark is pointed at, steps. */
+	const reach = Math.max(1, (span ? span[1] - span[0] : frames) / 150);
+	/** @type {(Node | string)[][]} */
+	const lines = [[h("b", {}, `step ${step}`), ` · ${secondsOf(step, fps)} s`]];
+	if (track) {
+		const events = (timeline?.events ?? []).filter(
+			([at, id]) => id === track.id && Math.abs(at - step) <= (timeline?.stride ?? 1),
+		);
+		const what = events.map(([, , kind]) => kind).join(", ");
+		lines.push([idTag(track.id), ` ${stateAt(track, step)}${what && ` · ${what}`}`]);
+		const near = decisionsOf(state, track.id, step)[0];
+		if (near && Math.abs(near.step - step) <= reach) lines.push([near.words]);
+	} else {
+		const gone = (timeline?.decisions ?? []).filter(
+			({ step: at, kind }) => kind === "removed" && Math.abs(at - step) <= reach,
+		);
+		for (const { track: id, words } of gone.slice(0, 3)) lines.push([idTag(id), ` ${words}`]);
+	}
+	if (timeline && step < timeline.done) {
+		const at = bucketOf(step, timeline);
+		const truth = timeline.truth ? ` of ${timeline.truth.mean[at]?.toFixed(0) ?? "–"}` : "";
+		lines.push([`people ${timeline.count.mean[at]?.toFixed(0) ?? "–"}${truth}`]);
+		const [mean, sigma] = [timeline.cardinality.mean[at], timeline.deviation.mean[at]];
+		if (mean !== undefined) lines.push([`expected ${mean.toFixed(2)} ± ${sigma.toFixed(2)}`]);
+	}
+	const series = scoresOf(state)?.series;
+	const cost = series?.[measure][bucketOf(step, series)];
+	if (series && cost !== undefined)
+		lines.push([`${measure.toUpperCase()} ${cost.toFixed(2)} ${series.unit}`]);
+	const error = series?.mean_error[bucketOf(step, series)];
+	if (series && error) lines.push([`mean error ${error.toFixed(2)} ${series.unit}`]);
+	return lines;
+}
+
+/** @param {TimelineSeam} timeline @param {Store<PageState>} store */
+function mountHint({ plot, at }, store) {
+	const read = (/** @type {PointerEvent} */ event) => {
+		const { step, track } = at(event);
+		return store.get().sequence ? hintLines(store.get(), step, track) : [];
+	};
+	const card = h("div", { class: "card hint-card", hidden: true });
+	plot.append(card);
+	plot.addEventListener("pointermove", (event) => {
+		// A finger or a pen has no other way to ask than to press.
+		const seeks = event.buttons && event.pointerType === "mouse";
+		const lines = seeks ? [] : read(event);
+		card.hidden = lines.length === 0;
+		if (card.hidden) return;
+		fill(
+			card,
+			lines.map((line) => h("p", {}, ...line)),
+		);
+		const box = plot.getBoundingClientRect();
+		const [x, y] = [event.clientX - box.left, event.clientY - box.top];
+		const left = x + 14 + card.offsetWidth > box.width ? x - 14 - card.offsetWidth : x + 14;
+		const top = Math.max(
+			2,
+			Math.min(y - card.offsetHeight / 2, box.height - card.offsetHeight - 2),
+		);
+		card.style.transform = `translate(${Math.round(left)}px, ${Math.round(top)}px)`;
+	});
+	for (const kind of ["pointerleave", "pointerdown", "wheel"])
+		plot.addEventListener(kind, () => (card.hidden = true), { passive: true });
+}
+
+/* ---------- The braid of identities: who is followed by which track, and where that changes. */
+
+/**
+ * By which track each person is followed, from switch to switch.
+ * @param {Server.PersonInfo[]} people
+ * @param {Server.Switch[]} switches
+ * @returns {{person: number, own: number, parts: {from: number, to: number, track: number}[]}[]}
+ * those that are followed at all; `own` is the track that stands for the person
+ */
+export function strands(people, switches) {
+	return people.flatMap(({ id, first, last, track }) => {
+		if (track === null) return [];
+		const own = switches.filter(({ person }) => person === id).sort((a, b) => a.step - b.step);
+		const starts = [first, ...own.map(({ step }) => step)];
+		const tracks = [own[0]?.before ?? track, ...own.map((one) => one.track)];
+		const parts = starts.map((from, k) => ({ from, to: starts[k + 1] ?? last, track: tracks[k] }));
+		return [{ person: id, own: track, parts }];
+	});
+}
+
+/**
+ * A line a person, at the height of the track that follows him and in the colour of the track
+ * that stands for him: where two exchange their tracks, their lines cross.
+ * @param {Pen} pen
+ * @param {Server.Scores} scores
+ * @param {Server.TrackLife[]} tracks  in the order of the lanes
+ * @param {number | null} selection  whose strands stand out
+ */
+function drawBraid({ g, row, view, ink }, { evaluation, series }, tracks, selection) {
+	const all = strands(evaluation.per_person, series.switches);
+	const carrying = new Set(all.flatMap(({ parts }) => parts.map(({ track }) => track)));
+	const order = tracks.map(({ id }) => id).filter((id) => carrying.has(id));
+	const apart = (row.height - 12) / Math.max(1, order.length - 1);
+	const level = (/** @type {number} */ id) => row.y + 6 + Math.max(0, order.indexOf(id)) * apart;
+	g.save();
+	g.beginPath();
+	g.rect(0, row.y, view.width, row.height);
+	g.clip();
+	for (const { person, own, parts } of all) {
+		const course = series.errors.find((one) => one.person === person);
+		const near = { first: course?.first ?? 0, stride: series.stride };
+		const paired = (/** @type {number} */ step) =>
+			(course?.values[bucketOf(step, near)] ?? null) !== null;
+		for (const lost of [true, false]) {
+			g.beginPath();
+			parts.forEach(({ from, to, track }, k) => {
+				const y = level(track);
+				const [x0, x1] = [Math.max(0, xOf(from, view)), Math.min(view.width, xOf(to, view))];
+				// Over to the next lane within a few pixels, as a strand goes over another.
+				if (k && !lost) {
+					g.moveTo(x0 - 4, level(parts[k - 1].track));
+					g.lineTo(x0 + 4, y);
+				}
+				const slope = (view.last - view.first) / view.width;
+				for (let x = x0, open = false; x < x1; x += 1) {
+					const here = paired(Math.round(view.first + x * slope)) !== lost;
+					if (here) g[open ? "lineTo" : "moveTo"](x, y);
+					open = here;
+				}
+			});
+			const meant = selection === null || parts.some(({ track }) => track === selection);
+			g.globalAlpha = meant ? 1 : 0.25;
+			stroke(g, ink.id(own), lost ? 0.75 : order.length > 12 ? 1 : 2, lost ? [1, 3] : []);
+		}
+	}
+	g.restore();
+}
+
+/* ---------- Strips of the selected track, under the others: added and taken away by a menu. */
 
 /** @param {Context} context @param {TimelineSeam} timeline */
-export function mountPlots({ store, actions }, timeline) {
+export function mountReading({ store, actions }, timeline) {
+	mountHint(timeline, store);
+	timeline.braid = drawBraid;
 	const gutter = one(".gut");
 	const menu = h("div", { class: "menu plots", popover: "auto", "aria-label": "Plots of a track" });
 	const button = h(
