@@ -61,8 +61,8 @@ def test_a_pinned_run_is_compared_with_the_engines_figures(flat_page: Page, serv
 
 
 MOST_AT_FIRST = 60
-"""Requests that open a recording whose run is there: the page, its style sheets and modules, 3D, the
-step that is shown in all cameras, lanes, figures and what is in doubt."""
+"""Requests that open a recording whose run is there: the page, its style sheets and modules, 3D,
+the step that is shown in all cameras, lanes, figures and what is in doubt."""
 
 
 def test_a_computed_recording_is_opened_by_few_requests(page: Page, server: Server) -> None:
@@ -75,7 +75,7 @@ def test_a_computed_recording_is_opened_by_few_requests(page: Page, server: Serv
     page.frame_locator("iframe").locator("canvas").first.wait_for()
     page.wait_for_timeout(3_000)  # what is read when the page is there, and what Check asks for
     paths = [urlsplit(url).path for url in asked if url.startswith("http")]
-    assert {"/api/timeline", "/api/corrections/queue", "/viser/", "/static/js/later.js"} <= set(paths)
+    assert {"/api/timeline", "/api/corrections/queue", "/viser/"} <= set(paths)
     assert len(paths) <= MOST_AT_FIRST, paths
     own = [url for url in asked if "/api/" in url]
     assert sorted(own) == sorted(set(own)), "nothing is asked for twice"
