@@ -435,3 +435,46 @@ def test_boxes_of_larger_pictures_than_the_videos_are_made_smaller(tmp_path: Pat
         corners = (expected[:, :2] + 0.5) / 4.0 - 0.5
         np.testing.assert_allclose(view.detections.boxes[:, :2], corners, atol=1e-3)
         np.testing.assert_allclose(view.detections.boxes[:, 2:], expected[:, 2:] / 4.0, atol=1e-3)
+
+
+PICTURES = 30
+
+
+def _pictures_by_number(folder: Path, numbers: list[int]) -> None:
+    """Pictures that are called so, and boxes that name them, of twice as many moments."""
+    toml(folder)
+    for camera in cameras():
+        own = folder / camera.name
+        own.mkdir()
+        for number in numbers[:PICTURES]:
+            cv2.imwrite(str(own / f"{number}.png"), np.zeros((SIZE[1], SIZE[0]), np.uint8))
+        frames, found = boxes(camera, PLACES)
+        rows = [
+            f"{camera.name}/{numbers[f]}.png,{','.join(map(str, box))}"
+            for f, box in zip(frames, found.tolist(), strict=True)
+        ]
+        path = folder / f"{camera.name}.csv"
+        path.write_text("\n".join(["image,left,top,width,height", *rows]))
+
+
+@pytest.mark.parametrize("every", [10, 40])
+def test_boxes_that_name_pictures_are_of_these(tmp_path: Path, every: int) -> None:
+    """Every tenth frame of a film, or the milliseconds since 1970."""
+    first = 0 if every == 10 else 1_714_560_000_000
+    _pictures_by_number(tmp_path, [first + every * number for number in range(len(PLACES))])
+    settled = settled_of(tmp_path, ImportOptions(accept_best=True))
+    _assert_cameras(settled)
+    assert settled.frames == PICTURES
+    for view, camera in zip(settled.views, cameras(), strict=True):
+        assert view.detections is not None
+        frames, found = boxes(camera, PLACES[:PICTURES])
+        np.testing.assert_array_equal(view.detections.frames, frames)
+        np.testing.assert_allclose(view.detections.boxes, found, atol=1e-6)
+
+
+def test_boxes_that_are_mostly_of_other_frames_end_the_import(tmp_path: Path) -> None:
+    toml(tmp_path)
+    detections(tmp_path, first=1000)
+    videos(tmp_path)
+    with pytest.raises(FormatError, match=r"boxes are of frames outside the 60 of the recording"):
+        settled_of(tmp_path)

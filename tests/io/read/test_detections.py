@@ -14,7 +14,6 @@ from numpy import ndarray
 from tests.io.read.rig import SIZE, boxes, cameras, read, walks
 from tracker.io.conventions.reading import read_boxes
 from tracker.io.importing.finding.times import on_one_clock
-from tracker.io.importing.gathering import gather
 from tracker.io.read.pieces import DetectionPiece, FormatError, TruthPiece
 from tracker.io.read.registry import recognise
 from tracker.io.read.source import SourceFile
@@ -580,12 +579,7 @@ def test_times_with_dates_are_counted_from_the_first_of_all_files(
         times = [w.isoformat() if written == "iso" else w.timestamp() * parts for w in whens]
         rows = [",".join(map(str, (w, *b))) for w, b in zip(times, BOXES.tolist(), strict=True)]
         path.write_text("\n".join(["timestamp,left,top,width,height", *rows]))
-    first, second = (
-        piece
-        for one in on_one_clock(gather([tmp_path]))
-        for piece in one.pieces
-        if isinstance(piece, DetectionPiece)
-    )
+    first, second = on_one_clock([_detections(path) for path in paths])
     assert first.fps == pytest.approx(25.0, rel=1e-3)
     _assert_boxes(first)
     _assert_boxes(second, first=25)

@@ -52,9 +52,9 @@ from tracker.io.importing.finding.scale import AS_STANDING, PERSON, paced, resiz
 from tracker.io.importing.finding.times import (
     CameraTime,
     Times,
+    counted_alike,
     first_index,
     frames_of,
-    on_one_clock,
     settle_times,
     told_beyond,
 )
@@ -126,11 +126,12 @@ def settle(taken: Sequence[ParsedFiles], options: ImportOptions | None = None) -
             interpretation is not to be accepted.
     """
     options = options or ImportOptions()
-    taken = on_one_clock(taken)
     sets, told = camera_sets(taken)
     matched = match_all(taken, sets, options, told)
     told += matched.told + short_videos(taken)
     found: list[tuple[str, str]] = []
+    if options.first_index is None:
+        matched = counted_alike(matched, found)
     cameras = matched.cameras
     for way in sorted({how for camera in cameras for how in camera.how.values()} - {"name"}):
         found.append(("matching", f"pictures and boxes go to the cameras by {way}"))
@@ -344,6 +345,9 @@ def _resized(raw: RawCamera, factor: float) -> RawCamera:
 
 _Boxes = tuple[Detections, Layout | None]
 
+_MOST_OUTSIDE = 0.5
+"""Share of all boxes that may be of frames which the recording does not have."""
+
 
 def _boxes(
     cameras: Sequence[MatchedCamera],
@@ -361,6 +365,7 @@ def _boxes(
     if first and any(p is not None and p.first_index is None for p in pieces):
         found.append(("first index", "1, since no frame is called 0; --first-index"))
     result: list[_Boxes | None] = []
+    outside, rows, example = 0, 0, ""
     for camera, size, time in zip(cameras, sizes, times.cameras, strict=True):
         piece = camera.detections
         if piece is None:
@@ -383,10 +388,19 @@ def _boxes(
             told.append(piece.left_out)
         if beyond := told_beyond(piece, first, within):
             told.append(beyond)
+            example = beyond
         scores = np.clip(piece.scores, 0.0, 1.0)
+        outside += int((~there).sum())
+        rows += len(there)
         there &= sane
         own = Detections(steps[there], four[there], scores[there])
         result.append((own, layout))
+    if outside > _MOST_OUTSIDE * rows and not options.accept_best:
+        raise FormatError(
+            f"{outside} of {rows} boxes are of frames outside the {times.frames} of the recording "
+            f"({example}); name boxes and pictures of the same frames, or {ACCEPT} imports the "
+            "others alone"
+        )
     return result
 
 

@@ -159,11 +159,16 @@ def read_table(
     """
     found = meanings(list(columns))
     rows = len(next(iter(columns.values()), ()))
-    when = _Times()
+    when = Times()
     if frame is None and "frame" not in found and "time" in found:
         column = found["time"]
-        cells = [_seconds(cell) for cell in columns[column]]
-        frames, when = _frames_of_times(file, column, _numbers(file, column, cells))
+        times = _numbers(file, column, [_seconds(cell) for cell in columns[column]])
+        if not np.isfinite(times).all():
+            raise file.error("expected a time in every row", column)
+        try:
+            frames, when = frames_of_times(times, plain(column).endswith("ms"))
+        except ValueError as error:
+            raise file.error(str(error), column) from None
     elif frame is None and "frame" not in found:
         raise file.error(
             'expected a column "frame" (or a number in the name of a file a frame), found the '
@@ -214,7 +219,7 @@ def _detections(
     frames: Int[ndarray, " D"],
     boxes: Float[ndarray, "D 4"],
     layout: Layout | None,
-    when: _Times,
+    when: Times,
 ) -> Iterator[Piece]:
     scores = np.ones(len(frames))
     if "score" in found:
@@ -315,7 +320,7 @@ def _truth(
     columns: Mapping[str, Column],
     found: Mapping[str, str],
     frames: Int[ndarray, " G"],
-    when: _Times,
+    when: Times,
 ) -> TruthPiece:
     axes = [axis for axis in "xyz" if axis in found]
     places = np.full((len(frames), 3), np.nan)
@@ -362,7 +367,7 @@ def _frames(file: SourceFile, name: str, cells: Column) -> Int[ndarray, " D"]:
     return values.astype(np.int64)
 
 
-class _Times(NamedTuple):
+class Times(NamedTuple):
     """What a column of times says of frames."""
 
     fps: float | None = None
@@ -371,41 +376,47 @@ class _Times(NamedTuple):
     """The time of frame 0 since the beginning of 1970, seconds; None if there are no dates."""
 
 
-def _frames_of_times(
-    file: SourceFile, name: str, times: Float[ndarray, " D"]
-) -> tuple[Int[ndarray, " D"], _Times]:
+def frames_of_times(
+    times: Float[ndarray, " D"], milliseconds: bool = False
+) -> tuple[Int[ndarray, " D"], Times]:
     """Frames that are as far apart as the times, counted from time 0 or the first of dates.
 
-    Times are seconds, or milliseconds where the column is called so or where whole numbers would be
-    :data:`_SELDOM` apart; since the beginning of 1970 they may be in milli-, micro- or nanoseconds
-    too. The rate that fits all of them is taken: times
-    are rounded, and where nobody was seen there are none.
+    Times are seconds, or milliseconds where whole numbers would be :data:`_SELDOM` apart; since the
+    beginning of 1970 they may be in milli-, micro- or nanoseconds too. The rate that fits all of
+    them is taken: times are rounded, and where nobody was seen there are none.
+
+    Args:
+        times: The finite time of each row.
+        milliseconds: Whether it is known that they are milliseconds.
+
+    Raises:
+        ValueError: With what was expected and found, if they are no times of a recording.
     """
-    if not np.isfinite(times).all():
-        raise file.error("expected a time in every row", name)
     apart = np.diff(np.unique(times))
     seldom = len(apart) > 0 and float(np.median(apart)) >= _SELDOM and not (times % 1.0).any()
-    seconds = times * (1e-3 if seldom or plain(name).endswith("ms") else 1.0)
-    begins = None
-    if len(times):
-        first = times.min()
-        parts = next((p for p in _PARTS_OF_SECONDS if _DATED[0] < first / p < _DATED[1]), None)
-        if parts is not None:
-            begins = float(first / parts)
-            seconds = (times - first) / parts
+    seconds = times * (1e-3 if seldom or milliseconds else 1.0)
+    first = float(times.min(initial=np.inf))
+    parts = parts_of_date(first)
+    if parts is not None:
+        seconds = (times - first) / parts
     own = np.unique(seconds)
     if len(own) < 2 or own[0] < 0.0 or own[-1] > _LONGEST:
-        raise file.error(
+        raise ValueError(
             f"expected two or more times from 0 to {_LONGEST:g} s since the beginning, or with "
             f'dates, found {own[0]:g} … {own[-1]:g} s; have a column "frame" instead'
             if len(own)
-            else "expected times, found none",
-            name,
+            else "expected times, found none"
         )
     apart = np.diff(own)
     steps = np.round(apart / np.median(apart))
     fps = float(round(steps.sum() / apart[steps > 0].sum(), 3))
-    return np.round(seconds * fps).astype(np.int64), _Times(fps, begins)
+    begins = None if parts is None else first / parts
+    return np.round(seconds * fps).astype(np.int64), Times(fps, begins)
+
+
+def parts_of_date(time: float) -> float | None:
+    """How many of its units a second has if a number is a date; None if it is none."""
+    return next((p for p in _PARTS_OF_SECONDS if _DATED[0] < time / p < _DATED[1]), None)
 
 
 def _seconds(cell: Any) -> Any:

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any, TypeVar
 
 import numpy as np
 from jaxtyping import Int
 from numpy import ndarray
 
-from tracker.io.importing.finding.matching import MatchedCamera
-from tracker.io.importing.gathering import ParsedFiles
+from tracker.io.importing.finding.matching import Matched, MatchedCamera
 from tracker.io.importing.options import ImportOptions
-from tracker.io.read.pieces import DetectionPiece, FormatError, Piece, TruthPiece, VideoPiece
+from tracker.io.read.columns import frames_of_times, parts_of_date
+from tracker.io.read.picture_names import number_in
+from tracker.io.read.pieces import DetectionPiece, FormatError, TruthPiece, VideoPiece
 from tracker.sequences.clock import Clock, Timing
 
 USUAL_RATE = 25.0
@@ -49,22 +51,95 @@ class Times:
     cameras: tuple[CameraTime, ...]
 
 
-def on_one_clock(taken: Sequence[ParsedFiles]) -> list[ParsedFiles]:
-    """Count frames that have dates from the first of all files: of each alone they begin at 0."""
-    pieces = [p for one in taken for p in one.pieces if isinstance(p, DetectionPiece | TruthPiece)]
+_Rows = TypeVar("_Rows", DetectionPiece, TruthPiece)
+
+
+def counted_alike(matched: Matched, found: list[tuple[str, str]]) -> Matched:
+    """Count the frames of boxes and truth from the first picture, or from the first date of all.
+
+    Pictures may be called by the frames of a video of which they are every tenth, or by their
+    times; that is so where more rows are of a picture by its number than by its place.
+
+    Args:
+        matched: The cameras with their pictures and boxes, and the truth.
+        found: What was found out is added.
+    """
+    numbers = [_numbers_of(camera) for camera in matched.cameras]
+    cameras = [
+        camera
+        if camera.detections is None
+        else replace(camera, detections=_at_place(camera.detections, own))
+        for camera, own in zip(matched.cameras, numbers, strict=True)
+    ]
+    first = next((own for own in numbers if own is not None), None)
+    truths = [(label, _at_place(truth, first)) for label, truth in matched.truths]
+    counted = [
+        new.raw.name
+        for new, old in zip(cameras, matched.cameras, strict=True)
+        if new.detections is not old.detections
+    ]
+    if counted:
+        found.append(("frames", f"the numbers in the names of pictures of {', '.join(counted)}"))
+    seen = [camera.detections for camera in cameras if camera.detections is not None]
+    clocked = iter(on_one_clock([*seen, *(truth for _, truth in truths)]))
+    cameras = [
+        camera if camera.detections is None else replace(camera, detections=next(clocked))
+        for camera in cameras
+    ]
+    truths = [(label, next(clocked)) for label, _ in truths]
+    return replace(matched, cameras=cameras, truths=truths)
+
+
+def on_one_clock(pieces: Sequence[DetectionPiece | TruthPiece]) -> list[Any]:
+    """Count frames that have dates from the first of all pieces: of each alone they begin at 0.
+
+    Numbers of frames that are dates, as in the names of pictures, become frames too.
+    """
+    pieces = [_of_dates(piece) for piece in pieces]
     begin = min((piece.begins for piece in pieces if piece.begins is not None), default=0.0)
-    return [replace(one, pieces=tuple(_since(begin, p) for p in one.pieces)) for one in taken]
+    return [piece if piece.begins is None else _since(begin, piece) for piece in pieces]
 
 
-def _since(begin: float, piece: Piece) -> Piece:
-    if not isinstance(piece, DetectionPiece | TruthPiece) or piece.begins is None:
+def _of_dates(piece: DetectionPiece | TruthPiece) -> DetectionPiece | TruthPiece:
+    if len(np.unique(piece.frames)) < 2 or parts_of_date(float(piece.frames.min())) is None:
         return piece
-    later = round((piece.begins - begin) * (piece.fps or 0.0))
-    frames = piece.frames + later
-    if isinstance(piece, TruthPiece):
-        return replace(piece, frames=frames, begins=begin)
-    last = None if piece.last_frame is None else piece.last_frame + later
-    return replace(piece, frames=frames, last_frame=last, begins=begin)
+    frames, when = frames_of_times(piece.frames.astype(float))
+    piece = replace(piece, frames=frames, fps=when.fps, begins=when.begins, first_index=0)
+    return replace(piece, last_frame=None) if isinstance(piece, DetectionPiece) else piece
+
+
+def _since(begin: float, piece: DetectionPiece | TruthPiece) -> DetectionPiece | TruthPiece:
+    later = round(((piece.begins or 0.0) - begin) * (piece.fps or 0.0))
+    piece = replace(piece, frames=piece.frames + later, begins=begin)
+    if isinstance(piece, DetectionPiece) and piece.last_frame is not None:
+        return replace(piece, last_frame=piece.last_frame + later)
+    return piece
+
+
+def _numbers_of(camera: MatchedCamera) -> Int[ndarray, " F"] | None:
+    """The numbers of a camera's pictures, ascending; None if it has none, or not all do."""
+    if camera.images is None:
+        return None
+    numbers = [number_in(path.name) for path in camera.images.files]
+    found = np.array([number for number in numbers if number is not None], dtype=np.int64)
+    return found if len(found) == len(numbers) and (np.diff(found) > 0).all() else None
+
+
+def _at_place(piece: _Rows, numbers: Int[ndarray, " F"] | None) -> _Rows:
+    if numbers is None or not len(piece.frames):
+        return piece
+    place = np.minimum(np.searchsorted(numbers, piece.frames), len(numbers) - 1)
+    there = numbers[place] == piece.frames
+    by_place = max(
+        int(((piece.frames >= first) & (piece.frames < first + len(numbers))).sum())
+        for first in (0, 1)
+    )
+    if int(there.sum()) <= by_place:
+        return piece
+    # of a picture that is not there: far behind the last
+    frames = np.where(there, place, 2 * len(numbers) + 2)
+    piece = replace(piece, frames=frames, first_index=0)
+    return replace(piece, last_frame=None) if isinstance(piece, DetectionPiece) else piece
 
 
 def settle_times(
