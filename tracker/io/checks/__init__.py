@@ -13,6 +13,7 @@ import numpy as np
 from tracker.io.checks.boxes import check_boxes, listen
 from tracker.io.checks.cameras import check_lenses, check_places
 from tracker.io.checks.timing import check_counting, check_time
+from tracker.io.checks.truth import check_truth
 from tracker.io.conventions.readings import EVERY_ORDER
 from tracker.sequences.finding import Check, Remedy, Status, absent
 from tracker.sequences.pictures.frames import FrameReader
@@ -54,6 +55,7 @@ def check(
         found += check_time(sequence, reader, clocks=clocks)
     if told is not None:
         found.append(check_counting(sequence))
+    found.append(check_truth(sequence))
     return found
 
 

@@ -9,20 +9,15 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from tracker.geometry.camera import Camera
+from tracker.io.checks.truth import contradicts, share_in_boxes
 from tracker.io.conventions.reading import Reading, levelled, upright
 from tracker.io.importing.finding.grids import feet_on_floor, infer_grid
 from tracker.io.read.pieces import GRIDS, METRES, TruthPiece, Unit
 from tracker.sequences.sequence import Detections, GroundTruth
 from tracker.sequences.tables import covered_steps, regular_gap
 
-_SAMPLED = 300
-"""Places that are held against the boxes."""
-
 _MOST_INSIDE = 0.5
 """Share of places in boxes that another unit or another turn must reach to be believed."""
-
-_LEAST_INSIDE = 0.2
-"""Share below which the truth contradicts the boxes."""
 
 _CLEARLY = 0.05
 """By how much more of the places must lie in boxes for another reading than the plain one."""
@@ -79,17 +74,20 @@ def settle_truth(
             for factor, turn in _ways(piece, reading):
                 moved = _moved(given, on_floor, factor, turn, middle)
                 candidates.append(("" if grid is None else f"the grid of {grid.name}", moved))
-        scores = [_inside(own, moved, cameras, detections) for _, moved in candidates]
+        scores = [share_in_boxes(own, moved, cameras, detections) for _, moved in candidates]
         if piece.cells is not None and max(scores) < _MOST_INSIDE:
             inferred = infer_grid(piece.cells, feet_on_floor(piece, views, cameras, floor))
             if inferred is not None:
                 moved = np.column_stack([inferred[0], np.full(len(given), middle)])
                 candidates.append((f"a grid of {inferred[1]}, by where the boxes stand", moved))
-                scores.append(_inside(own, moved, cameras, detections))
+                scores.append(share_in_boxes(own, moved, cameras, detections))
         best = int(np.argmax(scores))
         if scores[best] < max(scores[0] + _CLEARLY, _MOST_INSIDE):
             best = 0
-        if scores[best] < _LEAST_INSIDE and any(own is not None for own in detections):
+        moved = candidates[best][1]
+        if any(each is not None for each in detections) and contradicts(
+            scores[best], own, moved, cameras, detections
+        ):
             found.append(
                 ("truth", f"{piece.source.name}: {100 * scores[best]:.0f} % of its places lie in "
                  "boxes; its origin, axes, grid or unit may be others than the calibration's")
@@ -162,28 +160,6 @@ def _moved(
     moved = factor * given @ turn.T
     moved[on_floor, 2] = middle
     return np.asarray(moved)
-
-
-def _inside(
-    steps: ndarray,
-    places: Float[ndarray, "G 3"],
-    cameras: Sequence[Camera],
-    detections: Sequence[Detections | None],
-) -> float:
-    """Of the places that a camera with boxes sees, how many lie in a box."""
-    rows = np.unique(np.linspace(0, len(steps) - 1, min(_SAMPLED, len(steps))).astype(int))
-    seen = inside = 0
-    for camera, own in zip(cameras, detections, strict=True):
-        if own is None:
-            continue
-        pixels, _ = camera.project(places[rows])
-        visible = camera.contains(pixels)
-        for row in np.flatnonzero(visible):
-            boxes = own.boxes[own.at(int(steps[rows[row]]))]
-            low, high = boxes[:, :2], boxes[:, :2] + boxes[:, 2:]
-            seen += 1
-            inside += bool(((pixels[row] >= low) & (pixels[row] <= high)).all(axis=1).any())
-    return inside / seen if seen >= min(10, len(rows)) else 0.0
 
 
 def _overlap(steps: Sequence[ndarray], ids: Sequence[ndarray]) -> bool:

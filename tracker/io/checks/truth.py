@@ -1,0 +1,101 @@
+"""Does the truth stand where the boxes show people."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence as Many
+
+import numpy as np
+from jaxtyping import Float, Int
+from numpy import ndarray
+
+from tracker.geometry.camera import Camera
+from tracker.sequences.finding import Check, absent, good, percent, warning
+from tracker.sequences.sequence import Detections, Sequence
+
+_LEAST_INSIDE = 0.2
+"""Share of places in boxes below which the truth contradicts them."""
+
+_BY_CHANCE = 1.5
+"""The ratio to the share in the boxes of another time below which a share of less than half is one
+by chance, as of places that all lie in the middle of the room."""
+
+_SAMPLED = 300
+"""Places that are compared with the boxes."""
+
+
+def check_truth(sequence: Sequence) -> Check:
+    """Compare the places of the truth with the boxes of the cameras that see them.
+
+    Args:
+        sequence: With a calibration that is read rightly.
+    """
+    name = "the truth stands where the boxes are"
+    truth = sequence.ground_truth
+    detections = [view.detections for view in sequence.views]
+    if truth is None or not len(truth.frames):
+        return absent(name, "there is no truth")
+    if not any(own is not None and len(own.frames) for own in detections):
+        return absent(name, "there are no boxes")
+    share = share_in_boxes(truth.frames, truth.positions, sequence.cameras, detections)
+    if contradicts(share, truth.frames, truth.positions, sequence.cameras, detections):
+        return warning(
+            name,
+            f"{percent(share)} of its places lie in boxes of the cameras that see them: its "
+            "origin, axes or unit may be others than the calibration's, and figures against it "
+            "mean nothing",
+            share=share,
+        )
+    return good(name, f"{percent(share)} of its places lie in boxes", share=share)
+
+
+def contradicts(
+    share: float,
+    frames: Int[ndarray, " G"],
+    places: Float[ndarray, "G 3"],
+    cameras: Many[Camera],
+    detections: Many[Detections | None],
+) -> bool:
+    """Whether places lie in so few boxes that they are elsewhere than people are.
+
+    Args:
+        share: The places' share in boxes, of :func:`share_in_boxes`.
+        frames, places, cameras, detections: The arguments of that function.
+    """
+    first = int(frames.min())
+    length = int(frames.max()) - first + 1
+    if share < _LEAST_INSIDE or share >= 0.5 or length < 2:
+        return share < _LEAST_INSIDE
+    other = first + (frames - first + length // 2) % length
+    return share < _BY_CHANCE * share_in_boxes(other, places, cameras, detections)
+
+
+def share_in_boxes(
+    frames: Int[ndarray, " G"],
+    places: Float[ndarray, "G 3"],
+    cameras: Many[Camera],
+    detections: Many[Detections | None],
+) -> float:
+    """The share of places in a box, of those that a camera with boxes sees.
+
+    Args:
+        frames: The step of each place.
+        places: World metres.
+        cameras: The cameras.
+        detections: The boxes of each camera; None for none.
+
+    Returns:
+        0 … 1; 0 where hardly any place is in sight of a camera.
+    """
+    rows = np.unique(np.linspace(0, len(frames) - 1, min(_SAMPLED, len(frames))).astype(int))
+    seen = inside = 0
+    for camera, own in zip(cameras, detections, strict=True):
+        if own is None:
+            continue
+        pixels, _ = camera.project(places[rows])
+        visible = camera.contains(pixels)
+        for row in np.flatnonzero(visible):
+            boxes = own.boxes[own.at(int(frames[rows[row]]))]
+            low, high = boxes[:, :2], boxes[:, :2] + boxes[:, 2:]
+            seen += 1
+            inside += bool(((pixels[row] >= low) & (pixels[row] <= high)).all(axis=1).any())
+    return inside / seen if seen >= min(10, len(rows)) else 0.0
