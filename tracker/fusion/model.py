@@ -11,6 +11,7 @@ from numpy import ndarray
 from tracker.filters import association, gaussian_mixture, models
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion import missing_frames, visibility
+from tracker.fusion.heights import Heights
 from tracker.fusion.measurement_births import BirthModel, Evidence, MeasurementBirths, Newborns
 from tracker.fusion.missing_frames import Recent, StepEvidence
 from tracker.fusion.target_model import ExpectedBoxes, TargetModel
@@ -60,6 +61,10 @@ class FusionModel:
         self.height = 2.0 * float(sequence.target_half_extents[2])
         """Height of a target, metres: from this vertical distance on, two targets are one above the
         other and no duplicates."""
+        self.heights = Heights.of(
+            sequence.room, p.posture_height * self.target.half_height, self.target.posture_share
+        )
+        """Where a target's centre can be between floor and ceiling."""
         margin = p.followed_margin
         self.followed = (self.room.minimum - margin, self.room.maximum + margin)
         """Minimum and maximum of the volume in which targets are tracked, world metres."""
