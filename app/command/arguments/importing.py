@@ -54,12 +54,21 @@ class Import:
     """How rotations given by three angles are composed: zyx is R = Rz Ry Rx, zyx-inverse its
     inverse; vector: they are a rotation vector."""
     boxes: Annotated[
-        Literal["ltwh", "xyxy", "cxcywh", "ltwh-normalised", "xyxy-normalised", "cxcywh-normalised"]
+        Literal[
+            "ltwh",
+            "xyxy",
+            "yxyx",
+            "cxcywh",
+            "ltwh-normalised",
+            "xyxy-normalised",
+            "yxyx-normalised",
+            "cxcywh-normalised",
+        ]
         | None,
         arg(help_behavior_hint="(default: found out)"),
     ] = None
-    """What the four numbers of a box are: left, top and size; two corners; centre and size; in
-    pixels, or normalised: as parts of the picture's width and height."""
+    """What the four numbers of a box are: left, top and size; two corners, x or y first; centre and
+    size; in pixels, or normalised: as parts of the picture's width and height."""
     first_index: Annotated[int | None, arg(help_behavior_hint="(default: found out)")] = None
     """Number of the first frame in boxes and truth, 0 or 1."""
     fps: Annotated[float | None, arg(help_behavior_hint="(default: the videos')")] = None

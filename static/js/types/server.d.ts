@@ -558,7 +558,7 @@ declare namespace Server {
 		/** How rotations given by three angles are composed: ``zyx`` is R_z R_y R_x. */
 		turns: string | null;
 		/** What the four numbers of a box mean. */
-		boxes: "ltwh" | "xyxy" | "cxcywh" | null;
+		boxes: "ltwh" | "xyxy" | "yxyx" | "cxcywh" | null;
 		/** Whether boxes are parts of the picture's size. */
 		normalised: boolean | null;
 		/** The number of the first frame in detections and truth. */

@@ -151,7 +151,7 @@ def test_angles_of_which_nothing_tells_the_order_are_asked_for(
     lay_out(folder, "into the camera", seen=False)
     info = _settled(client, _send(client, folder))
     assert info["phase"] == "failed"
-    assert "in which order they turn" in info["error"]
+    assert "tell their order" in info["error"]
     assert ["zyx", "Rz Ry Rx"] in info["open_turns"]
     assert 'aria-label="Angles"' in info["sheet"]
     assert "xzy-inverse" in [name for name, _ in info["open_turns"]]

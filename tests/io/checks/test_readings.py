@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -18,7 +19,7 @@ from tracker.io.conventions.reading import FLIP, Reading, pose, read_boxes, to_c
 from tracker.io.conventions.readings import Seen
 from tracker.io.conventions.search import as_meant, find_reading
 from tracker.io.conventions.sizes import likely_unit
-from tracker.io.read.pieces import METRES, RawCamera
+from tracker.io.read.pieces import METRES, Layout, RawCamera
 from tracker.sequences.sequence import Sequence
 
 ROOMS = range(6)
@@ -151,15 +152,16 @@ def test_the_unit_follows_from_how_tall_and_far_people_are(unit: str, height: fl
     assert likely_unit(5.0 / one, scaled) == unit
 
 
-@pytest.mark.parametrize("layout", ["ltwh", "xyxy", "cxcywh"])
-def test_layouts_of_a_box(layout: str) -> None:
+@pytest.mark.parametrize("layout", get_args(Layout))
+def test_layouts_of_a_box(layout: Layout) -> None:
     box = np.array([[10.0, 20.0, 30.0, 60.0]])
     as_written = {
         "ltwh": box,
         "xyxy": np.array([[10.0, 20.0, 40.0, 80.0]]),
+        "yxyx": np.array([[20.0, 10.0, 80.0, 40.0]]),
         "cxcywh": np.array([[25.0, 50.0, 30.0, 60.0]]),
     }[layout]
-    np.testing.assert_allclose(read_boxes(as_written, layout), box)  # type: ignore[arg-type]
+    np.testing.assert_allclose(read_boxes(as_written, layout), box)
 
 
 def test_a_camera_without_a_pose_is_told() -> None:

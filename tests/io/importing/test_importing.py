@@ -354,6 +354,31 @@ def test_boxes_in_one_json_settle_as_others(
     assert all(view.detections is not None for view in settled.views)
 
 
+def test_corners_with_y_before_x_are_found_out(tmp_path: Path) -> None:
+    """As parts of the picture, beside scores and classes (TensorFlow's object detection)."""
+    toml(tmp_path)
+    width, height = SIZE
+    for camera in cameras():
+        frames, found = boxes(camera, PLACES)
+        records = []
+        for frame in sorted(set(frames.tolist())):
+            own = found[frames == frame]
+            left, top, right, bottom = *own[:, :2].T + 0.5, *(own[:, :2] + own[:, 2:]).T + 0.5
+            corners = np.column_stack([top / height, left / width, bottom / height, right / width])
+            records.append({
+                "frame": frame, "detection_boxes": corners.tolist(),
+                "detection_scores": [0.5] * len(own), "detection_classes": [1] * len(own),
+            })  # fmt: skip
+        (tmp_path / f"{camera.name}.json").write_text(json.dumps(records))
+    settled = settled_of(tmp_path)
+    _assert_cameras(settled)
+    assert dict(settled.found)["boxes"].startswith("yxyx, since")
+    for view, camera in zip(settled.views, cameras(), strict=True):
+        assert view.detections is not None
+        np.testing.assert_allclose(view.detections.boxes, boxes(camera, PLACES)[1], atol=1e-6)
+        np.testing.assert_array_equal(view.detections.scores, 0.5)
+
+
 def test_boxes_by_their_middle_are_found_out(tmp_path: Path) -> None:
     """``x, y, w, h`` are Ultralytics' and Roboflow's names for middle and size."""
     toml(tmp_path)

@@ -13,7 +13,7 @@ from tracker.geometry.consistency.consensus import Consensus
 from tracker.geometry.consistency.observed import pose_of
 from tracker.geometry.consistency.suggestion import LEAST_AGREEING, Suggestion, stands, suggest
 from tracker.io.conventions.level import confirmed, upwards
-from tracker.io.conventions.questions import describe_moved
+from tracker.io.conventions.questions import LAYOUTS, describe_moved
 from tracker.io.conventions.reading import Reading, exchanged, exchanges
 from tracker.io.conventions.readings import LEAST_SHARE, Judge, Judged, Open, Seen
 from tracker.io.conventions.search import Verdict, as_meant, find_reading
@@ -171,8 +171,7 @@ def _mistake(sequence: Sequence, told: BoxesTell) -> Check:
         words.append("OpenGL's camera axes (y up, z back)")
         remedies.append(Remedy("--axes", reading.axes))
     if reading.layout != "ltwh":
-        what = {"xyxy": "left, top, right, bottom", "cxcywh": "centre and size"}[reading.layout]
-        words.append(f"boxes read as {what}")
+        words.append(f"boxes read as {LAYOUTS[reading.layout]}")
         remedies.append(Remedy("--boxes", reading.layout))
     if reading.normalised:
         words.append("boxes read as parts of the picture's size")

@@ -12,7 +12,7 @@ import numpy as np
 from tracker.geometry.consistency.odds import DECISIVE, log_odds
 from tracker.io.conventions.reading import Reading, exchanged, exchanges, with_pixels
 from tracker.io.conventions.search import ClockFit, Verdict
-from tracker.io.read.pieces import FormatError, RawCamera
+from tracker.io.read.pieces import FormatError, Layout, RawCamera
 from tracker.sequences.finding import Remedy
 
 ACCEPT = "--accept-best"
@@ -41,7 +41,13 @@ UNPROVEN = (
 )
 """What is said of an import whose boxes prove nothing."""
 
-_LAYOUTS = {"ltwh": "left, top and size", "xyxy": "two corners", "cxcywh": "centre and size"}
+LAYOUTS: dict[Layout, str] = {
+    "ltwh": "left, top and size",
+    "xyxy": "two corners",
+    "yxyx": "two corners, y before x",
+    "cxcywh": "centre and size",
+}
+"""What the four numbers of a box are, in words."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,7 +179,7 @@ def in_words(reading: Reading, names: Sequence[str], parts: Sequence[str] = ()) 
     every = {
         "direction": f"poses {reading.direction}",
         "axes": "y down and z ahead" if reading.axes == "opencv" else "y up and z back",
-        "layout": f"boxes as {_LAYOUTS[reading.layout]}",
+        "layout": f"boxes as {LAYOUTS[reading.layout]}",
         "turns": f"angles {reading.turns}" if reading.turns else "",
         "order": "calibrations as given"
         if reading.order is None

@@ -189,7 +189,9 @@ def read_boxes(
         scale: Width and height of the picture where they are parts of it.
     """
     boxes = np.array(four, dtype=float)
-    if layout == "xyxy":
+    if layout == "yxyx":
+        boxes = boxes[:, [1, 0, 3, 2]]
+    if layout in ("xyxy", "yxyx"):
         boxes[:, 2:] -= boxes[:, :2]
     elif layout == "cxcywh":
         boxes[:, :2] -= boxes[:, 2:] / 2.0

@@ -334,9 +334,8 @@ def restricted(tried: Open, cameras: Many[RawCamera], seen: Many[Seen | None]) -
     if len(tried.normalised) > 1 and len(four):
         # parts of a picture are at most 1, and a box a little beyond the edge a little more
         tried = replace(tried, normalised=(bool(np.quantile(np.abs(four), 0.99) <= 1.5),))
-    if "xyxy" in tried.layouts and len(tried.layouts) > 1 and len(four):
-        corners = (four[:, 2:] > four[:, :2]).all(axis=1).mean()
-        if corners < 0.99:  # a right edge left of the left one
-            layouts = tuple(layout for layout in tried.layouts if layout != "xyxy")
-            tried = replace(tried, layouts=layouts)
+    sizes = tuple(layout for layout in tried.layouts if layout not in ("xyxy", "yxyx"))
+    if sizes and len(four) and (four[:, 2:] > four[:, :2]).all(axis=1).mean() < 0.99:
+        # a right edge left of the left one, or a lower one above the upper
+        tried = replace(tried, layouts=sizes)
     return tried

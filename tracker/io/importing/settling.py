@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import NamedTuple, get_args
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -343,7 +344,15 @@ def _resized(raw: RawCamera, factor: float) -> RawCamera:
     return replace(raw, translation=raw.translation * factor)
 
 
-_Boxes = tuple[Detections, Layout | None]
+class _Boxes(NamedTuple):
+    """The boxes of one camera."""
+
+    detections: Detections
+    """In pixels, and left, top, width, height if the layout is known; else as in the file."""
+    layout: Layout | None
+    scale: tuple[int, int] | None = None
+    """The picture's size, pixels, where numbers of an unknown layout are parts of it."""
+
 
 _MOST_OUTSIDE = 0.5
 """Share of all boxes that may be of frames which the recording does not have."""
@@ -374,7 +383,7 @@ def _boxes(
         layout = options.boxes or piece.layout
         normalised = piece.normalised if options.normalised is None else options.normalised
         scale = size if normalised else None
-        four = read_boxes(piece.boxes, layout or "ltwh", scale)
+        four = piece.boxes if layout is None else read_boxes(piece.boxes, layout, scale)
         steps = piece.frames - first
         within = frames_of(camera, time, times.frames)
         there = (steps >= 0) & (steps < within)
@@ -394,7 +403,7 @@ def _boxes(
         rows += len(there)
         there &= sane
         own = Detections(steps[there], four[there], scores[there])
-        result.append((own, layout))
+        result.append(_Boxes(own, layout, scale if layout is None else None))
     if outside > _MOST_OUTSIDE * rows and not options.accept_best:
         raise FormatError(
             f"{outside} of {rows} boxes are of frames outside the {times.frames} of the recording "
@@ -425,18 +434,24 @@ def _read(
         the boxes tell, where they tell anything.
     """
     seen = [
-        None if own is None else _seen(own[0], time)
+        None if own is None else _seen(own.detections, time)
         for own, time in zip(boxes, times.cameras, strict=True)
     ]
-    unknown = any(own is not None and own[1] is None for own in boxes)
-    layouts: tuple[Layout, ...] = ("ltwh", "xyxy", "cxcywh") if unknown else ("ltwh",)
+    open_boxes = [own for own in boxes if own is not None and own.layout is None]
+    in_parts = {own.scale is not None for own in open_boxes}
+    if len(in_parts) > 1:
+        raise FormatError(
+            "some cameras' boxes are pixels and others parts of the picture, and how their numbers "
+            "are meant is not said: --boxes says it"
+        )
+    layouts: tuple[Layout, ...] = get_args(Layout) if open_boxes else ("ltwh",)
     convention = raws[0].convention
     free = not options.swap and not options.cameras
     find = partial(
         find_reading,
         seen=[*seen, *[None] * len(spare)],
         fps=times.fps,
-        tried=Open(layouts=layouts, normalised=(False,), orders=free),
+        tried=Open(layouts=layouts, normalised=(True in in_parts,), orders=free),
         names=matched_by(cameras),
         pixels=_other_pixels(cameras, raws, seen),
     )
@@ -475,7 +490,7 @@ def _read(
             reading = replace(reading, lean=lean)
         share = 100.0 * best.consensus.share
         why = f"since {share:.0f} % of the boxes meet so"
-        if unknown:
+        if open_boxes:
             found.append(("boxes", f"{reading.layout}, {why}; --boxes"))
         if any(camera.picture_size is not None for camera in cameras):
             larger, reading = reading.pixels, replace(reading, pixels=1.0)
@@ -504,19 +519,19 @@ def _read(
     factor: float | None = None
     changed: list[_Boxes | None] = []
     for own in boxes:
-        if own is not None and own[1] is None:
-            four = read_boxes(own[0].boxes, reading.layout)
-            own = (replace(own[0], boxes=four), reading.layout)
+        if own is not None and own.layout is None:
+            four = read_boxes(own.detections.boxes, reading.layout, own.scale)
+            own = _Boxes(replace(own.detections, boxes=four), reading.layout)
         if own is not None and larger != 1.0:
-            corners = (own[0].boxes[:, :2] + 0.5) / larger - 0.5
-            four = np.column_stack([corners, own[0].boxes[:, 2:] / larger])
-            own = (replace(own[0], boxes=four), own[1])
+            corners = (own.detections.boxes[:, :2] + 0.5) / larger - 0.5
+            four = np.column_stack([corners, own.detections.boxes[:, 2:] / larger])
+            own = own._replace(detections=replace(own.detections, boxes=four))
         changed.append(own)
     if best is not None and arbitrary and convention.unit is None:
         size = options.half_extents
         factor = (PERSON if size is None else 2.0 * size[2]) / best.consensus.height
         raws = [_resized(raw, factor) for raw in raws]
-    reading = replace(reading, layout="ltwh", order=None, pixels=1.0)
+    reading = replace(reading, layout="ltwh", normalised=False, order=None, pixels=1.0)
     return reading, raws, changed, factor, verdict if enough else None
 
 
@@ -568,7 +583,7 @@ def _detections(own: _Boxes | None) -> Detections | None:
     """Sorted by step, without boxes that have no size."""
     if own is None:
         return None
-    boxes = own[0]
+    boxes = own.detections
     order = np.argsort(boxes.frames, kind="stable")
     order = order[(boxes.boxes[order, 2:] > 0.0).all(axis=1)]
     return Detections(boxes.frames[order], boxes.boxes[order], boxes.scores[order])

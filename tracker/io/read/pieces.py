@@ -26,7 +26,7 @@ Axes = Literal["opencv", "opengl"]
 """The axes of a camera: x right, y down, z ahead (OpenCV); or x right, y up, z back (OpenGL)."""
 Up = Literal["x", "y", "z", "-x", "-y", "-z"]
 Lens = Literal["pinhole", "rational", "fisheye"]
-Layout = Literal["ltwh", "xyxy", "cxcywh"]
+Layout = Literal["ltwh", "xyxy", "yxyx", "cxcywh"]
 """The meaning of a box's four numbers: left, top, width, height; left, top, right, bottom; or
 centre and size."""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from typing import get_args
 
 from app.web.importing.models import ImportedCheck, ImportedPair, ImportInfo
 from app.web.importing.sheet.building import (
@@ -19,6 +20,7 @@ from app.web.importing.sheet.building import (
 )
 from app.web.importing.sheet.drawing import plan_picture
 from app.web.tables.markup import Cell, Markup, joined
+from tracker.io.read.pieces import Layout
 from tracker.parameters import MethodKey
 from tracker.parameters.catalogue import METHODS
 from tracker.sequences.sequence import PRESETS
@@ -90,7 +92,7 @@ def room_part(info: ImportInfo) -> Markup:
         ),
         _choice("Poses", "pose", wish.pose, info.pose, ("world-to-camera", "camera-to-world")),
         _choice("Axes", "axes", wish.axes, info.axes, ("opencv", "opengl")),
-        _choice("Boxes", "boxes", wish.boxes, "", ("ltwh", "xyxy", "cxcywh")),
+        _choice("Boxes", "boxes", wish.boxes, "", get_args(Layout)),
         angles_choice(info),
         _choice("First frame", "first_index", wish.first_index, "", (0, 1)),
         _entrances(info),

@@ -32,9 +32,9 @@ KIND: Kind = "detections"
 SERIES = True
 
 _TOGETHER: dict[str, tuple[str, ...]] = {
-    "box": ("boxes", "bboxes", "predboxes", "xyxy", "detections"),
-    "score": ("scores", "confidences", "confs", "confidence", "score", "conf"),
-    "class": ("labels", "classes", "classids", "categoryids", "classid"),
+    "box": ("boxes", "bboxes", "predboxes", "detectionboxes", "xyxy", "detections"),
+    "score": ("scores", "detectionscores", "confidences", "confs", "confidence", "score", "conf"),
+    "class": ("labels", "classes", "detectionclasses", "classids", "categoryids", "classid"),
     "id": ("ids", "trackids", "trackerids", "trackerid"),
 }
 """Of lists beside each other, one a field: what they are called."""
