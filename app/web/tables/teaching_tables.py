@@ -34,7 +34,7 @@ def teach_tables(request: Request, bench: Bench) -> str:
         _templates(snapshot, sequence)
         + _offers(snapshot, sequence, teaching)
         + _numbers(sequence)
-        + _detector(sequence, snapshot.fetching)
+        + _detector(sequence, snapshot.fetching, snapshot.parameters.single_view)
         + _room(sequence)
         + _target(sequence)
         + _entrances(sequence)
@@ -147,8 +147,12 @@ def _numbers(sequence: Sequence) -> str:
     )
 
 
-def _detector(sequence: Sequence, fetching: int | None) -> str:
-    """A network that finds people where nobody draws templates; one can be fetched."""
+def _detector(sequence: Sequence, fetching: int | None, method: str) -> str:
+    """A network that finds people where nobody draws templates; one can be fetched.
+
+    Where one is at hand, one click pins the shown run and computes one by the network beside it,
+    or by shape where the shown run is the network's.
+    """
     if not sequence.has_pictures:
         return ""
     detector = sequence.detector
@@ -167,12 +171,22 @@ def _detector(sequence: Sequence, fetching: int | None) -> str:
     elif not named:
         at_hand = f"<span>{escaped(detector.name)} is at hand</span>"
     without = _send("Without it", "PUT teach/detector", {"model": None}).html if model else ""
+    beside = ""
+    if detector is not None:
+        other = "shapes" if method == "onnx_detector" else "onnx_detector"
+        beside = line(
+            Markup(
+                f'<button class="btn box" data-do="compareWith" data-value="{other}">'
+                f"Compare with {other}</button>"
+            ),
+            quiet(f" Pins the shown run as A and computes {other} as B."),
+        )
     return (
         '<form class="row" data-send="PUT teach/detector" aria-label="Detector">'
         '<label class="wide" title="A person detector exported to ONNX, on this machine">'
         f'Detector<input name="model" id="detector-model" value="{escaped(model)}" '
         'placeholder="path of a model.onnx" required></label>'
-        f'<button class="btn box">Use</button>{without}{at_hand}</form>'
+        f'<button class="btn box">Use</button>{without}{at_hand}</form>{beside}'
     )
 
 

@@ -242,6 +242,8 @@ interface Actions {
 	/** The parameters of a run before, by its number. */
 	useAgain: (number: string) => void;
 	runAgain: () => void;
+	/** Pin the shown run, and compute one of another single-view method beside it. */
+	compareWith: (method: string) => Promise<void>;
 	pin: (on: boolean) => void;
 	/** Smoothing on or off. */
 	hindsight: () => void;

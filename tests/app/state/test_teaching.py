@@ -554,6 +554,7 @@ def test_a_detector_is_chosen_by_its_path_and_taken_away(
     assert shown["methods"]["single_view"] == "onnx_detector"
     assert shown["parameters"]["fusion.survival_probability"] == 0.9
     assert f'value="{model}"' in client.get("/api/tables/teach").text
+    assert 'data-do="compareWith" data-value="shapes"' in client.get("/api/tables/teach").text
     (tmp_path / "text.onnx").write_text("no network")
     answering(tmp_path / "kinds.onnx", {"kinds": np.zeros((1, 3), np.float32)})
     for wrong, words in (
@@ -579,3 +580,4 @@ def test_a_detector_is_chosen_by_its_path_and_taken_away(
     assert shown["methods"]["single_view"] == before["methods"]["single_view"]
     assert shown["parameters"]["fusion.survival_probability"] == 0.9
     assert "Without it" not in client.get("/api/tables/teach").text
+    assert "compareWith" not in client.get("/api/tables/teach").text

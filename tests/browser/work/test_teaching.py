@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import re
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
 
 import httpx2
@@ -16,6 +17,7 @@ from app.scene import framing
 from app.scene.scene import _margin_around
 from tests.browser.conftest import Server
 from tests.browser.looking import as_at_first, ask, by_palette, readout, still, until, viser
+from tests.single_view.networks import pooling
 from tracker.export.tracks_csv import read_tracks_csv
 from tracker.runs import pipeline
 from tracker.sequences.reader import FILE, read_sequence
@@ -371,3 +373,42 @@ def test_a_face_is_dragged_in_3d_saved_and_reopened(page: Page, server: Server) 
     again = server.get("/api/export/tracks.csv").text.splitlines()
     assert [line for line in again if line[0] != "#"] == [line for line in shown if line[0] != "#"]
     page.keyboard.press("0")
+
+
+def test_one_click_compares_the_detector_with_shapes(
+    flat_page: Page, server: Server, tmp_path: Path, screenshots: Path | None
+) -> None:
+    """The shown run is A, the other method's is B, and their figures stand beside each other."""
+    page = flat_page
+    expect(page.locator(".lane").first).to_be_visible(timeout=30_000)
+    model = str(pooling(tmp_path / "red.onnx"))
+    try:
+        ask(server, "PUT", "teach/detector", {"model": model})
+        server.wait(_finished_by("onnx_detector"))
+        page.get_by_role("tab", name="Teach").click()
+        page.get_by_role("button", name="Compare with shapes").click()
+        server.wait(_finished_by("shapes"))
+        pinned = ask(server, "GET", "state")["pinned"]
+        assert pinned["parameters"]["single_view"] == "onnx_detector"
+        table = page.locator("#panel-compare")
+        expect(table).to_contain_text("pinned run", timeout=30_000)
+        expect(table).to_contain_text("onnx_detector")
+        if screenshots is not None:
+            page.screenshot(path=screenshots / "compared.png")
+        page.get_by_role("tab", name="Teach").click()
+        expect(page.get_by_role("button", name="Compare with onnx_detector")).to_be_visible()
+        if screenshots is not None:
+            page.screenshot(path=screenshots / "compare-button.png")
+    finally:
+        ask(server, "DELETE", "run/pin")
+        ask(server, "PUT", "teach/detector", {"model": None})
+        as_at_first(server)
+
+
+def _finished_by(method: str) -> Callable[[dict], bool]:
+    """Whether the shown run is one by this single-view method, and is finished."""
+    return lambda state: (
+        state["methods"]["single_view"] == method
+        and state["run"]["state"] == "done"
+        and state["run"]["key"] is not None
+    )
