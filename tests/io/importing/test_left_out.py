@@ -87,3 +87,50 @@ def test_the_others_of_a_spoilt_file_keep_their_numbers(tmp_path: Path, spoilt: 
         if view.matched.detections is not None
     }
     assert pairs == {f"cam{n + 1}": str(n) for n in range(4) if n != spoilt}
+
+
+SPOILT = {
+    "a word": lambda row: ",".join([row.split(",")[0], "abc", *row.split(",")[2:]]),
+    "a cell too few": lambda row: row.rpartition(",")[0],
+    "a cell too many": lambda row: f"{row},7",
+    "not a number": lambda row: ",".join([row.split(",")[0], "nan", *row.split(",")[2:]]),
+    "infinite": lambda row: ",".join([row.split(",")[0], "1e400", *row.split(",")[2:]]),
+    "cut": lambda row: row[:3],
+}
+
+
+def _spoil(path: Path, rows: list[int], how: str) -> int:
+    """Spoil some rows below the header of a CSV file; returns how many rows there are."""
+    lines = path.read_text().splitlines()
+    for row in rows:
+        lines[row + 1] = SPOILT[how](lines[row + 1])
+    path.write_text("\n".join(lines) + "\n")
+    return len(lines) - 1
+
+
+@pytest.mark.parametrize("how", SPOILT)
+def test_a_row_that_cannot_be_read_costs_no_camera_its_boxes(tmp_path: Path, how: str) -> None:
+    toml(tmp_path)
+    detections(tmp_path)
+    good = {view.camera.name: view for view in settled_of(tmp_path, ImportOptions(fps=25.0)).views}
+    count = _spoil(tmp_path / "cam2.csv", [30], how)
+    plan = settled_of(tmp_path, ImportOptions(fps=25.0))
+    for view in plan.views:
+        before, now = good[view.camera.name].detections, view.detections
+        assert before is not None
+        assert now is not None
+        assert len(before.frames) - len(now.frames) == (view.camera.name == "cam2")
+    (words,) = (text for text in plan.told if "left out" in text)
+    assert words.startswith(f"cam2.csv: 1 of {count} rows (")
+    if how not in ("not a number", "infinite"):  # these are rows without a box
+        assert "cannot be read and are left out, the first in line 32: " in words
+
+
+def test_a_table_of_which_most_rows_cannot_be_read_is_not_used(tmp_path: Path) -> None:
+    toml(tmp_path)
+    detections(tmp_path)
+    path = tmp_path / "cam2.csv"
+    _spoil(path, [*range(0, len(path.read_text().splitlines()) - 2, 2), 1, 3, 5], "a word")
+    (taken,) = (one for one in gather([tmp_path]) if one.label == "cam2.csv")
+    assert not taken.pieces
+    assert "cam2.csv" in taken.complaint

@@ -10,11 +10,12 @@ from pathlib import Path
 
 import numpy as np
 
+from tracker.io.importing.spoilt_rows import readable_rows
 from tracker.io.read.calibration.possible import check_cameras
-from tracker.io.read.pieces import CalibrationPiece, FormatError, Piece
+from tracker.io.read.pieces import CalibrationPiece, DetectionPiece, FormatError, Piece
 from tracker.io.read.protocol import Certainty, Format
 from tracker.io.read.registry import recognise, unforeseen
-from tracker.io.read.source import SourceFile
+from tracker.io.read.source import FileOfLines, SourceFile
 
 MOST_FILES = 200_000
 MOST_DEPTH = 8
@@ -25,6 +26,10 @@ _MOST_REFUSED = 200
 
 _LOOKED_AT = 50
 """Members of a series among which the one is sought that stands for all."""
+
+
+_MOST_SPOILT = 0.05
+"""Largest share of rows that are left out of a file that is recognised only without them."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -195,12 +200,41 @@ def _read(series: tuple[Path, ...], root: Path) -> Iterator[ParsedFiles]:
         if len(series) > 1:  # else it is the one that was just looked at
             found, certainty, complaint = _recognise(own)
         if found is not None:
-            yield _pieces(found, certainty, own, own.where)
+            taken = _pieces(found, certainty, own, own.where)
         else:
-            yield ParsedFiles(own.where, "", Certainty.NO, complaint=complaint, files=(path,))
+            taken = ParsedFiles(own.where, "", Certainty.NO, complaint=complaint, files=(path,))
+        yield taken if taken.pieces else _without_spoilt_rows(own, taken)
     if found is None and len(series) >= _LOOKED_AT:
         label = f"{SourceFile(series[0], root).where} … ({len(series)})"
         yield ParsedFiles(label, "", Certainty.NO, complaint=complaint, files=series)
+
+
+def _without_spoilt_rows(file: SourceFile, taken: ParsedFiles) -> ParsedFiles:
+    """The boxes of a table without its rows that cannot be read, which are summed up in a note.
+
+    Args:
+        file: The file.
+        taken: What is used where it is no such table, or most of it cannot be read.
+    """
+    most = 0.5 if taken.format else _MOST_SPOILT
+    try:
+        rows = readable_rows(file, most)
+        if rows is None:
+            return taken
+        own = FileOfLines(file, rows.lines)
+        found, certainty, _ = _recognise(own)
+    except FormatError:
+        return taken
+    if found is None or (taken.format and found.NAME != taken.format):
+        return taken
+    mended = _pieces(found, certainty, own, own.where)
+    pieces = [
+        replace(piece, left_out=" ".join(filter(None, (rows.left_out, piece.left_out))))
+        for piece in mended.pieces
+        if isinstance(piece, DetectionPiece)
+    ]
+    whole = len(pieces) == len(mended.pieces) > 0
+    return replace(mended, pieces=tuple(pieces)) if whole else taken
 
 
 def _size(path: Path) -> int:
@@ -222,7 +256,8 @@ def _recognise(file: SourceFile) -> tuple[Format | None, Certainty, str]:
 def _series_pieces(
     found: Format, certainty: Certainty, file: SourceFile, root: Path
 ) -> Iterator[ParsedFiles]:
-    """A series; without those of its files that cannot be read by themselves, each told.
+    """A series; without those of its files that cannot be read by themselves, also without some
+    of their rows, each told.
 
     Where these are more than half of the files, the rest is not used either.
     """
@@ -234,8 +269,20 @@ def _series_pieces(
         return
     alone = [SourceFile(path, root) for path in series]
     each = [_pieces(found, certainty, one, one.where) for one in alone]
-    spoilt = [one for one in each if one.complaint]
     whole = tuple(path for path, one in zip(series, each, strict=True) if not one.complaint)
+    tried = [
+        _without_spoilt_rows(one, own)
+        for one, own in zip(alone, each, strict=True)
+        if own.complaint
+    ]
+    mended = [one for one in tried if one.pieces]
+    spoilt = [one for one in tried if not one.pieces]
+    if mended and len(spoilt) <= len(whole) + len(mended):
+        yield from (*mended, *spoilt)
+        if whole:
+            label = f"{SourceFile(whole[0], root).where} … ({len(whole)})"
+            yield _pieces(found, certainty, SourceFile(whole[0], root, whole), label)
+        return
     if not whole or not 0 < len(spoilt) <= _LOOKED_AT:
         yield taken
         return

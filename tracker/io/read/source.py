@@ -11,6 +11,7 @@ import os
 import re
 import tomllib
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -299,6 +300,38 @@ class SourceFile:
 
     def _too_deep(self) -> FormatError:
         return self.error(f"has more than {MOST_DEPTH} levels of nesting; it is no data of ours")
+
+
+class FileOfLines(SourceFile):
+    """A text file of which only some lines count."""
+
+    def __init__(self, file: SourceFile, lines: Sequence[str]) -> None:
+        """Wrap a file.
+
+        Args:
+            file: The file.
+            lines: The lines that count.
+        """
+        super().__init__(file.path, file._root)
+        self._data = "\n".join([*lines, ""]).encode()
+
+    def member(self, path: Path) -> SourceFile:
+        """Return this file by its path, or another one of the folder."""
+        return self if path == self.path else super().member(path)
+
+    @cached_property
+    def size(self) -> int:
+        """The size of the lines, bytes."""
+        return len(self._data)
+
+    @cached_property
+    def head(self) -> bytes:
+        """The first bytes of the lines."""
+        return self._data[:HEAD_BYTES]
+
+    def bytes(self, most: int = MOST_BYTES) -> bytes:
+        """Return the lines, which were read within the limits."""
+        return self._data
 
 
 class _Loader(yaml.CSafeLoader):
