@@ -76,6 +76,13 @@ _TURNS = (0.32, 0.16, 0.08, 0.04, 0.02)  # radians to and fro about each axis of
 _SAME_SCENE = 0.03  # difference of two scenes, in radians and in the size of the rig
 
 
+_AROUND_JUMP = 4
+"""Moments on each side of a jump of a clock between which all steps are looked at."""
+
+_MOST_AROUND = 120
+"""Most steps that are looked at around a jump, as many as there are moments."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Interpretation:
     """A reading, and what the boxes say of it."""
@@ -174,7 +181,11 @@ class Likelihood:
         """The same of every third moment."""
         count = len(self.moments)
         part = max(1, min(PART, count // _LEAST_FIRST))
-        return Likelihood(self.judge.cameras, self._every, self.fps, self.moments[::part])
+        return self.of_moments(self.moments[::part])
+
+    def of_moments(self, moments: Int[ndarray, " M"]) -> Likelihood:
+        """The same of other moments."""
+        return Likelihood(self.judge.cameras, self._every, self.fps, moments)
 
     @property
     def boxes(self) -> int:
@@ -764,15 +775,37 @@ def fit_clocks(
                 _fine(likelihood, best, camera, int(lags[peak]), coarse, late, part)
                 for peak, part in zip(peaks[1:], parts[1:], strict=True)
             )
-            before, after = np.cumsum(first), np.cumsum(last[::-1])[::-1]
-            at = int(np.argmax(np.append(0.0, before[:-1]) + after))
-            found[camera] = ClockFit(0, begins, ends, int(likelihood.moments[at]))
+            jump = _jump(likelihood, best, camera, begins, ends, late)
+            at = int(np.searchsorted(likelihood.moments, jump))
+            begins = _fine(likelihood, best, camera, begins, coarse, late, slice(None, at))
+            ends = _fine(likelihood, best, camera, ends, coarse, late, slice(at, None))
+            jump = _jump(likelihood, best, camera, begins, ends, late)
+            found[camera] = ClockFit(0, begins, ends, jump)
         elif peaks[0] != here and clear:
             lag = int(lags[peaks[0]])
             steps = _fine(likelihood, best, camera, lag, coarse, late, slice(None))
             found[camera] = ClockFit(steps, steps, steps, 0)
             confirmed[camera] = log_odds(moved, usual)
     return found
+
+
+def _jump(
+    likelihood: Likelihood, best: Interpretation, camera: int, begins: int, ends: int,
+    late: Mapping[int, int],
+) -> int:  # fmt: skip
+    """The step from which a camera's boxes are explained by its last lag and no more by its first:
+    sought among the moments, then among all steps of the moments around."""
+    moments = likelihood.moments
+    around = _AROUND_JUMP * int(np.median(np.diff(moments)))
+    for dense in (False, True):
+        some = likelihood if not dense else likelihood.of_moments(moments)
+        steps = moments + np.array([[begins], [ends]])
+        first, last = some.of_camera(best, camera, steps, late)
+        before, after = np.cumsum(first), np.cumsum(last[::-1])[::-1]
+        jump = int(moments[int(np.argmax(np.append(0.0, before[:-1]) + after))])
+        low, high = max(jump - around, int(moments[0])), min(jump + around, int(moments[-1]))
+        moments = np.unique(np.linspace(low, high, _MOST_AROUND).round().astype(np.int64))
+    return jump
 
 
 def _fine(
