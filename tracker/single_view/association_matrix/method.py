@@ -23,6 +23,7 @@ from tracker.single_view.association_matrix.handing_over import advance
 from tracker.single_view.association_matrix.moving_objects import MovingObject, Situation
 from tracker.single_view.association_matrix.silhouettes import Fits, Silhouettes
 from tracker.single_view.dropped import Dropped
+from tracker.single_view.noise import box_sigmas
 from tracker.single_view.pictures import colour
 from tracker.single_view.pictures.blobs import Blobs, blobs
 from tracker.single_view.pictures.colour import BINS
@@ -194,8 +195,8 @@ class AssociationMatrix:
         )
 
     def _sigmas(self, boxes: Float[ndarray, "N 4"]) -> Float[ndarray, "N 4"]:
-        p, half_sizes = self._parameters, np.maximum(boxes[:, 2:], 0.5)
-        return np.concatenate([p.centre_sigma * half_sizes, p.size_sigma * half_sizes], axis=1)
+        p = self._parameters
+        return box_sigmas(boxes, p.centre_sigma, p.size_sigma)
 
     def _gates(self, objects: tuple[MovingObject, ...]) -> Float[ndarray, "G 5"]:
         """The gates of the objects in the next step."""

@@ -24,6 +24,7 @@ from tracker.single_view.box_sizes import BoxSizes
 from tracker.single_view.colour.appearance import Appearance, Scene
 from tracker.single_view.colour.trust import shapes_of_templates, taught_well, template_trust
 from tracker.single_view.dropped import Dropped
+from tracker.single_view.noise import box_sigmas
 from tracker.single_view.pictures import mean_shift
 from tracker.single_view.protocol import TRUST
 from tracker.single_view.shape.evidence import log_ratios, shape_sigmas
@@ -302,9 +303,7 @@ class PeakFinder:
     def sigmas(self, boxes: Float[ndarray, "N 4"]) -> Float[ndarray, "N 4"]:
         """Standard deviations of peaks: proportional to the box, with an upper bound."""
         p = self._parameters
-        half_sizes = np.maximum(boxes[:, 2:], 0.5)
-        half_sizes = half_sizes * np.minimum(1.0, p.sigma_height / half_sizes[:, 1:])
-        return np.concatenate([p.centre_sigma * half_sizes, p.size_sigma * half_sizes], axis=1)
+        return box_sigmas(boxes, p.centre_sigma, p.size_sigma, largest=p.sigma_height)
 
     def _sample(
         self, intensity: GaussianMixture, scene: Scene, rng: np.random.Generator

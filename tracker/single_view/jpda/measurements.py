@@ -24,6 +24,7 @@ from tracker.single_view.colour.peaks import PeakFinder
 from tracker.single_view.detector_boxes import DetectorBoxes, trust
 from tracker.single_view.dropped import Dropped
 from tracker.single_view.jpda.crowns import TargetSizes, crowns
+from tracker.single_view.noise import box_sigmas
 from tracker.single_view.pictures.blobs import blobs
 from tracker.single_view.pictures.foreground import (
     ForegroundModel,
@@ -190,9 +191,7 @@ class _Foreground:
 
     def sigmas(self, boxes: Float[ndarray, "N 4"]) -> Float[ndarray, "N 4"]:
         p = self._parameters
-        half_sizes = np.maximum(boxes[:, 2:], 0.5)
-        centres = np.hypot(p.centre_sigma * half_sizes, p.pixel_sigma)
-        return np.concatenate([centres, p.size_sigma * half_sizes], axis=1)
+        return box_sigmas(boxes, p.centre_sigma, p.size_sigma, pixels=p.pixel_sigma)
 
 
 class _Colours:

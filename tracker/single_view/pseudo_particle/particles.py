@@ -13,6 +13,7 @@ from tracker.parameters.groups.pseudo_particle import PseudoParticleParams
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.colour.appearance import Appearance, Scene
+from tracker.single_view.noise import box_sigmas
 from tracker.single_view.pictures import particles as particle_set
 
 
@@ -104,5 +105,4 @@ class ColourParticles:
     def sigmas(self, boxes: Float[ndarray, "N 4"]) -> Float[ndarray, "N 4"]:
         """Standard deviations of modes: proportional to the box."""
         p = self._parameters
-        half_sizes = np.maximum(boxes[:, 2:], 0.5)
-        return np.concatenate([p.centre_sigma * half_sizes, p.size_sigma * half_sizes], axis=1)
+        return box_sigmas(boxes, p.centre_sigma, p.size_sigma)

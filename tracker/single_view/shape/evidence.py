@@ -11,6 +11,7 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from tracker.parameters.groups.shapes import ShapesParams
+from tracker.single_view.noise import box_sigmas
 
 
 def log_ratios(
@@ -39,6 +40,4 @@ def shape_sigmas(
     """
     p = parameters
     extents = np.array([(half_extents[0] + half_extents[1]) / 2.0, half_extents[2]])
-    half_sizes = np.maximum(boxes[:, 2:], 0.5)
-    centres = np.hypot(p.place_sigma * half_sizes / extents, p.pixel_sigma)
-    return np.concatenate([centres, p.size_sigma * half_sizes], axis=1)
+    return box_sigmas(boxes, p.place_sigma, p.size_sigma, pixels=p.pixel_sigma, extents=extents)
