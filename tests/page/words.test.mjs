@@ -8,7 +8,7 @@ import {
   unbroken,
   whereIs,
 } from "../../static/js/check/words.js";
-import { livesAMinute } from "../../static/js/library/words.js";
+import { livesAMinute, whereabouts } from "../../static/js/library/words.js";
 
 test("a number and its unit stay on one line, other words do not", () => {
   assert.equal(
@@ -84,4 +84,19 @@ test("only who is there before and after can be exchanged, and else it says why"
   assert.match(why(4, 50), /Track 4 begins at step 50/);
   assert.match(why(9, 5), /Track 9 is not there at step 5\.$/);
   assert.equal(why(1, 15), "");
+});
+
+test("recordings of one name are told apart by the end of their paths", () => {
+  const of = (name, place) => ({ name, place });
+  const found = whereabouts([
+    of("take", "/data/monday/take"),
+    of("take", "/data/friday/take"),
+    of("take", "D:\\old\\friday\\take"),
+    of("other", "/data/monday/other"),
+  ]);
+  assert.deepEqual(Object.fromEntries(found), {
+    "/data/monday/take": "…/monday/take",
+    "/data/friday/take": "/data/friday/take",
+    "D:\\old\\friday\\take": "…/old/friday/take",
+  });
 });

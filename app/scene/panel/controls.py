@@ -33,6 +33,9 @@ ORIGIN = "viser"
 PANEL_WIDTH = 276
 """Pixels."""
 
+BUTTON = (73, 80, 87)
+"""Red, green and blue of a button, 0 ... 255: white words on it have a contrast of 8.2 : 1."""
+
 OWN_VALUES = "own values"
 """What the values are while they are no preset's, as on the page."""
 
@@ -113,7 +116,7 @@ class Controls:
             )
         )
         self._reset_all = server.gui.add_button(
-            "Reset all", hint="Every value and method to its default."
+            "Reset all", hint="Every value and method to its default.", color=BUTTON
         )
         self._reset_all.on_click(lambda _: self._reset(None))
         server.gui.add_html(
@@ -156,7 +159,7 @@ class Controls:
                     "What would each change?",
                     hint="Runs the recording with a few other values of each parameter listed "
                     "here, in the background, until somebody works again.",
-                    color="gray",
+                    color=BUTTON,
                 )
             button.on_click(partial(self._ask_curves, copy))
         self._curves = self._server.gui.add_html("")
@@ -187,7 +190,9 @@ class Controls:
         with folder:
             for group in dict.fromkeys(p.group for p in parameters):
                 self._inputs.add_group([p for p in parameters if p.group == group])
-            reset = self._server.gui.add_button(f"Reset {topic.lower()}", visible=False)
+            reset = self._server.gui.add_button(
+                f"Reset {topic.lower()}", visible=False, color=BUTTON
+            )
             reset.on_click(lambda _: self._reset(topic))
             self._resets[topic] = reset
 

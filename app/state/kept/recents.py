@@ -21,7 +21,7 @@ from tracker.files.folders import cache_folder
 from tracker.files.lock import locked
 from tracker.files.validated import read_as, set_aside, write_json
 from tracker.sequences import library
-from tracker.sequences.built_in import opens_by_name
+from tracker.sequences.built_in import built_in_name, opens_by_name
 from tracker.sequences.errors import SequenceError
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.reader import FILE
@@ -75,8 +75,8 @@ class Recents:
         if change != "sequence" or sequence is None:
             return
         folder = sequence.folder.absolute()
-        if opens_by_name(folder):
-            return  # the list has it anyway
+        if opens_by_name(folder) and built_in_name(folder) is None:
+            return  # rendered into the cache by an earlier version: nobody's recording
         one = Recent(
             sequence.name,
             str(folder),

@@ -33,6 +33,7 @@ from tracker.io.read.pieces import FormatError
 from tracker.parameters.catalogue import RunParameters
 from tracker.parameters.values import ParameterError, with_values
 from tracker.sequences import library
+from tracker.sequences.built_in import built_in_name
 
 router = APIRouter(prefix="/api", responses=ERRORS)
 
@@ -78,7 +79,8 @@ def recordings(request: Request, desk: AtDesk, bench: Bench) -> Recordings:
     data: Path | None = request.app.state.settings.data
     cards = [
         RecordingCard(
-            name=one.name, opens=one.folder, kind="recent", description="", cameras=one.cameras,
+            name=one.name, opens=built_in_name(Path(one.folder)) or one.folder, kind="recent",
+            description="", cameras=one.cameras,
             frames=one.frames, fps=one.fps, opened=one.opened,
             picture=f"/api/recordings/picture?recent={number}",
         )

@@ -7,10 +7,13 @@ import { fill, h, icon, one, write } from "../elements/dom.js";
 import { xOf } from "../play/clock.js";
 import { clockOf, middleOf } from "./words.js";
 
-/** A number, and the room that one needs, CSS pixels. */
-const NUMBER = 17;
+/** A number of one digit, and what each further digit adds to it, CSS pixels. */
+const [NUMBER, DIGIT] = [17, 7];
 /** Numbers that are written; those after them are a line. */
 const MOST = 60;
+
+/** How far from another a number is legible, CSS pixels. @param {HTMLElement} number */
+const roomOf = ({ textContent }) => NUMBER + DIGIT * ((textContent?.length ?? 1) - 1);
 
 /** @param {Context} context @param {TimelineSeam} timeline @param {Check} check */
 export function mountMarks({ store }, timeline, check) {
@@ -73,17 +76,19 @@ export function mountMarks({ store }, timeline, check) {
 		const { queue, chosen, told } = state.get();
 		const bottom = lanes.row.y + lanes.row.height;
 		row.style.top = `${y}px`;
-		/** The first in the queue keep their room. @type {number[]} */
+		/** The chosen one has its room, then the first in the queue. @type {number[]} */
 		const taken = [];
-		numbers.forEach((element, k) => {
+		const shown = numbers.flatMap((element, k) => {
 			const doubt = queue?.doubts[k];
-			if (!doubt) return;
+			return doubt ? [{ element, doubt, wanted: doubt.id === chosen?.id }] : [];
+		});
+		for (const { element, doubt } of shown.sort((a, b) => Number(b.wanted) - Number(a.wanted))) {
 			const x = xOf(middleOf(doubt), view);
-			const free = taken.every((other) => Math.abs(other - x) > NUMBER);
-			element.hidden = x < 0 || x > view.width || (!free && doubt.id !== chosen?.id);
+			const free = taken.every((other) => Math.abs(other - x) > roomOf(element));
+			element.hidden = x < 0 || x > view.width || !free;
 			if (!element.hidden) taken.push(x);
 			element.style.translate = `${Math.round(x)}px`;
-		});
+		}
 		g.fillStyle = faded(ink.get("warn"), 0.35);
 		for (const doubt of queue?.doubts ?? []) {
 			const [a, b] = [xOf(doubt.first, view), xOf(doubt.last + 1, view)];

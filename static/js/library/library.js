@@ -4,7 +4,7 @@ import { getJson } from "../state/api.js";
 import { chosenBar } from "./chosen.js";
 import { preview } from "./preview.js";
 import { runsTable } from "./runs.js";
-import { has, many, titleOf, factsOf, size, when } from "./words.js";
+import { factsOf, has, many, size, titleOf, when, whereabouts } from "./words.js";
 
 /* ---------- A recording whose folder is gone: its runs stay readable, and somebody may say
    where it is now. */
@@ -121,8 +121,8 @@ function shelf(on) {
 		foot,
 	);
 
-	/** @param {Server.RecordingInfo} one @param {boolean} chosen */
-	const item = (one, chosen) =>
+	/** @param {Server.RecordingInfo} one @param {boolean} chosen @param {string} [where] */
+	const item = (one, chosen, where) =>
 		h(
 			"button",
 			{
@@ -139,6 +139,7 @@ function shelf(on) {
 				"span",
 				{ class: "tx" },
 				h("b", {}, one.name),
+				where && h("span", { class: "small where" }, where),
 				h("span", { class: `small${one.missing ? " missing" : ""}` }, factsOf(one)),
 			),
 			h(
@@ -177,6 +178,7 @@ function shelf(on) {
 		show(library, recording) {
 			const text = this.text();
 			const walked = list.contains(document.activeElement);
+			const where = whereabouts(library.recordings);
 			fill(
 				list,
 				KINDS.flatMap(([word, kind]) => {
@@ -188,7 +190,9 @@ function shelf(on) {
 								(!text || has(text, [one.name, one.place]) || one.place === recording?.place),
 						);
 					const head = h("div", { class: "cap" }, h("span", {}, word), h("span", {}, "runs"));
-					const items = found.map((one) => item(one, one.place === recording?.place));
+					const items = found.map((one) =>
+						item(one, one.place === recording?.place, where.get(one.place)),
+					);
 					return found.length ? [head, ...items] : [];
 				}),
 			);

@@ -43,6 +43,33 @@ export const livesAMinute = ({ targets, steps }, fps) =>
 /** @param {Server.KeptRunInfo} run */
 export const titleOf = (run) => run.name || `Run ${run.id}`;
 
+/**
+ * Where recordings lie that have a name in common: the end of each one's path that no other has, by
+ * its path. Those with a name of their own are left out.
+ * @param {Pick<Server.RecordingInfo, "name" | "place">[]} recordings
+ * @returns {Map<string, string>}
+ */
+export function whereabouts(recordings) {
+	const foldersOf = (/** @type {string} */ place) => place.split(/[\\/]/).filter(Boolean);
+	/** @type {Map<string, string>} */
+	const found = new Map();
+	for (const { name, place } of recordings) {
+		const others = recordings.filter((other) => other.name === name && other.place !== place);
+		if (!others.length) continue;
+		const own = foldersOf(place);
+		const end = (/** @type {string[]} */ folders, /** @type {number} */ count) =>
+			folders.slice(-count).join("/");
+		let count = 1;
+		while (
+			count < own.length &&
+			others.some((other) => end(foldersOf(other.place), count) === end(own, count))
+		)
+			count += 1;
+		found.set(place, count < own.length ? `…/${end(own, count)}` : place);
+	}
+	return found;
+}
+
 /** What a recording is. @param {Server.RecordingInfo} recording */
 export function factsOf({ cameras, frames, fps, boxes_only: boxes, people, missing }) {
 	if (missing) return missing;

@@ -91,14 +91,14 @@ export function mountTour(root, { store }) {
 			),
 			h(
 				"p",
-				{},
+				{ class: "seen" },
 				`${cameras} one room. A coloured body is a person the filter believes in, the line on `,
 				"the floor where it came from; dashed in the pictures is the truth.",
 			),
 			THINGS.map(({ word, key: name, text }, index) =>
 				h(
 					"div",
-					{ class: done[index] ? "thing done" : "thing" },
+					{ class: `thing${done[index] ? " done" : index === next ? " next" : ""}` },
 					h("span", { class: "step" }, done[index] ? icon("i-tick", "s") : index + 1),
 					h(
 						"h3",

@@ -272,10 +272,36 @@ export function mountStudy(root, { store, actions }) {
 						h("div", {}, h("dt", {}, "disk"), h("dd", {}, `${(cost.bytes / 1e6).toFixed(1)} MB`)),
 					)
 				: h("p", {}, "See what is said beside Start."),
+			h("h3", {}, "What a study is"),
 			h(
 				"p",
-				{ class: "q" },
-				"Trial 0 is always the default. Here its figures will stand against each other: every trial a dot, those that nothing beats joined by a line.",
+				{},
+				"Many runs of the same recordings, each a trial with other values of the chosen parameters. It finds which values track better, and which parameters matter at all. Trial 0 is always the default.",
+			),
+			h("h3", {}, "What to do first"),
+			h(
+				"ol",
+				{ class: "firsts" },
+				h(
+					"li",
+					{},
+					h("b", {}, TUNE),
+					" does all of it for the open recording: it varies what matters most and checks the best values on other seeds.",
+				),
+				h(
+					"li",
+					{},
+					"Or say it yourself, at the left: recordings, parameters with their ranges, by which figure a trial is better. ",
+					h("b", {}, "Start"),
+					" runs it, also while you work elsewhere.",
+				),
+				h(
+					"li",
+					{},
+					"As trials end, each is a dot here: its figures against each other, what matters, each parameter, and a table. ",
+					h("b", {}, "Use"),
+					" puts the best values on the sliders.",
+				),
 			),
 		);
 	}

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any, get_args
 
+import numpy as np
 import pytest
 import viser
 from hypothesis import given
@@ -15,7 +16,7 @@ from hypothesis import strategies as st
 
 from app.paths import static_folder
 from app.scene.keys import hotkeys
-from app.scene.panel.controls import ORIGIN, Controls
+from app.scene.panel.controls import BUTTON, ORIGIN, Controls
 from app.scene.panel.sliders import Scale, hint_text, label_text, number_text, symbol_parts
 from app.state.workbench import Workbench
 from tests.app.scene import scene_case
@@ -326,6 +327,12 @@ def test_only_what_the_methods_read_is_shown(
     assert panel.wait(SECONDS)
     assert [key for key in shown.split() if not is_shown(key)] == []
     assert [key for key in hidden.split() if is_shown(key)] == []
+
+
+def test_buttons_have_words_that_can_be_read() -> None:
+    shares = np.array(BUTTON) / 255
+    linear = np.where(shares <= 0.04045, shares / 12.92, ((shares + 0.055) / 1.055) ** 2.4)
+    assert 1.05 / (linear @ (0.2126, 0.7152, 0.0722) + 0.05) >= 4.5
 
 
 def test_changed_values_are_marked_and_can_be_reset(panel: Controls, workbench: Workbench) -> None:

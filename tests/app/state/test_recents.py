@@ -10,6 +10,8 @@ import pytest
 
 from app.state.kept.recents import Recents
 from app.state.workbench import Workbench
+from tests.app.scene import scene_case
+from tracker.sequences.library import open_sequence
 
 GOOD = {"name": "a", "folder": "/x", "cameras": 3, "frames": 9, "fps": 25.0, "opened": 1e9}
 
@@ -38,3 +40,14 @@ def test_a_spoilt_list_is_kept_aside(
         assert Recents(Workbench(), file).all() == []
     assert words in caplog.text
     assert (tmp_path / "recent.unreadable.json").read_text() == text
+
+
+def test_a_built_in_room_is_among_what_was_open(tmp_path: Path) -> None:
+    workbench = Workbench()
+    recents = Recents(workbench, tmp_path / "recent.json")
+    scene_case.show(workbench, open_sequence("room24-2p"))
+    recents.close()
+    assert [one.name for one in recents.all()] == ["room24-2p"]
+    assert [one.name for one in Recents(Workbench(), tmp_path / "recent.json").all()] == [
+        "room24-2p"
+    ]

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import time
+from collections import Counter
 from collections.abc import Sequence
+from pathlib import Path
 
 from app.state.importing.uploads import MOST_BYTES
 from app.web.importing.models import RecordingCard, Recordings
@@ -128,11 +130,15 @@ def _cards(
     open_as: Sequence[str],
     *beside: Markup,
 ) -> Markup:
-    found = element("div", [_card(card, open_as) for card in cards], class_="cards")
+    names = Counter(card.name for card in cards)
+    found = element(
+        "div", [_card(card, open_as, named=names[card.name] == 1) for card in cards], class_="cards"
+    )
     return joined(heading(words, small(note), *beside), found)
 
 
-def _card(card: RecordingCard, open_as: Sequence[str]) -> Markup:
+def _card(card: RecordingCard, open_as: Sequence[str], *, named: bool) -> Markup:
+    """A recording; its folder is told with it where ``named`` says that its name is not enough."""
     is_open = card.opens in open_as
     length = (
         f"{card.fps:g} Hz · {_duration(card.frames / card.fps)}"
@@ -149,6 +155,7 @@ def _card(card: RecordingCard, open_as: Sequence[str]) -> Markup:
         "button",
         element("span", blank, picture, small(cameras, class_="lens"), class_="shot"),
         element("b", card.name),
+        None if named else small("…/" + "/".join(Path(card.opens).parts[-2:])),
         element(
             "span",
             element("span", length, class_="cut"),
@@ -156,7 +163,7 @@ def _card(card: RecordingCard, open_as: Sequence[str]) -> Markup:
             class_="small",
         ),
         class_="rec",
-        title=f"{card.name}: {card.description or length}",
+        title=f"{card.name}: {card.description or length}" + ("" if named else f", {card.opens}"),
         data_do="recording",
         data_value=card.opens,
         aria_current="true" if is_open else None,
