@@ -185,6 +185,9 @@ export function mountTables(root, { store, actions }) {
 		more,
 		resetAll,
 		report,
+		leaving,
+		stopLeaving,
+		leave,
 	} = parts(root);
 	for (const [name, { keys, path }] of Object.entries(TABLES)) {
 		const body = one(`#panel-${name} [data-fill]`, root);
@@ -240,6 +243,27 @@ export function mountTables(root, { store, actions }) {
 			};
 		});
 	}
+	// The run that is shown leaves in the same forms as those of the library.
+	/** @type {Promise<void> | undefined} */
+	let exports;
+	store.watch(["tab"], ({ tab }) => {
+		if (tab !== "runs") return;
+		exports ??= import("../library/exports.js").then(
+			({ exportMenu }) => {
+				const say = (
+					/** @type {string} */ words,
+					/** @type {(() => void) | undefined} */ cancel,
+				) => {
+					write(leaving, words);
+					stopLeaving.hidden = !cancel;
+					stopLeaving.onclick = cancel ?? null;
+				};
+				leave.append(...exportMenu({ actions, say, chosen: () => [null] }));
+				controls();
+			},
+			() => void (exports = undefined),
+		);
+	});
 	presetName.addEventListener("blur", () => (presetName.hidden = true));
 	removePreset.addEventListener("click", () => actions.removePreset(presets.value));
 
@@ -281,6 +305,8 @@ export function mountTables(root, { store, actions }) {
 		);
 		if (report.ariaDisabled) report.removeAttribute("href");
 		else report.setAttribute("href", "/api/export/report.html");
+		for (const button of all("[aria-haspopup=menu]", leave))
+			allow(button, run?.done ? "" : "There are no tracks yet.");
 		write(more, every ? "Headlines" : "All figures");
 	}
 	store.watch(

@@ -371,6 +371,7 @@ def test_what_cannot_be_imported_is_told(client: TestClient, data: Path, tmp_pat
     info = _settled(client, _send(client, folder))
     assert (info["phase"], info["cameras"]) == ("failed", [])
     assert "no calibration was found" in info["error"]
+    assert "Add a calibration file…" in info["sheet"]
     written = client.post(f"/api/import/{info['key']}/write", json={})
     assert "No calibration was found" in written.json()["detail"]
     toml(folder)

@@ -11,6 +11,7 @@ from playwright.sync_api import Page, expect
 
 from tests.browser.looking import ask
 from tests.browser.serving import Server
+from tracker.export.registry import FORMATS
 
 P_D = "fusion.detection_probability"
 
@@ -111,6 +112,17 @@ def test_a_run_leaves_as_a_file(library: Page) -> None:
     told = json.loads(Path(saved.value.path()).read_text(encoding="utf-8"))
     assert told["tracks"] != []
     assert saved.value.suggested_filename.endswith(".json")
+
+
+def test_the_shown_run_leaves_in_the_same_forms(flat_page: Page) -> None:
+    page = flat_page
+    page.get_by_role("tab", name="Runs").click()
+    page.get_by_role("tabpanel", name="Runs").get_by_role("button", name="Export").click()
+    expect(page.get_by_role("menuitem")).to_have_count(len(FORMATS))
+    with page.expect_download() as saved:
+        page.get_by_role("menuitem", name="JSON").click()
+    told = json.loads(Path(saved.value.path()).read_text(encoding="utf-8"))
+    assert told["tracks"] != []
 
 
 def test_a_run_is_opened_as_it_was_without_computing(library: Page, server: Server) -> None:

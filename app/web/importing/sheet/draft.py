@@ -14,6 +14,7 @@ from app.web.importing.sheet.building import (
 )
 from app.web.importing.sheet.cameras import cameras_table, ready
 from app.web.importing.sheet.settings import angles_choice, checks_part, room_part, target_part
+from app.web.importing.sheet.start import CALIBRATIONS
 from app.web.tables.markup import Markup, joined
 
 
@@ -27,6 +28,8 @@ def draft_sheet(info: ImportInfo) -> str:
     """All of it."""
     asked = angles_choice(info)
     body = [_files(info), element("div", asked, class_="in-asked") if asked else None]
+    if not info.cameras and not info.busy and info.phase in ("failed", "settled"):
+        body.append(_adding(info))
     if info.cameras:
         parts = (room_part(info), checks_part(info), target_part(info))
         body = [cameras_table(info), element("div", *parts, class_="in-body")]
@@ -71,6 +74,15 @@ def _files(info: ImportInfo) -> Markup:
         for name in info.coming
     ]
     return element("div", rows, class_="in-scroll in-files", tabindex=0)
+
+
+def _adding(info: ImportInfo) -> Markup:
+    """What may be missing where the files give no camera, and the way to add it."""
+    known = f"Cameras need a calibration: {CALIBRATIONS}."
+    if not info.uploaded:
+        known += " Put its file into the folder and open the folder again."
+    add = button("Add a calibration file…", "files", "box") if info.uploaded else None
+    return element("div", element("p", known), add, class_="in-asked in-add")
 
 
 def _copying(info: ImportInfo) -> str:

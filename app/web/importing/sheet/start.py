@@ -21,13 +21,12 @@ from app.web.importing.sheet.building import (
 )
 from app.web.tables.markup import Markup, joined
 
+CALIBRATIONS = (
+    "OpenCV, Pose2Sim, Caliscope, Anipose, Qualisys, COLMAP, Metashape, Kalibr, ROS, projections"
+)
 UNDERSTOOD = (
     ("Video", "mp4, mov, avi, mkv; folders of numbered pictures"),
-    (
-        "Calibration",
-        "OpenCV, Pose2Sim, Caliscope, Anipose, Qualisys, COLMAP, Metashape, Kalibr, ROS, "
-        "projections",
-    ),
+    ("Calibration", CALIBRATIONS),
     (
         "Detections",
         "MOTChallenge, YOLO, COCO, OpenPose, CVAT, LabelMe, VIA, JSON, CSV; none is fine too",

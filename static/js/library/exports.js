@@ -1,0 +1,122 @@
+/** Runs leave: a menu of forms, then each is written by the server and saved by the browser. */
+import { choices, fill, h, icon } from "../elements/dom.js";
+import { getJson } from "../state/api.js";
+
+const ASKS_MS = 250;
+
+/**
+ * @param {object} how
+ * @param {Actions} how.actions
+ * @param {() => (number | null)[]} how.chosen  runs of the library; null is the one that is shown
+ * @param {(words: string, cancel?: () => void) => void} how.say
+ */
+export function exportMenu({ actions, chosen, say }) {
+	const forms = h("div", { role: "menu", "aria-label": "Export as" });
+	const menu = h("div", { class: "menu", popover: "auto" }, forms);
+	const button = h(
+		"button",
+		{ class: "btn box", "aria-haspopup": "menu" },
+		icon("i-export"),
+		"Export",
+		icon("i-down", "s"),
+	);
+	button.popoverTargetElement = menu;
+	menu.addEventListener("toggle", (event) => {
+		if (/** @type {ToggleEvent} */ (event).newState !== "open") return;
+		const { left, top } = button.getBoundingClientRect();
+		Object.assign(menu.style, { left: `${left}px`, bottom: `${innerHeight - top + 6}px` });
+		menu.querySelector("button")?.focus();
+		void list();
+	});
+	menu.addEventListener("keydown", (event) => {
+		const step = { ArrowDown: 1, ArrowUp: -1 }[event.key];
+		if (!step || part.contains(/** @type {Node} */ (event.target))) return;
+		const all = [...menu.querySelectorAll("button")];
+		const at = all.indexOf(/** @type {HTMLButtonElement} */ (document.activeElement));
+		all[(at + step + all.length) % all.length].focus();
+		event.preventDefault();
+		event.stopPropagation();
+	});
+	const [first, last] = ["first step", "last step"].map((words) =>
+		h("input", { type: "number", min: 0, placeholder: words, "aria-label": `Video, ${words}` }),
+	);
+	const speed = h("select", { "aria-label": "Video, speed" });
+	choices(
+		/** @type {any} */ (speed),
+		[1, 0.5, 0.25, 0.1].map((value) => [value, value === 1 ? "real speed" : `${value}×`]),
+		1,
+	);
+	const part = h(
+		"div",
+		{ class: "video-part" },
+		h("b", {}, "Of a video"),
+		h("span", {}, first, " – ", last, " ", speed),
+	);
+	let listed = false;
+
+	/** Once the server has told them; asked again when the menu is opened again. */
+	async function list() {
+		if (listed) return;
+		const told = await getJson("/api/exports/formats").catch((error) => error);
+		if (told instanceof Error) {
+			fill(menu, h("p", { class: "small" }, `What can be written is not known: ${told.message}`));
+			return;
+		}
+		listed = true;
+		fill(menu, forms, part);
+		fill(
+			forms,
+			told.formats.map((/** @type {Server.FormatInfo} */ form) =>
+				h(
+					"button",
+					{
+						role: "menuitem",
+						onclick: () => (menu.hidePopover(), void write(form)),
+					},
+					h("b", {}, form.word),
+					h("span", { class: "small" }, form.help),
+				),
+			),
+		);
+		menu.querySelector("button")?.focus();
+	}
+
+	/** Which part of a video, and how fast. */
+	const wanted = () => ({
+		first: first.valueAsNumber || 0,
+		last: Number.isFinite(last.valueAsNumber) ? last.valueAsNumber : null,
+		speed: Number(speed.value),
+	});
+
+	/** @param {Server.FormatInfo} form */
+	async function write(form) {
+		for (const run of chosen()) {
+			const called = run === null ? "This run" : `Run ${run}`;
+			let now = await actions.ask("POST", "exports", {
+				format: form.name,
+				run,
+				...(form.video ? wanted() : {}),
+			});
+			if (!now) return;
+			const { number } = now;
+			while (now.state === "writing" && now.number === number) {
+				const share = now.total ? ` ${Math.round((100 * now.done) / now.total)} %` : "";
+				say(`${called} as ${form.word}${share}`, () => void actions.ask("DELETE", "exports"));
+				await new Promise((resolve) => setTimeout(resolve, ASKS_MS));
+				now = await getJson("/api/exports").catch((error) => ({
+					state: "failed",
+					error: error.message,
+				}));
+			}
+			say("");
+			if (now.state === "failed")
+				return actions.note("error", `${called} was not written as ${form.word}`, now.error);
+			if (now.state !== "done") return;
+			const link = h("a", { href: "/api/exports/file", download: now.name });
+			link.click();
+			await new Promise((resolve) => setTimeout(resolve, ASKS_MS));
+			say(`${now.name} was saved`);
+		}
+	}
+	return [button, menu];
+}
