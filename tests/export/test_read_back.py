@@ -19,6 +19,7 @@ from tracker.export.registry import FORMATS, save
 from tracker.fusion.trajectories import Trajectories
 from tracker.io.read.pieces import DetectionPiece, TruthPiece
 from tracker.parameters.catalogue import RunParameters
+from tracker.sequences.sequence import GroundTruth
 
 STEPS = 40
 PRESENT = {1: [*range(STEPS)], 4: [*range(0, 12), *range(25, STEPS)], 11: [*range(3, 20)]}
@@ -130,6 +131,41 @@ def test_tracks_come_back_with_their_ids_and_gaps(tmp_path: Path, name: str) -> 
     np.testing.assert_array_equal(frames[order], RUN.tracks.frames)
     np.testing.assert_array_equal(ids[order], RUN.tracks.ids)
     np.testing.assert_allclose(places[order], RUN.tracks.positions, atol=0.5001e-4)
+
+
+def test_the_truth_of_motchallenge_comes_back(tmp_path: Path) -> None:
+    """In each camera the boxes of the people whose position is certain, at their steps."""
+    own = RUN.tracks
+    valid = own.ids != 4
+    truth = GroundTruth(own.frames, own.ids, own.positions, valid)
+    run = ExportedRun(replace(SEQUENCE, ground_truth=truth), own, RunParameters())
+    save(tmp_path / "mot", FORMATS["motchallenge"], run)
+    for number, camera in enumerate(SEQUENCE.cameras):
+        (file,) = (tmp_path / "mot" / "gt").glob(f"**/*-{camera.name}/gt/gt.txt")
+        (piece,) = read(file)[1]
+        assert isinstance(piece, DetectionPiece)
+        boxes, visible = run.boxes[number]
+        assert piece.format == "MOTChallenge ground truth"
+        assert piece.first_index == 1
+        np.testing.assert_array_equal(piece.frames - 1, own.frames[visible & valid])
+        np.testing.assert_allclose(piece.boxes, boxes[visible & valid], atol=1e-6)
+        assert f"{int((visible & ~valid).sum())} of {int(visible.sum())} rows" in piece.left_out
+
+
+def test_the_truth_on_the_ground_plane_comes_back_as_places(tmp_path: Path) -> None:
+    own = RUN.tracks
+    truth = GroundTruth(own.frames, own.ids, own.positions, own.ids != 4)
+    run = ExportedRun(replace(SEQUENCE, ground_truth=truth), own, RunParameters())
+    save(tmp_path / "mot", FORMATS["motchallenge"], run)
+    (file,) = (tmp_path / "mot" / "gt").glob("**/*-ground-plane/gt/gt.txt")
+    (piece,) = read(file)[1]
+    assert isinstance(piece, TruthPiece)
+    assert (piece.unit, piece.up, piece.first_index) == ("m", "z", 1)
+    np.testing.assert_array_equal(piece.frames - 1, own.frames)
+    np.testing.assert_array_equal(piece.ids, np.unique(own.ids, return_inverse=True)[1] + 1)
+    np.testing.assert_allclose(piece.positions[:, :2], own.positions[:, :2], atol=1e-9)
+    assert np.isnan(piece.positions[:, 2]).all()
+    np.testing.assert_array_equal(piece.valid, own.ids != 4)
 
 
 @pytest.mark.parametrize(("form", "suffix"), [("opencv", ".yml"), ("pose2sim", ".toml")])

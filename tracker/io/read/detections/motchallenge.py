@@ -35,6 +35,10 @@ LABELS = "labels.txt"
 SEQUENCE = "seqinfo.ini"
 """The description that lies beside the folders ``gt`` and ``det`` of the challenge's sequences."""
 
+GROUND_PLANE = "-ground-plane"
+"""The end of the name of a sequence whose boxes are outlines on the floor in metres, as this
+program exports them."""
+
 _PEOPLE_WORDS = ("person", "people", "pedestrian", "human", "man", "woman", "player")
 _MOST_LABELS = 2**16  # bytes
 
@@ -64,6 +68,20 @@ def read(file: SourceFile) -> Iterator[Piece]:
     is_truth = columns in (8, 9) and set(np.unique(table[:, 6])) <= {0.0, 1.0}
     # the ninth number of the ground truth is how much of a person is seen; -1 is of a tracker's
     is_truth &= columns < 9 or bool((table[:, 8] >= 0.0).all())
+    if is_truth and file.path.parent.parent.name.endswith(GROUND_PLANE):
+        middles = boxes[:, :2] + boxes[:, 2:] / 2.0
+        yield TruthPiece(
+            source=file.path,
+            format="MOTChallenge ground plane",
+            frames=frames,
+            ids=ids,
+            positions=np.column_stack([middles, np.full(len(middles), np.nan)]),
+            unit="m",
+            up="z",
+            first_index=1,
+            valid=table[:, 6] == 1.0,
+        )
+        return
     keep = np.ones(len(table), dtype=bool)
     scores = np.ones(len(table))
     if is_truth:
