@@ -23,8 +23,14 @@ export function exportMenu({ actions, chosen, say }) {
 	button.popoverTargetElement = menu;
 	menu.addEventListener("toggle", (event) => {
 		if (/** @type {ToggleEvent} */ (event).newState !== "open") return;
-		const { left, top } = button.getBoundingClientRect();
-		Object.assign(menu.style, { left: `${left}px`, bottom: `${innerHeight - top + 6}px` });
+		const { left, right, top } = button.getBoundingClientRect();
+		// Towards the middle of the window, whose edges would cut it.
+		const far = left > innerWidth / 2;
+		Object.assign(menu.style, {
+			left: far ? "auto" : `${left}px`,
+			right: far ? `${innerWidth - right}px` : "auto",
+			bottom: `${innerHeight - top + 6}px`,
+		});
 		menu.querySelector("button")?.focus();
 		void list();
 	});

@@ -119,6 +119,9 @@ def test_the_shown_run_leaves_in_the_same_forms(flat_page: Page) -> None:
     page.get_by_role("tab", name="Runs").click()
     page.get_by_role("tabpanel", name="Runs").get_by_role("button", name="Export").click()
     expect(page.get_by_role("menuitem")).to_have_count(len(FORMATS))
+    box = page.get_by_role("menu", name="Export as").bounding_box()
+    assert box is not None
+    assert 0 <= box["x"] <= 1440 - box["width"], "all of it is in the window"
     with page.expect_download() as saved:
         page.get_by_role("menuitem", name="JSON").click()
     told = json.loads(Path(saved.value.path()).read_text(encoding="utf-8"))
