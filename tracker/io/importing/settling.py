@@ -48,7 +48,12 @@ from tracker.io.importing.finding.matching import (
     same_aspect,
 )
 from tracker.io.importing.finding.people import rate_of, rays_of_all
-from tracker.io.importing.finding.pictures import COMMON_SIZES, picture_sizes, scaled
+from tracker.io.importing.finding.pictures import (
+    COMMON_SIZES,
+    exchange_by_shape,
+    picture_sizes,
+    scaled,
+)
 from tracker.io.importing.finding.scale import AS_STANDING, PERSON, paced, resized
 from tracker.io.importing.finding.times import (
     CameraTime,
@@ -136,6 +141,7 @@ def settle(taken: Sequence[ParsedFiles], options: ImportOptions | None = None) -
     cameras = matched.cameras
     for way in sorted({how for camera in cameras for how in camera.how.values()} - {"name"}):
         found.append(("matching", f"pictures and boxes go to the cameras by {way}"))
+    exchange_by_shape(cameras, found)
     sizes = picture_sizes(cameras, found)
     check_lenses([camera.raw for camera in cameras + matched.spare], matched.format)
     plain = [scaled(camera.raw, size) for camera, size in zip(cameras, sizes, strict=True)]

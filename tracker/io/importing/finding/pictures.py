@@ -43,6 +43,49 @@ def picture_sizes(
     return [size or likely for size in sizes]
 
 
+def exchange_by_shape(cameras: Sequence[MatchedCamera], found: list[tuple[str, str]]) -> None:
+    """Exchange calibrations that have the shape of each other's pictures and not of their own.
+
+    Where pictures of several of these cameras have one shape, nothing is exchanged: whose is whose
+    is not told by shapes.
+
+    Args:
+        cameras: The cameras, whose calibrations are replaced.
+        found: What was found out is added.
+    """
+    wrong = [
+        (camera, camera.raw, camera.raw.image_size, camera.picture_size)
+        for camera in cameras
+        if camera.raw.image_size is not None
+        and camera.picture_size is not None
+        and not same_aspect(camera.raw.image_size, camera.picture_size)
+    ]
+    owners = [
+        [
+            k
+            for k, (_, _, calibrated, _) in enumerate(wrong)
+            if calibrated is not None and known is not None and same_aspect(calibrated, known)
+        ]
+        for _, _, _, known in wrong
+    ]
+    if (
+        not wrong
+        or {len(own) for own in owners} != {1}
+        or len({own[0] for own in owners}) < len(wrong)
+    ):
+        return
+    for (camera, raw, _, known), (owner,) in zip(wrong, owners, strict=True):
+        assert known is not None
+        found.append(
+            (
+                f"{raw.name} exchanged",
+                f"has the calibration of {wrong[owner][1].name}, whose shape its pictures of "
+                f"{known[0]}×{known[1]} have",
+            )
+        )
+        camera.raw = replace(wrong[owner][1], name=raw.name)
+
+
 def _size(camera: MatchedCamera, found: list[tuple[str, str]]) -> tuple[int, int] | None:
     known = camera.picture_size
     calibrated = camera.raw.image_size
