@@ -206,6 +206,29 @@ def test_a_poor_view_is_bounded() -> None:
     assert 0.0 < np.trace(errors.covariances(paths)[0]) <= 8.0 * unit * (1.0 + 1e-12)
 
 
+def test_the_shape_of_bodies_is_considered_as_one_error_of_all_cameras() -> None:
+    """(G δ)(G δ)ᵀ of horizontal centres, a third of it for the rims."""
+    noise, paths, halves = TRUE, paths_of(1), np.array([50.0, 80.0])
+    every = np.array([jacobians_of(0.3, 60.0), jacobians_of(1.7, 90.0)])
+    weights = 1.0 / noise.variances(halves)
+    information = np.einsum("cpa,cp,cpb->ab", every, weights, every) + np.eye(3)
+    offs = np.array([3.0, -2.0]), np.array([1.0, 4.0])
+    gains = [
+        np.linalg.solve(information, np.einsum("c,ca,c->a", off, every[:, 0], weights[:, 0]))
+        for off in offs
+    ]
+    plain, errors = PersistentErrors(noise, 1, 0.85), PersistentErrors(noise, 1, 0.85)
+    for camera, (half, jacobian) in enumerate(zip(halves, every, strict=True)):
+        seen = SureBoxes(
+            np.array([camera]), np.array([0]), np.zeros((1, 3)), jacobian[None], np.array([half])
+        )
+        plain.add(seen)
+        errors.add(seen)
+        errors.add_bodies(seen, offs[0][[camera]], offs[1][[camera]])
+    expected = np.outer(gains[0], gains[0]) / 3.0 + np.outer(gains[1], gains[1])
+    assert_allclose((errors.covariances(paths) - plain.covariances(paths))[0], expected)
+
+
 def test_what_cameras_have_in_common_is_as_large_as_what_they_differ_by() -> None:
     offsets = np.array([[0.03, 0.5, 0.5], [-0.04, 0.5, 0.5]])
     expected = COMMON * (0.05**2 + (0.03**2 + 0.04**2) / 2.0) * 0.85**2

@@ -10,7 +10,7 @@ from jaxtyping import Bool, Float
 from numpy import ndarray
 
 from tracker.geometry.camera import Camera
-from tracker.kernels import measurement
+from tracker.kernels import boxes, measurement
 from tracker.kernels.gating import Measurements
 from tracker.kernels.kalman import Expected
 from tracker.kernels.measurement import Target
@@ -178,6 +178,24 @@ class TargetModel:
             camera.calibration,
         )
         return ExpectedBoxes(found.expected, found.boxes, found.depths, found.valid)
+
+    def body_shifts(
+        self, camera: Camera, states: Float[ndarray, "J d"], radius: float
+    ) -> Float[ndarray, "J 4"]:
+        """Compute how far the bounds of a body are from those of its axis, pixels.
+
+        Args:
+            camera: The calibrated camera.
+            states: J states, position first, metres, world frame.
+            radius: Radius of the body, metres.
+
+        Returns:
+            As :func:`tracker.kernels.boxes.body_shifts`.
+        """
+        found = boxes.body_shifts(
+            np.ascontiguousarray(states, dtype=float), self.half_height, radius, camera.calibration
+        )
+        return np.asarray(found)
 
     def measured(self, view: ViewResult, factor: float) -> Measurements:
         """Convert the boxes of a camera to measurements z with noise R in squared pixels.

@@ -147,6 +147,54 @@ def expected_boxes(
 
 
 @kernel
+def body_shifts(states: ndarray, half_height: float, radius: float, camera: Calibration) -> ndarray:
+    """Compute how far the bounds of a body in the image are from those of its axis.
+
+    The rims of an upright cylinder around the axis are circles at its ends. To first order the
+    support function of such a circle is ρ |∂h/∂(x, y)|: by that much the box begins before, and
+    ends after, the projected end of the axis. If a body is widest elsewhere, the horizontal centre
+    is that of the axis at that level.
+
+    Args:
+        states: (J, d), position first, world metres.
+        half_height: Half height of the target, metres.
+        radius: ρ, of the cylinder, metres.
+        camera: Image size, lens and pose of the camera.
+
+    Returns:
+        (J, 4), pixels: shifts of horizontal centre, top and bottom by the rims, and that of the
+        horizontal centre from the middle of the axis to its head; 0 behind the lens.
+    """
+    count = len(states)
+    points = np.empty((2 * count, 3))
+    for j in range(count):
+        for end in range(2):
+            for axis in range(3):
+                points[2 * j + end, axis] = states[j, axis]
+        points[2 * j, 2] -= half_height
+        points[2 * j + 1, 2] += half_height
+    drawn = project_points(points, camera, True)
+    shifts = np.zeros((count, 4))
+    for j in range(count):
+        foot, head = 2 * j, 2 * j + 1
+        if not (drawn.valid[foot] and drawn.valid[head]):
+            continue
+        left, right, top, bottom = np.inf, -np.inf, np.inf, -np.inf
+        for end in range(foot, head + 1):
+            x, y = drawn.pixels[end, 0], drawn.pixels[end, 1]
+            across = radius * math.hypot(drawn.jacobians[end, 0, 0], drawn.jacobians[end, 0, 1])
+            along = radius * math.hypot(drawn.jacobians[end, 1, 0], drawn.jacobians[end, 1, 1])
+            left, right = min(left, x - across), max(right, x + across)
+            top, bottom = min(top, y - along), max(bottom, y + along)
+        one, other = drawn.pixels[foot], drawn.pixels[head]
+        shifts[j, 0] = (left + right - one[0] - other[0]) / 2.0
+        shifts[j, 1] = top - min(one[1], other[1])
+        shifts[j, 2] = bottom - max(one[1], other[1])
+        shifts[j, 3] = (other[0] - one[0]) / 2.0
+    return shifts
+
+
+@kernel
 def inside_probability(
     boxes: ndarray,
     jacobians: ndarray,

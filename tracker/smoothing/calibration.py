@@ -29,16 +29,16 @@ _ALIKE = 20.0
 """Number of boxes of neighbouring steps and cameras that count as one, since their errors
 correlate."""
 
-_SIZE_SIGMA = 0.1
+SIZE_SIGMA = 0.1
 """Standard deviation of people's heights, relative to the target's."""
 
-_OFFSET_SIGMA = 0.03
+OFFSET_SIGMA = 0.03
 """Standard deviation of the offset of a camera's boxes, half heights."""
 
-SIZE_RIDGE = _ALIKE * (_BOX_SIGMA / _SIZE_SIGMA) ** 2
+SIZE_RIDGE = _ALIKE * (_BOX_SIGMA / SIZE_SIGMA) ** 2
 """Weight of the prior of a person's size, in boxes."""
 
-OFFSET_RIDGE = _ALIKE * (_BOX_SIGMA / _OFFSET_SIGMA) ** 2
+OFFSET_RIDGE = _ALIKE * (_BOX_SIGMA / OFFSET_SIGMA) ** 2
 """Weight of the prior of a camera's offset, in boxes."""
 
 NARROWEST, WIDEST = 0.15, 1.0
@@ -66,11 +66,11 @@ class Calibration:
 
     The model of a box of person i in camera c is
 
-        z = h_c(x) + ½ height(h_c(x)) (b_c + s_i u + d_i w) + v,   v ~ N(0, f_c² R)
+        z = h_c(x) + ½ height(h_c(x)) (b_c + s_i u + d_i w) + g_c(x, ρ) + v,   v ~ N(0, f_c² R)
 
     with u = (0, −1, 1) and w = (0, 1, 1) for horizontal centre, top and bottom: a person taller
     than the target has a taller box without being nearer, and one whose boxes are shifted down is
-    not lower.
+    not lower. The upper and lower edge are those of a body of radius ρ, g pixels beyond its axis.
     """
 
     sizes: Float[ndarray, " n"]
@@ -83,6 +83,11 @@ class Calibration:
     """d: distance of the boxes below the person's centre, half heights."""
     noise: NoiseModel | None = None
     """The noise of boxes, where it is not that which stage 1 states."""
+    radius: float = 0.0
+    """ρ: radius of people's bodies, whose rims the boxes bound, metres; 0 for their axes."""
+    level_sigma: float = 0.0
+    """σ_ω: standard deviation of the level of the axis at which bodies are widest, half heights
+    above its middle."""
 
     @staticmethod
     def none(people: int, cameras: int, size: int) -> Calibration:

@@ -47,6 +47,9 @@ correlation of 0.6 between the persistent errors of two cameras."""
 _FARTHEST = 8.0
 """Bound of the persistent errors' part of a covariance, in the variance of one camera's."""
 
+_WIDE = 1.0
+"""Prior standard deviation of a position where the boxes of a step tell nothing, metres."""
+
 _DEVIATION, _DEVIATION_VELOCITY = 0.5, 1.0
 """Prior standard deviation of a window's first state around the smoothed one, m and m/s."""
 
@@ -231,7 +234,9 @@ class PersistentErrors:
 
         G Q_β Gᵀ + κ (q_x² + b_x²) h² I,   G = (Σ Hᵀ R⁻¹ H)⁻¹ Hᵀ R⁻¹
 
-    with the mean square b_x² of the cameras' offsets.
+    with the mean square b_x² of the cameras' offsets. Neither does what is not known of the shape
+    of bodies, by which horizontal centres are off by δ in all cameras at once: it adds
+    (G δ)(G δ)ᵀ, a third of it where the error is evenly distributed between none and δ.
     """
 
     def __init__(self, noise: NoiseModel, rows: int, half_height: float) -> None:
@@ -246,6 +251,7 @@ class PersistentErrors:
         self._unit = (noise.persistent[0] * half_height) ** 2
         self._information = np.zeros((rows, 3, 3))
         self._spread = np.zeros((rows, 3, 3))
+        self._rims, self._levels = np.zeros((rows, 3)), np.zeros((rows, 3))
 
     def add(self, seen: SureBoxes) -> None:
         """Add boxes of one camera, of each row at most one."""
@@ -255,8 +261,25 @@ class PersistentErrors:
         persistent = (squares * self._noise.persistent**2)[:, :, None] * weighted
         self._spread[seen.rows] += np.swapaxes(weighted, 1, 2) @ persistent
 
+    def add_bodies(
+        self, seen: SureBoxes, rims: Float[ndarray, " L"], levels: Float[ndarray, " L"]
+    ) -> None:
+        """Add what is not known of the bodies in the boxes of one camera.
+
+        Args:
+            seen: The boxes.
+            rims: By how much the horizontal centre of a cylinder is beside its axis, pixels: a body
+                that is narrower at head and feet is between both.
+            levels: Standard deviation of the horizontal centre since it is not known at which level
+                bodies are widest, pixels.
+        """
+        lateral = seen.jacobians[:, 0] / self._noise.variances(seen.half_heights)[:, :1]
+        self._rims[seen.rows] += rims[:, None] * lateral
+        self._levels[seen.rows] += levels[:, None] * lateral
+
     def covariances(self, paths: Paths) -> Float[ndarray, "N 3 3"]:
-        """Compute G Q_β Gᵀ of each row; a row without boxes has that of the nearest of its path."""
+        """Compute the covariance of each row; one without boxes has that of the nearest of its
+        path."""
         found = np.zeros_like(self._spread)
         has = np.flatnonzero(np.trace(self._spread, axis1=1, axis2=2) > 0.0)
         # where the boxes tell nothing of a direction, a weak prior keeps the inverse finite
@@ -265,6 +288,10 @@ class PersistentErrors:
         own = inverse @ self._spread[has] @ inverse
         trace = np.trace(own, axis1=1, axis2=2)
         found[has] = own * np.minimum(1.0, _FARTHEST * self._unit / trace)[:, None, None]
+        inverse = np.linalg.inv(self._information[has] + np.eye(3) / _WIDE**2)
+        for sums, share in ((self._rims, 1.0 / 3.0), (self._levels, 1.0)):
+            aside = inverse @ sums[has, :, None]
+            found[has] += share * aside @ np.swapaxes(aside, 1, 2)
         nearest = _nearest(has, paths)
         return np.asarray(found[nearest])
 

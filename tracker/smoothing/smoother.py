@@ -28,12 +28,15 @@ from tracker.kernels.smoothing.passes import SmoothedRows, drives, sums_around
 from tracker.parameters.groups.fusion import FusionParams
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult
+from tracker.smoothing.bodies import MOST_ROWS, BodyPriors, RowBoxes, estimate_bodies
 from tracker.smoothing.calibration import (
     FEWEST,
     NARROWEST,
     ODD,
     OFFSET_RIDGE,
+    OFFSET_SIGMA,
     SIZE_RIDGE,
+    SIZE_SIGMA,
     WIDEST,
     Calibration,
     Marks,
@@ -44,6 +47,7 @@ from tracker.smoothing.calibration import (
 )
 from tracker.smoothing.heights import BoxTops, standing_heights
 from tracker.smoothing.noise import (
+    LEAST_ROWS,
     NoiseModel,
     PersistentErrors,
     SureBoxes,
@@ -507,10 +511,37 @@ class Smoother:
             learnt: The self-calibration of the boxes.
         """
         found = self.model.target.expected(self.model.cameras[camera], states, covariances)
-        values = found.expected.values + learnt.shift(camera, people, found)
+        values = found.expected.values + self._shift(learnt, camera, states, people, found)
         return SeenBoxes(
             found.expected._replace(values=values), found.boxes, found.depths, found.valid
         )
+
+    def _shift(
+        self,
+        learnt: Calibration,
+        camera: int,
+        states: ndarray,
+        people: ndarray,
+        expected: ExpectedBoxes,
+    ) -> Float[ndarray, "L m"]:
+        """The correction that is added to the expected measurements of states, pixels.
+
+        Args:
+            learnt: The self-calibration of the boxes.
+            camera: Index of the camera.
+            states: (L, d) states.
+            people: Index of the path of each state.
+            expected: The expected boxes.
+        """
+        shift = learnt.shift(camera, people, expected)
+        if learnt.radius > 0.0:
+            edges = self._body_shifts(camera, states, learnt.radius)[:, 1:3]
+            shift[:, 1:3] += edges * free(expected)[:, 1:3]
+        return shift
+
+    def _body_shifts(self, camera: int, states: ndarray, radius: float) -> Float[ndarray, "L 4"]:
+        """Compute how far the bounds of bodies are from those of their axes, pixels."""
+        return self.model.target.body_shifts(self.model.cameras[camera], states, radius)
 
     def learn(self, paths: Paths, links: Links, learnt: Calibration) -> Calibration:
         """Estimate the self-calibration of the boxes given the paths: an M-step of EM.
@@ -606,7 +637,10 @@ class Smoother:
         covariances = self.fit(paths, links, 1, replace(learnt, noise=noise)).paths.covariances
         errors = PersistentErrors(noise, len(paths.states), half_height)
         for part in self._sure_boxes(paths, links.take(sure), learnt):
-            errors.add(SureBoxes(*part))
+            errors.add(own := SureBoxes(*part))
+            for camera in np.unique(own.cameras).tolist():  # one, or none
+                shifts = self._body_shifts(camera, paths.states[own.rows], learnt.radius)
+                errors.add_bodies(own, shifts[:, 0], learnt.level_sigma * shifts[:, 3])
         covariances[:, :3, :3] += errors.covariances(paths)
         common = common_variance(noise, learnt.offsets, half_height)
         covariances[:, [0, 1], [0, 1]] += common
@@ -614,6 +648,53 @@ class Smoother:
         placed = self.rows_with_places(paths)[0]
         covariances[placed] = paths.covariances[placed]
         return noise, common, covariances
+
+    def with_bodies(self, paths: Paths, links: Links, learnt: Calibration) -> Calibration:
+        """Add to a calibration the shape of people's bodies (:mod:`tracker.smoothing.bodies`).
+
+        Args:
+            paths: n paths, fitted with ``learnt``, which has no radius yet.
+            links: Association probabilities of rows and boxes.
+            learnt: The calibration.
+        """
+        target, owners = self.model.target, paths.owners
+        usable = links.shares > _SURE
+        usable &= ~np.isin(links.rows, self.rows_with_places(paths)[0])
+        sure = links.take(usable)
+        several = np.flatnonzero(np.bincount(sure.rows, minlength=len(paths.states)) >= 2)
+        if target.size < 3 or len(several) < LEAST_ROWS:
+            return learnt
+        stride = -(-len(several) // MOST_ROWS)
+        rows = several[::stride]
+        seen = RowBoxes.none(owners[rows], len(self.cameras), target.size)
+        alike = 0.0
+        for camera, lens in enumerate(self.model.cameras):
+            own = sure.take(sure.cameras == camera)
+            found = self._residuals(camera, paths, own, learnt)
+            alike = max(alike, _alike(found.rows, owners, found.left))
+            place = np.minimum(np.searchsorted(rows, found.rows), len(rows) - 1)
+            used = np.flatnonzero(rows[place] == found.rows)
+            states, tall = paths.states[found.rows[used]], found.half_heights[used, None]
+            expected = target.expected(lens, states)
+            at = place[used], np.full(len(used), camera)
+            seen.residuals[at] = found.plain[used] / tall
+            # where all are displaced by the cameras' offsets is not told from where they are
+            seen.residuals[(*at, 0)] -= learnt.offsets[camera, 0]
+            seen.jacobians[at] = expected.jacobians[:, :, :3] / tall[:, :, None]
+            own_shifts = self._body_shifts(camera, states, target.half_width)
+            seen.edges[at] = own_shifts[:, 1:3] / (target.half_width * tall)
+            seen.levels[at] = own_shifts[:, 3] / tall[:, 0]
+            seen.there[at] = 1.0
+        independent = min(1.0, stride * (1.0 - alike) / (1.0 + alike))
+        priors = BodyPriors(target.half_width, OFFSET_SIGMA, SIZE_SIGMA)
+        shape = estimate_bodies(seen, upright(target.size), len(paths.labels), independent, priors)
+        return replace(
+            learnt,
+            radius=shape.radius,
+            level_sigma=shape.level_sigma,
+            offsets=learnt.offsets + shape.offsets,
+            sizes=learnt.sizes + shape.sizes,
+        )
 
     def heights(
         self, paths: Paths, links: Links, learnt: Calibration, noise: NoiseModel
@@ -700,7 +781,7 @@ class Smoother:
                 measured,
                 half,
                 plain,
-                plain - learnt.shift(camera, owners[rows], expected),
+                plain - self._shift(learnt, camera, paths.states[rows], owners[rows], expected),
             )
 
     def with_shifts(self, paths: Paths, learnt: Calibration) -> Calibration:

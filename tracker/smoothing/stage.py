@@ -327,6 +327,9 @@ def _finished(
     del longer
     fitted = smoother.fit(begin.take_paths(), shared.links, 1, learnt).without_predictions()
     if p.learning:
+        learnt = smoother.with_bodies(fitted.paths, shared.links, learnt)
+        if learnt.radius > 0.0:
+            fitted = smoother.fit(fitted.paths, shared.links, 1, learnt).without_predictions()
         learnt = smoother.with_shifts(fitted.paths, learnt)
         if learnt.shifts.any():
             fitted = smoother.fit(fitted.paths, shared.links, 1, learnt).without_predictions()
