@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numpy import ndarray
 from numpy.testing import assert_allclose
+from scipy.stats import chi2
 
 from tests import world
 from tests.smoothing.known import Known, known
@@ -143,3 +144,17 @@ def test_the_radius_of_walkers_is_found_and_positions_gain_by_it(radius: float) 
         for learnt in (before, found)
     ]
     assert errors[1].mean() < 0.95 * errors[0].mean()
+
+    # positions stay, and their ellipses hold the places
+    kept = smoother.fit(fitted, links, 2, before)
+    states = kept.paths.states.copy()
+    reported = smoother.reported(kept, links, before)
+    assert reported is not None
+    np.testing.assert_array_equal(kept.paths.states, states)
+    off = states[:, :2] - paths.states[:, :2]
+    squares = [
+        np.einsum("ni,nij,nj->n", off, np.linalg.inv(own[:, :2, :2]), off)
+        for own in (kept.paths.covariances, reported.covariances)
+    ]
+    stated, held = ((own < chi2.ppf(0.95, 2)).mean() for own in squares)
+    assert stated < 0.9 < held

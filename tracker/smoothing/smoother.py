@@ -178,6 +178,19 @@ class _Residuals(NamedTuple):
     """Variance of the measurement, R, squared pixels."""
 
 
+class Reported(NamedTuple):
+    """What is reported of N rows of paths: how far their positions may be off."""
+
+    noise: NoiseModel
+    """The noise of the boxes."""
+    common: float
+    """The variance that all cameras have in common, m²."""
+    covariances: Float[ndarray, "N d d"]
+    """The covariances of the states."""
+    learnt: Calibration
+    """The self-calibration with the shape of bodies."""
+
+
 class Smoother:
     """Batch estimation of paths over a recording, with the models of the fusion.
 
@@ -608,10 +621,11 @@ class Smoother:
             parts.append((rows[whole], plain[whole], half[whole], left[whole], spread, own_noise))
         return _Residuals(*(np.concatenate(each) for each in zip(*parts, strict=True)))
 
-    def reported(
-        self, fitted: Fitted, links: Links, learnt: Calibration
-    ) -> tuple[NoiseModel, float, Float[ndarray, "N d d"]] | None:
+    def reported(self, fitted: Fitted, links: Links, learnt: Calibration) -> Reported | None:
         """Estimate the noise of boxes, and the covariances of paths whose boxes err so.
+
+        The positions stay as they are. With the shape of bodies they would be elsewhere, by δ:
+        their covariance is that of the displaced ones and δ δᵀ, their mean square error.
 
         Args:
             fitted: The paths, with N rows.
@@ -619,14 +633,17 @@ class Smoother:
             learnt: The self-calibration of the boxes.
 
         Returns:
-            The noise, the variance that all cameras have in common, square metres, and the
-            covariances; None where two cameras see too few rows, or boxes have no height.
+            None where two cameras see too few rows, or boxes have no height.
         """
-        paths = fitted.paths
+        given = fitted.paths
         sure = links.shares > _MAINLY
-        rows = choose_rows(paths, np.bincount(links.rows[sure], minlength=len(paths.states)))
+        rows = choose_rows(given, np.bincount(links.rows[sure], minlength=len(given.states)))
         if rows is None or self.model.target.size < 3:
             return None
+        learnt = self.with_bodies(given, links, learnt)
+        if learnt.radius > 0.0:
+            fitted = self.fit(given, links, 1, learnt).without_predictions()
+        paths = fitted.paths
         chosen = links.take(sure & np.isin(links.rows, rows))
         parts = [*self._sure_boxes(paths, chosen, learnt)]
         seen = SureBoxes(*(np.concatenate(each) for each in zip(*parts, strict=True)))
@@ -642,12 +659,14 @@ class Smoother:
                 shifts = self._body_shifts(camera, paths.states[own.rows], learnt.radius)
                 errors.add_bodies(own, shifts[:, 0], learnt.level_sigma * shifts[:, 3])
         covariances[:, :3, :3] += errors.covariances(paths)
+        displaced = paths.states[:, :3] - given.states[:, :3]
+        covariances[:, :3, :3] += displaced[:, :, None] * displaced[:, None]
         common = common_variance(noise, learnt.offsets, half_height)
         covariances[:, [0, 1], [0, 1]] += common
         # there a correction says how sure a position is
-        placed = self.rows_with_places(paths)[0]
-        covariances[placed] = paths.covariances[placed]
-        return noise, common, covariances
+        placed = self.rows_with_places(given)[0]
+        covariances[placed] = given.covariances[placed]
+        return Reported(noise, common, covariances, learnt)
 
     def with_bodies(self, paths: Paths, links: Links, learnt: Calibration) -> Calibration:
         """Add to a calibration the shape of people's bodies (:mod:`tracker.smoothing.bodies`).

@@ -327,9 +327,6 @@ def _finished(
     del longer
     fitted = smoother.fit(begin.take_paths(), shared.links, 1, learnt).without_predictions()
     if p.learning:
-        learnt = smoother.with_bodies(fitted.paths, shared.links, learnt)
-        if learnt.radius > 0.0:
-            fitted = smoother.fit(fitted.paths, shared.links, 1, learnt).without_predictions()
         learnt = smoother.with_shifts(fitted.paths, learnt)
         if learnt.shifts.any():
             fitted = smoother.fit(fitted.paths, shared.links, 1, learnt).without_predictions()
@@ -339,12 +336,13 @@ def _finished(
     there, odds = lifetimes.lifetimes(smoother, fitted.paths, shared, p)
     there[away] = 0.0
     paths = fitted.places.lead(fitted.paths, smoother.model.step_time)
-    noise, common, covariances = reported or (None, 0.0, paths.covariances)
+    noise = None if reported is None else reported.noise
+    covariances = paths.covariances if reported is None else reported.covariances
     owners = paths.owners
     heights = np.full((2, len(paths.labels)), np.nan)
-    if noise is not None:
+    if reported is not None:
         certain = paths.with_states(paths.states, covariances)
-        heights[:] = smoother.heights(certain, shared.links, learnt, noise)
+        heights[:] = smoother.heights(certain, shared.links, reported.learnt, reported.noise)
     present = odds > 0.0
     removed = [_removed(paths, path, odds[path]) for path in np.flatnonzero(~present).tolist()]
     links = shared.links
@@ -364,7 +362,7 @@ def _finished(
         learnt,
         decided.joined,
         noise,
-        common,
+        0.0 if reported is None else reported.common,
         *heights[:, owners[rows]],
     )
 
