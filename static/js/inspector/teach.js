@@ -142,6 +142,11 @@ export function mountTeach(mosaic, { store, actions }) {
 		},
 		tell: (words) => (hint.textContent = `${FRAME} ${words}`),
 	});
+	actions.compareWith = async (method) => {
+		if (!(await actions.ask("POST", "run/pin"))) return;
+		await actions.change({ single_view: method });
+		actions.showTab("compare");
+	};
 	actions.drawTemplate = () => {
 		begun = null;
 		drawn.remove();

@@ -253,11 +253,7 @@ export function createActions({ store, seek, send, receive }) {
 			const usual = schema?.methods.smoothing_method.at(-1) ?? now;
 			void actions.change({ smoothing_method: now !== "none" ? "none" : (smoothing ?? usual) });
 		},
-		async compareWith(method) {
-			if (!(await actions.ask("POST", "run/pin"))) return;
-			await actions.change({ single_view: method });
-			actions.showTab("compare");
-		},
+		async compareWith() {},
 		async swap() {
 			const { server, run } = store.get();
 			if (!server?.pinned || run?.state !== "done") return;
