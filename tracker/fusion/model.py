@@ -61,10 +61,14 @@ class FusionModel:
         self.height = 2.0 * float(sequence.target_half_extents[2])
         """Height of a target, metres: from this vertical distance on, two targets are one above the
         other and no duplicates."""
-        self.heights = Heights.of(
-            sequence.room, p.posture_height * self.target.half_height, self.target.posture_share
+        share = self.target.posture_share
+        self.heights = (
+            Heights.of(sequence.room, p.posture_height * self.target.half_height, share)
+            if share
+            else None
         )
-        """Where a target's centre can be between floor and ceiling."""
+        """Where a target's centre can be between floor and ceiling; None where no posture but the
+        upright one is assumed."""
         margin = p.followed_margin
         self.followed = (self.room.minimum - margin, self.room.maximum + margin)
         """Minimum and maximum of the volume in which targets are tracked, world metres."""

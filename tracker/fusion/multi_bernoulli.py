@@ -172,7 +172,8 @@ class MultiBernoulli:
                 tracks, record, constraints, self._model,
                 first_new_label=state.next_label, next_label=next_label,
             )  # fmt: skip
-        tracks = self._model.heights.truncate(tracks)
+        if self._model.heights is not None:
+            tracks = self._model.heights.truncate(tracks)
         kept = step_kernels.kept_tracks(
             tracks.weights, tracks.means, tracks.labels, record.sources, self._keeping_rule
         )

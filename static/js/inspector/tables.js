@@ -37,7 +37,8 @@ export function mountIdentity({ store, actions }) {
 	// It may have been begun in another window, or before this page was loaded; lanes come first.
 	let heard = "";
 	store.watch(["timeline", "tab"], ({ timeline, tab }) => {
-		const now = `${timeline?.run} ${tab}`;
+		const shown = TABLES[tab]?.keys.includes("identity");
+		const now = `${timeline?.run} ${shown ? tab : ""}`;
 		if (!timeline || now === heard) return;
 		heard = now;
 		void watch();

@@ -209,11 +209,10 @@ def test_another_version_of_the_package_makes_other_results(tmp_path: Path) -> N
 @pytest.mark.full
 def test_its_parameters_have_flags_and_are_listed(tmp_path: Path) -> None:
     installed(tmp_path, POINTS)
-    listed = python(tmp_path, "-m", "app", "parameters")
+    listed = python(tmp_path, "-m", "app", "parameters", "--json")
     assert listed.returncode == 0, listed.stderr
-    row = next(line for line in listed.stdout.splitlines() if "middle.half_width" in line)
-    for word in ("w", "1 … 200", "px", "20", "Half of the box's width."):
-        assert word in row
+    row = next(row for row in json.loads(listed.stdout) if row["key"] == "middle.half_width")
+    assert {"w", "1 … 200", "px", "20", "Half of the box's width."} <= set(row.values())
     helped = python(tmp_path, "-m", "app", "track", "--help")
     assert helped.returncode == 0, helped.stderr
     assert "--middle.half-width" in helped.stdout

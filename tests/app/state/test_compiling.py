@@ -67,15 +67,14 @@ def test_a_sequence_is_shown_at_once_and_run_when_its_loops_over_pixels_are_ther
         now = bench.snapshot()
         if now.sequence is not None and now.run is None:
             waits.append(now.run_state.message)
-            if waits[-1] == f"{COMPILING}, 20 of 50":
-                seen.touch()
 
     bench.subscribe(note)
     worker = Compiling(said.append)
     jobs = Jobs(bench, data=data, compiling=worker)
     jobs.open("crossing").result(30.0)
-    wait_until(lambda: said == [COMPILING])
+    wait_until(lambda: said == [COMPILING] and f"{COMPILING}, 20 of 50" in waits)
     assert bench.snapshot().run_state.done == 0, "it is seen before it can be run"
+    seen.touch()
     wait_until(lambda: bench.snapshot().run_state.state == "done")
     jobs.close()
     assert len(processes) == 2

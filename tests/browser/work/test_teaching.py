@@ -380,7 +380,6 @@ def test_one_click_compares_the_detector_with_shapes(
 ) -> None:
     """The shown run is A, the other method's is B, and their figures stand beside each other."""
     page = flat_page
-    expect(page.locator(".lane").first).to_be_visible(timeout=30_000)
     model = str(pooling(tmp_path / "red.onnx"))
     try:
         ask(server, "PUT", "teach/detector", {"model": model})
