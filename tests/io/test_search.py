@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from tests.conftest import DATA
 from tests.random_rooms import random_room
 from tracker.io.checks.boxes import raw_cameras
 from tracker.io.conventions.reading import FLIP, Reading, with_pixels
 from tracker.io.conventions.readings import Open, Seen
 from tracker.io.conventions.search import Verdict, find_reading
 from tracker.io.read.pieces import Convention, RawCamera
+from tracker.sequences.reader import read_sequence
 from tracker.sequences.sequence import Sequence
 
 
@@ -135,3 +137,18 @@ def test_a_camera_that_was_turned_after_its_calibration_is_named(seed: int) -> N
     moved = found(cameras, seen, Open(orders=False)).moved
     assert list(moved) == [own]
     assert moved[own] == pytest.approx(angle, abs=np.radians(2.0))
+
+
+@pytest.mark.data
+def test_where_a_camera_is_late_none_is_named_as_turned() -> None:
+    """Of the boxes of cmc1 the first camera's meet badly where the last one is 2 s late."""
+    sequence = read_sequence(DATA / "cmc1")
+    cameras, seen = given(sequence)
+    own = seen[3]
+    assert own is not None
+    seen[3] = Seen(own.frames + 8, own.four)
+    verdict = find_reading(cameras, seen, fps=sequence.fps, names="name")
+    assert verdict is not None
+    assert list(verdict.clocks) == [3]
+    assert verdict.clocks[3].late == pytest.approx(8, abs=1)
+    assert verdict.moved == {}

@@ -503,3 +503,40 @@ def test_boxes_that_are_mostly_of_other_frames_end_the_import(tmp_path: Path) ->
     videos(tmp_path)
     with pytest.raises(FormatError, match=r"boxes are of frames outside the 60 of the recording"):
         settled_of(tmp_path)
+
+
+def test_frames_without_pictures_are_counted_from_the_first(tmp_path: Path) -> None:
+    """Ten thousand frames in which nobody was seen are no part of a recording of sixty."""
+    toml(tmp_path)
+    detections(tmp_path, first=10_000)
+    settled = settled_of(tmp_path)
+    assert settled.frames == len(PLACES)
+    assert ("frames", "counted from 10000, the first that any file names") in settled.found
+    for view, camera in zip(settled.views, cameras(), strict=True):
+        assert view.detections is not None
+        np.testing.assert_array_equal(view.detections.frames, boxes(camera, PLACES)[0])
+
+
+def _timed(folder: Path, times: list[list[float]], kept: list[int]) -> None:
+    """Boxes of each camera with the time of each step, of every so many steps."""
+    for camera, own, every in zip(cameras(), times, kept, strict=True):
+        frames, found = boxes(camera, PLACES)
+        rows = [
+            f"{own[f]},{','.join(map(str, box))}"
+            for f, box in zip(frames.tolist(), found.tolist(), strict=True)
+            if f % every == 0
+        ]
+        path = folder / f"{camera.name}.csv"
+        path.write_text("\n".join(["time,left,top,width,height", *rows]))
+
+
+def test_times_of_cameras_with_other_rates_are_steps_of_one(tmp_path: Path) -> None:
+    toml(tmp_path)
+    _timed(tmp_path, [[0.2 * f for f in range(len(PLACES))]] * 4, [1, 1, 2, 2])
+    settled = settled_of(tmp_path)
+    _assert_cameras(settled)
+    assert (settled.fps, settled.frames) == (pytest.approx(5.0), len(PLACES))
+    for view, camera, every in zip(settled.views, cameras(), [1, 1, 2, 2], strict=True):
+        assert view.detections is not None
+        frames = boxes(camera, PLACES)[0]
+        np.testing.assert_array_equal(view.detections.frames, frames[frames % every == 0])

@@ -409,8 +409,25 @@ def find_reading(
         kind = "unproven"
     elif best.evidence.share < _LEAST_SHARE or nothing < DECISIVE:
         kind = "none"
-    moved = find_moved(likelihood, best) if kind == "decided" else {}
+    moved: dict[int, float] = {}
+    if kind == "decided":
+        moved, turned = find_moved(likelihood, best)
+        late = {camera: fit.late for camera, fit in clocks.items() if fit.late and fit.steady}
+        if moved and late:
+            # boxes of other moments meet badly, as those of a turned camera do
+            shifted = Likelihood(cameras, _shifted(seen, late), fps)
+            timed = replace(best, evidence=shifted.of_poses(best, judge.poses(best.reading)))
+            if timed.evidence.by_moment.mean() > turned.by_moment.mean():
+                moved, _ = find_moved(shifted, timed)
     return Verdict(kind, best, judge, rival, least, confirmed, clocks, moved, (*found,), clocks_at)
+
+
+def _shifted(seen: Many[Seen | None], late: Mapping[int, int]) -> list[Seen | None]:
+    """The boxes at the steps at which they were seen, by the steps that cameras are late."""
+    return [
+        own if own is None or camera not in late else Seen(own.frames - late[camera], own.four)
+        for camera, own in enumerate(seen)
+    ]
 
 
 def _candidates(
@@ -653,7 +670,7 @@ def confirm_moments(likelihood: Likelihood, best: Interpretation) -> dict[int, f
     return found
 
 
-def find_moved(likelihood: Likelihood, best: Interpretation) -> dict[int, float]:
+def find_moved(likelihood: Likelihood, best: Interpretation) -> tuple[dict[int, float], Evidence]:
     """Find the cameras that were turned since they were calibrated, by the same evidence.
 
     Each camera whose boxes are not well explained is turned about each of its axes to and fro, and
@@ -667,10 +684,11 @@ def find_moved(likelihood: Likelihood, best: Interpretation) -> dict[int, float]
         best: The reading.
 
     Returns:
-        The angle of each such camera, radians.
+        The angle of each such camera, radians; and the evidence with these turned.
     """
     poses = likelihood.judge.poses(best.reading)
-    shares = best.evidence.of_cameras()
+    evidence = best.evidence
+    shares = evidence.of_cameras()
     found: dict[int, float] = {}
     while len(found) <= (len(shares) - 1) // 2:
         gains: dict[int, tuple[float, Pose, float]] = {}
@@ -682,8 +700,9 @@ def find_moved(likelihood: Likelihood, best: Interpretation) -> dict[int, float]
             break
         camera = max(gains, key=lambda one: gains[one][0])
         _, poses[camera], found[camera] = gains[camera]
-        shares = likelihood.of_poses(best, poses).of_cameras()
-    return found
+        evidence = likelihood.of_poses(best, poses)
+        shares = evidence.of_cameras()
+    return found, evidence
 
 
 def _turned(

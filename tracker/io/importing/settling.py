@@ -137,7 +137,7 @@ def settle(taken: Sequence[ParsedFiles], options: ImportOptions | None = None) -
     told += matched.told + short_videos(taken)
     found: list[tuple[str, str]] = []
     if options.first_index is None:
-        matched = counted_alike(matched, found)
+        matched = counted_alike(matched, options.fps, found)
     cameras = matched.cameras
     for way in sorted({how for camera in cameras for how in camera.how.values()} - {"name"}):
         found.append(("matching", f"pictures and boxes go to the cameras by {way}"))

@@ -54,14 +54,16 @@ class Times:
 _Rows = TypeVar("_Rows", DetectionPiece, TruthPiece)
 
 
-def counted_alike(matched: Matched, found: list[tuple[str, str]]) -> Matched:
+def counted_alike(matched: Matched, fps: float | None, found: list[tuple[str, str]]) -> Matched:
     """Count the frames of boxes and truth from the first picture, or from the first date of all.
 
     Pictures may be called by the frames of a video of which they are every tenth, or by their
-    times; that is so where more rows are of a picture by its number than by its place.
+    times; that is so where more rows are of a picture by its number than by its place. Without
+    pictures frames are counted from the first, if there are fewer after it than before.
 
     Args:
         matched: The cameras with their pictures and boxes, and the truth.
+        fps: Steps a second, if that is stated.
         found: What was found out is added.
     """
     numbers = [_numbers_of(camera) for camera in matched.cameras]
@@ -81,7 +83,13 @@ def counted_alike(matched: Matched, found: list[tuple[str, str]]) -> Matched:
     if counted:
         found.append(("frames", f"the numbers in the names of pictures of {', '.join(counted)}"))
     seen = [camera.detections for camera in cameras if camera.detections is not None]
-    clocked = iter(on_one_clock([*seen, *(truth for _, truth in truths)]))
+    pieces = on_one_clock([*seen, *(truth for _, truth in truths)], fps)
+    begin = min((int(p.frames.min()) for p in pieces if len(p.frames)), default=0)
+    end = max((int(p.frames.max()) for p in pieces if len(p.frames)), default=0)
+    if begin > end - begin + 1 and not any(camera.video or camera.images for camera in cameras):
+        pieces = [_later(replace(piece, first_index=0), -begin) for piece in pieces]
+        found.append(("frames", f"counted from {begin}, the first that any file names"))
+    clocked = iter(pieces)
     cameras = [
         camera if camera.detections is None else replace(camera, detections=next(clocked))
         for camera in cameras
@@ -90,14 +98,34 @@ def counted_alike(matched: Matched, found: list[tuple[str, str]]) -> Matched:
     return replace(matched, cameras=cameras, truths=truths)
 
 
-def on_one_clock(pieces: Sequence[DetectionPiece | TruthPiece]) -> list[Any]:
-    """Count frames that have dates from the first of all pieces: of each alone they begin at 0.
+def on_one_clock(
+    pieces: Sequence[DetectionPiece | TruthPiece], fps: float | None = None
+) -> list[Any]:
+    """Count frames that have times at one rate, and those with dates from the first of all pieces.
 
-    Numbers of frames that are dates, as in the names of pictures, become frames too.
+    Of each piece alone they begin at 0 and have the rate of its rows. Numbers of frames that are
+    dates, as in the names of pictures, become frames too.
+
+    Args:
+        pieces: Boxes and truth.
+        fps: Steps a second; if None, the highest rate of the pieces where they differ.
     """
     pieces = [_of_dates(piece) for piece in pieces]
+    rates = [piece.fps for piece in pieces if piece.fps]
+    if rates and max(rates) / min(rates) - 1.0 > SAME_RATE:
+        common = max(rates) if fps is None else fps
+        pieces = [_at_rate(common, piece) if piece.fps else piece for piece in pieces]
     begin = min((piece.begins for piece in pieces if piece.begins is not None), default=0.0)
     return [piece if piece.begins is None else _since(begin, piece) for piece in pieces]
+
+
+def _at_rate(fps: float, piece: DetectionPiece | TruthPiece) -> DetectionPiece | TruthPiece:
+    ratio = fps / (piece.fps or fps)
+    frames = np.round(piece.frames * ratio).astype(np.int64)
+    piece = replace(piece, frames=frames, fps=fps)
+    if isinstance(piece, DetectionPiece) and piece.last_frame is not None:
+        return replace(piece, last_frame=round(piece.last_frame * ratio))
+    return piece
 
 
 def _of_dates(piece: DetectionPiece | TruthPiece) -> DetectionPiece | TruthPiece:
@@ -110,9 +138,13 @@ def _of_dates(piece: DetectionPiece | TruthPiece) -> DetectionPiece | TruthPiece
 
 def _since(begin: float, piece: DetectionPiece | TruthPiece) -> DetectionPiece | TruthPiece:
     later = round(((piece.begins or 0.0) - begin) * (piece.fps or 0.0))
-    piece = replace(piece, frames=piece.frames + later, begins=begin)
+    return _later(replace(piece, begins=begin), later)
+
+
+def _later(piece: DetectionPiece | TruthPiece, frames: int) -> DetectionPiece | TruthPiece:
+    piece = replace(piece, frames=piece.frames + frames)
     if isinstance(piece, DetectionPiece) and piece.last_frame is not None:
-        return replace(piece, last_frame=piece.last_frame + later)
+        return replace(piece, last_frame=piece.last_frame + frames)
     return piece
 
 
