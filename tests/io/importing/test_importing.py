@@ -355,7 +355,7 @@ def test_boxes_in_one_json_settle_as_others(
 
 
 def test_corners_with_y_before_x_are_found_out(tmp_path: Path) -> None:
-    """As parts of the picture, beside scores and classes (TensorFlow's object detection)."""
+    """TensorFlow's object detection writes parts of the picture, beside scores and classes."""
     toml(tmp_path)
     width, height = SIZE
     for camera in cameras():
@@ -377,6 +377,22 @@ def test_corners_with_y_before_x_are_found_out(tmp_path: Path) -> None:
         assert view.detections is not None
         np.testing.assert_allclose(view.detections.boxes, boxes(camera, PLACES)[1], atol=1e-6)
         np.testing.assert_array_equal(view.detections.scores, 0.5)
+
+
+def test_a_camera_that_saw_nobody_does_not_contradict_parts_of_the_picture(tmp_path: Path) -> None:
+    toml(tmp_path)
+    for number, camera in enumerate(cameras()):
+        frames, found = boxes(camera, PLACES)
+        found[:, :2] += found[:, 2:] / 2.0 + 0.5
+        found /= np.array([*SIZE, *SIZE])
+        rows = [f"{f},{','.join(map(str, b))}" for f, b in zip(frames, found, strict=True)]
+        lines = ["frame,x,y,w,h", *(rows if number else [])]
+        (tmp_path / f"{camera.name}.csv").write_text("\n".join(lines))
+    settled = settled_of(tmp_path)
+    assert dict(settled.found)["boxes"].startswith("cxcywh, since")
+    own = settled.views[1].detections
+    assert own is not None
+    np.testing.assert_allclose(own.boxes, boxes(cameras()[1], PLACES)[1], atol=1e-6)
 
 
 def test_boxes_by_their_middle_are_found_out(tmp_path: Path) -> None:

@@ -444,7 +444,7 @@ def _read(
         for own, time in zip(boxes, times.cameras, strict=True)
     ]
     open_boxes = [own for own in boxes if own is not None and own.layout is None]
-    in_parts = {own.scale is not None for own in open_boxes}
+    in_parts = {own.scale is not None for own in open_boxes if len(own.detections.frames)}
     if len(in_parts) > 1:
         raise FormatError(
             "some cameras' boxes are pixels and others parts of the picture, and how their numbers "
