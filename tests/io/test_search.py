@@ -141,7 +141,7 @@ def test_a_camera_that_was_turned_after_its_calibration_is_named(seed: int) -> N
 
 @pytest.mark.data
 def test_where_a_camera_is_late_none_is_named_as_turned() -> None:
-    """Of the boxes of cmc1 the first camera's meet badly where the last one is 2 s late."""
+    """The boxes of the first camera of cmc1 meet badly where the last one is 2 s late."""
     sequence = read_sequence(DATA / "cmc1")
     cameras, seen = given(sequence)
     own = seen[3]

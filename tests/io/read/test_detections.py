@@ -498,7 +498,7 @@ def test_labels_of_kitti_s_tracking(tmp_path: Path) -> None:
 
 
 def test_text_of_vatic_leaves_out_who_is_out_of_sight(tmp_path: Path) -> None:
-    """Its ten columns end with a name, as those of COLMAP's poses do."""
+    """The ten columns end with a name, as those of COLMAP's poses do."""
     path = tmp_path / "view1.txt"
     rows = [
         f'{n % 2} {" ".join(map(repr, c))} {f} 0 0 1 "PERSON"'
@@ -511,7 +511,7 @@ def test_text_of_vatic_leaves_out_who_is_out_of_sight(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("by", ["middle", "corner"])
 def test_boxes_in_xml_by_frame(tmp_path: Path, by: str) -> None:
-    """As of CAVIAR and PETS, and of UA-DETRAC; a frame of several and frames of one."""
+    """CAVIAR and PETS, and UA-DETRAC, have frames of several people and of one."""
     objects: dict[int, str] = {}
     for f, (cx, cy, w, h), (left, top, *_) in zip(FRAMES.tolist(), MIDDLES, CORNERS, strict=True):
         box = (
@@ -547,7 +547,7 @@ def test_a_time_that_all_boxes_of_a_file_share_is_no_frame(tmp_path: Path) -> No
 
 
 def test_a_file_a_camera_whose_boxes_have_times(tmp_path: Path) -> None:
-    """As of Rekognition: the numbers of the files are the cameras' and not those of frames."""
+    """The numbers of the files are the cameras' and not those of frames (Rekognition)."""
     names = ("Left", "Top", "Width", "Height")
     parts = (BOXES + np.array([0.5, 0.5, 0.0, 0.0])) / np.array(
         [*SIZE, *SIZE]

@@ -374,7 +374,7 @@ def test_tables_of_other_things_are_called_by_their_names(
 
 @pytest.mark.parametrize("named", ["R.txt", "cam_rvec.txt"])
 def test_rotation_and_translation_in_files_of_their_own(tmp_path: Path, named: str) -> None:
-    """As NumPy saves them: K, R and t of a camera in a folder of its own."""
+    """NumPy saves K, R and t of a camera as texts in a folder of its own."""
     prefix = "" if named == "R.txt" else "cam_"
     for camera in cameras():
         folder = tmp_path / camera.name
@@ -397,7 +397,7 @@ def test_rotation_and_translation_in_files_of_their_own(tmp_path: Path, named: s
 
 @pytest.mark.parametrize("order", ["wxyz", "xyzw"])
 def test_a_quaternion_whose_order_no_name_says_may_be_either(tmp_path: Path, order: str) -> None:
-    """As nuScenes has it, under ``rotation``."""
+    """nuScenes has four numbers under ``rotation``."""
     path = tmp_path / "calibrated_sensor.json"
     records = []
     for camera in cameras():

@@ -81,7 +81,7 @@ _PARTS_OF_SECONDS = (1.0, 1e3, 1e6, 1e9)
 _LONGEST_BOX = 8
 """Numbers of a box that is a list: the four, a score, a class, a track, and one to spare."""
 
-DECIMAL_COMMA = re.compile(r"[-+]?\d+,\d+(e[-+]?\d+)?", re.IGNORECASE)
+_DECIMAL_COMMA = re.compile(r"[-+]?\d+,\d+(e[-+]?\d+)?", re.IGNORECASE)
 
 Column = Sequence[Any]
 
@@ -91,10 +91,15 @@ def plain(name: str) -> str:
     return re.sub(r"[^a-z0-9]", "", name.lower())
 
 
+def decimal_point(cell: str) -> str:
+    """A number with a decimal comma as one with a point; any other cell as it is."""
+    return cell.replace(",", ".") if _DECIMAL_COMMA.fullmatch(cell.strip()) else cell
+
+
 def decimal_points(line: str) -> str:
     """A row with blanks between its cells, decimal commas as points; any other row as it is."""
     words = line.split() if "," in line else []
-    if len(words) < 3 or not all("," not in w or DECIMAL_COMMA.fullmatch(w) for w in words):
+    if len(words) < 3 or not all("," not in w or _DECIMAL_COMMA.fullmatch(w) for w in words):
         return line
     return line.replace(",", ".")
 

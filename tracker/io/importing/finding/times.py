@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
@@ -121,11 +121,7 @@ def on_one_clock(
 
 def _at_rate(fps: float, piece: DetectionPiece | TruthPiece) -> DetectionPiece | TruthPiece:
     ratio = fps / (piece.fps or fps)
-    frames = np.round(piece.frames * ratio).astype(np.int64)
-    piece = replace(piece, frames=frames, fps=fps)
-    if isinstance(piece, DetectionPiece) and piece.last_frame is not None:
-        return replace(piece, last_frame=round(piece.last_frame * ratio))
-    return piece
+    return _counted(replace(piece, fps=fps), lambda frames: np.round(frames * ratio))
 
 
 def _of_dates(piece: DetectionPiece | TruthPiece) -> DetectionPiece | TruthPiece:
@@ -142,9 +138,16 @@ def _since(begin: float, piece: DetectionPiece | TruthPiece) -> DetectionPiece |
 
 
 def _later(piece: DetectionPiece | TruthPiece, frames: int) -> DetectionPiece | TruthPiece:
-    piece = replace(piece, frames=piece.frames + frames)
+    return _counted(piece, lambda own: own + frames)
+
+
+def _counted(
+    piece: DetectionPiece | TruthPiece, count: Callable[[ndarray], ndarray]
+) -> DetectionPiece | TruthPiece:
+    """A piece with its frames, and the last that was looked at, counted otherwise."""
+    piece = replace(piece, frames=count(piece.frames).astype(np.int64))
     if isinstance(piece, DetectionPiece) and piece.last_frame is not None:
-        return replace(piece, last_frame=piece.last_frame + frames)
+        return replace(piece, last_frame=int(count(np.array(piece.last_frame))))
     return piece
 
 

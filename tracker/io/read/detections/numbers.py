@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from numpy import ndarray
 
-from tracker.io.read.columns import DECIMAL_COMMA, Column, meanings, read_table
+from tracker.io.read.columns import Column, decimal_point, meanings, read_table
 from tracker.io.read.pieces import Piece
 from tracker.io.read.protocol import Certainty, Kind
 from tracker.io.read.source import SourceFile
@@ -110,10 +110,7 @@ def _read(lines: list[str]) -> _Table | None:
 def _numbers(rows: list[list[str]], delimiter: str | None) -> Float[ndarray, "N C"] | None:
     """Return the cells as numbers, with decimal commas where these separate no columns."""
     if delimiter != ",":
-        rows = [
-            [cell.replace(",", ".") if DECIMAL_COMMA.fullmatch(cell) else cell for cell in row]
-            for row in rows
-        ]
+        rows = [[decimal_point(cell) for cell in row] for row in rows]
     try:
         values = np.array(rows, dtype=float)
     except ValueError:

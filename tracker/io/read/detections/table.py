@@ -16,7 +16,7 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from tracker.io.read.columns import DECIMAL_COMMA, Column, is_table, layout_of, meanings, read_table
+from tracker.io.read.columns import Column, decimal_point, is_table, layout_of, meanings, read_table
 from tracker.io.read.picture_names import is_camera_number, number_in
 from tracker.io.read.pieces import FormatError, Piece
 from tracker.io.read.protocol import Certainty, Kind
@@ -107,13 +107,7 @@ def _columns(file: SourceFile) -> tuple[dict[str, Column], list[int] | None]:
                 f"row {line}: expected {len(names)} columns as in the header, found {len(row)}"
             )
     if delimiter != ",":
-        rows = [
-            [
-                cell.replace(",", ".") if DECIMAL_COMMA.fullmatch(cell.strip()) else cell
-                for cell in row
-            ]
-            for row in rows
-        ]
+        rows = [[decimal_point(cell) for cell in row] for row in rows]
     cells = list(zip(*rows[1:], strict=True)) or [()] * len(names)
     return _with_boxes(dict(zip(names, cells, strict=True))), None
 
