@@ -27,16 +27,16 @@ def load(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[], Any]:
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "kernels"))
     file = tmp_path / "triples.py"
     file.write_text(_SOURCE, encoding="utf-8")
+    return lambda: loaded(file)
 
-    def load() -> Any:
-        specification = importlib.util.spec_from_file_location("triples", file)
-        assert specification is not None
-        assert specification.loader is not None
-        module = importlib.util.module_from_spec(specification)
-        specification.loader.exec_module(module)
-        return module.triple
 
-    return load
+def loaded(file: Path) -> Any:
+    specification = importlib.util.spec_from_file_location("triples", file)
+    assert specification is not None
+    assert specification.loader is not None
+    module = importlib.util.module_from_spec(specification)
+    specification.loader.exec_module(module)
+    return module.triple
 
 
 def misses(kernel: Any) -> int:
@@ -48,6 +48,21 @@ def test_what_is_whole_is_not_compiled_again(load: Callable[[], Any]) -> None:
     first, second = load(), load()
     assert first(2.0) == second(2.0) == 6.0
     assert (misses(first), misses(second)) == (1, 0)
+
+
+def test_the_same_source_elsewhere_and_later_is_not_compiled_again(
+    load: Callable[[], Any], tmp_path: Path
+) -> None:
+    """An installation in another folder has the machine code of one that was there before."""
+    load()(2.0)
+    source = tmp_path / "triples.py"
+    elsewhere = tmp_path / "elsewhere" / source.name
+    elsewhere.parent.mkdir()
+    elsewhere.write_bytes(source.read_bytes())
+    os.utime(elsewhere, (1.0, 1.0))
+    triple = loaded(elsewhere)
+    assert triple(2.0) == 6.0
+    assert misses(triple) == 0
 
 
 def flipped(at: float) -> Callable[[bytes], bytes]:

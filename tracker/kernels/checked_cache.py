@@ -71,19 +71,26 @@ class CheckedFiles(_Base):  # type: ignore[misc]  # numba has no types
             file.write(content + hashlib.sha256(content).digest())
 
 
-def keep(dispatcher: Any) -> None:
+def keep(dispatcher: Any, folder: Path) -> None:
     """Let numba store a kernel's machine code with a checksum, and compile it in one process.
 
     Args:
         dispatcher: A dispatcher of numba with caching enabled.
+        folder: A folder for this very content of the kernel's file and of what it imports, so
+            that neither the file's place nor its time says anything more.
+
+    Raises:
+        RuntimeError: If numba could not write into the folder and chose another one.
     """
     cache = dispatcher._cache
+    if folder not in Path(cache._cache_path).parents:
+        raise RuntimeError(f"{folder} cannot be written to")
     cache._impl = _StoredOnce(dispatcher)
-    plain = cache._cache_file
+    cache._impl._locator._cache_path = str(folder)  # numba's own holds a hash of the place
     cache._cache_file = CheckedFiles(
-        cache_path=plain._cache_path,
-        filename_base=plain._index_name.removesuffix(".nbi"),
-        source_stamp=plain._source_stamp,
+        cache_path=str(folder),
+        filename_base=cache._cache_file._index_name.removesuffix(".nbi"),
+        source_stamp=None,
     )
     dispatcher.compile = _OneProcess(dispatcher)
 

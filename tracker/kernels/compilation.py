@@ -83,12 +83,13 @@ def pixel_kernel(function: _F) -> _F:
 
 def compiled_later(function: _F) -> _F:
     """Compile like :func:`kernel` a function that is not counted among the kernels."""
+    folder = _folder_of(Path(function.__code__.co_filename))
     before = _config.CACHE_DIR
-    _config.CACHE_DIR = str(_folder_of(Path(function.__code__.co_filename)))
+    _config.CACHE_DIR = str(folder)
     try:
         compiled = numba.njit(cache=True, nogil=True)(function)
         if not _config.DISABLE_JIT:
-            checked_cache.keep(compiled)
+            checked_cache.keep(compiled, folder)
     except RuntimeError:  # no writable folder: it is compiled at every start
         compiled = numba.njit(nogil=True)(function)
     finally:
@@ -278,10 +279,9 @@ def _version() -> str:
 def _mark(of: Literal["complete", "pixels"]) -> Path:
     """The path of a file that exists once all kernels, or the loops over pixels, were compiled.
 
-    numba keeps machine code by the path of its source, so each installation has a file of its own.
+    The machine code belongs to the content of the sources: installations of one version share it.
     """
-    name = hashlib.sha256(f"{_version()} {_ROOT}".encode()).hexdigest()[:16]
-    return kernel_folder() / f"{name}.{of}"
+    return kernel_folder() / f"{_version()}.{of}"
 
 
 def is_compiled() -> bool:
