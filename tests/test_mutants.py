@@ -3,10 +3,22 @@
 from __future__ import annotations
 
 from pathlib import Path
+from queue import Queue
 
 import pytest
 
-from tests.mutate import ROOT, SORTS, Mutant, Unfit, changed, changes, draw, package_tests, read
+from tests.mutate import (
+    ROOT,
+    SORTS,
+    Mutant,
+    Unfit,
+    changed,
+    changes,
+    draw,
+    is_killed,
+    package_tests,
+    read,
+)
 
 MUTANTS = read()
 
@@ -57,6 +69,19 @@ def test_a_line_that_is_gone_or_there_twice_is_reported(
         Mutant("missing.py", old, "x", ()).text(tmp_path)
 
 
+def test_a_change_that_ends_the_interpreter_is_killed(tmp_path: Path) -> None:
+    (tmp_path / "kernel.py").write_text("LAST = 1\n")
+    (tmp_path / "test_it.py").write_text(
+        "import os, signal, kernel\n"
+        "def test_it():\n    kernel.LAST == 1 or os.kill(os.getpid(), signal.SIGKILL)\n"
+    )
+    copies: Queue[Path] = Queue()
+    for new, expected in (("2", True), ("1", False)):
+        copies.put(tmp_path)
+        mutant = Mutant("kernel.py", "1", new, ("test_it.py",))
+        assert is_killed(mutant, copies)[0] is expected
+
+
 def test_a_change_is_drawn_from_code_and_from_nothing_else(tmp_path: Path) -> None:
     (tmp_path / "gate.py").write_text(SOURCE)
     found = {(one.sort, one.lines[1]) for one in changes(tmp_path, "gate.py")}
@@ -75,7 +100,7 @@ def test_a_change_is_drawn_from_code_and_from_nothing_else(tmp_path: Path) -> No
 
 
 def test_every_drawn_change_leaves_a_program_and_is_another_one() -> None:
-    for drawn in draw(ROOT, ["kernels", "evaluation"], 60, 3):
+    for drawn in draw(ROOT, ["evaluation", "filters"], 60, 3):
         _, before, after = drawn.text(ROOT)
         assert before != after
         compile(after, drawn.file, "exec")
