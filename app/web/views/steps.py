@@ -9,11 +9,11 @@ from app import models
 from app.scene.geometry import FUTURE_SECONDS
 from app.state.pairs import pairs_at
 from app.web.pictures.likelihood import key_of
-from app.web.views.owners import tell_owners
 from tracker.fusion.protocol import FusionResult
 from tracker.fusion.trajectories import Trajectories
 from tracker.geometry.boxes import Boxes
 from tracker.parameters.groups.colour_phd import ColourPhdParams
+from tracker.runs.detection_owners import detection_owners
 from tracker.runs.pipeline import Run
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.dropped import GATES
@@ -80,7 +80,7 @@ def step_of(
             _add_views(message, run, step, with_samples)
         _add_tracks(message, sequence, run, step)
         if not run.only_tracks:
-            tell_owners(message, sequence, run, step)
+            _add_owners(message, run, step)
         if trails:
             _add_trails(message, sequence, run, step, trails)
     return message
@@ -148,6 +148,22 @@ def _add_views(message: models.Step, run: Run, step: int, with_samples: bool) ->
                     strict=True,
                 )
             ]
+
+
+def _add_owners(message: models.Step, run: Run, step: int) -> None:
+    """Write beside each detection whose it is, and how far the nearest track is from others."""
+    for camera, owners in zip(message.cameras, detection_owners(run, step), strict=True):
+        for detection, track, nearest, distance in zip(
+            camera.measurements,
+            owners.tracks.tolist(),
+            owners.nearest.tolist(),
+            owners.distances.tolist(),
+            strict=True,
+        ):
+            detection.track = track if track >= 0 else None
+            if nearest >= 0:
+                detection.nearest = nearest
+                detection.sigmas, detection.gate = round(distance, 2), round(owners.gate, 2)
 
 
 def _height(tracks: Trajectories, row: int) -> tuple[float, float] | None:
