@@ -15,13 +15,8 @@ from tracker.io.read.calibration import (
     projection,
     trees,
 )
-from tracker.io.read.calibration.datasets import middlebury, tsai
-from tracker.io.read.calibration.reconstruction import (
-    colmap,
-    colmap_binary,
-    mvsnet,
-    scenes,
-)
+from tracker.io.read.calibration.datasets import matrices, tsai
+from tracker.io.read.calibration.reconstruction import colmap, scenes
 from tracker.io.read.detections import (
     coco,
     motchallenge,
@@ -50,12 +45,10 @@ GROUP = "multiview_phd.formats"
 FORMATS: tuple[Format, ...] = (
     *trees.FORMATS,
     opencv,
-    colmap,
-    colmap_binary,
+    *colmap.FORMATS,
     *scenes.FORMATS,
-    mvsnet,
     tsai.TSAI,
-    middlebury,
+    *matrices.FORMATS,
     projection,
     matlab,
     labelled,

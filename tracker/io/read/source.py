@@ -264,6 +264,28 @@ class SourceFile:
         return root
 
     @cached_property
+    def xml_tree(self) -> Any:
+        """The content of an XML file: an element is a table of its attributes and children, of
+        which those of one name are a list; one without either is its text.
+
+        Raises:
+            FormatError: As :attr:`xml`.
+        """
+        return _tree_of_xml(self.xml)
+
+    @property
+    def tree(self) -> Any:
+        """The content of a file of JSON, XML or YAML, whichever its first sign states.
+
+        Raises:
+            FormatError: If it is not valid.
+        """
+        sign = self.head_text.lstrip()[:1]
+        if sign == "<":
+            return self.xml_tree
+        return self.json if sign in ("{", "[") else self.yaml
+
+    @cached_property
     def toml(self) -> dict[str, Any]:
         """The content of a TOML file.
 
@@ -300,6 +322,26 @@ class SourceFile:
 
     def _too_deep(self) -> FormatError:
         return self.error(f"has more than {MOST_DEPTH} levels of nesting; it is no data of ours")
+
+
+TEXT = "text()"
+"""The key of the text of an XML element that has attributes."""
+
+
+def _tree_of_xml(element: ElementTree.Element) -> Any:
+    children: dict[str, list[Any]] = {}
+    for child in element:
+        children.setdefault(child.tag, []).append(_tree_of_xml(child))
+    if not children and not element.attrib:
+        return element.text or ""
+    several = {tag: own if len(own) > 1 else own[0] for tag, own in children.items()}
+    text = {TEXT: element.text} if not children and (element.text or "").strip() else {}
+    return {**element.attrib, **several, **text}
+
+
+def listed(value: Any) -> list[Any]:
+    """Return the children of one name in a tree of XML, which is a list only of several."""
+    return value if isinstance(value, list) else [] if value is None else [value]
 
 
 class FileOfLines(SourceFile):

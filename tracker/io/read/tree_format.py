@@ -1,5 +1,7 @@
 """A calibration format that is declared: where the fields of a camera lie in a tree, in what form.
 
+The tree is that of JSON, YAML, TOML or XML, or what a function makes of any other file.
+
 A format names the path to its cameras and, for each part of a camera, where it lies; recognising,
 reading and wording errors is done here. Paths are keys with ``/`` between them; ``*`` stands for
 every field of a table or every element of a list, ``.`` for the whole file, ``|`` for "or". An
@@ -8,9 +10,9 @@ attribute of XML is a field like a child.
 
 from __future__ import annotations
 
-import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from pathlib import PurePosixPath
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -19,12 +21,10 @@ from tracker.files.text import shown
 from tracker.io.read import values
 from tracker.io.read.pieces import CalibrationPiece, Convention, Piece, RawCamera
 from tracker.io.read.protocol import Certainty, Kind
-from tracker.io.read.source import SourceFile
+from tracker.io.read.source import TEXT, SourceFile
 
-Syntax = Literal["json", "yaml", "toml", "xml"]
-
-_TEXT = "text()"
-"""The key of the text of an element that has attributes."""
+Syntax = Literal["json", "yaml", "toml", "xml"] | Callable[[SourceFile], Any]
+"""How a file becomes a tree. A function returns None for a file that is read with another one."""
 
 
 def at(value: Any, path: str) -> Any:
@@ -34,7 +34,7 @@ def at(value: Any, path: str) -> Any:
             value = value[int(step)] if int(step) < len(value) else None
         else:
             value = value.get(step) if isinstance(value, Mapping) else None
-    return value.get(_TEXT, value) if isinstance(value, Mapping) else value
+    return value.get(TEXT, value) if isinstance(value, Mapping) else value
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,8 +88,9 @@ class TreeFormat:
     """Paths in a camera's table. A table that has none of them is no camera's."""
     parts: tuple[Part, ...]
     convention: Convention = field(default_factory=Convention)
-    marks: tuple[str, ...] = ()
-    """Words in the beginning of a file that state the format; none if its fields do."""
+    marks: tuple[str, ...] | Callable[[SourceFile], bool] = ()
+    """Words in the beginning of a file that state the format, or a function that finds out whether
+    a file has it; none if its fields do."""
     most: int | None = None
     """The largest number of cameras of a rig that stands still; None for any."""
     choose: Callable[[list[Node]], list[Node]] = list
@@ -98,24 +99,29 @@ class TreeFormat:
     def recognise(self, file: SourceFile) -> Certainty:
         """The marks in the beginning; or a camera with every required field."""
         head = file.head_text
+        if callable(self.marks):
+            return Certainty.SURE if self.marks(file) else Certainty.NO
         if self.marks:
             return Certainty.SURE if all(mark in head for mark in self.marks) else Certainty.NO
         steps = {step for path in self.required for step in path.split("/")}
         sign = '"' if self.syntax == "json" else ""
         if not all(f"{sign}{step}{sign}" in head or step.isdigit() for step in steps):
             return Certainty.NO
-        starts = {"json": "{[", "xml": "<"}.get(self.syntax)
-        if starts is not None and head.lstrip()[:1] not in tuple(starts):
+        starts = {"json": ("{", "["), "xml": ("<",)}.get(str(self.syntax))
+        if starts is not None and head.lstrip()[:1] not in starts:
             return Certainty.NO
-        nodes = self._nodes(file)
+        nodes = self._nodes(file, self._tree(file))
         whole = any(all(node.find(path) is not None for path in self.required) for node in nodes)
         return Certainty.SURE if whole else Certainty.NO
 
     def read(self, file: SourceFile) -> Iterator[Piece]:
-        """One piece with every camera of the file."""
+        """One piece with every camera of the file; none if it is read with another file."""
+        tree = self._tree(file)
+        if tree is None and callable(self.syntax):
+            return
         found = []
         pose = np.eye(4)
-        nodes = self.choose(self._nodes(file))
+        nodes = self.choose(self._nodes(file, tree))
         if self.most is not None and not 1 <= len(nodes) <= self.most:
             raise file.error(
                 f"has {len(nodes)} posed pictures, expected one a camera that stands still, from 1 "
@@ -137,9 +143,13 @@ class TreeFormat:
             found.append(RawCamera(**fields))
         yield CalibrationPiece(file.path, self.NAME, tuple(found))
 
-    def _nodes(self, file: SourceFile) -> list[Node]:
+    def _tree(self, file: SourceFile) -> Any:
+        if callable(self.syntax):
+            return self.syntax(file)
+        return file.xml_tree if self.syntax == "xml" else getattr(file, self.syntax)
+
+    def _nodes(self, file: SourceFile, tree: Any) -> list[Node]:
         """The tables at the path to a camera that have any of the required fields."""
-        tree = _of_xml(file.xml) if self.syntax == "xml" else getattr(file, self.syntax)
         found: list[Node] = []
         if not isinstance(self.cameras, str):
             rows = self.cameras(tree)
@@ -170,21 +180,14 @@ def _matches(value: Any, path: str, key: str = "") -> Iterator[tuple[str, Any]]:
             yield from _matches(item, rest, str(own))
 
 
-def _of_xml(element: ElementTree.Element) -> Any:
-    """An element as a table of its attributes and children; those of one name are a list."""
-    children: dict[str, list[Any]] = {}
-    for child in element:
-        children.setdefault(child.tag, []).append(_of_xml(child))
-    if not children and not element.attrib:
-        return element.text or ""
-    several = {tag: own if len(own) > 1 else own[0] for tag, own in children.items()}
-    text = {_TEXT: element.text} if not children and (element.text or "").strip() else {}
-    return {**element.attrib, **several, **text}
-
-
 def name(path: str = "") -> Part:
     """The camera's name, at a path; its key where there is none."""
     return lambda node: {"name": str((path and node.find(path)) or node.key)}
+
+
+def stem() -> Part:
+    """The camera's name: its key is the path of a picture, whose suffix is left out."""
+    return lambda node: {"name": PurePosixPath(node.key).with_suffix("").as_posix()}
 
 
 def image_size(path: str, height: str = "") -> Part:
@@ -261,6 +264,20 @@ def pose(rotation: str, translation: str, *, optional: bool = False) -> Part:
                 node.file, node.where(translation), node.get(translation), 3, "x y z"
             ),
         }
+
+    return part
+
+
+def pose_of_quaternion(path: str) -> Part:
+    """A quaternion w x y z and a translation, seven numbers in one list."""
+
+    def part(node: Node) -> Mapping[str, Any]:
+        from scipy.spatial.transform import Rotation  # a server starts without it
+
+        what = "quaternion w x y z and translation"
+        seven = values.vector(node.file, node.where(path), node.get(path), 7, what)
+        turned = Rotation.from_quat(np.roll(seven[:4], -1))
+        return {"rotation": np.asarray(turned.as_matrix()), "translation": seven[4:]}
 
     return part
 

@@ -10,7 +10,6 @@ Source: OpenCV, "XML/YAML/JSON file storages" (core persistence) and the calib3d
 from __future__ import annotations
 
 import re
-import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -20,7 +19,7 @@ from tracker.files.text import shown
 from tracker.io.read.calibration.camera_fields import cameras, has_cameras
 from tracker.io.read.pieces import CalibrationPiece, Convention, Piece
 from tracker.io.read.protocol import Certainty, Kind
-from tracker.io.read.source import SourceFile
+from tracker.io.read.source import SourceFile, listed
 from tracker.io.read.values import numbers
 
 NAME = "OpenCV FileStorage"
@@ -44,43 +43,21 @@ def read(file: SourceFile) -> Iterator[Piece]:
 
 
 def _values(file: SourceFile) -> Any:
-    start = file.head_text.lstrip()[:1]
-    if start == "<":
-        return _of_xml(file, file.xml)
-    return _plain(file, file.json if start == "{" else file.yaml, "")
+    return _plain(file, file.tree, "")
 
 
 def _plain(file: SourceFile, value: Any, field: str) -> Any:
-    """Matrices as nested lists in place of tables with rows, cols and data."""
+    """Matrices as lists in place of tables with rows, cols and data; lists of XML as lists."""
     if isinstance(value, Mapping):
-        if "rows" in value and "cols" in value and "data" in value:
-            return _matrix(file, field, [value["rows"], value["cols"]], value["data"])
-        if "sizes" in value and "data" in value:
-            return _matrix(file, field, value["sizes"], value["data"])
+        if "data" in value and ("sizes" in value or {"rows", "cols"} <= value.keys()):
+            sizes = value.get("sizes", [value.get("rows"), value.get("cols")])
+            return _matrix(file, field, sizes, value["data"])
+        if value.keys() == {"_"}:
+            return _plain(file, listed(value["_"]), field)
         return {str(key): _plain(file, item, str(key)) for key, item in value.items()}
     if isinstance(value, list):
         return [_plain(file, item, field) for item in value]
-    return value
-
-
-def _of_xml(file: SourceFile, element: ElementTree.Element) -> Any:
-    children = list(element)
-    if element.get("type_id") in ("opencv-matrix", "opencv-nd-matrix"):
-        parts = {child.tag: child.text or "" for child in children}
-        if "sizes" in parts and "data" in parts:
-            return _matrix(file, element.tag, parts["sizes"], parts["data"])
-        if not {"rows", "cols", "data"} <= parts.keys():
-            raise file.error("expected a matrix with rows, cols and data", element.tag)
-        return _matrix(file, element.tag, [parts["rows"], parts["cols"]], parts["data"])
-    if not children:
-        text = (element.text or "").strip()
-        try:
-            return [float(word) for word in text.split()] if text else text
-        except ValueError:
-            return text.strip('"')
-    if all(child.tag == "_" for child in children):
-        return [_of_xml(file, child) for child in children]
-    return {child.tag: _of_xml(file, child) for child in children}
+    return value.strip().strip('"') if isinstance(value, str) else value
 
 
 def _matrix(file: SourceFile, field: str, sizes: Any, data: Any) -> list[float]:

@@ -49,9 +49,7 @@ def read(file: SourceFile) -> Iterator[Piece]:
 
 
 def _values(file: SourceFile) -> Any:
-    if file.head.startswith(_ZIP):
-        return _arrays(file)
-    return file.json if file.head_text.lstrip()[:1] in ("{", "[") else file.yaml
+    return _arrays(file) if file.head.startswith(_ZIP) else file.tree
 
 
 def _arrays(file: SourceFile) -> dict[str, Any]:

@@ -11,7 +11,6 @@ appendix D, "Camera models".
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from pathlib import PurePosixPath
 from typing import Any
 
 import numpy as np
@@ -24,6 +23,7 @@ from tracker.io.read.calibration.reconstruction.colmap import (
     model_lens,
 )
 from tracker.io.read.pieces import Convention
+from tracker.io.read.source import listed
 from tracker.io.read.tree_format import (
     Node,
     TreeFormat,
@@ -32,12 +32,8 @@ from tracker.io.read.tree_format import (
     number,
     pose_at,
     pose_matrix,
+    stem,
 )
-
-
-def _stem(node: Node) -> Mapping[str, Any]:
-    """The camera's name: the picture's without its suffix."""
-    return {"name": PurePosixPath(node.key).with_suffix("").as_posix()}
 
 
 def _frames(tree: Any) -> Iterator[tuple[str, Any]]:
@@ -64,8 +60,7 @@ def _nerfstudio_lens(node: Node) -> Mapping[str, Any]:
     model = str(own.get("camera_model", "OPENCV"))
     parts = {*MODELS.get(model, ("", ()))[1], "fx", "fy", "cx", "cy"} - {"f"}
     found = {part: values.number(node.file, node.where(part), own.get(part, 0.0)) for part in parts}
-    k, distortion, kind = model_lens(node.file, node.key, model, found)
-    return {"intrinsics": k, "distortion": distortion, "lens": kind}
+    return model_lens(node.file, node.key, model, found)
 
 
 NERFSTUDIO = TreeFormat(
@@ -74,7 +69,7 @@ NERFSTUDIO = TreeFormat(
     marks=('"frames"', '"transform_matrix"'),
     cameras=_frames,
     required=("transform_matrix",),
-    parts=(_stem, _nerfstudio_lens, image_size("w", "h"), pose_matrix("transform_matrix")),
+    parts=(stem(), _nerfstudio_lens, image_size("w", "h"), pose_matrix("transform_matrix")),
     convention=Convention(direction="camera-to-world", axes="opengl"),
     most=MOST_IMAGES,
 )
@@ -133,26 +128,21 @@ OPENMVG = TreeFormat(
     marks=('"sfm_data_version"',),
     cameras=_views,
     required=("id_view", "rotation", "center"),
-    parts=(_stem, image_size("width", "height"), _openmvg_lens, pose_at("rotation", "center")),
+    parts=(stem(), image_size("width", "height"), _openmvg_lens, pose_at("rotation", "center")),
     convention=Convention(direction="world-to-camera", axes="opencv"),
     most=MOST_IMAGES,
 )
 
 
-def _listed(value: Any) -> list[Any]:
-    """The children of one name in XML."""
-    return value if isinstance(value, list) else [] if value is None else [value]
-
-
 def _aligned(tree: Any) -> Iterator[tuple[str, Any]]:
     """The aligned cameras of a Metashape document, each with its sensor and its chunk's scale."""
-    for chunk in _listed(tree.get("chunk") if isinstance(tree, dict) else None):
-        sensors = {str(one.get("id")): one for one in _listed(at(chunk, "sensors/sensor"))}
+    for chunk in listed(tree.get("chunk") if isinstance(tree, dict) else None):
+        sensors = {str(one.get("id")): one for one in listed(at(chunk, "sensors/sensor"))}
         scale = at(chunk, "transform/scale")
-        for camera in _listed(at(chunk, "cameras/camera")):
+        for camera in listed(at(chunk, "cameras/camera")):
             if isinstance(camera, dict) and camera.get("transform"):
                 sensor = sensors.get(str(camera.get("sensor_id")), {})
-                lenses = _listed(sensor.get("calibration"))
+                lenses = listed(sensor.get("calibration"))
                 lens = [one for one in lenses if one.get("class") == "adjusted"]
                 name = str(camera.get("label", camera.get("id", "")))
                 yield name, {**camera, "scale": scale, "sensor": sensor, "lens": [*lens, None][0]}
