@@ -26,6 +26,21 @@ LARGEST_SIDE = 65535
 """Pixels."""
 
 
+NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+"""The pattern of a number in a text."""
+
+
+def numbers_in(value: Any) -> Float[ndarray, " n"] | None:
+    """All numbers of a list of any nesting, or of a text with blanks or commas between them; None
+    if something else is among them."""
+    if isinstance(value, str):
+        value = value.replace(",", " ").split()
+    try:
+        return np.asarray(value, dtype=float).ravel()
+    except (ValueError, TypeError):
+        return None
+
+
 def numbers(
     file: SourceFile, field: str, value: Any, *, missing: bool = False
 ) -> Float[ndarray, " n"]:
@@ -40,12 +55,9 @@ def numbers(
     Raises:
         FormatError: If something else is among them.
     """
-    if isinstance(value, str):
-        value = value.replace(",", " ").split()
-    try:
-        found = np.asarray(value, dtype=float).ravel()
-    except (ValueError, TypeError):
-        raise file.error(f"expected numbers, found {shown(value)}", field) from None
+    found = numbers_in(value)
+    if found is None:
+        raise file.error(f"expected numbers, found {shown(value)}", field)
     if not (np.isfinite(found) | (missing & np.isnan(found))).all():
         raise file.error(f"expected finite numbers, found {shown(value)}", field)
     return found

@@ -27,6 +27,7 @@ from tracker.io.read.values import (
     matrix,
     number,
     numbers,
+    numbers_in,
     rotation,
     vector,
 )
@@ -35,9 +36,6 @@ _POSES = ("RT", "inverse", "matrix_world", "pose")
 """Parts that are a whole pose, a 3×4 or a 4×4 matrix."""
 
 _LENS_PARTS = ("image_size", "intrinsics", "distortion", "lens")
-
-STEREO_WORLD = "1"
-"""Of the two cameras of a stereo calibration the one whose axes are the world's."""
 
 
 def by_camera(table: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
@@ -69,10 +67,8 @@ def is_camera(fields: Mapping[str, Any]) -> bool:
 
 def _is_pose(value: Any) -> bool:
     """Whether twelve or sixteen numbers begin with a rotation; rows of angles do not."""
-    if count(value) not in (12, 16):
-        return False
-    numbers = value.replace(",", " ").split() if isinstance(value, str) else value
-    return is_rotation(np.asarray(numbers, dtype=float).reshape(-1, 4)[:3, :3])
+    found = numbers_in(value) if count(value) in (12, 16) else None
+    return found is not None and is_rotation(found.reshape(-1, 4)[:3, :3])
 
 
 def camera(
@@ -218,11 +214,8 @@ def _of_quaternion(
 
 def _is_transposed(k: Any) -> bool:
     """Whether K is written for points in rows, as MATLAB, DANNCE and JARVIS have it; R is then."""
-    if count(k) != 9:
-        return False
-    given = np.asarray(k if not isinstance(k, str) else k.replace(",", " ").split(), dtype=float)
-    found = given.reshape(3, 3)
-    return bool(found[2, :2].any() and not found[:2, 2].any())
+    found = numbers_in(k) if count(k) == 9 else None
+    return found is not None and bool(found[6:8].any() and not found[[2, 5]].any())
 
 
 def _distortion(file: SourceFile, name: str, fields: Mapping[str, Any]) -> Any:

@@ -12,8 +12,11 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
+from numpy import ndarray
 
 from tracker.io.read.calibration.euler import KINDS, ORDERS
+from tracker.io.read.values import numbers_in
 
 MEANINGS: dict[str, tuple[str, ...]] = {
     "K": ("k", "m", "mtx", "cameramatrix", "cammatrix", "intrinsicmatrix", "intrinsics",
@@ -85,11 +88,12 @@ _ANGLES = {
 }  # fmt: skip
 """Of three angles by name: what they are called together."""
 
-_WHOLE = {
+_TABLES = {
     frozenset(parts): (name, parts)
-    for name, parts in {**_ANGLES, "quaternion_wxyz": "wxyz"}.items()
+    for name, parts in {**_ANGLES, "quaternion_wxyz": tuple("wxyz"), "": tuple("xyz")}.items()
 }
-"""By the names of its parts a rotation that is a table: what it is, and their order."""
+"""By the names of its parts a vector or a rotation that is a table: what it is, if that differs
+from the name of the table, and the order of its parts."""
 
 _SCALAR_OF = {word: name for name, words in _SCALARS.items() for word in words}
 
@@ -130,12 +134,8 @@ def count(value: Any) -> int:
     """How many numbers a list of any nesting, or a text of numbers, has; 0 for anything else."""
     if value is None or isinstance(value, Mapping):
         return 0
-    if isinstance(value, str):
-        value = value.replace(",", " ").split()
-    try:
-        return int(np.asarray(value, dtype=float).size)
-    except (ValueError, TypeError):
-        return 0
+    found = numbers_in(value)
+    return 0 if found is None else len(found)
 
 
 def fields_by_camera(table: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
@@ -169,7 +169,7 @@ def _meant(meaning: str, value: Any) -> str:
     """A lens's name over twelve numbers is that of a pose (OpenPose) or of a projection."""
     if meaning != "K" or count(value) != 12:
         return meaning
-    left = np.asarray(_listed(value), dtype=float).reshape(3, 4)[:, :3]
+    left = _numbers(value).reshape(3, 4)[:, :3]
     return "RT" if np.abs(left @ left.T - np.eye(3)).max() < 0.01 else "P"
 
 
@@ -194,14 +194,17 @@ def _settle_rotation(fields: dict[str, Any]) -> None:
             fields["rxyz"] = fields.pop("R")
         return
     if count(vector) == 3:
-        turned = np.asarray(_listed(vector), dtype=float).ravel()
+        turned = _numbers(vector)
         if np.linalg.norm(turned) > _FULL_TURN:
             vector = np.radians(turned).tolist()
     fields["R"] = vector
 
 
-def _listed(value: Any) -> Any:
-    return value.replace(",", " ").split() if isinstance(value, str) else value
+def _numbers(value: Any) -> Float[ndarray, " n"]:
+    """The numbers of a value that has some, as :func:`count` counts them."""
+    found = numbers_in(value)
+    assert found is not None
+    return found
 
 
 def _spread(table: Mapping[str, Any], depth: int = 0) -> dict[str, Any]:
@@ -210,17 +213,10 @@ def _spread(table: Mapping[str, Any], depth: int = 0) -> dict[str, Any]:
     for key, value in table.items():
         key = str(key)
         if isinstance(value, Mapping):
-            axes = {str(name).lower(): one for name, one in value.items()}
-            if set(axes) == set("xyz"):
-                value = [axes[axis] for axis in "xyz"]
-            elif {kind for kind, parts in _ANGLES.items() if set(parts) == set(axes)}:
-                key, value = next(
-                    (k, [axes[one] for one in parts])
-                    for k, parts in _ANGLES.items()
-                    if set(parts) == set(axes)
-                )
-            elif set(axes) == set("wxyz"):
-                key, value = "quaternion_wxyz", [axes[axis] for axis in "wxyz"]
+            own = {str(name).lower(): one for name, one in value.items()}
+            whole = _TABLES.get(frozenset(own))
+            if whole is not None:
+                key, value = whole[0] or key, [own[part] for part in whole[1]]
             elif plain(key) in _PARTS and depth < 2 and _holds_fields(value):
                 for name, inner in _spread(value, depth + 1).items():
                     fields.setdefault(name, inner)
@@ -287,7 +283,7 @@ def _centred(
     if any(count(side) != 1 for side in sides):
         return None
     focal = take("fx", "fy")
-    return focal and [*focal, *((float(np.ravel(_listed(side))[0]) - 1.0) / 2.0 for side in sides)]
+    return focal and [*focal, *((float(_numbers(side)[0]) - 1.0) / 2.0 for side in sides)]
 
 
 def _lens(

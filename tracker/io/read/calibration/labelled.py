@@ -16,6 +16,7 @@ from tracker.io.read.calibration.camera_words import split
 from tracker.io.read.pieces import CalibrationPiece, Convention, Piece
 from tracker.io.read.protocol import Certainty, Kind
 from tracker.io.read.source import SourceFile
+from tracker.io.read.values import NUMBER
 
 NAME = "text with K, R, T by name"
 KIND: Kind = "calibration"
@@ -23,8 +24,7 @@ SERIES = False
 
 MOST_BYTES = 2**20
 
-_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
-_TOKEN = re.compile(rf"(?P<name>[A-Za-z_][\w.]*)|(?P<number>{_NUMBER})")
+_TOKEN = re.compile(rf"(?P<name>[A-Za-z_][\w.]*)|(?P<number>{NUMBER})")
 _COMMENT = re.compile(r"(?m)(#|//|%).*$")
 _WRAPPING = ("array", "matrix", "np", "np.array", "numpy.array", "dtype", "float32", "float64")
 """Words that stand around numbers and name nothing."""

@@ -18,15 +18,20 @@ from typing import Any
 import numpy as np
 
 from tracker.files.text import shown
-from tracker.io.read.calibration.camera_fields import cameras, has_cameras
+from tracker.io.read.calibration.camera_fields import camera, cameras, has_cameras
 from tracker.io.read.pieces import CalibrationPiece, Convention, Piece, RawCamera, Unit
 from tracker.io.read.protocol import Certainty, Kind
 from tracker.io.read.source import SourceFile
-from tracker.io.read.values import intrinsics, lens, matrix, numbers, rotation, vector
+from tracker.io.read.values import focal_and_centre, matrix, need, numbers, vector
 
 NAME = "MATLAB .mat of cameras"
 KIND: Kind = "calibration"
 SERIES = False
+
+_WORLD_TO_CAMERA = Convention(direction="world-to-camera", axes="opencv")
+
+_FROM_1 = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 1.0], [0.0, 0.0, 0.0]])
+"""What the principal point loses where pixels are counted from 0."""
 
 MOST_BYTES = 16 * 2**20
 MOST_UNPACKED_BYTES = 64 * 2**20
@@ -110,64 +115,39 @@ def _find(values: Any, name: str, depth: int = 0) -> dict[str, Any] | None:
 
 def _stereo(file: SourceFile, values: dict[str, Any]) -> Iterator[RawCamera]:
     """The world is camera 1; x₂ = x₁ R + t in rows, so R is transposed, t in WorldUnits."""
-    first = values["CameraParameters1"]
-    unit = _UNITS.get(str(values.get("WorldUnits") or first.get("WorldUnits", "")).lower())
+    both = [values["CameraParameters1"], values["CameraParameters2"]]
+    unit = _UNITS.get(str(values.get("WorldUnits") or both[0].get("WorldUnits", "")).lower())
     convention = Convention(unit=unit, direction="world-to-camera", axes="opencv")
     pose = values.get("PoseCamera2")
     if isinstance(pose, dict):
-        turned = rotation(file, "PoseCamera2.R", pose["R"])
-        moved = vector(file, "PoseCamera2.Translation", pose["Translation"], 3, "x y z")
+        turned, moved = pose["R"], pose["Translation"]
     else:
-        both = [values.get("RotationOfCamera2"), values.get("TranslationOfCamera2")]
-        if any(part is None for part in both):
-            raise file.error("RotationOfCamera2 or TranslationOfCamera2 is missing")
-        turned = rotation(file, "RotationOfCamera2", both[0]).T
-        moved = vector(file, "TranslationOfCamera2", both[1], 3, "x y z")
+        need(file, values, ("RotationOfCamera2", "TranslationOfCamera2"))
+        turned, moved = np.transpose(values["RotationOfCamera2"]), values["TranslationOfCamera2"]
     poses = ((np.eye(3), np.zeros(3)), (turned, moved))
-    for side, (rotated, translation) in zip("12", poses, strict=True):
-        field = f"CameraParameters{side}"
-        fields = values[field]
-        if "K" in fields:
-            k = matrix(file, f"{field}.K", fields["K"], 3, 3)
-        else:
-            k = matrix(file, f"{field}.IntrinsicMatrix", fields["IntrinsicMatrix"], 3, 3).T
-        k = intrinsics(file, f"{field}.K", k) - [[0, 0, 1], [0, 0, 1], [0, 0, 0]]
-        radial = numbers(file, f"{field}.RadialDistortion", fields["RadialDistortion"])
-        tangential = numbers(file, f"{field}.TangentialDistortion", fields["TangentialDistortion"])
-        distortion, model = lens(file, field, [*radial[:2], *tangential, *radial[2:]])
-        size = fields.get("ImageSize")
-        height_width = numbers(file, f"{field}.ImageSize", [] if size is None else size)
-        yield RawCamera(
-            name=side,
-            image_size=(int(height_width[1]), int(height_width[0]))
-            if len(height_width) == 2
-            else None,
-            intrinsics=k,
-            distortion=distortion,
-            lens=model,
-            rotation=rotated,
-            translation=translation,
-            convention=convention,
-        )
+    for side, own, (rotated, translation) in zip("12", both, poses, strict=True):
+        k = own["K"] if "K" in own else np.transpose(own["IntrinsicMatrix"])
+        size = numbers(file, f"CameraParameters{side}.ImageSize", own.get("ImageSize", []))
+        fields = {
+            "K": matrix(file, f"CameraParameters{side}.K", k, 3, 3) - _FROM_1,
+            "radial": own["RadialDistortion"],
+            "tangential": own["TangentialDistortion"],
+            "R": rotated,
+            "T": translation,
+            **({"size": size[::-1]} if len(size) == 2 else {}),
+        }
+        yield camera(file, side, fields, convention)
 
 
 def _bouguet(file: SourceFile, values: dict[str, Any]) -> Iterator[RawCamera]:
     """x_right = R x_left + T, millimetres by its tutorial, but in fact the board's unit."""
-    convention = Convention(direction="world-to-camera", axes="opencv")
-    right = (values.get("R", values.get("om")), values.get("T"))
-    for side, (turned, translation) in {"left": (np.eye(3), np.zeros(3)), "right": right}.items():
+    poses = {"left": (np.eye(3), np.zeros(3)), "right": (values.get("R", values.get("om")),
+                                                         values.get("T"))}  # fmt: skip
+    size = {"size": [values["nx"], values["ny"]]} if {"nx", "ny"} <= values.keys() else {}
+    for side, (turned, moved) in poses.items():
         fx, fy = vector(file, f"fc_{side}", values[f"fc_{side}"], 2, "focal lengths")
         cx, cy = vector(file, f"cc_{side}", values.get(f"cc_{side}"), 2, "principal point")
-        skew = float(values.get(f"alpha_c_{side}", 0.0))
-        distortion, model = lens(file, f"kc_{side}", values.get(f"kc_{side}"))
-        size = (values.get("nx"), values.get("ny"))
-        yield RawCamera(
-            name=side,
-            image_size=None if None in size else (int(size[0]), int(size[1])),  # type: ignore[arg-type]
-            intrinsics=np.array([[fx, skew * fx, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]]),
-            distortion=distortion,
-            lens=model,
-            rotation=rotation(file, "R", turned),
-            translation=vector(file, "T", translation, 3, "x y z"),
-            convention=convention,
-        )
+        k = focal_and_centre(fx, fy, cx, cy)
+        k[0, 1] = fx * float(values.get(f"alpha_c_{side}", 0.0))
+        fields = {"K": k, "D": values.get(f"kc_{side}"), "R": turned, "T": moved, **size}
+        yield camera(file, side, fields, _WORLD_TO_CAMERA)

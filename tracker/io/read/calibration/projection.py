@@ -21,7 +21,7 @@ from numpy import ndarray
 from tracker.io.read.pieces import CalibrationPiece, Convention, Piece, RawCamera
 from tracker.io.read.protocol import Certainty, Kind
 from tracker.io.read.source import SourceFile
-from tracker.io.read.values import intrinsics, is_rotation
+from tracker.io.read.values import NUMBER, intrinsics, is_rotation
 
 NAME = "matrices P, [R | t] or K"
 KIND: Kind = "calibration"
@@ -37,9 +37,8 @@ _SHORT = 2000
 """Bytes that up to nine numbers take."""
 
 _NPY = b"\x93NUMPY"
-_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _ROW = re.compile(
-    rf"\s*(?:([A-Za-z_]\w*)\s*[:=,\s]\s*)?[\[(\s]*({_NUMBER}(?:[\s,;]+{_NUMBER})*)[\])\s,;]*"
+    rf"\s*(?:([A-Za-z_]\w*)\s*[:=,\s]\s*)?[\[(\s]*({NUMBER}(?:[\s,;]+{NUMBER})*)[\])\s,;]*"
 )
 
 
@@ -106,8 +105,8 @@ def _halves(file: SourceFile) -> tuple[Float[ndarray, "3 3"], Float[ndarray, " 3
             if path is None:
                 return None
             member = file.member(path)
-        words = re.findall(_NUMBER, member.head_text) if member.size < _SHORT else []
-        if re.sub(rf"{_NUMBER}|[\s,;\[\]]", "", member.head_text) or len(words) not in (3, 9):
+        words = re.findall(NUMBER, member.head_text) if member.size < _SHORT else []
+        if re.sub(rf"{NUMBER}|[\s,;\[\]]", "", member.head_text) or len(words) not in (3, 9):
             return None
         values.append(np.array(words, dtype=float))
     rotation, translation = values
