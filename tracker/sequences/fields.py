@@ -5,8 +5,8 @@ from __future__ import annotations
 import difflib
 import math
 import sys
-from collections.abc import Iterable
-from typing import Any
+from collections.abc import Callable, Iterable
+from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 from jaxtyping import Float
@@ -53,6 +53,10 @@ def listed(words: Iterable[str]) -> str:
     )
 
 
+_P = ParamSpec("_P")
+_T = TypeVar("_T")
+
+
 class Fields:
     """One table of a TOML file. Unknown fields are rejected at once, others are checked when read.
 
@@ -97,6 +101,15 @@ class Fields:
     def error(self, name: str, message: str) -> SequenceError:
         """Return an error that names a field."""
         return SequenceError(f"{self.where}, {name}: {message}")
+
+    def checked(
+        self, name: str, check: Callable[_P, _T], *parts: _P.args, **options: _P.kwargs
+    ) -> _T:
+        """Return what a function makes of a field's value; its ``ValueError`` names the field."""
+        try:
+            return check(*parts, **options)
+        except ValueError as error:
+            raise self.error(name, str(error)) from None
 
     def _get(self, name: str, default: Any, expected: str) -> Any:
         if name in self._values:

@@ -11,6 +11,7 @@ from jaxtyping import Bool
 from numpy import ndarray
 
 from tracker.files.text import shown
+from tracker.geometry.calibration import LARGEST_SIDE, checked_size
 from tracker.sequences.calibration import POSE, read_camera
 from tracker.sequences.clock import FIELDS, Timing, read_timing
 from tracker.sequences.fields import Fields
@@ -208,19 +209,16 @@ def _image_size(fields: Fields, pictures: Pictures | None) -> tuple[int, int]:
     point."""
     if "image_size" in fields:
         size = fields.vector("image_size", 2, "width and height in pixels", positive=True)
-        if (size != np.floor(size)).any() or (size > 65535).any():
-            found = f"{size[0]:g} and {size[1]:g}"
+        width, height = fields.checked("image_size", checked_size, size)
+        if width * height > MOST_PIXELS:
             raise fields.error(
-                "image_size", f"expected two whole numbers of pixels up to 65535, found {found}"
+                "image_size", f"expected at most {MOST_PIXELS:,} pixels, found {width} × {height}"
             )
-        if size.prod() > MOST_PIXELS:
-            raise fields.error(
-                "image_size",
-                f"expected at most {MOST_PIXELS:,} pixels, found {size[0]:g} × {size[1]:g}",
-            )
-        return int(size[0]), int(size[1])
+        return width, height
     if pictures is not None:
         return pictures.size
     lens = read_camera("", (1, 1), fields).intrinsics
-    width, height = (min(65535, max(2, round(2.0 * float(middle) + 1.0))) for middle in lens[:2, 2])
+    width, height = (
+        min(LARGEST_SIDE, max(2, round(2.0 * float(middle) + 1.0))) for middle in lens[:2, 2]
+    )
     return width, height

@@ -20,12 +20,13 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
+from tracker.geometry.calibration import Lens
+
 Unit = Literal["m", "cm", "mm"]
 Direction = Literal["world-to-camera", "camera-to-world"]
 Axes = Literal["opencv", "opengl"]
 """The axes of a camera: x right, y down, z ahead (OpenCV); or x right, y up, z back (OpenGL)."""
 Up = Literal["x", "y", "z", "-x", "-y", "-z"]
-Lens = Literal["pinhole", "rational", "fisheye"]
 Layout = Literal["ltwh", "xyxy", "yxyx", "cxcywh"]
 """The meaning of a box's four numbers: left, top, width, height; left, top, right, bottom; or
 centre and size."""

@@ -2,32 +2,47 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from typing import Any
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
 from tracker.files.text import shown
-from tracker.io.read.pieces import Lens
+from tracker.geometry import calibration as geometry
+from tracker.geometry.calibration import Lens
 from tracker.io.read.source import SourceFile
-
-ROTATION_TOLERANCE = 2e-3
-"""How far R Rᵀ may be from the identity: entries written with three decimals pass."""
-
-ROUNDED_ZERO = 1e-9
-"""An entry of K below the diagonal that is zero but for rounding, pixels."""
 
 MOST_TURNED = 1000.0
 """Of a rotation vector's numbers: radians, or degrees by mistake."""
 
-LARGEST_SIDE = 65535
-"""Pixels."""
+ROUNDED_ZERO = 1e-9
+"""An entry of K below the diagonal that is zero but for rounding, pixels."""
 
+COUNTS = (0, 1, 2, *geometry.COUNTS[1:])
+"""The counts of numbers of a lens; some programs have only k1, or k1 and k2."""
 
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 """The pattern of a number in a text."""
+
+
+_P = ParamSpec("_P")
+_T = TypeVar("_T")
+
+
+def _checked(
+    file: SourceFile,
+    field: str,
+    check: Callable[_P, _T],
+    *parts: _P.args,
+    **options: _P.kwargs,
+) -> _T:
+    """What a check of :mod:`tracker.geometry.calibration` returns; its error names the field."""
+    try:
+        return check(*parts, **options)
+    except ValueError as error:
+        raise file.error(str(error), field) from None
 
 
 def numbers_in(value: Any) -> Float[ndarray, " n"] | None:
@@ -95,18 +110,8 @@ def intrinsics(file: SourceFile, field: str, value: Any) -> Float[ndarray, "3 3"
     Raises:
         FormatError: If it is of another form.
     """
-    found = matrix(file, field, value, 3, 3)
-    form = "[[fx, s, cx], [0, fy, cy], [0, 0, 1]] in pixels"
-    below = found[[1, 2, 2], [0, 0, 1]]
-    if np.abs(below).max() > ROUNDED_ZERO or abs(found[2, 2] - 1.0) > 1e-9:
-        raise file.error(f"expected {form}, found {shown(found.tolist())}", field)
-    found[[1, 2, 2], [0, 0, 1]] = 0.0
-    if found[0, 0] <= 0.0 or found[1, 1] <= 0.0:
-        raise file.error(
-            f"expected focal lengths above 0 pixels, found {found[0, 0]:g} and {found[1, 1]:g}",
-            field,
-        )
-    return found
+    given = matrix(file, field, value, 3, 3)
+    return _checked(file, field, geometry.checked_intrinsics, given, rounding=ROUNDED_ZERO)
 
 
 def focal_and_centre(fx: float, fy: float, cx: float, cy: float) -> Float[ndarray, "3 3"]:
@@ -133,21 +138,7 @@ def rotation(file: SourceFile, field: str, value: Any) -> Float[ndarray, "3 3"]:
         raise file.error(
             f"expected a 3×3 matrix or a rotation vector, found {len(found)} numbers", field
         )
-    turned = found.reshape(3, 3)
-    if not is_rotation(turned):
-        raise file.error(
-            "expected a rotation (R Rᵀ = 1, determinant 1), found R Rᵀ off by "
-            f"{np.abs(turned @ turned.T - np.eye(3)).max():.2g} and determinant "
-            f"{np.linalg.det(turned):.4g}",
-            field,
-        )
-    return turned
-
-
-def is_rotation(found: Float[ndarray, "3 3"]) -> bool:
-    """Whether R Rᵀ = 1 and the determinant is 1, as far as three decimals tell."""
-    error = float(np.abs(found @ found.T - np.eye(3)).max())
-    return error <= ROTATION_TOLERANCE and float(np.linalg.det(found)) > 0.0
+    return _checked(file, field, geometry.checked_rotation, found.reshape(3, 3))
 
 
 def lens(
@@ -159,28 +150,7 @@ def lens(
         FormatError: If it is a model that cameras here do not have, by its name.
     """
     found = numbers(file, field, [] if value is None else value)
-    if fisheye:
-        if len(found) not in (0, 4):
-            raise file.error(
-                f"expected the 4 numbers of a fisheye (k1 k2 k3 k4), found {len(found)}", field
-            )
-        return (found if len(found) else np.zeros(4)), "fisheye"
-    if len(found) not in (0, 1, 2, 4, 5, 8, 12, 14):
-        raise file.error(
-            f"expected 4, 5 or 8 numbers (k1 k2 p1 p2 [k3 [k4 k5 k6]]), found {len(found)}", field
-        )
-    if len(found) > 8 and found[8:].any():
-        raise file.error(
-            "has a thin-prism or tilted lens (s1 … τy of OpenCV's 12 or 14 numbers), expected at "
-            "most 8; calibrate again with the rational or the plain model",
-            field,
-        )
-    found = found[:8]
-    if len(found) == 8 and found[5:].any():
-        return found, "rational"
-    plain = np.zeros(5)
-    plain[: min(5, len(found))] = found[:5]
-    return plain, "pinhole"
+    return _checked(file, field, geometry.checked_distortion, found, fisheye=fisheye, counts=COUNTS)
 
 
 def image_size(file: SourceFile, field: str, value: Any) -> tuple[int, int]:
@@ -193,12 +163,7 @@ def image_size(file: SourceFile, field: str, value: Any) -> tuple[int, int]:
         by_name = {str(key).lower(): one for key, one in value.items()}
         value = [by_name.get(side, by_name.get(side[0])) for side in ("width", "height")]
     found = vector(file, field, value, 2, "width and height")
-    if (found != np.round(found)).any() or (found < 1).any() or (found > LARGEST_SIDE).any():
-        raise file.error(
-            f"expected two whole numbers of pixels up to {LARGEST_SIDE}, found {shown(value)}",
-            field,
-        )
-    return int(found[0]), int(found[1])
+    return _checked(file, field, geometry.checked_size, found)
 
 
 def number(file: SourceFile, field: str, value: Any) -> float:

@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
+from tracker.geometry.calibration import is_rotation
 from tracker.io.read.calibration import euler
 from tracker.io.read.calibration.camera_words import count, fields_by_camera
 from tracker.io.read.calibration.euler import KINDS, NAMED_AXES
@@ -22,7 +23,6 @@ from tracker.io.read.source import SourceFile
 from tracker.io.read.values import (
     image_size,
     intrinsics,
-    is_rotation,
     lens,
     matrix,
     number,

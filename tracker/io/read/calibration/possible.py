@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from tracker.files.text import shown
+from tracker.geometry.calibration import check_focal_lengths
 from tracker.geometry.camera import Camera
 from tracker.io.read.pieces import CalibrationPiece, RawCamera
 from tracker.io.read.source import SourceFile
-from tracker.sequences.calibration import LEAST_FOCAL
-from tracker.sequences.fields import LARGEST, LARGEST_IN_MATRIX, LONGEST_NAME
+from tracker.sequences.fields import LARGEST_IN_MATRIX, LONGEST_NAME
 
 
 def check_cameras(file: SourceFile, piece: CalibrationPiece) -> None:
@@ -30,18 +30,11 @@ def check_cameras(file: SourceFile, piece: CalibrationPiece) -> None:
 
 
 def _check_lens(file: SourceFile, camera: RawCamera) -> None:
-    matrix = camera.intrinsics
-    if matrix is None:
-        return
-    focal = matrix[[0, 1], [0, 1]]
-    # not a number is neither at most the one nor at least the other
-    if not (np.abs(matrix).max() <= LARGEST and focal.min() >= LEAST_FOCAL):
-        raise file.error(
-            f"expected focal lengths from {LEAST_FOCAL:g} to {LARGEST:g} pixels and nothing larger "
-            f"in K, found fx = {focal[0]:.4g}, fy = {focal[1]:.4g} and {np.abs(matrix).max():.4g} "
-            "at most",
-            f"{camera.name} K".strip(),
-        )
+    try:
+        if camera.intrinsics is not None:
+            check_focal_lengths(camera.intrinsics)
+    except ValueError as error:
+        raise file.error(str(error), f"{camera.name} K".strip()) from None
 
 
 def _check_pose(file: SourceFile, camera: RawCamera) -> None:

@@ -18,10 +18,11 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
+from tracker.geometry.calibration import is_rotation
 from tracker.io.read.pieces import CalibrationPiece, Convention, Piece, RawCamera
 from tracker.io.read.protocol import Certainty, Kind
 from tracker.io.read.source import SourceFile
-from tracker.io.read.values import NUMBER, intrinsics, is_rotation
+from tracker.io.read.values import NUMBER, intrinsics
 
 NAME = "matrices P, [R | t] or K"
 KIND: Kind = "calibration"

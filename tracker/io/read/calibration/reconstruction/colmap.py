@@ -23,8 +23,9 @@ from typing import Any
 import numpy as np
 
 from tracker.files.text import shown
+from tracker.geometry.calibration import Lens
 from tracker.io.read import values
-from tracker.io.read.pieces import Convention, Lens
+from tracker.io.read.pieces import Convention
 from tracker.io.read.source import SourceFile
 from tracker.io.read.tree_format import TreeFormat, pose_of_quaternion, stem
 
