@@ -33,6 +33,7 @@ from app.models.requests import (
 )
 from app.models.state import (
     CameraInfo,
+    EditsInfo,
     EntranceInfo,
     GroupInfo,
     MethodsInfo,
@@ -93,6 +94,7 @@ __all__ = [
     "Courses",
     "CurveRequest",
     "Decided",
+    "EditsInfo",
     "EntranceInfo",
     "Estimate",
     "Feeding",

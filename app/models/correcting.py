@@ -115,10 +115,6 @@ class Corrections(Model):
     """Ranges of steps that somebody has looked at, without overlap, in order."""
     names: dict[int, str]
     """Of tracks of the shown run."""
-    undo: str | None
-    """What would be taken back."""
-    redo: str | None
-    """What would be said again."""
 
 
 class AlternativeInfo(Model):

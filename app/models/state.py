@@ -116,11 +116,18 @@ class TeachingInfo(Model):
     """What the sequence was taught since its file was read."""
 
     key: str
-    """Names room and templates as they are; POST /api/teach/restore goes back to them."""
+    """Names room and templates as they are."""
     unsaved: int
     """Changes that its file does not have."""
     editing_room: bool
     """Whether the 3D view has handles on the room."""
+
+
+class EditsInfo(Model):
+    """What would be undone and redone, in words; null for nothing."""
+
+    undo: str | None
+    redo: str | None
 
 
 class TrailInfo(Model):
@@ -175,6 +182,9 @@ class State(Model):
     pinned: PinnedInfo | None
     teaching: TeachingInfo
     corrections: CorrectionsState
+    edits: EditsInfo
+    marks: int
+    """Grows when kept runs are named, marked, deleted or restored."""
     viser: ViserInfo
 
 

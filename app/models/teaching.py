@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from pydantic import Field
 
 from app.models.base import GivenPath, Model, Vector
@@ -54,15 +52,6 @@ class EditingChange(Model):
     """Handles on the room, or none."""
 
     on: bool
-
-
-class RestoreRequest(Model):
-    """Room and templates as they were at some moment."""
-
-    key: str = Field(max_length=64)
-    """As the state named them."""
-    changes: dict[str, Any] = Field(default_factory=dict)
-    """Values by key that were changed with them."""
 
 
 class DetectorRequest(Model):

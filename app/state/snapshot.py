@@ -25,7 +25,7 @@ from tracker.sequences.sequence import Sequence
 Change = Literal[
     "sequence", "opening", "parameters", "playhead", "selection", "layers", "view", "theme",
     "run", "progress", "evaluation", "pinned", "presets", "taught", "editing", "corrections",
-    "ghosts", "offers", "fetching",
+    "ghosts", "offers", "fetching", "edits", "marks",
 ]  # fmt: skip
 """What is another now: ``run`` is a run's beginning and its end, ``progress`` its new steps,
 ``taught`` another room or other templates of the same recording."""
@@ -153,6 +153,12 @@ class Snapshot:
     presets: Presets = field(default_factory=lambda: MappingProxyType({}))
     corrections: tuple[Correction, ...] = ()
     """What was put right by hand in the open sequence."""
+    undo_words: str | None = None
+    """What would be undone; None for nothing."""
+    redo_words: str | None = None
+    """What would be redone; None for nothing."""
+    marks: int = 0
+    """Grows when kept runs are named, marked, deleted or restored."""
     playhead: int = 0
     playhead_origin: str = ""
     sought: bool = False

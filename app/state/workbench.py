@@ -246,6 +246,17 @@ class Workbench(ShownRun):
             if corrections != now.corrections:
                 self._put("corrections", corrections=corrections)
 
+    def show_edits(self, undo: str | None, redo: str | None) -> None:
+        """Show what would be undone and redone; None for nothing."""
+        with self._edit() as now:
+            if (undo, redo) != (now.undo_words, now.redo_words):
+                self._put("edits", undo_words=undo, redo_words=redo)
+
+    def runs_marked(self) -> None:
+        """Tell everyone who looks that kept runs have other names or marks, or are deleted."""
+        with self._edit() as now:
+            self._put("marks", marks=now.marks + 1)
+
     def edit_room(self, on: bool) -> None:
         """Have the 3D view with handles on the room, or without."""
         with self._edit() as now:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -11,14 +12,17 @@ from fastapi import APIRouter, Depends, Query, Request, Response
 
 from app import models
 from app.errors import ApiError
+from app.state.edits import Edit, EditError
 from app.state.kept.history import History
 from app.state.snapshot import Snapshot
 from app.state.teaching import Teaching
+from app.state.workbench import Workbench
 from app.state.workers.sensitivity import Sensitivity
 from app.web.dependencies import (
     ERRORS,
     FOR_EVER,
     Bench,
+    Edited,
     Own,
     Part,
     Work,
@@ -123,6 +127,31 @@ def remove_preset(name: str, own: Own, bench: Bench) -> models.State:
     """Forget a saved preset."""
     own.remove(name)
     return results.state_of(bench.snapshot())
+
+
+@router.post("/undo")
+def undo(edits: Edited, bench: Bench) -> models.State:
+    """Put back what was before the last edit, whatever it was of; those of an earlier start too."""
+    _said(bench, "Undone", edits.undo)
+    return results.state_of(bench.snapshot())
+
+
+@router.post("/redo")
+def redo(edits: Edited, bench: Bench) -> models.State:
+    """Do again what was undone last."""
+    _said(bench, "Done again", edits.redo)
+    return results.state_of(bench.snapshot())
+
+
+def _said(bench: Workbench, what: str, act: Callable[[], Edit]) -> None:
+    try:
+        edit = act()
+    except EditError as error:
+        words = str(error)
+        raise ApiError(
+            409, "no_edit", f"{words[:1].upper()}{words[1:]}.", hint="Nothing was changed."
+        ) from None
+    bench.notify("info", f"{what}: {edit.words}")
 
 
 @router.post("/run/cancel")

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 from fastapi import Depends, Query, Request
 
 from app.errors import ApiError, Problem
+from app.state.edits import Edits
 from app.state.kept.presets import OwnPresets
 from app.state.workbench import Workbench
 from app.state.workers.jobs import Jobs
@@ -37,6 +38,11 @@ def _own_presets(request: Request) -> OwnPresets:
     return presets
 
 
+def _edits(request: Request) -> Edits:
+    edits: Edits = request.app.state.edits
+    return edits
+
+
 @dataclass(frozen=True, slots=True)
 class Shown:
     """The range of steps that a plot shows, and into how many buckets it is summed up."""
@@ -60,6 +66,7 @@ def _shown(
 
 Part = Annotated[Shown, Depends(_shown)]
 Bench = Annotated[Workbench, Depends(_workbench)]
+Edited = Annotated[Edits, Depends(_edits)]
 Own = Annotated[OwnPresets, Depends(_own_presets)]
 Work = Annotated[Jobs, Depends(_jobs)]
 

@@ -1,4 +1,4 @@
-"""The routes of teaching: templates, the room, entrances; going back; saving."""
+"""The routes of teaching: templates, the room, entrances; saving."""
 
 from __future__ import annotations
 
@@ -18,7 +18,6 @@ from app.models.teaching import (
     EditingChange,
     NewEntrance,
     NewTemplate,
-    RestoreRequest,
     TargetChange,
     TextChange,
     ValueChange,
@@ -217,20 +216,6 @@ def stop_fetching(request: Request, bench: Bench) -> models.State:
 async def edit_room(wish: EditingChange, bench: Bench) -> models.State:
     """Have the 3D view with handles on the room, or without."""
     bench.edit_room(wish.on)
-    return results.state_of(bench.snapshot())
-
-
-@router.post("/restore")
-def restore(wish: RestoreRequest, bench: Bench, teach: Teach) -> models.State:
-    """Go back to room and templates, and values, as they were; what undo does."""
-    with _complaining():
-        if not teach.restore(wish.key, wish.changes):
-            raise ApiError(
-                404,
-                "unknown_state",
-                "Room and templates of that moment are not known any more.",
-                hint="They are known from the opening of a sequence on.",
-            )
     return results.state_of(bench.snapshot())
 
 

@@ -9,6 +9,7 @@ import pytest
 from starlette.testclient import TestClient
 
 from app.command.flags import parse
+from app.state.edits import Edits
 from app.state.kept.presets import OwnPresets
 from app.state.workbench import Workbench
 from tests.parameters.test_renamed import DEFAULTS, MEANT, OTHER
@@ -21,13 +22,14 @@ def test_a_saved_preset_has_the_names_of_now(tmp_path: Path) -> None:
     path = tmp_path / "presets.json"
     write_json(path, {"mine": OTHER})
     workbench = Workbench()
-    own = OwnPresets(workbench, path)
+    own = OwnPresets(workbench, Edits(workbench), path)
     assert workbench.snapshot().presets == {"mine": MEANT}
     workbench.apply_preset("mine")
     assert changed_values(workbench.snapshot().parameters) == MEANT
     assert workbench.snapshot().preset == "mine"
     own.rename("mine", "ours")
-    assert OwnPresets(Workbench(), path)  # what was written is read again
+    again = Workbench()
+    assert OwnPresets(again, Edits(again), path)  # what was written is read again
     assert all(old not in path.read_text(encoding="utf-8") for old in RENAMED)
 
 

@@ -14,6 +14,7 @@ import httpx
 import numpy as np
 from starlette.testclient import TestClient
 
+from app.state.edits import Edits
 from app.state.kept.presets import OwnPresets
 from app.state.snapshot import Event, Notice
 from app.state.workbench import Workbench
@@ -91,7 +92,9 @@ def study(folder: Path) -> None:
 
 def presets(folder: Path) -> None:
     folder.mkdir(parents=True)
-    OwnPresets(Workbench(), folder / "presets.json").keep("mine", {"fusion.clutter_rate": 0.5})
+    OwnPresets((bench := Workbench()), Edits(bench), folder / "presets.json").keep(
+        "mine", {"fusion.clutter_rate": 0.5}
+    )
 
 
 def library(folder: Path) -> None:
@@ -131,7 +134,7 @@ def read_presets(path: Path) -> None:
     workbench = Workbench()
     heard: list[Event] = []
     workbench.subscribe_events(heard.append)
-    OwnPresets(workbench, path)
+    OwnPresets(workbench, Edits(workbench), path)
     for one in heard:
         if isinstance(one, Notice):
             raise Refused(f"{one.message} {one.hint}")

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from app.state.edits import Edits
 from app.state.kept.presets import OwnPresets
 from app.state.workbench import Workbench
 from tests.bad_input.writes import KINDS
@@ -85,20 +86,20 @@ def test_a_flipped_byte_of_a_kept_file_is_found_and_nothing_is_lost(
     data[byte % len(data)] ^= 1
     path.write_bytes(data)
     workbench = Workbench()
-    own = OwnPresets(workbench, path)
+    own = OwnPresets(workbench, Edits(workbench), path)
     kept = workbench.snapshot().presets
     assert not kept or kept == {"mine": {"fusion.clutter_rate": 0.5}}
     if not kept:
         assert (tmp_path / "presets.unreadable.json").read_bytes() == bytes(data)
     own.save("new")
     again = Workbench()
-    OwnPresets(again, path)
+    OwnPresets(again, Edits(again), path)
     assert "new" in again.snapshot().presets
 
 
 def test_two_workbenches_keep_each_others_presets(tmp_path: Path) -> None:
     path = tmp_path / "presets.json"
-    one, other = (OwnPresets(Workbench(), path) for _ in range(2))
+    one, other = (OwnPresets((bench := Workbench()), Edits(bench), path) for _ in range(2))
     one.save("of one")
     other.save("of the other")
     assert set(read_json(path)) == {"of one", "of the other"}

@@ -46,7 +46,6 @@ def test_there_is_no_such_run(refusing: TestClient, number: int) -> None:
         refused(refusing.request(method, path))
     for path, body in [
         ("/api/library/delete", {"runs": [number]}),
-        ("/api/library/take-back", {"runs": [number]}),
         ("/api/exports", {"run": number, "format": "csv"}),
         ("/api/view", {"camera": number - 2}),
     ]:

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from app.state.edits import Edits
 from app.state.kept.drafts import Drafts
 from app.state.kept.presets import OwnPresets, keep_preset
 from app.state.workbench import Workbench
@@ -71,7 +72,7 @@ def keep_mine(folder: Path, number: int) -> None:
 
 def mine(folder: Path) -> int:
     workbench = Workbench()
-    OwnPresets(workbench, folder / "presets.json")
+    OwnPresets(workbench, Edits(workbench), folder / "presets.json")
     assert not list(folder.glob("*.unreadable*"))
     found = workbench.snapshot().presets.get("mine", {"fusion.clutter_rate": 0.0})
     return round(found["fusion.clutter_rate"] / STEP)

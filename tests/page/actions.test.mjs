@@ -33,6 +33,6 @@ test("what was refused is said until the like is accepted", async () => {
   await actions.ask("PUT", "teach/detector", { model: "c" });
   assert.deepEqual(said(), ["Two rays pass each other."]);
   actions.note("warn", "Worth knowing", "");
-  await actions.ask("POST", "corrections/undo");
+  await actions.ask("POST", "corrections", {});
   assert.deepEqual(said(), ["Worth knowing"]);
 });

@@ -94,7 +94,7 @@ test("a key of Check means what it says there, and what it meant before elsewher
   const find = (key, place) => commandFor(key, true, place)?.name;
   assert.equal(find("y", "check"), "check-next");
   assert.equal(find("y", "tune"), "hindsight");
-  assert.equal(find("Ctrl+z", "check"), "check-undo");
+  assert.equal(find("Ctrl+z", "check"), "undo");
   assert.equal(find("Ctrl+z", "tune"), "undo");
   assert.equal(find("Delete", "tune"), "check-nobody");
   assert.equal(find("Shift+F10", "tune"), "check-menu");

@@ -12,6 +12,7 @@ from app.state.snapshot import Change, RunState
 from app.state.workbench import Workbench
 from tracker.parameters.catalogue import METHODS, PARAMETERS, RunParameters
 from tracker.parameters.values import ParameterError, changed_values, value_of
+from tracker.sequences.writing.teaching import Values, taught_values
 
 MOST_RUNS = 50
 """Older ones are forgotten."""
@@ -38,8 +39,8 @@ class PastRun:
     """How many parameters were not at their defaults."""
     state: RunState
     """How far it was when it was last heard of."""
-    taught: str
-    """The digest of the sequence with the templates and the room that it had."""
+    taught: Values
+    """The templates and the room that its sequence had."""
     moved: frozenset[str] = frozenset()
     """The keys in which it differs from the one before."""
     asked: float = 0.0
@@ -62,13 +63,12 @@ class History:
         with self._lock:
             return list(self._runs)
 
-    def use_again(self, number: int, restore: Callable[[str, Mapping[str, Any]], bool]) -> None:
-        """Set all parameters to those of a run, and what was taught, where it is still known.
+    def use_again(self, number: int, restore: Callable[[Values, Mapping[str, Any]], None]) -> None:
+        """Set all parameters to those of a run, and what was taught where its recording is open.
 
         Args:
             number: The run's.
-            restore: Goes back to what was taught once and to values by key, in one change;
-                another sequence's it does not know.
+            restore: Goes back to what was taught once and to values by key, in one change.
 
         Raises:
             ParameterError: If there is no such run.
@@ -82,7 +82,9 @@ class History:
             )
         keys = (*METHODS, *PARAMETERS)
         values = {key: value_of(run.parameters, key) for key in keys}
-        if not restore(run.taught, values):
+        if run.recording == self._workbench.snapshot().sequence_key:
+            restore(run.taught, values)
+        else:
             self._workbench.set_parameters(values, "api")
 
     def _note(self, change: Change) -> None:
@@ -100,9 +102,10 @@ class History:
             # a run that was superseded before its first step is not worth a row
             earlier = [r for r in self._runs if r.state.state != "computing" or r.state.done]
             moved, asked = frozenset[str](), time.monotonic()
+            taught = taught_values(sequence)
             if earlier and earlier[0].recording == now.sequence_key:
                 moved = _differing(earlier[0].parameters, now.parameters)
-                same = moved and moved == earlier[0].moved and sequence.digest == earlier[0].taught
+                same = moved and moved == earlier[0].moved and taught == earlier[0].taught
                 if same and asked - earlier[0].asked < DRAG_SECONDS:
                     self._counted = earlier.pop(0).number - 1
             self._counted += 1
@@ -110,7 +113,7 @@ class History:
             at = time.strftime("%H:%M:%S")
             new = PastRun(
                 self._counted, at, sequence.name, now.sequence_key, now.parameters, changes, state,
-                sequence.digest, moved, asked,
+                taught, moved, asked,
             )  # fmt: skip
             self._runs = [new, *earlier][:MOST_RUNS]
 

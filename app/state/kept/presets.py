@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from app.errors import FULL, sentence
+from app.state.edits import Edits
 from app.state.snapshot import Presets
 from app.state.workbench import Workbench
 from tracker.files.lock import locked
@@ -30,14 +31,16 @@ _KIND = dict[str, dict[str, Any]]
 class OwnPresets:
     """Saves, renames and removes the presets of a workbench."""
 
-    def __init__(self, workbench: Workbench, path: Path | None) -> None:
+    def __init__(self, workbench: Workbench, edits: Edits, path: Path | None) -> None:
         """Read what was saved before.
 
         Args:
             workbench: Shows them.
+            edits: Where what is done with them can be undone.
             path: Their file; None keeps them for this start only.
         """
-        self._workbench = workbench
+        self._workbench, self._edits = workbench, edits
+        edits.own("presets", self._restore)
         self._path = path
         if path is not None:
             workbench.set_presets(self._read(path))
@@ -58,7 +61,7 @@ class OwnPresets:
             ParameterError: If the name is empty, too long or a built-in preset's.
         """
         name = _checked(name)
-        self._change(lambda presets: {**presets, name: values})
+        self._change(f"preset {name} saved", lambda presets: {**presets, name: dict(values)})
 
     def rename(self, name: str, new: str) -> None:
         """Give a preset another name, which no other one may have.
@@ -74,7 +77,7 @@ class OwnPresets:
                 raise ParameterError("name", f"expected a name that is free, got {new!r}", YOURS)
             return {new if key == name else key: values for key, values in presets.items()}
 
-        self._change(renamed)
+        self._change(f"preset {name} renamed {new}", renamed)
 
     def remove(self, name: str) -> None:
         """Forget a preset.
@@ -87,21 +90,32 @@ class OwnPresets:
             _check_known(presets, name)
             return {key: values for key, values in presets.items() if key != name}
 
-        self._change(removed)
+        self._change(f"preset {name} removed", removed)
 
-    def _change(self, change: Callable[[Presets], Presets]) -> None:
+    def _restore(self, values: Mapping[str, Mapping[str, Any] | None]) -> None:
+        """Have some presets as they were once, and those that were not there no more."""
+
+        def restored(presets: Presets) -> Presets:
+            every = {**presets, **values}
+            return {name: one for name, one in every.items() if one is not None}
+
+        self._change("", restored)
+
+    def _change(self, words: str, change: Callable[[Presets], Presets]) -> None:
         """Change what is saved: in the file as it is now, whoever wrote it last.
 
         Raises:
             ParameterError: If the file cannot be written; the presets are as they were.
         """
-        if self._path is None:
-            self._workbench.set_presets(change(self._workbench.snapshot().presets))
-            return
+        before = self._workbench.snapshot().presets
         try:
-            with locked(self._path):
-                presets = change(self._read(self._path))
-                write_json(self._path, dict(presets))
+            if self._path is None:
+                presets = change(before)
+            else:
+                with locked(self._path):
+                    before = self._read(self._path)
+                    presets = change(before)
+                    write_json(self._path, dict(presets))
         except OSError as error:
             if error.errno in FULL:
                 raise  # the answer says so: it is not the name
@@ -111,6 +125,9 @@ class OwnPresets:
                 "See who may write there.",
             ) from None
         self._workbench.set_presets(presets)
+        names = [name for name in {**before, **presets} if before.get(name) != presets.get(name)]
+        old, new = ({name: one.get(name) for name in names} for one in (before, presets))
+        self._edits.done(words, "presets", old, new)
 
     def _read(self, path: Path) -> Presets:
         """What the file has; a spoilt one is set aside, and what is known stays."""

@@ -1,15 +1,13 @@
-"""What the open sequence was taught: its values now, those before, and what is kept of them.
+"""What the open sequence was taught: its values now, and what is kept of them.
 
 Every edit makes another value of the sequence, checked as its file would be, and the jobs
-compute its run as after a moved slider. What it was before is kept, so that undo brings
-it back, its run included.
+compute its run as after a moved slider.
 """
 
 from __future__ import annotations
 
 import copy
 import threading
-from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -17,6 +15,7 @@ from types import MappingProxyType
 from typing import Any
 
 from app.errors import sentence
+from app.state.edits import Edits
 from app.state.kept.drafts import Drafts
 from app.state.snapshot import Change
 from app.state.workbench import Workbench
@@ -35,9 +34,6 @@ from tracker.sequences.writing.teaching import (
     with_taught,
 )
 
-KEPT_STATES = 500
-"""Rooms and templates that can be gone back to."""
-
 Check = Callable[[Sequence], None]
 """Raises a :class:`SequenceError` if a sequence will not do."""
 
@@ -45,19 +41,20 @@ Check = Callable[[Sequence], None]
 class Taught:
     """The values of the open sequence and how they are replaced; any thread may ask."""
 
-    def __init__(self, workbench: Workbench, drafts: Path | None = None) -> None:
+    def __init__(self, workbench: Workbench, edits: Edits, drafts: Path | None = None) -> None:
         """Follow a workbench.
 
         Args:
             workbench: Whose sequence.
+            edits: Where what is taught can be undone.
             drafts: Where what is not saved is kept for the next start; None: not beyond this one.
         """
         self._workbench = workbench
         self._lock = threading.RLock()
         self._opened: Sequence | None = None
-        self._states: OrderedDict[str, Values] = OrderedDict()
         self._drafts = Drafts(drafts)
         self._unsubscribe = workbench.subscribe(self._on_change)
+        edits.own_teaching(self.restore)
 
     def close(self) -> None:
         """Stop following."""
@@ -93,22 +90,18 @@ class Taught:
             edit(values)
             self._put(values, check)
 
-    def restore(self, key: str, changes: Mapping[str, Any] = MappingProxyType({})) -> bool:
-        """Go back, or on again, to what was taught once, and to the values that went with it.
+    def restore(self, values: Values, changes: Mapping[str, Any] = MappingProxyType({})) -> None:
+        """Have room and templates as they were once, and the parameters that went with them.
 
         Args:
-            key: As the state named it.
-            changes: Values by key.
+            values: Room and templates, by the keys of a ``sequence.toml``.
+            changes: Parameters by key.
 
-        Returns:
-            Whether it is still known; nothing changes where it is not.
+        Raises:
+            SequenceError: If they do not fit the open sequence; nothing is changed then.
         """
         with self._lock:
-            known = self._states.get(key)
-            if known is None:
-                return False
-            self._put(copy.deepcopy(known), changes=changes)
-            return True
+            self._put(copy.deepcopy(values), changes=changes)
 
     def save(self) -> Path:
         """Write what was taught into the sequence's file; the backup of what was there.
@@ -160,7 +153,6 @@ class Taught:
         saved = self._workbench.snapshot().saved
         if saved is not None and values == taught_values(saved):
             sequence = saved
-        self._remember(sequence)
         defaults = _defaults(sequence)
         self._workbench.teach(sequence, defaults, {**self._fitting(defaults), **changes})
 
@@ -174,12 +166,6 @@ class Taught:
         used = now.parameters.method("single_view").used(now.parameters)
         looks = used.pictures and not used.detections and not used.detector
         return {"single_view": defaults.single_view} if looks else {}
-
-    def _remember(self, sequence: Sequence) -> None:
-        self._states[sequence.digest] = taught_values(sequence)
-        self._states.move_to_end(sequence.digest)
-        while len(self._states) > KEPT_STATES:
-            self._states.popitem(last=False)
 
     def _on_change(self, change: Change) -> None:
         if change not in ("sequence", "taught"):
@@ -195,8 +181,6 @@ class Taught:
                     self._drafts.keep(sequence.folder, *values)
                 return
             self._opened = sequence
-            self._states.clear()
-            self._remember(sequence)
             self._take_up(sequence)
 
     def _take_up(self, sequence: Sequence) -> None:

@@ -7,6 +7,7 @@ import os
 from pathlib import Path
 from typing import Literal
 
+from app.state.edits import Edits
 from app.state.teaching.entrances import entrances_of
 from app.state.teaching.taught import Taught
 from app.state.teaching.values import METRE_DIGITS, at, rounded, take, within
@@ -30,16 +31,21 @@ class Teaching(Taught):
     """Edits what the open sequence was taught; any thread may ask."""
 
     def __init__(
-        self, workbench: Workbench, data: Path | None = None, drafts: Path | None = None
+        self,
+        workbench: Workbench,
+        edits: Edits,
+        data: Path | None = None,
+        drafts: Path | None = None,
     ) -> None:
         """Follow a workbench.
 
         Args:
             workbench: Whose sequence.
+            edits: Where what is taught can be undone.
             data: Where a copy is offered to be put.
             drafts: Where what is not saved is kept for the next start; None: not beyond this one.
         """
-        super().__init__(workbench, drafts)
+        super().__init__(workbench, edits, drafts)
         self._data = data
 
     def add_template(

@@ -1,4 +1,4 @@
-"""The routes of corrections: the list, the queue, answers, undo."""
+"""The routes of corrections: the list, the queue, answers."""
 
 from __future__ import annotations
 
@@ -88,24 +88,6 @@ def add_corrections(wish: CorrectionsRequest, bench: Bench, correct: Correct) ->
     return views.corrections_of(bench.snapshot(), correct)
 
 
-@router.post("/undo")
-def undo(bench: Bench, correct: Correct) -> Corrections:
-    """Take the last action back; those of an earlier start too."""
-    _open(bench)
-    with _complaining(409):
-        correct.undo()
-    return views.corrections_of(bench.snapshot(), correct)
-
-
-@router.post("/redo")
-def redo(bench: Bench, correct: Correct) -> Corrections:
-    """Do again what was taken back last."""
-    _open(bench)
-    with _complaining(409):
-        correct.redo()
-    return views.corrections_of(bench.snapshot(), correct)
-
-
 @router.get("/queue")
 def doubtful_places(bench: Bench, correct: Correct, doubts: Doubts) -> DoubtQueue:
     """The doubtful places of the shown run, the most at stake first."""
@@ -178,7 +160,7 @@ def truth(bench: Bench, work: Work) -> Response:
 
 @router.delete("/{correction}")
 def remove(correction: str, bench: Bench, correct: Correct) -> Corrections:
-    """Take one out, wherever it stands; it can be taken back as any action."""
+    """Take one out, wherever it stands; it can be undone as any edit."""
     _open(bench)
     with _complaining(404):
         correct.remove(correction)

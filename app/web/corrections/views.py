@@ -77,8 +77,6 @@ def corrections_of(snapshot: Snapshot, correcting: Correcting) -> Corrections:
         corrections=infos,
         checked=checked_ranges(snapshot.corrections),
         names=names_by_track(tuple(found.values()), snapshot.corrections),
-        undo=correcting.undo_words,
-        redo=correcting.redo_words,
     )
 
 

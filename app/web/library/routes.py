@@ -14,6 +14,7 @@ from fastapi.responses import HTMLResponse
 from app.errors import ApiError, sentence
 from app.models import State
 from app.models.base import RowNumber
+from app.state.marking import Marking
 from app.state.workers.keeper import Keeper
 from app.web.dependencies import ERRORS, Bench, Work, nothing_open
 from app.web.library import drawing, models, preview
@@ -52,7 +53,13 @@ def _library(keeper: Kept) -> Library:
         raise no_library(error) from None
 
 
+def _marking(request: Request) -> Marking:
+    marking: Marking = request.app.state.marking
+    return marking
+
+
 Opened = Annotated[Library, Depends(_library)]
+Marks = Annotated[Marking, Depends(_marking)]
 
 
 @router.get("")
@@ -200,39 +207,21 @@ def compared(
 
 
 @router.patch("/runs/{number}")
-def change(number: RowNumber, wish: models.RunChanges, opened: Opened) -> models.KeptRunInfo:
+def change(number: RowNumber, wish: models.RunChanges, marking: Marks) -> models.KeptRunInfo:
     """Name, star, note and tag a run."""
     try:
-        if wish.name is not None:
-            opened.rename(number, wish.name)
-        if wish.star is not None:
-            opened.star(number, wish.star)
-        if wish.note is not None:
-            opened.note(number, wish.note)
-        if wish.tags is not None:
-            opened.tag(number, wish.tags)
-        return _info(opened.run(number))
+        return _info(marking.mark(number, wish.model_dump(exclude_none=True)))
     except LibraryError as error:
         raise no_library(error) from None
 
 
 @router.post("/delete")
-def delete(wish: models.RunNumbers, opened: Opened) -> models.Deleted:
-    """Delete runs; they can be taken back for a day."""
+def delete(wish: models.RunNumbers, marking: Marks) -> models.Deleted:
+    """Delete runs; this can be undone for a day."""
     try:
-        return models.Deleted(runs=wish.runs, bytes=opened.delete(wish.runs))
+        return models.Deleted(runs=wish.runs, bytes=marking.delete(wish.runs))
     except LibraryError as error:
         raise no_library(error) from None
-
-
-@router.post("/take-back")
-def take_back(wish: models.RunNumbers, opened: Opened) -> models.Deleted:
-    """Have deleted runs again."""
-    try:
-        opened.restore(wish.runs)
-    except LibraryError as error:
-        raise no_library(error) from None
-    return models.Deleted(runs=wish.runs, bytes=0)
 
 
 @router.post("/runs/{number}/open")

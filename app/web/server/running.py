@@ -14,11 +14,13 @@ from app.errors import sentence
 from app.state import opening_step
 from app.state.correcting import Correcting
 from app.state.doubting import Doubting
+from app.state.edits import Edits
 from app.state.importing.desk import Desk
 from app.state.kept.crashes import Crash, Crashes
 from app.state.kept.history import History
 from app.state.kept.presets import OwnPresets
 from app.state.kept.recents import Recents
+from app.state.marking import Marking
 from app.state.memory import Budget
 from app.state.snapshot import Notice
 from app.state.studies import StudyDesk
@@ -78,16 +80,20 @@ async def lifespan(app: FastAPI) -> AsyncIterator[None]:
     pictures = app.state.pictures = Pictures(workbench)
     app.state.timelines = Timelines()
     app.state.history = History(workbench)
+    edits = app.state.edits = Edits(
+        workbench,
+        settings_folder() / "edits" if kept else None,
+        settings_folder() / "corrections" if kept else None,
+    )
     own_presets = settings_folder() / "presets.json" if kept else None
-    app.state.presets = OwnPresets(workbench, own_presets)
+    app.state.presets = OwnPresets(workbench, edits, own_presets)
     app.state.likelihoods = Likelihoods()
     app.state.swatches = Swatches()
     teaching = app.state.teaching = Teaching(
-        workbench, settings.data, settings_folder() / "unsaved" if kept else None
+        workbench, edits, settings.data, settings_folder() / "unsaved" if kept else None
     )
-    correcting = app.state.correcting = Correcting(
-        workbench, settings_folder() / "corrections" if kept else None
-    )
+    correcting = app.state.correcting = Correcting(workbench, edits)
+    edits.follow()
     app.state.doubting = Doubting()
     given = Path(settings.sequence or "").expanduser()
     roots = [given] if settings.sequence and given.is_dir() else []
@@ -103,6 +109,7 @@ async def lifespan(app: FastAPI) -> AsyncIterator[None]:
     )
     sensitivity = app.state.sensitivity = Sensitivity(workbench, settings.seed)
     keeper = app.state.keeper = Keeper(workbench, settings.library, settings.keep)
+    app.state.marking = Marking(workbench, edits, keeper.library)
     study_desk = app.state.studies = StudyDesk(workbench, studies_folder())
     told = app.state.stream = Stream(workbench)
     door = app.state.gateway = Gateway()
@@ -137,6 +144,7 @@ async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         told.stop()
         teaching.close()
         correcting.close()
+        edits.close()
         recents.close()
         desk.close()
         pictures.close()

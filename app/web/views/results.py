@@ -47,6 +47,8 @@ def state_of(snapshot: Snapshot) -> models.State:
         pinned=_pinned_of(snapshot),
         teaching=_teaching_of(snapshot),
         corrections=corrections.state_of(snapshot),
+        edits=models.EditsInfo(undo=snapshot.undo_words, redo=snapshot.redo_words),
+        marks=snapshot.marks,
         viser=models.ViserInfo(),
     )
 

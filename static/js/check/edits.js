@@ -218,6 +218,7 @@ function mountMenu(context, timeline, does) {
 		if (track !== null) actions.select(track);
 		if (click) store.set({ playing: 0 });
 		const { told } = state.get();
+		const undo = store.get().server?.edits.undo;
 		const at = (/** @type {string} */ name) =>
 			commandOf(name).keys.slice(0, 1).map(keyLabel).join();
 		show(
@@ -246,7 +247,7 @@ function mountMenu(context, timeline, does) {
 						},
 					]),
 				),
-			told?.undo && item("i-undo", [`Undo: ${told.undo}`], "", () => actions.correct("undo")),
+			undo && item("i-undo", [`Undo: ${undo}`], "", () => actions.undo(-1)),
 		);
 	}
 
@@ -472,7 +473,7 @@ export function mountCorrecting(context, timeline) {
 		if (!(await check.say([wish])) || store.get().place === "check") return;
 		actions.note("info", words, "It holds after every change of parameters.", {
 			word: "Undo",
-			act: () => void check.undo("undo"),
+			act: () => void actions.undo(-1),
 		});
 	}
 
@@ -631,8 +632,6 @@ export function mountCorrecting(context, timeline) {
 			const track = who();
 			if (track !== null) menu.open({ track, step: shown() });
 		},
-		undo: () => check.undo("undo"),
-		redo: () => check.undo("redo"),
 		truth: () => sendsFile(actions, "/api/corrections/truth.csv", "ground_truth.csv"),
 	};
 	actions.correct = (what) => EDITS[what]();

@@ -158,12 +158,16 @@ function createCheck({ store, actions, playback }) {
 		clearTimeout(waiting);
 		waiting = setTimeout(() => void refresh(), Math.max(0, rest));
 	}
-	let heard = "";
+	let [heard, count] = ["", 0];
 	// Lanes of another run come first: who opens one waits for them.
 	store.on(["server", "timeline"], ({ server, timeline }) => {
 		const now = `${server?.corrections?.key} ${timeline?.run}`;
 		if (!timeline || now === heard) return;
 		heard = now;
+		// What is said no more is doubtful again.
+		const said = server?.corrections.count ?? 0;
+		if (said < count) gone.clear();
+		count = said;
 		soon(100);
 	});
 	store.on(["place"], ({ place }) => place === "check" && void refresh());
@@ -207,13 +211,6 @@ function createCheck({ store, actions, playback }) {
 			if (queue) receiveQueue(queue);
 			else answered = false;
 		},
-		drop(id) {
-			gone.clear();
-			return ask("DELETE", `/${id}`);
-		},
-		async undo(direction) {
-			gone.clear();
-			await ask("POST", `/${direction}`);
-		},
+		drop: (id) => ask("DELETE", `/${id}`),
 	};
 }

@@ -2,6 +2,7 @@
 import { fill, h, icon, idTag, write } from "../elements/dom.js";
 import { commandOf, keyLabel } from "../state/commands.js";
 import { shownVersion } from "../state/events.js";
+import { offerTurn } from "../panes/controls.js";
 import { drawCrop } from "./crops.js";
 import { ICONS, camerasFor, clockOf, middleOf, percent, stepsOf, unbroken } from "./words.js";
 import { palette } from "../draw/canvas.js";
@@ -30,19 +31,23 @@ export function mountQueue(root, { store, actions }, check, crops) {
 	});
 	const blank = h("div", { class: "qblank", hidden: true });
 	const count = h("span", { class: "count" });
-	/** @param {"undo" | "redo"} what */
-	const turn = (what) =>
+	/** @param {"undo" | "redo"} what @param {-1 | 1} direction */
+	const turn = (what, direction) =>
 		h(
 			"button",
 			{
 				class: "btn icon",
-				"aria-label": commandOf(`check-${what}`).title,
-				"data-key": commandOf(`check-${what}`).keys.map(keyLabel).join(),
-				onclick: () => actions.correct(what),
+				"aria-label": commandOf(what).title,
+				"data-key": commandOf(what).keys.map(keyLabel).join(),
+				onclick: () => actions.undo(direction),
 			},
 			icon(`i-${what}`),
 		);
-	const [undo, redo] = [turn("undo"), turn("redo")];
+	const [undo, redo] = [turn("undo", -1), turn("redo", 1)];
+	store.watch(["server"], ({ server }) => {
+		offerTurn(undo, "undo", server);
+		offerTurn(redo, "redo", server);
+	});
 	const file = h(
 		"button",
 		{
@@ -289,10 +294,6 @@ export function mountQueue(root, { store, actions }, check, crops) {
 		done.hidden = !newest.length;
 		fill(done, newest.map(line));
 		done.setAttribute("aria-activedescendant", at ? `correction-${at}` : "");
-		undo.disabled = !now?.undo;
-		redo.disabled = !now?.redo;
-		undo.dataset.tip = now?.undo ? `Undo: ${now.undo}` : "Nothing to undo";
-		redo.dataset.tip = now?.redo ? `Redo: ${now.redo}` : "Nothing to redo";
 		const chosen = newest.find(({ id }) => id === at);
 		const unmet = newest.filter(({ met }) => met === false).length;
 		fill(

@@ -12,16 +12,9 @@ import { many, size } from "./words.js";
  * @param {() => Promise<void>} how.refresh  runs are others now
  */
 export function chosenBar({ actions, chosen, none, refresh }) {
-	/** @type {Server.Deleted | null} */
-	let deleted = null;
 	const picked = h("b");
 	const line = h("span", { role: "status", class: "gone-line" });
 	const stop = h("button", { class: "btn" }, "Stop");
-	const undo = h(
-		"button",
-		{ class: "btn", "data-key": "Ctrl Z", onclick: () => void takeBack() },
-		"Undo",
-	);
 	const side = h(
 		"button",
 		{ class: "btn box", onclick: () => void compare() },
@@ -31,7 +24,6 @@ export function chosenBar({ actions, chosen, none, refresh }) {
 	/** @param {string} words @param {() => void} [cancel] */
 	const say = (words, cancel) => {
 		fill(line, words);
-		undo.hidden = true;
 		stop.hidden = !cancel;
 		stop.onclick = cancel ?? null;
 		element.hidden = !words && !chosen().length;
@@ -54,15 +46,7 @@ export function chosenBar({ actions, chosen, none, refresh }) {
 			icon("i-close", "s"),
 		),
 	);
-	const element = h(
-		"div",
-		{ class: "undo-line" },
-		tools,
-		h("span", { class: "grow" }),
-		line,
-		stop,
-		undo,
-	);
+	const element = h("div", { class: "undo-line" }, tools, h("span", { class: "grow" }), line, stop);
 
 	async function compare() {
 		const dialog = /** @type {any} */ (one(".compare"));
@@ -80,37 +64,29 @@ export function chosenBar({ actions, chosen, none, refresh }) {
 	/** @param {number[]} ids */
 	async function remove(ids) {
 		if (!ids.length) return;
-		deleted = await actions.ask("POST", "library/delete", { runs: ids });
+		/** @type {Server.Deleted | null} */
+		const deleted = await actions.ask("POST", "library/delete", { runs: ids });
 		none();
 		await refresh();
-	}
-
-	async function takeBack() {
 		if (!deleted) return;
-		if (await actions.ask("POST", "library/take-back", { runs: deleted.runs })) deleted = null;
-		await refresh();
+		const what = ids.length === 1 ? `Run ${ids[0]}` : many(ids.length, "run");
+		actions.note("info", `${what} deleted, ${size(deleted.bytes)}`, "", {
+			word: "Undo",
+			act: () => void actions.undo(-1),
+		});
 	}
 
 	return {
 		element,
 		remove,
-		takeBack,
-		/** What was deleted is over: others are chosen. */
-		forget: () => (deleted = null),
 		show() {
 			const count = chosen().length;
 			fill(picked, `${count} chosen`);
 			tools.hidden = !count;
 			side.disabled = count < 2 || count > 4;
 			side.title = side.disabled ? "Two to four runs stand side by side" : "";
-			undo.hidden = !deleted;
 			stop.hidden = true;
-			if (deleted) {
-				const { runs, bytes } = deleted;
-				const what = runs.length === 1 ? `Run ${runs[0]}` : many(runs.length, "run");
-				fill(line, icon("i-trash", "s"), `${what} deleted, ${size(bytes)}`);
-			}
-			element.hidden = !count && !deleted;
+			element.hidden = !count;
 		},
 	};
 }

@@ -373,7 +373,6 @@ export function mountLibrary(root, { store, actions }) {
 	/** @param {number} id */
 	function tick(id) {
 		if (!chosen.delete(id)) chosen.add(id);
-		bar.forget();
 		show();
 	}
 
@@ -421,7 +420,6 @@ export function mountLibrary(root, { store, actions }) {
 		F2: rename,
 		Delete: () => void bar.remove(chosen.size ? [...chosen] : focused === null ? [] : [focused]),
 		"Ctrl+a": () => (listed().forEach(({ id }) => chosen.add(id)), show()),
-		"Ctrl+z": () => void bar.takeBack(),
 		"/": () => recordings.find.focus(),
 	};
 	document.addEventListener(
@@ -467,6 +465,12 @@ export function mountLibrary(root, { store, actions }) {
 			waiting = setTimeout(() => void refresh(), KEPT_MS);
 	});
 	store.on(["place"], ({ place }) => {
+		if (place === "library") void refresh();
+	});
+	let marks = store.get().server?.marks;
+	store.on(["server"], ({ place, server }) => {
+		if (server?.marks === marks) return;
+		marks = server?.marks;
 		if (place === "library") void refresh();
 	});
 	show();

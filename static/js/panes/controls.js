@@ -6,6 +6,17 @@ import { all, one } from "../elements/dom.js";
 import { commandFor, commandOf, keyLabel, keyOf, perform } from "../state/commands.js";
 import { isBench } from "../state/address.js";
 
+/**
+ * Have a button say what it would undo or redo.
+ * @param {Part | HTMLButtonElement} button @param {"undo" | "redo"} name
+ * @param {Server.State | null} server
+ */
+export function offerTurn(button, name, server) {
+	const words = server?.edits[name];
+	button.disabled = !words;
+	button.dataset.tip = words ? `${commandOf(name).title}: ${words}` : `Nothing to ${name}`;
+}
+
 /* ---------- Where recordings come in: a key, a button, a drop. The sheet is read when wanted. */
 
 /** @param {Context} context */
@@ -82,9 +93,9 @@ export function mountControls({ store, actions, press }) {
 			},
 		);
 	}
-	store.watch(["undoable"], ({ undoable }) => {
-		for (const [index, name] of ["undo", "redo"].entries())
-			for (const button of all(`[data-command=${name}]`)) button.disabled = !undoable[index];
+	store.watch(["server"], ({ server }) => {
+		for (const name of /** @type {const} */ (["undo", "redo"]))
+			for (const button of all(`[data-command=${name}]`)) offerTurn(button, name, server);
 	});
 	store.watch(["loupe", "realTime", "follow", "nearest"], (state) => {
 		for (const [name, key] of /** @type {const} */ ([

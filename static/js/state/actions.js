@@ -7,9 +7,6 @@ import { eventsNow, nextEvent, nextLayers, ordered } from "./events.js";
 export const valuesOf = ({ changed, parameters }) =>
 	Object.fromEntries(changed.map((key) => [key, parameters[key]]));
 
-/** Changes of one drag that follow each other within this time are undone together. */
-const SAME_DRAG = 1500;
-
 /** Arrangements of the panes by name: shares of the window. @type {Record<string, PageState["layout"]>} */
 const LAYOUTS = {
 	tune: {},
@@ -42,10 +39,7 @@ async function download(path, fallback) {
  */
 export function createActions({ store, seek, send, receive }) {
 	let noteId = 0;
-	/** Values to go back to and on to, newest last.  @type {Record<string, any>[][]} */
-	const [past, future] = [[], []];
-	let rememberedAt = -Infinity;
-	let [undoing, turn] = [0, Promise.resolve()];
+	let turn = Promise.resolve();
 	/** Until the server has heard of all layers that were switched. */
 	let switching = Promise.resolve();
 	/** Layers that were on in pictures and off in 3D, or the other way round, before their key. */
@@ -54,19 +48,6 @@ export function createActions({ store, seek, send, receive }) {
 	/** The method of smoothing before it was switched off. @type {string | undefined} */
 	let smoothing;
 	const frames = () => store.get().frames;
-
-	const count = () => store.set({ undoable: [past.length, future.length] });
-
-	/**
-	 * A change that is undone by itself, however soon it follows another.
-	 * @param {"POST"} method
-	 * @param {string} path
-	 * @param {object} [body]
-	 */
-	function askApart(method, path, body) {
-		rememberedAt = -Infinity;
-		return actions.ask(method, path, body);
-	}
 
 	/** @type {Actions} */
 	const actions = {
@@ -231,18 +212,15 @@ export function createActions({ store, seek, send, receive }) {
 			store.set({ asked: name });
 			return actions.ask("POST", "sequence", { name });
 		},
-		async change({ taught, ...changes }) {
-			if (taught) await actions.ask("POST", "teach/restore", { key: taught, changes });
-			else await actions.ask("PATCH", "parameters", { changes });
-		},
-		reset: (...keys) => void askApart("POST", "parameters/reset", keys.length ? { keys } : {}),
-		preset: (name) => void askApart("POST", "parameters/preset", { name }),
+		change: (changes) => actions.ask("PATCH", "parameters", { changes }),
+		reset: (...keys) => void actions.ask("POST", "parameters/reset", keys.length ? { keys } : {}),
+		preset: (name) => void actions.ask("POST", "parameters/preset", { name }),
 		savePreset: (name) => actions.ask("POST", "presets", { name }),
 		renamePreset: (name, to) =>
 			actions.ask("PATCH", `presets/${encodeURIComponent(name)}`, { name: to }),
 		removePreset: (name) => actions.ask("DELETE", `presets/${encodeURIComponent(name)}`),
 		cancel: () => void actions.ask("POST", "run/cancel"),
-		useAgain: (number) => void askApart("POST", `run/again/${number}`),
+		useAgain: (number) => void actions.ask("POST", `run/again/${number}`),
 		runAgain: () => void actions.ask("POST", "run"),
 		pin: (on) => void actions.ask(on ? "POST" : "DELETE", "run/pin"),
 		hindsight() {
@@ -261,37 +239,12 @@ export function createActions({ store, seek, send, receive }) {
 			if (!(await actions.ask("POST", "run/pin"))) return;
 			await actions.change(Object.fromEntries(differs.map((key) => [key, parameters[key]])));
 		},
-		remember(before, after) {
-			const old = Object.fromEntries(
-				Object.keys(after)
-					.filter((key) => before[key] !== after[key])
-					.map((key) => [key, before[key]]),
-			);
-			if (Object.keys(old).length === 0) return;
-			const now = performance.now();
-			const last = past[past.length - 1];
-			const same =
-				last && now - rememberedAt < SAME_DRAG && Object.keys(old).every((key) => key in last);
-			rememberedAt = undoing ? -Infinity : now;
-			if (undoing < 0) future.push(old);
-			else if (undoing > 0 || !same) past.push(old);
-			if (!undoing) future.length = 0;
-			if (past.length > 100) past.shift();
-			count();
-		},
-		forget() {
-			past.length = future.length = 0;
-			count();
-		},
 		undo(direction) {
 			// Pressed again before the last answer came, it waits for its turn.
+			const name = direction < 0 ? "undo" : "redo";
 			turn = turn.then(async () => {
-				const old = (direction < 0 ? past : future).pop();
-				if (!old) return;
-				undoing = direction;
-				await actions.change(old);
-				undoing = 0;
-				count();
+				if (store.get().server?.edits[name]) await actions.ask("POST", name);
+				else actions.note("info", `Nothing to ${name}`, "");
 			});
 			return turn;
 		},

@@ -40,10 +40,7 @@ export function createReceiver({ store, playback, actions, address, isOld }) {
 	 */
 	function receiveState(told, streamed = false) {
 		// A method is a choice as a value is.
-		const server = {
-			...told,
-			parameters: { ...told.parameters, ...told.methods, taught: told.teaching.key },
-		};
+		const server = { ...told, parameters: { ...told.parameters, ...told.methods } };
 		const before = store.get().server;
 		const changed = before?.sequence?.key !== server.sequence?.key;
 		// An answer to a request may be older than what the socket has brought since, and another
@@ -55,7 +52,6 @@ export function createReceiver({ store, playback, actions, address, isOld }) {
 		if (changed) {
 			if (before?.sequence && server.sequence) tellWhoOpened(before.sequence, server.sequence);
 			playback.clear(server.playhead);
-			actions.forget();
 			store.set({
 				// What went wrong before it was opened is over.
 				notes: store
@@ -66,7 +62,6 @@ export function createReceiver({ store, playback, actions, address, isOld }) {
 				selection: server.selection,
 			});
 		} else if (before) {
-			actions.remember(before.parameters, server.parameters);
 			if (before.selection !== server.selection) store.set({ selection: server.selection });
 			// Whoever looks through a camera in 3D wants to see its picture.
 			if (before.view !== server.view && typeof server.view === "number")

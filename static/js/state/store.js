@@ -118,7 +118,6 @@ export function initialState() {
 		names: {},
 		wantsStudy: false,
 		dismissed: [],
-		undoable: [0, 0],
 		...kept,
 		layers2d: { ...LAYERS_2D, ...kept.layers2d },
 		theme: document.documentElement.dataset.theme === "light" ? "light" : "dark",

@@ -20,8 +20,6 @@ type Correcting =
 	| "name"
 	| "checked"
 	| "menu"
-	| "undo"
-	| "redo"
 	| "truth";
 
 type Doubt = Server.DoubtQueue["doubts"][number];
@@ -74,5 +72,4 @@ interface Check {
 	answer: (alternative: number) => Promise<boolean>;
 	skip: () => Promise<void>;
 	drop: (id: string) => Promise<boolean>;
-	undo: (direction: "undo" | "redo") => Promise<void>;
 }

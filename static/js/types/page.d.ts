@@ -164,8 +164,6 @@ interface PageState {
 	signs: Record<string, string>;
 	/** Whether somebody has chosen a step of this sequence. */
 	moved: boolean;
-	/** How many changes can be undone, and redone. */
-	undoable: [number, number];
 	/** Notices that were closed for good, by name. */
 	dismissed: string[];
 }
@@ -251,11 +249,7 @@ interface Actions {
 	checkIdentities: (what: "start" | "stop") => void;
 	/** The shown run and the pinned one change places. */
 	swap: () => Promise<void>;
-	/** What the parameters were, whoever changed them. */
-	remember: (before: Record<string, any>, after: Record<string, any>) => void;
-	/** What can be undone. */
-	forget: () => void;
-	/** Or redo. */
+	/** The last edit of anything, or what was undone last. */
 	undo: (direction: -1 | 1) => void;
 	copyRun: (what: "command" | "json") => void;
 	/** Begin to drag boxes on pictures, or leave it. */

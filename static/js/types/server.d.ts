@@ -193,10 +193,6 @@ declare namespace Server {
 		checked: [number, number][];
 		/** Of tracks of the shown run. */
 		names: Record<string, string>;
-		/** What would be taken back. */
-		undo: string | null;
-		/** What would be said again. */
-		redo: string | null;
 	}
 
 	/** How corrections stand. */
@@ -287,6 +283,12 @@ declare namespace Server {
 		/** Places that corrections settle. */
 		answered: number;
 		doubts: app__models__correcting__DoubtInfo[];
+	}
+
+	/** What would be undone and redone, in words; null for nothing. */
+	interface EditsInfo {
+		undo: string | null;
+		redo: string | null;
 	}
 
 	/** Where people appear: mean and standard deviation. */
@@ -1123,6 +1125,9 @@ declare namespace Server {
 		pinned: PinnedInfo | null;
 		teaching: TeachingInfo;
 		corrections: CorrectionsState;
+		edits: EditsInfo;
+		/** Grows when kept runs are named, marked, deleted or restored. */
+		marks: number;
 		viser: ViserInfo;
 	}
 
@@ -1246,7 +1251,7 @@ declare namespace Server {
 
 	/** What the sequence was taught since its file was read. */
 	interface TeachingInfo {
-		/** Names room and templates as they are; POST /api/teach/restore goes back to them. */
+		/** Names room and templates as they are. */
 		key: string;
 		/** Changes that its file does not have. */
 		unsaved: number;

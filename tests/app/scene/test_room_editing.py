@@ -11,6 +11,7 @@ import viser
 from viser import _messages
 
 from app.scene.room.editing import FACES, Face, RoomEditing, dragged, grips
+from app.state.edits import Edits
 from app.state.teaching import Teaching
 from app.state.workbench import Workbench
 from tests.app.scene import scene_case
@@ -24,7 +25,7 @@ RIGHT = Face("max", 0)
 def bench(server: viser.ViserServer) -> Iterator[tuple[Workbench, RoomEditing]]:
     """A room of two by three metres and more, with handles."""
     workbench = Workbench()
-    teaching = Teaching(workbench)
+    teaching = Teaching(workbench, Edits(workbench))
     editing = RoomEditing(server, workbench, teaching)
     of = scene_case.sequence()
     workbench.open(of, of.name, FrameReader(of), RunParameters(single_view="none"))

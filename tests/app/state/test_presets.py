@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from starlette.testclient import TestClient
 
+from app.state.edits import Edits
 from app.state.kept.presets import LONGEST_NAME, OwnPresets
 from app.state.snapshot import Event, Notice
 from app.state.workbench import Workbench
@@ -26,7 +27,7 @@ def shown(workbench: Workbench) -> tuple[list[str], str | None]:
 def test_what_was_saved_is_there_again(tmp_path: Path) -> None:
     path = tmp_path / "settings" / "presets.json"
     workbench = Workbench()
-    own = OwnPresets(workbench, path)
+    own = OwnPresets(workbench, Edits(workbench), path)
     assert shown(workbench) == ([], "robust")
     workbench.set_parameters({P_D: 0.7, "fusion_method": "sequential_phd"}, "test")
     assert shown(workbench) == ([], None)
@@ -35,7 +36,7 @@ def test_what_was_saved_is_there_again(tmp_path: Path) -> None:
     workbench.reset_parameters()
 
     later = Workbench()
-    OwnPresets(later, path)
+    OwnPresets(later, Edits(later), path)
     assert shown(later) == (["büro am Morgen"], "robust")
     later.set_parameters({"fusion.clutter_rate": 3.0}, "test")
     later.apply_preset("büro am Morgen")
@@ -47,7 +48,7 @@ def test_what_was_saved_is_there_again(tmp_path: Path) -> None:
 
 def test_renaming_and_removing(tmp_path: Path) -> None:
     workbench = Workbench()
-    own = OwnPresets(workbench, tmp_path / "presets.json")
+    own = OwnPresets(workbench, Edits(workbench), tmp_path / "presets.json")
     own.save("a")
     own.save("b")
     own.rename("a", "c")
@@ -63,7 +64,7 @@ def test_renaming_and_removing(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["", "   ", "x" * (LONGEST_NAME + 1), "published"])
 def test_names_that_do_not_do(name: str) -> None:
     with pytest.raises(ParameterError, match="name: "):
-        OwnPresets(Workbench(), None).save(name)
+        OwnPresets((bench := Workbench()), Edits(bench), None).save(name)
 
 
 @pytest.mark.parametrize("text", ["{", "[]", '{"a": 1}', '{"\\ud800": {}}', "[" * 100_000])
@@ -73,7 +74,7 @@ def test_a_spoilt_file_is_kept_aside(tmp_path: Path, text: str) -> None:
     workbench = Workbench()
     heard: list[Event] = []
     workbench.subscribe_events(heard.append)
-    own = OwnPresets(workbench, path)
+    own = OwnPresets(workbench, Edits(workbench), path)
     assert isinstance(heard[0], Notice)
     assert "presets.unreadable.json" in (heard[0].hint or "")
     assert (tmp_path / "presets.unreadable.json").read_text() == text
@@ -85,7 +86,7 @@ def test_a_value_that_is_no_parameter_any_more_is_told_when_it_is_taken(tmp_path
     path = tmp_path / "presets.json"
     path.write_text('{"old": {"fusion.gone": 1}}')
     workbench = Workbench()
-    OwnPresets(workbench, path)
+    OwnPresets(workbench, Edits(workbench), path)
     assert shown(workbench) == (["old"], "robust")
     with pytest.raises(ParameterError, match=r"fusion\.gone"):
         workbench.apply_preset("old")

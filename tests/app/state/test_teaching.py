@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
+from app.state.edits import Edits
 from app.state.kept.drafts import Drafts
 from app.state.snapshot import Event
 from app.state.teaching.taught import Taught
@@ -110,19 +111,13 @@ def test_a_run_used_again_brings_its_templates_back(client: TestClient) -> None:
     assert again["sequence"]["templates"] == 0
     assert again["parameters"] == before["parameters"]
     assert tracks(client) == first
-    wish = {"key": taught["teaching"]["key"], "changes": {"single_view": "never"}}
-    assert client.post("/api/teach/restore", json=wish).status_code == 422
-    assert state(client)["teaching"]["key"] == before["teaching"]["key"]
-    wish["changes"] = {"single_view": "colour_phd"}
-    client.post("/api/teach/restore", json=wish)
+    client.post("/api/undo")
     assert done(client)["run"]["key"] == taught["run"]["key"]
 
 
 def test_a_template_is_named_renamed_removed_and_brought_back(client: TestClient) -> None:
-    keys = [state(client)["teaching"]["key"]]
     for body in (BOX, {**BOX, "step": 6}, {**BOX, "step": 7, "name": "Bob"}):
-        answer = client.post("/api/teach/templates", json=body)
-        keys.append(answer.json()["teaching"]["key"])
+        client.post("/api/teach/templates", json=body)
     client.patch("/api/teach/templates/0", json={"value": "Anna"})
 
     def names() -> list[str]:
@@ -134,13 +129,17 @@ def test_a_template_is_named_renamed_removed_and_brought_back(client: TestClient
     assert names() == ["Anna", "person2", "Bob"]
     client.delete("/api/teach/templates/1")
     assert names() == ["Anna", "Bob"]
-    client.post("/api/teach/restore", json={"key": keys[3]})
+    for _ in range(2):  # the removal, then the name
+        client.post("/api/undo")
     assert names() == ["person1", "person2", "Bob"]
-    answer = client.post("/api/teach/restore", json={"key": keys[0]})
+    for _ in range(3):
+        answer = client.post("/api/undo")
     assert answer.json()["teaching"]["unsaved"] == 0
+    assert answer.json()["edits"] == {"undo": None, "redo": "template person1 added"}
     assert names() == []
-    answer = client.post("/api/teach/restore", json={"key": "never"})
-    assert answer.status_code == 404
+    answer = client.post("/api/undo")
+    assert answer.status_code == 409
+    assert answer.json()["detail"] == "There is nothing to undo."
 
 
 def test_the_room_changes_the_run_and_undo_brings_it_back_at_once(client: TestClient) -> None:
@@ -151,7 +150,8 @@ def test_the_room_changes_the_run_and_undo_brings_it_back_at_once(client: TestCl
     assert changed["sequence"]["room"]["max"][0] == 0.2
     assert changed["run"]["key"] != before["run"]["key"]
     assert tracks(client) != first
-    client.post("/api/teach/restore", json={"key": before["teaching"]["key"]})
+    for _ in range(2):
+        client.post("/api/undo")
     assert done(client)["run"]["key"] == before["run"]["key"]
     assert tracks(client) == first
 
@@ -223,13 +223,12 @@ def test_templates_that_the_tracks_offer_are_taken_and_taken_back(client: TestCl
     assert len(pictures) == offered
     assert client.get(pictures[0]).status_code == 200
 
-    before = state(client)["teaching"]["key"]
     taken = client.post("/api/teach/offers/0/taken")
     assert taken.status_code == 200, taken.text
     now = done(client)
     assert now["sequence"]["templates"] == now["teaching"]["unsaved"] == 1
     assert client.get("/api/tables/teach").text.count("Add offer ") == offered - 1
-    client.post("/api/teach/restore", json={"key": before})  # what undo sends
+    client.post("/api/undo")
     assert done(client)["sequence"]["templates"] == 0
     assert client.get("/api/tables/teach").text.count("Add offer ") == offered
 
@@ -332,9 +331,8 @@ def test_a_rendered_room_is_offered_as_a_copy(
 
 def test_discard_is_the_file_again_and_undo_knows_what_was_discarded(client: TestClient) -> None:
     client.post("/api/teach/templates", json=BOX)
-    key = state(client)["teaching"]["key"]
     assert client.post("/api/teach/discard").json()["teaching"]["unsaved"] == 0
-    assert client.post("/api/teach/restore", json={"key": key}).json()["teaching"]["unsaved"] == 1
+    assert client.post("/api/undo").json()["teaching"]["unsaved"] == 1
 
 
 @pytest.mark.full
@@ -380,7 +378,7 @@ def test_what_is_not_saved_outlives_the_server(
         assert again["run"]["key"] == taught["run"]["key"]
         client.post("/api/teach/discard")
         assert list((tmp_path / "settings" / "unsaved").iterdir()) == []
-        client.post("/api/teach/restore", json={"key": taught["teaching"]["key"]})
+        client.post("/api/undo")
     text = (walkers / FILE).read_text("utf-8")
     (walkers / FILE).write_text(
         text.replace("min = [", "min = [-9.0, ", 1).replace(", 0.0]", "]", 1)
@@ -413,7 +411,7 @@ def test_what_was_taught_on_a_room_as_it_was_rendered_before_is_taken_up_once(
     def opened() -> tuple[Workbench, list[Event]]:
         bench, heard = Workbench(), list[Event]()
         bench.subscribe_events(heard.append)
-        Taught(bench, drafts)
+        Taught(bench, Edits(bench), drafts)
         bench.open(room, "key", FrameReader(room), pipeline.default_parameters(room))
         return bench, heard
 
@@ -478,10 +476,9 @@ def test_the_first_template_is_looked_at_where_nobody_chose_a_method(
     (walkers / "sequence.toml").write_text(re.sub(r"detections = .*\n", "", text))
     client.post("/api/sequence", json={"name": str(walkers)})
     wait_until(lambda: state(client)["methods"]["single_view"] == "shapes")
-    key = state(client)["teaching"]["key"]
     taught = client.post("/api/teach/templates", json=BOX).json()
     assert taught["methods"]["single_view"] == "colour_phd"
-    back = client.post("/api/teach/restore", json={"key": key}).json()
+    back = client.post("/api/undo").json()
     assert back["methods"]["single_view"] == "shapes", "and so it is without it"
     chosen = {"changes": {"single_view": "jpda"}}
     client.patch("/api/parameters", json=chosen)
@@ -498,7 +495,7 @@ def test_the_size_of_people_is_taught_saved_and_taken_back(
     assert answer["sequence"]["target"]["half_extents"] == [*half[:2], 0.75]
     assert answer["teaching"]["unsaved"] == 1
     assert "target: " in client.get("/api/tables/teach").text
-    back = client.post("/api/teach/restore", json={"key": before["teaching"]["key"]}).json()
+    back = client.post("/api/undo").json()
     assert back["sequence"]["target"]["half_extents"] == half
     client.post("/api/teach/target", json={"half_extents": [0.3, 0.3, 0.65]})
     client.post("/api/teach/save")

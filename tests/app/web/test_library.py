@@ -246,8 +246,13 @@ def test_names_stars_notes_and_deletion(kept: TestClient) -> None:
     gone = kept.post("/api/library/delete", json={"runs": [number]}).json()
     assert gone["bytes"] > 0
     assert len(runs_of(kept)) == 1
-    kept.post("/api/library/take-back", json={"runs": [number]})
+    told = kept.post("/api/undo").json()
     assert runs_of(kept)[0]["name"] == "baseline"
+    assert told["edits"]["redo"] == f"run {number} deleted"
+    assert kept.post("/api/undo").json()["marks"] > told["marks"]
+    assert {key: runs_of(kept)[0][key] for key in wish} == {
+        "name": "", "star": False, "note": "", "tags": []
+    }  # fmt: skip
     answer = kept.post("/api/library/delete", json={"runs": [999]})
     assert answer.status_code == 404
     assert "no run 999" in answer.json()["detail"]

@@ -71,9 +71,10 @@ def test_keys_choose_star_name_and_delete(library: Page, server: Server) -> None
     expect(library.get_by_text("1 chosen")).to_be_visible()
     library.keyboard.press("Delete")
     expect(library.locator("tr[data-run]")).to_have_count(1)
-    expect(library.get_by_role("status").filter(has_text="Run 1 deleted")).to_be_visible()
+    expect(library.get_by_text("Run 1 deleted")).to_be_visible()
     library.keyboard.press("Control+z")
     expect(library.locator("tr[data-run]")).to_have_count(2)
+    expect(library.get_by_text("Undone: run 1 deleted")).to_be_visible()
     assert kept(server, 2)[1]["name"] == "baseline"
     library.keyboard.press("Escape")
     expect(library.locator("main")).to_be_visible()
@@ -83,7 +84,7 @@ def test_the_last_runs_of_a_recording_are_taken_back(library: Page) -> None:
     library.keyboard.press("Control+a")
     library.get_by_role("button", name="Delete").click()
     expect(library.get_by_role("heading", name="Nothing kept yet")).to_be_visible()
-    library.get_by_role("button", name="Undo").click(timeout=10_000)
+    library.get_by_role("button", name="Undo", exact=True).last.click(timeout=10_000)
     expect(library.locator("tr[data-run]")).to_have_count(2)
 
 

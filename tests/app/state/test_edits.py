@@ -1,0 +1,217 @@
+"""One order of edits, whatever they are of: undone and redone, dragged, stored, taken up."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from starlette.testclient import TestClient
+
+from app.state import edits as module
+from app.state.edits import EditError, Edits
+from app.state.snapshot import Event, Notice
+from app.state.workbench import Workbench
+from app.web.server import Settings, create_app
+from tests.app.conftest import ADDRESS, wait_until
+from tracker.parameters.values import value_of
+from tracker.runs import pipeline
+from tracker.sequences.pictures.frames import FrameReader
+from tracker.sequences.reader import read_sequence
+
+P_D, P_S = "fusion.detection_probability", "fusion.survival_probability"
+
+
+def opened(crossing: Path) -> Workbench:
+    workbench = Workbench()
+    sequence = read_sequence(crossing)
+    workbench.open(sequence, "key", FrameReader(sequence), pipeline.default_parameters(sequence))
+    return workbench
+
+
+@pytest.fixture
+def bench(crossing: Path) -> Workbench:
+    return opened(crossing)
+
+
+@pytest.fixture
+def edits(bench: Workbench) -> Iterator[Edits]:
+    edits = followed(bench)
+    yield edits
+    edits.close()
+
+
+def followed(bench: Workbench, folder: Path | None = None) -> Edits:
+    edits = Edits(bench, folder)
+    edits._open(bench.snapshot())
+    edits.follow()
+    return edits
+
+
+def values(bench: Workbench) -> tuple[Any, ...]:
+    return tuple(value_of(bench.snapshot().parameters, key) for key in (P_D, P_S))
+
+
+def test_a_drag_is_one_edit_and_two_sliders_are_two(
+    bench: Workbench, edits: Edits, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = 100.0
+    monkeypatch.setattr(module.time, "monotonic", lambda: now)
+    before = values(bench)
+    for value in (0.9, 0.8, 0.7):
+        now += 0.3
+        bench.set_parameters({P_D: value}, "viser")
+    bench.set_parameters({P_S: 0.9}, "viser")
+    now += module.DRAG_SECONDS
+    bench.set_parameters({P_S: 0.8}, "viser")
+    assert bench.snapshot().undo_words == "Survival probability"
+    found = []
+    for _ in range(3):
+        edits.undo()
+        found.append(values(bench))
+    assert found == [(0.7, 0.9), (0.7, before[1]), before]
+    with pytest.raises(EditError, match="nothing to undo"):
+        edits.undo()
+    for _ in range(3):
+        edits.redo()
+    assert values(bench) == (0.7, 0.8)
+    with pytest.raises(EditError, match="nothing to redo"):
+        edits.redo()
+
+
+def test_a_slider_that_comes_back_to_where_it_was_is_no_edit(
+    bench: Workbench, edits: Edits
+) -> None:
+    start = values(bench)[0]
+    bench.set_parameters({P_D: 0.5}, "viser")
+    bench.set_parameters({P_D: start}, "viser")
+    assert bench.snapshot().undo_words is None
+
+
+def test_a_reset_right_after_a_drag_is_an_edit_of_its_own(bench: Workbench, edits: Edits) -> None:
+    bench.set_parameters({P_D: 0.5}, "viser")
+    bench.reset_parameters([P_D], "api")
+    edits.undo()
+    assert values(bench)[0] == 0.5
+
+
+def test_methods_that_are_switched_twice_are_two_edits(bench: Workbench, edits: Edits) -> None:
+    usual = bench.snapshot().parameters.smoothing_method
+    bench.set_parameters({"smoothing_method": "none"}, "api")
+    bench.set_parameters({"smoothing_method": usual}, "api")
+    edits.undo()
+    assert bench.snapshot().parameters.smoothing_method == "none"
+    assert bench.snapshot().redo_words == f"smoothing method {usual}"
+
+
+@given(st.lists(st.sampled_from(["p_d", "p_s", "preset", "undo", "redo"]), max_size=20))
+def test_undo_and_redo_lead_through_the_same_values(acts: list[str]) -> None:
+    bench = Workbench()
+    sequence = SEQUENCE[0]
+    bench.open(sequence, "key", FrameReader(sequence), pipeline.default_parameters(sequence))
+    edits = Edits(bench)
+    edits._open(bench.snapshot())
+    edits.follow()
+    presets: list[str] = []
+    edits.own("presets", lambda names: presets.__setitem__(slice(None), list(names)))
+    random = np.random.default_rng(len(acts))
+
+    def now() -> tuple[Any, ...]:
+        return (*values(bench), *presets)
+
+    past, future = [now()], []
+    for act in acts:
+        if act == "undo" and len(past) > 1:
+            edits.undo()
+            future.append(past.pop())
+        elif act == "redo" and future:
+            edits.redo()
+            past.append(future.pop())
+        elif act in ("p_d", "p_s", "preset"):
+            if act == "preset":
+                before = list(presets)
+                presets.append(f"own {len(presets)}")
+                edits.done("a preset", "presets", before, list(presets))
+            else:
+                value = round(float(random.uniform(0.55, 0.95)), 6)
+                bench.set_parameters({P_D if act == "p_d" else P_S: value}, f"api {value}")
+            past, future = [*past, now()], []
+        assert now() == past[-1]
+    edits.close()
+
+
+SEQUENCE: list[Any] = []
+
+
+@pytest.fixture(autouse=True)
+def sequence(crossing: Path) -> None:
+    SEQUENCE[:] = [read_sequence(crossing)]
+
+
+def test_what_cannot_be_put_back_for_good_does_not_bar_the_way(
+    bench: Workbench, edits: Edits
+) -> None:
+    def put(_: object) -> None:
+        raise ValueError("the run is gone")
+
+    edits.own("runs", put)
+    bench.set_parameters({P_D: 0.5}, "api")
+    edits.done("run 3 deleted", "runs", False, True)
+    with pytest.raises(EditError, match="run 3 deleted: the run is gone"):
+        edits.undo()
+    edits.undo()
+    assert values(bench)[0] != 0.5
+
+
+def test_edits_are_taken_up_after_a_start_where_they_still_fit(
+    crossing: Path, tmp_path: Path
+) -> None:
+    bench = opened(crossing)
+    edits = followed(bench, tmp_path)
+    bench.set_parameters({P_D: 0.5}, "one")
+    bench.set_parameters({P_D: 0.6}, "two")
+    edits.done("a preset", "presets", {"mine": None}, {"mine": {}})
+    edits.close()
+    again = opened(crossing)
+    edits = followed(again, tmp_path)
+    shown = []
+    edits.own("presets", shown.append)
+    assert again.snapshot().undo_words == "a preset"
+    # the page that comes back sets what it had: nobody has edited anything
+    again.set_parameters({P_D: 0.6}, "api")
+    assert again.snapshot().undo_words == "a preset"
+    edits.undo()
+    assert shown == [{"mine": None}]
+    edits.undo()
+    assert values(again)[0] == 0.5
+    assert again.snapshot().redo_words == "Detection probability"
+    edits.close()
+    (tmp_path / "everywhere.json").write_text("{}")
+    edits = followed(opened(crossing), tmp_path)
+    assert edits._done[-1].words == "Detection probability"
+    edits.close()
+
+
+def test_a_note_says_what_was_undone(crossing: Path) -> None:
+    settings = Settings(sequence=str(crossing), with_viser=False)
+    with TestClient(create_app(settings), base_url=ADDRESS) as client:
+        wait_until(lambda: client.get("/api/state").json()["run"]["done"] > 0)
+        heard: list[Event] = []
+        bench: Workbench = client.app.state.workbench  # type: ignore[attr-defined]
+        bench.subscribe_events(heard.append)
+        client.patch("/api/parameters", json={"changes": {P_D: 0.5}})
+        client.post("/api/presets", json={"name": "mine"})
+        assert client.post("/api/undo").json()["presets"] == []
+        assert client.post("/api/redo").json()["presets"] == ["mine"]
+        client.post("/api/undo")
+        client.post("/api/undo")
+    assert [one.message for one in heard if isinstance(one, Notice)] == [
+        "Undone: preset mine saved",
+        "Done again: preset mine saved",
+        "Undone: preset mine saved",
+        "Undone: Detection probability",
+    ]
