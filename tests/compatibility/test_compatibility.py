@@ -373,6 +373,7 @@ def test_corrections_give_the_tracks_that_they_gave(
 def test_what_was_said_last_can_be_taken_back_after_a_start(home: Home) -> None:
     with page(home, "crossing") as client:
         ids = [one["id"] for one in SAID["correction"]]
+        until(lambda: state_of(client)["edits"]["undo"] is not None)
         answer = client.post("/api/undo")
         assert answer.status_code == 200, answer.text
         log = tomllib.loads((home.crossing / "corrections.toml").read_text(encoding="utf-8"))
