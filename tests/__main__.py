@@ -213,6 +213,10 @@ def main() -> int:
     # each process has a core: threads that wait for each other there cost a fifth more
     os.environ["OPENBLAS_NUM_THREADS"] = "1"
     page, code = page_checks(), code_checks()
+    # once for all processes that run tests: each would compile all modules again
+    collected = Check(
+        "collection", ((PYTHON, "-m", "pytest", "--collect-only", "-q", "-m", SHORT),)
+    )
     # at once for all processes that the tests start
     kernels = Check("kernels", ((PYTHON, "-m", "tracker.runs.warm_up"),))
     benchmarks = Check("benchmarks", ((PYTHON, "-m", "tests.benchmarks", "--short"),))
@@ -261,7 +265,7 @@ def main() -> int:
                 reading = lanes.submit(in_order, page)
                 with installing():
                     compiling = lanes.submit(kernels.run)
-                failed += in_order(code) + reading.result()
+                failed += in_order([*code, collected]) + reading.result()
                 failed += [] if compiling.result() else [kernels.name]
             failed += [] if tests.run(shown=True) else [tests.name]
             if not failed and not arguments.pytest:

@@ -47,7 +47,16 @@ def link(name: str) -> zipfile.ZipInfo:
     return found
 
 
-PACKED = zlib.compress(bytes(100_000_000), 9)
+def zeros_packed(megabytes: int) -> bytes:
+    """So many zeros as zlib packs them: one piece over and over, with the sum of all."""
+    million = bytes(1_000_000)
+    packer = zlib.compressobj(9)
+    first, again = (packer.compress(million) + packer.flush(zlib.Z_FULL_FLUSH) for _ in range(2))
+    adler = ((1_000_000 * megabytes % 65521) << 16) + 1
+    return first + again * (megabytes - 1) + b"\x03\x00" + struct.pack(">I", adler)
+
+
+PACKED = zeros_packed(100)
 LAUGHS = (
     '<?xml version="1.0"?><!DOCTYPE lolz [<!ENTITY a "aaaaaaaaaa">'
     + "".join(f'<!ENTITY {chr(98 + n)} "{f"&{chr(97 + n)};" * 10}">' for n in range(12))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,6 @@ from tracker.runs import pipeline
 from tracker.runs.pipeline import Run
 from tracker.runs.stage_cache import StageCache
 from tracker.sequences.sequence import Sequence
-from tracker.smoothing.identity import identities, splitting
 
 STEPS = 80
 FUSIONS = ("multi_bernoulli", "sequential_phd")
@@ -238,31 +238,42 @@ def test_only_what_depends_on_a_correction_is_computed_again() -> None:
     assert looked.keys == before.keys
 
 
-_GAP = with_a_gap()
-_BEFORE = run_of(_GAP)
-_CHOICES = (
-    make(kind="same", places=[place(_BEFORE, 20, 0.5), place(_BEFORE, 70, 0.6)]),
-    make(kind="different", places=[place(_BEFORE, 40, -0.7), place(_BEFORE, 41, -0.7)]),
-    make(kind="different", places=[place(_BEFORE, 10, 0.5), place(_BEFORE, 11, 0.5)]),
-    make(kind="nobody", places=[place(_BEFORE, 62, 0.6), place(_BEFORE, 78, 0.6)]),
-    make(kind="left", places=[place(_BEFORE, 50, -0.7)]),
-    make(kind="here", places=[[45, 0.0, 1.2, 1.0]]),
-)
+GAP = with_a_gap()
+
+
+@cache
+def uncorrected() -> Run:
+    """The run of ``GAP`` as it is."""
+    return run_of(GAP)
+
+
+@cache
+def choices() -> tuple[Correction, ...]:
+    """Corrections of every kind, of ``GAP``."""
+    run = uncorrected()
+    return (
+        make(kind="same", places=[place(run, 20, 0.5), place(run, 70, 0.6)]),
+        make(kind="different", places=[place(run, 40, -0.7), place(run, 41, -0.7)]),
+        make(kind="different", places=[place(run, 10, 0.5), place(run, 11, 0.5)]),
+        make(kind="nobody", places=[place(run, 62, 0.6), place(run, 78, 0.6)]),
+        make(kind="left", places=[place(run, 50, -0.7)]),
+        make(kind="here", places=[[45, 0.0, 1.2, 1.0]]),
+    )
 
 
 @settings(deadline=None, max_examples=15, suppress_health_check=[HealthCheck.too_slow])
-@given(st.lists(st.one_of(st.sampled_from(_CHOICES), st.just("undo")), min_size=1, max_size=7))
+@given(st.lists(st.one_of(st.integers(0, 5), st.just("undo")), min_size=1, max_size=7))
 def test_any_sequence_of_corrections_and_undos_ends_where_the_rest_alone_would(
-    actions: list[Correction | str],
+    actions: list[int | str],
 ) -> None:
-    run, told = _BEFORE, []
+    run, told = uncorrected(), []
     for action in actions:
         if isinstance(action, str):
             told = told[:-1]
-        elif action not in told:
-            told = [*told, action]
-        run = run_of(_GAP, tuple(told), previous=run)
-    assert same_tracks(run, run_of(_GAP, tuple(told)))
+        elif choices()[action] not in told:
+            told = [*told, choices()[action]]
+        run = run_of(GAP, tuple(told), previous=run)
+    assert same_tracks(run, run_of(GAP, tuple(told)))
 
 
 _CACHE = StageCache()
@@ -270,49 +281,17 @@ _CACHE = StageCache()
 
 
 @settings(deadline=None, max_examples=15, suppress_health_check=[HealthCheck.too_slow])
-@given(st.lists(st.sampled_from(_CHOICES), unique=True, max_size=6))
-def test_what_other_corrections_left_changes_nothing(told: list[Correction]) -> None:
-    once = run_of(_GAP, tuple(told))
-    again = run_of(_GAP, tuple(told), cache=_CACHE)
+@given(st.lists(st.integers(0, 5), unique=True, max_size=6))
+def test_what_other_corrections_left_changes_nothing(chosen: list[int]) -> None:
+    told = tuple(choices()[number] for number in chosen)
+    once = run_of(GAP, told)
+    again = run_of(GAP, told, cache=_CACHE)
     assert same_tracks(once, again)
     assert once.outcomes == again.outcomes
     if told:
         assert once.smoothed is not None
         assert again.smoothed is not None
         assert once.smoothed.decisions == again.smoothed.decisions
-
-
-def test_what_was_settled_before_is_not_settled_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    solves: list[list[Correction]] = []
-    settled = identities._linked
-
-    def counted(*given: Any) -> Any:
-        solves.append(given[3])
-        return settled(*given)
-
-    looked: list[object] = []
-    cuts = splitting.find_splits
-
-    def looked_at(*given: Any) -> Any:
-        looked.append(given)
-        return cuts(*given)
-
-    monkeypatch.setattr(identities, "_linked", counted)
-    monkeypatch.setattr(splitting, "find_splits", looked_at)
-    cache = StageCache()
-    same, parted = _CHOICES[0], _CHOICES[1]
-    as_it_is = make(kind="same", places=[place(_BEFORE, 5, -0.7), place(_BEFORE, 9, -0.7)])
-    run_of(_GAP, (same,), cache=cache)
-    first, cut = len(solves), len(looked)
-    assert [same] in solves
-    held = run_of(_GAP, (same, as_it_is), cache=cache)
-    assert len(solves) == first, "what holds by itself asks for nothing"
-    assert [one.met for one in held.outcomes] == [True, True]
-    run_of(_GAP, (same, as_it_is, parted), cache=cache)
-    assert solves[first:] == [[same, parted]], "only with the new one"
-    assert len(looked) == cut, "where tracks are cut by themselves is the same as before"
-    run_of(_GAP, (same,), cache=cache)
-    assert len(solves) == first + 1, "and nothing for taking it back"
 
 
 def test_a_method_that_takes_no_corrections_runs_as_before(monkeypatch: pytest.MonkeyPatch) -> None:
