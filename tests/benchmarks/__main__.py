@@ -49,6 +49,9 @@ SUITES = {
     "crowd": studies.crowd,
 }
 
+LONG = ("full_hd",)
+"""Renders videos for longer than it measures: the short form has it only where it is named."""
+
 
 def main() -> int:
     """All suites or the named ones."""
@@ -63,7 +66,8 @@ def main() -> int:
         chart.write(record.read(), arguments.chart)
         return 0
     found: list[Measurement] = []
-    for name in arguments.names or SUITES:
+    chosen = [name for name in SUITES if name not in LONG or not arguments.short]
+    for name in arguments.names or chosen:
         begin = time.monotonic()
         for measurement in SUITES[name](arguments.short):
             found.append(measurement)

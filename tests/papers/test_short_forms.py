@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import json
-import os
-import subprocess
-import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from tests.conftest import DATA
+from tests.papers.__main__ import main
 from tests.papers.claims import association, jpda, ppf
 from tests.papers.claims.cmc import GATES
 from tests.papers.claims.cmc import methods as cmc_methods
@@ -122,24 +120,30 @@ LOOKS: dict[str, Callable[[dict[str, Any]], None]] = {
 """What must be seen in the numbers of each."""
 
 
-def test_all_in_short_show_the_direction_of_each_claim(tmp_path: Path) -> None:
-    """In one process, since several of them look at the same runs."""
+DEAR = ("fig3", "ppf", "association", "methods", "rooms")
+"""Experiments whose short form takes most of a minute each: with ``--long`` alone."""
+
+
+def look_at(names: Iterable[str], folder: Path) -> None:
+    """Run some experiments as the command does, and look at what each leaves."""
     data = ["--data", str(DATA)] if HAS_DATA else []
-    done = subprocess.run(
-        [sys.executable, "-m", "tests.papers", "--all", "--quick", "--output", str(tmp_path),
-         *data],
-        cwd=Path(__file__).parents[2],
-        env={**os.environ, "PYTHONWARNINGS": "error"},
-        capture_output=True,
-        text=True,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    found = {
-        path.stem: json.loads(path.read_text(encoding="utf-8")) for path in tmp_path.glob("*.json")
-    }
-    assert set(found) == set(EXPERIMENTS) - (set() if data else NEEDS_DATA)
-    for name, told in found.items():
-        assert (tmp_path / f"{name}.png").stat().st_size > 10_000, name
-        table = told["table"]
+    for name in names:
+        if name in NEEDS_DATA and not data:
+            continue
+        assert main([name, "--quick", "--output", str(folder), *data]) == 0
+        assert (folder / f"{name}.png").stat().st_size > 10_000, name
+        found = json.loads((folder / f"{name}.json").read_text(encoding="utf-8"))
+        table = found["table"]
         assert {len(row) for row in table["rows"]} == {len(table["head"])}, name
-        LOOKS[name](told)
+        LOOKS[name](found)
+
+
+def test_in_short_they_show_the_direction_of_each_claim(tmp_path: Path) -> None:
+    """In one process, since several of them look at the same runs."""
+    look_at((name for name in EXPERIMENTS if name not in DEAR), tmp_path)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", DEAR)
+def test_the_dear_ones_do_too(name: str, tmp_path: Path) -> None:
+    look_at([name], tmp_path)

@@ -82,13 +82,10 @@ def test_heads_that_hide_and_leave(data_folder: Path, method: str) -> None:
 
 
 @both_methods
-@pytest.mark.parametrize("camera", range(4))
-def test_a_camera_that_is_taken_away_or_fails_for_a_while(
-    data_folder: Path, method: str, camera: int
-) -> None:
+def test_a_camera_that_is_taken_away_or_fails_for_a_while(data_folder: Path, method: str) -> None:
     sequence = read_sequence(data_folder / "cmc2")
     whole = number(scored(sequence, pipeline.compute(sequence, parameters(method))), "mota")
-    for last in (160, sequence.frames):
+    for camera, last in ((0, 160), (1, sequence.frames), (2, 160), (3, sequence.frames)):
         blind = without(sequence, camera, 100, last)
         mota = number(scored(blind, pipeline.compute(blind, parameters(method))), "mota")
         assert mota >= whole - 0.05

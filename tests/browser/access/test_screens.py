@@ -58,7 +58,7 @@ def keep(page: Page, folder: Path | None, name: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "size",
-    ["720p", "laptop", pytest.param("wide", marks=pytest.mark.long)],
+    ["720p", *(pytest.param(one, marks=pytest.mark.long) for one in ("laptop", "wide"))],
 )
 def test_everything_is_inside_the_window(
     browser: Browser, server: Server, size: str, tmp_path: Path, screenshots: Path | None

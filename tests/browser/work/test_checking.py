@@ -11,7 +11,7 @@ from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Browser, Page, expect
 
 from tests.browser.conftest import opened
-from tests.browser.looking import ask, by_palette, readout, shown_in_3d, until, viser
+from tests.browser.looking import ask, by_palette, readout, until, viser
 from tests.browser.meeting import FRAMES, HIDDEN, write_meeting
 from tests.browser.serving import Server
 
@@ -78,8 +78,7 @@ def test_an_exchange_is_put_right_by_keys_alone(
     browser: Browser, server: Server, as_it_was: None, screenshots: Path | None
 ) -> None:
     assert exchanged(server), "the trap holds"
-    with opened(browser, server) as page:
-        frame = viser(page)
+    with opened(browser, server, flat=True) as page:
         by_palette(page, "next place to check")
         expect(places(page).first).to_have_attribute("aria-selected", "true")
         expect(page.get_by_role("tab", name="Place")).to_have_attribute("aria-selected", "true")
@@ -108,11 +107,11 @@ def test_an_exchange_is_put_right_by_keys_alone(
         )
         assert not exchanged(server)
         until(page, lambda: int(sign.inner_text() or 0) < before, "one place less")
-        # lanes, pictures and 3D are of the run that obeys
+        # lanes and pictures are of the run that obeys
         run = server.wait_for_run()["run"]["key"]
         assert server.get("/api/timeline").json()["run"] == run
         page.keyboard.press("End")
-        until(page, lambda: shown_in_3d(frame) == str(FRAMES - 1), "3D is at the last step")
+        until(page, lambda: readout(page) == str(FRAMES - 1), "the last step")
         cams = page.locator(".cam")
         left = side_of(server, FRAMES - 1)
         for camera in range(2):

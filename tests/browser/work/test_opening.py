@@ -159,12 +159,9 @@ def test_four_cameras_fit_a_small_screen(page: Page, files: Path) -> None:
 
 
 @pytest.mark.data
-@pytest.mark.parametrize("name", ["pose2sim-multi", "wildtrack-60"])
-def test_folders_of_others_are_tracked(
-    flat_page: Page, server: Server, foreign: Path, name: str
-) -> None:
-    """From the drop to the last track, with what their makers give and nothing told."""
-    page = flat_page
+def test_a_folder_of_others_is_tracked(flat_page: Page, server: Server, foreign: Path) -> None:
+    """From the drop to the last track, with what its makers give and nothing told."""
+    page, name = flat_page, "wildtrack-60"
     drop(page, foreign / name)
     settled(page)
     page.keyboard.press("Control+Enter")
@@ -274,8 +271,9 @@ def test_an_upload_is_stopped_cleanly(flat_page: Page, files: Path, folder: Path
 
 @pytest.mark.data
 def test_a_foreign_recording_is_dropped_and_tracked(
-    page: Page, server: Server, foreign: Path
+    flat_page: Page, server: Server, foreign: Path
 ) -> None:
+    page = flat_page
     drop(page, foreign / "pose2sim-multi")
     settled(page)
     sheet = page.locator("dialog.opener")

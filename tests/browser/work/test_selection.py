@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 
-import pytest
 from playwright.sync_api import Page, Route, expect
 
 from tests.browser.looking import as_at_first, ask, readout, shown_in_3d, until, until_still, viser
@@ -69,23 +67,44 @@ def box_of(server: Server, track: int, camera: int) -> list[float]:
     return box
 
 
-@pytest.mark.parametrize("choose", [by_row, by_lane, by_plot, by_picture, by_3d])
-def test_a_selection_reaches_every_view(
-    request: pytest.FixtureRequest, server: Server, choose: Callable[[Page, Server, int], None]
-) -> None:
-    # the others come the same way as that of a picture
-    with_3d = choose in (by_picture, by_3d)
-    page: Page = request.getfixturevalue("page" if with_3d else "flat_page")
+def test_a_selection_reaches_every_view(flat_page: Page, server: Server) -> None:
+    as_at_first(server)
+    ask(server, "POST", "seek", {"step": STEP})
+    until(flat_page, lambda: readout(flat_page) == str(STEP), "both people are there")
+    track = nearest(server)
+    for choose in (by_row, by_lane, by_plot, by_picture):
+        choose(flat_page, server, track)
+        it_is_everywhere(flat_page, server, track)
+    by_lane(flat_page, server, track)
+    flat_page.locator("body").press("f")  # this one alone
+    expect(flat_page.locator(".lane")).to_have_count(1)
+    expect(flat_page.locator("#panel-tracks tbody tr")).to_have_count(1)
+    expect(flat_page.get_by_role("button", name="only selected")).to_have_attribute(
+        "aria-pressed", "true"
+    )
+    flat_page.locator("body").press("f")
+    expect(flat_page.locator(".lane")).to_have_count(2)
+
+
+def test_a_selection_in_3d_reaches_every_view(page: Page, server: Server) -> None:
     as_at_first(server)
     ask(server, "POST", "seek", {"step": STEP})
     until(page, lambda: readout(page) == str(STEP), "both people are there")
+    track = nearest(server)
+    by_3d(page, server, track)
+    it_is_everywhere(page, server, track)
+
+
+def nearest(server: Server) -> int:
+    """The track nearest to the first camera, whom nobody hides."""
     tracks = [track["id"] for track in server.get(f"/api/step/{STEP}").json()["tracks"]]
     assert len(tracks) == 2
-    # the one nearest to the camera, whom nobody hides
-    track = max(tracks, key=lambda track: box_of(server, track, 0)[3])
-    choose(page, server, track)
-    state = server.wait(lambda state: state["selection"] is not None)
-    assert state["selection"] == track
+    return max(tracks, key=lambda track: box_of(server, track, 0)[3])
+
+
+def it_is_everywhere(page: Page, server: Server, track: int) -> None:
+    """The track is selected in all of the page's views, and after Escape in none."""
+    assert server.wait(lambda state: state["selection"] is not None)["selection"] == track
     lane = page.locator(".lane[aria-pressed=true]")
     expect(lane).to_have_count(1)
     expect(lane).to_have_attribute("aria-label", f"Track {track}")
@@ -93,19 +112,10 @@ def test_a_selection_reaches_every_view(
     expect(row).to_have_count(1)
     assert re.match(rf"{track}\b", row.inner_text())
     until(page, lambda: f"sel={track}" in page.url, "the address has it")
-
-    page.locator("body").press("f")  # this one alone
-    expect(page.locator(".lane")).to_have_count(1)
-    expect(page.locator("#panel-tracks tbody tr")).to_have_count(1)
-    expect(page.get_by_role("button", name="only selected")).to_have_attribute(
-        "aria-pressed", "true"
-    )
-    page.locator("body").press("f")
-    expect(page.locator(".lane")).to_have_count(2)
     page.keyboard.press("Escape")
     server.wait(lambda state: state["selection"] is None)
     expect(page.locator("#panel-tracks tr[aria-selected=true]")).to_have_count(0)
-    expect(page.locator(".lane[aria-pressed=true]")).to_have_count(0)
+    expect(lane).to_have_count(0)
 
 
 def test_others_stay_away_whatever_is_told_before_the_answer(
