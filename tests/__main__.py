@@ -33,6 +33,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent
 ENVIRONMENT = ROOT / ".venv"
@@ -47,6 +48,12 @@ WORKERS = CORES + 1
 """Processes that run the short form's tests side by side, one more than there are cores, since
 many wait for what another process does; each takes up to a gigabyte. The full form's have a core
 each: a browser and its server keep one busy."""
+
+FOR_KERNELS = (
+    "jaxtyping", "numba", "numpy", "opencv-python-headless", "platformdirs", "pydantic", "pyyaml",
+    "scipy", "typing-extensions",
+)  # fmt: skip
+"""What ``tracker.runs.warm_up`` imports: installed first, and the rest while it compiles."""
 
 SHORT = "not full and not long"
 FULL = "full"
@@ -94,7 +101,7 @@ def tell(words: str) -> None:
 def installing() -> Iterator[None]:
     """Make the environment and install the project, unless nothing has changed since.
 
-    Within it the program itself is there; the tools of the tests are when it is left.
+    Within it is there what the kernels are compiled with; all else is when it is left.
     """
     if not Path(PYTHON).exists():
         venv.EnvBuilder(with_pip=True).create(ENVIRONMENT)
@@ -105,8 +112,9 @@ def installing() -> Iterator[None]:
     begin = time.monotonic()
     # compiled when imported: the tests import a small part of what is installed
     pip = [PYTHON, "-m", "pip", "install", "--quiet", "--no-compile"]
-    subprocess.run([*pip, "--editable", str(ROOT)], check=True)
+    subprocess.run([*pip, *of_kernels()], check=True)
     yield
+    subprocess.run([*pip, "--editable", str(ROOT)], check=True)
     subprocess.run([*pip, *requirements("test")], check=True)  # the project is there
     # by itself: its own requirements bring a second OpenCV that clashes with the headless one
     subprocess.run([*pip, "--no-deps", "trackeval>=1.3"], check=True)
@@ -114,9 +122,21 @@ def installing() -> Iterator[None]:
     tell(f"── installation: {time.monotonic() - begin:.0f} s")
 
 
+def project_table() -> dict[str, Any]:
+    """What the project says of itself."""
+    text = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    found: dict[str, Any] = tomllib.loads(text)["project"]
+    return found
+
+
+def of_kernels() -> list[str]:
+    """Those of the project's requirements that its kernels are compiled with."""
+    return [r for r in project_table()["dependencies"] if re.split(r"[=<>]", r)[0] in FOR_KERNELS]
+
+
 def requirements(extra: str) -> list[str]:
     """What an extra of the project brings, those that it names in their turn too."""
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    project = project_table()
     found: list[str] = []
     for one in project["optional-dependencies"][extra]:
         own = re.fullmatch(rf"{project['name']}\[([\w,-]+)\]", one)
