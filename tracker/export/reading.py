@@ -118,6 +118,16 @@ def _limited(path: Path, what: str) -> bytes:
         raise SequenceError(f"{path}: cannot be read ({error.strerror})") from None
 
 
+_FIELDS = {
+    "positions": ("x", "y", "z"),
+    "existences": ("existence",),
+    "sigmas": ("sigma_x", "sigma_y", "sigma_z"),
+}
+"""The fields that each track has in JSON, and the columns that they are."""
+
+_OPTIONAL = (COVARIANCE, *HEIGHT)
+
+
 def _json(path: Path) -> TrackFile:
     """Read tracks as ``tracks.schema.json`` has them."""
     where = path.name
@@ -133,64 +143,47 @@ def _json(path: Path) -> TrackFile:
         ) from None
     names = [camera.name for camera in file.sequence.cameras]
     for k, track in enumerate(file.tracks):
-        columns: dict[str, Any] = {
-            "positions": track.positions, "existences": track.existences, "sigmas": track.sigmas,
-            **{f"boxes.{name}": track.boxes.get(name, []) for name in names},
-        }  # fmt: skip
-        optional = {
-            "covariance_xy": track.covariance_xy, "height": track.height,
-            "sigma_height": track.sigma_height,
-        }  # fmt: skip
-        columns |= {name: values for name, values in optional.items() if values}
-        for name, values in columns.items():
+        rows: dict[str, Any] = {name: getattr(track, name) for name in _FIELDS}
+        rows |= {f"boxes.{name}": track.boxes.get(name, []) for name in names}
+        rows |= {name: own for name in _OPTIONAL if (own := getattr(track, name))}
+        for name, values in rows.items():
             if len(values) != len(track.frames):
                 raise SequenceError(
                     f"{where}, field tracks.{k}.{name}: expected {len(track.frames)} rows as "
                     f"tracks.{k}.frames has, found {len(values)}"
                 )
-    tracks = file.tracks
+    tracks = [one for one in file.tracks if one.frames]
 
-    def column(name: str, shape: tuple[int, ...] = ()) -> ndarray:
+    def column(name: str) -> ndarray:
         rows = [row for track in tracks for row in getattr(track, name)]
-        return _finite(where, name, np.array(rows, dtype=np.float64).reshape(len(rows), *shape))
+        return np.array(rows, dtype=np.float64)
 
     frames = np.array([step for one in tracks for step in one.frames], dtype=np.int64)
     ids = np.array([one.id for one in tracks for _ in one.frames], dtype=np.int64)
     order = _in_order(where, frames, ids)
-    has = {
-        name: all(len(getattr(one, name)) for one in tracks if one.frames)
-        for name in ("covariance_xy", "height", "sigma_height")
-    }
+    columns = {"frame": frames, "time": frames / file.sequence.fps, "id": ids}
+    for name, parts in _FIELDS.items():
+        values = _finite(where, name, column(name)).reshape(-1, len(parts))
+        columns |= dict(zip(parts, values.T, strict=True))
+    for name in _OPTIONAL:
+        if all(getattr(one, name) for one in tracks):
+            columns[name] = column(name)
+    if COVARIANCE in columns:
+        _finite(where, COVARIANCE, columns[COVARIANCE])
     missing = [np.nan] * len(BOX)
-    return TrackFile(
-        frames=frames[order],
-        times=frames[order] / file.sequence.fps,
-        ids=ids[order],
-        positions=column("positions", (3,))[order],
-        existences=column("existences")[order],
-        sigmas=column("sigmas", (3,))[order],
-        boxes={
-            name: np.array(
-                [box or missing for one in tracks for box in one.boxes[name]], dtype=np.float64
-            ).reshape(-1, len(BOX))[order]
-            for name in names
-        },
-        settings={
-            "sequence": file.sequence.name,
-            "seed": str(file.run.seed),
-            **{key: str(value) for key, value in file.run.parameters.items()},
-        },
-        covariances_xy=column("covariance_xy")[order] if has["covariance_xy"] else None,
-        heights=_heights(tracks, "height")[order] if has["height"] else None,
-        sigma_heights=_heights(tracks, "sigma_height")[order] if has["sigma_height"] else None,
+    for name in names:
+        boxes = [box or missing for one in tracks for box in one.boxes[name]]
+        sides = np.array(boxes, dtype=np.float64).reshape(-1, len(BOX)).T
+        columns |= {f"{name}_{side}": own for side, own in zip(BOX, sides, strict=True)}
+    settings = {"sequence": file.sequence.name, "seed": file.run.seed, **file.run.parameters}
+    return TrackFile.of_columns(
+        columns,
+        names,
+        order,
+        settings={key: str(value) for key, value in settings.items()},
         done=file.run.steps if file.run.steps < file.sequence.frames else None,
         remarks=tuple(file.run.remarks),
     )
-
-
-def _heights(tracks: list[Any], name: str) -> Float[ndarray, " N"]:
-    """Return the heights of all rows, NaN where they are not estimated."""
-    return np.array([value for one in tracks for value in getattr(one, name)], dtype=np.float64)
 
 
 def _finite(where: str, name: str, values: ndarray) -> ndarray:
@@ -246,33 +239,16 @@ def _parquet(path: Path) -> TrackFile:
             raise SequenceError(f'{where}, column "{name}": expected whole numbers')
         return values.astype(np.int64)
 
-    def three(*names: str) -> Float[ndarray, "N 3"]:
-        values = np.column_stack([column(name) for name in names])
-        return np.asarray(_finite(where, names[0], values)[order])
-
-    frames, ids = whole("frame"), whole("id")
-    order = _in_order(where, frames, ids)
+    values = {name: _finite(where, name, column(name)) for name in COLUMNS}
+    values |= {"frame": whole("frame"), "id": whole("id")}
     cameras = [name.removesuffix("_left") for name in table.column_names if name.endswith("_left")]
-    facts = _facts(table.schema.metadata or {})
-    optional = {
-        name: column(name)[order] if name in table.column_names else None
-        for name in (COVARIANCE, *HEIGHT)
-    }
-    return TrackFile(
-        frames=frames[order],
-        times=_finite(where, "time", column("time"))[order],
-        ids=ids[order],
-        positions=three("x", "y", "z"),
-        existences=_finite(where, "existence", column("existence"))[order],
-        sigmas=three("sigma_x", "sigma_y", "sigma_z"),
-        boxes={
-            camera: np.column_stack([column(f"{camera}_{side}") for side in BOX])[order]
-            for camera in cameras
-        },
-        settings=facts,
-        covariances_xy=optional[COVARIANCE],
-        heights=optional[HEIGHT[0]],
-        sigma_heights=optional[HEIGHT[1]],
+    values |= {f"{camera}_{side}": column(f"{camera}_{side}") for camera in cameras for side in BOX}
+    values |= {name: column(name) for name in _OPTIONAL if name in table.column_names}
+    return TrackFile.of_columns(
+        values,
+        cameras,
+        _in_order(where, values["frame"], values["id"]),
+        settings=_facts(table.schema.metadata or {}),
     )
 
 
@@ -313,14 +289,13 @@ def _places(path: Path) -> TrackFile:
     frames = truth.frames - int(truth.first_index or 0)
     order = _in_order(where, frames, truth.ids)
     places = truth.positions @ _Y_UP.T if truth.up == "y" else truth.positions
-    rows = len(order)
-    return TrackFile(
-        frames=frames[order],
-        times=np.full(rows, np.nan) if truth.fps is None else frames[order] / truth.fps,
-        ids=truth.ids[order],
-        positions=_finite(where, "places", places)[order],
-        existences=np.ones(rows),
-        sigmas=np.full((rows, 3), np.nan),
-        boxes={},
-        settings={},
-    )
+    values = dict(zip("xyz", _finite(where, "places", places).T, strict=True))
+    nothing = np.full(len(order), np.nan)
+    values |= {
+        "frame": frames,
+        "time": nothing if truth.fps is None else frames / truth.fps,
+        "id": truth.ids,
+        "existence": np.ones(len(order)),
+        **{f"sigma_{axis}": nothing for axis in "xyz"},
+    }
+    return TrackFile.of_columns(values, (), order, settings={})

@@ -95,6 +95,47 @@ class TrackFile:
     def __len__(self) -> int:
         return len(self.frames)
 
+    @classmethod
+    def of_columns(
+        cls,
+        columns: Mapping[str, ndarray],
+        cameras: Many[str],
+        order: Int[ndarray, " N"],
+        *,
+        settings: Mapping[str, str],
+        done: int | None = None,
+        remarks: tuple[str, ...] = (),
+    ) -> TrackFile:
+        """Return the content of a file in any form from its columns.
+
+        Args:
+            columns: The columns by the names that the CSV file has; :data:`COVARIANCE` and
+                :data:`HEIGHT` may be missing.
+            cameras: The names of the cameras that have columns.
+            order: The order of the rows by step and then id.
+            settings, done, remarks: As the attributes.
+        """
+        own = {name: column[order] for name, column in columns.items()}
+
+        def stacked(*names: str) -> Float[ndarray, "N C"]:
+            return np.column_stack([own[name] for name in names])
+
+        return cls(
+            frames=own["frame"].astype(np.int64),
+            times=own["time"],
+            ids=own["id"].astype(np.int64),
+            positions=stacked("x", "y", "z"),
+            existences=own["existence"],
+            sigmas=stacked("sigma_x", "sigma_y", "sigma_z"),
+            boxes={name: stacked(*(f"{name}_{side}" for side in BOX)) for name in cameras},
+            settings=settings,
+            covariances_xy=own.get(COVARIANCE),
+            heights=own.get(HEIGHT[0]),
+            sigma_heights=own.get(HEIGHT[1]),
+            done=done,
+            remarks=remarks,
+        )
+
 
 def write_tracks_csv(
     stream: TextIO,
@@ -271,21 +312,12 @@ def read_tracks_csv(path: Path | str) -> TrackFile:
     frames = columns.whole("frame", 0, None, "the step")
     ids = columns.whole("id", 0, None, "the track")
     order = columns.one_row_each(frames, ids, "track")
-    return TrackFile(
-        frames=frames[order],
-        times=columns.values["time"][order],
-        ids=ids[order],
-        positions=columns.stacked("x", "y", "z")[order],
-        existences=columns.values["existence"][order],
-        sigmas=columns.stacked("sigma_x", "sigma_y", "sigma_z")[order],
-        boxes={
-            camera: columns.stacked(*(f"{camera}_{side}" for side in BOX))[order]
-            for camera in cameras
-        },
+    values = {name: own for name, own in columns.values.items() if name in header}
+    return TrackFile.of_columns(
+        values,
+        cameras,
+        order,
         settings=_settings(path),
-        covariances_xy=columns.values[COVARIANCE][order] if COVARIANCE in header else None,
-        heights=columns.values["height"][order] if "height" in header else None,
-        sigma_heights=columns.values["sigma_height"][order] if "sigma_height" in header else None,
         done=_done(path),
         remarks=_remarks(path),
     )

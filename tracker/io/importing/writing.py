@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 from numpy import ndarray
 
 from tracker.files.atomic import replacing, write_whole
@@ -15,7 +15,7 @@ from tracker.io.conventions.questions import ACCEPT
 from tracker.io.importing.bringing import Told, bring, bring_images
 from tracker.io.importing.settling import ImportPlan, PlannedView
 from tracker.io.read.pieces import FormatError
-from tracker.sequences.sequence import Detections, GroundTruth
+from tracker.sequences.writing.csv_files import steps_without_boxes, write_boxes, write_truth
 
 FILE = "sequence.toml"
 
@@ -56,7 +56,7 @@ def write(
         tables.append(_camera(view, own, folder, copy, copied, told))
     truth = ""
     if settled.truth is not None:
-        _write_truth(folder / "ground_truth.csv", settled.truth)
+        write_truth(folder / "ground_truth.csv", settled.truth, decimals=".5f")
         truth = '\n[ground_truth]\nfile = "ground_truth.csv"\n'
     head = [
         *([] if settled.open is None else [f"# by {ACCEPT}: {settled.open}"]),
@@ -119,7 +119,9 @@ def _camera(
         lines.append(f"timestamps = {_text(file)}")
     if view.detections is not None:
         file = f"{name}.csv"
-        _write_boxes(folder / file, view.detections, view.looked_at)
+        looked_at = np.zeros(0, dtype=np.int64) if view.looked_at is None else view.looked_at
+        empty = steps_without_boxes(view.detections, looked_at)
+        write_boxes(folder / file, view.detections, empty, decimals=(".3f", ".4f"))
         lines += ['detected_steps = "listed"'] if view.looked_at is not None else []
         lines.append(f"detections = {_text(file)}")
     lines += [
@@ -146,32 +148,6 @@ def _file_names(names: Sequence[str]) -> list[str]:
         count = sum(other.lower() == plain.lower() for other in found)
         found.append(plain if not count else f"{plain}_{len(found)}")
     return found
-
-
-def _write_boxes(path: Path, detections: Detections, looked_at: Int[ndarray, " K"] | None) -> None:
-    """Write the boxes, and a row without a box for each frame that was looked at in vain."""
-    rows = [
-        f"{frame},{','.join(f'{value:.3f}' for value in box)},{score:.4f}"
-        for frame, box, score in zip(
-            detections.frames.tolist(), detections.boxes.tolist(), detections.scores.tolist(),
-            strict=True,
-        )
-    ]  # fmt: skip
-    empty = np.setdiff1d([] if looked_at is None else looked_at, detections.frames)
-    rows += [f"{int(frame)},,,,," for frame in empty]
-    text = "\n".join(["frame,left,top,width,height,score", *rows]) + "\n"
-    write_whole(path, text.encode())
-
-
-def _write_truth(path: Path, truth: GroundTruth) -> None:
-    rows = [
-        f"{frame},{who},{x:.5f},{y:.5f},{z:.5f},{int(valid)}"
-        for frame, who, (x, y, z), valid in zip(
-            truth.frames.tolist(), truth.ids.tolist(), truth.positions.tolist(),
-            truth.valid.tolist(), strict=True,
-        )
-    ]  # fmt: skip
-    write_whole(path, ("\n".join(["frame,id,x,y,z,valid", *rows]) + "\n").encode())
 
 
 def _text(text: str) -> str:

@@ -22,6 +22,7 @@ from tracker.files.text import shown
 from tracker.io.read.picture_names import camera_of, number_in
 from tracker.io.read.pieces import DetectionPiece, Layout, Piece, TruthPiece, Unit
 from tracker.io.read.source import SourceFile
+from tracker.io.read.values import plain
 
 WORDS: dict[str, tuple[str, ...]] = {
     "frame": ("frame", "frameid", "frameindex", "framenumber", "frameno", "frameidx", "framenr",
@@ -55,8 +56,6 @@ WORDS: dict[str, tuple[str, ...]] = {
 }  # fmt: skip
 """Names, without case, blanks and underscores, of each meaning; the first that is there counts."""
 
-_MEANING = {word: meaning for meaning, words in WORDS.items() for word in words}
-
 PEOPLE = ("person", "pedestrian", "people", "human", "1", "0")
 """Classes that are people: by name, or the first of COCO (1) and of YOLO (0)."""
 
@@ -84,11 +83,6 @@ _LONGEST_BOX = 8
 _DECIMAL_COMMA = re.compile(r"[-+]?\d+,\d+(e[-+]?\d+)?", re.IGNORECASE)
 
 Column = Sequence[Any]
-
-
-def plain(name: str) -> str:
-    """A column's name without case, blanks, brackets and underscores."""
-    return re.sub(r"[^a-z0-9]", "", name.lower())
 
 
 def decimal_point(cell: str) -> str:

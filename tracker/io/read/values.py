@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, ParamSpec, TypeVar
 
@@ -43,6 +44,11 @@ def _checked(
         return check(*parts, **options)
     except ValueError as error:
         raise file.error(str(error), field) from None
+
+
+def plain(name: str) -> str:
+    """A field's or a column's name without case, blanks, brackets and underscores."""
+    return re.sub(r"[^a-z0-9]", "", name.lower())
 
 
 def numbers_in(value: Any) -> Float[ndarray, " n"] | None:

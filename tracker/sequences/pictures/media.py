@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +14,7 @@ from numpy import ndarray
 from tracker.files.folders import files_matching
 from tracker.sequences.errors import SequenceError
 from tracker.sequences.fields import LONGEST_NAME, Fields, did_you_mean, listed
-from tracker.sequences.pictures.numbering import whole_row
+from tracker.sequences.pictures.numbering import by_number, whole_row
 from tracker.sequences.pictures.video import VideoError, index_video, read_image, why_no_picture
 from tracker.sequences.sequence import View
 
@@ -145,8 +144,8 @@ def check_pictures(view: View, found: Pictures, fields: Fields, frames: int) -> 
         return list(_short(view, found.frames, frames, "video has"))
     check_size(view, fields, found.size, "image size")
     warnings = [*_holes(view), *_short(view, found.frames, frames, "images are")]
-    by_number = sorted(view.images, key=_by_number)
-    for first, other in zip(by_number, view.images, strict=True):
+    ordered = sorted(view.images, key=lambda path: by_number(path.as_posix()))
+    for first, other in zip(ordered, view.images, strict=True):
         if first != other:
             warnings.append(
                 f'camera "{view.camera.name}": images are taken in the order of their names, '
@@ -212,9 +211,3 @@ def _holes(view: View) -> Iterable[str]:
         f"{'is' if len(names) == 1 else 'are'} missing in the row of its pictures; the steps there "
         "have no picture (where none is missing, number the files one by one)"
     )
-
-
-def _by_number(path: Path) -> list[str | int]:
-    """Return a sort key that orders numbers in names by value."""
-    parts = re.split(r"(\d+)", path.as_posix())
-    return [int(part) if part.isdigit() else part for part in parts]

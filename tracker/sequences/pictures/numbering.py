@@ -56,6 +56,11 @@ def whole_row(images: Sequence[Path]) -> tuple[tuple[Path, ...], Bool[ndarray, "
     return tuple(row), there
 
 
+def by_number(text: str) -> list[str | int]:
+    """Return a sort key that orders numbers in names by value."""
+    return [int(part) if part.isdigit() else part for part in _DIGITS.split(text)]
+
+
 def _place(parts: Sequence[Sequence[str]]) -> int | None:
     """Return the index of the only part that differs between names, if it is a number; else None.
 

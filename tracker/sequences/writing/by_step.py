@@ -6,7 +6,6 @@ Each video has the picture of step k as frame k, in full size and at a low bit r
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterable
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -16,6 +15,7 @@ import numpy as np
 from tracker.sequences.clock import FIELDS as CLOCK
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence, View
+from tracker.sequences.writing.csv_files import steps_without_boxes, write_boxes, write_truth
 from tracker.sequences.writing.teaching import taught_values
 
 _QUALITY = {"preset": "veryfast", "crf": "32"}
@@ -66,12 +66,7 @@ def write_by_step(folder: Path, sequence: Sequence, *, videos: bool) -> None:
     truth = sequence.ground_truth
     if truth is not None:
         document["ground_truth"] = {"file": "truth.csv"}
-        columns = (truth.frames, truth.ids, truth.positions, truth.valid.astype(int))
-        rows = zip(*(column.tolist() for column in columns), strict=True)
-        _write_csv(
-            folder / "truth.csv", "frame,id,x,y,z,valid",
-            (f"{f},{n},{x:.9g},{y:.9g},{z:.9g},{valid}" for f, n, (x, y, z), valid in rows),
-        )  # fmt: skip
+        write_truth(folder / "truth.csv", truth, decimals=".9g")
     (folder / "sequence.toml").write_text(tomlkit.dumps(document), encoding="utf-8")
 
 
@@ -80,26 +75,17 @@ def _write_boxes(folder: Path, name: str, view: View) -> dict[str, str]:
     boxes = view.detections
     assert boxes is not None
     fields = {"detections": f"{name}.csv"}
-    rows = np.column_stack([boxes.frames, boxes.boxes, boxes.scores]).tolist()
-    lines = [f"{int(row[0])}," + ",".join(f"{v:.9g}" for v in row[1:]) for row in rows]
     vectors = boxes.embeddings
+    empty = np.zeros(0, dtype=np.int64)
     if view.detector_ran is not None:
-        # steps at which the detector ran and found no box are listed too
         fields["detected_steps"] = "listed"
-        empty = np.setdiff1d(np.flatnonzero(view.detector_ran), boxes.frames)
-        lines += [f"{step},,,,," for step in empty.tolist()]
+        empty = steps_without_boxes(boxes, np.flatnonzero(view.detector_ran))
         vectors = np.pad(vectors, ((0, len(empty) if vectors.shape[1] else 0), (0, 0)))
     if vectors.shape[1]:
         fields["appearance"] = f"{name}.npy"
         np.save(folder / fields["appearance"], vectors)
-    _write_csv(folder / fields["detections"], "frame,left,top,width,height,score", lines)
+    write_boxes(folder / fields["detections"], boxes, empty, decimals=(".9g", ".9g"))
     return fields
-
-
-def _write_csv(path: Path, head: str, rows: Iterable[str]) -> None:
-    """Write a table from its first line and all others."""
-    with path.open("w", encoding="utf-8", newline="\n") as file:
-        file.writelines(f"{row}\n" for row in (head, *rows))
 
 
 def _write_video(path: Path, sequence: Sequence, camera: int) -> None:

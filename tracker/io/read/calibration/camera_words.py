@@ -16,7 +16,7 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from tracker.io.read.calibration.euler import KINDS, ORDERS
-from tracker.io.read.values import numbers_in
+from tracker.io.read.values import numbers_in, plain
 
 MEANINGS: dict[str, tuple[str, ...]] = {
     "K": ("k", "m", "mtx", "cameramatrix", "cammatrix", "intrinsicmatrix", "intrinsics",
@@ -109,11 +109,6 @@ _LONGEST_NAME = 200
 
 _FULL_TURN = 2.0 * math.pi * 1.01
 """Radians; a rotation vector that is longer is one in degrees."""
-
-
-def plain(key: str) -> str:
-    """A field's name without case, blanks and underscores."""
-    return re.sub(r"[^a-z0-9]", "", key.lower())
 
 
 def split(key: str) -> tuple[str, str] | None:

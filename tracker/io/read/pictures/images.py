@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
-from pathlib import Path
 
 from tracker.io.read.pieces import ImagesPiece, Piece
 from tracker.io.read.protocol import Certainty, Kind
 from tracker.io.read.source import SourceFile
-from tracker.sequences.pictures.numbering import whole_row
+from tracker.sequences.pictures.numbering import by_number, whole_row
 from tracker.sequences.pictures.video import read_image, why_no_picture
 
 NAME = "numbered pictures"
@@ -31,9 +29,5 @@ def read(file: SourceFile) -> Iterator[Piece]:
     picture = read_image(file.series[0])
     if picture is None:
         raise file.member(file.series[0]).error(why_no_picture(file.series[0]))
-    files, _ = whole_row(sorted(file.series, key=_by_number))
+    files, _ = whole_row(sorted(file.series, key=lambda path: by_number(path.name)))
     yield ImagesPiece(file.path.parent, files, (picture.shape[1], picture.shape[0]))
-
-
-def _by_number(path: Path) -> list[str | int]:
-    return [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", path.name)]
