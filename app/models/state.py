@@ -130,6 +130,21 @@ class EditsInfo(Model):
     redo: str | None
 
 
+class TaskInfo(Model):
+    """Work in the background: an export, a check of identities, an import."""
+
+    of: str
+    """The number of an export, the key of a run, or that of an import."""
+    state: str
+    done: int
+    """Of :attr:`total`; of an import its version: whoever shows it asks for it again."""
+    total: int
+    """0 while it is not known."""
+    words: str
+    """What it makes: the name of a file."""
+    error: str | None
+
+
 class TrailInfo(Model):
     """How trails are drawn, in 3D and in pictures."""
 
@@ -185,6 +200,9 @@ class State(Model):
     edits: EditsInfo
     marks: int
     """Grows when kept runs are named, marked, deleted or restored."""
+    tasks: dict[str, TaskInfo]
+    """By ``export``, ``identity``, or ``import`` and its key. They come over the socket as they go
+    on, and here as they are when something else is told."""
     viser: ViserInfo
 
 

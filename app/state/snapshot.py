@@ -25,7 +25,7 @@ from tracker.sequences.sequence import Sequence
 Change = Literal[
     "sequence", "opening", "parameters", "playhead", "selection", "layers", "view", "theme",
     "run", "progress", "evaluation", "pinned", "presets", "taught", "editing", "corrections",
-    "ghosts", "offers", "fetching", "edits", "marks",
+    "ghosts", "offers", "fetching", "edits", "marks", "tasks",
 ]  # fmt: skip
 """What is another now: ``run`` is a run's beginning and its end, ``progress`` its new steps,
 ``taught`` another room or other templates of the same recording."""
@@ -87,6 +87,21 @@ class RunState:
     """The key that a computation with these values would have, where older code made this one."""
     warnings: tuple[str, ...] = ()
     """What its result is not: pictures that were missing, files that changed; a sentence each."""
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """Work in the background that somebody waits for; the pages are told of it as it goes on."""
+
+    of: str
+    """What it is done for: the key of a run or of an import, or the number of an export."""
+    state: str
+    done: int = 0
+    total: int = 0
+    """Steps or bytes; 0 while it is not known."""
+    words: str = ""
+    """What it makes: the name of a file."""
+    error: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,6 +174,8 @@ class Snapshot:
     """What would be redone; None for nothing."""
     marks: int = 0
     """Grows when kept runs are named, marked, deleted or restored."""
+    tasks: Mapping[str, Task] = field(default_factory=lambda: MappingProxyType({}))
+    """The newest of each kind: ``export``, ``identity``, and ``import`` with its key."""
     playhead: int = 0
     playhead_origin: str = ""
     sought: bool = False

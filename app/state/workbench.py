@@ -23,6 +23,7 @@ from app.state.snapshot import (
     Notice,
     Presets,
     StudyNews,
+    Task,
     Trail,
     View,
     clamp,
@@ -251,6 +252,19 @@ class Workbench(ShownRun):
         with self._edit() as now:
             if (undo, redo) != (now.undo_words, now.redo_words):
                 self._put("edits", undo_words=undo, redo_words=redo)
+
+    def show_task(self, kind: str, task: Task | None) -> None:
+        """Show how far some work in the background is, in place of what was shown of its kind.
+
+        Args:
+            kind: Of the work.
+            task: How far it is; None to show it no more.
+        """
+        with self._edit() as now:
+            if task != now.tasks.get(kind):
+                tasks = {**now.tasks, kind: task}
+                shown = {key: one for key, one in tasks.items() if one is not None}
+                self._put("tasks", tasks=MappingProxyType(shown))
 
     def runs_marked(self) -> None:
         """Tell everyone who looks that kept runs have other names or marks, or are deleted."""

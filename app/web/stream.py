@@ -23,8 +23,9 @@ from app.state.snapshot import Change, Command, Event, Notice, Snapshot, StudyNe
 from app.state.workbench import Workbench
 from app.web.views import results, steps
 
-SECONDS_BETWEEN = {"progress": 0.1, "timeline": 0.25}
-"""How often at most a page is told how far the run is, and that the timeline has grown."""
+SECONDS_BETWEEN = {"progress": 0.1, "tasks": 0.25, "timeline": 0.25}
+"""How often at most a page is told how far the run and other work is, and that the timeline has
+grown."""
 
 LARGEST_MESSAGE = 1 << 14
 """Characters of a page's message."""
@@ -46,7 +47,7 @@ class _Page:
     """What one page has not been told yet."""
 
     def __init__(self) -> None:
-        self.news: set[Change] = {"sequence", "playhead"}
+        self.news: set[Change] = {"sequence", "playhead", "tasks"}
         self.flies = True
         self.messages: list[str] = []
         self.wake = asyncio.Event()
@@ -193,7 +194,7 @@ class Stream:
                 origin = snapshot.playhead_origin
                 told = {"type": "playhead", "step": snapshot.playhead, "origin": origin}
                 await socket.send_text(json.dumps(told))
-            if news - {"playhead", "progress", "evaluation"}:
+            if news - {"playhead", "progress", "evaluation", "tasks"}:
                 await socket.send_text(self._state_text(snapshot))
             await self._tell_step(socket, page, snapshot)
             await self._tell_evaluation(socket, page, snapshot)
@@ -239,8 +240,10 @@ class Stream:
         if "progress" in news:
             page.due |= {"progress", "timeline"}
         if news & {"run", "sequence"}:
-            page.due = {"timeline"}  # how far the run is was in the state
+            page.due = {"timeline", *page.due} - {"progress"}  # how far the run is, the state said
             page.told_at["timeline"] = 0.0
+        if "tasks" in news:
+            page.due.add("tasks")
         shown = _shown(snapshot)
         if shown == page.told_timeline:
             page.due.discard("timeline")
@@ -249,11 +252,12 @@ class Stream:
             if now - page.told_at[kind] >= SECONDS_BETWEEN[kind]:
                 page.told_at[kind] = now
                 page.due.discard(kind)
+                told: dict[str, Any]
                 if kind == "timeline":
                     page.told_timeline = shown
-                    told: dict[str, Any] = {
-                        "run": shown[1], "done": shown[2], "revision": shown[3],
-                    }  # fmt: skip
+                    told = {"run": shown[1], "done": shown[2], "revision": shown[3]}
+                elif kind == "tasks":
+                    told = {"tasks": results.tasks_of(snapshot)}
                 else:
                     told = {"run": results.run_of(snapshot).model_dump(mode="json")}
                 await socket.send_text(json.dumps({"type": kind, **told}))

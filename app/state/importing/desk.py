@@ -13,6 +13,7 @@ from pathlib import Path
 from app.errors import sentence
 from app.state.importing.draft import Draft, folder_name
 from app.state.importing.uploads import Announced, UploadError
+from app.state.workbench import Workbench
 from tracker.files.folders import settings_folder
 from tracker.sequences.reader import FILE, given_folder
 
@@ -26,14 +27,18 @@ FORGOTTEN_SECONDS = 86400.0
 class Desk:
     """Thread-safe owner of all drafts."""
 
-    def __init__(self, data: Path | None = None, roots: Sequence[Path] = ()) -> None:
+    def __init__(
+        self, workbench: Workbench, data: Path | None = None, roots: Sequence[Path] = ()
+    ) -> None:
         """Nothing is written yet.
 
         Args:
+            workbench: Shows how far imports are.
             data: Where recordings are; the person's own place where none is given or it can only
                 be read.
             roots: Further folders that may be imported by their path.
         """
+        self._workbench = workbench
         own = settings_folder() / "recordings"
         self.home = data.absolute() if data is not None and os.access(data, os.W_OK) else own
         self._data = data.absolute() if data is not None else self.home
@@ -105,7 +110,13 @@ class Desk:
         try:
             self.home.mkdir(parents=True, exist_ok=True)
             self._tidy()
-            draft = Draft(secrets.token_hex(8), self.home, self._free_name(name), source)
+            draft = Draft(
+                secrets.token_hex(8),
+                self.home,
+                self._free_name(name),
+                self._workbench.show_task,
+                source,
+            )
         except OSError as error:
             raise UploadError(
                 f"{self.home}: cannot be written ({error.strerror}); start the workbench with "

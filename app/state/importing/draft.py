@@ -18,6 +18,7 @@ import numpy as np
 from app.errors import sentence
 from app.state.importing.uploads import Upload
 from app.state.importing.wish import ImportWish, looks_alike, options_of
+from app.state.snapshot import Task
 from tracker.io.read.pieces import FormatError, ImagesPiece, VideoPiece
 from tracker.runs.pipeline import Cancelled
 from tracker.sequences.pictures.video import VideoDecoder, VideoError, index_video, read_image
@@ -75,16 +76,24 @@ class Known:
 class Draft:
     """See the module's words; any thread may ask."""
 
-    def __init__(self, key: str, home: Path, name: str, source: Path | None = None) -> None:
+    def __init__(
+        self,
+        key: str,
+        home: Path,
+        name: str,
+        show: Callable[[str, Task | None], None],
+        source: Path | None = None,
+    ) -> None:
         """Begin.
 
         Args:
             key: Of the draft.
             home: Folder of the recordings that it may become one of.
             name: What it is called until somebody says otherwise.
+            show: Tells of a task, by its kind; None of none any more.
             source: Files that are there already; None: they are uploaded.
         """
-        self.key = key
+        self.key, self._show = key, show
         self.home = home
         self.folder = home / f".import-{key}"
         self.folder.mkdir(parents=True)
@@ -99,6 +108,7 @@ class Draft:
         self._stop = threading.Event()
         self._given_up = False
         self._pictures: dict[Path, bytes | None] = {}
+        show(f"import {key}", Task(key, self._known.phase))
         if source is not None:
             self._look_again()
 
@@ -167,6 +177,8 @@ class Draft:
         with self._lock:
             version = self._known.version + 1
             self._known = replace(self._known, version=version, **changes)  # type: ignore[arg-type]
+            # what is known of it is more than a task tells: its version says when to ask
+            self._show(f"import {self.key}", Task(self.key, self._known.phase, version))
 
     def _look_again(self) -> None:
         """Find everything out in the background; what was under way is given up."""
@@ -331,6 +343,7 @@ class Draft:
         with self._lock:
             self._stop.set()
             self._given_up = True
+            self._show(f"import {self.key}", None)
             if self._known.phase not in _BEGUN:
                 shutil.rmtree(self.folder, ignore_errors=True)
 

@@ -13,6 +13,8 @@ from pathlib import Path
 from typing import Literal
 
 from app.errors import sentence
+from app.state.snapshot import Task
+from app.state.workbench import Workbench
 from app.state.workers.threads import CLOSING_SECONDS, be_nice
 from tracker.export.exported_run import ExportedRun, Options, Stopped
 from tracker.export.registry import Format, save
@@ -40,7 +42,8 @@ class Exporting:
 class Exporter:
     """The newest wish wins; what was written stays until the next one."""
 
-    def __init__(self) -> None:
+    def __init__(self, workbench: Workbench) -> None:
+        self._workbench = workbench
         self._lock = threading.Lock()
         self._now = Exporting()
         self._cancelled = threading.Event()
@@ -81,11 +84,13 @@ class Exporter:
             ending = form.suffix or f"-{form.name}.zip"
             self._now = Exporting(self._now.number + 1, "writing", form.name, f"{plain}{ending}")
             number, path = self._now.number, self._folder / self._now.name
+            self._show()
 
         def tell(**values: object) -> None:
             with self._lock:
                 if self._now.number == number:
                     self._now = replace(self._now, **values)  # type: ignore[arg-type]
+                    self._show()
 
         def work() -> None:
             be_nice()
@@ -109,6 +114,11 @@ class Exporter:
         self._thread = threading.Thread(target=work, name="export", daemon=True)
         self._thread.start()
         return self._now
+
+    def _show(self) -> None:
+        now = self._now
+        told = Task(str(now.number), now.state, now.done, now.total, now.name, now.error)
+        self._workbench.show_task("export", told)
 
     def cancel(self) -> None:
         """Stop what is under way; nothing of it is left."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from app.errors import sentence
-from app.state.snapshot import Change
+from app.state.snapshot import Change, Task
 from app.state.workbench import Workbench
 from app.state.workers.threads import CLOSING_SECONDS, be_nice
 from tracker.review.self_consistency import Estimate, estimate
@@ -64,6 +64,7 @@ class IdentityCheck:
             self._cancelled.set()
             self._cancelled = cancelled = threading.Event()
             self._now = Checked(run.key, "looking")
+            self._show()
             self._thread = threading.Thread(
                 target=self._work, args=(run, cancelled), name="identity", daemon=True
             )
@@ -76,6 +77,7 @@ class IdentityCheck:
             self._cancelled.set()
             if self._now.state == "looking":
                 self._now = replace(self._now, state="cancelled")
+                self._show()
 
     def close(self) -> None:
         """Stop, and wait a moment for the processes to end."""
@@ -83,6 +85,11 @@ class IdentityCheck:
         self.cancel()
         if self._thread is not None:
             self._thread.join(timeout=CLOSING_SECONDS)
+
+    def _show(self) -> None:
+        now = self._now
+        told = Task(now.run, now.state, now.done, now.total, error=now.error)
+        self._workbench.show_task("identity", told)
 
     def _on_change(self, change: Change) -> None:
         if change in ("sequence", "run") and self._now.state == "looking":
@@ -97,6 +104,7 @@ class IdentityCheck:
             with self._lock:
                 if not cancelled.is_set():
                     self._now = replace(self._now, **values)  # type: ignore[arg-type]
+                    self._show()
 
         try:
             found = estimate(

@@ -97,13 +97,13 @@ async def lifespan(app: FastAPI) -> AsyncIterator[None]:
     app.state.doubting = Doubting()
     given = Path(settings.sequence or "").expanduser()
     roots = [given] if settings.sequence and given.is_dir() else []
-    desk = app.state.desk = Desk(settings.data, roots)
+    desk = app.state.desk = Desk(workbench, settings.data, roots)
     recents = app.state.recents = Recents(
         workbench, settings_folder() / "recent.json" if kept else None
     )
     evaluator = app.state.evaluator = Evaluator(workbench)
     identity_check = app.state.identity_check = IdentityCheck(workbench)
-    exporter = app.state.exporter = Exporter()
+    exporter = app.state.exporter = Exporter(workbench)
     detector_fetching = app.state.detector_fetching = DetectorFetching(
         workbench, lambda: jobs.use_detector(None)
     )

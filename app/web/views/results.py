@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict
+from typing import Any
 
 from numpy import ndarray
 
@@ -49,8 +50,14 @@ def state_of(snapshot: Snapshot) -> models.State:
         corrections=corrections.state_of(snapshot),
         edits=models.EditsInfo(undo=snapshot.undo_words, redo=snapshot.redo_words),
         marks=snapshot.marks,
+        tasks={kind: models.TaskInfo(**one) for kind, one in tasks_of(snapshot).items()},
         viser=models.ViserInfo(),
     )
+
+
+def tasks_of(snapshot: Snapshot) -> dict[str, dict[str, Any]]:
+    """Work in the background, by its kind."""
+    return {kind: asdict(task) for kind, task in snapshot.tasks.items()}
 
 
 def run_of(snapshot: Snapshot) -> models.RunInfo:

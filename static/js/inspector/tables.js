@@ -7,42 +7,21 @@ import { all, allow, choices, one, parts, write, fill, h, icon } from "../elemen
 import { fetcher, request, getJson } from "../state/api.js";
 import { eventsNow, scoresOf } from "../state/events.js";
 
-/* ---------- The check of identities without truth: begun, watched and stopped. ---------- */
-
-const ASKS_MS = 400;
+/* ---------- The check of identities without truth: begun and stopped. ---------- */
 
 /** @param {Context} context */
 export function mountIdentity({ store, actions }) {
-	let watching = false;
-
-	async function watch() {
-		if (watching) return;
-		watching = true;
-		for (;;) {
-			/** @type {Server.IdentityInfo | null} */
-			const identity = await getJson("/api/identity").catch(() => null);
-			if (identity) store.set({ identity });
-			if (identity?.state !== "looking") break;
-			await new Promise((resolve) => setTimeout(resolve, ASKS_MS));
-		}
-		watching = false;
-	}
-
-	actions.checkIdentities = async (what) => {
-		const told = await actions.ask(what === "stop" ? "DELETE" : "POST", "identity");
-		if (!told) return;
-		store.set({ identity: told });
-		void watch();
-	};
-	// It may have been begun in another window, or before this page was loaded; lanes come first.
-	let heard = "";
-	store.watch(["timeline", "tab"], ({ timeline, tab }) => {
-		const shown = TABLES[tab]?.keys.includes("identity");
-		const now = `${timeline?.run} ${shown ? tab : ""}`;
-		if (!timeline || now === heard) return;
-		heard = now;
-		void watch();
+	const read = fetcher(async () => store.set({ identity: await getJson("/api/identity") }));
+	// It may have been begun in another window, or before this page was loaded.
+	/** @type {Server.TaskInfo | undefined} */
+	let heard;
+	store.watch(["tasks"], ({ tasks: { identity } }) => {
+		if (JSON.stringify(identity) === JSON.stringify(heard)) return;
+		heard = identity;
+		void read();
 	});
+	actions.checkIdentities = (what) =>
+		void actions.ask(what === "stop" ? "DELETE" : "POST", "identity");
 }
 
 /* ---------- Steps that somebody marked, each with a note: kept in this browser for each
@@ -259,7 +238,7 @@ export function mountTables(root, { store, actions }) {
 					stopLeaving.hidden = !cancel;
 					stopLeaving.onclick = cancel ?? null;
 				};
-				leave.append(...exportMenu({ actions, say, chosen: () => [null] }));
+				leave.append(...exportMenu({ store, actions, say, chosen: () => [null] }));
 				controls();
 			},
 			() => void (exports = undefined),

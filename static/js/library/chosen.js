@@ -6,12 +6,13 @@ import { many, size } from "./words.js";
 
 /**
  * @param {object} how
+ * @param {Store<PageState>} how.store
  * @param {Actions} how.actions
  * @param {() => number[]} how.chosen
  * @param {() => void} how.none  choose none
  * @param {() => Promise<void>} how.refresh  runs are others now
  */
-export function chosenBar({ actions, chosen, none, refresh }) {
+export function chosenBar({ store, actions, chosen, none, refresh }) {
 	const picked = h("b");
 	const line = h("span", { role: "status", class: "gone-line" });
 	const stop = h("button", { class: "btn" }, "Stop");
@@ -33,7 +34,7 @@ export function chosenBar({ actions, chosen, none, refresh }) {
 		{ class: "picked", role: "toolbar", "aria-label": "Chosen runs" },
 		picked,
 		side,
-		exportMenu({ actions, say, chosen }),
+		exportMenu({ store, actions, say, chosen }),
 		h(
 			"button",
 			{ class: "btn box", onclick: () => void remove(chosen()) },

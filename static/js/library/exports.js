@@ -2,15 +2,17 @@
 import { choices, fill, h, icon } from "../elements/dom.js";
 import { getJson } from "../state/api.js";
 
-const ASKS_MS = 250;
+/** A browser begins to read a file before the next one takes its place, milliseconds. */
+const SAVES_MS = 250;
 
 /**
  * @param {object} how
+ * @param {Store<PageState>} how.store
  * @param {Actions} how.actions
  * @param {() => (number | null)[]} how.chosen  runs of the library; null is the one that is shown
  * @param {(words: string, cancel?: () => void) => void} how.say
  */
-export function exportMenu({ actions, chosen, say }) {
+export function exportMenu({ store, actions, chosen, say }) {
 	const forms = h("div", { role: "menu", "aria-label": "Export as" });
 	const menu = h("div", { class: "menu", popover: "auto" }, forms);
 	const button = h(
@@ -94,6 +96,26 @@ export function exportMenu({ actions, chosen, say }) {
 		speed: Number(speed.value),
 	});
 
+	/**
+	 * An export, once it is over or another one has taken its place.
+	 * @param {string} number
+	 * @param {(now: Server.TaskInfo) => void} tell  how far it is
+	 * @returns {Promise<Server.TaskInfo>}
+	 */
+	const ended = (number, tell) =>
+		new Promise((resolve) => {
+			const unsubscribe = store.on(["tasks"], look);
+			function look() {
+				const now = store.get().tasks.export;
+				// The server was started again, or has not told of it yet.
+				if (!now || Number(now.of) < Number(number)) return;
+				if (now.of === number && now.state === "writing") return tell(now);
+				unsubscribe();
+				resolve(now.of === number ? now : { ...now, state: "cancelled" });
+			}
+			look();
+		});
+
 	/** @param {Server.FormatInfo} form */
 	async function write(form) {
 		for (const run of chosen()) {
@@ -104,24 +126,20 @@ export function exportMenu({ actions, chosen, say }) {
 				...(form.video ? wanted() : {}),
 			});
 			if (!now) return;
-			const { number } = now;
-			while (now.state === "writing" && now.number === number) {
-				const share = now.total ? ` ${Math.round((100 * now.done) / now.total)} %` : "";
-				say(`${called} as ${form.word}${share}`, () => void actions.ask("DELETE", "exports"));
-				await new Promise((resolve) => setTimeout(resolve, ASKS_MS));
-				now = await getJson("/api/exports").catch((error) => ({
-					state: "failed",
-					error: error.message,
-				}));
-			}
+			now = await ended(String(now.number), ({ done, total }) =>
+				say(
+					`${called} as ${form.word}${total ? ` ${Math.round((100 * done) / total)} %` : ""}`,
+					() => void actions.ask("DELETE", "exports"),
+				),
+			);
 			say("");
 			if (now.state === "failed")
 				return actions.note("error", `${called} was not written as ${form.word}`, now.error);
 			if (now.state !== "done") return;
-			const link = h("a", { href: "/api/exports/file", download: now.name });
+			const link = h("a", { href: "/api/exports/file", download: now.words });
 			link.click();
-			await new Promise((resolve) => setTimeout(resolve, ASKS_MS));
-			say(`${now.name} was saved`);
+			await new Promise((resolve) => setTimeout(resolve, SAVES_MS));
+			say(`${now.words} was saved`);
 		}
 	}
 	return [button, menu];

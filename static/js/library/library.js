@@ -235,6 +235,7 @@ export function mountLibrary(root, { store, actions }) {
 	});
 	const small = preview({ store, actions }, (run, note) => void change(run, { note }));
 	const bar = chosenBar({
+		store,
 		actions,
 		chosen: () => runs.filter(({ id }) => chosen.has(id)).map(({ id }) => id),
 		none: chooseNone,

@@ -1,6 +1,6 @@
 /** The sheet that opens recordings: by a key, by a drop anywhere, from files or from the disk. */
 import { all, h, one, write } from "../elements/dom.js";
-import { ApiError, getJson, request, sendJson } from "../state/api.js";
+import { ApiError, fetcher, getJson, request, sendJson } from "../state/api.js";
 
 /* ---------- Files that a person drops or chooses, and the way of their bytes to the server. */
 
@@ -148,7 +148,6 @@ function mountPlan(svg, room, put) {
 	place();
 }
 
-const ASK_AGAIN = 400;
 const CONTROLS = "button, input, select, [tabindex]";
 const SCROLLING = ".cams-scroll, .in-scroll, .open-list";
 
@@ -166,8 +165,6 @@ export function mountOpening({ store, actions }) {
 	let [shown, trouble, turns] = ["", "", 0];
 	/** What is being wished, one after the other; looking and writing come after it. */
 	let wishing = Promise.resolve();
-	/** @type {Timer} */
-	let timer;
 
 	/** Do something with the server; what it refuses is told in the sheet. @param {() => Promise<any>} work */
 	async function attempt(work) {
@@ -200,7 +197,6 @@ export function mountOpening({ store, actions }) {
 	function take(next) {
 		if (info?.key === next.key && next.version < info.version) return;
 		info = next;
-		clearTimeout(timer);
 		if (next.phase === "written") {
 			info = null;
 			past = [];
@@ -208,27 +204,28 @@ export function mountOpening({ store, actions }) {
 			actions.note("info", `${next.wish.name} was imported`, next.folder);
 		} else {
 			show(next.sheet);
-			if (next.busy || ["writing", "copying", "reading"].includes(next.phase)) again(next.key);
+			// It may have been told of before this answer came.
+			void read();
 		}
 	}
 
-	/** Look how far it is, a little later. @param {string} key */
-	function again(key) {
-		clearTimeout(timer);
-		timer = setTimeout(
-			() =>
-				void attempt(async () => {
-					if (info?.key !== key) return;
-					await wishing;
-					const asked = turns;
-					const now = await getJson(`/api/import/${key}`);
-					// What was wished meanwhile is not in this answer.
-					if (asked === turns) take(now);
-					else again(key);
-				}),
-			ASK_AGAIN,
-		);
-	}
+	/** Read what is known by now, if it is more than what is shown. */
+	const read = fetcher(async () => {
+		await wishing;
+		const news = info && store.get().tasks[`import ${info.key}`];
+		if (info && news && news.done > info.version) await look(info.key);
+	});
+	/** @param {string} key */
+	const look = (key) =>
+		attempt(async () => {
+			const asked = turns;
+			const now = await getJson(`/api/import/${key}`);
+			// What was wished meanwhile is not in this answer.
+			if (asked === turns && info?.key === key) take(now);
+		});
+	store.on(["tasks"], read);
+	// A server that was started again knows it no more.
+	store.on(["link"], ({ link }) => link === "open" && info && void look(info.key));
 
 	/** @param {string} html */
 	function show(html) {
@@ -336,7 +333,6 @@ export function mountOpening({ store, actions }) {
 		sending?.abort();
 		sending = null;
 		past = [];
-		clearTimeout(timer);
 		const gone = info;
 		info = null;
 		if (gone) await request(`/api/import/${gone.key}`, { method: "DELETE" });
@@ -420,7 +416,6 @@ export function mountOpening({ store, actions }) {
 		event.preventDefault();
 	});
 	dialog.addEventListener("close", () => {
-		clearTimeout(timer);
 		// What was sought would take the next Escape for itself.
 		if (!info) dialog.innerHTML = shown = "";
 	});

@@ -172,6 +172,7 @@ export function createReceiver({ store, playback, actions, address, isOld }) {
 			void fetchTimeline();
 		},
 		evaluation: () => void fetchScores(),
+		tasks: ({ tasks }) => store.set({ tasks }),
 		study({ study }) {
 			const before = store.get().study;
 			store.set({ study });

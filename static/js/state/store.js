@@ -106,6 +106,7 @@ export function initialState() {
 		every: false,
 		scores: null,
 		identity: null,
+		tasks: {},
 		measure: "ospa",
 		laneOrder: "longest",
 		layout: {},

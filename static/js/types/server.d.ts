@@ -1128,6 +1128,11 @@ declare namespace Server {
 		edits: EditsInfo;
 		/** Grows when kept runs are named, marked, deleted or restored. */
 		marks: number;
+		/**
+		 * By ``export``, ``identity``, or ``import`` and its key. They come over the socket as they go
+		 * on, and here as they are when something else is told.
+		 */
+		tasks: Record<string, TaskInfo>;
 		viser: ViserInfo;
 	}
 
@@ -1247,6 +1252,20 @@ declare namespace Server {
 	/** The upright box around a person. */
 	interface TargetInfo {
 		half_extents: [number, number, number];
+	}
+
+	/** Work in the background: an export, a check of identities, an import. */
+	interface TaskInfo {
+		/** The number of an export, the key of a run, or that of an import. */
+		of: string;
+		state: string;
+		/** Of :attr:`total`; of an import its version: whoever shows it asks for it again. */
+		done: number;
+		/** 0 while it is not known. */
+		total: number;
+		/** What it makes: the name of a file. */
+		words: string;
+		error: string | null;
 	}
 
 	/** What the sequence was taught since its file was read. */

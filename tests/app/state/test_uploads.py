@@ -9,6 +9,7 @@ import pytest
 from app.state.importing import uploads
 from app.state.importing.desk import Desk
 from app.state.importing.uploads import Announced, Upload, UploadError, safe_path
+from app.state.workbench import Workbench
 
 
 @pytest.mark.parametrize(
@@ -88,7 +89,7 @@ def test_only_what_is_below_the_data_folder_is_opened(tmp_path: Path) -> None:
     data.mkdir()
     (other / "session").mkdir(parents=True)
     (data / "way-out").symlink_to(other / "session")
-    desk = Desk(data)
+    desk = Desk(Workbench(), data)
     for path in (str(other / "session"), "../other/session", "way-out"):
         with pytest.raises(UploadError, match="below the data folder"):
             desk.begin_from(path)
@@ -98,7 +99,7 @@ def test_only_what_is_below_the_data_folder_is_opened(tmp_path: Path) -> None:
 
 
 def test_the_oldest_import_makes_room(tmp_path: Path) -> None:
-    desk = Desk(tmp_path)
+    desk = Desk(Workbench(), tmp_path)
     drafts = [desk.begin([Announced("a.csv", 1)]) for _ in range(6)]
     assert [desk.draft(draft.key) is not None for draft in drafts] == [False] * 2 + [True] * 4
     desk.close()

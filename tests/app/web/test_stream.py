@@ -36,12 +36,26 @@ def test_a_page_is_told_everything_when_it_comes(client: TestClient) -> None:
     with connect(client) as socket:
         messages = read_until(socket, is_type("timeline"))
     told = {message["type"]: message for message in messages}
-    assert set(told) == {"playhead", "state", "step", "evaluation", "timeline"}
+    assert set(told) == {"playhead", "state", "step", "evaluation", "tasks", "timeline"}
     assert told["playhead"]["step"] == 40
     assert told["state"]["state"] == client.get("/api/state").json()
     step = {k: v for k, v in told["step"].items() if k != "type"}
     assert step == client.get("/api/step/40").json()
     assert told["timeline"]["done"] == 120
+
+
+def test_work_in_the_background_is_told_until_it_is_over(client: TestClient) -> None:
+    with connect(client) as socket:
+        read_until(socket, is_type("timeline"))
+        number = str(client.post("/api/exports", json={"format": "csv"}).json()["number"])
+
+        def over(message: Message) -> bool:
+            now = message.get("tasks", {}).get("export", {})
+            return bool(now.get("of") == number and now["state"] == "done")
+
+        messages = read_until(socket, over)
+    assert messages[-1]["tasks"]["export"]["words"].endswith(".csv")
+    assert not any(message["type"] == "state" for message in messages), "nothing else is told anew"
 
 
 def test_a_seek_reaches_every_page(client: TestClient) -> None:

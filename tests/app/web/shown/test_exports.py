@@ -12,6 +12,7 @@ import av
 import pytest
 from starlette.testclient import TestClient
 
+from app.state.workbench import Workbench
 from app.state.workers.exporter import Exporter
 from app.web.server import Settings, create_app
 from tests.app.conftest import ADDRESS, run_is, wait_until
@@ -64,7 +65,7 @@ def test_what_cannot_be_written_is_a_sentence(client: TestClient) -> None:
 
 
 def test_one_that_is_stopped_leaves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    exporter, waiting, go = Exporter(), threading.Event(), threading.Event()
+    exporter, waiting, go = Exporter(Workbench()), threading.Event(), threading.Event()
 
     def slowly() -> ExportedRun:
         waiting.set()
