@@ -29,8 +29,9 @@ from random import Random
 from tracker.files.atomic import write_whole
 from tracker.files.folders import cache_folder
 
-HANG_SECONDS = 30.0
-"""A worker that says nothing for so long is ended; its kernels may be compiled before."""
+HANG_SECONDS = 300.0
+"""A worker that says nothing for so long is ended; its kernels may be compiled before. A case takes
+a second, but on a machine with thirty other processes half a minute."""
 
 COMPILE_SECONDS = 600.0
 

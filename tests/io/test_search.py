@@ -40,7 +40,7 @@ def test_calibrations_in_any_order_are_assigned(seed: int) -> None:
     moved = np.roll(np.arange(5), int(rng.integers(1, 5)))  # none has its own
     stated = Convention(direction="world-to-camera", axes="opencv")
     shuffled = [replace(cameras[own], convention=stated) for own in moved]
-    verdict = found(shuffled, seen, Open(layouts=("ltwh",), normalised=(False,)))
+    verdict = found(shuffled, seen, Open(layouts=("ltwh",), parts=(0,)))
     assert verdict.best.reading.order == tuple(np.argsort(moved).tolist())
     assert verdict.kind == "decided"
 
@@ -83,7 +83,7 @@ def test_boxes_are_read_anew_where_order_and_pictures_were_found_with_others() -
         for own in seen
     ]
     verdict = find_reading(
-        smaller, corners, fps=10.0, tried=Open(normalised=(False,)), names="order", pixels=(2.0,)
+        smaller, corners, fps=10.0, tried=Open(parts=(0,)), names="order", pixels=(2.0,)
     )
     assert verdict is not None
     assert verdict.kind == "decided"
@@ -99,7 +99,7 @@ def test_a_calibration_without_boxes_is_that_of_boxes_without_their_own() -> Non
     moved = [4, 1, 5, 3, 0, 2]
     shuffled = [replace(cameras[own], convention=stated) for own in moved]
     boxes = [*seen[:4], None, None]
-    verdict = found(shuffled, boxes, Open(layouts=("ltwh",), normalised=(False,)))
+    verdict = found(shuffled, boxes, Open(layouts=("ltwh",), parts=(0,)))
     assert verdict.kind == "decided"
     order = verdict.best.reading.order
     assert order is not None

@@ -13,6 +13,7 @@ import pytest
 from app.command.main import main
 from tests.io.read.recorded import PLACES, detections, settled_of, toml, videos
 from tests.io.read.rig import FLIP, HALF_EXTENTS, SIZE, boxes, cameras
+from tracker.io.conventions.questions import PARTS
 from tracker.io.importing.finding.names import match, short_names
 from tracker.io.importing.options import ImportOptions
 from tracker.io.importing.settling import ImportPlan
@@ -393,6 +394,23 @@ def test_a_camera_that_saw_nobody_does_not_contradict_parts_of_the_picture(tmp_p
     own = settled.views[1].detections
     assert own is not None
     np.testing.assert_allclose(own.boxes, boxes(cameras()[1], PLACES)[1], atol=1e-6)
+
+
+@pytest.mark.parametrize("parts", [100, 1000])
+def test_boxes_in_finer_parts_of_the_picture_are_found_out(tmp_path: Path, parts: int) -> None:
+    toml(tmp_path)
+    for camera in cameras():
+        frames, found = boxes(camera, PLACES)
+        found[:, :2] += 0.5
+        found *= parts / np.array([*SIZE, *SIZE])
+        rows = [f"{f},{','.join(map(str, b))}" for f, b in zip(frames, found, strict=True)]
+        lines = ["frame,left,top,width,height", *rows]
+        (tmp_path / f"{camera.name}.csv").write_text("\n".join(lines))
+    settled = settled_of(tmp_path)
+    assert dict(settled.found)["boxes"].startswith(PARTS[parts])
+    for view, camera in zip(settled.views, cameras(), strict=True):
+        assert view.detections is not None
+        np.testing.assert_allclose(view.detections.boxes, boxes(camera, PLACES)[1], atol=1e-6)
 
 
 def test_boxes_by_their_middle_are_found_out(tmp_path: Path) -> None:

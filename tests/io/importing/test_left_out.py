@@ -7,13 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from tests.io.read.recorded import detections, settled_of, toml
+from tests.io.read.recorded import PLACES, detections, settled_of, toml
 from tests.io.read.rig import boxes, cameras, walks
 from tracker.export.calibration import save_calibration
 from tracker.io.importing.gathering import gather
 from tracker.io.importing.options import ImportOptions
 from tracker.io.importing.settling import ImportPlan, settle
-from tracker.io.read.pieces import FormatError
+from tracker.io.read.pieces import DetectionPiece, FormatError
 
 
 def _coco(folder: Path, *, people: bool) -> ImportPlan:
@@ -126,6 +126,25 @@ def test_a_row_that_cannot_be_read_costs_no_camera_its_boxes(tmp_path: Path, how
         assert "cannot be read and are left out, the first in line 32: " in words
 
 
+def test_rows_without_the_number_of_a_frame_cost_no_others(tmp_path: Path) -> None:
+    """The file of one camera is JSON, which has no lines that could be left out."""
+    toml(tmp_path)
+    detections(tmp_path)
+    frames, found = boxes(cameras()[1], PLACES)
+    numbers = [*frames[:30].tolist(), 3.7, None, *frames[32:].tolist()]
+    records = [
+        {"frame": n, "bbox": [x, y, x + w, y + h]}
+        for n, (x, y, w, h) in zip(numbers, found.tolist(), strict=True)
+    ]
+    (tmp_path / "cam2.csv").unlink()
+    (tmp_path / "cam2.json").write_text(json.dumps(records))
+    (piece,) = (p for one in gather([tmp_path]) if one.label == "cam2.json" for p in one.pieces)
+    assert isinstance(piece, DetectionPiece)
+    assert len(piece.frames) == len(frames) - 2
+    assert f"frame: 2 of {len(frames)} rows" in piece.left_out
+    assert "in row 31: expected the whole number of a frame, found 3.7" in piece.left_out
+
+
 def test_a_table_of_which_most_rows_cannot_be_read_is_not_used(tmp_path: Path) -> None:
     toml(tmp_path)
     detections(tmp_path)
@@ -134,3 +153,7 @@ def test_a_table_of_which_most_rows_cannot_be_read_is_not_used(tmp_path: Path) -
     (taken,) = (one for one in gather([tmp_path]) if one.label == "cam2.csv")
     assert not taken.pieces
     assert "cam2.csv" in taken.complaint
+    with pytest.raises(FormatError, match=r"cam2\.csv.*most of what cam2 saw would be left out"):
+        settled_of(tmp_path)
+    plan = settled_of(tmp_path, ImportOptions(accept_best=True))
+    assert [view.camera.name for view in plan.views] == ["cam1", "cam3", "cam4"]

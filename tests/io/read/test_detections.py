@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -310,7 +311,9 @@ def test_five_numbers_without_a_header(tmp_path: Path, sign: str) -> None:
     _assert_boxes(piece)
 
 
-@pytest.mark.parametrize(("name", "scale"), [("time", 1.0), ("timestamp_ms", 1000.0)])
+@pytest.mark.parametrize(
+    ("name", "scale"), [("time", 1.0), ("timestamp_ms", 1000.0), ("frame", 1.0)]
+)
 @pytest.mark.parametrize("fps", [2.0, 29.97])
 def test_times_in_place_of_frames(tmp_path: Path, name: str, scale: float, fps: float) -> None:
     """Rounded to milliseconds, and nobody is seen for a while."""
@@ -463,6 +466,70 @@ def test_rows_of_numbers_without_known_names(tmp_path: Path, name: str, rows: li
     assert piece.layout is None
     assert (piece.scores == (0.75 if "comma" in name or "score" in name else 1.0)).all()
     _assert_boxes(piece)
+
+
+@pytest.mark.parametrize("header", ["Kamera;Klasse;Bild;Links;Oben;Breite;Hoehe", ""])
+def test_words_between_numbers_are_cameras_or_classes(tmp_path: Path, header: str) -> None:
+    path = tmp_path / "alle.csv"
+    rows = [
+        ";".join([camera, "person", f"{f:.0f}", *map(repr, b)])
+        for camera in ("north", "south")
+        for f, *b in _rows()
+    ]
+    path.write_text("\n".join([*filter(None, [header]), *rows]))
+    pieces = [p for p in read(path)[1] if isinstance(p, DetectionPiece)]
+    assert [p.camera for p in pieces] == ["north", "south"]
+    for piece in pieces:
+        _assert_boxes(piece)
+
+
+def test_a_table_without_boxes_says_what_is_missing(tmp_path: Path) -> None:
+    path = tmp_path / "cam1.csv"
+    path.write_text("frame,x,y,score\n0,1.5,2.5,0.9\n1,2.5,3.5,0.8\n")
+    found, _, complaint = recognise(SourceFile(path))
+    assert found is None
+    assert 'is a table of "frame, x, y, score", among which are neither boxes' in str(complaint)
+
+
+SCORES = np.linspace(0.25, 0.75, len(FRAMES))
+ARRAYS: dict[str, Callable[[Path], object]] = {
+    "rows": lambda path: np.save(path, np.column_stack([FRAMES, BOXES, SCORES])),
+    "a structure": lambda path: np.save(
+        path,
+        np.rec.fromarrays([FRAMES, *BOXES.T, SCORES], names="frame,left,top,width,height,conf"),
+    ),
+    "columns": lambda path: np.savez(path, frames=FRAMES, boxes=BOXES, scores=SCORES),
+    "cameras": lambda path: np.savez_compressed(
+        path, north=np.column_stack([FRAMES, BOXES, SCORES]), notes=np.zeros(3)
+    ),
+}
+
+
+@pytest.mark.parametrize("form", ARRAYS)
+def test_arrays_of_numpy(tmp_path: Path, form: str) -> None:
+    ARRAYS[form](tmp_path / "cam1")
+    (path,) = tmp_path.iterdir()
+    piece = _detections(path)
+    _assert_boxes(piece)
+    np.testing.assert_array_equal(piece.scores, SCORES)
+    assert piece.camera == ("north" if form == "cameras" else "")
+
+
+@pytest.mark.parametrize("change", ["cut", "another size", "objects"])
+def test_spoilt_arrays_of_numpy_are_none(tmp_path: Path, change: str) -> None:
+    path = tmp_path / "cam1.npy"
+    np.save(path, np.column_stack([FRAMES, BOXES]))
+    data = path.read_bytes()
+    if change == "cut":
+        path.write_bytes(data[:-8])
+    elif change == "another size":
+        size = str(len(FRAMES)).encode()
+        path.write_bytes(data.replace(size + b", 5", b"9" * 15 + b", 5", 1))
+    else:
+        np.save(path, np.array([{}, {}]), allow_pickle=True)
+    found, _, complaint = recognise(SourceFile(path))
+    assert found is None
+    assert "NumPy array" in str(complaint)
 
 
 def test_rows_of_a_sensor_are_no_boxes(tmp_path: Path) -> None:

@@ -80,3 +80,39 @@ def test_csv_of_places_with_names_for_people(tmp_path: Path) -> None:
     assert truth.ids.tolist() == [1, 2, 1]
     assert truth.unit == "mm"
     np.testing.assert_array_equal(truth.positions[2], [7, 8, 9])
+
+
+TABLES: dict[str, str] = {
+    "x1 y1 of two": "frame,x1,y1,x2,y2\n0,3,1,2,4\n2,3,5,2,6\n",
+    "x1 y1 of three": "frame,x1,y1,x2,y2,x3,y3\n0,3,1,2,4,9,\n2,3,5,2,6,,9\n",
+    "person1_x": "frame;person1_x;person1_y;person2_x;person2_y\n0;3;1;2;4\n2;3;5;2;6\n",
+    "position": json.dumps([
+        {"frame": f, "person_id": i, "position": p}
+        for f, i, p in ((0, 1, [3, 1, 0]), (0, 2, [2, 4, 0]), (2, 1, [3, 5, 0]), (2, 2, [2, 6, 0]))
+    ]),
+    "x and y below position": json.dumps([
+        {"frame": f, "person_id": i, "position": {"x": x, "y": y}}
+        for f, i, x, y in ((0, 1, 3, 1), (0, 2, 2, 4), (2, 1, 3, 5), (2, 2, 2, 6))
+    ]),
+    "people of frames": json.dumps({"frames": [
+        {"frame": 0, "people": [{"id": 1, "location": [3, 1]}, {"id": 2, "location": [2, 4]}]},
+        {"frame": 2, "people": [{"id": 1, "location": [3, 5]}]},
+        {"frame": 2, "people": [{"id": 2, "location": [2, 6]}]},
+    ]}),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("form", TABLES)
+def test_places_of_several_people_in_one_row_or_record(tmp_path: Path, form: str) -> None:
+    path = tmp_path / "truth.txt"
+    path.write_text(TABLES[form])
+    truth = _truth(path)
+    rows = sorted(zip(truth.frames.tolist(), truth.ids.tolist(), *truth.positions[:, :2].T.tolist(),
+                      strict=True))  # fmt: skip
+    assert rows == [(0, 1, 3, 1), (0, 2, 2, 4), (2, 1, 3, 5), (2, 2, 2, 6)]
+
+
+def test_two_corners_are_no_people(tmp_path: Path) -> None:
+    path = tmp_path / "cam1.csv"
+    path.write_text("frame,x1,y1,x2,y2\n0,3,1,20,40\n2,3,5,20,60\n")
+    assert isinstance(read(path)[1][0], DetectionPiece)

@@ -13,7 +13,7 @@ from tracker.geometry.consistency.consensus import Consensus
 from tracker.geometry.consistency.observed import pose_of
 from tracker.geometry.consistency.suggestion import LEAST_AGREEING, Suggestion, stands, suggest
 from tracker.io.conventions.level import confirmed, upwards
-from tracker.io.conventions.questions import LAYOUTS, describe_moved
+from tracker.io.conventions.questions import LAYOUTS, PARTS, describe_moved
 from tracker.io.conventions.reading import Reading, exchanged, exchanges
 from tracker.io.conventions.readings import LEAST_SHARE, Judge, Judged, Open, Seen
 from tracker.io.conventions.search import Verdict, as_meant, find_reading
@@ -173,8 +173,9 @@ def _mistake(sequence: Sequence, told: BoxesTell) -> Check:
     if reading.layout != "ltwh":
         words.append(f"boxes read as {LAYOUTS[reading.layout]}")
         remedies.append(Remedy("--boxes", reading.layout))
-    if reading.normalised:
-        words.append("boxes read as parts of the picture's size")
+    if reading.parts:
+        words.append(f"boxes read as {PARTS[reading.parts]}")
+    if reading.parts == 1:
         remedies.append(Remedy("--boxes", f"{reading.layout}-normalised"))
     if reading.order is not None:
         pairs = exchanged(reading.order, names)

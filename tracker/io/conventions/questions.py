@@ -31,8 +31,9 @@ OF_ONE = (
 """What is said of an import of one camera with boxes."""
 
 Part = Literal[
-    "direction", "axes", "layout", "turns", "order", "mirrored", "flipped", "pixels", "scene"
-]
+    "direction", "axes", "layout", "parts", "turns", "order", "mirrored", "flipped", "pixels",
+    "scene",
+]  # fmt: skip
 """What two interpretations may differ in; the scene where none of the others does."""
 
 UNPROVEN = (
@@ -48,6 +49,14 @@ LAYOUTS: dict[Layout, str] = {
     "cxcywh": "centre and size",
 }
 """What the four numbers of a box are, in words."""
+
+PARTS = {
+    0: "pixels",
+    1: "parts of the picture's size",
+    100: "per cent of the picture's size",
+    1000: "thousandths of the picture's size",
+}
+"""What numbers of boxes count, in words."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,7 +153,8 @@ def _differing(one: Reading, other: Reading) -> list[Part]:
 def _open(best: Reading, rival: Reading, odds: float, names: Sequence[str]) -> Question:
     sure = "as likely" if odds < math.log(2.0) else f"{math.exp(min(odds, 7.0)):.0f} : 1"
     differing = _differing(best, rival)
-    words = {"layout": "boxes", "order": "which calibration is whose", "turns": "angles",
+    words = {"layout": "boxes", "parts": "what numbers of boxes count",
+             "order": "which calibration is whose", "turns": "angles",
              "direction": "where R and t lead", "axes": "axes of cameras",
              "mirrored": "handedness of the world", "flipped": "left and right of the pictures",
              "pixels": "size of the pictures"}  # fmt: skip
@@ -180,6 +190,7 @@ def in_words(reading: Reading, names: Sequence[str], parts: Sequence[str] = ()) 
         "direction": f"poses {reading.direction}",
         "axes": "y down and z ahead" if reading.axes == "opencv" else "y up and z back",
         "layout": f"boxes as {LAYOUTS[reading.layout]}",
+        "parts": f"in {PARTS[reading.parts]}" if reading.parts or "parts" in parts else "",
         "turns": f"angles {reading.turns}" if reading.turns else "",
         "order": "calibrations as given"
         if reading.order is None

@@ -29,8 +29,9 @@ class Reading:
     direction: Direction = "world-to-camera"
     axes: Axes = "opencv"
     layout: Layout = "ltwh"
-    normalised: bool = False
-    """Whether boxes are parts of the picture's size."""
+    parts: int = 0
+    """In how many parts of the picture's width and height boxes are given: 1, 100 (per cent) or
+    1000; 0 for pixels."""
     unit: Unit = "m"
     up: Up = "z"
     lean: tuple[float, float] = (0.0, 0.0)
@@ -179,7 +180,10 @@ def _split(camera: RawCamera) -> Camera:
 
 
 def read_boxes(
-    four: Float[ndarray, "D 4"], layout: Layout, scale: tuple[int, int] | None = None
+    four: Float[ndarray, "D 4"],
+    layout: Layout,
+    scale: tuple[int, int] | None = None,
+    parts: int = 1,
 ) -> Float[ndarray, "D 4"]:
     """Boxes as left, top, width, height in pixels.
 
@@ -187,6 +191,7 @@ def read_boxes(
         four: The numbers as the file has them.
         layout: What they mean.
         scale: Width and height of the picture where they are parts of it.
+        parts: How many parts each of these has then.
     """
     boxes = np.array(four, dtype=float)
     if layout == "yxyx":
@@ -196,7 +201,7 @@ def read_boxes(
     elif layout == "cxcywh":
         boxes[:, :2] -= boxes[:, 2:] / 2.0
     if scale is not None:
-        boxes *= np.array([*scale, *scale], dtype=float)
+        boxes *= np.array([*scale, *scale], dtype=float) / parts
         boxes[:, :2] -= 0.5  # a part of the picture's size begins at the pixel's corner
     return boxes
 
@@ -211,7 +216,7 @@ def boxes_by(
         reading: How they are meant.
         size: Width and height of the pictures.
     """
-    boxes = read_boxes(four, reading.layout, size if reading.normalised else None)
+    boxes = read_boxes(four, reading.layout, size if reading.parts else None, reading.parts)
     if reading.flipped:
         boxes[:, 0] = size[0] - 1.0 - boxes[:, 0] - boxes[:, 2]
     return boxes

@@ -53,6 +53,10 @@ _LEAST_BREADTH = -0.2
 LEAST_SHARE = 0.05
 """A smaller share of agreeing pairs proves nothing."""
 
+_SAME_SIZE = 0.05
+"""By how much the sides of a picture may differ from thousand pixels that lead to one scene with
+boxes in thousandths."""
+
 EVERY_ORDER = 4
 """Up to so many cameras every exchange is tried, above that one pair at a time."""
 
@@ -78,7 +82,9 @@ class Open:
     directions: tuple[Direction, ...] = get_args(Direction)
     axes: tuple[Axes, ...] = get_args(Axes)
     layouts: tuple[Layout, ...] = get_args(Layout)
-    normalised: tuple[bool, ...] = (False, True)
+    parts: tuple[int, ...] = (0, 1)
+    finer: tuple[int, ...] = (100, 1000)
+    """Parts of the picture's size that are tried besides pixels."""
     orders: bool = True
     """Whether calibrations may be exchanged."""
 
@@ -191,7 +197,7 @@ class Judge:
         own, calibration = self._paired[camera], self.order(reading)[camera]
         if own is None or not len(own.four):
             return 0.0
-        key = (camera, calibration, reading.layout, reading.normalised, reading.pixels)
+        key = (camera, calibration, reading.layout, reading.parts, reading.pixels)
         if key not in self._breadths:
             size = self.lens_at(calibration, reading)[0].image_size
             boxes = boxes_by(own.four, reading, size)
@@ -280,7 +286,7 @@ class Judge:
             camera,
             calibration,
             reading.layout,
-            reading.normalised,
+            reading.parts,
             reading.pixels,
             reading.flipped,
             told,
@@ -331,9 +337,17 @@ def restricted(tried: Open, cameras: Many[RawCamera], seen: Many[Seen | None]) -
     if all(camera.projection is not None for camera in cameras):
         tried = replace(tried, directions=("world-to-camera",), axes=("opencv",))
     four = np.concatenate([np.zeros((0, 4)), *(own.four for own in seen if own is not None)])
-    if len(tried.normalised) > 1 and len(four):
+    if len(tried.parts) > 1 and len(four):
         # parts of a picture are at most 1, and a box a little beyond the edge a little more
-        tried = replace(tried, normalised=(bool(np.quantile(np.abs(four), 0.99) <= 1.5),))
+        tried = replace(tried, parts=(int(np.quantile(np.abs(four), 0.99) <= 1.5),))
+    largest = np.quantile(np.abs(four), 0.99) if len(four) else 0.0
+    known = [camera.image_size for camera in cameras if camera.image_size is not None]
+    finer = tuple(
+        parts
+        for parts in tried.finer
+        if largest <= parts and any(abs(side / parts - 1.0) > _SAME_SIZE for side in sum(known, ()))
+    )
+    tried = replace(tried, finer=finer)
     sizes = tuple(layout for layout in tried.layouts if layout not in ("xyxy", "yxyx"))
     if sizes and len(four) and (four[:, 2:] > four[:, :2]).all(axis=1).mean() < 0.99:
         # a right edge left of the left one, or a lower one above the upper

@@ -215,7 +215,7 @@ class Likelihood:
                 found.append(None)
                 continue
             way = poses[camera].rotation @ up
-            key = (steps[camera] is None, camera, calibration, reading.layout, reading.normalised,
+            key = (steps[camera] is None, camera, calibration, reading.layout, reading.parts,
                    reading.flipped, reading.pixels, tuple(np.round(way, 7).tolist()))  # fmt: skip
             if key not in self._boxes:
                 lens, known = self.judge.lens_at(calibration, reading)
@@ -444,7 +444,7 @@ def _candidates(
     ]
     if not found or found[0].evidence.share < _EXPLAINED:
         rivals = readings  # any of them may explain the boxes in a mirror or of other pictures
-    found += _scored(likelihood, list(_questioned(rivals, pixels)), -RARE)
+    found += _scored(likelihood, list(_questioned(rivals, pixels, open_.finer)), -RARE)
     if open_.orders:
         best = max(found, key=lambda one: one.score, default=None)
         if best is None or best.prior < 0.0 or best.evidence.share < _PLAINLY:
@@ -486,7 +486,7 @@ def _reread(
     if not found:
         return []
     best, known = found[0], {one.reading for one in found}
-    parts = ("order", "pixels", "mirrored", "flipped")
+    parts = ("order", "parts", "pixels", "mirrored", "flipped")
     questioned = {part: getattr(best.reading, part) for part in parts}
     others = [replace(reading, **questioned) for reading in readings]
     return _scored(likelihood, [one for one in others if one not in known], best.prior)
@@ -539,9 +539,9 @@ def _far_behind(best: Interpretation, one: Interpretation) -> bool:
 
 
 def _readings(open_: Open, cameras: Many[RawCamera]) -> Iterator[Reading]:
-    parts = (open_.directions, open_.axes, open_.layouts, open_.normalised, turns_of(cameras))
-    for direction, axes, layout, normalised, turns in itertools.product(*parts):
-        yield Reading(direction, axes, layout, normalised, turns=turns)
+    parts = (open_.directions, open_.axes, open_.layouts, open_.parts, turns_of(cameras))
+    for direction, axes, layout, share, turns in itertools.product(*parts):
+        yield Reading(direction, axes, layout, share, turns=turns)
 
 
 def _scored(likelihood: Likelihood, readings: Many[Reading], prior: float) -> list[Interpretation]:
@@ -550,13 +550,17 @@ def _scored(likelihood: Likelihood, readings: Many[Reading], prior: float) -> li
     return sorted((one for one in found if one is not None), key=lambda one: -one.score)
 
 
-def _questioned(readings: Many[Reading], pixels: Many[float]) -> Iterator[Reading]:
-    """Readings in a mirrored world, with mirrored pictures, and for pictures of another size."""
+def _questioned(
+    readings: Many[Reading], pixels: Many[float], finer: Many[int]
+) -> Iterator[Reading]:
+    """Readings in a mirrored world, with mirrored pictures, for pictures of another size, and with
+    boxes in parts of it."""
     for reading in readings:
         yield replace(reading, mirrored=True)
         yield replace(reading, flipped=True)
-        if not reading.normalised:
+        if not reading.parts:
             yield from (replace(reading, pixels=factor) for factor in pixels)
+            yield from (replace(reading, parts=parts) for parts in finer)
 
 
 def _with_orders(likelihood: Likelihood, best: Interpretation, each: float) -> list[Interpretation]:
@@ -617,7 +621,7 @@ def _orders(own: tuple[int, ...], count: int) -> Iterator[tuple[int, ...]]:
 
 def same_scene(judge: Judge, one: Interpretation, other: Interpretation) -> bool:
     """Whether the cameras with boxes differ by a turn, shift or scale of the world alone."""
-    parts = ("layout", "pixels", "flipped", "mirrored")
+    parts = ("layout", "parts", "pixels", "flipped", "mirrored")
     if any(getattr(one.reading, part) != getattr(other.reading, part) for part in parts):
         return False
     first, second = (

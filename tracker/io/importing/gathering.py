@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tracker.io.importing.spoilt_rows import readable_rows
+from tracker.io.importing.spoilt_rows import is_table, readable_rows
 from tracker.io.read.calibration.possible import check_cameras
 from tracker.io.read.pieces import CalibrationPiece, DetectionPiece, FormatError, Piece
 from tracker.io.read.protocol import Certainty, Format
@@ -45,6 +45,8 @@ class ParsedFiles:
     complaint: str = ""
     """Why it is not used, where it was recognised or begins as something known."""
     files: tuple[Path, ...] = ()
+    mostly_spoilt: bool = False
+    """Whether it is a table of text most rows of which cannot be read."""
 
 
 def gather(sources: Sequence[Path]) -> list[ParsedFiles]:
@@ -220,7 +222,7 @@ def _without_spoilt_rows(file: SourceFile, taken: ParsedFiles) -> ParsedFiles:
     try:
         rows = readable_rows(file, most)
         if rows is None:
-            return taken
+            return replace(taken, mostly_spoilt=bool(taken.format) and is_table(file))
         own = FileOfLines(file, rows.lines)
         found, certainty, _ = _recognise(own)
     except FormatError:

@@ -23,6 +23,7 @@ from tracker.io.conventions.orders import MOST_CAMERAS
 from tracker.io.conventions.questions import (
     ACCEPT,
     OF_ONE,
+    PARTS,
     UNPROVEN,
     Undecided,
     Unexplained,
@@ -457,7 +458,7 @@ def _read(
         find_reading,
         seen=[*seen, *[None] * len(spare)],
         fps=times.fps,
-        tried=Open(layouts=layouts, normalised=(True in in_parts,), orders=free),
+        tried=Open(layouts=layouts, parts=(int(True in in_parts),), orders=free),
         names=matched_by(cameras),
         pixels=_other_pixels(cameras, raws, seen),
     )
@@ -524,9 +525,14 @@ def _read(
             found.append((name, f"{getattr(reading, name)}, {how}; --{flag}"))
     factor: float | None = None
     changed: list[_Boxes | None] = []
-    for own in boxes:
-        if own is not None and own.layout is None:
-            four = read_boxes(own.detections.boxes, reading.layout, own.scale)
+    finer = reading.parts if reading.parts > 1 else 0
+    if finer:
+        found.append(("boxes", f"{PARTS[finer]}, {why}"))
+    for own, raw in zip(boxes, raws, strict=True):
+        if own is not None and (own.layout is None or finer):
+            scale = raw.image_size if finer else own.scale
+            layout = reading.layout if own.layout is None else "ltwh"
+            four = read_boxes(own.detections.boxes, layout, scale, max(finer, 1))
             own = _Boxes(replace(own.detections, boxes=four), reading.layout)
         if own is not None and larger != 1.0:
             corners = (own.detections.boxes[:, :2] + 0.5) / larger - 0.5
@@ -537,7 +543,7 @@ def _read(
         size = options.half_extents
         factor = (PERSON if size is None else 2.0 * size[2]) / best.consensus.height
         raws = [_resized(raw, factor) for raw in raws]
-    reading = replace(reading, layout="ltwh", normalised=False, order=None, pixels=1.0)
+    reading = replace(reading, layout="ltwh", parts=0, order=None, pixels=1.0)
     return reading, raws, changed, factor, verdict if enough else None
 
 

@@ -48,7 +48,7 @@ def readable_rows(file: SourceFile, most: float) -> ReadableRows | None:
     Raises:
         FormatError: If the file cannot be read as text.
     """
-    if not file.is_text or file.size > MOST_TREE_BYTES or file.head_text.lstrip()[:1] in "[{<":
+    if not is_table(file):
         return None
     lines = file.lines()
     rows = [k for k, line in enumerate(lines) if line.strip() and not line.startswith("#")]
@@ -77,6 +77,15 @@ def readable_rows(file: SourceFile, most: float) -> ReadableRows | None:
         [line for k, line in enumerate(lines) if k not in set(spoilt)],
         f"{file.where}: {count} cannot be read and are left out, the first in line {first + 1}: "
         f"{shown(lines[first])}.",
+    )
+
+
+def is_table(file: SourceFile) -> bool:
+    """Whether a file is text of rows rather than a tree, and not too large to look at each row."""
+    return (
+        file.is_text
+        and file.size <= MOST_TREE_BYTES
+        and file.head_text.lstrip()[:1] not in ("[", "{", "<")
     )
 
 

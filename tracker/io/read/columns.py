@@ -52,6 +52,8 @@ WORDS: dict[str, tuple[str, ...]] = {
     "x": ("x", "xm", "worldx", "xworld", "px", "posx", "positionx", "xmm", "xcm"),
     "y": ("y", "ym", "worldy", "yworld", "py", "posy", "positiony", "ymm", "ycm"),
     "z": ("z", "zm", "worldz", "zworld", "pz", "posz", "positionz", "zmm", "zcm"),
+    "place": ("position", "pos", "place", "location", "xyz", "xy", "worldposition", "position3d",
+              "location3d", "coordinates", "worldcoordinates", "floorposition"),
     "valid": ("valid",),
 }  # fmt: skip
 """Names, without case, blanks and underscores, of each meaning; the first that is there counts."""
@@ -67,6 +69,10 @@ _OURS = "existence"
 
 _LONGEST = 1e6
 """Seconds: larger numbers are not times since a recording began."""
+
+_FRACTIONS = 0.4
+"""Share of numbers of frames that are not whole above which they are seconds: of two frames a
+second every other one is whole."""
 
 _SELDOM = 5.0
 """Seconds between two pictures of a recording that are more likely milliseconds."""
@@ -134,7 +140,41 @@ def is_table(names: Sequence[str]) -> bool:
         return False
     found = meanings(names)
     when = "frame" in found or "time" in found
-    return layout_of(found) is not None or (when and all(p in found for p in ("id", "x", "y")))
+    placed = "place" in found or ("x" in found and "y" in found)
+    return layout_of(found) is not None or (when and "id" in found and placed)
+
+
+def has_boxes(names: Sequence[str]) -> bool:
+    """Whether there are frames or times, and a column with all numbers of a box."""
+    found = meanings(names)
+    return "box" in found and not found.keys().isdisjoint(("frame", "time"))
+
+
+def singular(name: str) -> str:
+    """The name of a column, that of a list with an ending as ``boxes`` without it."""
+    own = plain(name)
+    endings = (own, own.removesuffix("s"), own.removesuffix("es"))
+    return next((word for word in endings if meanings([word])), name)
+
+
+def _with_places(file: SourceFile, columns: Mapping[str, Column]) -> Mapping[str, Column]:
+    """Return the columns with places that are lists of two or three numbers as x, y, z.
+
+    Raises:
+        FormatError: If they are anything else.
+    """
+    found = meanings(list(columns))
+    if "place" not in found or "x" in found or layout_of(found) is not None or "box" in found:
+        return columns
+    name = found["place"]
+    try:
+        values = np.asarray(columns[name], dtype=float)
+    except (ValueError, TypeError):
+        values = np.zeros(0)
+    if values.ndim != 2 or values.shape[1] not in (2, 3):
+        raise file.error("expected two or three numbers of a place in every row", name)
+    axes: dict[str, Column] = dict(zip("xyz", values.T.tolist(), strict=False))
+    return {**{key: cells for key, cells in columns.items() if key != name}, **axes}
 
 
 def read_table(
@@ -156,6 +196,19 @@ def read_table(
     Raises:
         FormatError: If there is no frame, or a cell is no number.
     """
+    columns = _with_places(file, columns)
+    columns, left_out = (columns, "") if frame is not None else _with_frames(file, columns)
+    for piece in _pieces(file, name, columns, frame, boxes_layout):
+        yield replace(piece, left_out=" ".join(filter(None, (left_out, piece.left_out))))
+
+
+def _pieces(
+    file: SourceFile,
+    name: str,
+    columns: Mapping[str, Column],
+    frame: int | None,
+    boxes_layout: Layout | None,
+) -> Iterator[DetectionPiece | TruthPiece]:
     found = meanings(list(columns))
     rows = len(next(iter(columns.values()), ()))
     when = Times()
@@ -176,7 +229,7 @@ def read_table(
     elif frame is not None:
         frames = np.full(rows, frame, dtype=np.int64)
     else:
-        frames = _frames(file, found["frame"], columns[found["frame"]])
+        frames = _numbers_in(columns[found["frame"]]).astype(np.int64)
     form = layout_of(found)
     if form is None and "box" in found:
         values, more = _fours(file, found["box"], columns[found["box"]], frames)
@@ -219,7 +272,7 @@ def _detections(
     boxes: Float[ndarray, "D 4"],
     layout: Layout | None,
     when: Times,
-) -> Iterator[Piece]:
+) -> Iterator[DetectionPiece]:
     scores = np.ones(len(frames))
     if "score" in found:
         scores = _numbers(file, found["score"], columns[found["score"]], blank=1.0)
@@ -348,22 +401,55 @@ def _truth(
     )
 
 
-def _frames(file: SourceFile, name: str, cells: Column) -> Int[ndarray, " D"]:
+def _with_frames(
+    file: SourceFile, columns: Mapping[str, Column]
+) -> tuple[Mapping[str, Column], str]:
+    """Return the rows that have the whole number of a frame, and a sentence about the others.
+
+    Where most numbers are not whole they are times, and their column is called so.
+
+    Raises:
+        FormatError: If half of the rows have no frame.
+    """
+    name = meanings(list(columns)).get("frame")
+    if name is None:
+        return columns, ""
+    numbers = _numbers_in(columns[name])
+    whole = (numbers == np.round(numbers)) & (np.abs(numbers) < 2**53)
+    rows, out = len(whole), int((~whole).sum())
+    if not out:
+        return columns, ""
+    own = np.unique(numbers)
+    if len(own) > 1 and np.isfinite(own).all() and (own % 1.0 > 0.0).mean() > _FRACTIONS:
+        named = {key: cells for key, cells in columns.items() if key != name}
+        return named if "time" in meanings(list(named)) else {**named, "time": columns[name]}, ""
+    row = int(np.argmin(whole))
+    words = f"row {row + 1}: expected the whole number of a frame, found"
+    if 2 * out >= rows:
+        raise file.error(f"{words} {shown(columns[name][row])}", name)
+    kept = {
+        key: [cells[k] for k in np.flatnonzero(whole).tolist()] for key, cells in columns.items()
+    }
+    return kept, (
+        f"{file.where}, {name}: {out} of {rows} rows ({out / rows:.2%}) are left out, the first in "
+        f"{words} {shown(columns[name][row])}"
+    )
+
+
+def _numbers_in(cells: Column) -> Float[ndarray, " D"]:
+    """The number of each cell or of the name in it; NaN if there is none."""
     try:
-        values = np.asarray(cells, dtype=float)
-    except (ValueError, TypeError):
-        numbers = [number_in(str(cell)) for cell in cells]
-        if None in numbers:
-            cell = cells[numbers.index(None)]
-            raise file.error(f"expected a frame's number, found {shown(cell)}", name) from None
-        return np.array(numbers, dtype=np.int64)
-    whole = np.isfinite(values) & (values == np.round(values)) & (np.abs(values) < 2**53)
-    if not whole.all():
-        row = int(np.argmin(whole))
-        raise file.error(
-            f"row {row + 1}: expected the whole number of a frame, found {shown(cells[row])}", name
-        )
-    return values.astype(np.int64)
+        return np.asarray(cells, dtype=float)
+    except (ValueError, TypeError, OverflowError):
+        return np.array([_number_of(cell) for cell in cells])
+
+
+def _number_of(cell: Any) -> float:
+    try:
+        return float(cell)
+    except (ValueError, TypeError, OverflowError):
+        number = number_in(str(cell))
+    return np.nan if number is None else float(number)
 
 
 class Times(NamedTuple):

@@ -175,6 +175,8 @@ class TruthPiece:
     cells: Int[ndarray, " G"] | None = None
     """The number of each row's place on a grid that the file does not define; ``positions`` are
     those of the first of :data:`GRIDS`."""
+    left_out: str = ""
+    """A sentence about rows of the file that have no place; empty where there are none."""
     feet: Mapping[str, Float[ndarray, "G 2"]] = field(default_factory=lambda: MappingProxyType({}))
     """By view the middle of the lower edge of each row's own box, pixels; NaN for none."""
 

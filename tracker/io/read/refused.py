@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable
 from typing import NamedTuple
 
+from tracker.files.text import shown
 from tracker.io.read.pieces import FormatError
 from tracker.io.read.source import SourceFile
 
@@ -101,6 +102,11 @@ _KNOWN: tuple[_Refused, ...] = (
         _holds(r"\AFormat Version,"),
         "export it as TRC to have it as truth",
     ),
+    _Refused(
+        "Supervisely's annotation of a video",
+        _holds(r'"(objectKey|framesCount)"'),
+        "export it as COCO or MOTChallenge",
+    ),
     _Refused("C3D", _starts(*(bytes([n, 0x50]) for n in range(2, 12))), "export it as TRC"),
     _Refused("a skeleton in BVH", _holds(r"\AHIERARCHY\s"), "export the joints as TRC"),
     _Refused("FBX", _starts(b"Kaydara FBX"), "export the joints as TRC"),
@@ -130,4 +136,25 @@ def refusal(file: SourceFile, complaint: FormatError | None = None) -> FormatErr
     for one in (*_KNOWN, _ARCHIVE) if complaint is None else _KNOWN:
         if one.is_it(file):
             return file.error(f"is {one.what}, which is not read; {one.instead}")
+    names = _header(file) if complaint is None else ()
+    if names:
+        return file.error(
+            f"is a table of {shown(', '.join(names))}, among which are neither boxes nor places; "
+            'name its columns "frame", "left", "top", "width", "height" (and "camera"), or '
+            '"frame", "id", "x", "y" of places on the floor'
+        )
     return complaint
+
+
+def _header(file: SourceFile) -> tuple[str, ...]:
+    """The names of the columns of a table of numbers; none of another file."""
+    lines = file.head_text.splitlines()[:2]
+    delimiter = max(",;\t", key=lines[0].count) if len(lines) == 2 else ","
+    names, cells = (
+        [cell.strip() for cell in line.split(delimiter)] for line in (lines + [""] * 2)[:2]
+    )
+    numbers = [cell for cell in cells if re.fullmatch(r"-?\d+([.,]\d+)?", cell)]
+    named = len(names) > 2 and all(re.search(r"[^\W\d_]", name) for name in names)
+    return (
+        tuple(names) if named and len(names) == len(cells) and 2 * len(numbers) > len(cells) else ()
+    )

@@ -18,6 +18,7 @@ from tracker.io.read.calibration import (
 from tracker.io.read.calibration.datasets import matrices, tsai
 from tracker.io.read.calibration.reconstruction import colmap, scenes
 from tracker.io.read.detections import (
+    arrays,
     coco,
     motchallenge,
     nested,
@@ -70,6 +71,7 @@ FORMATS: tuple[Format, ...] = (
     nested,
     table,
     parquet,
+    arrays,
     wildtrack,
     trc,
     panoptic,

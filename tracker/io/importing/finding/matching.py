@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from tracker.io.conventions.questions import ACCEPT
 from tracker.io.importing.finding.calibrations import CameraSet
 from tracker.io.importing.finding.names import How, match, words_of
 from tracker.io.importing.gathering import ParsedFiles
@@ -111,6 +112,8 @@ def match_all(
     if len(lost) == len(used) and any(lost) and not any(c.video or c.images for c in used):
         raise FormatError(f"no box of a person is left in any camera: {next(filter(None, lost))}")
     if used and len(used) < len(cameras):
+        if not options.accept_best:
+            _check_read([c.raw.name for c in cameras if c not in used], taken)
         left = [c.raw.name for c in cameras if c not in used]
         told.append(
             f"{len(left)} cameras of {chosen.label} have neither video nor boxes and are left out: "
@@ -118,6 +121,25 @@ def match_all(
         )
     spare = [c for c in cameras if used and c not in used]
     return Matched(used or cameras, chosen.format, truths, told, spare)
+
+
+def _check_read(names: Sequence[str], taken: Sequence[ParsedFiles]) -> None:
+    """Check that no table of the cameras without files is mostly spoilt.
+
+    Args:
+        names: The cameras without files.
+        taken: All files.
+
+    Raises:
+        FormatError: If most rows of a table that belongs to one of them cannot be read.
+    """
+    for one in taken:
+        found = match(names, [one.label], by_order=False) if one.mostly_spoilt else None
+        if found is not None:
+            raise FormatError(
+                f"{one.complaint}; so most of what {names[found[0][0]]} saw would be left out: get "
+                f"the file again, or {ACCEPT} imports the other cameras alone"
+            )
 
 
 _Pictures = list[tuple[str, VideoPiece | ImagesPiece]]

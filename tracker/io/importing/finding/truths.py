@@ -61,6 +61,8 @@ def settle_truth(
     steps, ids, places, valid = [], [], [], []
     beyond = 0
     for piece in pieces:
+        if piece.left_out:
+            found.append(("truth", piece.left_out))
         first = piece.first_index if first_index is None else first_index
         own = piece.frames - (first if first is not None else int(piece.frames.min() > 0))
         given = piece.positions.copy()

@@ -16,12 +16,23 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+import numpy as np
+
 from tracker.io.read.columns import Column, decimal_point, is_table, layout_of, meanings, read_table
 from tracker.io.read.picture_names import is_camera_number, number_in
 from tracker.io.read.pieces import FormatError, Piece
 from tracker.io.read.protocol import Certainty, Kind
 from tracker.io.read.source import SourceFile
 from tracker.io.read.values import is_list_of_tables
+
+_OF_PERSON = re.compile(
+    r"(?:(?:p|id|person|ped|pedestrian|player|subject|target|track|human|object)[ _.-]?)?"
+    r"(?P<number>\d+)[ _.-]?(?P<axis>[xyz])|(?P<before>[xyz])[ _.-]?(?P<after>\d+)"
+)
+"""The name of a column with a coordinate of one person."""
+
+_CORNERS = 0.9
+"""Share of rows in which the second of two points is right of and below the first of a box."""
 
 NAME = "table of boxes or places (CSV, JSON)"
 KIND: Kind = "detections"
@@ -32,7 +43,8 @@ def recognise(file: SourceFile) -> Certainty:
     """A header, or records, with the names of a box or of a person's place."""
     start = file.head_text.lstrip()[:1]
     if start in ("[", "{"):
-        if not any(word in file.head_text for word in ("box", "x_min", "xmin", "x1", "left")):
+        words = ("box", "x_min", "xmin", "x1", "left", '"x"', "xyz", "position", "location")
+        if not any(word in file.head_text for word in words):
             return Certainty.NO
         records = _records(file)
         names = list(flat(records[0][1])) if records else []
@@ -40,7 +52,8 @@ def recognise(file: SourceFile) -> Certainty:
         return Certainty.LIKELY if has_box or is_table(names) else Certainty.NO
     lines = _data_lines(file.head_text)
     names = _cells(lines[0], _delimiter(lines[0])) if lines else []
-    return Certainty.LIKELY if len(names) > 3 and is_table(_flat_names(names)) else Certainty.NO
+    known = len(names) > 3 and (is_table(_flat_names(names)) or bool(_people_of(names)))
+    return Certainty.LIKELY if known else Certainty.NO
 
 
 def read(file: SourceFile) -> Iterator[Piece]:
@@ -109,7 +122,51 @@ def _columns(file: SourceFile) -> tuple[dict[str, Column], list[int] | None]:
     if delimiter != ",":
         rows = [[decimal_point(cell) for cell in row] for row in rows]
     cells = list(zip(*rows[1:], strict=True)) or [()] * len(names)
-    return _with_boxes(dict(zip(names, cells, strict=True))), None
+    return _a_row_a_person(_with_boxes(dict(zip(names, cells, strict=True)))), None
+
+
+def _people_of(names: list[str]) -> dict[str, dict[str, str]]:
+    """The columns x, y and z of each person of a table that has some for each, by the person.
+
+    They are called ``x1, y1, x2, y2`` … or ``person1_x, person1_y`` …
+    """
+    people: dict[str, dict[str, str]] = {}
+    for name in names:
+        match = _OF_PERSON.fullmatch(name.strip().lower())
+        if match is not None:
+            number = match["number"] or match["after"]
+            people.setdefault(number, {})[match["axis"] or match["before"]] = name
+    whole = {number: own for number, own in people.items() if {"x", "y"} <= own.keys()}
+    when = {"frame", "time"} & meanings(names).keys()
+    return whole if len(whole) > 1 and when else {}
+
+
+def _a_row_a_person(columns: dict[str, Column]) -> dict[str, Column]:
+    """A table with columns for each person as one with a row for each; any other as it is.
+
+    Two people of whom the second is nearly always right of and below the first are a box.
+    """
+    people = _people_of(list(columns))
+    if not people:
+        return columns
+    if layout_of(meanings(list(columns))) is not None and len(people) == 2:
+        corners = [columns[people[n][axis]] for axis in "xy" for n in sorted(people)]
+        try:
+            left, right, top, bottom = np.array(corners, dtype=float)
+        except ValueError:  # a person who is not there
+            left, right, top, bottom = np.zeros((4, 1))
+        if ((right > left) & (bottom > top)).mean() > _CORNERS:
+            return columns
+    found = meanings(list(columns))
+    when = found.get("frame", found.get("time", ""))
+    long: dict[str, Column] = {
+        when: [cell for _ in people for cell in columns[when]],
+        "id": [number for number in people for _ in columns[when]],
+    }
+    for axis in "xyz":
+        if all(axis in own for own in people.values()):
+            long[axis] = [cell for own in people.values() for cell in columns[own[axis]]]
+    return long
 
 
 def _with_boxes(columns: dict[str, Column]) -> dict[str, Column]:
@@ -142,7 +199,10 @@ def _records(file: SourceFile) -> list[tuple[int | None, dict[str, Any]]]:
             for record in records
             if isinstance(record, dict)
         ]
-    return [(None, record) for record in values if isinstance(record, dict)]
+    records = [record for record in values if isinstance(record, dict)]
+    expanded = _of_lines(records)
+    placed = bool(expanded) and "place" in meanings(list(expanded[0]))
+    return [(None, record) for record in (expanded if placed else records)]
 
 
 def _of_lines(values: list[Any]) -> list[dict[str, Any]]:
@@ -161,9 +221,9 @@ def _of_lines(values: list[Any]) -> list[dict[str, Any]]:
 
 
 def flat(record: Mapping[str, Any]) -> dict[str, Any]:
-    """A record with the fields of its box as its own."""
+    """A record with the fields of its box, or of its place, as its own."""
     flat = {key: value for key, value in record.items() if not isinstance(value, dict)}
-    for key in ("box", "bbox", "bounding_box"):
+    for key in ("box", "bbox", "bounding_box", "position", "location"):
         if isinstance(record.get(key), dict):
             flat.update(record[key])
     return flat
