@@ -12,7 +12,6 @@ import numpy as np
 from numpy import ndarray
 from scipy.stats import chi2
 
-from tests.benchmarks.plane import plain_phd
 from tests.benchmarks.plane.scenario import (
     DETECTION,
     MERGING,
@@ -106,32 +105,6 @@ class Phd:
         if rule == "components":
             reported = self._mixture.take(phd.extract(self._mixture, HALF))
         return reported.means[:, [0, 2]]
-
-
-class PlainPhd:
-    """The same recursion with NumPy alone."""
-
-    def __init__(self, case: Scenario) -> None:
-        self._case = case
-        self._mixture, self._births = _start(case)
-
-    def step(self, scan: ndarray) -> None:
-        """One step of the recursion."""
-        survivors = plain_phd.predict(self._mixture, TRANSITION, MOTION_NOISE, SURVIVAL)
-        posterior, _ = plain_phd.update(
-            gaussian_mixture.concatenate([survivors, self._births]),
-            scan,
-            jacobian=POSITION,
-            noise=NOISE,
-            detection=DETECTION,
-            clutter_intensity=self._case.clutter_intensity,
-            gate=GATE,
-        )
-        self._mixture, _ = plain_phd.reduce(posterior, PRUNING, MERGING, self._case.most_components)
-
-    def places(self, rule: str) -> ndarray:
-        """By ``components``."""
-        return self._mixture.means[self._mixture.weights > HALF][:, [0, 2]]
 
 
 class Labelled:

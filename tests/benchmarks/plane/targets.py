@@ -1,4 +1,4 @@
-"""Many targets in the plane: the engine's filters beside plain NumPy and Stone Soup."""
+"""Many targets in the plane: the engine's filters beside Stone Soup."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tests.benchmarks.measure import Measurement
-from tests.benchmarks.plane.filters import Filter, Labelled, Phd, PlainPhd
+from tests.benchmarks.plane.filters import Filter, Labelled, Phd
 from tests.benchmarks.plane.scenario import Scenario, ospa, scenario
 
 STEPS = {10: 40, 100: 40, 500: 20, 1000: 10}
@@ -21,9 +21,6 @@ THEIR_STEPS = {10: 40, 100: 40, 500: 4, 1000: 2}
 MILLISECONDS = {100: 0.4, 500: 4.0, 1000: 12.0}
 OSPA = {100: 16.6, 500: 16.5, 1000: 15.5}
 """What the engine's GM-PHD filter is to reach, by number of targets."""
-
-LEAST_FACTOR = 3.0
-"""Kernels against plain NumPy, the whole step: below, something is broken."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,17 +72,8 @@ def _at(targets: int, short: bool) -> Iterator[Measurement]:
     case = scenario(targets, STEPS[targets])
     name = f"GM-PHD, {targets} targets"
     ours = course(Phd, case, steps, ("components", "W_z"))
-    plain = course(PlainPhd, case, min(steps, 6), ("components",))
     aim = f"≤ {MILLISECONDS[targets]:g} ms" if targets in MILLISECONDS else ""
     yield Measurement(f"{name}: step", ours.median, "ms", aim)
-    yield Measurement(f"{name}: step, NumPy alone", plain.median, "ms")
-    yield Measurement(
-        f"{name}: kernels against NumPy",
-        statistics.median(plain.milliseconds) / ours.median,
-        "×",
-        f"≥ {LEAST_FACTOR:g}",
-        LEAST_FACTOR if targets >= 100 else None,
-    )
     yield Measurement(f"{name}: OSPA, components", ours.ospa("components"), "m")
     aim = f"≤ {OSPA[targets]:g} m" if targets in OSPA else ""
     yield Measurement(f"{name}: OSPA, W_z", ours.ospa("W_z"), "m", aim)
@@ -95,10 +83,10 @@ def _at(targets: int, short: bool) -> Iterator[Measurement]:
     yield Measurement(f"{name}: step", labelled.median, "ms", aims[0])
     yield Measurement(f"{name}: OSPA", labelled.ospa("components"), "m", aims[1])
     if not short and importlib.util.find_spec("stonesoup") is not None:
-        yield from _beside_stone_soup(case, ours, plain)
+        yield from _beside_stone_soup(case, ours)
 
 
-def _beside_stone_soup(case: Scenario, ours: Course, plain: Course) -> Iterator[Measurement]:
+def _beside_stone_soup(case: Scenario, ours: Course) -> Iterator[Measurement]:
     from tests.benchmarks.plane.stone_soup import StoneSoupPhd
 
     targets, steps = case.targets, THEIR_STEPS[case.targets]
@@ -108,12 +96,6 @@ def _beside_stone_soup(case: Scenario, ours: Course, plain: Course) -> Iterator[
     yield Measurement(f"{name}: step, Stone Soup", theirs.median, "ms")
     yield Measurement(
         f"{name}: against Stone Soup", theirs.median / ours.median, "×", "≥ 1000" if many else ""
-    )
-    yield Measurement(
-        f"{name}: NumPy alone against Stone Soup",
-        theirs.median / plain.median,
-        "×",
-        "≥ 100" if many else "",
     )
     yield Measurement(
         f"{name}: OSPA of {steps} steps, components, Stone Soup", theirs.ospa("components"), "m"
