@@ -281,13 +281,16 @@ def main() -> int:
             tell("── what `python3 -m tests` checks has passed on these files")
         else:
             before = digest()
-            with ThreadPoolExecutor(2) as lanes:
+            with ThreadPoolExecutor(3) as lanes:
                 reading = lanes.submit(in_order, page)
                 with installing():
                     compiling = lanes.submit(kernels.run)
-                failed += in_order([*code, collected]) + reading.result()
+                # types keep one core busy for a minute: the tests do not wait for them
+                checking = lanes.submit(in_order, code)
+                failed += in_order([collected])
                 failed += [] if compiling.result() else [kernels.name]
-            failed += [] if tests.run(shown=True) else [tests.name]
+                failed += [] if tests.run(shown=True) else [tests.name]
+                failed += reading.result() + checking.result()
             if not failed and not arguments.pytest:
                 PASSED.write_text(before, encoding="utf-8")
         if arguments.all:

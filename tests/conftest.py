@@ -8,7 +8,7 @@ import shutil
 import signal
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
@@ -50,6 +50,14 @@ os.environ["MULTIVIEW_PHD_DETECTORS"] = str(Path(_LIBRARY.name) / "detectors")
 os.environ["MULTIVIEW_PHD_SETTINGS"] = str(Path(_LIBRARY.name) / "settings")
 
 
+def short(values: Iterable[object], count: int = 1) -> list[object]:
+    """Parameters of a test, of which the short form has the first ones."""
+    return [
+        value if number < count else pytest.param(value, marks=pytest.mark.full)
+        for number, value in enumerate(values)
+    ]
+
+
 LONGEST = 1500
 """Seconds after which a test is taken to hang: the slowest takes four minutes of two free cores."""
 
@@ -86,6 +94,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         marks = {mark.name for mark in item.iter_markers()}
         if marks & {"browser", "data"} and "main_job" not in marks:
             item.add_marker(pytest.mark.full)
+    # the longest first, so that no process is left with it while the others have nothing to do
+    items.sort(key=lambda item: item.get_closest_marker("main_job") is None)
     if config.getoption("--long") or "long" in config.getoption("-m"):
         return
     long = [item for item in items if item.get_closest_marker("long")]

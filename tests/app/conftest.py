@@ -77,16 +77,32 @@ def opened(data: Path) -> Iterator[TestClient]:
         yield client
 
 
-@pytest.fixture
-def client(data: Path) -> Iterator[TestClient]:
-    """An application that a test has for itself."""
+@pytest.fixture(scope="module")
+def shared(data: Path) -> Iterator[TestClient]:
+    """One application for all tests of a module, for those that ask for what it refuses."""
     with opened(data) as client:
         yield client
 
 
-@pytest.fixture(scope="module")
-def refusing(data: Path) -> Iterator[TestClient]:
-    """One application for all tests of a module that ask for what it refuses."""
+@pytest.fixture
+def client(shared: TestClient) -> TestClient:
+    """The application of the module: ``crossing`` computed and scored with the defaults, nothing
+    pinned, nothing selected, at the first step."""
+    if (shared.get("/api/state").json()["sequence"] or {"name": ""})["name"] != "crossing":
+        shared.post("/api/sequence", json={"name": "crossing"})
+        wait_until(run_is(shared, "done"))
+    shared.delete("/api/run/pin")
+    shared.post("/api/parameters/reset", json={})
+    shared.post("/api/select", json={"id": None})
+    wait_until(run_is(shared, "done"))
+    wait_until(is_evaluated(shared))
+    shared.post("/api/seek", json={"step": 0})
+    return shared
+
+
+@pytest.fixture
+def own_client(data: Path) -> Iterator[TestClient]:
+    """An application that a test has for itself: it has seen nothing yet but one run."""
     with opened(data) as client:
         yield client
 

@@ -1,5 +1,5 @@
 """The application that wrong requests and files are sent to."""
 
-from tests.app.conftest import client, crossing, data, refusing, run
+from tests.app.conftest import client, crossing, data, run, shared
 
-__all__ = ["client", "crossing", "data", "refusing", "run"]
+__all__ = ["client", "crossing", "data", "run", "shared"]

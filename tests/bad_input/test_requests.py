@@ -29,7 +29,7 @@ def refused(answer: Any) -> dict[str, Any]:
 
 @pytest.mark.full
 @pytest.mark.parametrize("number", [*HUGE, 0, -1])
-def test_there_is_no_such_run(refusing: TestClient, number: int) -> None:
+def test_there_is_no_such_run(shared: TestClient, number: int) -> None:
     for method, path in [
         ("GET", f"/api/library/runs/{number}"),
         ("GET", f"/api/library/runs/{number}/drawn"),
@@ -43,37 +43,37 @@ def test_there_is_no_such_run(refusing: TestClient, number: int) -> None:
         ("DELETE", f"/api/teach/entrances/{number - 2}"),
         ("DELETE", f"/api/teach/templates/{number - 2}"),
     ]:
-        refused(refusing.request(method, path))
+        refused(shared.request(method, path))
     for path, body in [
         ("/api/library/delete", {"runs": [number]}),
         ("/api/exports", {"run": number, "format": "csv"}),
         ("/api/view", {"camera": number - 2}),
     ]:
-        refused(refusing.post(path, json=body))
+        refused(shared.post(path, json=body))
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_names_that_no_file_can_have(refusing: TestClient, name: str) -> None:
+def test_names_that_no_file_can_have(shared: TestClient, name: str) -> None:
     for path, field in [
         ("/api/sequence", "name"),
         ("/api/import/path", "path"),
         ("/api/parameters/preset", "name"),
     ]:
-        refused(refusing.post(path, json={field: name}))
+        refused(shared.post(path, json={field: name}))
     if name in IMPOSSIBLE:
-        refused(refusing.post("/api/teach/copy", json={"folder": name}))
+        refused(shared.post("/api/teach/copy", json={"folder": name}))
 
 
-def test_a_preset_has_a_name_that_can_be_seen(refusing: TestClient) -> None:
+def test_a_preset_has_a_name_that_can_be_seen(shared: TestClient) -> None:
     for name in ("a\0b", "\x1b[31mred", "\u202edesrever", " ", "x" * 61):
-        refused(refusing.post("/api/presets", json={"name": name}))
+        refused(shared.post("/api/presets", json={"name": name}))
 
 
 @pytest.mark.full
 @pytest.mark.parametrize("value", [10**400, -(10**400), "9" * 5000, [], {}, None, "\0", [[1]]])
-def test_no_parameter_takes_what_it_does_not_take(refusing: TestClient, value: Any) -> None:
+def test_no_parameter_takes_what_it_does_not_take(shared: TestClient, value: Any) -> None:
     for key in (*PARAMETERS, *METHODS):
-        answer = refusing.patch("/api/parameters", json={"changes": {key: value}})
+        answer = shared.patch("/api/parameters", json={"changes": {key: value}})
         assert refused(answer)["field"] == key
 
 
@@ -92,23 +92,23 @@ def test_no_parameter_takes_what_it_does_not_take(refusing: TestClient, value: A
         b"\x00",
     ],
 )
-def test_bodies_that_are_none(refusing: TestClient, body: bytes) -> None:
+def test_bodies_that_are_none(shared: TestClient, body: bytes) -> None:
     for method, path in [("POST", "/api/seek"), ("PATCH", "/api/parameters")]:
         headers = {"content-type": "application/json"}
-        refused(refusing.request(method, path, content=body, headers=headers))
+        refused(shared.request(method, path, content=body, headers=headers))
 
 
-def test_words_that_are_no_text_come_back_as_text(refusing: TestClient) -> None:
+def test_words_that_are_no_text_come_back_as_text(shared: TestClient) -> None:
     for path, body in [
         ("/api/parameters", b'{"changes":{"\\ud800":1}}'),
         ("/api/layers", b'{"changes":{"\\ud800":true}}'),
         ("/api/parameters", b'{"changes":{"fusion.clutter_rate":"\\ud800"}}'),
     ]:
         headers = {"content-type": "application/json"}
-        refused(refusing.patch(path, content=body, headers=headers))
-    refused(refusing.get("/api/%ff%fe"))
-    refused(refusing.get("/static/%00"))
-    refused(refusing.get("/static/" + "x" * 300))
+        refused(shared.patch(path, content=body, headers=headers))
+    refused(shared.get("/api/%ff%fe"))
+    refused(shared.get("/static/%00"))
+    refused(shared.get("/static/" + "x" * 300))
 
 
 def test_a_full_disk_is_said_and_changes_nothing(

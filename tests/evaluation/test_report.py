@@ -116,6 +116,7 @@ def test_nothing_to_show_is_shown(truth, tracks, steps: int):
     assert ("0 of 40 steps" in text) == (steps == 0)
 
 
+@pytest.mark.full
 def test_tall_tables_scroll():
     truth = walks(1)
     tracks = perturbed(truth, 1, false=8.0)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tests.conftest import DATA
+from tests.conftest import DATA, short
 from tests.random_rooms import random_room
 from tracker.io.checks.boxes import raw_cameras
 from tracker.io.conventions.reading import FLIP, Reading, with_pixels
@@ -45,7 +45,7 @@ def test_calibrations_in_any_order_are_assigned(seed: int) -> None:
     assert verdict.kind == "decided"
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", short(range(3)))
 @pytest.mark.parametrize("axis", range(3))
 def test_the_vertical_is_found_along_any_axis_and_with_any_convention(seed: int, axis: int) -> None:
     cameras, seen = given(random_room(seed, cameras=3, people=3))
@@ -122,7 +122,7 @@ def test_clocks_are_compared_anew_once_the_rate_is_known() -> None:
     assert clock.ends - clock.begins == pytest.approx(-3, abs=1)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", short(range(4)))
 def test_a_camera_that_was_turned_after_its_calibration_is_named(seed: int) -> None:
     cameras, seen = given(random_room(seed, cameras=4, people=3))
     assert found(cameras, seen, Open(orders=False)).moved == {}

@@ -84,7 +84,7 @@ def flipped(at: float) -> Callable[[bytes], bytes]:
         lambda content: content[: len(content) // 2],
         lambda content: content[:20],
         lambda content: b"\0" * len(content),
-        *(flipped(at) for at in (0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 1.0)),
+        *(flipped(at) for at in (0.0, 0.5, 1.0)),
     ],
 )
 def test_what_was_damaged_is_compiled_anew_and_kept_whole(

@@ -132,6 +132,7 @@ def test_the_digest_follows_imports(
         before = digest()
 
 
+@pytest.mark.full
 def test_imports_alone_tell_what_the_whole_file_tells() -> None:
     quick = 0
     for file in compilation._ROOT.rglob("*.py"):

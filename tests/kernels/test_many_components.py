@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy import ndarray
 from numpy.testing import assert_allclose, assert_array_equal
@@ -190,6 +190,7 @@ def test_prediction_is_the_formula(seed: int, size: int, shared: bool) -> None:
     assert_allclose(found.weights, 0.9 * mixture.weights)
 
 
+@settings(max_examples=20)
 @given(st.integers(0, 2**32 - 1), st.integers(0, 5), st.sampled_from((0.3, 0.5)))
 def test_components_share_their_weight_among_measurements_the_surest_first(
     seed: int, count: int, threshold: float

@@ -93,6 +93,7 @@ def test_a_camera_without_a_picture_is_blind_elsewhere_too(tmp_path: Path) -> No
     assert there[1].detector_ran is None
 
 
+@pytest.mark.full
 def test_small_videos_show_the_same_steps(tmp_path: Path) -> None:
     folder = write_sequence(tmp_path / "numbers", frames=12, first_frame=3)
     result = kept(folder, tmp_path / "library.sqlite3")

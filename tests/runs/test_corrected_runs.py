@@ -11,6 +11,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from tests.conftest import short
 from tests.engine.synthetic import crossing, sequence, walk
 from tracker.corrections import Correction
 from tracker.corrections.kinds import make
@@ -189,6 +190,7 @@ def test_nobody_is_where_somebody_says_so(fusion: str, smoothing: str) -> None:
     assert others.sum() >= STEPS - 10, "who is elsewhere stays"
 
 
+@pytest.mark.full
 def test_who_turns_often_is_left_out_along_his_whole_course() -> None:
     steps, turn = 320, 20
     there = walk((-0.5, 0.4, 1.0), (0.5, 0.4, 1.0), turn)
@@ -212,7 +214,7 @@ def test_who_turns_often_is_left_out_along_his_whole_course() -> None:
     assert len(set(after.tracks.ids.tolist())) == 1
 
 
-@pytest.mark.parametrize("smoothing", SMOOTHINGS)
+@pytest.mark.parametrize("smoothing", short(SMOOTHINGS))
 def test_the_log_again_gives_the_same_tracks_bit_for_bit(smoothing: str) -> None:
     whole = with_a_gap()
     before = run_of(whole, (), smoothing=smoothing)
@@ -265,7 +267,7 @@ def choices() -> tuple[Correction, ...]:
     )
 
 
-@settings(deadline=None, max_examples=15, suppress_health_check=[HealthCheck.too_slow])
+@settings(deadline=None, max_examples=6, suppress_health_check=[HealthCheck.too_slow])
 @given(st.lists(st.one_of(st.integers(0, 5), st.just("undo")), min_size=1, max_size=7))
 def test_any_sequence_of_corrections_and_undos_ends_where_the_rest_alone_would(
     actions: list[int | str],
@@ -284,7 +286,7 @@ _CACHE = StageCache()
 """Of all examples together, so that each finds what others with other corrections left."""
 
 
-@settings(deadline=None, max_examples=15, suppress_health_check=[HealthCheck.too_slow])
+@settings(deadline=None, max_examples=6, suppress_health_check=[HealthCheck.too_slow])
 @given(st.lists(st.integers(0, 5), unique=True, max_size=6))
 def test_what_other_corrections_left_changes_nothing(chosen: list[int]) -> None:
     told = tuple(choices()[number] for number in chosen)
@@ -316,7 +318,7 @@ def test_a_method_that_takes_no_corrections_runs_as_before(monkeypatch: pytest.M
     assert len(run.tracks)
 
 
-@pytest.mark.parametrize("smoothing", SMOOTHINGS)
+@pytest.mark.parametrize("smoothing", short(SMOOTHINGS))
 @pytest.mark.parametrize(("kind", "before", "after"), [("left", 50, 51), ("came", 49, 50)])
 def test_who_left_or_came_in_while_he_is_seen_on_is_two_people(
     smoothing: str, kind: str, before: int, after: int

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from tests.runs.test_corrected_runs import place, run_of, with_a_gap
 from tracker.corrections.kinds import make
@@ -18,6 +19,7 @@ SLIDERS = tuple(
 )
 
 
+@pytest.mark.full
 def test_nine_of_ten_hold_after_five_sliders_at_random() -> None:
     whole = with_a_gap()
     before = run_of(whole)

@@ -65,6 +65,7 @@ def steps(monkeypatch: pytest.MonkeyPatch) -> dict[str, int]:
     return counts
 
 
+@pytest.mark.full
 def test_going_back_to_earlier_values_computes_nothing(steps: dict[str, int]) -> None:
     cache = StageCache()
     values = [0.9, 0.95, 0.97, 0.9, 0.97, 0.95]

@@ -127,6 +127,7 @@ def test_a_study_goes_on_where_it_ran(
     assert client.post(start, json={"workers": 1}).status_code == 200
 
 
+@pytest.mark.full
 def test_where_the_time_alone_ends_it_no_number_of_trials_is_told(
     client: TestClient, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

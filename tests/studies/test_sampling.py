@@ -129,6 +129,7 @@ def test_vetoed_trials_are_infeasible_however_good_they_are(
     assert sum(one.vetoed for one in again) < 10
 
 
+@pytest.mark.full
 def test_a_long_search_uses_the_best_and_the_last_trials(
     made: StudyDefinition, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -57,6 +57,7 @@ def test_the_values_tried_are_few_allowed_and_hold_the_one_now() -> None:
             with_values(RunParameters(), {key: value})
 
 
+@pytest.mark.full
 def test_a_curve_is_what_runs_of_these_values_reach(bench: Workbench, curves: Sensitivity) -> None:
     curves.ask([T_E])
     until(lambda: not curves.under_way)

@@ -208,6 +208,7 @@ def test_entrances_are_suggested_by_the_tracks(client: TestClient) -> None:
     assert "teach/entrances/suggested" in client.get("/api/tables/teach").text
 
 
+@pytest.mark.full
 def test_templates_that_the_tracks_offer_are_taken_and_taken_back(client: TestClient) -> None:
     done(client)
     assert "Offered templates" not in client.get("/api/tables/teach").text
@@ -293,6 +294,7 @@ def test_saving_keeps_a_backup_and_reopens_to_the_same_run(
     assert tracks(client) == shown
 
 
+@pytest.mark.full
 def test_a_copy_leaves_the_original_and_goes_on_in_the_copy(
     client: TestClient, walkers: Path
 ) -> None:
@@ -391,6 +393,7 @@ def test_what_is_not_saved_outlives_the_server(
         assert "taken up" not in heard
 
 
+@pytest.mark.full
 def test_what_was_taught_on_a_room_as_it_was_rendered_before_is_taken_up_once(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -506,6 +509,7 @@ def test_the_size_of_people_is_taught_saved_and_taken_back(
         )
 
 
+@pytest.mark.full
 def test_a_detector_is_fetched_by_a_click(
     client: TestClient, npm: Npm, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -538,6 +542,7 @@ def test_a_detector_is_fetched_by_a_click(
     assert done(client)["methods"]["single_view"] == "onnx_detector"
 
 
+@pytest.mark.full
 def test_a_detector_is_chosen_by_its_path_and_taken_away(
     client: TestClient, walkers: Path, tmp_path: Path
 ) -> None:

@@ -51,7 +51,7 @@ def test_a_run_that_is_not_finished_is_not_checked(crossing: Path) -> None:
     assert check.now.state == "idle"
 
 
-def test_another_run_ends_a_check(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_another_run_ends_a_check(own_client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
     stopped: list[str] = []
 
     def endless(run: Run, *, cancelled: Callable[[], bool], **_: Any) -> Estimate:
@@ -60,14 +60,14 @@ def test_another_run_ends_a_check(client: TestClient, monkeypatch: pytest.Monkey
         raise identity_check.Cancelled
 
     monkeypatch.setattr(identity_check, "estimate", endless)
-    key = client.post("/api/identity").json()["run"]
-    client.patch("/api/parameters", json={"changes": {"fusion.detection_probability": 0.7}})
-    wait_until(lambda: client.get("/api/identity").json()["state"] == "cancelled")
+    key = own_client.post("/api/identity").json()["run"]
+    own_client.patch("/api/parameters", json={"changes": {"fusion.detection_probability": 0.7}})
+    wait_until(lambda: own_client.get("/api/identity").json()["state"] == "cancelled")
     wait_until(lambda: stopped == [key])
 
 
 def test_who_stops_a_check_does_not_wait_for_its_processes(
-    client: TestClient, monkeypatch: pytest.MonkeyPatch
+    own_client: TestClient, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     begins, ends = threading.Event(), threading.Event()
     left: list[str] = []
@@ -80,12 +80,12 @@ def test_who_stops_a_check_does_not_wait_for_its_processes(
         return Estimate(1.0, 1.0, (), (), ())
 
     monkeypatch.setattr(identity_check, "estimate", slow_to_hear)
-    key = client.post("/api/identity").json()["run"]
+    key = own_client.post("/api/identity").json()["run"]
     assert begins.wait(30.0)
-    assert client.delete("/api/identity").json()["state"] == "cancelled"
+    assert own_client.delete("/api/identity").json()["state"] == "cancelled"
     worker = next(one for one in threading.enumerate() if one.name == "identity")
     ends.set()
     worker.join(30.0)
     assert left == [key]
-    told = client.get("/api/identity").json()
+    told = own_client.get("/api/identity").json()
     assert (told["state"], told["score"], told["done"]) == ("cancelled", None, 0)

@@ -143,6 +143,7 @@ def test_a_wish_is_looked_into_and_can_be_taken_back(client: TestClient, files: 
     assert _wish(client, info, names={})["phase"] == "settled"
 
 
+@pytest.mark.full
 def test_angles_of_which_nothing_tells_the_order_are_asked_for(
     client: TestClient, tmp_path: Path
 ) -> None:

@@ -134,6 +134,7 @@ def test_a_changed_parameter_ends_in_the_step_of_its_own_run(client: TestClient)
     wait_until(run_is(client, "done"))
 
 
+@pytest.mark.full
 def test_a_step_is_told_again_when_hindsight_has_replaced_its_people(
     client: TestClient, monkeypatch: pytest.MonkeyPatch
 ) -> None:

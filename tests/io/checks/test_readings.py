@@ -8,6 +8,7 @@ from typing import get_args
 import numpy as np
 import pytest
 
+from tests.conftest import short
 from tests.mistakes import MISTAKES
 from tests.random_rooms import random_room
 from tracker.geometry.consistency.consensus import Consensus
@@ -39,7 +40,7 @@ def warnings(sequence: Sequence) -> list[str]:
     return [str(remedy) for each in found for remedy in each.remedies]
 
 
-@pytest.mark.parametrize("seed", ROOMS)
+@pytest.mark.parametrize("seed", short(ROOMS, 2))
 def test_nothing_is_odd_in_a_good_room(seed: int) -> None:
     found = check(random_room(seed))
     assert [str(each) for each in found if each.status == "warning"] == []

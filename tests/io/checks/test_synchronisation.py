@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 import pytest
 
+from tests.conftest import short
 from tests.random_rooms import looking_camera, random_room, random_walkers
 from tracker.geometry.camera import Camera
 from tracker.io.checks import check
@@ -25,7 +26,7 @@ def against_the_first(found: tuple[CameraOffset, ...]) -> list[float]:
 
 
 @pytest.mark.parametrize("late", STEPS)
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", short(range(3)))
 def test_a_late_camera_is_found_from_boxes(seed: int, late: float) -> None:
     sequence = random_room(seed, fps=12.0, steps=300, people=3, late=(0.0, late / 12.0))
     found = synchronise(sequence)

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from tests.conftest import short
 from tests.io.read.recorded import PLACES, settled_of
 from tests.io.read.rig import FLIP, boxes, cameras
 from tracker.geometry.camera import Camera
@@ -107,7 +108,7 @@ def lay_out(folder: Path, form: str, *, seen: bool = True) -> None:
     (folder / "rig.json").write_text(json.dumps(tables))
 
 
-@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("form", short(FORMS, 2))
 def test_the_boxes_tell_how_angles_are_composed(tmp_path: Path, form: str) -> None:
     lay_out(tmp_path, form)
     settled = settled_of(tmp_path)

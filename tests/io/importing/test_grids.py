@@ -20,7 +20,7 @@ def _walks(rng: np.random.Generator, size: tuple[float, float]) -> ndarray:
     return rng.uniform([0.0, 0.0], size, (400, 2))
 
 
-@settings(deadline=None, max_examples=15)
+@settings(deadline=None, max_examples=6)
 @given(
     st.integers(100, 1500),
     st.sampled_from([0.01, 0.025, 0.05, 0.1]),

@@ -43,6 +43,7 @@ def test_the_unit_follows_from_the_height_of_people(
     assert settled.frames == len(PLACES)
 
 
+@pytest.mark.full
 def test_poses_of_ones_own_the_other_way_round(tmp_path: Path) -> None:
     tables = {
         c.name: {"K": c.intrinsics.tolist(), "dist": c.distortion.tolist(),
@@ -531,6 +532,7 @@ def test_boxes_that_name_pictures_are_of_these(tmp_path: Path, every: int) -> No
         np.testing.assert_allclose(view.detections.boxes, found, atol=1e-6)
 
 
+@pytest.mark.full
 def test_boxes_that_are_mostly_of_other_frames_end_the_import(tmp_path: Path) -> None:
     toml(tmp_path)
     detections(tmp_path, first=1000)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from app.command.main import main
+from tests.conftest import short
 from tests.io.read.recorded import PLACES, detections, settled_of, toml, videos
 from tests.io.read.rig import SIZE, boxes, cameras
 from tracker.io.checks import check
@@ -173,10 +174,12 @@ def test_what_was_told_wrongly_is_mended_by_the_right_flag(
 
 @pytest.mark.parametrize(
     "options",
-    [
-        ImportOptions(pose="camera-to-world", axes="opencv"),
-        ImportOptions(axes="opengl", pose="world-to-camera"),
-    ],
+    short(
+        [
+            ImportOptions(pose="camera-to-world", axes="opencv"),
+            ImportOptions(axes="opengl", pose="world-to-camera"),
+        ]
+    ),
 )
 def test_poses_that_were_told_wrongly_are_not_taken(tmp_path: Path, options: ImportOptions) -> None:
     toml(tmp_path)

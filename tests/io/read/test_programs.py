@@ -123,6 +123,7 @@ def test_a_scene_of_the_ai_city_challenge_2024(tmp_path: Path) -> None:
     _assert_truth(plan)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("sign", [" ", "_"])
 @pytest.mark.parametrize("floor", [True, False])
 def test_a_scene_of_nvidia_s_smart_spaces(tmp_path: Path, sign: str, floor: bool) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tests.conftest import short
 from tests.engine.synthetic import crossing, sequence, walk
 from tests.runs.test_corrected_runs import run_of, with_a_gap
 from tracker.corrections import Place
@@ -18,7 +19,7 @@ from tracker.review.queue.other_run import OtherRun
 from tracker.review.queue.ranking import IdentityReach, _with_none_of_them
 
 
-@pytest.mark.parametrize("smoothing", ["identities", "positions", "none"])
+@pytest.mark.parametrize("smoothing", short(["identities", "positions", "none"]))
 def test_who_was_away_is_asked_for_first_and_not_again(smoothing: str) -> None:
     path = walk((-1.1, 0.5, 1.0), (1.1, 0.6, 1.0), 80)
     other = walk((1.1, -0.7, 1.0), (-1.0, -0.6, 1.0), 80)

@@ -40,26 +40,26 @@ FOREIGN = [
         "",
     ],
 )
-def test_a_foreign_host_gets_nothing(refusing: TestClient, host: str) -> None:
+def test_a_foreign_host_gets_nothing(shared: TestClient, host: str) -> None:
     for path in ("/", "/api/state", "/viser/", "/openapi.json", "/static/js/main.js"):
-        answer = refusing.get(path, headers={"host": host})
+        answer = shared.get(path, headers={"host": host})
         assert answer.status_code == 421
         assert answer.json()["code"] == "foreign_host"
     with (
         pytest.raises(WebSocketDisconnect),
-        connect(refusing, host=host),
+        connect(shared, host=host),
     ):
         pass
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1:8000", "localhost", "LOCALHOST:9", "[::1]:8000"])
-def test_our_own_names_are_answered(refusing: TestClient, host: str) -> None:
-    assert refusing.get("/api/state", headers={"host": host}).status_code == 200
+def test_our_own_names_are_answered(shared: TestClient, host: str) -> None:
+    assert shared.get("/api/state", headers={"host": host}).status_code == 200
 
 
 @pytest.mark.parametrize("origin", FOREIGN)
-def test_a_foreign_page_may_not_write(refusing: TestClient, origin: str) -> None:
-    before = refusing.get("/api/state").json()["version"]
+def test_a_foreign_page_may_not_write(shared: TestClient, origin: str) -> None:
+    before = shared.get("/api/state").json()["version"]
     for method, path, body in [
         ("POST", "/api/select", {"id": 1}),
         ("PATCH", "/api/parameters", {"changes": {}}),
@@ -68,36 +68,36 @@ def test_a_foreign_page_may_not_write(refusing: TestClient, origin: str) -> None
         ("PUT", "/anything", None),
         ("DELETE", "/api/state", None),
     ]:
-        answer = refusing.request(method, path, json=body, headers={"origin": origin})
+        answer = shared.request(method, path, json=body, headers={"origin": origin})
         assert answer.status_code == 403
         assert answer.json()["code"] == "foreign_origin"
-    assert refusing.get("/api/state").json()["version"] == before
+    assert shared.get("/api/state").json()["version"] == before
 
 
 @pytest.mark.parametrize("origin", FOREIGN)
 @pytest.mark.parametrize("path", ["/api/stream", "/viser", "/viser/"])
-def test_a_foreign_page_gets_no_socket(refusing: TestClient, path: str, origin: str) -> None:
+def test_a_foreign_page_gets_no_socket(shared: TestClient, path: str, origin: str) -> None:
     with (
         pytest.raises(WebSocketDisconnect) as refusal,
-        connect(refusing, path, origin=origin),
+        connect(shared, path, origin=origin),
     ):
         pass
     assert refusal.value.code == 1008
 
 
-def test_our_own_page_may_write_and_connect(refusing: TestClient) -> None:
-    assert refusing.post("/api/select", json={"id": 1}, headers=OWN).status_code == 200
-    with connect(refusing, **OWN) as socket:
+def test_our_own_page_may_write_and_connect(shared: TestClient) -> None:
+    assert shared.post("/api/select", json={"id": 1}, headers=OWN).status_code == 200
+    with connect(shared, **OWN) as socket:
         assert socket.receive_json()["type"] in ("state", "playhead")
 
 
-def test_who_is_no_browser_may_write(refusing: TestClient) -> None:
-    assert refusing.post("/api/select", json={"id": 1}).status_code == 200
+def test_who_is_no_browser_may_write(shared: TestClient) -> None:
+    assert shared.post("/api/select", json={"id": 1}).status_code == 200
 
 
-def test_bodies_are_small(refusing: TestClient) -> None:
+def test_bodies_are_small(shared: TestClient) -> None:
     body = b'{"changes":{},"origin":"' + b"x" * LARGEST_BODY + b'"}'
-    answer = refusing.patch("/api/parameters", content=body)
+    answer = shared.patch("/api/parameters", content=body)
     assert answer.status_code == 413
     assert answer.json()["code"] == "too_large"
 
@@ -105,14 +105,14 @@ def test_bodies_are_small(refusing: TestClient) -> None:
         for start in range(0, len(body), 65536):
             yield body[start : start + 65536]
 
-    answer = refusing.patch("/api/parameters", content=piecewise())  # type: ignore[arg-type]
+    answer = shared.patch("/api/parameters", content=piecewise())  # type: ignore[arg-type]
     assert answer.status_code == 413
     assert answer.json()["code"] == "too_large"
 
 
-def test_no_other_page_may_frame_ours(refusing: TestClient) -> None:
+def test_no_other_page_may_frame_ours(shared: TestClient) -> None:
     for path in ("/", "/api/state", "/docs"):
-        answer = refusing.get(path)
+        answer = shared.get(path)
         assert answer.headers["x-frame-options"] == "SAMEORIGIN"
         assert answer.headers["x-content-type-options"] == "nosniff"
 

@@ -53,14 +53,14 @@ def test_a_kept_run_as_a_video(data: Path, tmp_path: Path) -> None:
         assert len(list(file.decode(video=0))) == 10
 
 
-def test_what_cannot_be_written_is_a_sentence(client: TestClient) -> None:
-    answer = client.post("/api/exports", json={"format": "mp4"})
+def test_what_cannot_be_written_is_a_sentence(own_client: TestClient) -> None:
+    answer = own_client.post("/api/exports", json={"format": "mp4"})
     assert answer.status_code == 422
     assert "no pictures" in answer.json()["detail"]
-    answer = client.post("/api/exports", json={"format": "mp5"})
+    answer = own_client.post("/api/exports", json={"format": "mp5"})
     assert "expected one of csv" in answer.json()["detail"]
-    assert client.get("/api/exports/file").status_code == 409
-    names = [f["name"] for f in client.get("/api/exports/formats").json()["formats"]]
+    assert own_client.get("/api/exports/file").status_code == 409
+    names = [f["name"] for f in own_client.get("/api/exports/formats").json()["formats"]]
     assert names == list(FORMATS)
 
 

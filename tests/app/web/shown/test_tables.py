@@ -173,12 +173,12 @@ def test_the_comparison_is_the_evaluations(client: TestClient) -> None:
 
 
 @pytest.mark.full
-def test_runs_are_listed_and_can_be_taken_up_again(client: TestClient) -> None:
-    before = client.get("/api/state").json()
-    client.patch("/api/parameters", json={"changes": {"fusion.detection_probability": 0.6}})
-    client.patch("/api/parameters", json={"changes": {"fusion_method": "sequential_phd"}})
-    wait_until(run_is(client, "done"))
-    html = get(client, "runs")
+def test_runs_are_listed_and_can_be_taken_up_again(own_client: TestClient) -> None:
+    before = own_client.get("/api/state").json()
+    own_client.patch("/api/parameters", json={"changes": {"fusion.detection_probability": 0.6}})
+    own_client.patch("/api/parameters", json={"changes": {"fusion_method": "sequential_phd"}})
+    wait_until(run_is(own_client, "done"))
+    html = get(own_client, "runs")
     rows = cells(html, "Runs")
     assert [row[0] for row in rows] == sorted((row[0] for row in rows), key=int, reverse=True)
     assert rows[0][2] == "none · sequential_phd", "by their own names, as everywhere"
@@ -186,11 +186,11 @@ def test_runs_are_listed_and_can_be_taken_up_again(client: TestClient) -> None:
     assert (rows[0][5], rows[-1][5]) == ("2", "0")
     assert (rows[0][6], rows[-1][6]) == ("current", "use again")
     assert 'data-do="useAgain" data-value="1"' in html
-    after = client.post("/api/run/again/1").json()
+    after = own_client.post("/api/run/again/1").json()
     assert after["parameters"] == before["parameters"]
     assert after["methods"] == before["methods"]
-    assert client.post("/api/run/again/99").status_code == 422
-    wait_until(run_is(client, "done"))
+    assert own_client.post("/api/run/again/99").status_code == 422
+    wait_until(run_is(own_client, "done"))
 
 
 @pytest.mark.parametrize("path", ["step/0", "events"])
