@@ -73,15 +73,6 @@ def test_parameters_by_set_and_by_flag(
 
 
 @pytest.mark.full
-def test_methods_and_presets(run: Runs, crossing: Path, tmp_path: Path) -> None:
-    out = tmp_path / "tracks.csv"
-    chosen = ["--single-view", "none", "--fusion", "sequential_phd", "--preset", "published"]
-    assert run("track", crossing, "-o", out, *chosen)[0] == 0
-    changes = {**PRESETS["published"], "fusion_method": "sequential_phd"}
-    assert out.read_text(encoding="utf-8") == engine_csv(crossing, tmp_path / "own.csv", changes)
-
-
-@pytest.mark.full
 def test_stage_1_is_kept_for_the_next_run_unless_told_otherwise(
     run: Runs, data: Path, tmp_path: Path, own_cache: Path
 ) -> None:

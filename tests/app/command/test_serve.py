@@ -12,7 +12,6 @@ import sys
 from collections.abc import Callable, Coroutine, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
@@ -21,7 +20,7 @@ import pytest
 import viser
 from starlette.testclient import TestClient
 from websockets.asyncio.client import connect
-from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.exceptions import ConnectionClosed
 from websockets.typing import Origin, Subprotocol
 
 from app.command import main as cli
@@ -136,59 +135,6 @@ def test_viser_says_itself_why_it_closes(server: Server) -> None:
     assert closed.value.rcvd is not None
     assert closed.value.rcvd.code == 1002
     assert "Version mismatch" in closed.value.rcvd.reason
-
-
-@pytest.mark.full
-@pytest.mark.parametrize("path", ["/viser", "/viser/", "/api/stream"])
-def test_foreign_pages_get_no_socket(server: Server, path: str) -> None:
-    async def talk(origin: str, host: str | None) -> None:
-        headers = {"Host": host} if host else None
-        async with connect(
-            f"ws://{server.place}{path}",
-            subprotocols=[VISER],
-            origin=Origin(origin),
-            additional_headers=headers,
-        ):
-            pass
-
-    for origin in ("http://evil.example", "null", "http://localhost:1"):
-        with pytest.raises(InvalidStatus) as refused:
-            said(partial(talk, origin, None))
-        assert refused.value.response.status_code == 403
-
-
-@pytest.mark.full
-def test_the_printed_link_opens_what_is_closed_without_it(tmp_path: Path) -> None:
-    server = start(str(write_crossing(tmp_path / "crossing")), "--token")
-
-    async def sockets(**headers: str) -> list[bool]:
-        opened = []
-        for path in ("/api/stream", "/viser"):
-            try:
-                async with connect(
-                    f"ws://{server.place}{path}",
-                    subprotocols=[VISER],
-                    additional_headers=headers,
-                    max_size=None,
-                ) as ws:
-                    opened.append(len(await ws.recv()) > 0)
-            except InvalidStatus:
-                opened.append(False)
-        return opened
-
-    try:
-        with httpx.Client(base_url=server.address) as browser:
-            assert browser.get("/api/state").status_code == 401
-            assert said(sockets) == [False, False]
-            assert "Go on" in browser.get("/", params={"token": server.token}).text
-            name = f"multiview-phd-{server.address.rpartition(':')[2]}"
-            assert browser.cookies[name] == server.token
-            assert browser.get("/api/state").status_code == 200
-            assert browser.get("/viser/").status_code == 200
-            assert said(partial(sockets, Cookie=f"{name}={server.token}")) == [True, True]
-    finally:
-        server.process.send_signal(signal.SIGINT)
-        assert server.process.communicate(timeout=20) == ("", "")
 
 
 def test_no_token_is_for_this_machine_alone(

@@ -14,7 +14,6 @@ from playwright.sync_api import Browser, Page, expect
 
 from app.web.access.viewer import Entrance, start_viser
 from tests.browser.conftest import opened
-from tests.browser.looking import ask
 from tests.browser.looking import viser as room
 from tests.browser.serving import Server
 from tests.browser.walkers import write_walkers
@@ -145,17 +144,6 @@ def test_a_foreign_page_finds_no_way_into_the_3d_view(
         inside.stop()
 
 
-def test_a_page_whose_name_points_here_gets_nothing(browser: Browser, server: Server) -> None:
-    # DNS rebinding: any name under localhost is this machine, and stands for a foreign one
-    context = browser.new_context()
-    page = context.new_page()
-    answer = page.goto(f"http://evil.localhost:{server.port}/")
-    assert answer is not None
-    assert answer.status == 421
-    assert "foreign_host" in page.content()
-    context.close()
-
-
 def test_a_foreign_page_cannot_frame_ours_nor_reach_into_its_window(
     browser: Browser, server: Server, foreign: ThreadingHTTPServer
 ) -> None:
@@ -174,32 +162,6 @@ def test_a_foreign_page_cannot_frame_ours_nor_reach_into_its_window(
         other.value.locator(".cam canvas").first.wait_for()
         assert page.evaluate("other.closed")  # to the page that opened it, it is gone
         other.value.close()
-
-
-def test_a_link_on_a_foreign_page_asks_before_it_opens_something(
-    browser: Browser, server: Server, foreign: ThreadingHTTPServer
-) -> None:
-    link = f"{server.address}?sequence=room44-3p&fusion.clutter_rate=9"
-    foreign.page = (  # type: ignore[attr-defined]
-        f'<!doctype html><a href="{link}">look</a><script>window.go = () => location = "{link}"'
-        "</script>"
-    )
-    before = ask(server, "POST", "seek", {"step": 0})
-    for way in ("a", "go", "refresh"):
-        with on(browser, foreign, HOSTS[1]) as page:
-            if way == "a":
-                page.get_by_role("link", name="look").click()
-            else:
-                page.evaluate("go()" if way == "go" else f"window.open('{link}', '_self')")
-            expect(page.get_by_role("heading")).to_have_text("A link on another page led here")
-            expect(page.locator("code")).to_have_text("room44-3p")
-            page.wait_for_timeout(300)
-            after = server.get("/api/state").json()
-            assert after["sequence"] == before["sequence"]
-            assert after["parameters"] == before["parameters"]
-            page.get_by_role("link", name="No, as it was").click()
-            page.locator(".cam canvas").first.wait_for()
-    assert server.get("/api/state").json()["sequence"] == before["sequence"]
 
 
 def test_the_token_opens_all_of_it_and_a_new_one_closes_it(
