@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from app.models import Model, TrackLife
+from app.models import Model, RoomInfo, TrackLife
 from app.models.base import RowNumber
 from tracker.library.records import KeptRun
 
@@ -117,10 +117,16 @@ class Preview(Model):
     tracks: list[TrackLife]
     people: list[float]
     """Targets at each of equally many steps, their mean."""
+    people_every: int
+    """How many steps a value of :attr:`people` stands for."""
     courses: list[Course]
     ospa: list[float]
     """Its mean over equally many steps each, metres; empty without a truth, and where the figures
     are provisional."""
+    ospa_every: int
+    """How many steps a value of :attr:`ospa` stands for."""
+    room: RoomInfo | None
+    """Of its recording, where that is open."""
 
 
 class Place(Model):

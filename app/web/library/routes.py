@@ -8,8 +8,7 @@ from concurrent.futures import Future
 from pathlib import Path
 from typing import Annotated
 
-from fastapi import APIRouter, Depends, Query, Request, Response
-from fastapi.responses import HTMLResponse
+from fastapi import APIRouter, Depends, Request, Response
 
 from app.errors import ApiError, sentence
 from app.models import State
@@ -17,11 +16,17 @@ from app.models.base import RowNumber
 from app.state.marking import Marking
 from app.state.workers.keeper import Keeper
 from app.web.dependencies import ERRORS, Bench, Work, nothing_open
-from app.web.library import drawing, models, preview
+from app.web.library import models, preview
 from app.web.opening import begun, told_in_the_answer
 from app.web.views import results
 from tracker.library.errors import LibraryError, NoSuchRun
-from tracker.library.keeping import code_version, record_of_recording, run_for_display
+from tracker.library.keeping import (
+    CURVE,
+    code_version,
+    record_of_recording,
+    run_for_display,
+    stride,
+)
 from tracker.library.records import KeptRun, Recording, Result
 from tracker.library.store import Library
 from tracker.parameters.catalogue import PARAMETERS
@@ -161,49 +166,28 @@ async def move(recording: int, wish: models.Place, opened: Opened) -> models.Rec
 
 
 @router.get("/runs/{number}")
-def run(number: RowNumber, opened: Opened) -> models.Preview:
-    """One kept run in small: its facts, lanes, people and ways from above."""
-    return _small(opened, _result(opened, number))
+def run(number: RowNumber, opened: Opened, bench: Bench) -> models.Preview:
+    """One kept run in small: its facts, lanes, people and ways from above.
 
-
-def _small(opened: Library, result: Result) -> models.Preview:
+    The room is there where it is known: that of the open recording.
+    """
+    result, now = _result(opened, number), bench.snapshot()
     fps = next((r.fps for r in opened.recordings() if r.id == result.run.recording), 25.0)
-    tracks = result.kept.tracks
+    tracks, steps = result.kept.tracks, result.run.steps
+    known = now.saved is not None and (
+        record_of_recording(now.saved, now.opened_as).place == result.place
+    )
     return models.Preview(
         run=_info(result.run),
-        frames=result.run.steps,
-        tracks=preview.lanes(tracks, result.run.steps, fps),
-        people=preview.people(tracks, result.run.steps),
+        frames=steps,
+        tracks=preview.lanes(tracks, steps, fps),
+        people=preview.people(tracks, steps),
+        people_every=stride(steps, preview.BUCKETS),
         courses=preview.courses(tracks, fps),
         ospa=[] if result.run.provisional else list(result.ospa),
+        ospa_every=stride(steps, CURVE),
+        room=results.room_of(now.saved.room) if now.saved is not None and known else None,
     )
-
-
-@router.get("/runs/{number}/drawn", response_class=HTMLResponse)
-def drawn(number: RowNumber, opened: Opened, bench: Bench) -> str:
-    """One kept run in small, as a part of the page."""
-    result, now = _result(opened, number), bench.snapshot()
-    told, room = _small(opened, result), None
-    if (
-        now.saved is not None
-        and record_of_recording(now.saved, now.opened_as).place == result.place
-    ):
-        room = now.saved.room
-    return drawing.preview(
-        told.run, told.frames, told.tracks, told.people, told.courses, told.ospa, room
-    )
-
-
-@router.get("/compared", response_class=HTMLResponse)
-def compared(
-    opened: Opened,
-    runs: Annotated[list[RowNumber], Query(max_length=12, description="Their numbers.")],
-) -> str:
-    """Kept runs side by side, as a part of the page."""
-    try:
-        return drawing.comparison([_info(opened.run(number)) for number in runs])
-    except LibraryError as error:
-        raise no_library(error) from None
 
 
 @router.patch("/runs/{number}")

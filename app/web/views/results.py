@@ -13,6 +13,7 @@ from app.web.command_line import command_line
 from app.web.corrections import views as corrections
 from tracker.parameters.catalogue import GROUPS, METHODS, PARAMETERS, PRESETS
 from tracker.parameters.values import changed_values, shown_keys, value_of
+from tracker.sequences.sequence import Room
 from tracker.sequences.writing.teaching import changes, taught_values
 
 
@@ -114,7 +115,6 @@ def _sequence_of(snapshot: Snapshot) -> models.SequenceInfo | None:
     sequence = snapshot.sequence
     if sequence is None:
         return None
-    room = sequence.room
     return models.SequenceInfo(
         key=snapshot.sequence_key,
         name=sequence.name,
@@ -125,14 +125,7 @@ def _sequence_of(snapshot: Snapshot) -> models.SequenceInfo | None:
         has_pictures=any(view.has_pictures for view in sequence.views),
         has_detections=any(view.detections is not None for view in sequence.views),
         has_truth=sequence.ground_truth is not None,
-        room=models.RoomInfo(
-            min=_vector(room.minimum),
-            max=_vector(room.maximum),
-            entrances=[
-                models.EntranceInfo(position=_vector(e.position), sigma=_vector(e.sigma))
-                for e in room.entrances
-            ],
-        ),
+        room=room_of(sequence.room),
         target=models.TargetInfo(half_extents=_vector(sequence.target_half_extents)),
         cameras=[
             models.CameraInfo(
@@ -146,6 +139,18 @@ def _sequence_of(snapshot: Snapshot) -> models.SequenceInfo | None:
         ],
         templates=len(sequence.templates),
         warnings=list(sequence.warnings),
+    )
+
+
+def room_of(room: Room) -> models.RoomInfo:
+    """The volume that people are tracked in, and where they appear."""
+    return models.RoomInfo(
+        min=_vector(room.minimum),
+        max=_vector(room.maximum),
+        entrances=[
+            models.EntranceInfo(position=_vector(e.position), sigma=_vector(e.sigma))
+            for e in room.entrances
+        ],
     )
 
 

@@ -1,27 +1,23 @@
 /** The bar under the runs: what can be done with those that are ticked, and what was just done. */
 import { fill, h, icon, one } from "../elements/dom.js";
-import { request, getJson } from "../state/api.js";
 import { exportMenu } from "./exports.js";
+import { comparison } from "./small.js";
 import { many, size } from "./words.js";
 
 /**
  * @param {object} how
  * @param {Store<PageState>} how.store
  * @param {Actions} how.actions
- * @param {() => number[]} how.chosen
+ * @param {() => Server.KeptRunInfo[]} how.chosen
  * @param {() => void} how.none  choose none
  * @param {() => Promise<void>} how.refresh  runs are others now
  */
 export function chosenBar({ store, actions, chosen, none, refresh }) {
+	const numbers = () => chosen().map(({ id }) => id);
 	const picked = h("b");
 	const line = h("span", { role: "status", class: "gone-line" });
 	const stop = h("button", { class: "btn" }, "Stop");
-	const side = h(
-		"button",
-		{ class: "btn box", onclick: () => void compare() },
-		icon("i-swap"),
-		"Compare",
-	);
+	const side = h("button", { class: "btn box", onclick: compare }, icon("i-swap"), "Compare");
 	/** @param {string} words @param {() => void} [cancel] */
 	const say = (words, cancel) => {
 		fill(line, words);
@@ -34,10 +30,10 @@ export function chosenBar({ store, actions, chosen, none, refresh }) {
 		{ class: "picked", role: "toolbar", "aria-label": "Chosen runs" },
 		picked,
 		side,
-		exportMenu({ store, actions, say, chosen }),
+		exportMenu({ store, actions, say, chosen: numbers }),
 		h(
 			"button",
-			{ class: "btn box", onclick: () => void remove(chosen()) },
+			{ class: "btn box", onclick: () => void remove(numbers()) },
 			icon("i-trash"),
 			"Delete",
 		),
@@ -49,15 +45,9 @@ export function chosenBar({ store, actions, chosen, none, refresh }) {
 	);
 	const element = h("div", { class: "undo-line" }, tools, h("span", { class: "grow" }), line, stop);
 
-	async function compare() {
+	function compare() {
 		const dialog = /** @type {any} */ (one(".compare"));
-		const numbers = chosen().map((id) => `runs=${id}`);
-		const answer = await request(`/api/library/compared?${numbers.join("&")}`).catch(
-			(error) => error,
-		);
-		if (answer instanceof Error)
-			return actions.note("error", "The runs cannot be compared", answer.message);
-		dialog.innerHTML = await answer.text();
+		fill(dialog, comparison(chosen()));
 		dialog.onclick = () => dialog.close();
 		dialog.showModal();
 	}

@@ -237,7 +237,7 @@ export function mountLibrary(root, { store, actions }) {
 	const bar = chosenBar({
 		store,
 		actions,
-		chosen: () => runs.filter(({ id }) => chosen.has(id)).map(({ id }) => id),
+		chosen: () => runs.filter(({ id }) => chosen.has(id)),
 		none: chooseNone,
 		refresh,
 	});

@@ -1,6 +1,7 @@
 /** One run in small, and what can be done with it: opened, pinned, taken as the start of a study. */
 import { fill, h } from "../elements/dom.js";
-import { request } from "../state/api.js";
+import { getJson } from "../state/api.js";
+import { drawn } from "./small.js";
 import { many, titleOf, when } from "./words.js";
 
 /**
@@ -14,7 +15,7 @@ export function preview({ store, actions }, written) {
 	/** @type {Server.KeptRunInfo | null} */
 	let now = null;
 	/** @type {number | null} what the body shows */
-	let drawn = null;
+	let shown = null;
 	body.addEventListener("change", ({ target }) => {
 		if (now) written(now, /** @type {HTMLInputElement} */ (target).value);
 	});
@@ -63,7 +64,7 @@ export function preview({ store, actions }, written) {
 		async show(run) {
 			now = run;
 			if (!run) {
-				drawn = null;
+				shown = null;
 				fill(head);
 				const empty = "A run that is chosen is shown here in small.";
 				return fill(body, h("p", { class: "blank" }, empty));
@@ -85,14 +86,13 @@ export function preview({ store, actions }, written) {
 					"Start a study here",
 				),
 			);
-			const answer = await request(`/api/library/runs/${run.id}/drawn`).catch((error) => error);
-			const text = answer instanceof Error ? "" : await answer.text();
+			const answer = await getJson(`/api/library/runs/${run.id}`).catch((error) => error);
 			if (run.id !== now?.id) return;
 			// Whoever writes a note is not disturbed.
-			if (run.id === drawn && body.contains(document.activeElement)) return;
-			drawn = text ? run.id : null;
-			if (text) body.innerHTML = text;
-			else fill(body, h("p", { class: "blank" }, answer.message));
+			if (run.id === shown && body.contains(document.activeElement)) return;
+			shown = answer instanceof Error ? null : run.id;
+			if (answer instanceof Error) fill(body, h("p", { class: "blank" }, answer.message));
+			else fill(body, ...drawn(answer));
 		},
 	};
 }

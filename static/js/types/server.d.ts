@@ -884,12 +884,18 @@ declare namespace Server {
 		tracks: TrackLife[];
 		/** Targets at each of equally many steps, their mean. */
 		people: number[];
+		/** How many steps a value of :attr:`people` stands for. */
+		people_every: number;
 		courses: Course[];
 		/**
 		 * Its mean over equally many steps each, metres; empty without a truth, and where the figures
 		 * are provisional.
 		 */
 		ospa: number[];
+		/** How many steps a value of :attr:`ospa` stands for. */
+		ospa_every: number;
+		/** Of its recording, where that is open. */
+		room: RoomInfo | null;
 	}
 
 	/** A parameter, or the choice of a method, with the range that is tried. */

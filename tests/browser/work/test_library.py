@@ -50,7 +50,12 @@ def test_runs_are_listed_with_what_differs(library: Page, screenshots: Path | No
     expect(rows.nth(0)).to_contain_text("0.8")
     expect(library.locator("main")).to_be_hidden()
     expect(library.locator(".item[aria-selected=true]")).to_contain_text("2 cameras")
-    expect(library.get_by_role("img", name="Lanes of run 2")).to_be_visible()
+    small = library.get_by_role("region", name="The run")
+    expect(small.get_by_role("img", name="Lanes of run 2: 2 tracks over 60 steps")).to_be_visible()
+    for word in ("People over time", "OSPA over time", "Ways from above"):
+        expect(small.get_by_role("img", name=word)).to_be_visible()
+    assert small.locator("polyline").count() == 4, "two curves and the ways of two tracks"
+    expect(small.locator("dd").nth(1)).to_have_text("0.95 → 0.8")
     if screenshots:
         for theme in ("dark", "light"):
             library.emulate_media(color_scheme=theme)  # type: ignore[arg-type]
@@ -101,6 +106,7 @@ def test_runs_stand_side_by_side(library: Page) -> None:
     dialog = library.get_by_role("dialog", name="Runs side by side")
     expect(dialog).to_contain_text("0.95")
     expect(dialog.get_by_role("row", name="MOTA")).to_be_visible()
+    expect(dialog.get_by_role("columnheader")).to_have_text(["What", "Run 2", "Run 1"])
     library.keyboard.press("Escape")
     expect(dialog).to_have_count(0)
 

@@ -1,0 +1,287 @@
+/** A kept run in small, and runs side by side: what of them is drawn. */
+import { colourIndex, h, idTag, symbolOf } from "../elements/dom.js";
+import { figure, titleOf } from "./words.js";
+
+/** Lanes that are drawn: those of the longest tracks. */
+const MOST_LANES = 6;
+
+/** Word, field, digits, and which end is the better: 0 for neither. */
+const FIGURES = /** @type {const} */ ([
+	["MOTA", "mota", 3, 1],
+	["IDF1", "idf1", 3, 1],
+	["HOTA", "hota", 3, 1],
+	["OSPA, m", "ospa", 3, -1],
+	["Position error, m", "position_error", 3, -1],
+	["Missed", "misses", 0, -1],
+	["False", "false_positives", 0, -1],
+	["Identity switches", "id_switches", 0, -1],
+	["Tracks", "targets", 0, 0],
+]);
+
+const PROVISIONAL = "made before the run was finished; opening it computes them again";
+
+/**
+ * An element of a drawing.
+ * @param {string} tag @param {Record<string, string | number>} attributes @param {Element[]} children
+ */
+function svg(tag, attributes, ...children) {
+	const element = document.createElementNS("http://www.w3.org/2000/svg", tag);
+	for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, String(value));
+	element.append(...children);
+	return element;
+}
+
+/** @param {unknown} text */
+const quiet = (text) => h("span", { class: "q" }, String(text));
+
+/** @param {Server.ChangeInfo} change */
+const named = ({ key, symbol }) => h("span", { title: key }, symbolOf(symbol, ""));
+
+/** @param {Server.KeptRunInfo} run */
+const programOf = (run) => (run.older_code ? `${run.program}, older code` : run.program);
+
+/* ---------- One run: lanes, people and OSPA over time, ways from above, facts. ---------- */
+
+/** @param {Server.Preview} told */
+export const drawn = (told) => [
+	h(
+		"div",
+		{ class: "pv-lanes" },
+		lanes(told),
+		curve("People", "", told.people, told.frames, told.people_every),
+		told.ospa.length > 0 && curve("OSPA", " m", told.ospa, told.frames, told.ospa_every),
+	),
+	h("div", { class: "pv-top" }, ways(told)),
+	h("dl", { class: "pv-facts" }, ...facts(told.run)),
+];
+
+/** @param {Server.Preview} told */
+function lanes({ run, frames, tracks }) {
+	const longest = tracks
+		.toSorted((a, b) => a.first - a.last - (b.first - b.last))
+		.slice(0, MOST_LANES);
+	const at = (/** @type {number} */ step) => `${((100 * step) / Math.max(1, frames)).toFixed(2)}%`;
+	const more = tracks.length - longest.length;
+	return h(
+		"div",
+		{
+			class: "lines",
+			role: "img",
+			"aria-label": `Lanes of run ${run.id}: ${tracks.length} tracks over ${frames} steps`,
+		},
+		h("span"),
+		h(
+			"span",
+			{ class: "ends" },
+			ticks(frames).map((step) => h("span", { "--at": at(step) }, step)),
+		),
+		...longest
+			.sort((a, b) => a.first - b.first)
+			.flatMap(({ id, spans }) => [
+				idTag(id),
+				h(
+					"div",
+					{ "--c": `var(--id-${colourIndex(id)})` },
+					spans.map(([first, last, kind]) =>
+						h("i", {
+							class: kind.replace(" ", "-"),
+							"--at": at(first),
+							"--long": at(last + 1 - first),
+						}),
+					),
+				),
+			]),
+		...(more > 0 ? [h("span"), quiet(`and ${more} more`)] : []),
+	);
+}
+
+/** Round steps, four to ten of them. @param {number} frames */
+function ticks(frames) {
+	const most = Math.max(10, frames) / 4;
+	const power = 10 ** Math.floor(Math.log10(most));
+	const apart = Math.max(1, [5, 2, 1].map((k) => k * power).find((step) => step <= most) ?? 1);
+	return Array.from({ length: Math.ceil(frames / apart) }, (_, k) => k * apart);
+}
+
+/**
+ * A staircase over the steps; people are whole, everything else ends where it is largest.
+ * @param {string} word @param {string} unit @param {number[]} values @param {number} frames
+ * @param {number} every  steps that a value stands for: one of fewer steps than the run ends early
+ */
+function curve(word, unit, values, frames, every) {
+	const most = Math.max(unit ? 0.1 : 1, ...values);
+	const top = most.toFixed(unit ? 2 : 0);
+	const points = values.flatMap((value, k) =>
+		[k, k + 1].map((at) => `${Math.min(at * every, frames)},${most - value}`),
+	);
+	return h(
+		"div",
+		{ class: "crowd" },
+		h("span", {}, `${word}${unit}`, h("br"), quiet(`0–${top}`)),
+		svg(
+			"svg",
+			{
+				viewBox: `0 0 ${Math.max(1, frames)} ${most}`,
+				preserveAspectRatio: "none",
+				role: "img",
+				"aria-label": `${word} over time, at most ${top}${unit}`,
+			},
+			svg("polyline", { points: points.join(" ") }),
+		),
+	);
+}
+
+/** The value below which a share of sorted ones lies. @param {number[]} sorted @param {number} share */
+const quantile = (sorted, share) => sorted[Math.round(share * (sorted.length - 1))];
+
+/** The ways of tracks from above, in the room where that is known. @param {Server.Preview} told */
+function ways({ courses, room }) {
+	const points = courses.flatMap((course) => course.points);
+	if (!points.length) return null;
+	// A stray point far away does not make all others small.
+	const ends = [0, 1].map((axis) => {
+		const sorted = points.map((point) => point[axis]).sort((a, b) => a - b);
+		const [low, high] = [quantile(sorted, 0.005), quantile(sorted, 0.995)];
+		return room ? [Math.min(low, room.min[axis]), Math.max(high, room.max[axis])] : [low, high];
+	});
+	const [[left, right], [low, high]] = ends;
+	const side = Math.max(right - left, high - low, 1);
+	const pad = 0.06 * side;
+	return svg(
+		"svg",
+		{
+			viewBox: [left - pad, -high - pad, right - left + 2 * pad, high - low + 2 * pad].join(" "),
+			role: "img",
+			"aria-label": "Ways from above",
+		},
+		...(room ? outline(room) : []),
+		...courses.map(({ id, points: way }) => {
+			const [x, y] = way[way.length - 1];
+			const drawing = svg(
+				"g",
+				{},
+				svg("polyline", { points: way.map(([u, v]) => `${u},${-v}`).join(" ") }),
+				svg("circle", { cx: x, cy: -y, r: side / 60 }),
+			);
+			drawing.style.setProperty("--c", `var(--id-${colourIndex(id)})`);
+			return drawing;
+		}),
+	);
+}
+
+/** The volume and the entrances from above. @param {Server.RoomInfo} room */
+const outline = ({ min, max, entrances }) => [
+	svg("rect", { x: min[0], y: -max[1], width: max[0] - min[0], height: max[1] - min[1] }),
+	...entrances.map(({ position, sigma }) =>
+		svg("ellipse", { cx: position[0], cy: -position[1], rx: 2 * sigma[0], ry: 2 * sigma[1] }),
+	),
+];
+
+/** @param {Server.KeptRunInfo} run */
+function facts(run) {
+	const note = h("input", {
+		class: "addnote",
+		"aria-label": "Note",
+		placeholder: "add a note",
+		value: run.note,
+	});
+	const marked = (/** @type {string} */ text) => (run.provisional ? quiet(text) : text);
+	const error = figure(run.position_error);
+	/** @type {[Child, Child[]][]} */
+	const rows = [
+		["Note", [note]],
+		...run.changes.map(
+			(change) =>
+				/** @type {[Child, Child[]]} */ ([
+					named(change),
+					[quiet(`${change.default} → `), change.value],
+				]),
+		),
+	];
+	if (run.corrected) rows.push(["Corrections of a person", [run.corrected]]);
+	if (run.provisional) rows.push(["Figures", [`provisional: ${PROVISIONAL}`]]);
+	rows.push(
+		["Missed", [marked(figure(run.misses, 0))]],
+		["False", [marked(figure(run.false_positives, 0))]],
+		["Identity switches", [marked(figure(run.id_switches, 0))]],
+		["Position error", [marked(run.position_error === null ? error : `${error} m`)]],
+		["Seed", [run.seed]],
+		["Program", [programOf(run)]],
+	);
+	return rows.flatMap(([word, value]) => [h("dt", {}, word), h("dd", {}, value)]);
+}
+
+/* ---------- Runs side by side: what differs, and their figures, the best of each bold. ---------- */
+
+/** @param {Server.KeptRunInfo[]} runs */
+export function comparison(runs) {
+	/** @type {[Child, Child[]][]} */
+	const rows = [];
+	for (const [word, of] of /** @type {[string, (run: Server.KeptRunInfo) => Child][]} */ ([
+		["Single view", (run) => run.single_view],
+		["Fusion", (run) => run.fusion_method],
+		["Seed", (run) => run.seed],
+		["Corrections", (run) => run.corrected],
+		["Program", programOf],
+	]))
+		if (new Set(runs.map(of)).size > 1) rows.push([word, runs.map(of)]);
+	const known = new Map(runs.flatMap(({ changes }) => changes).map((one) => [one.key, one]));
+	for (const change of known.values())
+		rows.push([
+			named(change),
+			runs.map((run) => run.changes.find(({ key }) => key === change.key)?.value ?? change.default),
+		]);
+	rows.push(...FIGURES.map((one) => sideBySide(runs, one)));
+	if (runs.some(({ provisional }) => provisional))
+		rows.push(["Figures", runs.map(({ provisional }) => (provisional ? PROVISIONAL : ""))]);
+	return h(
+		"table",
+		{ "aria-label": "Runs side by side" },
+		h(
+			"thead",
+			{},
+			h(
+				"tr",
+				{},
+				h("th", { scope: "col" }, "What"),
+				runs.map((run) => h("th", { scope: "col", class: "num" }, titleOf(run))),
+			),
+		),
+		h(
+			"tbody",
+			{},
+			rows.map(([word, values]) =>
+				h(
+					"tr",
+					{},
+					h("td", {}, word),
+					values.map((value) => h("td", { class: "num" }, value)),
+				),
+			),
+		),
+	);
+}
+
+/**
+ * A figure of several runs: provisional ones are shown, not compared.
+ * @param {Server.KeptRunInfo[]} runs @param {(typeof FIGURES)[number]} figure
+ * @returns {[string, Child[]]}
+ */
+function sideBySide(runs, [word, key, digits, sign]) {
+	const provisional = (/** @type {Server.KeptRunInfo} */ run) =>
+		key !== "targets" && run.provisional;
+	const there = runs
+		.filter((run) => sign && run[key] !== null && !provisional(run))
+		.map((run) => sign * Number(run[key]));
+	const best = there.length > 1 ? Math.max(...there) : null;
+	const alone = there.filter((value) => value === best).length === 1;
+	return [
+		word,
+		runs.map((run) => {
+			const text = figure(run[key], digits);
+			if (provisional(run)) return quiet(`(${text})`);
+			const wins = alone && run[key] !== null && sign * Number(run[key]) === best;
+			return wins ? h("b", { class: "top1" }, text) : text;
+		}),
+	];
+}
