@@ -537,7 +537,7 @@ declare namespace Server {
 	/** What is asked where the files leave open how they are meant. */
 	interface ImportQuestion {
 		/** The first part of the interpretation that differs. */
-		code: "direction" | "axes" | "layout" | "turns" | "order" | "mirrored" | "flipped" | "pixels" | "scene";
+		code: "direction" | "axes" | "layout" | "parts" | "turns" | "order" | "mirrored" | "flipped" | "pixels" | "scene";
 		/** In words, the likelier one first. */
 		interpretations: [string, string];
 		difference: string;
