@@ -553,6 +553,20 @@ def test_frames_without_pictures_are_counted_from_the_first(tmp_path: Path) -> N
         np.testing.assert_array_equal(view.detections.frames, boxes(camera, PLACES)[0])
 
 
+def test_cameras_that_count_from_other_frames_are_refused(tmp_path: Path) -> None:
+    toml(tmp_path)
+    for number, camera in enumerate(cameras()):
+        frames, found = boxes(camera, PLACES)
+        rows = [
+            f"{f + 55 * number},{','.join(map(str, b))}"
+            for f, b in zip(frames.tolist(), found.tolist(), strict=True)
+        ]
+        path = tmp_path / f"{camera.name}.csv"
+        path.write_text("\n".join(["frame,left,top,width,height", *rows]))
+    with pytest.raises(FormatError, match=r"other frames \(cam1 0 … 59, cam2 55 … 114"):
+        settled_of(tmp_path)
+
+
 def _timed(folder: Path, times: list[list[float]], kept: list[int]) -> None:
     """Boxes of each camera with the time of each step, of every so many steps."""
     for camera, own, every in zip(cameras(), times, kept, strict=True):

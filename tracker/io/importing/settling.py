@@ -59,6 +59,7 @@ from tracker.io.importing.finding.scale import AS_STANDING, PERSON, paced, resiz
 from tracker.io.importing.finding.times import (
     CameraTime,
     Times,
+    check_common,
     counted_alike,
     first_index,
     frames_of,
@@ -463,17 +464,22 @@ def _read(
         pixels=_other_pixels(cameras, raws, seen),
     )
     verdict = find([*raws, *spare])
+    question = None
     if verdict is not None:
         stated = _stated(options) if verdict.kind == "none" else ""
         otherwise = find([*plain, *spare]) if stated else None
         if otherwise is not None and otherwise.kind not in ("decided", "open"):
             otherwise = None
         question = check_verdict(verdict, [*raws, *spare], stated, otherwise)
-        if question is not None and not options.accept_best:
-            raise question
+    if not options.accept_best:
+        if question is not None or verdict is None or verdict.kind == "unproven":
+            pairs = zip(raws, seen, strict=True)
+            check_common({raw.name: own.frames for raw, own in pairs if own is not None})
         if question is not None:
-            open_.append(question)
-            found.append(("accepted", f"by {ACCEPT}: {question}"))
+            raise question
+    elif question is not None:
+        open_.append(question)
+        found.append(("accepted", f"by {ACCEPT}: {question}"))
     if sum(own is not None for own in seen) == 1:
         told.append(OF_ONE)
     larger = 1.0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Int
 from numpy import ndarray
 
+from tracker.io.conventions.questions import ACCEPT
 from tracker.io.importing.finding.matching import Matched, MatchedCamera
 from tracker.io.importing.options import ImportOptions
 from tracker.io.read.columns import frames_of_times, parts_of_date
@@ -293,6 +294,35 @@ def first_index(piece: DetectionPiece, options: ImportOptions, frames: int | Non
         return piece.first_index
     last = max(int(piece.frames.max()), piece.last_frame or 0)
     return 1 if piece.frames.min() == 1 and (frames is None or last >= frames) else 0
+
+
+def check_common(steps: Mapping[str, Int[ndarray, " D"]]) -> None:
+    """Check that the boxes of cameras are of the same steps, where these prove nothing.
+
+    Args:
+        steps: The steps of the boxes of each camera, by its name.
+
+    Raises:
+        FormatError: If two cameras have boxes during less than half of the shortest recording.
+    """
+    spans = {name: (int(own.min()), int(own.max()) + 1) for name, own in steps.items() if len(own)}
+    if len(spans) < 2:
+        return
+    # steps that begin a span count one more camera from there on, those that end one, one less
+    edges = sorted(
+        [(first, 1) for first, _ in spans.values()] + [(e, -1) for _, e in spans.values()]
+    )
+    common, cameras, before = 0, 0, 0
+    for edge, change in edges:
+        common += (edge - before) * (cameras > 1)
+        cameras, before = cameras + change, edge
+    if 2 * common < min(end - first for first, end in spans.values()):
+        listed = ", ".join(f"{name} {first} … {end - 1}" for name, (first, end) in spans.items())
+        raise FormatError(
+            f"the boxes of cameras are of other frames ({listed}), so that nothing tells whether "
+            "they belong together: count the frames of all of them from one moment; "
+            f"{ACCEPT} imports them as they are"
+        )
 
 
 def told_beyond(piece: DetectionPiece, first: int, frames: int) -> str:
