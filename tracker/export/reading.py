@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray
-from pydantic import ValidationError
 
 from tracker.export.json_file import TracksFile
 from tracker.export.tracks_csv import BOX, COLUMNS, COVARIANCE, HEIGHT, TrackFile, read_tracks_csv
+from tracker.files.validated import InvalidJson, parse_json
 from tracker.io.read.pieces import FormatError, TruthPiece
 from tracker.io.read.registry import recognise
 from tracker.io.read.source import SourceFile
@@ -133,13 +133,11 @@ def _json(path: Path) -> TrackFile:
     where = path.name
     data = _limited(path, "JSON")
     try:
-        file = TracksFile.model_validate_json(data)
-    except ValidationError as error:
-        first = error.errors(include_url=False, include_input=False)[0]
-        at = ".".join(map(str, first["loc"]))
+        file = parse_json(TracksFile, data)
+    except InvalidJson as error:
         raise SequenceError(
-            f"{where}{f', field {at}' if at else ''}: expected tracks as `track -o tracks.json` "
-            f"writes them, found that {first['msg'][:1].lower()}{first['msg'][1:]}"
+            f"{where}{f', field {error.field}' if error.field else ''}: expected tracks as "
+            f"`track -o tracks.json` writes them, but here: {error.problem}"
         ) from None
     names = [camera.name for camera in file.sequence.cameras]
     for k, track in enumerate(file.tracks):

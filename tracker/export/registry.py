@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import importlib
-import shutil
+import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -188,14 +188,9 @@ def save(
         with replacing(path) as temporary:
             form.write(temporary, run, options)
     elif zipped:
-        with replacing(path) as temporary:
-            folder = temporary.with_name(temporary.name + ".folder")
-            folder.mkdir()
-            try:
-                form.write(folder, run, options)
-                zip_folder(folder, temporary)
-            finally:
-                shutil.rmtree(folder, ignore_errors=True)
+        with replacing(path) as temporary, tempfile.TemporaryDirectory() as folder:
+            form.write(Path(folder), run, options)
+            zip_folder(Path(folder), temporary)
     else:
         with new_folder(path) as temporary:
             form.write(temporary, run, options)

@@ -150,24 +150,24 @@ def consensus(
     rays: Many[Rays],
     poses: Many[Pose],
     pairs: Mapping[tuple[int, int], PairsOfBoxes],
-    rng: np.random.Generator | None = None,
 ) -> Consensus:
     """Find the rise that most pairs of boxes have in common, and the pairs that agree with it.
+
+    Where there are many rises they are sampled with the seed 0, so that the result is always the
+    same.
 
     Args:
         rays: Rays of the boxes of each camera.
         poses: Pose of each camera.
         pairs: Pairs of boxes by the indices of two cameras, of
             :func:`tracker.geometry.consistency.observed.pair_up`.
-        rng: Generator that samples rises where there are many; None for one with the seed 0.
     """
-    rng = np.random.default_rng(0) if rng is None else rng
     found = {
         (a, b): triangulate_pairs(own, rays[a], rays[b], poses[a], poses[b])
         for (a, b), own in pairs.items()
     }
     rises = np.concatenate([np.zeros((0, 3)), *(met.rises for met in found.values())])
-    rise = _common_rise(rises, rng)
+    rise = _common_rise(rises, np.random.default_rng(0))
     shares: dict[tuple[int, int], float] = {}
     agreeing = 0
     feet, all_rises, gaps, fits = (

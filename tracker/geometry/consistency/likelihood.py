@@ -133,9 +133,7 @@ def at_moments(
     )
 
 
-def fit_floor(
-    rise: Float[ndarray, " 3"], feet: Float[ndarray, "N 3"], scale: float | None = None
-) -> Scene:
+def fit_floor(rise: Float[ndarray, " 3"], feet: Float[ndarray, "N 3"]) -> Scene:
     """Fit the floor as the mode of triangulated feet along the rise.
 
     The mode is the middle of the shortest interval with 40 % of the feet, and the scatter the
@@ -144,7 +142,6 @@ def fit_floor(
     Args:
         rise: From foot to head.
         feet: Triangulated feet.
-        scale: Length of the rise where it is to be another one.
     """
     height = float(np.linalg.norm(rise))
     normal = rise / height

@@ -30,6 +30,9 @@ LEAST_GAIN = 4.0
 LEAST_SHARPNESS = 3.5
 """Deviations by which the peak must stand above the curve."""
 
+LEAST_SCORE = 0.3
+"""The score of a box below which it is left out."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CameraOffset:
@@ -57,7 +60,6 @@ def synchronise(
     *,
     source: Literal["boxes", "motion"] | None = None,
     reader: FrameReader | None = None,
-    height: float | None = None,
     most_steps: int = MOST_STEPS,
 ) -> tuple[CameraOffset, ...]:
     """Find out how late each camera is. Nothing is applied.
@@ -66,7 +68,6 @@ def synchronise(
         sequence: With calibrated cameras.
         source: What is compared; boxes where every camera has them, else the pictures' motion.
         reader: Of the pictures; one is opened where none is given.
-        height: Of the boxes, metres; worked out where it is not given.
         most_steps: Of which pictures are looked at.
 
     Returns:
@@ -75,7 +76,7 @@ def synchronise(
     source = source or ("boxes" if sequence.has_detections else "motion")
     pairings: dict[tuple[int, int], Pairing] = {}
     if source == "boxes":
-        pairings = {**box_pairings(sequence, height)}
+        pairings = {**box_pairings(sequence)}
     elif sequence.has_pictures:
         own = reader or FrameReader(sequence)
         try:
@@ -126,34 +127,27 @@ class BoxPairing:
         )
 
 
-def box_pairings(
-    sequence: Sequence, height: float | None = None, score_threshold: float = 0.3
-) -> dict[tuple[int, int], BoxPairing]:
-    """The pairs of cameras that both have boxes.
+def box_pairings(sequence: Sequence) -> dict[tuple[int, int], BoxPairing]:
+    """The pairs of cameras that both have boxes of :data:`LEAST_SCORE`, as high as the boxes tell.
 
     Args:
         sequence: With calibrated cameras.
-        height: Of the boxes, metres; worked out where it is not given.
-        score_threshold: Boxes below it are left out.
     """
     rays: list[Rays] = []
     linked: list[LinkedBoxes | None] = []
     for view in sequence.views:
         own = view.detections
-        kept = (
-            np.zeros(0, dtype=int) if own is None else np.flatnonzero(own.scores >= score_threshold)
-        )
+        kept = np.zeros(0, dtype=int) if own is None else np.flatnonzero(own.scores >= LEAST_SCORE)
         frames = np.zeros(0, dtype=int) if own is None else own.frames[kept]
         boxes = np.zeros((0, 4)) if own is None else own.boxes[kept]
         rays.append(upright_rays(frames, boxes, view.camera))
         linked.append(
             link_boxes(view.camera, rays[-1], boxes, sequence.frames) if len(frames) else None
         )
-    if height is None:
-        agreed = consensus_of_cameras(sequence.cameras, rays)
-        known = 2.0 * float(sequence.target_half_extents[2])
-        near = 0.5 < agreed.height / known < 2.0 and agreed.agreeing >= LEAST_AGREEING
-        height = agreed.height if near else known
+    agreed = consensus_of_cameras(sequence.cameras, rays)
+    known = 2.0 * float(sequence.target_half_extents[2])
+    near = 0.5 < agreed.height / known < 2.0 and agreed.agreeing >= LEAST_AGREEING
+    height = agreed.height if near else known
     return {
         (a, b): BoxPairing(one, other, height)
         for (a, one), (b, other) in itertools.combinations(enumerate(linked), 2)
