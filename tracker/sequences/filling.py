@@ -125,13 +125,8 @@ def find_room(
         most = max(len(view.detections.frames) for view in views if view.detections is not None)
         every = 1 + most // _MOST_BOXES  # all cameras use the same steps
         for view in views:
-            own = view.detections
-            kept = np.zeros(0, int)
-            if own is not None:
-                kept = np.flatnonzero((own.scores >= _SCORE_THRESHOLD) & (own.frames % every == 0))
-            frames = np.zeros(0, int) if own is None else own.frames[kept]
-            boxes = np.zeros((0, 4)) if own is None else own.boxes[kept]
-            rays.append(upright_rays(frames, boxes, view.camera))
+            own = view.boxes_above(_SCORE_THRESHOLD, every)
+            rays.append(upright_rays(own.frames, own.boxes, view.camera))
         agreed = consensus_of_cameras(cameras, rays)
     found = suggest(cameras, agreed, half_extents)
     if found is None:

@@ -144,6 +144,14 @@ class View:
         """Whether there is a video or a list of images."""
         return self.video is not None or bool(self.images)
 
+    def boxes_above(self, score: float, every: int = 1) -> Detections:
+        """Return the boxes with at least a score at every n-th step; none without detections."""
+        if self.detections is None:
+            return Detections(np.zeros(0, dtype=np.int64), np.zeros((0, 4)), np.zeros(0))
+        own = self.detections
+        rows = np.flatnonzero((own.scores >= score) & (own.frames % every == 0))
+        return Detections(own.frames[rows], own.boxes[rows], own.scores[rows])
+
     def need_pictures(self, sequence: str, instead: str = "") -> None:
         """Check that there are pictures.
 

@@ -136,13 +136,12 @@ def box_pairings(sequence: Sequence) -> dict[tuple[int, int], BoxPairing]:
     rays: list[Rays] = []
     linked: list[LinkedBoxes | None] = []
     for view in sequence.views:
-        own = view.detections
-        kept = np.zeros(0, dtype=int) if own is None else np.flatnonzero(own.scores >= LEAST_SCORE)
-        frames = np.zeros(0, dtype=int) if own is None else own.frames[kept]
-        boxes = np.zeros((0, 4)) if own is None else own.boxes[kept]
-        rays.append(upright_rays(frames, boxes, view.camera))
+        own = view.boxes_above(LEAST_SCORE)
+        rays.append(upright_rays(own.frames, own.boxes, view.camera))
         linked.append(
-            link_boxes(view.camera, rays[-1], boxes, sequence.frames) if len(frames) else None
+            link_boxes(view.camera, rays[-1], own.boxes, sequence.frames)
+            if len(own.frames)
+            else None
         )
     agreed = consensus_of_cameras(sequence.cameras, rays)
     known = 2.0 * float(sequence.target_half_extents[2])

@@ -45,15 +45,15 @@ GROUP = "multiview_phd.formats"
 
 FORMATS: tuple[Format, ...] = (
     *trees.FORMATS,
-    opencv,
+    opencv.OPENCV,
     *colmap.FORMATS,
     *scenes.FORMATS,
     tsai.TSAI,
     *matrices.FORMATS,
     projection,
     matlab,
-    labelled,
-    plain,
+    labelled.LABELLED,
+    plain.PLAIN,
     camera_rows,
     numbers,
     motchallenge,

@@ -8,19 +8,12 @@ again begins the next camera.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from typing import Any
 
-from tracker.io.read.calibration.camera_fields import cameras, has_cameras
 from tracker.io.read.calibration.camera_words import split
-from tracker.io.read.pieces import CalibrationPiece, Convention, Piece
-from tracker.io.read.protocol import Certainty, Kind
+from tracker.io.read.calibration.named_format import NamedFormat
 from tracker.io.read.source import SourceFile
 from tracker.io.read.values import NUMBER
-
-NAME = "text with K, R, T by name"
-KIND: Kind = "calibration"
-SERIES = False
 
 MOST_BYTES = 2**20
 
@@ -30,20 +23,12 @@ _WRAPPING = ("array", "matrix", "np", "np.array", "numpy.array", "dtype", "float
 """Words that stand around numbers and name nothing."""
 
 
-def recognise(file: SourceFile) -> Certainty:
-    """A short text of names and numbers in which a camera's parts are called so."""
+def _may_be(file: SourceFile) -> bool:
+    """A short text in which a camera's parts are called so at the beginning of a line."""
     head = file.head_text
     if not head or file.size > MOST_BYTES or head.lstrip()[:1] in ("{", "<") or "%YAML" in head:
-        return Certainty.NO
-    if not any(_means_a_camera(line) for line in head.splitlines()[:200]):
-        return Certainty.NO
-    return Certainty.POSSIBLE if has_cameras(_values(file.text(MOST_BYTES))) else Certainty.NO
-
-
-def read(file: SourceFile) -> Iterator[Piece]:
-    """One piece with every camera of the file; nothing is known of the convention."""
-    values = _values(file.text(MOST_BYTES))
-    yield CalibrationPiece(file.path, NAME, tuple(cameras(file, values, Convention())))
+        return False
+    return any(map(_means_a_camera, head.splitlines()[:200]))
 
 
 def _means_a_camera(line: str) -> bool:
@@ -52,11 +37,11 @@ def _means_a_camera(line: str) -> bool:
     return meaning is not None and meaning[0] not in ("name", "size", "width", "height")
 
 
-def _values(text: str) -> Any:
+def _values(file: SourceFile) -> Any:
     """A table of the names, or one a camera where they come again."""
     tables: list[dict[str, Any]] = [{}]
     numbers: list[float] | None = None
-    for token in _TOKEN.finditer(_COMMENT.sub("", text)):
+    for token in _TOKEN.finditer(_COMMENT.sub("", file.text(MOST_BYTES))):
         name = token["name"]
         if name is None:
             if numbers is not None:
@@ -73,3 +58,6 @@ def _values(text: str) -> Any:
     ]
     # what stands before the names that come again is of none of the cameras
     return found[0] if len(found) == 1 else {str(n): table for n, table in enumerate(found)}
+
+
+LABELLED = NamedFormat("text with K, R, T by name", _values, _may_be)

@@ -10,36 +10,22 @@ Source: OpenCV, "XML/YAML/JSON file storages" (core persistence) and the calib3d
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from tracker.files.text import shown
-from tracker.io.read.calibration.camera_fields import cameras, has_cameras
-from tracker.io.read.pieces import CalibrationPiece, Convention, Piece
-from tracker.io.read.protocol import Certainty, Kind
+from tracker.io.read.calibration.named_format import NamedFormat
+from tracker.io.read.pieces import Convention
+from tracker.io.read.protocol import Certainty
 from tracker.io.read.source import SourceFile, listed
 from tracker.io.read.values import numbers
 
-NAME = "OpenCV FileStorage"
-KIND: Kind = "calibration"
-SERIES = False
 
-CONVENTION = Convention(direction="world-to-camera", axes="opencv")
-
-
-def recognise(file: SourceFile) -> Certainty:
-    """The root ``opencv_storage``, or matrices of the type ``opencv-matrix``, with a camera."""
-    head = file.head_text
-    if not re.search(r"<opencv_storage>|opencv-matrix|\A%YAML:1", head):
-        return Certainty.NO
-    return Certainty.SURE if has_cameras(_values(file)) else Certainty.NO
-
-
-def read(file: SourceFile) -> Iterator[Piece]:
-    """One piece with every camera of the file."""
-    yield CalibrationPiece(file.path, NAME, tuple(cameras(file, _values(file), CONVENTION)))
+def _may_be(file: SourceFile) -> bool:
+    """The root ``opencv_storage``, or matrices of the type ``opencv-matrix``."""
+    return re.search(r"<opencv_storage>|opencv-matrix|\A%YAML:1", file.head_text) is not None
 
 
 def _values(file: SourceFile) -> Any:
@@ -66,3 +52,12 @@ def _matrix(file: SourceFile, field: str, sizes: Any, data: Any) -> list[float]:
     if count < 1 or len(found) % count:  # several numbers an element, where it has channels
         raise file.error(f"expected {count:g} numbers, found {len(found)} ({shown(data)})", field)
     return [float(each) for each in found]
+
+
+OPENCV = NamedFormat(
+    "OpenCV FileStorage",
+    _values,
+    _may_be,
+    Certainty.SURE,
+    Convention(direction="world-to-camera", axes="opencv"),
+)

@@ -8,20 +8,14 @@ from __future__ import annotations
 import io
 import zipfile
 import zlib
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 from numpy import ndarray
 
-from tracker.io.read.calibration.camera_fields import cameras, has_cameras
-from tracker.io.read.pieces import CalibrationPiece, Convention, FormatError, Piece
-from tracker.io.read.protocol import Certainty, Kind
+from tracker.io.read.calibration.named_format import NamedFormat
+from tracker.io.read.pieces import FormatError
 from tracker.io.read.source import SourceFile
-
-NAME = "JSON, YAML or .npz with K, R, t"
-KIND: Kind = "calibration"
-SERIES = False
 
 MOST_BYTES = 16 * 2**20
 """Of an archive of arrays, packed and unpacked: a few bytes may stand for gigabytes."""
@@ -29,23 +23,15 @@ MOST_BYTES = 16 * 2**20
 _ZIP = b"PK\x03\x04"
 
 
-def recognise(file: SourceFile) -> Certainty:
-    """JSON, YAML or arrays that hold a table with a camera's fields."""
-    if file.head.startswith(_ZIP):
-        return Certainty.POSSIBLE if has_cameras(_arrays(file)) else Certainty.NO
+def _may_be(file: SourceFile) -> bool:
+    """An archive of arrays, or the beginning of JSON or YAML that can be parsed."""
     head = file.head_text.lstrip()
+    if file.head.startswith(_ZIP) or head[:1] in ("{", "["):
+        return True
     try:
-        if head[:1] in ("{", "[") or (":" in head and "\n" in head and "<" not in head[:1]):
-            return Certainty.POSSIBLE if has_cameras(_values(file)) else Certainty.NO
+        return ":" in head and "\n" in head and head[:1] != "<" and file.yaml is not None
     except FormatError:  # some other text
-        if head[:1] in ("{", "["):
-            raise
-    return Certainty.NO
-
-
-def read(file: SourceFile) -> Iterator[Piece]:
-    """One piece with every camera of the file; nothing is known of the convention."""
-    yield CalibrationPiece(file.path, NAME, tuple(cameras(file, _values(file), Convention())))
+        return False
 
 
 def _values(file: SourceFile) -> Any:
@@ -83,3 +69,6 @@ def _arrays(file: SourceFile) -> dict[str, Any]:
         }
         for camera in range(count)
     }
+
+
+PLAIN = NamedFormat("JSON, YAML or .npz with K, R, t", _values, _may_be)
