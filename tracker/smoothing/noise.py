@@ -157,9 +157,9 @@ def estimate_noise(
     """
     from scipy.optimize import minimize  # half a second that a server starts without
 
-    windows = _windows(paths, rows, seen, motion.transition, noise_scales)
-    dimension, size = paths.states.shape[1], seen.residuals.shape[1]
-    prior = np.diag(np.repeat([_DEVIATION**2, _DEVIATION_VELOCITY**2], 3)[:dimension])
+    windows = windows_of(paths, rows, seen, motion.transition, noise_scales)
+    size = seen.residuals.shape[1]
+    prior = window_prior(paths.states.shape[1])
     deviation = DeviationMotion(motion.transition, motion.noise, prior)
 
     def model_of(logarithms: ndarray) -> NoiseModel:
@@ -170,9 +170,7 @@ def estimate_noise(
         )
 
     def cost(logarithms: ndarray) -> float:
-        noise = model_of(logarithms)
-        kept = float(np.exp(-step_time / noise.time))
-        errors = BoxErrors(noise.white, noise.pixels, noise.persistent, kept, noise.process)
+        errors = box_errors(model_of(logarithms), step_time)
         return -float(log_likelihood(windows, deviation, errors))
 
     shares = np.square(windows.residuals / windows.half_heights[:, None]).mean(axis=0)
@@ -190,14 +188,38 @@ def estimate_noise(
     return model_of(found.x)
 
 
-def _windows(
+def box_errors(noise: NoiseModel, step_time: float) -> BoxErrors:
+    """Convert a noise model to that of one step, as the likelihood takes it.
+
+    Args:
+        noise: The noise.
+        step_time: Time between two steps, seconds.
+    """
+    kept = float(np.exp(-step_time / noise.time))
+    return BoxErrors(noise.white, noise.pixels, noise.persistent, kept, noise.process)
+
+
+def window_prior(dimension: int) -> Float[ndarray, "d d"]:
+    """The prior covariance of a window's first deviation, for states of size d."""
+    return np.diag(np.repeat([_DEVIATION**2, _DEVIATION_VELOCITY**2], 3)[:dimension])
+
+
+def windows_of(
     paths: Paths,
     rows: Int[ndarray, " K"],
     seen: SureBoxes,
     transition: Float[ndarray, "d d"],
     noise_scales: Float[ndarray, " N"],
 ) -> Windows:
-    """The rows with their boxes, row after row; a window ends with its path or its length."""
+    """Arrange rows with their boxes, row after row; a window ends with its path or its length.
+
+    Args:
+        paths: The paths, with N rows.
+        rows: The rows, ascending.
+        seen: Boxes of these rows and of others.
+        transition: F of the motion model.
+        noise_scales: Factor on the process noise of the step to each row.
+    """
     owners = paths.owners_of(rows)
     within = rows - paths.starts[owners]
     begins = np.append(True, (np.diff(rows) != 1) | (within[1:] % WINDOW == 0))

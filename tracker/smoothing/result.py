@@ -10,6 +10,7 @@ from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
 from tracker.smoothing.calibration import Calibration
+from tracker.smoothing.camera_errors import CameraErrors
 from tracker.smoothing.noise import NoiseModel
 
 DecisionKind = Literal["cut", "joined", "removed"]
@@ -93,6 +94,8 @@ class Smoothed:
     """Height of the track's person while standing, metres; NaN where it is not estimated."""
     sigma_heights: Float[ndarray, " N"] = field(default_factory=lambda: np.zeros(0))
     """Standard deviation of the height, metres."""
+    cameras: CameraErrors | None = None
+    """The errors and delays of each camera; None where no noise is estimated."""
 
     @staticmethod
     def empty(dimension: int, cameras: int) -> Smoothed:

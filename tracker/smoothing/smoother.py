@@ -45,6 +45,7 @@ from tracker.smoothing.calibration import (
     shifts,
     upright,
 )
+from tracker.smoothing.camera_errors import CameraErrors, estimate_camera_errors
 from tracker.smoothing.heights import BoxTops, standing_heights
 from tracker.smoothing.noise import (
     LEAST_ROWS,
@@ -189,6 +190,8 @@ class Reported(NamedTuple):
     """The covariances of the states."""
     learnt: Calibration
     """The self-calibration with the shape of bodies."""
+    cameras: CameraErrors
+    """The errors of each camera apart."""
 
 
 class Smoother:
@@ -650,6 +653,16 @@ class Smoother:
         noise = estimate_noise(
             paths, rows, seen, self.model.motion, fitted.noise_scales, self.model.step_time
         )
+        cameras = estimate_camera_errors(
+            paths,
+            rows,
+            seen,
+            self.model.motion,
+            fitted.noise_scales,
+            self.model.step_time,
+            noise,
+            learnt.offsets,
+        )
         half_height = float(self._sequence.target_half_extents[2])
         covariances = self.fit(paths, links, 1, replace(learnt, noise=noise)).paths.covariances
         errors = PersistentErrors(noise, len(paths.states), half_height)
@@ -666,7 +679,7 @@ class Smoother:
         # there a correction says how sure a position is
         placed = self.rows_with_places(given)[0]
         covariances[placed] = given.covariances[placed]
-        return Reported(noise, common, covariances, learnt)
+        return Reported(noise, common, covariances, learnt, cameras)
 
     def with_bodies(self, paths: Paths, links: Links, learnt: Calibration) -> Calibration:
         """Add to a calibration the shape of people's bodies (:mod:`tracker.smoothing.bodies`).

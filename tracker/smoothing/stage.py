@@ -363,7 +363,9 @@ def _finished(
         decided.joined,
         noise,
         0.0 if reported is None else reported.common,
-        *heights[:, owners[rows]],
+        heights=heights[0, owners[rows]],
+        sigma_heights=heights[1, owners[rows]],
+        cameras=None if reported is None else reported.cameras,
     )
 
 

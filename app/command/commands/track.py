@@ -37,6 +37,7 @@ def track(command: Track) -> int:
     from app.state.workers.compiling import Compiling
     from tracker.io.checks import check
     from tracker.runs import gaps, pipeline
+    from tracker.runs.camera_notes import camera_notes
     from tracker.runs.fitting import advice
     from tracker.runs.gates import notices
     from tracker.runs.outcome import why_no_tracks
@@ -102,7 +103,7 @@ def track(command: Track) -> int:
     kept = "" if "single_view" in stages else "; stage 1 was kept from an earlier run"
     if (reason := why_no_tracks(run)) is not None:
         say(reason)
-    for sentence in notices(run):
+    for sentence in (*notices(run), *camera_notes(run)):
         say(sentence)
     if told_by_hand:
         unmet = {one.id: one.why for one in run.outcomes if not one.met}

@@ -30,6 +30,7 @@ from tracker.library.records import Result
 from tracker.parameters.catalogue import RunParameters
 from tracker.parameters.values import changed_values, with_values
 from tracker.runs import gaps, pipeline
+from tracker.runs.camera_notes import camera_notes
 from tracker.runs.gates import notices
 from tracker.runs.outcome import why_no_tracks
 from tracker.runs.pipeline import Cancelled, Progress, Run
@@ -308,6 +309,7 @@ class Jobs:
         else:
             reason = why_no_tracks(run)
             told = [*([reason] if reason else []), *gaps.sentences(run), *notices(run)]
+            told += camera_notes(run)
             workbench.run_ends(wanted.key, "done", warnings=told)
 
     def _leave_out(self, wanted: _Wanted, crashed: Note) -> None:

@@ -1,0 +1,59 @@
+"""Sentences about cameras whose boxes are out of line with the others', and about their clocks."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tracker.runs.run import Run
+from tracker.smoothing.camera_errors import CameraErrors, Quantity, significance
+
+_WALKING = 1.4
+"""Preferred speed of walking, m/s (Bohannon, Age and Ageing 26(1), 1997)."""
+
+_ERRING: dict[Quantity, str] = {
+    "horizontal": "their places across the picture err",
+    "vertical": "their places up and down the picture err",
+    "height": "their heights err",
+    "all": "they err",
+}
+
+
+def camera_notes(run: Run) -> list[str]:
+    """Describe which camera's boxes err more than those of the others, and which cameras are late.
+
+    A delay is named where it is significant, and somebody who walks moves by more in this time than
+    the boxes of a camera are off.
+    """
+    smoothed = run.smoothed
+    if smoothed is None or smoothed.cameras is None or smoothed.noise is None:
+        return []
+    errors = smoothed.cameras
+    names = [view.camera.name for view in run.sequence.views]
+    found = []
+    if errors.out_of_line is not None:
+        camera, quantity = errors.out_of_line
+        factor = errors.of(camera, quantity)
+        found.append(
+            f'the boxes of camera "{names[camera]}" are out of line: {_ERRING[quantity]} '
+            f"{factor:.1f} times as much as the other cameras'; its calibration is turned, or its "
+            "boxes are worse, see multiview-phd check; sigma is too small where it alone sees "
+            "somebody"
+        )
+    off = float(smoothed.noise.persistent[0] * run.sequence.target_half_extents[2])
+    delays = _delays(errors, names, off / _WALKING)
+    if delays:
+        found.append(
+            f"by the errors of boxes {', '.join(delays)}; nothing is corrected: see Time in "
+            "multiview-phd check, which measures this by itself, and time_offset in sequence.toml"
+        )
+    return found
+
+
+def _delays(errors: CameraErrors, names: list[str], least: float) -> list[str]:
+    """Describe the delays of more than ``least`` seconds that are significant."""
+    bound = np.maximum(least, significance(len(names)) * errors.delay_sigmas)
+    return [
+        f'camera "{names[camera]}" is {abs(errors.delays[camera]):.2f} s '
+        + ("late" if errors.delays[camera] > 0.0 else "early")
+        for camera in np.flatnonzero(np.abs(errors.delays) > bound).tolist()
+    ]
