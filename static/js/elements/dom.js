@@ -142,12 +142,23 @@ export function allow(control, why) {
 }
 
 /**
+ * Replace what a list of choices has where it is others: a list that is open would close.
+ * @param {Element} select @param {...(Child | Child[])} children
+ */
+export function refill(select, ...children) {
+	const made = [...h("select", {}, ...children).childNodes];
+	const there = select.childNodes;
+	if (made.length !== there.length || made.some((node, k) => !node.isEqualNode(there[k])))
+		select.replaceChildren(...made);
+}
+
+/**
  * @param {Element & { value: string }} select
  * @param {[string | number, string][]} choices  values and words
  * @param {string | number} chosen
  */
 export function choices(select, choices, chosen) {
-	fill(
+	refill(
 		select,
 		choices.map(([value, word]) => h("option", { value }, word)),
 	);

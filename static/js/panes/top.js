@@ -1,5 +1,5 @@
 /** The top bar: its places, what is open, which methods run, how far they are. */
-import { allow, fill, h, one, parts, write, all } from "../elements/dom.js";
+import { allow, fill, h, one, parts, write, all, refill } from "../elements/dom.js";
 import { PLACES, isBench, placeOf } from "../state/address.js";
 
 /* ---------- The words of the top bar that lead from place to place, and what they lead to. A
@@ -126,7 +126,7 @@ export function mountTop(root, { store, actions }) {
 			/** @type {string} */ label,
 			/** @type {Server.SequenceEntryInfo[]} */ entries,
 		) => entries.length > 0 && h("optgroup", { label }, entries.map(option));
-		fill(
+		refill(
 			sequence,
 			!open && h("option", { value: "", disabled: true }, "choose a sequence"),
 			open && !sequences.some(({ name }) => name === open) && h("option", { value: open }, open),
@@ -147,7 +147,7 @@ export function mountTop(root, { store, actions }) {
 			const now = server?.parameters[key] ?? "";
 			const names = schema?.methods[key] ?? [];
 			const unfit = server?.unfit[key] ?? {};
-			fill(
+			refill(
 				select,
 				(names.includes(now) ? names : [now, ...names]).map((name) =>
 					h(

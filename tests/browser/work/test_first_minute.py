@@ -30,6 +30,21 @@ def test_reset_all_resets_all(flat_page: Page, server: Server) -> None:
         expect(page.locator(".note")).to_have_count(0)
 
 
+def test_lists_of_choices_stay_as_they_are_while_they_have_the_same(
+    flat_page: Page, server: Server
+) -> None:
+    page = flat_page
+    as_at_first(server)
+    lists = "select[data-ref=sequence], select[data-ref=single_view]"
+    mark = "all => all.forEach(list => [...list.options].forEach(one => (one.same = true)))"
+    page.locator(lists).evaluate_all(mark)
+    ask(server, "PATCH", "parameters", {"changes": {P_D: 0.6}})
+    expect(page.get_by_role("tab", name=re.compile("Changes"))).to_contain_text("1")
+    kept = "all => all.map(list => [...list.options].every(one => one.same))"
+    assert page.locator(lists).evaluate_all(kept) == [True, True]
+    as_at_first(server)
+
+
 def test_undo_is_offered_only_where_there_is_something_to_undo(
     flat_page: Page, server: Server
 ) -> None:
