@@ -51,9 +51,10 @@ _KNOWN: tuple[_Refused, ...] = (
     _Refused("a Python pickle (as of DeepLabCut's 3D projects)", _is_pickle, _ITSELF),
     _Refused("a NumPy array of Python objects (a pickle)", _is_array_of_objects, _ITSELF),
     _Refused(
-        "a NumPy array of another shape than cameras have",
+        "a NumPy array of another shape than cameras or boxes have",
         _starts(b"\x93NUMPY"),
-        "save boxes as CSV with a header, and K, R and t of a camera together as .npz",
+        "save rows of frame, left, top, width, height, columns by name (frame, id, x, y) as .npz, "
+        "or K, R and t of a camera together as .npz",
     ),
     _Refused(
         "HDF5 (as of DeepLabCut, SLEAP or MATLAB 7.3)",
