@@ -483,12 +483,13 @@ def test_words_between_numbers_are_cameras_or_classes(tmp_path: Path, header: st
         _assert_boxes(piece)
 
 
-def test_a_table_without_boxes_says_what_is_missing(tmp_path: Path) -> None:
+@pytest.mark.parametrize("cell", ["0.9", "90 %"])
+def test_a_table_without_boxes_says_what_is_missing(tmp_path: Path, cell: str) -> None:
     path = tmp_path / "cam1.csv"
-    path.write_text("frame,x,y,score\n0,1.5,2.5,0.9\n1,2.5,3.5,0.8\n")
+    path.write_text(f"frame,x,score\n0,{cell},{cell}\n1,{cell},{cell}\n")
     found, _, complaint = recognise(SourceFile(path))
     assert found is None
-    assert 'is a table of "frame, x, y, score", among which are neither boxes' in str(complaint)
+    assert 'is a table of "frame, x, score", among which are neither boxes' in str(complaint)
 
 
 SCORES = np.linspace(0.25, 0.75, len(FRAMES))

@@ -154,7 +154,7 @@ def _header(file: SourceFile) -> tuple[str, ...]:
     names, cells = (
         [cell.strip() for cell in line.split(delimiter)] for line in (lines + [""] * 2)[:2]
     )
-    numbers = [cell for cell in cells if re.fullmatch(r"-?\d+([.,]\d+)?", cell)]
+    numbers = [cell for cell in cells if re.fullmatch(r"-?\d+([.,]\d+)?(\s*%)?", cell)]
     named = len(names) > 2 and all(re.search(r"[^\W\d_]", name) for name in names)
     return (
         tuple(names) if named and len(names) == len(cells) and 2 * len(numbers) > len(cells) else ()
