@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from tracker.review.queue.meetings import ambiguous_shares, meetings
 from tracker.review.queue.ranking import is_answered, once_each
 from tracker.review.queue.unclaimed import unclaimed
 from tracker.runs.run import Run
+from tracker.steps.steps import Ragged, Steps
 
 
 def without(run: Run, track: int, first: int = 0, last: int = 10**6) -> Run:
@@ -66,6 +68,29 @@ def test_boxes_are_drawn_between_people_no_more_than_they_are() -> None:
     shares = ambiguous_shares(run)
     assert all(0.0 < share <= 1.0 for share in shares.values())
     assert all(one < other for one, other, _ in shares)
+
+
+class Growing:
+    """The filter's results of a run that is being computed: there are more at every look."""
+
+    def __init__(self, results: Steps[Any]) -> None:
+        self._results, self._there = results, 30
+
+    def __len__(self) -> int:
+        return self._there
+
+    def column(self, name: str, **part: int) -> Ragged:
+        self._there += 5
+        return self._results.before(self._there).column(name, **part)
+
+
+def test_a_run_that_grows_while_it_is_read_is_read_as_far_as_it_was() -> None:
+    run = near()
+    whole = ambiguous_shares(run)
+    growing = replace(run)
+    growing.tracks, growing.fused = run.tracks, cast("Any", Growing(run.fused))
+    found = ambiguous_shares(growing)
+    assert found == {key: share for key, share in whole.items() if key[2] < 30}
 
 
 def test_who_is_missing_is_asked_for_with_where_he_is() -> None:

@@ -165,11 +165,12 @@ def ambiguous_shares(run: Run) -> dict[tuple[int, int, int], float]:
 def _associated(run: Run) -> tuple[ndarray, ndarray, ndarray, ndarray, ndarray]:
     """Return step, label, index of the camera, index of the box and probability of each
     association."""
+    there = len(run.fused)  # a run that is being computed grows from one column to the next
     cameras, components, boxes, probabilities = (
-        run.fused.column(f"associations.{name}")
+        run.fused.column(f"associations.{name}", last=there)
         for name in ("cameras", "components", "boxes", "probabilities")
     )
-    labels, steps = run.fused.column("posterior.labels"), cameras.steps
+    labels, steps = run.fused.column("posterior.labels", last=there), cameras.steps
     if not len(steps):
         nothing = np.zeros(0, dtype=np.int64)
         return nothing, nothing, nothing, nothing, np.zeros(0)
