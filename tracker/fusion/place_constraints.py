@@ -34,15 +34,17 @@ def constraints_by_step(corrections: Iterable[Correction]) -> dict[int, PlaceCon
     present: dict[int, list[tuple[ndarray, float, ndarray]]] = {}
     empty: dict[int, list[tuple[tuple[float, float], float]]] = {}
     for one in corrections:
+        if one.accuracy is None:  # it is not about a place
+            continue
         if one.kind == "here":
             place, *meant = one.places
             reference = meant[0].point if meant else np.full(3, np.nan)
-            present.setdefault(place.step, []).append((place.point, one.accuracy or 0.0, reference))
+            present.setdefault(place.step, []).append((place.point, one.accuracy, reference))
         elif one.kind == "nobody":
             first, last = one.steps
             for step in range(first, last + 1):
                 if (where := along(one.places, step)) is not None:
-                    empty.setdefault(step, []).append((where, one.accuracy or 0.0))
+                    empty.setdefault(step, []).append((where, one.accuracy))
     return {
         step: PlaceConstraints(
             np.array([place for place, _, _ in present.get(step, [])]).reshape(-1, 3),
