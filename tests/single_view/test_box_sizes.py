@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -16,9 +18,15 @@ from tracker.geometry.boxes import Boxes
 from tracker.parameters.catalogue import RunParameters
 from tracker.parameters.groups.detections import DetectionBoxParams
 from tracker.parameters.values import with_values
-from tracker.sequences.sequence import Room
+from tracker.sequences.sequence import Entrance, Room
 from tracker.single_view import box_sizes
-from tracker.single_view.box_sizes import BoxSizes, entrance_boxes, upright_boxes
+from tracker.single_view.box_sizes import (
+    BoxSizes,
+    entrance_boxes,
+    outline_share,
+    upright_boxes,
+    usual_heights,
+)
 from tracker.single_view.detector_boxes import judged, meets, standing_between
 from tracker.single_view.jpda.crowns import TargetSizes
 
@@ -119,20 +127,63 @@ def test_what_is_said_of_a_cell_is_of_the_sizes_in_it() -> None:
 
 def test_with_entrances_most_sizes_are_of_their_heights() -> None:
     anywhere, there = (
-        BoxSizes.of(LENS, ROOM, HALF, at_entrance_heights=at).quantiles(5) for at in (False, True)
+        BoxSizes.of(LENS, ROOM, HALF, at_usual_heights=at).quantiles(5) for at in (False, True)
     )
     both = anywhere[1] & there[1]
     spreads = [np.log(t[both][:, 3, 1] / t[both][:, 1, 1]).mean() for t, _ in (anywhere, there)]
     assert spreads[1] < 0.75 * spreads[0]
-    bare = Room(ROOM.minimum, ROOM.maximum)
+    low = Room(ROOM.minimum, np.array([1.5, 1.5, 1.3]))  # too low to stand in
     assert_array_equal(
-        BoxSizes.of(LENS, bare, HALF, at_entrance_heights=True).sizes,
-        BoxSizes.of(LENS, bare, HALF).sizes,
+        BoxSizes.of(LENS, low, HALF, at_usual_heights=True).sizes,
+        BoxSizes.of(LENS, low, HALF).sizes,
     )
     away = Room(np.array([-51.0, -51.0, 0.0]), np.array([-50.0, -50.0, 2.0]))
     nothing = BoxSizes.of(LENS, away, HALF)
     assert_array_equal([nothing.smallest, nothing.largest], [[1.0, 1.0], [2.0, 2.0]])
     assert not nothing.contains(places(5)[:, :2]).any()
+
+
+@pytest.mark.parametrize("half_height", [0.125, 0.36, 0.85, 1.1])
+def test_without_entrances_sizes_are_those_of_people_who_stand_on_the_floor(
+    half_height: float,
+) -> None:
+    half = np.array([0.2, 0.2, half_height])
+    raised = Room(np.array([-1.5, -1.5, 0.4]), np.array([1.5, 1.5, 2.6]))
+    means, sigmas = usual_heights(raised, half_height)
+    # from the crown of somebody 1.65 m tall down, or up from the floor where that is further
+    assert means == pytest.approx([0.4 + max(1.65 - half_height, half_height)])
+    assert sigmas == pytest.approx([0.1])
+    doors = replace(raised, entrances=(Entrance(np.array([0.0, 0.0, means[0]]), np.full(3, 0.1)),))
+    as_doors, as_people = (
+        BoxSizes.of(LENS, room, half, at_usual_heights=True) for room in (doors, raised)
+    )
+    assert_array_equal(as_people.sizes, as_doors.sizes)
+    middles = [TargetSizes(LENS, room, half, 2.0).middle for room in (doors, raised)]
+    assert_allclose(middles[1], middles[0], rtol=0.15)
+
+
+@given(st.floats(0.02, 1.0), st.floats(0.02, 1.0), st.floats(0.05, 1.2), st.floats(1.01, 2.0))
+def test_the_outline_of_a_person_fills_less_of_a_wider_box(
+    width: float, depth: float, half_height: float, factor: float
+) -> None:
+    share = outline_share(np.array([width, depth, half_height]))
+    assert 0.0 < share <= 1.0 + 1e-12
+    wider = outline_share(np.array([factor * width, factor * depth, half_height]))
+    assert share / factor - 1e-12 <= wider <= share + 1e-12, "what is added is empty at most"
+    # the same by rows of the outline: head, trunk and legs of somebody as tall as the box at least
+    rise = 2.0 * half_height
+    down = (np.arange(4000) + 0.5) / 4000 * rise
+    stature = max(1.65, rise)
+    across = stature * np.select([down < 0.13 * stature, down < 0.47 * stature], [0.1, 0.195], 0.11)
+    filled = np.minimum(across, width + depth).mean() / (width + depth)
+    assert share == pytest.approx(filled, abs=2e-3)
+
+
+def test_the_outline_of_a_whole_body_has_the_area_that_is_measured() -> None:
+    half = np.array([0.3, 0.3, 0.86])
+    area = outline_share(half) * 0.6 * 1.72
+    # Fanger 1972: projected area of standing people, 0.23 to 0.35 of an effective area of 1.3 m²
+    assert 0.23 * 1.3 < area < 0.35 * 1.3
 
 
 def test_an_entrance_is_a_gaussian_of_the_boxes_that_come_in_by_it() -> None:

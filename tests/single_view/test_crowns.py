@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from numpy import ndarray
 
+from tests import world
 from tests.world import SMALL_CAMERAS as CAMERAS
 from tests.world import SMALL_ROOM as ROOM
 from tracker.parameters.groups.jpda import JpdaParams
@@ -87,3 +88,32 @@ def test_an_empty_mask_and_a_full_one_show_nobody(sizes: TargetSizes, filled: bo
     found = crowns(mask, sizes, 40, NUMBERS)
     assert found.boxes.shape == (0, 4)
     assert found.pieces.shape == (0, 4)
+
+
+def body(width: float) -> tuple[ndarray, ndarray]:
+    """The mask of a standing person whose parts are ``width`` times as wide, and the whole box."""
+    whole = np.array([0.3, 0.3, 0.85])
+    boxes, seen = upright_boxes(CAMERA, np.array([[0.0, 0.0, 0.85]]), whole)
+    assert seen.all()
+    (x, y, half_x, half_y), mask = boxes[0], np.zeros(CAMERA.image_size[::-1], dtype=np.uint8)
+    pixels = half_x / 0.3  # per metre
+    for top, bottom, across in ((0.0, 0.13, 0.17), (0.13, 0.47, 0.32), (0.47, 1.0, 0.18)):
+        rows = [round(y + (2.0 * share - 1.0) * half_y) for share in (top, bottom)]
+        half = max(0.5, width * across * pixels / 2.0)
+        cv2.rectangle(mask, (round(x - half), rows[0]), (round(x + half), rows[1]), 1, -1)
+    return mask, boxes
+
+
+@pytest.mark.parametrize("entrances", [True, False])
+def test_a_whole_body_need_not_fill_its_box_but_its_outline(entrances: bool) -> None:
+    doors = world.volume(1.5, 2.0, [(0.0, 1.4, 0.85)], (0.25, 0.25, 0.05)).entrances
+    room = Room(ROOM.minimum, ROOM.maximum, doors if entrances else ())
+    sizes = TargetSizes(CAMERA, room, np.array([0.3, 0.3, 0.85]), NUMBERS.height_sigmas)
+    mask, boxes = body(1.0)
+    found = crowns(mask, sizes, 40, NUMBERS)
+    compare(found.boxes, boxes)
+    assert found.inside[0] > 0.7
+    slim, _ = body(0.75)  # seen from the side
+    assert len(crowns(slim, sizes, 40, NUMBERS).boxes) == 1
+    pole, _ = body(0.2)
+    assert len(crowns(pole, sizes, 10, NUMBERS).boxes) == 0

@@ -1,4 +1,8 @@
-"""Possible sizes of a target's box at each place of an image, from the calibrated camera."""
+"""Possible sizes of a target's box at each place of an image, from the calibrated camera.
+
+[DC66] Drillis, Contini, "Body segment parameters", Office of Vocational Rehabilitation, 1966.
+[NCD16] NCD Risk Factor Collaboration, "A century of trends in adult human height", eLife 5, 2016.
+"""
 
 from __future__ import annotations
 
@@ -21,9 +25,18 @@ still contains some hundred of the positions."""
 POSITIONS = 60_000
 """Number of positions in the room that are projected for each camera: enough for every cell."""
 
-AT_ENTRANCE_HEIGHT, HEIGHT_FACTOR = 0.9, 2.0
-"""Share of the positions at the entrances' heights, and the factor on those heights'
-spread: some people sit or bend, and entrances are drawn by eye."""
+AT_USUAL_HEIGHT, HEIGHT_FACTOR = 0.9, 2.0
+"""Share of the positions at the usual heights, and the factor on those heights' spread: some people
+sit or bend, and entrances are drawn by eye."""
+
+CROWN, CROWN_SIGMA = 1.65, 0.1
+"""Mean and standard deviation of the heights of standing adults, women and men together, metres
+([NCD16]: country means of 1.50 to 1.83 m, of which most are within 1.57 to 1.79 m)."""
+
+OUTLINE = ((0.13, 0.10), (0.47, 0.195), (1.0, 0.11))
+"""Head, trunk with arms, and legs: their lower ends below the crown, and their mean widths seen
+from all sides, in statures. Lengths and widths from the front are those of [DC66]; the mean width
+of a convex outline is its circumference over pi (Cauchy), here that of an ellipse half as deep."""
 
 BELOW_FLOOR = 0.1
 """Extent of a target below the room's volume that is allowed, for a floor drawn by eye, metres."""
@@ -86,6 +99,21 @@ def upright_boxes(
     return boxes, whole & camera.contains(boxes[:, :2])
 
 
+def outline_share(half_extents: Float[ndarray, " 3"]) -> float:
+    """The share of a target's box that the outline of a standing person fills on average, 0 … 1.
+
+    The box hangs from the crown. A box around a head or a trunk is nearly full; one around a whole
+    body, as wide as its arms reach, is for the most part empty.
+
+    Args:
+        half_extents: Half width, depth and height of a target, metres.
+    """
+    width, height = half_extents[0] + half_extents[1], 2.0 * half_extents[2]
+    ends, widths = np.array(OUTLINE).T * max(CROWN, height)
+    lengths = np.diff(np.minimum(ends, height), prepend=0.0)
+    return float((lengths * np.minimum(widths, width)).sum() / (width * height))
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class BoxSizes:
     """The sizes of targets anywhere in the room, by the cell of the image with their centre."""
@@ -111,7 +139,7 @@ class BoxSizes:
         room: Room,
         half_extents: Float[ndarray, " 3"],
         *,
-        at_entrance_heights: bool = False,
+        at_usual_heights: bool = False,
     ) -> BoxSizes:
         """Project positions spread evenly over the room's volume.
 
@@ -119,8 +147,8 @@ class BoxSizes:
             camera: The calibrated camera.
             room: The room, with volume and entrances.
             half_extents: Half width, depth and height of a target, metres.
-            at_entrance_heights: Whether most positions are at the heights of the entrances, which
-                do not change much for a person, rather than at any height.
+            at_usual_heights: Whether most positions are at the heights of :func:`usual_heights`,
+                which do not change much for a person, rather than at any height.
         """
         width, height = camera.image_size
         cell = max(width, height) / CELLS
@@ -128,8 +156,8 @@ class BoxSizes:
         low = room.minimum.copy()
         low[2] = min(low[2] + half_extents[2] - BELOW_FLOOR, room.maximum[2])
         positions = low + _even_points(POSITIONS) * (room.maximum - low)
-        if at_entrance_heights and room.entrances:
-            _bring_to_entrance_heights(positions, room)
+        if at_usual_heights:
+            _bring_to_usual_heights(positions, *usual_heights(room, float(half_extents[2])))
         boxes, visible = upright_boxes(camera, positions, half_extents)
         boxes = boxes[visible]
         place = _cells(boxes[:, :2], cell, columns, rows)
@@ -199,13 +227,37 @@ class BoxSizes:
         return sizes, possible
 
 
-def _bring_to_entrance_heights(positions: Float[ndarray, "N 3"], room: Room) -> None:
-    """Move most of the positions to the heights of the entrances, in turn, in place."""
-    moved = positions[: round(AT_ENTRANCE_HEIGHT * len(positions))]
+def usual_heights(
+    room: Room, half_height: float
+) -> tuple[Float[ndarray, " E"], Float[ndarray, " E"]]:
+    """Means and standard deviations of the heights of targets' centres, world metres.
+
+    They are those of the entrances. Without entrances they are one pair, that of people who stand
+    on the floor: the target is below their crown, and reaches to the floor where it is a whole
+    body. A room that is too low for them has none.
+
+    Args:
+        room: The room, whose volume holds the centres of targets.
+        half_height: Half height of a target, metres.
+    """
+    if room.entrances:
+        heights = [(entrance.position[2], entrance.sigma[2]) for entrance in room.entrances]
+    else:
+        standing = room.minimum[2] + max(CROWN - half_height, half_height)
+        heights = [(standing, CROWN_SIGMA)] if standing <= room.maximum[2] else []
+    means, sigmas = np.array(heights, dtype=float).reshape(-1, 2).T
+    return means, sigmas
+
+
+def _bring_to_usual_heights(
+    positions: Float[ndarray, "N 3"], means: Float[ndarray, " E"], sigmas: Float[ndarray, " E"]
+) -> None:
+    """Move most of the positions to some heights, in turn, in place."""
+    moved = positions[: round(AT_USUAL_HEIGHT * len(positions))]
     spread = _normals(_even_points(len(moved))[:, 2])
-    for number, entrance in enumerate(room.entrances):
-        own = slice(number, None, len(room.entrances))
-        moved[own, 2] = entrance.position[2] + HEIGHT_FACTOR * entrance.sigma[2] * spread[own]
+    for number, (mean, sigma) in enumerate(zip(means, sigmas, strict=True)):
+        own = slice(number, None, len(means))
+        moved[own, 2] = mean + HEIGHT_FACTOR * sigma * spread[own]
 
 
 def _even_points(count: int) -> Float[ndarray, "N 3"]:

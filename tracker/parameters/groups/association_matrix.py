@@ -116,7 +116,7 @@ class AssociationMatrixParams(Params):
     least_inside: Annotated[
         float, Field(ge=0.0, le=1.0), ui("f_min", step=0.05, advanced=True, when=_TARGETS)
     ] = 0.4
-    """Targets: a box with a smaller share of foreground is rejected."""
+    """Targets: a box with less foreground than this share of a person's outline is rejected."""
 
     averaging_width: Annotated[
         float,

@@ -180,7 +180,8 @@ class JpdaParams(Params):
     height_sigmas: Annotated[
         float, Field(ge=0.0, le=10.0), ui("k_z", step=0.5, advanced=True, when=_CROWNS)
     ] = 2.0
-    """Range of a target's height around that of the entrances, in standard deviations."""
+    """Range of a target's height around that of the entrances, or of people who stand where there
+    are none, in standard deviations."""
 
     crack: Annotated[
         float,
@@ -199,7 +200,7 @@ class JpdaParams(Params):
     least_inside: Annotated[
         float, Field(ge=0.0, le=1.0), ui("f_i", step=0.05, advanced=True, when=_CROWNS)
     ] = 0.4
-    """A box with a smaller share of foreground is of no target."""
+    """A box with less foreground than this share of a person's outline in it is of no target."""
 
     most_above: Annotated[
         float, Field(ge=0.0, le=1.0), ui("f_a", step=0.05, advanced=True, when=_CROWNS)

@@ -19,7 +19,7 @@ from tracker.kernels.pictures import silhouettes
 from tracker.kernels.pictures.silhouettes import Acceptance, SizeTable
 from tracker.parameters.groups.association_matrix import AssociationMatrixParams
 from tracker.sequences.sequence import Room
-from tracker.single_view.box_sizes import BoxSizes
+from tracker.single_view.box_sizes import BoxSizes, outline_share
 from tracker.single_view.pictures.blobs import Blobs
 from tracker.single_view.pictures.foreground import integral, shape_scores
 
@@ -55,13 +55,14 @@ class Silhouettes:
 
     The size of a target at a place depends on its distance, which one camera does not
     determine. People keep about the height at which they come in, so most of the sizes are
-    those at the heights of the entrances.
+    those at the heights of the entrances, or of people who stand where there are none.
     """
 
     def __init__(self, camera: Camera, room: Room, half_extents: Float[ndarray, " 3"]) -> None:
         """Compute the possible sizes at each place of the image."""
-        self._sizes = BoxSizes.of(camera, room, half_extents, at_entrance_heights=True)
+        self._sizes = BoxSizes.of(camera, room, half_extents, at_usual_heights=True)
         self._table, self._possible = self._sizes.quantiles(SIZES)
+        self._outline = outline_share(half_extents)
         self._usual = (self._sizes.smallest[1] + self._sizes.largest[1]) / 2.0
 
     def half_heights(self, centres: Float[ndarray, "N 2"]) -> Float[ndarray, " N"]:
@@ -96,6 +97,7 @@ class Silhouettes:
             hanging.boxes,
             inside_weight=p.inside_weight,
             around_weight=p.around_weight,
+            outline=self._outline,
         )
         good = inside >= p.least_inside
         chosen = silhouettes.choose(

@@ -24,7 +24,7 @@ from scipy.ndimage import minimum_filter1d
 from tracker.geometry.camera import Camera
 from tracker.parameters.groups.jpda import JpdaParams
 from tracker.sequences.sequence import Room
-from tracker.single_view.box_sizes import BELOW_FLOOR, BoxSizes
+from tracker.single_view.box_sizes import BELOW_FLOOR, BoxSizes, outline_share, usual_heights
 from tracker.single_view.dropped import Dropped
 from tracker.single_view.pictures.blobs import Blobs, blobs
 from tracker.single_view.pictures.foreground import integral, shape_shares
@@ -37,7 +37,7 @@ class Crowns:
     boxes: Float[ndarray, "N 4"]
     """Boxes of the targets, pixels."""
     inside: Float[ndarray, " N"]
-    """Share of foreground in each box."""
+    """Share of foreground in each box, in that of a person's outline, 0 … 1."""
     pieces: Float[ndarray, "N 4"]
     """Box of the foreground component of each target, pixels."""
     dropped: Dropped
@@ -49,7 +49,8 @@ class TargetSizes:
 
     It is that of targets with centres at the heights of the entrances, or of lower
     ones, for people who sit or bend, where none of those can be. Anything higher, such as an
-    open door, is no target. A room without entrances has no prior of heights.
+    open door, is no target. In a room without entrances it is that of people who stand on the
+    floor, and of targets at any height where none of those can be.
     """
 
     def __init__(
@@ -65,13 +66,15 @@ class TargetSizes:
             camera: The calibrated camera.
             room: The room with its entrances.
             half_extents: Half width, depth and height of a target, metres.
-            height_sigmas: Range of heights around the entrances', in standard deviations.
+            height_sigmas: Range of heights around the usual ones, in standard deviations.
         """
         upright, lower = (
             BoxSizes.of(camera, part, half_extents)
             for part in _walked(room, float(half_extents[2]), height_sigmas)
         )
         self._grid, places = lower, lower.places()
+        self.outline = outline_share(half_extents)
+        """Share of a target's box that the outline of a person fills, 0 … 1."""
         standing, there = upright.typical(places)
         self._table = np.where(there[:, None], standing, lower.typical(places)[0])
         somewhere = np.isfinite(self._table[:, 0])
@@ -93,15 +96,15 @@ class TargetSizes:
 
 def _walked(room: Room, half_height: float, sigmas_wide: float) -> tuple[Room, Room]:
     """The parts of the room's volume with the centres of upright targets, and of all targets."""
-    if not room.entrances:
+    means, sigmas = usual_heights(room, half_height)
+    if not len(means):
         return room, room
-    heights = np.array([entrance.position[2] for entrance in room.entrances])
-    sigmas = np.array([entrance.sigma[2] for entrance in room.entrances])
     low, high = room.minimum.copy(), room.maximum.copy()
     # the volume of box sizes begins at the centre of a target on its floor
-    low[2] = (heights - sigmas_wide * sigmas).min() - half_height + BELOW_FLOOR
-    high[2] = (heights + sigmas_wide * sigmas).max()
-    return Room(low, high), Room(room.minimum, high)
+    low[2] = (means - sigmas_wide * sigmas).min() - half_height + BELOW_FLOOR
+    high[2] = (means + sigmas_wide * sigmas).max()
+    highest = high if room.entrances else room.maximum
+    return Room(low, high), Room(room.minimum, highest)
 
 
 def crowns(
@@ -131,6 +134,7 @@ def crowns(
     boxes = np.concatenate([np.zeros((0, 4)), *found])
     owners = np.repeat(np.arange(pieces.size), [len(tops) for tops in found])
     inside, above, beside = shape_shares(integral(closed), boxes)
+    inside = np.minimum(inside / sizes.outline, 1.0)
     full = inside >= p.least_inside
     good = full & (above <= p.most_above) & (beside <= p.most_beside)
     kept: list[int] = []

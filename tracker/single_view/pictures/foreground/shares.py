@@ -60,17 +60,21 @@ def shape_scores(
     *,
     inside_weight: float,
     around_weight: float,
+    outline: float = 1.0,
 ) -> tuple[Float[ndarray, " N"], Float[ndarray, " N"]]:
     """Compute log factors of the likelihood of boxes from the foreground, and shares inside.
 
     A box on a person is full of foreground, with background above and beside it:
-    a ln(inside + 0.02) - b (above + beside), of :func:`shape_shares`.
+    a ln(inside + 0.02) - b (above + beside), of :func:`shape_shares`, where a box that is as
+    full as the outline of a person counts as full.
 
     Args:
         sums: Integral image of the mask, of :func:`integral`.
         boxes: Centre and half sizes of N boxes, pixels.
         inside_weight: a, the weight of the share inside.
         around_weight: b, the weight of the shares around.
+        outline: Share of a box that the outline of a person fills, 0 … 1.
     """
     inside, above, beside = shape_shares(sums, boxes)
+    inside = np.minimum(inside / outline, 1.0)
     return inside_weight * np.log(inside + 0.02) - around_weight * (above + beside), inside
