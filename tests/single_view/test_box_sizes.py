@@ -132,7 +132,7 @@ def test_with_entrances_most_sizes_are_of_their_heights() -> None:
     both = anywhere[1] & there[1]
     spreads = [np.log(t[both][:, 3, 1] / t[both][:, 1, 1]).mean() for t, _ in (anywhere, there)]
     assert spreads[1] < 0.75 * spreads[0]
-    low = Room(ROOM.minimum, np.array([1.5, 1.5, 1.3]))  # too low to stand in
+    low = Room(ROOM.minimum, np.array([1.5, 1.5, 1.2]))  # too low to sit in
     assert_array_equal(
         BoxSizes.of(LENS, low, HALF, at_usual_heights=True).sizes,
         BoxSizes.of(LENS, low, HALF).sizes,
@@ -144,16 +144,18 @@ def test_with_entrances_most_sizes_are_of_their_heights() -> None:
 
 
 @pytest.mark.parametrize("half_height", [0.125, 0.36, 0.85, 1.1])
-def test_without_entrances_sizes_are_those_of_people_who_stand_on_the_floor(
+def test_without_entrances_sizes_are_those_of_people_on_the_floor(
     half_height: float,
 ) -> None:
     half = np.array([0.2, 0.2, half_height])
     raised = Room(np.array([-1.5, -1.5, 0.4]), np.array([1.5, 1.5, 2.6]))
     means, sigmas = usual_heights(raised, half_height)
-    # from the crown of somebody 1.65 m tall down, or up from the floor where that is further
-    assert means == pytest.approx([0.4 + max(1.65 - half_height, half_height)])
-    assert sigmas == pytest.approx([0.1])
-    doors = replace(raised, entrances=(Entrance(np.array([0.0, 0.0, means[0]]), np.full(3, 0.1)),))
+    # from a crown at 1.55 m down, or up from the floor where that is higher
+    assert means == pytest.approx([0.4 + max(1.55 - half_height, half_height)])
+    assert sigmas == pytest.approx([0.2 if half_height < 0.7 else 0.1])
+    doors = replace(
+        raised, entrances=(Entrance(np.array([0.0, 0.0, means[0]]), np.full(3, sigmas[0])),)
+    )
     as_doors, as_people = (
         BoxSizes.of(LENS, room, half, at_usual_heights=True) for room in (doors, raised)
     )

@@ -29,9 +29,12 @@ AT_USUAL_HEIGHT, HEIGHT_FACTOR = 0.9, 2.0
 """Share of the positions at the usual heights, and the factor on those heights' spread: some people
 sit or bend, and entrances are drawn by eye."""
 
-CROWN, CROWN_SIGMA = 1.65, 0.1
-"""Mean and standard deviation of the heights of standing adults, women and men together, metres
-([NCD16]: country means of 1.50 to 1.83 m, of which most are within 1.57 to 1.79 m)."""
+STATURE = 1.65
+"""Mean height of standing adults, women and men together, metres ([NCD16])."""
+
+CROWN, CROWN_SIGMA = 1.55, 0.2
+"""Mean and standard deviation of the heights of people's crowns, metres: nearly all are between
+those of people who sit on chairs (1.2 m) and of tall ones who stand (1.9 m)."""
 
 OUTLINE = ((0.13, 0.10), (0.47, 0.195), (1.0, 0.11))
 """Head, trunk with arms, and legs: their lower ends below the crown, and their mean widths seen
@@ -109,7 +112,7 @@ def outline_share(half_extents: Float[ndarray, " 3"]) -> float:
         half_extents: Half width, depth and height of a target, metres.
     """
     width, height = half_extents[0] + half_extents[1], 2.0 * half_extents[2]
-    ends, widths = np.array(OUTLINE).T * max(CROWN, height)
+    ends, widths = np.array(OUTLINE).T * max(STATURE, height)
     lengths = np.diff(np.minimum(ends, height), prepend=0.0)
     return float((lengths * np.minimum(widths, width)).sum() / (width * height))
 
@@ -232,9 +235,9 @@ def usual_heights(
 ) -> tuple[Float[ndarray, " E"], Float[ndarray, " E"]]:
     """Means and standard deviations of the heights of targets' centres, world metres.
 
-    They are those of the entrances. Without entrances they are one pair, that of people who stand
-    on the floor: the target is below their crown, and reaches to the floor where it is a whole
-    body. A room that is too low for them has none.
+    They are those of the entrances. Without entrances they are one pair, that of people on the
+    floor: the target is below the crown of somebody who sits or stands, or, where it is a whole
+    body, reaches up from the floor. A room that is too low for them has none.
 
     Args:
         room: The room, whose volume holds the centres of targets.
@@ -243,8 +246,11 @@ def usual_heights(
     if room.entrances:
         heights = [(entrance.position[2], entrance.sigma[2]) for entrance in room.entrances]
     else:
-        standing = room.minimum[2] + max(CROWN - half_height, half_height)
-        heights = [(standing, CROWN_SIGMA)] if standing <= room.maximum[2] else []
+        # a body's centre is at half the height of its crown, and varies half as much
+        hanging, standing = (CROWN - half_height, CROWN_SIGMA), (half_height, CROWN_SIGMA / 2.0)
+        above, sigma = max(hanging, standing)
+        height = room.minimum[2] + above
+        heights = [(height, sigma)] if height <= room.maximum[2] else []
     means, sigmas = np.array(heights, dtype=float).reshape(-1, 2).T
     return means, sigmas
 

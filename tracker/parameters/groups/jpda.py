@@ -180,8 +180,8 @@ class JpdaParams(Params):
     height_sigmas: Annotated[
         float, Field(ge=0.0, le=10.0), ui("k_z", step=0.5, advanced=True, when=_CROWNS)
     ] = 2.0
-    """Range of a target's height around that of the entrances, or of people who stand where there
-    are none, in standard deviations."""
+    """Range of a target's height around that of the entrances, or of people on the floor where
+    there are none, in standard deviations."""
 
     crack: Annotated[
         float,

@@ -55,7 +55,7 @@ class Silhouettes:
 
     The size of a target at a place depends on its distance, which one camera does not
     determine. People keep about the height at which they come in, so most of the sizes are
-    those at the heights of the entrances, or of people who stand where there are none.
+    those at the heights of the entrances, or of people on the floor where there are none.
     """
 
     def __init__(self, camera: Camera, room: Room, half_extents: Float[ndarray, " 3"]) -> None:

@@ -49,8 +49,8 @@ class TargetSizes:
 
     It is that of targets with centres at the heights of the entrances, or of lower
     ones, for people who sit or bend, where none of those can be. Anything higher, such as an
-    open door, is no target. In a room without entrances it is that of people who stand on the
-    floor, and of targets at any height where none of those can be.
+    open door, is no target. In a room without entrances it is that of people on the floor, and
+    of targets at any height where none of those can be.
     """
 
     def __init__(

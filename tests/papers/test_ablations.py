@@ -1,0 +1,83 @@
+"""The study of stage 1's parameters: what is judged, at which values, and what counts as flat."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.papers.rooms import ablations
+from tests.papers.rooms.ablations import METHODS, Trial, effects, ends, judged, table, trials
+from tests.papers.rooms.kept import keep_row, read_rows
+from tracker.parameters.catalogue import PARAMETERS, RunParameters
+from tracker.parameters.values import value_of, with_values
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_published_and_essential_parameters_are_not_judged(method: str) -> None:
+    keys = judged(method)
+    assert len(keys) > 5
+    for key in keys:
+        parameter = PARAMETERS[key]
+        assert (parameter.stage, parameter.published) == ("single_view", None)
+        assert not parameter.essential
+
+
+def test_ends_are_other_values_within_the_range_on_both_sides() -> None:
+    one_sided = 0
+    for key in {key for method in METHODS for key in judged(method)}:
+        default, values = value_of(RunParameters(), key), ends(key)
+        assert values, key
+        for value in values:
+            assert value != default
+            with_values(RunParameters(), {key: value})  # is accepted
+        if PARAMETERS[key].kind in ("int", "float"):
+            one_sided += min(values) > default or max(values) < default
+    assert one_sided <= 2, "a default at the end of its range has one side"
+
+
+def test_every_trial_has_a_key_of_its_own() -> None:
+    made = list(trials(tuple(METHODS)))
+    assert len({one.row_key(100) for one in made}) == len(made)
+    assert made[0].row_key(100) != made[0].row_key(50)
+
+
+def test_a_parameter_is_flat_where_no_value_changes_a_mean(tmp_path: Path) -> None:
+    first, second = judged("jpda")[:2]
+    for seed in (1, 2):
+        for trial in trials(("jpda",)):
+            if trial.key not in ("", first, second):
+                continue
+            # the changes of the first parameter cancel, those of the second do not
+            moved = {first: 0.1 if seed == 1 else -0.1, second: 0.02, "": 0.0}[trial.key]
+            row: dict[str, Any] = {"seed": seed, "key": trial.row_key(9)}
+            keep_row(tmp_path, row | {"found_share": 0.5 + moved, "false_per_step": 0, "idf1": 1})
+    found = {
+        one["parameter"]: one for one in effects(read_rows(tmp_path), range(1, 3), 9, ("jpda",))
+    }
+    assert [found[key]["flat"] for key in (first, second)] == [True, False]
+    assert found[second]["rooms"] == 2
+    assert next(iter(found[second]["changes"].values()))[0] == pytest.approx(0.02)
+    assert not found[judged("jpda")[2]]["flat"], "what was not measured is not flat"
+    text = table(list(found.values()), range(1, 3), 9)
+    assert text.count("| flat |") == len(ends(first))
+    assert f"| {second} " in text
+
+
+def test_what_has_a_row_is_not_run_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for trial in trials(("jpda",)):
+        row = {"found_share": 0.5, "false_per_step": 0.0, "idf1": 0.5}
+        keep_row(tmp_path, row | {"seed": 7, "key": trial.row_key(9)})
+
+    def fails(*_: object, **__: object) -> None:
+        raise AssertionError("rendered")
+
+    monkeypatch.setattr(ablations, "render_random", fails)
+    shown = tmp_path / "table.md"
+    words = ["-o", tmp_path, "--table", shown, "--first", 7, "--count", 1, "--steps", 9]
+    assert ablations.main([*map(str, words), "--method", "jpda"]) == 0
+    assert "flat" in shown.read_text(encoding="utf-8")
+    with pytest.raises(AssertionError, match="rendered"):
+        ablations.main([*map(str, words), "--method", "shapes"])
+    assert Trial("shapes").row_key(9) not in {key for _, key in read_rows(tmp_path)}
