@@ -178,6 +178,8 @@ function createCheck({ store, actions, playback }) {
 		// In Tune nobody looks at what a run under way leaves open.
 		if (run.state === "computing" && store.get().place !== "check") return;
 		ended = now;
+		// Lanes that are still on their way have it asked when they are here.
+		if (!store.get().timeline) return;
 		soon(run.state === "computing" ? OFTEN - (performance.now() - asked) : 100);
 	});
 
