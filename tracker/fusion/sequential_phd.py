@@ -252,10 +252,8 @@ def _relabelled(mixture: GaussianMixture, labels: Int[ndarray, " J"]) -> Gaussia
 
 def _confirmed_labels(mixture: GaussianMixture) -> dict[int, float]:
     """The weight of each confirmed label."""
-    confirmed = np.flatnonzero(mixture.weights > CONFIRMED)
-    return dict(
-        zip(mixture.labels[confirmed].tolist(), mixture.weights[confirmed].tolist(), strict=True)
-    )
+    heavy = mixture.weights > CONFIRMED
+    return dict(zip(mixture.labels[heavy].tolist(), mixture.weights[heavy].tolist(), strict=True))
 
 
 def _occluders(mixture: GaussianMixture, confirmed: dict[int, float]) -> Float[ndarray, " J"]:
