@@ -13,6 +13,7 @@ from tests import world
 from tests.smoothing.known import Known, known
 from tracker.parameters.groups.smoothing import SmoothingParams
 from tracker.smoothing.identity.constraints import ConstraintResolver
+from tracker.smoothing.identity.odds import Rates
 from tracker.smoothing.identity.splitting import Splits, Tracked, find_splits, split_tracks
 
 STEPS = 30
@@ -30,7 +31,12 @@ def tracked(scene: Known, **known_of: ndarray) -> Tracked:
         **known_of,
     }  # fmt: skip
     fitted = smoother.fit(paths, links, 2)
-    return Tracked(smoother, fitted, smoother.associate(fitted.paths), **values)
+    return Tracked(
+        smoother,
+        fitted,
+        smoother.associate(fitted.paths),
+        **values,
+    )
 
 
 def standing(*hidden: int) -> Known:
@@ -124,7 +130,9 @@ def test_short_pieces_beside_longer_ones_are_left_out_and_names_are_the_filters(
     one = tracked(standing(), names=np.repeat([7, 9, -1], 10))
     clear = np.ones(STEPS, dtype=bool)
     clear[[10, 14, 18, 29]] = False
-    plain = Splits(np.zeros(STEPS, dtype=np.int64), clear, np.zeros(STEPS, dtype=bool))
+    plain = Splits(
+        np.zeros(STEPS, dtype=np.int64), clear, np.zeros(STEPS, dtype=bool), Rates(0.1, 0.1)
+    )
     nobody = ConstraintResolver(one.fitted, (), 10)
     pieces, kept = split_tracks(one, plain, nobody)
     assert pieces.firsts.tolist() == [0, 19]

@@ -37,6 +37,7 @@ def smoother(*cameras: object) -> Any:
 NOBODYS = Links(*(np.zeros(0, dtype=np.int64) for _ in range(3)), np.zeros(0))
 P = SmoothingParams(memory=0.25)
 """Two fifths of a step's evidence are new."""
+RATES = odds.Rates(BIRTH * STEP, 1.0 - SURVIVAL)
 
 
 def test_a_piece_is_worth_its_boxes_less_its_misses_and_comes_and_goes_inside_the_recording() -> (
@@ -50,7 +51,7 @@ def test_a_piece_is_worth_its_boxes_less_its_misses_and_comes_and_goes_inside_th
     chances, missed = np.full((2, rows), 0.5), np.zeros((2, rows))
     chances[1], missed[0, 0], missed[1, 20] = 1.0, 1.0, 0.5
     shared = BoxAssociations(NOBODYS, chances, missed, np.full((2, rows), -1))
-    worths, births, deaths = odds.tracklet_odds(smoother(), own, shared, P)
+    worths, births, deaths = odds.tracklet_odds(smoother(), own, shared, P, RATES)
     bounds = ((0, 19), (19, 38), (38, 41))
     expected = [own.odds[a:b].sum() + (b - a) * np.log(SURVIVAL) + 1.5 for a, b in bounds]
     expected[0] += 0.4 * np.log(0.5)
@@ -58,13 +59,50 @@ def test_a_piece_is_worth_its_boxes_less_its_misses_and_comes_and_goes_inside_th
     assert_allclose(worths, expected)
     assert_allclose(births, [0.0, *[np.log(BIRTH * STEP)] * 2])
     assert_allclose(deaths, [np.log(1.0 - SURVIVAL), 0.0, np.log(1.0 - SURVIVAL)])
-    assert odds.log_restart(smoother()) == pytest.approx(np.log(BIRTH * STEP * (1.0 - SURVIVAL)))
+    assert RATES.restart == pytest.approx(np.log(BIRTH * STEP * (1.0 - SURVIVAL)))
+
+
+@pytest.mark.parametrize(("birth", "death"), [(0.02, 0.01), (0.4, 0.2)])
+def test_rates_are_those_of_the_tracks_and_of_the_parameters_where_these_tell_nothing(
+    birth: float, death: float
+) -> None:
+    """Without tracks the parameters hold; from many they are recovered, whatever the prior."""
+    steps, rng = 4000, np.random.default_rng(3)
+    begins = np.flatnonzero(rng.random(steps) < birth)
+    ends = np.minimum(begins + rng.geometric(death, len(begins)) - 1, steps - 1)
+    spans = zip(range(1, len(begins) + 1), begins.tolist(), ends.tolist(), strict=True)
+    paths = standing(*((label, first, last, 0.0) for label, first, last in spans))
+    long = smoother()
+    long.frames = steps
+    everyone = np.ones(len(begins), dtype=bool)
+    found = odds.Rates.of(long, paths, everyone)
+    assert found.birth == pytest.approx(birth, rel=0.25)
+    assert found.death == pytest.approx(death, rel=0.25)
+    few = odds.Rates.of(long, paths, everyone & (np.arange(len(begins)) % 2 > 0))
+    assert few.birth == pytest.approx(found.birth / 2.0, rel=0.1)
+    assert few.death == pytest.approx(found.death, rel=0.25)
+    never = odds.Rates.of(smoother(), standing((1, 0, FRAMES - 1, 0.0)), np.zeros(1, dtype=bool))
+    assert never.death == pytest.approx(1.0 - SURVIVAL)
+    assert never.birth == pytest.approx(1.0 / (FRAMES + 1.0 / (BIRTH * STEP)))
+    assert_allclose(np.exp([found.survival, found.leave]), [1.0 - found.death, found.death])
+
+
+def test_who_is_there_at_both_ends_of_the_recording_has_neither_come_nor_left() -> None:
+    one = np.ones(1, dtype=bool)
+    whole, later, earlier = (
+        odds.Rates.of(smoother(), standing((1, first, last, 0.0)), one)
+        for first, last in ((0, FRAMES - 1), (1, FRAMES - 1), (0, FRAMES - 2))
+    )
+    assert later.birth == pytest.approx(2.0 * whole.birth)
+    assert earlier.birth == whole.birth
+    assert whole.death == pytest.approx(1.0 / (FRAMES + 1.0 / (1.0 - SURVIVAL)))
+    assert earlier.death == pytest.approx(2.0 / (FRAMES - 1 + 1.0 / (1.0 - SURVIVAL)))
 
 
 def test_a_link_survives_its_gap_and_its_motion_tells_as_much_as_is_new() -> None:
     paths = standing((1, 0, 4, 0.0), (2, 5, 9, 0.1), (3, 8, 12, 0.2), (4, 26, 28, 0.2))
     known = Ends.alone(fitted(paths), PRIOR)
-    found = odds.ShortGapOdds(smoother(), paths, NOBODYS, P, None).pairs(known)
+    found = odds.ShortGapOdds(smoother(), paths, NOBODYS, P, None, RATES).pairs(known)
     pairs = Pairs(np.array([0, 0, 1, 2]), np.array([1, 2, 3, 3]), np.array([1, 4, 17, 14]),
                   np.zeros(4))  # fmt: skip
     for name in ("earlier", "later", "gaps"):
@@ -78,7 +116,7 @@ def test_a_link_survives_its_gap_and_its_motion_tells_as_much_as_is_new() -> Non
 def test_the_longest_gap_is_two_seconds_and_the_fastest_goes_three_metres_in_one() -> None:
     p = SmoothingParams(longest=0.6)
     paths = standing((1, 0, 4, 0.0), (2, 10, 12, 2.8), (3, 10, 12, 2.8001), (4, 11, 12, 0.0))
-    found = odds.ShortGapOdds(smoother(), paths, NOBODYS, p, None).pairs(
+    found = odds.ShortGapOdds(smoother(), paths, NOBODYS, p, None, RATES).pairs(
         Ends.alone(fitted(paths), PRIOR)
     )
     assert list(zip(found.earlier.tolist(), found.later.tolist(), strict=True)) == [(0, 1)]
@@ -88,13 +126,16 @@ def test_who_comes_back_is_one_of_those_who_left() -> None:
     """By the label of the filter alone; by looks as likely as one of all who were gone."""
     paths = standing((5, 0, 2, 0.0), (6, 0, 3, 3.0), (5, 8, 9, 0.0), (7, 3, 4, 0.0))
     chains = [[0], [1], [2], [3]]
-    found = odds.long_gap_odds(smoother(), paths, NOBODYS, chains, P, None)
+    found = odds.long_gap_odds(smoother(), paths, NOBODYS, chains, P, None, RATES)
     newcomer = np.log(BIRTH * STEP * (1.0 - SURVIVAL))
     assert list(zip(found.earlier.tolist(), found.later.tolist(), strict=True)) == [(0, 2)]
     assert found.gains == pytest.approx([newcomer + P.keeping])
     assert found.gaps.tolist() == [6]
     # of one chain already, or overlapping, nothing is said
-    assert len(odds.long_gap_odds(smoother(), paths, NOBODYS, [[0, 2], [1]], P, None).gains) == 0
+    assert (
+        len(odds.long_gap_odds(smoother(), paths, NOBODYS, [[0, 2], [1]], P, None, RATES).gains)
+        == 0
+    )
 
 
 @pytest.mark.parametrize("weight", [1.0, 0.5])
@@ -109,7 +150,7 @@ def test_looks_weigh_in_a_link_and_in_a_return(weight: float) -> None:
     assert known.all()
     assert ratio[::2].min() > ratio[1::2].max()
     chains = [[k] for k in range(7)]
-    found = odds.long_gap_odds(smoother(camera), later, links, chains, p, [embeddings])
+    found = odds.long_gap_odds(smoother(camera), later, links, chains, p, [embeddings], RATES)
     newcomer = np.log(BIRTH * STEP * (1.0 - SURVIVAL))
     assert_allclose(found.gains, newcomer - np.log(6.0) + weight * ratio)
     assert found.earlier.tolist() == list(range(6))

@@ -190,6 +190,7 @@ def _linked(
         waits: Whether there are corrections, for which the tracks may be split again.
     """
     smoother, shared, before = tracked.smoother, tracked.shared, tracked.fitted.paths
+    rates = plain.rates
     rows_before = len(before.states)
     before = before.without_states()
     resolver = ConstraintResolver(tracked.fitted, corrections, leeway)
@@ -208,10 +209,12 @@ def _linked(
         shared.missed[:, source_rows],
         shared.hidden_by[:, source_rows],
     )
-    worths, births, deaths = odds.tracklet_odds(smoother, refitted, own, parameters)
+    worths, births, deaths = odds.tracklet_odds(smoother, refitted, own, parameters, rates)
     del own, shared
     alone = Ends.alone(refitted, smoother.prior)
-    short_gap_odds = odds.ShortGapOdds(smoother, refitted.paths, links, parameters, seen.embeddings)
+    short_gap_odds = odds.ShortGapOdds(
+        smoother, refitted.paths, links, parameters, seen.embeddings, rates
+    )
     pairs = short_gap_odds.pairs(alone)
     people = template_log_odds(refitted.paths, links, smoother, seen, parameters.appearance)
     longest = max(round(parameters.longest / smoother.model.step_time), 1)
@@ -246,7 +249,9 @@ def _linked(
             replace(constraints, must_link=()).of_chains(first, tracklets) or LinkConstraints()
         )
     # chains linked by motion have better embeddings than single tracklets
-    back = odds.long_gap_odds(smoother, refitted.paths, links, first, parameters, seen.embeddings)
+    back = odds.long_gap_odds(
+        smoother, refitted.paths, links, first, parameters, seen.embeddings, rates
+    )
     of_firsts = TrackletGraph(
         np.zeros(len(first)), -births[[c[0] for c in first]], -deaths[[c[-1] for c in first]],
         back.earlier, back.later, -back.gains, people_of_chains(people, first),
@@ -260,7 +265,7 @@ def _linked(
     labels = _labels(tracklets, chains)
     decisions = split_decisions(tracklets, before, source_rows, plain.reasons, chains, labels)
     decisions += join_decisions(
-        tracklets, pairs, chains, labels, odds.log_restart(smoother), set(constraints.must_link)
+        tracklets, pairs, chains, labels, rates.restart, set(constraints.must_link)
     )
     paths, rows = join_chains(refitted.paths, chains, labels)
     lengths = np.diff(tracklets.starts)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence as Many
+from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
 from tracker.fusion import visibility
@@ -22,12 +23,68 @@ from tracker.smoothing.smoother import BoxAssociations, Fitted, Smoother
 FASTEST = 3.0
 """Largest speed of a person in a room over several steps, metres per second."""
 
+_LEAST = 1e-6
+"""Least probability that a person leaves, or that none comes."""
+
 _POINTS = 4096
 """Number of points on the lines between tracklets whose expected boxes are in memory at a time."""
 
 
+@dataclass(frozen=True, slots=True)
+class Rates:
+    """How often people come and leave, as the recording's own tracks show it."""
+
+    birth: float
+    """Expected number of people who come in one step, below 1."""
+    death: float
+    """Probability that a person has left a step later."""
+
+    @staticmethod
+    def of(smoother: Smoother, paths: Paths, present: Bool[ndarray, " n"]) -> Rates:
+        """Estimate the rates from tracks, with the parameters of the fusion as the prior.
+
+        A rate γ of births has the prior density γ₀⁻¹ e^(−γ/γ₀), whose mean is the parameter γ₀,
+        and a probability of death the beta density with mean 1 − p_S that is worth one death. With
+        b tracks that begin after the first of T steps, and d that end before the last, over N rows,
+        the means given the tracks are
+
+            γ = (b + 1) / (T + 1/γ₀),    1 − p = (d + 1) / (N + 1/(1 − p_S))
+
+        Args:
+            smoother: The parameters, and the number of steps.
+            paths: n tracks.
+            present: Which of them are of people.
+        """
+        p, frames = smoother.parameters, smoother.frames
+        births = int((present & (paths.firsts > 0)).sum())
+        deaths = int((present & (paths.lasts < frames - 1)).sum())
+        rows = int(np.diff(paths.starts)[present].sum())
+        leaving = max(1.0 - p.survival_probability, _LEAST)
+        birth = (births + 1) / (frames + 1.0 / (p.birth_rate * smoother.model.step_time))
+        return Rates(min(birth, 1.0 - _LEAST), (deaths + 1) / (rows + 1.0 / leaving))
+
+    @property
+    def survival(self) -> float:
+        """Log probability that a person is still there a step later."""
+        return float(np.log1p(-self.death))
+
+    @property
+    def leave(self) -> float:
+        """Log probability that a person has left a step later."""
+        return float(np.log(self.death))
+
+    @property
+    def restart(self) -> float:
+        """Log probability of a death and a birth at one step, which compete with a link."""
+        return float(np.log(self.birth)) + self.leave
+
+
 def tracklet_odds(
-    smoother: Smoother, fitted: Fitted, shared: BoxAssociations, parameters: SmoothingParams
+    smoother: Smoother,
+    fitted: Fitted,
+    shared: BoxAssociations,
+    parameters: SmoothingParams,
+    rates: Rates,
 ) -> tuple[Float[ndarray, " n"], Float[ndarray, " n"], Float[ndarray, " n"]]:
     """Compute the log odds of each tracklet against clutter, and log probabilities of birth and
     death.
@@ -37,6 +94,7 @@ def tracklet_odds(
         fitted: The n tracklets, fitted to their boxes.
         shared: Association and miss probabilities of their rows.
         parameters: Time constant of correlated evidence.
+        rates: How often people come and leave.
 
     Returns:
         Log odds of being a target, log probability of a birth at the first step, and of a death
@@ -44,24 +102,12 @@ def tracklet_odds(
     """
     step_time, paths = smoother.model.step_time, fitted.paths
     count = len(paths.labels)
-    survival, death = _survival(smoother)
-    rows = fitted.odds + independence(step_time, parameters.memory) * misses(shared) + survival
+    rows = fitted.odds + independence(step_time, parameters.memory) * misses(shared)
+    rows += rates.survival
     worths = np.bincount(paths.owners, rows, count) + smoother.log_place
-    births = np.where(paths.firsts <= 0, 0.0, log_restart(smoother) - death)
-    deaths = np.where(paths.lasts >= smoother.frames - 1, 0.0, death)
+    births = np.where(paths.firsts <= 0, 0.0, rates.restart - rates.leave)
+    deaths = np.where(paths.lasts >= smoother.frames - 1, 0.0, rates.leave)
     return worths, births, deaths
-
-
-def _survival(smoother: Smoother) -> tuple[float, float]:
-    """Return log p_S and log(1 − p_S) of one step."""
-    survival = min(smoother.parameters.survival_probability, 1.0 - 1e-6)
-    return float(np.log(survival)), float(np.log1p(-survival))
-
-
-def log_restart(smoother: Smoother) -> float:
-    """Return the log probability of a death and a birth at one step, which compete with a link."""
-    rate = smoother.parameters.birth_rate * smoother.model.step_time
-    return float(np.log(rate)) + _survival(smoother)[1]
 
 
 class ShortGapOdds:
@@ -78,6 +124,7 @@ class ShortGapOdds:
         links: Links,
         p: SmoothingParams,
         embeddings: Many[Float[ndarray, "B A"]] | None,
+        rates: Rates,
     ) -> None:
         """Compute the odds that do not depend on the estimates at the ends.
 
@@ -87,8 +134,9 @@ class ShortGapOdds:
             links: Association probabilities of their rows and boxes.
             p: The longest gap, and the weight of the appearance.
             embeddings: A unit vector for each box of each camera; None without appearance.
+            rates: How often people come and leave.
         """
-        self._smoother, self._paths = smoother, paths
+        self._smoother, self._paths, self._rates = smoother, paths, rates
         self._share = independence(smoother.model.step_time, p.memory)
         self._near = near = tracklets.near_pairs(
             paths,
@@ -115,8 +163,7 @@ class ShortGapOdds:
             smoother.prior,
             smoother.log_place,
         )
-        survival, _ = _survival(smoother)
-        gains = motion + near.gaps * survival + self._empty + self._alike
+        gains = motion + near.gaps * self._rates.survival + self._empty + self._alike
         paths = self._paths
         return _finite(near.earlier, near.later, gains, paths.firsts, paths.lasts)
 
@@ -128,6 +175,7 @@ def long_gap_odds(
     chains: list[list[int]],
     p: SmoothingParams,
     embeddings: Many[Float[ndarray, "B A"]] | None,
+    rates: Rates,
 ) -> Pairs:
     """Compute the log odds of links over long gaps, from appearance and from the filter's labels.
 
@@ -141,11 +189,12 @@ def long_gap_odds(
         chains: The tracklets of each chain.
         p: Weights of the appearance and of the filter's labels.
         embeddings: A unit vector for each box of each camera; None without appearance.
+        rates: How often people come and leave.
 
     Returns:
         Pairs of chains with their log odds.
     """
-    newcomer, count = log_restart(smoother), len(chains)
+    newcomer, count = rates.restart, len(chains)
     keys, gains = np.zeros(0, dtype=np.int64), np.zeros(0)
     firsts = np.array([paths.firsts[chain[0]] for chain in chains], dtype=np.int64)
     lasts = np.array([paths.lasts[chain[-1]] for chain in chains], dtype=np.int64)

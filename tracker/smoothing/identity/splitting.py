@@ -11,7 +11,7 @@ from numpy import ndarray
 from tracker.parameters.groups.smoothing import SmoothingParams
 from tracker.smoothing.identity.constraints import ConstraintResolver
 from tracker.smoothing.identity.exchanges import exchange_breaks
-from tracker.smoothing.identity.odds import FASTEST
+from tracker.smoothing.identity.odds import FASTEST, Rates
 from tracker.smoothing.identity.tracklets import split_paths
 from tracker.smoothing.lifetimes import independence, lifetimes
 from tracker.smoothing.paths import Paths
@@ -66,6 +66,8 @@ class Splits:
     """The rows that remain in tracklets."""
     breaks: Bool[ndarray, " N"]
     """The rows before which a path is split though both sides remain."""
+    rates: Rates
+    """How often people come and leave."""
 
 
 def find_splits(tracked: Tracked, p: SmoothingParams) -> Splits:
@@ -80,7 +82,7 @@ def find_splits(tracked: Tracked, p: SmoothingParams) -> Splits:
     smoother, fitted, shared = tracked.smoother, tracked.fitted, tracked.shared
     step_time, paths = smoother.model.step_time, fitted.paths
     rows = len(paths.states)
-    there, _ = lifetimes(smoother, paths, shared, p)
+    there, odds = lifetimes(smoother, paths, shared, p)
     reasons = np.zeros(rows, dtype=np.int64)
     fed = np.bincount(shared.links.rows, shared.links.shares, rows) > _FED
     fed[smoother.rows_with_places(paths)[0]] = True
@@ -103,7 +105,7 @@ def find_splits(tracked: Tracked, p: SmoothingParams) -> Splits:
     )
     clear = _between(paths, fed & (reasons == 0)) & (reasons == 0)
     begins, between = _of_two(paths, tracked.names)
-    return Splits(reasons, clear & ~between, breaks | begins)
+    return Splits(reasons, clear & ~between, breaks | begins, Rates.of(smoother, paths, odds > 0.0))
 
 
 def split_tracks(
