@@ -31,12 +31,7 @@ def tracked(scene: Known, **known_of: ndarray) -> Tracked:
         **known_of,
     }  # fmt: skip
     fitted = smoother.fit(paths, links, 2)
-    return Tracked(
-        smoother,
-        fitted,
-        smoother.associate(fitted.paths),
-        **values,
-    )
+    return Tracked(smoother, fitted, smoother.associate(fitted.paths), **values)
 
 
 def standing(*hidden: int) -> Known:
