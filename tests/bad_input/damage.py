@@ -50,6 +50,8 @@ def grow(path: Path, size: int) -> None:
 
 
 def _not_utf_8(path: Path, place: float, what: int) -> None:
+    if path.stat().st_size > MOST_BYTES:  # another damage has grown it
+        return
     data = path.read_bytes()
     at = data.index(b"\n") + 1 if b"\n" in data else 0
     path.write_bytes(data[:at] + b"\xff\xfe" + data[at:])
