@@ -24,10 +24,13 @@ from tracker.single_view.dropped import DROPPED, GATES
 STEPS = 10
 
 
-def film(folder: Path, *, stays: bool) -> Sequence:
+def film(folder: Path, *, stays: bool, narrow: bool = False) -> Sequence:
+    """Somebody who stays or walks, twice as wide as a target where that is narrow."""
     seat = np.tile([0.35, -0.3, 1.0], (STEPS, 1))
     path = seat if stays else walk((-0.8, 0.0, 1.0), (0.6, 0.3, 1.05), STEPS)
-    return painted_sequence(folder, [path], [RED if stays else GREEN])
+    sequence = painted_sequence(folder, [path], [RED if stays else GREEN])
+    shares = [0.5, 0.5, 1.0] if narrow else np.ones(3)
+    return replace(sequence, target_half_extents=sequence.target_half_extents * shares)
 
 
 def run_of(sequence: Sequence, **changes: object) -> Run:
@@ -97,7 +100,11 @@ def test_of_the_foreground_alone_tops_are_counted(tmp_path: Path) -> None:
             r"candidates a picture fell for foreground: lower jpda\.least_inside",
         ),
         (
-            {"single_view": "association_matrix", "association_matrix__acceptance": 0.0},
+            {
+                "single_view": "association_matrix",
+                "narrow": True,
+                "association_matrix__acceptance": 0.0,
+            },
             r"fell for outline: lower association_matrix\.acceptance",
         ),
         (
@@ -117,9 +124,9 @@ def test_of_the_foreground_alone_tops_are_counted(tmp_path: Path) -> None:
 def test_a_run_without_tracks_names_gate_and_value(
     changes: dict[str, object], words: str, tmp_path: Path
 ) -> None:
-    stays = bool(changes.get("stays"))
-    values = {name: value for name, value in changes.items() if name != "stays"}
-    run = run_of(film(tmp_path, stays=stays), **values)
+    stays, narrow = bool(changes.get("stays")), bool(changes.get("narrow"))
+    values = {name: value for name, value in changes.items() if name not in ("stays", "narrow")}
+    run = run_of(film(tmp_path, stays=stays, narrow=narrow), **values)
     told = why_no_tracks(run)
     assert told is not None
     assert told.startswith("no tracks: 10 pictures")

@@ -23,7 +23,7 @@ from tracker.io.read.picture_names import is_camera_number, number_in
 from tracker.io.read.pieces import FormatError, Piece
 from tracker.io.read.protocol import Certainty, Kind
 from tracker.io.read.source import SourceFile
-from tracker.io.read.values import is_list_of_tables
+from tracker.io.read.values import is_list_of_tables, plain
 
 _OF_PERSON = re.compile(
     r"(?:(?:p|id|person|ped|pedestrian|player|subject|target|track|human|object)[ _.-]?)?"
@@ -33,6 +33,9 @@ _OF_PERSON = re.compile(
 
 _CORNERS = 0.9
 """Share of rows in which the second of two points is right of and below the first of a box."""
+
+_LENS = frozenset(("fx", "focal", "focallength", "intrinsics", "cameramatrix", "k"))
+"""Names of which a record of a camera has one beside its position."""
 
 NAME = "table of boxes or places (CSV, JSON)"
 KIND: Kind = "detections"
@@ -48,6 +51,8 @@ def recognise(file: SourceFile) -> Certainty:
             return Certainty.NO
         records = _records(file)
         names = list(flat(records[0][1])) if records else []
+        if not _LENS.isdisjoint(map(plain, names)):
+            return Certainty.NO
         has_box = "box" in meanings(names) or layout_of(meanings(names)) is not None
         return Certainty.LIKELY if has_box or is_table(names) else Certainty.NO
     lines = _data_lines(file.head_text)
