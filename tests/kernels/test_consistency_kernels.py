@@ -121,6 +121,28 @@ def test_ratios_are_those_of_the_stated_gaussian(first: int, second: int) -> Non
     assert_allclose(ratios(a, b), expected, rtol=1e-4, atol=1e-9)
 
 
+@pytest.mark.parametrize("upwards", [True, False])
+def test_whom_the_other_camera_has_in_front_in_part_alone_explains_nothing(upwards: bool) -> None:
+    """It is within the body and looks along it: feet or head are behind it."""
+    axis = NORMAL if upwards else -NORMAL
+    beside = np.cross(axis, [0.0, 0.0, 1.0]) / np.linalg.norm(np.cross(axis, [0.0, 0.0, 1.0]))
+    rotation = np.stack([beside, np.cross(axis, beside), axis])
+    foot = np.array([0.2, 1.0, 4.0])
+    foot *= FLOOR / (NORMAL @ foot)
+    ends = np.array([foot, foot + RISE])
+    feet, heads = (ends / np.linalg.norm(ends, axis=1, keepdims=True))[:, None]
+    there, starts = np.array([True]), np.array([0, 1])
+    centre = ends.mean(axis=0) + 0.1 * beside
+    across = (ends - centre) @ rotation.T
+    assert sorted(across[:, 2] > 0.0) == [False, True]
+    seen = (across[:, :2] / across[:, 2:]).reshape(1, 4)
+    first, second = (
+        Boxes(feet, heads, there, seen, np.zeros(1), starts, turned, place)
+        for turned, place in ((np.eye(3), np.zeros(3)), (rotation, centre))
+    )
+    assert ratios(first, second).tolist() == [0.0]
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_the_explained_share_is_the_likeliest(seed: int) -> None:
     rng = np.random.default_rng(seed)
