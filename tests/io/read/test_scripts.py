@@ -157,6 +157,35 @@ def test_focal_lengths_alone_look_through_the_middle(tmp_path: Path) -> None:
     assert_same(raw, Camera("a", SIZE, np.array(middle), *pose, np.zeros(5)))
 
 
+@pytest.mark.parametrize(
+    "lens",
+    [
+        {"focal_length_mm": 4.5, "sensor_width_mm": 6.4},
+        {"focal": 4.5, "sensor_height": 3.6},
+        {"focal": 900.0},
+        {"fov_x_deg": 2.0 * np.degrees(np.arctan(WIDTH / 1800.0))},
+        {"vfov": 2.0 * np.arctan(HEIGHT / 1800.0)},
+        {"hfov": 2.0 * np.degrees(np.arctan(WIDTH / 1800.0)),
+         "vfov": 2.0 * np.degrees(np.arctan(HEIGHT / 1800.0))},
+    ],
+)  # fmt: skip
+def test_a_focal_length_told_in_another_way(tmp_path: Path, lens: dict[str, float]) -> None:
+    """Of 900 pixels in a picture of 1280 × 720."""
+    table = {"width": WIDTH, "height": HEIGHT, "c2w": np.eye(4).tolist(), **lens}
+    (tmp_path / "cameras.json").write_text(json.dumps({"a": table}))
+    (raw,) = raw_cameras(tmp_path / "cameras.json")
+    assert raw.intrinsics is not None
+    middle = [[900.0, 0.0, 639.5], [0.0, 900.0, 359.5], [0.0, 0.0, 1.0]]
+    np.testing.assert_allclose(raw.intrinsics, middle)
+
+
+def test_millimetres_without_a_sensor_are_no_focal_length(tmp_path: Path) -> None:
+    table = {"width": WIDTH, "height": HEIGHT, "c2w": np.eye(4).tolist(), "focal": 4.5}
+    (tmp_path / "cameras.json").write_text(json.dumps({"a": table}))
+    (raw,) = raw_cameras(tmp_path / "cameras.json")
+    assert raw.intrinsics is None
+
+
 def test_sensors_of_a_smart_city(tmp_path: Path) -> None:
     """A ``cameraMatrix`` of 3×4 numbers beside ``intrinsicMatrix`` is no lens."""
     sensors = [

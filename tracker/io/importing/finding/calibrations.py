@@ -54,7 +54,10 @@ def camera_sets(taken: Sequence[ParsedFiles]) -> tuple[list[CameraSet], list[str
     for pose in poses:
         joined = [found for lens in lenses if (found := _join(pose, lens)) is not None]
         if not joined:
-            told.append(f"{pose.label}: has poses, but no file has the lenses of these cameras")
+            told.append(
+                f"{pose.label}: has poses, but no file has the lenses of these cameras: K, a focal "
+                "length in pixels or with the sensor's width, or an angle called fov_x or fov_y"
+            )
             continue
         # of several, the one that comes last by its name
         complete.append(joined[-1])

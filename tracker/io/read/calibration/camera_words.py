@@ -65,6 +65,11 @@ _PARTS = ("intrinsics", "intrinsic", "intrinsicparameters", "extrinsics", "extri
 _SCALARS: dict[str, tuple[str, ...]] = {
     "fx": ("fx", "focallengthx", "focalx"), "fy": ("fy", "focallengthy", "focaly"),
     "f": ("f", "focal", "focallength"),
+    "f mm": ("fmm", "focalmm", "focallengthmm"),
+    "sensor width": ("sensorwidth", "sensorwidthmm"),
+    "sensor height": ("sensorheight", "sensorheightmm"),
+    "angle x": ("fovx", "fovxdeg", "hfov", "hfovdeg", "horizontalfov", "cameraanglex"),
+    "angle y": ("fovy", "fovydeg", "vfov", "vfovdeg", "verticalfov", "cameraangley"),
     "cx": ("cx", "ppx", "u0", "principalpointx"), "cy": ("cy", "ppy", "v0", "principalpointy"),
     **{name: (name,) for name in ("k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2")},
     **{f"q{axis}": (f"q{axis}",) for axis in "wxyz"},
@@ -106,6 +111,9 @@ _LENGTHS: dict[str, tuple[int, ...]] = {
 
 _LONGEST_NAME = 200
 """Signs of a field's name; all its beginnings are looked at."""
+
+_WIDEST = 4.0
+"""Width of a picture in focal lengths from which none is in pixels: an angle of 127 degrees."""
 
 _FULL_TURN = 2.0 * math.pi * 1.01
 """Radians; a rotation vector that is longer is one in degrees."""
@@ -254,7 +262,9 @@ def _composed(fields: dict[str, Any]) -> dict[str, Any]:
                 fields.pop(key, None)
         return [numbers[name] for name in names]
 
-    one, two = take("f", "cx", "cy"), take("fx", "fy", "cx", "cy")
+    two = take("fx", "fy", "cx", "cy")
+    # beside the size of a sensor it is in millimetres
+    one = None if numbers.keys() & {"sensor width", "sensor height"} else take("f", "cx", "cy")
     four = two or (one and [one[0], *one]) or _centred(fields, take)
     if four is not None:
         fx, fy, cx, cy = four
@@ -269,16 +279,42 @@ def _composed(fields: dict[str, Any]) -> dict[str, Any]:
     return {**fields, **found}
 
 
-def _centred(
-    fields: Mapping[str, Any], take: Callable[..., list[float] | None]
-) -> list[float] | None:
-    """Focal lengths without a principal point: it is the middle of the picture."""
+_Take = Callable[..., list[float] | None]
+
+
+def _centred(fields: Mapping[str, Any], take: _Take) -> list[float] | None:
+    """Focal lengths in any form; without a principal point it is the middle of the picture."""
     by_meaning = {meaning: fields[key] for key in fields for meaning, _ in [split(key) or ("", "")]}
     sides = [by_meaning.get(side) for side in ("width", "height")]
     if any(count(side) != 1 for side in sides):
         return None
-    focal = take("fx", "fy")
-    return focal and [*focal, *((float(_numbers(side)[0]) - 1.0) / 2.0 for side in sides)]
+    width, height = (float(_numbers(side)[0]) for side in sides)
+    focal = take("fx", "fy") or _by_sensor(take, width, height) or _by_angle(take, width, height)
+    if focal is None and (one := take("f")) is not None and _WIDEST * one[0] > width:
+        focal = [one[0], one[0]]
+    middle = [(width - 1.0) / 2.0, (height - 1.0) / 2.0]
+    return focal and [*focal, *(take("cx", "cy") or middle)]
+
+
+def _by_sensor(take: _Take, width: float, height: float) -> list[float] | None:
+    """Focal lengths in pixels, of square ones, from millimetres and the size of the sensor."""
+    for side, pixels in (("sensor width", width), ("sensor height", height)):
+        both = take("f mm", side) or take("f", side)
+        if both is not None and both[1] > 0.0:
+            return [both[0] * pixels / both[1]] * 2
+    return None
+
+
+def _by_angle(take: _Take, width: float, height: float) -> list[float] | None:
+    """Focal lengths in pixels from the angles that a picture covers, degrees, or radians up to pi;
+    where one is told pixels are square."""
+    found = [
+        pixels / 2.0 / math.tan((angle if angle <= math.pi else math.radians(angle)) / 2.0)
+        for name, pixels in (("angle x", width), ("angle y", height))
+        for angle in take(name) or ()
+        if angle > 0.0
+    ]
+    return [found[0], found[-1]] if found else None
 
 
 def _lens(
@@ -304,7 +340,7 @@ def _in_order(radial: list[float], tangential: list[float]) -> list[float]:
     return lens if any(lens[5:]) else lens[:5]
 
 
-def _pose(take: Callable[..., list[float] | None], *, lens: bool) -> Iterator[tuple[str, Any]]:
+def _pose(take: _Take, *, lens: bool) -> Iterator[tuple[str, Any]]:
     """R and t from their elements; beside a lens ``x y z`` alone are the camera's place."""
     matrix = take(*(f"r{row}{column}" for row in "123" for column in "123"))
     quaternion, vector = take("qw", "qx", "qy", "qz"), take("vx", "vy", "vz")
