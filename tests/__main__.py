@@ -2,7 +2,7 @@
 
 Needs nothing but Python 3.11 or newer: makes the environment ``.venv``, installs
 the project and its test tools into it, and checks style, types, the import rules,
-every law and oracle, and the main job in a browser: in seven to thirteen minutes on two cores
+every law and oracle, and the main job in a browser: in five to twelve minutes on two cores
 the first time. ``python3 -m tests --all`` checks the rest as well: all of the
 browser, processes, recordings, benchmarks and mutants; what has already
 passed on these very files is not run again.

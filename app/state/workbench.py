@@ -54,9 +54,7 @@ class Workbench(ShownRun):
         with self._edit() as now:
             return self._put_parameters(with_values(now.parameters, changes), origin)
 
-    def reset_parameters(
-        self, keys: Iterable[str] | None = None, origin: str = ""
-    ) -> RunParameters:
+    def reset_parameters(self, keys: Iterable[str] | None = None) -> RunParameters:
         """Return some values, or all and the methods too, to what they are by default."""
         with self._edit() as now:
             wanted = (*METHODS, *PARAMETERS) if keys is None else tuple(map(current_key, keys))
@@ -64,9 +62,9 @@ class Workbench(ShownRun):
                 if key not in METHODS and key not in PARAMETERS:
                     with_values(now.parameters, {key: None})  # says what is wrong
             changes = {key: value_of(now.defaults, key) for key in wanted}
-            return self._put_parameters(with_values(now.parameters, changes), origin)
+            return self._put_parameters(with_values(now.parameters, changes), "reset")
 
-    def apply_preset(self, name: str, origin: str = "") -> RunParameters:
+    def apply_preset(self, name: str) -> RunParameters:
         """Take a preset's values, and the defaults where it has none.
 
         The single-view method stays where the preset names none: it follows from what the
@@ -85,7 +83,7 @@ class Workbench(ShownRun):
                     "GET /api/schema has the built-in presets, GET /api/state your own.",
                 )
             changes = {"single_view": now.parameters.single_view, **presets[name]}
-            return self._put_parameters(with_values(now.defaults, changes), origin)
+            return self._put_parameters(with_values(now.defaults, changes), f"preset {name}")
 
     def set_presets(self, presets: Presets) -> None:
         """Have these presets besides the built-in ones."""

@@ -97,14 +97,14 @@ async def set_parameters(wish: models.ParameterChanges, bench: Bench) -> models.
 @router.post("/parameters/reset")
 async def reset_parameters(bench: Bench, wish: models.ResetRequest | None = None) -> models.State:
     """Return some values, or all, to their defaults."""
-    bench.reset_parameters(wish.keys if wish is not None else None, "api")
+    bench.reset_parameters(wish.keys if wish is not None else None)
     return results.state_of(bench.snapshot())
 
 
 @router.post("/parameters/preset")
 async def apply_preset(wish: models.PresetRequest, bench: Bench) -> models.State:
     """Take a preset's values, and the defaults where it has none."""
-    bench.apply_preset(wish.name, "api")
+    bench.apply_preset(wish.name)
     return results.state_of(bench.snapshot())
 
 

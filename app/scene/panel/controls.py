@@ -208,14 +208,14 @@ class Controls:
     def _take_preset(self, event: viser.GuiEvent[Any]) -> None:
         now = self._workbench.snapshot()
         if event.client_id is not None and event.target.value in (*PRESETS, *now.presets):
-            self._workbench.apply_preset(event.target.value, ORIGIN)
+            self._workbench.apply_preset(event.target.value)
         self._worker.ask("refresh")  # own values cannot be taken: it shows again what they are
 
     def _reset(self, topic: Topic | None) -> None:
         keys = None
         if topic is not None:
             keys = sorted(_about(topic, self._shown_keys(self._workbench.snapshot().parameters)))
-        self._workbench.reset_parameters(keys, ORIGIN)
+        self._workbench.reset_parameters(keys)
 
     # the worker's thread
 

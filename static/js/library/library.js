@@ -226,6 +226,7 @@ export function mountLibrary(root, { store, actions }) {
 	/** @type {number | null} */
 	let focused = null;
 	let starred = false;
+	let writing = false;
 
 	const recordings = shelf({
 		choose: (one) => void choose(one),
@@ -305,7 +306,8 @@ export function mountLibrary(root, { store, actions }) {
 	}
 
 	function show() {
-		if (!library) return;
+		// Who is writing a name goes on; what is news by then is drawn after it.
+		if (!library || writing) return;
 		const matching = listed();
 		recordings.show(library, recording);
 		fill(title, recording ? `Runs of ${recording.name}` : "Runs");
@@ -380,7 +382,7 @@ export function mountLibrary(root, { store, actions }) {
 	/** @param {Server.KeptRunInfo} run @param {object} what */
 	async function change(run, what) {
 		const told = await actions.ask("PATCH", `library/runs/${run.id}`, what);
-		if (!told) return;
+		if (!told) return show();
 		runs = runs.map((one) => (one.id === run.id ? told : one));
 		await focus(focused);
 	}
@@ -391,10 +393,10 @@ export function mountLibrary(root, { store, actions }) {
 		const cell = root.querySelector(`tr[data-run="${focused}"] td:nth-child(2)`);
 		if (!run || !cell) return;
 		const field = h("input", { class: "field", value: run.name, "aria-label": "Name of the run" });
-		let over = false;
+		writing = true;
 		const end = (/** @type {boolean} */ keep) => {
-			if (over) return;
-			over = true;
+			if (!writing) return;
+			writing = false;
 			if (keep && field.value !== run.name) void change(run, { name: field.value });
 			else show();
 		};

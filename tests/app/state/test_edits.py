@@ -94,9 +94,19 @@ def test_a_slider_that_comes_back_to_where_it_was_is_no_edit(
 
 def test_a_reset_right_after_a_drag_is_an_edit_of_its_own(bench: Workbench, edits: Edits) -> None:
     bench.set_parameters({P_D: 0.5}, "viser")
-    bench.reset_parameters([P_D], "api")
+    bench.reset_parameters([P_D])
     edits.undo()
     assert values(bench)[0] == 0.5
+
+
+def test_presets_one_right_after_the_other_are_two_edits(bench: Workbench, edits: Edits) -> None:
+    """Also where the second brings back what the first changed."""
+    bench.set_presets({"low": {P_D: 0.6}, "high": {P_D: 0.9}})
+    bench.set_parameters({P_D: 0.6}, "api")
+    bench.apply_preset("high")
+    bench.apply_preset("low")
+    edits.undo()
+    assert values(bench)[0] == 0.9
 
 
 def test_methods_that_are_switched_twice_are_two_edits(bench: Workbench, edits: Edits) -> None:

@@ -100,13 +100,14 @@ def test_finding_leaves_what_matches(library: Page) -> None:
     expect(library.get_by_text("No run matches")).to_be_visible()
 
 
-def test_runs_stand_side_by_side(library: Page) -> None:
+def test_runs_stand_side_by_side(library: Page, server: Server) -> None:
     library.keyboard.press("Control+a")
     library.get_by_role("button", name="Compare").click()
     dialog = library.get_by_role("dialog", name="Runs side by side")
     expect(dialog).to_contain_text("0.95")
     expect(dialog.get_by_role("row", name="MOTA")).to_be_visible()
-    expect(dialog.get_by_role("columnheader")).to_have_text(["What", "Run 2", "Run 1"])
+    names = [run["name"] or f"Run {run['id']}" for run in kept(server, 2)]
+    expect(dialog.get_by_role("columnheader")).to_have_text(["What", *names])
     library.keyboard.press("Escape")
     expect(dialog).to_have_count(0)
 
