@@ -137,7 +137,7 @@ class TaskInfo(Model):
     """The number of an export, the key of a run, or that of an import."""
     state: str
     done: int
-    """Of :attr:`total`; of an import its version: whoever shows it asks for it again."""
+    """What is done of :attr:`total`; that of an import is its version, by which it is read again."""
     total: int
     """0 while it is not known."""
     words: str

@@ -113,7 +113,7 @@ class Edits:
         """Take up the edits that belong to no recording.
 
         Args:
-            workbench: Whose parameters and teaching are followed.
+            workbench: The workbench whose parameters and teaching are followed.
             folder: Where edits are stored for the next start; None: for this one only.
             earlier: Where earlier versions stored the actions on corrections.
         """
@@ -136,7 +136,7 @@ class Edits:
         if folder is not None:
             self._take_up(folder / "everywhere.json")
         self._unsubscribe: Callable[[], None] = lambda: None
-        self._tell()
+        self._show_words()
 
     def follow(self) -> None:
         """Compare parameters and what is taught from now on: after those who take up what was
@@ -169,15 +169,18 @@ class Edits:
             return
         with self._lock:
             self._add(Edit(words, {part: (before, after)}, time.time()), "")
-        self._tell()
+        self._show_words()
 
     def forget(self, part: Part) -> None:
         """Drop the edits of a part that something else than the workbench has changed."""
         with self._lock:
-            self._done = [edit for edit in self._done if part not in edit.parts]
-            self._undone = [edit for edit in self._undone if part not in edit.parts]
+            self._drop(part)
             self._written_soon()
-        self._tell()
+        self._show_words()
+
+    def _drop(self, part: Part) -> None:
+        self._done = [edit for edit in self._done if part not in edit.parts]
+        self._undone = [edit for edit in self._undone if part not in edit.parts]
 
     def undo(self) -> Edit:
         """Put back what was before the last edit.
@@ -235,7 +238,7 @@ class Edits:
                 (self._done, self._undone)[to].append(edit)
             self._at = 0.0
             self._written_soon()
-        self._tell()
+        self._show_words()
 
     def _add(self, edit: Edit, origin: str) -> None:
         now = time.monotonic()
@@ -256,7 +259,7 @@ class Edits:
                 self._done.remove(own[0])
         self._written_soon()
 
-    def _tell(self) -> None:
+    def _show_words(self) -> None:
         with self._telling:
             with self._lock:
                 words = [stack[-1].words if stack else None for stack in (self._done, self._undone)]
@@ -288,7 +291,7 @@ class Edits:
                 if left and changed_values(now.parameters, now.defaults) == left:
                     return
                 self._add(edit, now.parameters_origin)
-        self._tell()
+        self._show_words()
 
     def _open(self, now: Snapshot) -> None:
         """Leave the recording that was open, and take up the edits of another."""
@@ -312,8 +315,7 @@ class Edits:
         done = [edit.parts[part][1] for edit in self._done if part in edit.parts]
         undone = [edit.parts[part][0] for edit in self._undone if part in edit.parts]
         if (done or undone) and value != (done or undone)[-1]:
-            self._done = [edit for edit in self._done if part not in edit.parts]
-            self._undone = [edit for edit in self._undone if part not in edit.parts]
+            self._drop(part)
 
     # over a start
 

@@ -255,7 +255,7 @@ class Workbench(ShownRun):
         """Show how far some work in the background is, in place of what was shown of its kind.
 
         Args:
-            kind: Of the work.
+            kind: The kind of work.
             task: How far it is; None to show it no more.
         """
         with self._edit() as now:

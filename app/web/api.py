@@ -132,18 +132,18 @@ def remove_preset(name: str, own: Own, bench: Bench) -> models.State:
 @router.post("/undo")
 def undo(edits: Edited, bench: Bench) -> models.State:
     """Put back what was before the last edit, whatever it was of; those of an earlier start too."""
-    _said(bench, "Undone", edits.undo)
+    _turn(bench, "Undone", edits.undo)
     return results.state_of(bench.snapshot())
 
 
 @router.post("/redo")
 def redo(edits: Edited, bench: Bench) -> models.State:
     """Do again what was undone last."""
-    _said(bench, "Done again", edits.redo)
+    _turn(bench, "Done again", edits.redo)
     return results.state_of(bench.snapshot())
 
 
-def _said(bench: Workbench, what: str, act: Callable[[], Edit]) -> None:
+def _turn(bench: Workbench, what: str, act: Callable[[], Edit]) -> None:
     try:
         edit = act()
     except EditError as error:

@@ -123,7 +123,7 @@ def test_ratios_are_those_of_the_stated_gaussian(first: int, second: int) -> Non
 
 @pytest.mark.parametrize("upwards", [True, False])
 def test_whom_the_other_camera_has_in_front_in_part_alone_explains_nothing(upwards: bool) -> None:
-    """It is within the body and looks along it: feet or head are behind it."""
+    """The camera is within the body and looks along it: feet or head are behind it."""
     axis = NORMAL if upwards else -NORMAL
     beside = np.cross(axis, [0.0, 0.0, 1.0]) / np.linalg.norm(np.cross(axis, [0.0, 0.0, 1.0]))
     rotation = np.stack([beside, np.cross(axis, beside), axis])

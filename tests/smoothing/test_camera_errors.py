@@ -20,7 +20,7 @@ from tracker.smoothing.camera_errors import (
     estimate_camera_errors,
     significance,
 )
-from tracker.smoothing.noise import NoiseModel, SureBoxes
+from tracker.smoothing.noise import NoiseModel, NoiseSample, SureBoxes
 from tracker.smoothing.paths import Paths
 
 NO_OFFSETS = np.zeros((4, 3))
@@ -31,7 +31,8 @@ def errors_of(
 ) -> CameraErrors:
     """The errors of the cameras of some simulated boxes."""
     rows, scales = np.arange(len(paths.states)), np.ones(len(paths.states))
-    return estimate_camera_errors(paths, rows, seen, motion_of(), scales, STEP, noise, offsets)
+    sample = NoiseSample(paths, rows, seen, motion_of(), scales, STEP)
+    return estimate_camera_errors(sample, noise, offsets)
 
 
 def noisier(seed: int, camera: int, factor: float) -> tuple[Paths, SureBoxes]:

@@ -29,6 +29,7 @@ from tracker.smoothing.noise import (
     MOST_ROWS,
     WINDOW,
     NoiseModel,
+    NoiseSample,
     PersistentErrors,
     SureBoxes,
     choose_rows,
@@ -93,7 +94,7 @@ def estimates(seeds: range) -> ndarray:
     for seed in seeds:
         paths, seen = simulated(seed, TRUE, 600)
         rows, scales = np.arange(600), np.ones(600)
-        one = estimate_noise(paths, rows, seen, motion_of(), scales, STEP)
+        one = estimate_noise(NoiseSample(paths, rows, seen, motion_of(), scales, STEP))
         found.append([*one.white, one.pixels, *one.persistent, one.time, one.process])
     return np.asarray(np.median(found, axis=0))
 

@@ -82,7 +82,7 @@ def _of_camera(
 
     Args:
         camera: The camera.
-        view: Its result of stage 1.
+        view: The result of stage 1 in this camera.
         target: The measurement model.
         p: The parameters of the fusion.
         posterior: The component of each track.

@@ -14,12 +14,11 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 from numpy import ndarray
 
-from tracker.filters.models import Motion
-from tracker.kernels.smoothing.innovations import DeviationMotion, log_likelihood
-from tracker.smoothing.noise import NoiseModel, SureBoxes, box_errors, window_prior, windows_of
+from tracker.kernels.smoothing.innovations import log_likelihood
+from tracker.smoothing.noise import NoiseModel, NoiseSample, SureBoxes, box_errors
 from tracker.smoothing.paths import Paths
 
 Quantity = Literal["horizontal", "vertical", "height", "all"]
@@ -96,33 +95,21 @@ class CameraErrors:
 
 
 def estimate_camera_errors(
-    paths: Paths,
-    rows: Int[ndarray, " K"],
-    seen: SureBoxes,
-    motion: Motion,
-    noise_scales: Float[ndarray, " N"],
-    step_time: float,
-    noise: NoiseModel,
-    offsets: Float[ndarray, "C m"],
+    sample: NoiseSample, noise: NoiseModel, offsets: Float[ndarray, "C m"]
 ) -> CameraErrors:
     """Estimate each camera's errors, and by how much it is late.
 
     Args:
-        paths: Smoothed paths, with N rows.
-        rows: The rows by which the noise was estimated.
-        seen: The boxes of these rows.
-        motion: The motion model.
-        noise_scales: Factor on the process noise of the step to each row.
-        step_time: Time between two steps, seconds.
+        sample: The boxes by which the noise was estimated.
         noise: The noise of all cameras together.
         offsets: b: offset of each camera's boxes that is left out of the residuals, half heights.
     """
+    seen = sample.seen
     whole = replace(
         seen, residuals=seen.residuals + seen.half_heights[:, None] * offsets[seen.cameras]
     )
-    factors, least = _factors(paths, whole, noise, len(offsets), step_time)
-    late = _delays(paths, rows, seen, motion, noise_scales, step_time, noise, len(offsets))
-    return CameraErrors(factors, least, *late)
+    factors, least = _factors(sample.paths, whole, noise, len(offsets), sample.step_time)
+    return CameraErrors(factors, least, *_delays(sample, noise, len(offsets)))
 
 
 def _factors(
@@ -218,14 +205,7 @@ def _log_factors(
 
 
 def _delays(
-    paths: Paths,
-    rows: Int[ndarray, " K"],
-    seen: SureBoxes,
-    motion: Motion,
-    noise_scales: Float[ndarray, " N"],
-    step_time: float,
-    noise: NoiseModel,
-    cameras: int,
+    sample: NoiseSample, noise: NoiseModel, cameras: int
 ) -> tuple[Float[ndarray, " C"], Float[ndarray, " C"]]:
     """Estimate by how much each camera is late, by the innovation likelihood.
 
@@ -234,22 +214,18 @@ def _delays(
     values give its maximum and its curvature. Of all clocks together nothing is known: their mean
     is 0.
     """
-    unknown = np.full(cameras, np.nan)
-    if paths.states.shape[1] < 6 or np.bincount(seen.cameras, minlength=cameras).min() == 0:
+    unknown, seen, states = np.full(cameras, np.nan), sample.seen, sample.paths.states
+    if states.shape[1] < 6 or np.bincount(seen.cameras, minlength=cameras).min() == 0:
         return unknown, unknown
-    velocities = paths.states[seen.rows, 3:6]
-    behind = step_time * np.einsum("lpa,la->lp", seen.jacobians, velocities)
-    prior = window_prior(paths.states.shape[1])
-    deviation = DeviationMotion(motion.transition, motion.noise, prior)
+    step_time, deviation = sample.step_time, sample.deviation
     errors = box_errors(noise, step_time)
-    given, moving, of_camera = (
-        windows_of(paths, rows, replace(seen, residuals=one), motion.transition, noise_scales)
-        for one in (seen.residuals, behind, np.repeat(seen.cameras[:, None], behind.shape[1], 1))
-    )
+    behind = step_time * np.einsum("lpa,la->lp", seen.jacobians, states[seen.rows, 3:6])
+    windows, order = sample.windows()
+    behind, camera = behind[order], seen.cameras[order]
 
     def likelihood(late: ndarray) -> float:
-        moved = given.residuals + late[of_camera.residuals] * moving.residuals
-        return float(log_likelihood(given._replace(residuals=moved), deviation, errors))
+        moved = windows.residuals + late[camera, None] * behind
+        return float(log_likelihood(windows._replace(residuals=moved), deviation, errors))
 
     units = np.eye(cameras)
     middle = likelihood(np.zeros(cameras))

@@ -106,6 +106,65 @@ class SureBoxes:
     """Half height of the expected box, pixels."""
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class NoiseSample:
+    """Rows of smoothed paths, with N rows in all, and the boxes by which the noise is estimated."""
+
+    paths: Paths
+    rows: Int[ndarray, " K"]
+    """The rows, ascending, as :func:`choose_rows` returns them."""
+    seen: SureBoxes
+    """The boxes of these rows."""
+    motion: Motion
+    """The motion model."""
+    noise_scales: Float[ndarray, " N"]
+    """Factor on the process noise of the step to each row."""
+    step_time: float
+    """Time between two steps, seconds."""
+
+    @property
+    def deviation(self) -> DeviationMotion:
+        """The motion of a window's deviation from the smoothed states."""
+        variances = np.repeat([_DEVIATION**2, _DEVIATION_VELOCITY**2], 3)
+        prior = np.diag(variances[: self.paths.states.shape[1]])
+        return DeviationMotion(self.motion.transition, self.motion.noise, prior)
+
+    def windows(self) -> tuple[Windows, Int[ndarray, " O"]]:
+        """Arrange rows with their boxes; a window ends with its path or its length.
+
+        Returns:
+            The windows, and the box of the sample that each of their boxes is.
+        """
+        paths, rows, seen = self.paths, self.rows, self.seen
+        owners = paths.owners_of(rows)
+        within = rows - paths.starts[owners]
+        begins = np.append(True, (np.diff(rows) != 1) | (within[1:] % WINDOW == 0))
+        order = np.lexsort((seen.cameras, seen.rows))
+        order = order[np.isin(seen.rows[order], rows)]
+        at = np.searchsorted(rows, seen.rows[order])
+        window = np.cumsum(begins)[at]
+        # the cameras of each window, from 0
+        pairs = window * (seen.cameras.max(initial=0) + 1) + seen.cameras[order]
+        distinct, index = np.unique(pairs, return_inverse=True)
+        of_window = distinct // (seen.cameras.max(initial=0) + 1)
+        slots = index - np.searchsorted(of_window, window)
+        drifts = np.zeros((len(rows), paths.states.shape[1]))
+        later = np.flatnonzero(~begins)
+        before, transition = paths.states[rows[later] - 1], self.motion.transition
+        drifts[later] = before @ transition.T - paths.states[rows[later]]
+        windows = Windows(
+            np.append(np.flatnonzero(begins), len(rows)),
+            drifts,
+            np.ascontiguousarray(self.noise_scales[rows]),
+            np.searchsorted(at, np.arange(len(rows) + 1)),
+            slots.astype(np.int64),
+            np.ascontiguousarray(seen.residuals[order]),
+            np.ascontiguousarray(seen.jacobians[order]),
+            np.ascontiguousarray(seen.half_heights[order]),
+        )
+        return windows, order
+
+
 def choose_rows(paths: Paths, counts: Int[ndarray, " N"]) -> Int[ndarray, " K"] | None:
     """Choose the rows from which the noise is estimated: windows that are spread over the paths.
 
@@ -137,30 +196,16 @@ def choose_rows(paths: Paths, counts: Int[ndarray, " N"]) -> Int[ndarray, " K"] 
     return np.concatenate([np.arange(first[w], last[w]) for w in chosen])
 
 
-def estimate_noise(
-    paths: Paths,
-    rows: Int[ndarray, " K"],
-    seen: SureBoxes,
-    motion: Motion,
-    noise_scales: Float[ndarray, " N"],
-    step_time: float,
-) -> NoiseModel:
+def estimate_noise(sample: NoiseSample) -> NoiseModel:
     """Maximise the innovation likelihood of white and persistent errors of boxes.
 
     Args:
-        paths: Smoothed paths, with N rows.
-        rows: Those that count, ascending, as :func:`choose_rows` returns them.
-        seen: The boxes of these rows.
-        motion: The motion model.
-        noise_scales: Factor on the process noise of the step to each row.
-        step_time: Time between two steps, seconds.
+        sample: The boxes by which the noise is estimated.
     """
     from scipy.optimize import minimize  # half a second that a server starts without
 
-    windows = windows_of(paths, rows, seen, motion.transition, noise_scales)
-    size = seen.residuals.shape[1]
-    prior = window_prior(paths.states.shape[1])
-    deviation = DeviationMotion(motion.transition, motion.noise, prior)
+    windows, _ = sample.windows()
+    size, step_time, deviation = windows.residuals.shape[1], sample.step_time, sample.deviation
 
     def model_of(logarithms: ndarray) -> NoiseModel:
         values = np.exp(logarithms)
@@ -197,54 +242,6 @@ def box_errors(noise: NoiseModel, step_time: float) -> BoxErrors:
     """
     kept = float(np.exp(-step_time / noise.time))
     return BoxErrors(noise.white, noise.pixels, noise.persistent, kept, noise.process)
-
-
-def window_prior(dimension: int) -> Float[ndarray, "d d"]:
-    """The prior covariance of a window's first deviation, for states of size d."""
-    return np.diag(np.repeat([_DEVIATION**2, _DEVIATION_VELOCITY**2], 3)[:dimension])
-
-
-def windows_of(
-    paths: Paths,
-    rows: Int[ndarray, " K"],
-    seen: SureBoxes,
-    transition: Float[ndarray, "d d"],
-    noise_scales: Float[ndarray, " N"],
-) -> Windows:
-    """Arrange rows with their boxes, row after row; a window ends with its path or its length.
-
-    Args:
-        paths: The paths, with N rows.
-        rows: The rows, ascending.
-        seen: Boxes of these rows and of others.
-        transition: F of the motion model.
-        noise_scales: Factor on the process noise of the step to each row.
-    """
-    owners = paths.owners_of(rows)
-    within = rows - paths.starts[owners]
-    begins = np.append(True, (np.diff(rows) != 1) | (within[1:] % WINDOW == 0))
-    order = np.lexsort((seen.cameras, seen.rows))
-    order = order[np.isin(seen.rows[order], rows)]
-    at = np.searchsorted(rows, seen.rows[order])
-    window = np.cumsum(begins)[at]
-    # the cameras of each window, from 0
-    pairs = window * (seen.cameras.max(initial=0) + 1) + seen.cameras[order]
-    distinct, index = np.unique(pairs, return_inverse=True)
-    of_window = distinct // (seen.cameras.max(initial=0) + 1)
-    slots = index - np.searchsorted(of_window, window)
-    drifts = np.zeros((len(rows), paths.states.shape[1]))
-    later = np.flatnonzero(~begins)
-    drifts[later] = paths.states[rows[later] - 1] @ transition.T - paths.states[rows[later]]
-    return Windows(
-        np.append(np.flatnonzero(begins), len(rows)),
-        drifts,
-        np.ascontiguousarray(noise_scales[rows]),
-        np.searchsorted(at, np.arange(len(rows) + 1)),
-        slots.astype(np.int64),
-        np.ascontiguousarray(seen.residuals[order]),
-        np.ascontiguousarray(seen.jacobians[order]),
-        np.ascontiguousarray(seen.half_heights[order]),
-    )
 
 
 class PersistentErrors:

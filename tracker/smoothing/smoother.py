@@ -50,6 +50,7 @@ from tracker.smoothing.heights import BoxTops, standing_heights
 from tracker.smoothing.noise import (
     LEAST_ROWS,
     NoiseModel,
+    NoiseSample,
     PersistentErrors,
     SureBoxes,
     choose_rows,
@@ -650,19 +651,11 @@ class Smoother:
         chosen = links.take(sure & np.isin(links.rows, rows))
         parts = [*self._sure_boxes(paths, chosen, learnt)]
         seen = SureBoxes(*(np.concatenate(each) for each in zip(*parts, strict=True)))
-        noise = estimate_noise(
+        sample = NoiseSample(
             paths, rows, seen, self.model.motion, fitted.noise_scales, self.model.step_time
         )
-        cameras = estimate_camera_errors(
-            paths,
-            rows,
-            seen,
-            self.model.motion,
-            fitted.noise_scales,
-            self.model.step_time,
-            noise,
-            learnt.offsets,
-        )
+        noise = estimate_noise(sample)
+        cameras = estimate_camera_errors(sample, noise, learnt.offsets)
         half_height = float(self._sequence.target_half_extents[2])
         covariances = self.fit(paths, links, 1, replace(learnt, noise=noise)).paths.covariances
         errors = PersistentErrors(noise, len(paths.states), half_height)

@@ -126,7 +126,7 @@ class Preview(Model):
     ospa_every: int
     """How many steps a value of :attr:`ospa` stands for."""
     room: RoomInfo | None
-    """Of its recording, where that is open."""
+    """The room of its recording, where that is open."""
 
 
 class Place(Model):

@@ -165,9 +165,9 @@ function createCheck({ store, actions, playback }) {
 		if (!timeline || now === heard) return;
 		heard = now;
 		// What is said no more is doubtful again.
-		const said = server?.corrections.count ?? 0;
-		if (said < count) gone.clear();
-		count = said;
+		const corrections = server?.corrections.count ?? 0;
+		if (corrections < count) gone.clear();
+		count = corrections;
 		soon(100);
 	});
 	store.on(["place"], ({ place }) => place === "check" && void refresh());

@@ -472,8 +472,8 @@ export function mountLibrary(root, { store, actions }) {
 	});
 	let marks = store.get().server?.marks;
 	store.on(["server"], ({ place, server }) => {
-		// Who is writing a name or a note goes on; what is written is news by itself.
-		if (server?.marks === marks || root.querySelector("input.field:focus, .addnote:focus")) return;
+		// Who is writing goes on; what is written is news by itself.
+		if (server?.marks === marks || writing || root.querySelector(".addnote:focus")) return;
 		marks = server?.marks;
 		if (place === "library") void refresh();
 	});

@@ -894,7 +894,7 @@ declare namespace Server {
 		ospa: number[];
 		/** How many steps a value of :attr:`ospa` stands for. */
 		ospa_every: number;
-		/** Of its recording, where that is open. */
+		/** The room of its recording, where that is open. */
 		room: RoomInfo | null;
 	}
 
@@ -1265,7 +1265,9 @@ declare namespace Server {
 		/** The number of an export, the key of a run, or that of an import. */
 		of: string;
 		state: string;
-		/** Of :attr:`total`; of an import its version: whoever shows it asks for it again. */
+		/**
+		 * What is done of :attr:`total`; that of an import is its version, by which it is read again.
+		 */
 		done: number;
 		/** 0 while it is not known. */
 		total: number;

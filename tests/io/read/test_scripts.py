@@ -170,7 +170,7 @@ def test_focal_lengths_alone_look_through_the_middle(tmp_path: Path) -> None:
     ],
 )  # fmt: skip
 def test_a_focal_length_told_in_another_way(tmp_path: Path, lens: dict[str, float]) -> None:
-    """Of 900 pixels in a picture of 1280 × 720."""
+    """The focal length is 900 pixels in a picture of 1280 × 720."""
     table = {"width": WIDTH, "height": HEIGHT, "c2w": np.eye(4).tolist(), **lens}
     (tmp_path / "cameras.json").write_text(json.dumps({"a": table}))
     (raw,) = raw_cameras(tmp_path / "cameras.json")

@@ -50,7 +50,7 @@ class Trial:
     key: str = ""
     """Key of the changed parameter."""
     value: Any = None
-    """Its value."""
+    """The value of that parameter."""
 
     @property
     def parameters(self) -> RunParameters:

@@ -6,11 +6,14 @@ reference to another file; a file beyond a limit is an error with one sentence.
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import re
 import tomllib
 import xml.etree.ElementTree as ElementTree
+import zipfile
+import zlib
 from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
@@ -388,6 +391,29 @@ def _matrix(loader: yaml.CSafeLoader, node: yaml.Node) -> Any:
 
 for _kind in ("opencv-matrix", "opencv-nd-matrix"):
     _Loader.add_constructor(f"tag:yaml.org,2002:{_kind}", _matrix)
+
+
+def npz_members(data: bytes, most: int) -> dict[str, bytes] | None:
+    """Unpack the arrays of an ``.npz``, of which a few bytes may stand for gigabytes.
+
+    Args:
+        data: The archive.
+        most: Largest size of all arrays together, bytes.
+
+    Returns:
+        The content of each ``.npy`` by its name; None if together they are larger.
+
+    Raises:
+        ValueError: If it is no archive, or a damaged one.
+    """
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            members = [one for one in archive.infolist() if one.filename.endswith(".npy")]
+            if sum(one.file_size for one in members) > most:
+                return None
+            return {one.filename.removesuffix(".npy"): archive.read(one) for one in members}
+    except (zipfile.BadZipFile, EOFError, NotImplementedError, zlib.error) as error:
+        raise ValueError(f"is no intact archive ({error})") from None
 
 
 def parse_yaml(text: str, most_depth: int = 100) -> Any:

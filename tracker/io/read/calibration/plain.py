@@ -6,8 +6,6 @@ Arrays of an ``.npz`` may have the cameras as their first axis: K (C, 3, 3), t (
 from __future__ import annotations
 
 import io
-import zipfile
-import zlib
 from typing import Any
 
 import numpy as np
@@ -15,7 +13,7 @@ from numpy import ndarray
 
 from tracker.io.read.calibration.named_format import NamedFormat
 from tracker.io.read.pieces import FormatError
-from tracker.io.read.source import SourceFile
+from tracker.io.read.source import SourceFile, npz_members
 
 MOST_BYTES = 16 * 2**20
 """Of an archive of arrays, packed and unpacked: a few bytes may stand for gigabytes."""
@@ -40,23 +38,19 @@ def _values(file: SourceFile) -> Any:
 
 def _arrays(file: SourceFile) -> dict[str, Any]:
     """The arrays of an archive by their names, or a table of them a camera."""
+    data = file.bytes(MOST_BYTES)
     try:
-        with zipfile.ZipFile(io.BytesIO(file.bytes(MOST_BYTES))) as archive:
-            members = [one for one in archive.infolist() if one.filename.endswith(".npy")]
-            if sum(one.file_size for one in members) > MOST_BYTES:
-                raise file.error(
-                    f"unpacks to more than {MOST_BYTES / 2**20:.0f} MB, expected a calibration"
-                )
-            arrays: dict[str, ndarray] = {
-                one.filename.removesuffix(".npy"): np.load(
-                    io.BytesIO(archive.read(one)), allow_pickle=False
-                )
-                for one in members
-            }
-    except (zipfile.BadZipFile, ValueError, EOFError, NotImplementedError, zlib.error) as error:
-        if isinstance(error, FormatError):
-            raise
+        members = npz_members(data, MOST_BYTES)
+        arrays: dict[str, ndarray] = {
+            name: np.load(io.BytesIO(own), allow_pickle=False)
+            for name, own in (members or {}).items()
+        }
+    except (ValueError, EOFError):
         return {}  # some other archive
+    if members is None:
+        raise file.error(
+            f"unpacks to more than {MOST_BYTES / 2**20:.0f} MB, expected a calibration"
+        )
     lenses = [own for own in arrays.values() if own.ndim == 3 and own.shape[1:] == (3, 3)]
     if not lenses:
         return {name: own.tolist() for name, own in arrays.items()}

@@ -11,8 +11,6 @@ from __future__ import annotations
 
 import io
 import math
-import zipfile
-import zlib
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -23,7 +21,7 @@ from tracker.io.read.columns import Column, has_boxes, is_table, read_table, sin
 from tracker.io.read.detections import numbers
 from tracker.io.read.pieces import Piece
 from tracker.io.read.protocol import Certainty, Kind
-from tracker.io.read.source import SourceFile
+from tracker.io.read.source import SourceFile, npz_members
 
 NAME = "NumPy arrays of boxes or places"
 KIND: Kind = "detections"
@@ -84,12 +82,9 @@ def _arrays(file: SourceFile) -> dict[str, ndarray]:
     try:
         if data.startswith(_ARRAY):
             return {"": _array(data)}
-        with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            members = [one for one in archive.infolist() if one.filename.endswith(".npy")]
-            if sum(one.file_size for one in members) > MOST_BYTES:
-                return {}
-            return {one.filename.removesuffix(".npy"): _array(archive.read(one)) for one in members}
-    except (zipfile.BadZipFile, ValueError, EOFError, NotImplementedError, zlib.error):
+        members = npz_members(data, MOST_BYTES) or {}
+        return {name: _array(own) for name, own in members.items()}
+    except (ValueError, EOFError):
         return {}  # other arrays, or some other archive
 
 
