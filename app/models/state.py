@@ -137,7 +137,7 @@ class TaskInfo(Model):
     """The number of an export, the key of a run, or that of an import."""
     state: str
     done: int
-    """What is done of :attr:`total`; that of an import is its version, by which it is read again."""
+    """What is done of :attr:`total`; of an import it is the version that can be read."""
     total: int
     """0 while it is not known."""
     words: str

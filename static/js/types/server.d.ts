@@ -1265,9 +1265,7 @@ declare namespace Server {
 		/** The number of an export, the key of a run, or that of an import. */
 		of: string;
 		state: string;
-		/**
-		 * What is done of :attr:`total`; that of an import is its version, by which it is read again.
-		 */
+		/** What is done of :attr:`total`; of an import it is the version that can be read. */
 		done: number;
 		/** 0 while it is not known. */
 		total: number;
