@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import httpx2
 from playwright.sync_api import Browser, Page, expect
 
 from tests.browser.looking import as_at_first, ask, by_palette, readout, until
@@ -49,6 +50,8 @@ def test_undo_is_offered_only_where_there_is_something_to_undo(
     flat_page: Page, server: Server
 ) -> None:
     page = flat_page
+    while httpx2.post(server.address + "api/undo").status_code == 200:
+        pass  # what other tests did with this server
     as_at_first(server)
     page.reload()
     page.get_by_role("tab", name=re.compile("Changes")).click()

@@ -133,6 +133,7 @@ def test_the_field_of_a_new_name_is_no_trap(flat_page: Page, server: Server) -> 
     def draw(left: float) -> None:
         if "drawing" not in (page.locator(".mosaic").get_attribute("class") or ""):
             page.keyboard.press("c")
+            expect(page.locator(".mosaic")).to_have_class(re.compile("drawing"))
         box = still(page.locator(".cam").first)
         scale = box["width"] / 192
         x, y = box["x"] + left * scale, box["y"] + 30 * scale
@@ -183,6 +184,8 @@ def test_a_template_is_drawn_moved_and_named_by_keys_alone(flat_page: Page, serv
     as_at_first(server)
     before = server.get("/api/state").json()["sequence"]["templates"]
     page.keyboard.press("c")
+    drawing = re.compile("drawing")  # its code is loaded when it is first asked for
+    expect(page.locator(".mosaic")).to_have_class(drawing)
     page.locator(".cam").nth(1).focus()
     page.keyboard.press("Enter")
     box = page.get_by_role("button", name="Box in cam2")
@@ -210,7 +213,7 @@ def test_a_template_is_drawn_moved_and_named_by_keys_alone(flat_page: Page, serv
     assert readout(page) == readout_before  # the clock has other keys meanwhile
     page.keyboard.press("Escape")  # leaves the box, and again the drawing
     expect(box).to_have_count(0)
-    expect(page.locator(".mosaic")).to_have_class(re.compile("drawing"))
+    expect(page.locator(".mosaic")).to_have_class(drawing)
     page.keyboard.press("Enter")
     page.keyboard.press("Shift+ArrowLeft")
     page.keyboard.press("Enter")
@@ -221,7 +224,7 @@ def test_a_template_is_drawn_moved_and_named_by_keys_alone(flat_page: Page, serv
     page.keyboard.press("Enter")
     expect(name).to_have_value("Eve")
     page.keyboard.press("Escape")
-    expect(page.locator(".mosaic")).not_to_have_class(re.compile("drawing"))
+    expect(page.locator(".mosaic")).not_to_have_class(drawing)
     page.keyboard.press("Control+s")
     server.wait(lambda state: state["teaching"]["unsaved"] == 0)
     template = read_sequence(Path(server.folder)).templates[before]
