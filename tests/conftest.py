@@ -88,14 +88,16 @@ def pytest_collection() -> Iterator[object]:
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Mark what belongs to the full form alone; leave long tests out unless they are asked for.
 
-    Of the browser the main job is part of the short form; recordings are not everywhere.
+    Of the browser one test is part of the short form; recordings are not everywhere.
     """
     for item in items:
         marks = {mark.name for mark in item.iter_markers()}
-        if marks & {"browser", "data"} and "main_job" not in marks:
+        if marks & {"browser", "data"} and "short" not in marks:
             item.add_marker(pytest.mark.full)
     # the longest first, so that no process is left with it while the others have nothing to do
-    items.sort(key=lambda item: item.get_closest_marker("main_job") is None)
+    items.sort(
+        key=lambda item: not {"short", "main_job"} & {mark.name for mark in item.iter_markers()}
+    )
     if config.getoption("--long") or "long" in config.getoption("-m"):
         return
     long = [item for item in items if item.get_closest_marker("long")]

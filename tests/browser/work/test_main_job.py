@@ -52,6 +52,7 @@ UNFOLD = """label => {
 }"""
 
 
+@pytest.mark.short
 def test_pictures_overlays_readout_and_3d_show_the_same_step(page: Page, server: Server) -> None:
     scene = viser(page)
     clear_overlays(page)
