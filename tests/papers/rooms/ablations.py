@@ -91,7 +91,8 @@ def ends(key: str) -> tuple[Any, ...]:
     if parameter.kind == "bool":
         return (not default,)
     if parameter.kind == "choice":
-        return tuple(one for one in parameter.choices if one != default)
+        without = {default, "detections"}  # the rooms have no boxes of a detector
+        return tuple(one for one in parameter.choices if one not in without)
     low, high = float(parameter.minimum or 0.0), float(parameter.maximum or 0.0)
     if high <= 1.0 and default > 0.5:
         both = [1.0 - (1.0 - default) * FACTOR, 1.0 - (1.0 - default) / FACTOR]
