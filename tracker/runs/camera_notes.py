@@ -40,20 +40,22 @@ def camera_notes(run: Run) -> list[str]:
             "somebody"
         )
     off = float(smoothed.noise.persistent[0] * run.sequence.target_half_extents[2])
-    delays = _delays(errors, names, off / _WALKING)
+    delays = _delays(errors, names, off / _WALKING, run.sequence.fps)
     if delays:
         found.append(
-            f"by the errors of boxes {', '.join(delays)}; nothing is corrected: see Time in "
-            "multiview-phd check, which measures this by itself, and time_offset in sequence.toml"
+            f"by its boxes, {'; '.join(delays)}; nothing is corrected: multiview-phd check "
+            "measures this by itself and says whether frames are missing, or what to write as "
+            "time_offset in sequence.toml"
         )
     return found
 
 
-def _delays(errors: CameraErrors, names: list[str], least: float) -> list[str]:
+def _delays(errors: CameraErrors, names: list[str], least: float, fps: float) -> list[str]:
     """Describe the delays of more than ``least`` seconds that are significant."""
     bound = np.maximum(least, significance(len(names)) * errors.delay_sigmas)
     return [
-        f'camera "{names[camera]}" is {abs(errors.delays[camera]):.2f} s '
+        f'camera "{names[camera]}" is {abs(errors.delays[camera]):.2f} s, or '
+        f"{abs(errors.delays[camera]) * fps:.1f} steps, "
         + ("late" if errors.delays[camera] > 0.0 else "early")
         for camera in np.flatnonzero(np.abs(errors.delays) > bound).tolist()
     ]

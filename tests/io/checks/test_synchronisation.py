@@ -74,7 +74,7 @@ def test_lost_frames_are_a_warning_with_their_number_and_step(camera: int) -> No
     assert int(jump[1]) == pytest.approx(-12, abs=2)
     step = re.search(r"about step (\d+)", words)
     assert step is not None
-    assert int(step[1]) == pytest.approx(150, abs=5)
+    assert int(step[1]) == pytest.approx(150, abs=2)
 
 
 def test_the_curve_has_its_peak_at_the_offset() -> None:

@@ -816,16 +816,18 @@ def _jump(
     likelihood: Likelihood, best: Interpretation, camera: int, begins: int, ends: int,
     late: Mapping[int, int],
 ) -> int:  # fmt: skip
-    """The step from which a camera's boxes are explained by its last lag and no more by its first:
-    sought among the moments, then among all steps of the moments around."""
+    """The step from which a camera's boxes are explained no more by its first lag: sought among the
+    moments, then among all steps of the moments around. Of the steps whose frames the camera lost
+    nothing is expected."""
     moments = likelihood.moments
-    around = _AROUND_JUMP * int(np.median(np.diff(moments)))
+    around = _AROUND_JUMP * int(np.median(np.diff(moments))) + abs(ends - begins)
     for dense in (False, True):
         some = likelihood if not dense else likelihood.of_moments(moments)
         steps = moments + np.array([[begins], [ends]])
         first, last = some.of_camera(best, camera, steps, late)
-        before, after = np.cumsum(first), np.cumsum(last[::-1])[::-1]
-        jump = int(moments[int(np.argmax(np.append(0.0, before[:-1]) + after))])
+        before, after = np.append(0.0, np.cumsum(first)), np.append(np.cumsum(last[::-1])[::-1], 0)
+        resumed = np.searchsorted(moments, moments + max(0, begins - ends))
+        jump = int(moments[int(np.argmax(before[:-1] + after[resumed]))])
         low, high = max(jump - around, int(moments[0])), min(jump + around, int(moments[-1]))
         moments = np.unique(np.linspace(low, high, _MOST_AROUND).round().astype(np.int64))
     return jump
