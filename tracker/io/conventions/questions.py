@@ -231,8 +231,8 @@ def describe_clocks(clocks: Mapping[int, ClockFit], names: Sequence[str]) -> lis
     return [
         f"{names[camera]}: about step {fit.jump} its clock jumps by {fit.ends - fit.begins} steps, "
         f"or it drifts: it is {fit.begins} steps late in the first third of the recording and "
-        f"{fit.ends} in the last; frames were lost, or its rate is another one: nothing is corrected, "
-        "a file with the time of each of its frames as timestamps in sequence.toml mends it"
+        f"{fit.ends} in the last; frames were lost, or its rate is another one: nothing is "
+        "corrected; a file with the time of each frame, named by timestamps in sequence.toml, does"
         for camera, fit in clocks.items()
         if not fit.steady
     ]
