@@ -20,3 +20,10 @@ def test_no_more_folders_are_silently_wrong_than_before() -> None:
     ]
     assert len(silent) <= SILENT, silent
     assert any(how == "right" for _, how, _, _ in found)
+
+
+def test_mirrored_pictures_in_another_order_are_not_taken_for_centres_of_boxes() -> None:
+    """Boxes read as centre and size meet well with two calibrations exchanged, better mirrored."""
+    _, how, why, _ = score(9301, 35)
+    assert how == "refused"
+    assert "left and right are exchanged" in why

@@ -459,11 +459,13 @@ def _candidates(
         found.sort(key=lambda one: -one.score)
         worst = min(found[0].evidence.of_cameras().values(), default=0.0)
         if worst < _WELL and each < NAME_PRIOR["name"]:
-            # a mirror and an exchange together: most cameras of a regular rig agree without both
+            # a mirror and an exchange together: most cameras of a regular rig agree without both,
+            # some with boxes that are read wrongly
             own, up = replace(found[0].reading, order=None), np.abs(found[0].scene.rise)
             mirrors = [
-                replace(own, flipped=not own.flipped),
-                replace(own, mirrored=not own.mirrored),
+                replace(own, layout=layout, **{part: not getattr(own, part)})
+                for layout in open_.layouts
+                for part in ("flipped", "mirrored")
             ]
             found += _reassigned(likelihood, mirrors, each, -RARE, (int(np.argmax(up)),))
             found.sort(key=lambda one: -one.score)
