@@ -450,6 +450,7 @@ def _candidates(
         if best is None or best.prior < 0.0 or best.evidence.share < _PLAINLY:
             found += _reassigned(likelihood, readings, each)
     found.sort(key=lambda one: -one.score)
+    leaders = found[:1]
     if open_.orders and found:
         starts = found[:1]
         if found[0].evidence.share < _EXPLAINED and len(cameras) < EVERY_ORDER:
@@ -457,6 +458,7 @@ def _candidates(
         for start in starts:
             found += _with_orders(likelihood, start, each)
         found.sort(key=lambda one: -one.score)
+        leaders = found[:1]
         worst = min(found[0].evidence.of_cameras().values(), default=0.0)
         if worst < _WELL and each < NAME_PRIOR["name"]:
             # a mirror and an exchange together: most cameras of a regular rig agree without both,
@@ -469,29 +471,32 @@ def _candidates(
             ]
             found += _reassigned(likelihood, mirrors, each, -RARE, (int(np.argmax(up)),))
             found.sort(key=lambda one: -one.score)
-    if again := _reread(likelihood, readings, found):
-        found = sorted((*found, *again), key=lambda one: -one.score)
-        if open_.orders and found[0] is again[0]:
-            found += _with_orders(likelihood, found[0], each)
-            found.sort(key=lambda one: -one.score)
+            leaders += found[:1]
+    for leader in leaders:
+        if again := _reread(likelihood, readings, found, leader):
+            found = sorted((*found, *again), key=lambda one: -one.score)
+            if open_.orders and found[0] is again[0]:
+                found += _with_orders(likelihood, found[0], each)
+                found.sort(key=lambda one: -one.score)
     return found
 
 
 def _reread(
-    likelihood: Likelihood, readings: Many[Reading], found: Many[Interpretation]
+    likelihood: Likelihood,
+    readings: Many[Reading],
+    found: Many[Interpretation],
+    leader: Interpretation,
 ) -> list[Interpretation]:
-    """Every reading with what the likeliest one alone was questioned in, the likeliest first.
+    """Every reading with what a leading one alone was questioned in, the likeliest first.
 
     An exchange and another size of the pictures let many boxes meet although they are read
     wrongly; it is not before these are right that the right reading of the boxes is the likeliest.
     """
-    if not found:
-        return []
-    best, known = found[0], {one.reading for one in found}
+    known = {one.reading for one in found}
     parts = ("order", "parts", "pixels", "mirrored", "flipped")
-    questioned = {part: getattr(best.reading, part) for part in parts}
+    questioned = {part: getattr(leader.reading, part) for part in parts}
     others = [replace(reading, **questioned) for reading in readings]
-    return _scored(likelihood, [one for one in others if one not in known], best.prior)
+    return _scored(likelihood, [one for one in others if one not in known], leader.prior)
 
 
 def _reassigned(
