@@ -465,9 +465,12 @@ def _candidates(
             # some with boxes that are read wrongly
             own, up = replace(found[0].reading, order=None), np.abs(found[0].scene.rise)
             mirrors = [
-                replace(own, layout=layout, **{part: not getattr(own, part)})
+                mirror
                 for layout in open_.layouts
-                for part in ("flipped", "mirrored")
+                for mirror in (
+                    replace(own, layout=layout, flipped=not own.flipped),
+                    replace(own, layout=layout, mirrored=not own.mirrored),
+                )
             ]
             found += _reassigned(likelihood, mirrors, each, -RARE, (int(np.argmax(up)),))
             found.sort(key=lambda one: -one.score)
