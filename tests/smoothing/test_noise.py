@@ -19,6 +19,7 @@ from tracker.kernels.smoothing.innovations import (
     DeviationMotion,
     Windows,
     log_likelihood,
+    normalised_innovations,
 )
 from tracker.runs.fitting import default_parameters
 from tracker.runs.pipeline import compute
@@ -142,7 +143,7 @@ def test_the_likelihood_is_that_of_all_boxes_together() -> None:
                 part = half[a] * half[b] * kept * np.diag(errors.persistent**2)
                 joint[3 * a : 3 * a + 3, 3 * b : 3 * b + 3] += part
     joint += block_diag(*(np.diag((h * errors.white) ** 2 + errors.pixels**2) for h in half))
-    assert_allclose(found, multivariate_normal(mean, joint).logpdf(residuals.ravel()))
+    assert_allclose(found.value, multivariate_normal(mean, joint).logpdf(residuals.ravel()))
     twice = windows._replace(
         starts=np.array([0, 3, 6]), drifts=np.tile(drifts, (2, 1)), noise_scales=np.tile(scales, 2),
         boxes=np.append(boxes, 5 + boxes[1:]), slots=np.tile(slots, 2),
@@ -150,7 +151,56 @@ def test_the_likelihood_is_that_of_all_boxes_together() -> None:
         half_heights=np.tile(half, 2),
     )  # fmt: skip
     deviation = DeviationMotion(motion.transition, motion.noise, prior)
-    assert_allclose(log_likelihood(twice, deviation, errors), 2.0 * found)
+    assert_allclose(log_likelihood(twice, deviation, errors).value, 2.0 * found.value)
+
+
+def random_windows(seed: int) -> tuple[Windows, DeviationMotion, BoxErrors]:
+    """Two windows of 4 and 3 rows, with boxes of up to three cameras, and some noise."""
+    rng = np.random.default_rng(seed)
+    motion = motion_of()
+    prior = np.diag(rng.uniform(0.2, 1.0, 6))
+    counts = np.array([2, 0, 3, 1, 3, 2, 1])
+    boxes = np.append(0, np.cumsum(counts))
+    slots = np.concatenate([np.sort(rng.permutation(3)[:count]) for count in counts])
+    total = int(counts.sum())
+    half = rng.uniform(20.0, 80.0, total)
+    windows = Windows(
+        np.array([0, 4, 7]), rng.normal(size=(7, 6)) * 0.1, rng.uniform(0.5, 2.0, 7), boxes,
+        slots, rng.normal(size=(total, NUMBERS)) * 10.0,
+        rng.normal(size=(total, NUMBERS, 3)) * 50.0, half,
+    )  # fmt: skip
+    errors = BoxErrors(np.array([0.02, 0.05, 0.03]), 1.5, np.array([0.06, 0.02, 0.04]), 0.8, 1.7)
+    return windows, DeviationMotion(motion.transition, motion.noise, prior), errors
+
+
+def test_the_gradient_of_the_likelihood_is_that_of_finite_differences() -> None:
+    windows, motion, errors = random_windows(8)
+    numbers = np.array(
+        [*errors.white, errors.pixels, *errors.persistent, errors.kept, errors.process]
+    )
+
+    def value(numbers: ndarray) -> float:
+        moved = BoxErrors(numbers[:3], numbers[3], numbers[4:7], numbers[7], numbers[8])
+        return float(log_likelihood(windows, motion, moved).value)
+
+    slopes = log_likelihood(windows, motion, errors).gradient
+    found = [*slopes.white, slopes.pixels, *slopes.persistent, slopes.kept, slopes.process]
+    steps = np.diag(1e-5 * numbers)
+    expected = [
+        (value(numbers + step) - value(numbers - step)) / (2.0 * step.sum()) for step in steps
+    ]
+    assert_allclose(found, expected, rtol=1e-5)
+
+
+def test_what_is_added_to_residuals_is_added_to_the_innovations() -> None:
+    windows, motion, errors = random_windows(9)
+    added = np.random.default_rng(10).normal(size=(*windows.residuals.shape, 2))
+    found = normalised_innovations(windows, motion, errors, added)
+    at = np.array([0.3, -2.0])
+    moved = windows._replace(residuals=windows.residuals + added @ at)
+    squares = np.square(found[:, 0]).sum() - np.square(found @ [1.0, *at]).sum()
+    before, after = (log_likelihood(each, motion, errors).value for each in (windows, moved))
+    assert_allclose(after - before, 0.5 * squares)
 
 
 def test_rows_are_windows_that_two_cameras_see() -> None:

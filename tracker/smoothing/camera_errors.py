@@ -17,7 +17,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from tracker.kernels.smoothing.innovations import log_likelihood
+from tracker.kernels.smoothing.innovations import normalised_innovations
 from tracker.smoothing.noise import NoiseModel, NoiseSample, SureBoxes, box_errors
 from tracker.smoothing.paths import Paths
 
@@ -210,9 +210,9 @@ def _delays(
     """Estimate by how much each camera is late, by the innovation likelihood.
 
     A camera that is late by o shows a person who moves with velocity v where the person was, and
-    its boxes have the residual −H v o. The log likelihood is quadratic in all o, so that a few
-    values give its maximum and its curvature. Of all clocks together nothing is known: their mean
-    is 0.
+    its boxes have the residual −H v o. The innovations are linear in all o, so that least squares
+    give the maximum of the likelihood and its curvature. Of all clocks together nothing is known:
+    their mean is 0.
     """
     unknown, seen, states = np.full(cameras, np.nan), sample.seen, sample.paths.states
     if states.shape[1] < 6 or np.bincount(seen.cameras, minlength=cameras).min() == 0:
@@ -221,22 +221,10 @@ def _delays(
     errors = box_errors(noise, step_time)
     behind = step_time * np.einsum("lpa,la->lp", seen.jacobians, states[seen.rows, 3:6])
     windows, order = sample.windows()
-    behind, camera = behind[order], seen.cameras[order]
-
-    def likelihood(late: ndarray) -> float:
-        moved = windows.residuals + late[camera, None] * behind
-        return float(log_likelihood(windows._replace(residuals=moved), deviation, errors))
-
-    units = np.eye(cameras)
-    middle = likelihood(np.zeros(cameras))
-    ahead = np.array([likelihood(unit) for unit in units])
-    back = np.array([likelihood(-unit) for unit in units])
-    slope = (ahead - back) / 2.0
-    curvature = np.diag(2.0 * middle - ahead - back)
-    for i in range(cameras):
-        for j in range(i):
-            both = likelihood(units[i] + units[j])
-            curvature[i, j] = curvature[j, i] = ahead[i] + ahead[j] - both - middle
+    added = np.zeros((*windows.residuals.shape, cameras))
+    added[np.arange(len(order)), :, seen.cameras[order]] = behind[order]
+    found = normalised_innovations(windows, deviation, errors, added)
+    slope, curvature = -found[:, 1:].T @ found[:, 0], found[:, 1:].T @ found[:, 1:]
     free = np.eye(cameras) - 1.0 / cameras
     inverse = np.linalg.pinv(free @ curvature @ free, rcond=1e-6, hermitian=True)
     variances = np.diagonal(inverse)

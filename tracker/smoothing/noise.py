@@ -214,9 +214,16 @@ def estimate_noise(sample: NoiseSample) -> NoiseModel:
             white, float(values[size]), persistent, float(values[-2]), float(values[-1])
         )
 
-    def cost(logarithms: ndarray) -> float:
-        errors = box_errors(model_of(logarithms), step_time)
-        return -float(log_likelihood(windows, deviation, errors))
+    def cost(logarithms: ndarray) -> tuple[float, ndarray]:
+        noise = model_of(logarithms)
+        errors = box_errors(noise, step_time)
+        found = log_likelihood(windows, deviation, errors)
+        slopes = found.gradient
+        # the derivative of exp(-Δt/τ) by log τ
+        of_time = slopes.kept * errors.kept * step_time / noise.time
+        by_value = np.array([*slopes.white, slopes.pixels, *slopes.persistent])
+        by_value *= np.array([*noise.white, noise.pixels, *noise.persistent])
+        return -found.value, -np.array([*by_value, of_time, slopes.process * noise.process])
 
     shares = np.square(windows.residuals / windows.half_heights[:, None]).mean(axis=0)
     each = np.clip(np.sqrt(shares / 2.0), 2.0 * SHARES[0], SHARES[1] / 2.0)
@@ -226,6 +233,7 @@ def estimate_noise(sample: NoiseSample) -> NoiseModel:
     found = minimize(
         cost,
         start,
+        jac=True,
         method="L-BFGS-B",
         bounds=bounds,
         options={"maxiter": _ITERATIONS, "ftol": _TOLERANCE},
