@@ -62,6 +62,16 @@ def test_a_picture_turned_by_a_quarter_turns_the_box() -> None:
     assert_allclose(around.boxes[0], (middle - straight[[2, 3, 0, 1]]), atol=1e-6)
 
 
+@pytest.mark.parametrize("degrees", [50.0, -50.0, 130.0])
+def test_in_a_picture_turned_by_less_the_box_spans_the_axis_from_top_to_bottom(
+    degrees: float,
+) -> None:
+    camera, place = rolled(ring(1)[0], degrees), np.array([0.2, -0.1, 0.85])
+    ends, _ = camera.project(place + np.outer([-1.0, 1.0], [0.0, 0.0, HALF_HEIGHT]))
+    _, top, _, bottom = seen(camera, place[None], 4).boxes[0]
+    assert_allclose([top, bottom], np.sort(ends[:, 1]), atol=1e-6)
+
+
 @pytest.mark.parametrize("degrees", [0.0, 30.0, 89.0, -91.0, 180.0])
 @pytest.mark.parametrize("size", [2, 3, 4])
 def test_the_derivative_is_that_of_the_values(degrees: float, size: int) -> None:

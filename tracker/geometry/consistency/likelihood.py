@@ -172,11 +172,11 @@ def evidence(
         scene: How people stand.
         among: Which pairs (a, b) are compared; all where it is not given.
     """
-    there = [camera for camera, own in enumerate(boxes) if own is not None and len(own.heads)]
+    seen = {camera: own for camera, own in enumerate(boxes) if own is not None and len(own.heads)}
     moments = max((len(own.starts) - 1 for own in boxes if own is not None), default=0)
-    if not there:
+    if not seen:
         return Evidence({}, {}, 0, moments)
-    own = [box for box in boxes if box is not None and len(box.heads)]
+    there, own = list(seen), list(seen.values())
     firsts = np.cumsum([0, *(len(box.heads) for box in own[:-1])])
     compared = ~np.eye(len(there), dtype=bool)
     if among is not None:
