@@ -31,6 +31,7 @@ from app.models.requests import (
     TrailChanges,
     ViewChange,
 )
+from app.models.runs import ChangedValue, Changes, CurveInfo, PastRunInfo, PastRuns
 from app.models.state import (
     CameraInfo,
     EditsInfo,
@@ -89,10 +90,13 @@ __all__ = [
     "CameraTrack",
     "CameraTruth",
     "Candidate",
+    "ChangedValue",
+    "Changes",
     "Counts",
     "CourseKind",
     "CourseKinds",
     "Courses",
+    "CurveInfo",
     "CurveRequest",
     "Decided",
     "EditsInfo",
@@ -112,6 +116,8 @@ __all__ = [
     "OpeningInfo",
     "ParameterChanges",
     "ParameterInfo",
+    "PastRunInfo",
+    "PastRuns",
     "PinnedInfo",
     "PinnedLife",
     "PinnedTimeline",

@@ -1,10 +1,11 @@
-"""What a page asks for when it teaches a sequence; texts of fields are taken as numbers."""
+"""Teaching a sequence: what a page asks for, where texts of fields are taken as numbers, and what
+the sequence was taught."""
 
 from __future__ import annotations
 
 from pydantic import Field
 
-from app.models.base import GivenPath, Model, Vector
+from app.models.base import Box, GivenPath, Model, Vector
 
 
 class NewTemplate(Model):
@@ -66,3 +67,56 @@ class CopyRequest(Model):
 
     folder: GivenPath
     """A path, or a name beside the offered one; new or empty."""
+
+
+class TemplateInfo(Model):
+    """A box whose colours model a person."""
+
+    name: str
+    camera: str
+    """Its name."""
+    step: int
+    box: Box
+
+
+class OfferInfo(Model):
+    """A template that the tracks offer."""
+
+    template: TemplateInfo
+    track: int
+    reason: str
+    """What speaks for it."""
+
+
+class DetectorInfo(Model):
+    """A detection network that is at hand."""
+
+    name: str
+    path: str | None
+    """That somebody named for this recording; null for a fetched one, which serves all."""
+
+
+class Taught(Model):
+    """What the open sequence was taught; room, entrances and target are in its state."""
+
+    templates: list[TemplateInfo]
+    offers: list[OfferInfo] | None
+    """Null before they are asked for."""
+    method: str
+    """The single-view method in use."""
+    looking: str | None
+    """A method that looks at templates, where that in use does not."""
+    detector: DetectorInfo | None
+    fetching: int | None
+    """Percentage of a network that is being fetched."""
+    sizes: dict[str, Vector]
+    """Half width, depth and height of common targets in metres, by their words."""
+    unsaved: list[str]
+    """What the sequence's file does not have, in words."""
+    file: str
+    """The sequence's file, with its folder."""
+    read_only: str | None
+    """Why it can only be saved as a copy; null where it can be saved."""
+    built_in: bool
+    copy_to: str
+    """A folder that is not there yet, to be offered for a copy."""

@@ -34,6 +34,7 @@ from app.web.pictures.jpegs import Pictures
 from app.web.views import results, steps
 from app.web.views.timeline import Timelines
 from tracker.export import tracks_csv
+from tracker.parameters.values import changed_values, value_of
 from tracker.runs import gaps
 from tracker.runs.run import given_names, row_corrections
 from tracker.sequences import library
@@ -168,6 +169,33 @@ async def run_again(bench: Bench, jobs: Work) -> models.State:
     return results.state_of(bench.snapshot())
 
 
+@router.get("/runs")
+def past_runs(request: Request, bench: Bench) -> models.PastRuns:
+    """The current run and those before it since the server was started."""
+    history: History = request.app.state.history
+    now = bench.snapshot()
+    name = now.sequence.name if now.sequence is not None else ""
+    return models.PastRuns(
+        runs=[
+            models.PastRunInfo(
+                number=run.number,
+                key=run.state.key,
+                at=run.at,
+                sequence=run.sequence,
+                same_recording=run.sequence == name or run.recording == now.sequence_key,
+                single_view=run.parameters.single_view,
+                fusion_method=run.parameters.fusion_method,
+                state=run.state.state,
+                done=run.state.done,
+                total=run.state.total,
+                steps_per_second=run.state.steps_per_second,
+                changes=run.changes,
+            )
+            for run in history.runs
+        ]
+    )
+
+
 @router.post("/run/again/{number}")
 async def use_again(request: Request, number: int, bench: Bench) -> models.State:
     """Set all values, and what was taught, to those of a run before, by its number in the table."""
@@ -177,11 +205,33 @@ async def use_again(request: Request, number: int, bench: Bench) -> models.State
     return results.state_of(bench.snapshot())
 
 
+@router.get("/changes")
+def changes(request: Request, bench: Bench) -> models.Changes:
+    """What differs from the defaults, and what parameters would change."""
+    snapshot = bench.snapshot()
+    sensitivity: Sensitivity = request.app.state.sensitivity
+    return models.Changes(
+        changed=[
+            models.ChangedValue(key=key, default=value_of(snapshot.defaults, key), now=value)
+            for key, value in changed_values(snapshot.parameters, snapshot.defaults).items()
+        ],
+        curves=[
+            models.CurveInfo(
+                key=key,
+                measure=curve.measure,
+                values=list(curve.values),
+                scores=list(curve.scores),
+            )
+            for key, curve in sensitivity.curves().items()
+        ],
+    )
+
+
 @router.post("/sensitivity")
 async def compute_curves(request: Request, wish: models.CurveRequest, bench: Bench) -> models.State:
     """Compute in the background what some parameters would change, until somebody works.
 
-    ``GET /api/tables/changes`` and the 3D view's panel show it.
+    ``GET /api/changes`` and the 3D view's panel show it.
     """
     sensitivity: Sensitivity = request.app.state.sensitivity
     sensitivity.ask(wish.keys)

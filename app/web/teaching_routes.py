@@ -14,11 +14,15 @@ from app import models
 from app.errors import ApiError, sentence
 from app.models.teaching import (
     CopyRequest,
+    DetectorInfo,
     DetectorRequest,
     EditingChange,
     NewEntrance,
     NewTemplate,
+    OfferInfo,
     TargetChange,
+    Taught,
+    TemplateInfo,
     TextChange,
     ValueChange,
 )
@@ -28,6 +32,10 @@ from app.web.dependencies import ERRORS, FOR_EVER, Bench, Work, nothing_open
 from app.web.opening import begun, told_in_the_answer
 from app.web.pictures.swatches import Swatches
 from app.web.views import results
+from tracker.parameters.catalogue import METHODS, method_of
+from tracker.sequences.built_in import opens_by_name
+from tracker.sequences.sequence import PRESETS, Template
+from tracker.sequences.writing.teaching import changes, taught_values
 
 NOTHING_LOST = "Nothing was changed, and nothing is lost."
 
@@ -52,6 +60,55 @@ def _complaining(code: str = "cannot_teach") -> Iterator[None]:
         words = sentence(error)
         words = words[:1].upper() + words[1:] + "."
         raise ApiError(422, code, words, hint=NOTHING_LOST) from None
+
+
+@router.get("")
+def taught(bench: Bench, teach: Teach) -> Taught:
+    """What the open sequence was taught, what its tracks offer, and how it can be saved."""
+    snapshot = bench.snapshot()
+    sequence, saved, parameters = snapshot.sequence, snapshot.saved, snapshot.parameters
+    if sequence is None or saved is None:
+        raise nothing_open()
+
+    def looks(method: str) -> bool:
+        return method_of("single_view", method).used(parameters).templates != "no"
+
+    method = parameters.single_view
+    offered = None
+    if snapshot.offers is not None:
+        offered = [
+            OfferInfo(template=_template(one.template), track=one.track, reason=one.reason)
+            for one in teach.offered()
+        ]
+    network = sequence.detector
+    detector = None
+    if network is not None:
+        path = str(network.path) if network.named else None
+        detector = DetectorInfo(name=network.name, path=path)
+    return Taught(
+        templates=[_template(template) for template in sequence.templates],
+        offers=offered,
+        method=method,
+        looking=None if looks(method) else next(filter(looks, METHODS["single_view"])),
+        detector=detector,
+        fetching=snapshot.fetching,
+        sizes=dict(PRESETS),
+        unsaved=changes(taught_values(saved), taught_values(sequence)),
+        file=f"{sequence.folder.name}/sequence.toml",
+        read_only=teach.why_not_in_place(),
+        built_in=bool(opens_by_name(sequence.folder)),
+        copy_to=str(teach.copy_folder()),
+    )
+
+
+def _template(template: Template) -> TemplateInfo:
+    left, top, width, height = template.box.tolist()
+    return TemplateInfo(
+        name=template.name,
+        camera=template.camera,
+        step=template.frame,
+        box=(left, top, width, height),
+    )
 
 
 @router.post("/templates")

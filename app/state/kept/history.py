@@ -78,7 +78,7 @@ class History:
             raise ParameterError(
                 "number",
                 f"expected the number of a listed run, got {number}",
-                "GET /api/tables/runs lists them.",
+                "GET /api/runs lists them.",
             )
         keys = (*METHODS, *PARAMETERS)
         values = {key: value_of(run.parameters, key) for key in keys}

@@ -65,6 +65,7 @@ def evaluation_of(scored: Scored, evaluation: Evaluation) -> models.EvaluationIn
             for row in evaluation.cameras
         ],
         notes=list(evaluation.notes),
+        changes=len(changed(scored)),
     )
 
 
@@ -187,13 +188,6 @@ def switches_of(evaluation: Evaluation) -> list[models.Switch]:
             )
         )
     return switches
-
-
-def stated_of(evaluation: Evaluation) -> str:
-    """The settings behind the figures, in words."""
-    settings = evaluation.settings
-    gate, cost = settings.in_words(("distance", "gate")), settings.in_words(("cutoff", "order"))
-    return f"{gate} · {cost}"
 
 
 def comparison_of(

@@ -105,6 +105,8 @@ class EvaluationInfo(Model):
     cameras: list[CameraScoreInfo]
     notes: list[str]
     """What a reader of the figures must know."""
+    changes: int
+    """How many parameters are not at the defaults of the recording."""
 
 
 class PersonError(Model):

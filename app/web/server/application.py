@@ -29,7 +29,6 @@ from app.web.server.running import lifespan
 from app.web.server.settings import Settings
 from app.web.studies import result_routes as study_results
 from app.web.studies import routes as studies
-from app.web.tables import event_tables, tables, teaching_tables
 from tracker import __version__
 from tracker.library.records import Result
 
@@ -39,10 +38,7 @@ ROUTERS = (
     likelihood_routes.router,
     floor_routes.router,
     view_routes.router,
-    tables.router,
-    event_tables.router,
     teaching_routes.router,
-    teaching_tables.router,
     corrections.router,
     evaluation.router,
     identity_routes.router,

@@ -1,11 +1,20 @@
 /**
- * The panels whose tables the server writes: they are fetched while they are looked at, when
- * something that they tell of is new. Their buttons name an action and its value. Beside them what two
- * panels have of their own: the check of identities, and the steps that somebody marked.
+ * The panels are drawn while they are looked at, when something that they tell of is new. Beside
+ * them what two panels have of their own: the check of identities, and the steps that somebody
+ * marked.
  */
-import { all, allow, choices, one, parts, write, fill, h, icon } from "../elements/dom.js";
-import { fetcher, request, getJson } from "../state/api.js";
+import { all, allow, choices, one, parts, write, fill, h, icon, redraw } from "../elements/dom.js";
+import { fetcher, getJson } from "../state/api.js";
 import { eventsNow, scoresOf } from "../state/events.js";
+import {
+	changeTables,
+	compareTables,
+	eventTable,
+	runTable,
+	seriesOf,
+	stepTables,
+} from "./panels.js";
+import { teachPanel } from "./taught.js";
 
 /* ---------- The check of identities without truth: begun and stopped. ---------- */
 
@@ -126,27 +135,32 @@ export function mountBookmarks(root, { store, actions, playback }) {
 }
 
 /**
- * What a panel tells of, and where it comes from.
- * @type {Record<string, {keys: (keyof PageState)[], path: (state: Readonly<PageState>) => string}>}
+ * What a panel tells of, what it asks the server for, and how it is drawn; null: not yet.
+ * @type {Record<string, {
+ *   keys: (keyof PageState)[],
+ *   read?: (state: Readonly<PageState>) => Promise<any>,
+ *   draw: (state: Readonly<PageState>, told: any, actions: Actions) => Child | Child[],
+ * }>}
  */
 const TABLES = {
-	step: { keys: ["result", "scores"], path: ({ shown }) => `step/${Math.max(0, shown)}` },
+	step: { keys: ["result", "scores", "basis", "names"], read: seriesOf, draw: stepTables },
 	events: {
-		keys: ["timeline", "scores", "eventKind", "identity"],
-		path: ({ eventKind }) => `events${eventKind && `?kind=${eventKind}`}`,
+		keys: ["timeline", "scores", "basis", "eventKind", "identity"],
+		draw: eventTable,
 	},
-	teach: { keys: ["server"], path: () => "teach" },
-	changes: { keys: ["server"], path: () => "changes" },
+	teach: { keys: ["server"], read: () => getJson("/api/teach"), draw: teachPanel },
+	changes: {
+		keys: ["server", "schema"],
+		read: () => getJson("/api/changes"),
+		draw: changeTables,
+	},
 	compare: {
-		keys: ["scores", "basis", "every", "identity"],
-		path: ({ every }) => `compare?every=${every}`,
+		keys: ["scores", "basis", "every", "identity", "schema"],
+		read: async ({ scores }) => (scores?.reference ? getJson("/api/evaluation/comparison") : null),
+		draw: compareTables,
 	},
-	runs: { keys: ["server", "run"], path: () => "runs" },
+	runs: { keys: ["server", "run"], read: () => getJson("/api/runs"), draw: runTable },
 };
-
-/** By what a button or a field is found again in a table that is written anew. @param {Part} control */
-const called = ({ id, ariaLabel, form, textContent }) =>
-	id || ariaLabel || `${form?.ariaLabel ?? ""} ${textContent}`;
 
 /** @type {Pane} */
 export function mountTables(root, { store, actions }) {
@@ -169,36 +183,20 @@ export function mountTables(root, { store, actions }) {
 		stopLeaving,
 		leave,
 	} = parts(root);
-	for (const [name, { keys, path }] of Object.entries(TABLES)) {
+	for (const [name, { keys, read, draw }] of Object.entries(TABLES)) {
 		const body = one(`#panel-${name} [data-fill]`, root);
-		let told = "";
 		const refresh = fetcher(async () => {
-			const { tab, sequence } = store.get();
-			if (tab !== name || !sequence) return;
-			const text = await (await request(`/api/tables/${path(store.get())}`)).text();
-			if (text === told) return;
-			told = text;
-			// Where the focus was, it is again, on the one in its place; what is being typed stays, but
-			// for what the server has taken.
-			const held = all(":focus", body)[0];
-			const at = all("button, input", body).findIndex((control) => control === held);
-			const typed = all("input", body).filter(({ value, defaultValue }) => value !== defaultValue);
-			body.innerHTML = text;
-			for (const { id, value, defaultValue } of typed)
-				for (const field of all(`#${id}`, body))
-					if (field.defaultValue === defaultValue) field.value = value;
-			const there = all("button, input", body);
-			if (at >= 0)
-				(there.find((control) => called(control) === called(held)) || there[at] || body).focus();
+			const wanted = () => store.get().tab === name && store.get().sequence;
+			if (!wanted()) return;
+			const told = await read?.(store.get());
+			// What is wrong with a drawing is not taken for a lost server.
+			queueMicrotask(() => {
+				const drawn = wanted() ? draw(store.get(), told, actions) : null;
+				if (drawn) redraw(body, drawn);
+			});
 		});
 		store.watch([...keys, "tab", "sequence"], refresh);
 	}
-	root.addEventListener("click", ({ target }) => {
-		const { do: act, value = "" } = /** @type {Part} */ (
-			/** @type {Part} */ (target).closest("[data-do]") ?? root
-		).dataset;
-		if (act) /** @type {any} */ (actions)[act](value);
-	});
 
 	kind.addEventListener("change", () =>
 		store.set({ eventKind: /** @type {LaneEvent["kind"]} */ (kind.value) }),

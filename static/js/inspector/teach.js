@@ -1,10 +1,11 @@
 /**
- * Teaching: boxes dragged on a picture, and the fields of a panel that the server writes; each says
- * where it is sent.
+ * Teaching: boxes dragged on a picture, and the fields of its panel, each of which says where
+ * it is sent.
  */
 import { lensOf } from "../draw/overlay.js";
 import { all, h, one } from "../elements/dom.js";
 import { resultOf } from "../state/events.js";
+import { NUMBERS } from "./taught.js";
 
 /* ---------- A box over a picture without a pointer: arrows move it, with Ctrl they size it,
    with Shift they go further; Enter keeps it. */
@@ -115,9 +116,6 @@ function mountFrame(mosaic, store, { keep, tell }) {
 const DRAW = "Drag a box around a person, or Enter for one that arrows move. Esc leaves.";
 const FRAME = "Arrows move the box, with Ctrl they size it, with Shift further; Enter keeps it.";
 const NAME = "Whose colours are these? Type a name: Enter keeps it, Esc leaves it as it is.";
-
-/** What the form of a template without a mouse is called. */
-const NUMBERS = "Template by numbers";
 
 /** @param {HTMLElement} mosaic  the pictures @param {Context} context */
 export function mountTeach(mosaic, { store, actions }) {

@@ -138,6 +138,20 @@ declare namespace Server {
 		last: number;
 	}
 
+	/** A parameter or method that is not at its default. */
+	interface ChangedValue {
+		key: string;
+		default: any;
+		now: any;
+	}
+
+	/** What differs from the defaults, and what parameters would change. */
+	interface Changes {
+		changed: ChangedValue[];
+		/** Of the parameters that somebody asked for. */
+		curves: CurveInfo[];
+	}
+
 	/** One side of a comparison. */
 	interface ComparedRun {
 		run: string;
@@ -240,6 +254,17 @@ declare namespace Server {
 		courses: TrackCourse[];
 	}
 
+	/** What a parameter would change, as far as it is computed. */
+	interface CurveInfo {
+		key: string;
+		/** MOTA; where there is no truth the number of tracks. */
+		measure: string;
+		/** Ascending, or the choices. */
+		values: any[];
+		/** One a value; null where the run failed. */
+		scores: (number | null)[];
+	}
+
 	/** What smoothing made otherwise than the filter, and why. */
 	interface Decided {
 		step: number;
@@ -252,6 +277,13 @@ declare namespace Server {
 	interface Deleted {
 		runs: number[];
 		bytes: number;
+	}
+
+	/** A detection network that is at hand. */
+	interface DetectorInfo {
+		name: string;
+		/** That somebody named for this recording; null for a fetched one, which serves all. */
+		path: string | null;
 	}
 
 	/** One figure of two runs: A the reference, B the shown run. */
@@ -319,6 +351,8 @@ declare namespace Server {
 		cameras: CameraScoreInfo[];
 		/** What a reader of the figures must know. */
 		notes: string[];
+		/** How many parameters are not at the defaults of the recording. */
+		changes: number;
 	}
 
 	/**
@@ -776,6 +810,14 @@ declare namespace Server {
 		of: "truth" | "run" | "agreement";
 	}
 
+	/** A template that the tracks offer. */
+	interface OfferInfo {
+		template: TemplateInfo;
+		track: number;
+		/** What speaks for it. */
+		reason: string;
+	}
+
 	/** A sequence on its way. */
 	interface OpeningInfo {
 		name: string;
@@ -809,6 +851,32 @@ declare namespace Server {
 		advanced: boolean;
 		/** Among the few that are shown first. */
 		essential: boolean;
+	}
+
+	/** One run, finished or not. */
+	interface PastRunInfo {
+		/** From 1 on. */
+		number: number;
+		key: string;
+		/** Time of day at which it began, as text. */
+		at: string;
+		/** Its name then. */
+		sequence: string;
+		/** Whether it is of the recording that is open, so that its parameters can be used again. */
+		same_recording: boolean;
+		single_view: string;
+		fusion_method: string;
+		state: "idle" | "computing" | "done" | "failed" | "cancelled";
+		done: number;
+		total: number;
+		steps_per_second: number;
+		/** How many parameters were not at their defaults. */
+		changes: number;
+	}
+
+	/** The runs since the server was started, newest first. */
+	interface PastRuns {
+		runs: PastRunInfo[];
 	}
 
 	/** A person's position error over time. */
@@ -1274,6 +1342,31 @@ declare namespace Server {
 		error: string | null;
 	}
 
+	/** What the open sequence was taught; room, entrances and target are in its state. */
+	interface Taught {
+		templates: TemplateInfo[];
+		/** Null before they are asked for. */
+		offers: OfferInfo[] | null;
+		/** The single-view method in use. */
+		method: string;
+		/** A method that looks at templates, where that in use does not. */
+		looking: string | null;
+		detector: DetectorInfo | null;
+		/** Percentage of a network that is being fetched. */
+		fetching: number | null;
+		/** Half width, depth and height of common targets in metres, by their words. */
+		sizes: Record<string, [number, number, number]>;
+		/** What the sequence's file does not have, in words. */
+		unsaved: string[];
+		/** The sequence's file, with its folder. */
+		file: string;
+		/** Why it can only be saved as a copy; null where it can be saved. */
+		read_only: string | null;
+		built_in: boolean;
+		/** A folder that is not there yet, to be offered for a copy. */
+		copy_to: string;
+	}
+
 	/** What the sequence was taught since its file was read. */
 	interface TeachingInfo {
 		/** Names room and templates as they are. */
@@ -1282,6 +1375,15 @@ declare namespace Server {
 		unsaved: number;
 		/** Whether the 3D view has handles on the room. */
 		editing_room: boolean;
+	}
+
+	/** A box whose colours model a person. */
+	interface TemplateInfo {
+		name: string;
+		/** Its name. */
+		camera: string;
+		step: number;
+		box: [number, number, number, number];
 	}
 
 	/** The shown run over time, as far as it is computed, summed up in buckets of steps. */

@@ -7,11 +7,39 @@ stands for the control's value and ``"#"`` for its number times ``data-scale``. 
 
 from __future__ import annotations
 
+import html
 import json
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
-from app.web.tables.markup import Cell, Markup, escaped, written
+
+@dataclass(frozen=True, slots=True)
+class Markup:
+    """Text that is HTML already."""
+
+    html: str
+
+
+Cell = Markup | str | int | float | None
+
+
+def escaped(value: object) -> str:
+    """Anything as text of a page."""
+    return html.escape(str(value))
+
+
+def written(cell: Cell) -> str:
+    """A cell's content as HTML; a dash where there is nothing."""
+    if isinstance(cell, Markup):
+        return cell.html
+    return "–" if cell is None else escaped(cell)
+
+
+def joined(*cells: Cell) -> Markup:
+    """Several things in one cell."""
+    return Markup("".join(written(cell) for cell in cells))
+
 
 Child = Cell | bool | Iterable[Markup]
 

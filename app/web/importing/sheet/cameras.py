@@ -6,16 +6,18 @@ from urllib.parse import quote
 
 from app.web.importing.models import ImportedCamera, ImportInfo
 from app.web.importing.sheet.building import (
+    Cell,
+    Markup,
     element,
     field,
     icon,
+    joined,
     number_field,
     select,
     small,
     wishing,
 )
 from app.web.importing.sheet.drawing import curve_picture
-from app.web.tables.markup import Cell, Markup, joined
 
 HEADS = ("Camera", "Video", "Calibration", "Starts late by, frames", "Detections", "Ready")
 

@@ -6,16 +6,17 @@ from app.web.importing.models import ImportInfo
 from app.web.importing.sheet.building import (
     CLOSE,
     GROW,
+    Markup,
     button,
     element,
     field,
     icon,
+    joined,
     size_text,
 )
 from app.web.importing.sheet.cameras import cameras_table, ready
 from app.web.importing.sheet.settings import angles_choice, checks_part, room_part, target_part
 from app.web.importing.sheet.start import CALIBRATIONS
-from app.web.tables.markup import Markup, joined
 
 
 def can_be_written(info: ImportInfo) -> bool:

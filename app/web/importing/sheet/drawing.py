@@ -6,8 +6,7 @@ import math
 from itertools import groupby
 
 from app.web.importing.models import ImportedOffset, ImportedPlan, ImportInfo
-from app.web.importing.sheet.building import element
-from app.web.tables.markup import Markup
+from app.web.importing.sheet.building import Markup, element
 
 PLAN_SIZE = (330.0, 360.0)
 """About how many pixels the plan has; lengths of its signs are by these."""

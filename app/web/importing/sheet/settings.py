@@ -8,9 +8,12 @@ from typing import get_args
 from app.web.importing.models import ImportedCheck, ImportedPair, ImportInfo
 from app.web.importing.sheet.building import (
     GROW,
+    Cell,
+    Markup,
     element,
     heading,
     icon,
+    joined,
     number_field,
     segment,
     select,
@@ -19,7 +22,6 @@ from app.web.importing.sheet.building import (
     wishing,
 )
 from app.web.importing.sheet.drawing import plan_picture
-from app.web.tables.markup import Cell, Markup, joined
 from tracker.io.read.pieces import Layout
 from tracker.parameters import MethodKey
 from tracker.parameters.catalogue import METHODS

@@ -12,14 +12,15 @@ from app.web.importing.models import RecordingCard, Recordings
 from app.web.importing.sheet.building import (
     CLOSE,
     GROW,
+    Markup,
     button,
     element,
     heading,
     icon,
+    joined,
     size_text,
     small,
 )
-from app.web.tables.markup import Markup, joined
 
 CALIBRATIONS = (
     "OpenCV, Pose2Sim, Caliscope, Anipose, Qualisys, COLMAP, Metashape, Kalibr, ROS, projections"

@@ -1,1 +1,0 @@
-"""Tables as the page shows them, in HTML and for other programs."""
