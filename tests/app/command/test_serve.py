@@ -243,7 +243,7 @@ def test_no_route_is_built_while_other_threads_may_warn(monkeypatch: pytest.Monk
 
     with TestClient(app, base_url="http://127.0.0.1:8000") as client:
         monkeypatch.setattr("warnings.catch_warnings", silenced)
-        for path in ("/api/state", "/api/tables/runs"):
+        for path in ("/api/state", "/api/runs"):
             assert client.get(path).status_code == 200
         monkeypatch.undo()
         assert app.openapi_schema is None  # a start does not wait for it

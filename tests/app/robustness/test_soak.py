@@ -81,7 +81,7 @@ def use(running: Server, pages: list[Page], chance: random.Random, seconds: floa
             case 2:
                 ask(running, "POST", "select", {"id": chance.choice([None, 1, 2])})
             case 3:
-                for path in ("timeline", "evaluation", "tables/runs", "recordings"):
+                for path in ("timeline", "evaluation", "runs", "recordings"):
                     running.get(f"/api/{path}")
             case 4:
                 page.keyboard.press(chance.choice(["Space", "PageDown", "End", "Home"]))

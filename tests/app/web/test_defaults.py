@@ -9,7 +9,6 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
-from app.web.tables import teaching_tables
 from tests.app.conftest import Runs
 from tests.app.web.test_api import assert_error
 from tracker.evaluation import evaluate_sequence
@@ -84,9 +83,8 @@ def test_teach_says_where_a_method_looks_at_no_templates(
     client: TestClient, changes: dict[str, Any], asks: bool
 ) -> None:
     client.patch("/api/parameters", json={"changes": changes})
-    words = teaching_tables._method(client.app.state.workbench.snapshot())  # type: ignore[attr-defined]
-    assert ("looks at no templates" in str(words)) == asks
-    assert ("Use colour_phd" in str(words)) == asks
+    looking = client.get("/api/teach").json()["looking"]
+    assert looking == ("colour_phd" if asks else None)
 
 
 def test_what_was_asked_for_wrongly_is_told_where_to_find_what_there_is(
@@ -101,7 +99,7 @@ def test_what_was_asked_for_wrongly_is_told_where_to_find_what_there_is(
     assert hint(wrong) == "GET /api/schema lists every parameter with its range."
     preset = client.post("/api/parameters/preset", json={"name": "nobody's"})
     assert hint(preset).startswith("GET /api/schema has the built-in presets, ")
-    assert hint(client.post("/api/run/again/999")) == "GET /api/tables/runs lists them."
+    assert hint(client.post("/api/run/again/999")) == "GET /api/runs lists them."
     assert "the cameras" in hint(client.post("/api/view", json={"camera": 9}))
     assert "the layers" in hint(client.patch("/api/layers", json={"changes": {"walls": True}}))
     assert "your presets" in hint(client.delete("/api/presets/none-such"))

@@ -174,7 +174,7 @@ def test_of_a_kept_run_nothing_is_made_up_of_what_was_not_stored(kept: TestClien
     assert timeline["count"] == before["count"]
     assert timeline["cardinality"]["mean"] == timeline["deviation"]["mean"] == []
     assert kept.get(f"/api/courses/{track}?kind=detection").json() == detected
-    for page in ("tables/step/60", "tables/events", "tables/compare", "corrections/queue"):
+    for page in ("step/60", "changes", "runs", "corrections/queue"):
         assert kept.get(f"/api/{page}").status_code == 200, page
     refused = kept.post("/api/identity")
     assert refused.status_code == 409

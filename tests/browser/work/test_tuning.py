@@ -6,9 +6,9 @@ from urllib.parse import urlsplit
 
 from playwright.sync_api import Page, expect
 
-from app.web.tables.markup import number
 from tests.browser.looking import as_at_first, ask, until
 from tests.browser.serving import Server
+from tests.browser.work.test_panels import number
 from tracker.evaluation import compare, evaluate_sequence
 from tracker.parameters.catalogue import PARAMETERS
 from tracker.parameters.values import with_values
