@@ -1,13 +1,11 @@
 /** The panel of teaching: templates with their colours, the room, entrances, and saving. */
 import { h, idTag, line, quiet } from "../elements/dom.js";
 import { table } from "../elements/grid.js";
+import { NUMBERS } from "./teach.js";
 
 /** @typedef {NonNullable<PageState["sequence"]>} Sequence */
 
 const AXES = ["x", "y", "z"];
-
-/** What the form of a template without a mouse is called. */
-export const NUMBERS = "Template by numbers";
 
 /** A length as it is typed, metres. @param {number} value */
 const typed = (value) => String(Number(value.toPrecision(6)));

@@ -5,7 +5,6 @@
 import { lensOf } from "../draw/overlay.js";
 import { all, h, one } from "../elements/dom.js";
 import { resultOf } from "../state/events.js";
-import { NUMBERS } from "./taught.js";
 
 /* ---------- A box over a picture without a pointer: arrows move it, with Ctrl they size it,
    with Shift they go further; Enter keeps it. */
@@ -116,6 +115,9 @@ function mountFrame(mosaic, store, { keep, tell }) {
 const DRAW = "Drag a box around a person, or Enter for one that arrows move. Esc leaves.";
 const FRAME = "Arrows move the box, with Ctrl they size it, with Shift further; Enter keeps it.";
 const NAME = "Whose colours are these? Type a name: Enter keeps it, Esc leaves it as it is.";
+
+/** What the form of a template without a mouse is called. */
+export const NUMBERS = "Template by numbers";
 
 /** @param {HTMLElement} mosaic  the pictures @param {Context} context */
 export function mountTeach(mosaic, { store, actions }) {
