@@ -2,51 +2,6 @@
 import { fill, h, write } from "./dom.js";
 
 /**
- * The head of a column.
- * @param {string} word  empty over buttons @param {Attributes} attributes @param {(() => void)} [sort]
- */
-const headOf = (word, attributes, sort) =>
-	h(
-		"th",
-		{ scope: "col", ...attributes },
-		sort ? h("button", { onclick: sort }, word) : word || h("span", { class: "vh" }, "Actions"),
-	);
-
-/**
- * A table that is made once: one of several below each other.
- * @param {string} label
- * @param {string[]} words  of the columns; a `#` in front means numbers, at the right
- * @param {(Child | Child[])[][]} rows  a cell a column; a dash stands for null
- */
-export function table(label, words, rows) {
-	const kinds = words.map((word) => ({ class: word.startsWith("#") ? "num" : "" }));
-	return h(
-		"table",
-		{ "aria-label": label },
-		h(
-			"thead",
-			{},
-			h(
-				"tr",
-				{},
-				words.map((word, k) => headOf(word.replace("#", ""), kinds[k])),
-			),
-		),
-		h(
-			"tbody",
-			{},
-			rows.map((row) =>
-				h(
-					"tr",
-					{},
-					row.map((cell, k) => h("td", kinds[k], .../** @type {Child[]} */ ([cell ?? "–"].flat()))),
-				),
-			),
-		),
-	);
-}
-
-/**
  * @template R
  * @param {string} label
  * @param {Column<R>[]} columns
@@ -70,7 +25,13 @@ export function grid(
 	/** @type {Map<string | number, {row: R, element: HTMLTableRowElement}>} */
 	const kept = new Map();
 	const heads = columns.map(({ word, kind = "", help, by: value }) =>
-		headOf(word, { class: kind, title: help }, value && (() => sort(word))),
+		h(
+			"th",
+			{ scope: "col", class: kind, title: help },
+			value
+				? h("button", { onclick: () => sort(word) }, word)
+				: word || h("span", { class: "vh" }, "Actions"),
+		),
 	);
 	const body = h("tbody");
 

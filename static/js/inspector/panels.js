@@ -1,6 +1,6 @@
 /** What the panels beside the pictures tell: the shown step, events, changes, figures and runs. */
-import { fixed, h, idTag, line, nothing, parameterName, quiet, show } from "../elements/dom.js";
-import { table } from "../elements/grid.js";
+import { h, idTag, show } from "../elements/dom.js";
+import { fixed, line, nothing, parameterName, quiet, table } from "../elements/drawn.js";
 import { getJson } from "../state/api.js";
 import { eventsNow, resultOf, scoresOf, trueCount } from "../state/events.js";
 

@@ -3,7 +3,8 @@
  * them what two panels have of their own: the check of identities, and the steps that somebody
  * marked.
  */
-import { all, allow, choices, one, parts, write, fill, h, icon, redraw } from "../elements/dom.js";
+import { all, allow, choices, one, parts, write, fill, h, icon } from "../elements/dom.js";
+import { redraw } from "../elements/drawn.js";
 import { fetcher, getJson } from "../state/api.js";
 import { eventsNow, scoresOf } from "../state/events.js";
 import {

@@ -1,6 +1,6 @@
 /** The panel of teaching: templates with their colours, the room, entrances, and saving. */
-import { h, idTag, line, quiet } from "../elements/dom.js";
-import { table } from "../elements/grid.js";
+import { h, idTag } from "../elements/dom.js";
+import { line, quiet, table } from "../elements/drawn.js";
 import { NUMBERS } from "./teach.js";
 
 /** @typedef {NonNullable<PageState["sequence"]>} Sequence */
