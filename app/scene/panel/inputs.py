@@ -2,7 +2,8 @@
 
 What the server writes into an input comes back to it without a client and is ignored; and it
 writes into one only when that stands elsewhere than the store's value and nobody is just
-moving it.
+moving it. viser tells of an edit some time after it has taken its value: an input that has another
+value than the last one known is being moved, too.
 """
 
 from __future__ import annotations
@@ -50,6 +51,8 @@ class Inputs:
         self._lock = threading.Lock()
         self._moved: dict[str, Any] = {}
         """Edits that nobody has taken yet: the input that was moved, by key."""
+        self._known: dict[str, Any] = {}
+        """The value of each input that was written into it or told of last, by viser's name."""
         self.by_key: dict[str, Any] = {}
         self.copies: dict[str, list[Any]] = {}
         """The same parameters among the essentials and among what is found."""
@@ -133,12 +136,26 @@ class Inputs:
         self._hear(key, handle)
 
     def _hear(self, key: str, handle: Any) -> None:
+        self._known[handle._impl.uuid] = handle.value
+
         @handle.on_update  # type: ignore[untyped-decorator]
         def _(event: viser.GuiEvent[Any]) -> None:
             if event.client_id is not None:  # else it is our own writing
                 with self._lock:
-                    self._moved[key] = handle
+                    self._take(key, handle)
                 self._on_move()
+
+    def _take(self, key: str, handle: Any) -> None:
+        self._moved[key], self._known[handle._impl.uuid] = handle, handle.value
+
+    def _is_moved(self, key: str, handle: Any) -> bool:
+        if handle.value != self._known[handle._impl.uuid]:
+            self._take(key, handle)
+            self._on_move()
+        return key in self._moved
+
+    def _put(self, handle: Any, value: Any) -> None:
+        handle.value = self._known[handle._impl.uuid] = value
 
     # reading and writing them
 
@@ -159,25 +176,25 @@ class Inputs:
         scale = self.scales.get(key)
         for handle in self.of(key):
             with self._lock:
-                if key in self._moved:  # the edit comes next
+                if self._is_moved(key, handle):  # the edit comes next
                     return
                 if scale is None:
                     if handle.value != value:
-                        handle.value = value
+                        self._put(handle, value)
                 elif not scale.stands_at(handle.value, value):
-                    handle.value = scale.place(value)
+                    self._put(handle, scale.place(value))
 
     def write_method(self, key: MethodKey, name: str, unfit: Mapping[str, str]) -> None:
         """The methods, marked where one cannot work here; of the chosen one the hint says why."""
         handle = self.by_key[key]
         marked = {name: f"{name}{UNFIT}" if name in unfit else name for name in METHODS[key]}
         with self._lock:
-            if key in self._moved:
+            if self._is_moved(key, handle):
                 return
             if handle.options != tuple(marked.values()):
                 handle.options = tuple(marked.values())
             if handle.value != marked[name]:
-                handle.value = marked[name]
+                self._put(handle, marked[name])
             hint = unfit.get(name, RunParameters.model_fields[key].description)
             if handle.hint != hint:
                 handle.hint = hint

@@ -1,6 +1,7 @@
 /** The 3D pane: viser's page inside ours, with its layers and view points. */
 import { drawing } from "../draw/canvas.js";
 import { all, fill, h, icon, one, parts } from "../elements/dom.js";
+import { takeWholeNumbers } from "./numbers.js";
 
 /* ---------- How often another document of this window draws: viser goes on drawing for a while
    after each change, and where there is no graphics card each of its frames is one that pictures
@@ -115,6 +116,7 @@ export function mountView3d(root, { store, actions, playback, retry, press }) {
 		pace(view, playback.after3d);
 		// Its panel leaves out what the page around it says already.
 		view.document.documentElement.classList.add("mvp-inside");
+		takeWholeNumbers(view.document);
 		view.addEventListener(
 			"keydown",
 			(event) => {

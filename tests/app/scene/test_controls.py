@@ -288,6 +288,16 @@ def test_a_slider_that_is_being_moved_is_not_written(panel: Controls, workbench:
     assert value(workbench, key) == 3.13e-3
 
 
+def test_an_edit_that_is_not_told_of_yet_is_not_written_over(
+    panel: Controls, workbench: Workbench
+) -> None:
+    handle = panel._inputs.by_key[P_D]
+    handle._impl.value = 0.7  # viser takes the value first and calls back later
+    workbench.set_parameters({P_D: 0.8}, "page")
+    assert panel.wait(SECONDS)
+    assert handle.value == value(workbench, P_D) == 0.7
+
+
 @pytest.mark.parametrize(
     ("changes", "shown", "hidden"),
     [

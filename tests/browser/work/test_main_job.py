@@ -14,6 +14,7 @@ from playwright.sync_api import Browser, Frame, Locator, Page, WebSocket
 
 from tests.browser.conftest import opened
 from tests.browser.looking import (
+    as_at_first,
     ask,
     clear_overlays,
     numbers_in_pictures,
@@ -91,6 +92,26 @@ def test_main_job(browser: Browser, tmp_path: Path) -> None:
                 assert found != before, key
     finally:
         server.stop()
+
+
+def test_a_typed_number_counts_when_it_is_finished(page: Page, server: Server) -> None:
+    key = "fusion.survival_probability"
+    row = row_of(viser(page), key)
+    field = row.locator("input:visible")
+    for delay, end in ((0, "Enter"), (250, "Enter"), (30, "Tab")):
+        as_at_first(server)
+        default = server.get("/api/state").json()["parameters"][key]
+        until(page, lambda: field.input_value() == f"{default:g}", "the default")  # noqa: B023
+        field.click()
+        field.press("Control+a")
+        field.press_sequentially("0.9", delay=delay)
+        assert server.get("/api/state").json()["parameters"][key] == default
+        field.press(end)
+        server.wait(lambda state: state["parameters"][key] == 0.9)
+        thumb = row.get_by_role("slider")
+        until(page, lambda: thumb.get_attribute("aria-valuenow") == "0.9", "the slider at 0.9")  # noqa: B023
+        assert field.input_value() == "0.9"
+    as_at_first(server)
 
 
 def the_room_is_shown(
