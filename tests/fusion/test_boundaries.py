@@ -403,6 +403,22 @@ def test_a_stated_place_updates_whom_it_means_or_begins_somebody() -> None:
     assert_array_equal(found.means[0], mixture.means[0])
 
 
+@pytest.mark.parametrize(("beyond", "born"), [(-0.01, False), (0.01, True)])
+def test_a_place_above_a_person_is_somebody_elses_from_their_height_on(
+    beyond: float, born: bool
+) -> None:
+    """Two people cannot stand in one place, but one may be above the other, as on a gallery."""
+    up = MODEL.height + beyond
+    told = constraints_by_step(
+        [make(kind="here", places=[[0, 0.0, 0.0, 0.85 + up]], accuracy=0.2)]
+    )[0]
+    assert up**2 / (0.01 + 0.04) > MODEL.gate_of_places
+    found, _, _ = apply_constraints(
+        people((3, 0.6, 0.0)), Record.blank(4, 1), told, MODEL, first_new_label=9, next_label=9
+    )
+    assert found.size == 1 + born
+
+
 def test_the_heavier_of_two_is_meant_where_both_are_as_near() -> None:
     mixture = people((3, 0.3, -0.1), (4, 0.8, 0.1))
     told = constraints_by_step([make(kind="here", places=[[0, 0.0, 0.0, 0.85]], accuracy=0.1)])[0]
