@@ -24,6 +24,7 @@ from app.command.arguments.library import Bundle, FormatName, LibraryCommand, Li
 from app.command.arguments.listing import Benchmark, Parameters, Sequences
 from app.command.arguments.studies import Batch, Study, Tune
 from app.command.arguments.templates import Templates
+from app.command.terminal import say
 from app.command.typed import WrongValue, registry
 from tracker import __version__
 from tracker.library import KEEP
@@ -33,11 +34,12 @@ from tracker.parameters.catalogue import (
     METHODS,
     PARAMETERS,
     PRESETS,
+    REMOVED,
     RENAMED,
     Parameter,
     RunParameters,
 )
-from tracker.parameters.values import ParameterError, current_key
+from tracker.parameters.values import ParameterError, current_key, removed_notes
 
 DEFAULT_SEQUENCE = "room44-3p"
 
@@ -56,7 +58,7 @@ def has_screen() -> bool:
 
 
 def set_values(items: tuple[str, ...]) -> dict[str, str]:
-    """The values of ``--set`` by key.
+    """The values of ``--set`` by key, without parameters that no longer exist, which it says.
 
     Raises:
         ParameterError: If one is not KEY=VALUE.
@@ -67,7 +69,9 @@ def set_values(items: tuple[str, ...]) -> dict[str, str]:
         if not mark:
             raise ParameterError("--set", f"expected KEY=VALUE, got {item!r}")
         values[current_key(key.strip())] = text.strip()
-    return values
+    for sentence in removed_notes(values):
+        say(sentence)
+    return {key: text for key, text in values.items() if key not in REMOVED}
 
 
 @dataclass
@@ -336,14 +340,22 @@ Arguments = (
 
 
 def _with_current_flags(arguments: Iterable[str]) -> list[str]:
-    """The arguments with the flags of now for those that parameters had in earlier versions."""
+    """The arguments with the flags of now for those that parameters had in earlier versions.
+
+    A flag of a parameter that no longer exists becomes a ``--set``, which says what holds instead.
+    """
     flags = {
         f"--{old}".replace("_", "-"): f"--{new}".replace("_", "-") for old, new in RENAMED.items()
     }
-    found = []
-    for argument in arguments:
+    removed = {f"--{key}".replace("_", "-"): key for key in REMOVED}
+    found, rest = [], iter(arguments)
+    for argument in rest:
         flag, mark, value = argument.partition("=")
-        found.append(flags.get(flag.replace("_", "-"), flag) + mark + value)
+        name = flag.replace("_", "-")
+        if name in removed:
+            found += ["--set", f"{removed[name]}={value if mark else next(rest, '')}"]
+        else:
+            found.append(flags.get(name, flag) + mark + value)
     return found
 
 

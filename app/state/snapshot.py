@@ -15,7 +15,7 @@ from tracker.corrections import Correction
 from tracker.fusion.trajectories import Trajectories
 from tracker.parameters import MethodKey
 from tracker.parameters.catalogue import METHODS, PARAMETERS, PRESETS, RunParameters
-from tracker.parameters.values import changed_values, value_of
+from tracker.parameters.values import changed_values, value_of, with_current_keys
 from tracker.review.template_suggestions import Suggestion
 from tracker.runs.fitting import unfit_methods
 from tracker.runs.pipeline import Run
@@ -208,7 +208,7 @@ class Snapshot:
         own = changed_values(self.parameters, self.defaults)
         single_view = {"single_view": self.parameters.single_view}
         for name, values in {**PRESETS, **self.presets}.items():
-            meant = {**single_view, **values}
+            meant = {**single_view, **with_current_keys(values)}
             if not meant.keys() <= _KEYS:  # saved by another version
                 continue
             if own == {k: v for k, v in meant.items() if v != value_of(self.defaults, k)}:

@@ -29,8 +29,14 @@ from app.state.snapshot import (
     clamp,
 )
 from tracker.corrections import Correction
-from tracker.parameters.catalogue import METHODS, PARAMETERS, PRESETS, RunParameters
-from tracker.parameters.values import ParameterError, current_key, value_of, with_values
+from tracker.parameters.catalogue import METHODS, PARAMETERS, PRESETS, REMOVED, RunParameters
+from tracker.parameters.values import (
+    ParameterError,
+    current_key,
+    removed_notes,
+    value_of,
+    with_values,
+)
 from tracker.review.template_suggestions import Suggestion
 from tracker.runs.pipeline import Run
 from tracker.sequences.sequence import Sequence
@@ -52,12 +58,15 @@ class Workbench(ShownRun):
         if origin.startswith(CLAMPED_ORIGIN):
             changes = {key: clamp(key, value) for key, value in changes.items()}
         with self._edit() as now:
-            return self._put_parameters(with_values(now.parameters, changes), origin)
+            parameters = self._put_parameters(with_values(now.parameters, changes), origin)
+        self.note_removed(changes)
+        return parameters
 
     def reset_parameters(self, keys: Iterable[str] | None = None) -> RunParameters:
         """Return some values, or all and the methods too, to what they are by default."""
         with self._edit() as now:
             wanted = (*METHODS, *PARAMETERS) if keys is None else tuple(map(current_key, keys))
+            wanted = tuple(key for key in wanted if key not in REMOVED)
             for key in wanted:
                 if key not in METHODS and key not in PARAMETERS:
                     with_values(now.parameters, {key: None})  # says what is wrong
@@ -83,7 +92,14 @@ class Workbench(ShownRun):
                     "GET /api/schema has the built-in presets, GET /api/state your own.",
                 )
             changes = {"single_view": now.parameters.single_view, **presets[name]}
-            return self._put_parameters(with_values(now.defaults, changes), f"preset {name}")
+            parameters = self._put_parameters(with_values(now.defaults, changes), f"preset {name}")
+        self.note_removed(changes)
+        return parameters
+
+    def note_removed(self, keys: Iterable[str]) -> None:
+        """Say what holds instead of those parameters among some that no longer exist."""
+        for sentence in removed_notes(keys):
+            self.notify("warn", sentence)
 
     def set_presets(self, presets: Presets) -> None:
         """Have these presets besides the built-in ones."""

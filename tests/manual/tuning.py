@@ -40,6 +40,9 @@ leads here.
 
 Pin a run as A (`Pin as A`) before a change; lanes, strips and the Compare tab then show both.
 
+A preset, study, kept run, address or command of an earlier version may name a parameter that no
+longer exists. It opens all the same, without that value, and a note says what holds instead.
+
 ## How to read the pictures
 
 Each is a short piece of a sequence, run once for every marked value, all other parameters at

@@ -12,7 +12,7 @@ from typing import Any, Literal, TypeVar
 
 from tracker.library.columns import KeptTracks
 from tracker.parameters.catalogue import RunParameters
-from tracker.parameters.values import with_current_keys
+from tracker.parameters.values import removed_notes, with_current_keys
 
 Source = Literal["track", "page", "bundle", "batch"]
 """The origin of a run: a command, the page, or a bundle that was unpacked."""
@@ -182,6 +182,12 @@ class KeptRun(_Run):
     def changes(self) -> dict[str, Any]:
         """The values of parameters that differ from the recording's defaults, by key."""
         return with_current_keys(json.loads(self.changes_json))
+
+    @property
+    def removed(self) -> tuple[str, ...]:
+        """A sentence for each parameter that had another value than by default, and no longer
+        exists."""
+        return removed_notes(json.loads(self.changes_json))
 
     @property
     def tags(self) -> list[str]:

@@ -73,6 +73,16 @@ RENAMED: Mapping[str, str] = {
 """The keys of parameters in earlier versions, and their keys now: files, addresses and commands
 that have the old ones are read as before."""
 
+REMOVED: Mapping[str, str] = {
+    "foreground.background_centre": "the c-means starts at a background centre of 5 grey levels",
+    "foreground.foreground_centre": "the c-means starts at a foreground centre of 50 grey levels",
+    "foreground.update_limit": "the adaptive background follows differences below 6 grey levels",
+    "foreground.update_frames": "the adaptive background follows pixels after 10 steps",
+    "foreground.update_rate": "the adaptive background goes a tenth of the way to each picture",
+}
+"""The keys of parameters of earlier versions that no longer exist, and what holds instead: files,
+addresses and commands that name them are read without them, and a note says so."""
+
 FOLLOWING = ("colour_phd", "none", "shapes")
 """Candidates for the default of ``single_view``: the first whose requirements the recording
 meets is chosen, or a fetched detection network instead of shapes."""
@@ -168,10 +178,16 @@ class SharedParameters(Params):
     @model_validator(mode="before")
     @classmethod
     def _read_earlier_names(cls, data: Any) -> Any:
-        """Move the values that have names of earlier versions to the names of now."""
+        """Move the values that have names of earlier versions to the names of now, and leave out
+        those of parameters that no longer exist."""
         if not isinstance(data, dict):
             return data
         data = dict(data)
+        for key in REMOVED:
+            group, name = key.split(".")
+            values = data.get(group)
+            if isinstance(values, dict) and name in values:
+                data[group] = {other: one for other, one in values.items() if other != name}
         for old, new in RENAMED.items():
             (group, before), name = old.split("."), new.split(".")[1]
             values = data.get(group)

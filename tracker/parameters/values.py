@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import lru_cache
 from operator import attrgetter
 from typing import Any, cast
@@ -11,7 +11,7 @@ from typing import Any, cast
 from pydantic import ValidationError
 
 from tracker.files.text import visible
-from tracker.parameters.catalogue import METHODS, PARAMETERS, RENAMED, RunParameters
+from tracker.parameters.catalogue import METHODS, PARAMETERS, REMOVED, RENAMED, RunParameters
 from tracker.parameters.definition import Stage
 from tracker.parameters.method import MethodKey, Uses
 
@@ -48,9 +48,18 @@ def current_key(key: str) -> str:
 
 
 def with_current_keys(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return values by the keys of now; a value under a key of now wins over one under its old."""
+    """Return values by the keys of now, without those of parameters that no longer exist.
+
+    A value under a key of now wins over one under its old.
+    """
     renamed = {new: values[old] for old, new in RENAMED.items() if old in values}
-    return renamed | {key: one for key, one in values.items() if key not in RENAMED}
+    earlier = RENAMED.keys() | REMOVED.keys()
+    return renamed | {key: one for key, one in values.items() if key not in earlier}
+
+
+def removed_notes(keys: Iterable[str]) -> tuple[str, ...]:
+    """Return one sentence for each key of a parameter that no longer exists: what holds instead."""
+    return tuple(f"{key} no longer exists: {REMOVED[key]}" for key in keys if key in REMOVED)
 
 
 def value_of(parameters: RunParameters, key: str) -> Any:
@@ -63,8 +72,8 @@ def with_values(parameters: RunParameters, changes: Mapping[str, Any]) -> RunPar
 
     Args:
         parameters: The parameters to start from; they are not modified.
-        changes: The new values by key, also by the keys of earlier versions; numbers may be text,
-            as on a command line.
+        changes: The new values by key, also by the keys of earlier versions, of which those that
+            no longer exist change nothing; numbers may be text, as on a command line.
 
     Raises:
         ParameterError: If a key does not exist or a value is out of its range.

@@ -6,7 +6,7 @@ import glob
 import json
 import os
 import tomllib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
 
@@ -16,6 +16,7 @@ from pydantic import (
     BeforeValidator,
     ConfigDict,
     Field,
+    PrivateAttr,
     ValidationError,
     ValidationInfo,
     model_validator,
@@ -23,7 +24,7 @@ from pydantic import (
 
 from tracker.files.text import not_utf_8, shown
 from tracker.parameters.catalogue import METHODS, PARAMETERS, PRESETS, RunParameters
-from tracker.parameters.values import value_of, with_current_keys, with_values
+from tracker.parameters.values import removed_notes, value_of, with_current_keys, with_values
 from tracker.sequences.fields import did_you_mean
 from tracker.sequences.reader import FILE
 from tracker.studies.errors import StudyError
@@ -151,7 +152,8 @@ def _all_varied(found: Any) -> Any:
         return found
     varied = tuple(_varied(key, table) for key, table in _flat_ranges(found).items())
     if not varied:
-        words = "expected at least one parameter to vary, found none"
+        gone = "".join(f"; {note}" for note in removed_notes(_keys(found)))
+        words = f"expected at least one parameter to vary, found none{gone}"
         raise _InvalidFieldError("parameters", words)
     return varied
 
@@ -195,6 +197,13 @@ class StudyDefinition(BaseModel):
     """Values of varied parameters that are tried right after the defaults."""
     varied: Annotated[tuple[Varied, ...], BeforeValidator(_all_varied), Field(alias="parameters")]
     """The varied parameters; in the file a table by key."""
+
+    _notes: tuple[str, ...] = PrivateAttr(())
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """One sentence for each parameter that the file names and that no longer exists."""
+        return self._notes
 
     @model_validator(mode="after")
     def _check_tables(self) -> StudyDefinition:
@@ -292,9 +301,13 @@ def definition_of(found: Mapping[str, Any], *, where: str, folder: Path) -> Stud
             expected and found.
     """
     try:
-        return StudyDefinition.model_validate(
+        definition = StudyDefinition.model_validate(
             {"parameters": {}, **found}, context={"folder": folder}
         )
+        tables = (found.get(name) for name in ("values", "start", "parameters"))
+        keys = [key for table in tables if isinstance(table, Mapping) for key in _keys(table)]
+        definition._notes = removed_notes(dict.fromkeys(keys))
+        return definition
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
     cause = first.get("ctx", {}).get("error")
@@ -379,6 +392,14 @@ def _flat(table: Mapping[str, Any]) -> dict[str, Any]:
         else:
             flat[key] = found
     return with_current_keys(flat)
+
+
+def _keys(table: Mapping[str, Any]) -> Iterator[str]:
+    """Yield the keys of a table, and those of its tables with the group before them."""
+    for key, found in table.items():
+        yield key
+        if isinstance(found, Mapping):
+            yield from (f"{key}.{name}" for name in found)
 
 
 def _flat_ranges(table: Mapping[str, Any]) -> dict[str, Any]:

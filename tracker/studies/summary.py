@@ -98,7 +98,7 @@ class Summary:
 
     def sentences(self) -> list[str]:
         """Return the main results as sentences without full stops."""
-        found = []
+        found = [*self.definition.notes]
         best, default = self.best, self.default
         lead = self.objectives[0]
         if best is not None and default is not None:

@@ -55,7 +55,10 @@ def study(command: Study) -> int:
         case RunStudy():
             from tracker.studies.definition import read_definition
 
-            return run(create(read_definition(action.file), folder), action, as_json=action.json)
+            definition = read_definition(action.file)
+            for sentence in definition.notes:
+                say(sentence)
+            return run(create(definition, folder), action, as_json=action.json)
         case ResumeStudy():
             return run(find(action.study, folder), action, as_json=action.json)
         case ListStudies():

@@ -17,7 +17,7 @@ from app.state.snapshot import Presets
 from app.state.workbench import Workbench
 from tracker.files.lock import locked
 from tracker.files.validated import read_as, set_aside, write_json
-from tracker.parameters.catalogue import PRESETS
+from tracker.parameters.catalogue import PRESETS, REMOVED
 from tracker.parameters.values import ParameterError, changed_values, with_current_keys
 
 YOURS = "GET /api/state lists your presets."
@@ -162,8 +162,14 @@ def keep_preset(path: Path, name: str, values: Mapping[str, Any]) -> None:
 
 
 def _stored(path: Path) -> dict[str, dict[str, Any]]:
-    """The presets of a file, under the names that the parameters have now."""
-    return {name: with_current_keys(values) for name, values in read_as(path, _KIND).items()}
+    """The presets of a file, under the names that the parameters have now.
+
+    Parameters that no longer exist stay, so that whoever takes the preset learns of them.
+    """
+    return {
+        name: with_current_keys(values) | {k: v for k, v in values.items() if k in REMOVED}
+        for name, values in read_as(path, _KIND).items()
+    }
 
 
 def _checked(name: str) -> str:

@@ -184,7 +184,8 @@ class Jobs:
                 self._under_way.cancelled.set()
             self._wanted = None
             stands_for = "" if run.key == wanted else wanted
-            self._workbench.show_kept(run, result.run.id, stands_for, _beyond_the_end(run, result))
+            warnings = (*result.run.removed, *_beyond_the_end(run, result))
+            self._workbench.show_kept(run, result.run.id, stands_for, warnings)
 
     def key_of(self, sequence: Sequence, result: Result) -> str:
         """The key that a computation with a kept run's values would have now."""

@@ -158,7 +158,7 @@ def test_the_iteration_stops_where_the_foreground_grows_least(
 def two_classes_in_numpy(difference: ndarray, parameters: ForegroundParams) -> tuple[list, list]:
     """The iteration, pixel by pixel, as its equations say."""
     p = parameters
-    m_b, m_f = np.full(3, p.background_centre), np.full(3, p.foreground_centre)
+    m_b, m_f = np.full(3, 5.0), np.full(3, 50.0)
     thresholds, counts, before = [], [], None
     for _ in range(20):
         t = np.maximum(
@@ -197,7 +197,7 @@ def test_the_iteration_agrees_with_numpy(
 
 def test_differences_are_compared_in_units_of_each_classs_deviation() -> None:
     """At the first threshold d is as far from both centres, in their deviations."""
-    parameters = ForegroundParams(background_centre=5.0, foreground_centre=50.0)
+    parameters = ForegroundParams()
     found = cluster(np.zeros((8, 8, 3), dtype=np.uint8), parameters)
     threshold = found.thresholds[0, 0]
     assert (threshold - 5.0) / 3.0 == pytest.approx(50.0 - threshold)

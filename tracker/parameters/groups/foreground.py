@@ -54,20 +54,6 @@ class ForegroundParams(Params):
     ] = 14.0
     """Learnt: a pixel that differs more than this from a tenth of a second ago changed."""
 
-    background_centre: Annotated[
-        float,
-        Field(ge=0.0, le=50.0),
-        ui("m_b", unit="grey levels", step=1.0, advanced=True, when=_ADAPTIVE),
-    ] = 5.0
-    """Adaptive: where the background's class of differences starts."""
-
-    foreground_centre: Annotated[
-        float,
-        Field(ge=10.0, le=200.0),
-        ui("m_f", unit="grey levels", step=1.0, advanced=True, when=_ADAPTIVE),
-    ] = 50.0
-    """Adaptive: where the foreground's class of differences starts."""
-
     deviation_ratio: Annotated[
         float, Field(ge=0.1, le=10.0), ui("σ_b/σ_f", step=0.1, log=True, when=_ADAPTIVE)
     ] = 3.0
@@ -85,19 +71,6 @@ class ForegroundParams(Params):
 
     drop_shadows: Annotated[bool, ui("S", published=False, when=_ADAPTIVE)] = True
     """Adaptive: whether an even loss of light is no difference."""
-
-    update_limit: Annotated[
-        int, Field(ge=1, le=60), ui("Th", unit="grey levels", step=1, advanced=True, when=_ADAPTIVE)
-    ] = 6
-    """Adaptive: only a pixel that differs by less than this changes the background."""
-
-    update_frames: Annotated[
-        int, Field(ge=1, le=250), ui("w", unit="steps", step=1, advanced=True, when=_ADAPTIVE)
-    ] = 10
-    """Adaptive: a pixel must have been background for so long to change it."""
-
-    update_rate: Annotated[float, Field(ge=0.0, le=1.0), ui("α", step=0.01, when=_ADAPTIVE)] = 0.1
-    """Adaptive: how far the background goes towards each picture."""
 
     minimum_area: Annotated[int, Field(ge=1, le=5000), ui("A_min", unit="px", log=True)] = 40
     """Smaller pieces of foreground are dropped."""
