@@ -17,6 +17,7 @@ from tests.world import HEAD, PERSON
 from tests.world import SMALL_CAMERAS as CAMERAS
 from tests.world import SMALL_ROOM as ROOM
 from tests.world import surveillance as look_at
+from tracker.geometry.calibration import LARGEST_SIDE, checked_size
 from tracker.geometry.camera import NEAREST_DEPTH, Camera, stacked
 from tracker.kernels import lens
 
@@ -330,3 +331,12 @@ def test_a_box_that_only_touches_the_pictures_edge_is_not_visible(
     boxes, seen = camera.project_boxes(np.array([[x, y, 1.0]]), half)
     assert_allclose(boxes, [[127.5 + 64.0 * (x - 1.0), 63.5 + 64.0 * (y - 1.0), 128.0, 128.0]])
     assert seen.tolist() == [visible]
+
+
+def test_a_picture_has_a_whole_number_of_pixels_from_one_to_the_largest() -> None:
+    assert checked_size(np.array([1.0, LARGEST_SIDE])) == (1, LARGEST_SIDE)
+    assert checked_size(np.array([LARGEST_SIDE, 1.0])) == (LARGEST_SIDE, 1)
+    for wrong in (0.0, -1.0, 1.5, LARGEST_SIDE + 1.0):
+        for size in ([wrong, 9.0], [9.0, wrong]):
+            with pytest.raises(ValueError, match="expected two whole numbers of pixels"):
+                checked_size(np.array(size))

@@ -7,6 +7,7 @@ from numpy import ndarray
 from numpy.testing import assert_allclose
 
 from tests import world
+from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.parameters.catalogue import RunParameters
 from tracker.parameters.groups.colour_phd import ColourPhdParams
 from tracker.parameters.groups.detections import DetectionBoxParams
@@ -74,6 +75,22 @@ def test_the_noise_of_associated_foreground_adds_pixels_to_its_centre(
     expected = shares(0.1, 0.2)
     expected[:, :2] = np.hypot(expected[:, :2], 3.0)
     assert_allclose(source.sigmas(BOXES), expected)
+
+
+def test_a_target_is_occluded_within_so_many_half_sizes_of_a_peak(
+    heads: Sequence, reader: FrameReader
+) -> None:
+    values = {
+        "jpda.measurements": "colour", "jpda.cover": 1.75, "foreground.threshold": 30.0,
+        "foreground.minimum_area": 4, "colour_phd.shapes": "never",
+    }  # fmt: skip
+    source = source_of(heads, 0, with_values(RunParameters(), values), reader)
+    _, found = source.measure(
+        source.start(), 4, reader.picture(0, 4), GaussianMixture.empty(4), np.random.default_rng(0)
+    )
+    assert len(found.boxes)
+    assert_allclose(found.pieces[:, :2], found.boxes[:, :2])
+    assert_allclose(found.pieces[:, 2:], 1.75 * found.boxes[:, 2:])
 
 
 def test_the_noise_of_shapes_is_the_same_in_metres_everywhere() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.golden.pieces import cut
-from tests.single_view.shaken import scene, shaken, taken
+from tests.single_view.shaken import MIDDLE, SIZE, scene, shaken, taken
 from tracker.parameters.catalogue import RunParameters
 from tracker.parameters.values import with_values
 from tracker.runs import pipeline
@@ -18,7 +18,7 @@ from tracker.sequences.library import open_sequence
 from tracker.sequences.pictures.frames import FrameReader, Picture
 from tracker.single_view.working.sequence import Working
 from tracker.single_view.working.shaking import check_shake
-from tracker.single_view.working.stabilisation import StaticScene, agreed
+from tracker.single_view.working.stabilisation import StaticScene, _evened, agreed
 
 
 def test_a_shake_is_the_deviation_of_what_moved_and_is_undone() -> None:
@@ -43,6 +43,25 @@ def test_a_shake_is_the_deviation_of_what_moved_and_is_undone() -> None:
     assert wider is not None
     assert wider.reduction == pytest.approx(320.0 / 720.0)
     assert wider.shake == pytest.approx(3.0 * found.shake, rel=0.2)
+
+
+def test_a_camera_that_turns_about_the_middle_of_its_picture_is_not_shifted() -> None:
+    room = scene(np.random.default_rng(8))
+
+    def turned(angle: float) -> np.ndarray:
+        turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+        matrix = np.column_stack([turn, MIDDLE - turn @ (MIDDLE + 30.0)])
+        return np.asarray(cv2.warpAffine(room, matrix, SIZE, flags=cv2.INTER_CUBIC))
+
+    found = StaticScene.learn([turned(0.0)] * 3, None, 0.2)
+    assert found is not None
+    angle = 0.06
+    forth, back = (found._moved(_evened(turned(one), 1.0)) for one in (angle, -angle))
+    assert forth is not None
+    assert back is not None
+    assert forth[2] == pytest.approx(angle, rel=0.02)
+    # about another point p the shifts would be θ J p
+    assert np.abs((forth - back)[:2] / (2.0 * angle)).max() < 0.2
 
 
 def test_people_light_and_noise_are_no_shake() -> None:

@@ -42,6 +42,15 @@ def test_the_bounds_of_a_thin_body_are_those_of_its_rims(camera: Camera) -> None
         assert found[3] == pytest.approx(head[0] - middle[0], abs=0.15 * abs(found[3]) + 0.5)
 
 
+def test_each_of_several_bodies_has_the_bounds_that_it_has_alone() -> None:
+    camera = world.ring(3)[0]
+    places = [[0.2, 0.1, HALF], [1.2, -0.9, 1.1 * HALF], [-1.0, 1.1, HALF]]
+    states = np.column_stack([places, np.zeros((3, 3))])
+    alone = [body_shifts(states[j : j + 1], HALF, 0.2, camera.calibration)[0] for j in range(3)]
+    assert len(np.unique(alone, axis=0)) == 3
+    assert_allclose(body_shifts(states, HALF, 0.2, camera.calibration), alone, atol=1e-9)
+
+
 def test_behind_the_lens_there_are_no_bounds() -> None:
     camera = world.look_at("one", (4.0, 0.0, 2.0))
     states = np.array([[9.0, 0.0, HALF], [0.0, 0.0, HALF]])
