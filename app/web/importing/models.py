@@ -11,6 +11,7 @@ from app.state.importing.draft import Phase
 from app.state.importing.wish import ImportWish
 from tracker.io.checks import Status
 from tracker.io.conventions.questions import Part
+from tracker.sequences.sequence import PRESETS
 
 
 class AnnouncedFile(Model):
@@ -199,8 +200,8 @@ class ImportInfo(Model):
     plan: ImportedPlan | None
     folder: str
     """Where it was written."""
-    sheet: str = ""
-    """The sheet that shows all this, as HTML."""
+    sizes: dict[str, Vector] = PRESETS
+    """Half width, depth and height of common targets in metres, by their words."""
 
 
 class Begun(Model):
@@ -229,6 +230,8 @@ class RecordingCard(Model):
     """Seconds since 1970; 0 where it never was."""
     picture: str
     """Address of its picture; empty where there is none yet."""
+    open: bool
+    """Whether it is what is open now."""
 
 
 class Recordings(Model):
@@ -241,5 +244,5 @@ class Recordings(Model):
     """Where recordings go."""
     free: int
     """Bytes on that disk."""
-    sheet: str
-    """The sheet that shows them, as HTML."""
+    most: int
+    """Bytes that an upload may have."""

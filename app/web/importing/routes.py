@@ -14,7 +14,7 @@ from fastapi import APIRouter, Depends, Query, Request, Response
 from app.errors import ApiError, sentence
 from app.state.importing.desk import Desk
 from app.state.importing.draft import Draft
-from app.state.importing.uploads import Announced, UploadError
+from app.state.importing.uploads import MOST_BYTES, Announced, UploadError
 from app.state.importing.wish import ImportWish
 from app.state.kept.recents import Recents, thumbnail
 from app.web.dependencies import ERRORS, Bench, Work
@@ -27,7 +27,6 @@ from app.web.importing.models import (
     Recordings,
     WriteRequest,
 )
-from app.web.importing.sheet.start import start_sheet
 from app.web.importing.views import info_of
 from tracker.io.read.pieces import FormatError
 from tracker.parameters.catalogue import RunParameters
@@ -77,12 +76,16 @@ def recordings(request: Request, desk: AtDesk, bench: Bench) -> Recordings:
     """What was open last, the folders of the data folder, the built-in rooms."""
     recents: Recents = request.app.state.recents
     data: Path | None = request.app.state.settings.data
+    snapshot = bench.snapshot()
+    open_as = [snapshot.opened_as]
+    if snapshot.sequence is not None:
+        open_as.append(str(snapshot.sequence.folder.absolute()))
     cards = [
         RecordingCard(
             name=one.name, opens=built_in_name(Path(one.folder)) or one.folder, kind="recent",
             description="", cameras=one.cameras,
             frames=one.frames, fps=one.fps, opened=one.opened,
-            picture=f"/api/recordings/picture?recent={number}",
+            picture=f"/api/recordings/picture?recent={number}", open=False,
         )
         for number, one in enumerate(recents.all())
     ]  # fmt: skip
@@ -92,19 +95,20 @@ def recordings(request: Request, desk: AtDesk, bench: Bench) -> Recordings:
         RecordingCard(
             name=entry.name, opens=entry.name, kind=entry.kind, description=entry.description,
             cameras=entry.cameras, frames=entry.frames, fps=0.0, opened=0.0,
-            picture=f"/api/recordings/picture?name={quote(entry.name)}",
+            picture=f"/api/recordings/picture?name={quote(entry.name)}", open=False,
         )
         for entry in entries
         if str(entry.folder.absolute()) not in listed and entry.error is None
     ]  # fmt: skip
-    snapshot = bench.snapshot()
-    open_as = [snapshot.opened_as]
-    if snapshot.sequence is not None:
-        open_as.append(str(snapshot.sequence.folder.absolute()))
-    known = Recordings(
-        recordings=cards, folders=desk.folders(), data=str(desk.home), free=desk.free(), sheet=""
+    for card in cards:
+        card.open = card.opens in open_as
+    return Recordings(
+        recordings=cards,
+        folders=desk.folders(),
+        data=str(desk.home),
+        free=desk.free(),
+        most=MOST_BYTES,
     )
-    return known.model_copy(update={"sheet": start_sheet(known, open_as)})
 
 
 @router.get(

@@ -23,7 +23,6 @@ from app.web.importing.models import (
     ImportInfo,
     ImportQuestion,
 )
-from app.web.importing.sheet.draft import draft_sheet
 from tracker.io.checks import Check
 from tracker.io.checks.synchronisation import CameraOffset
 from tracker.io.importing.finding.angles import open_turns, product_in_words, turns_in_words
@@ -47,12 +46,7 @@ def _changed(wish: ImportWish, changes: Mapping[str, Any]) -> ImportWish:
 
 
 def info_of(draft: Draft) -> ImportInfo:
-    """Everything that is known, and the sheet that shows it."""
-    info = _info(draft)
-    return info.model_copy(update={"sheet": draft_sheet(info)})
-
-
-def _info(draft: Draft) -> ImportInfo:
+    """Everything that is known."""
     known, upload = draft.known, draft.upload
     settled, looked = known.settled, known.looked
     return ImportInfo(

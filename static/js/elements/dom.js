@@ -74,8 +74,24 @@ export function mountTips() {
  * @param {Attributes} [attributes]
  * @param {...(Child | Child[])} children
  */
-export function h(tag, attributes = {}, ...children) {
-	const element = document.createElement(tag);
+export const h = (tag, attributes, ...children) =>
+	furnish(document.createElement(tag), attributes, children);
+
+/**
+ * The same of a drawing.
+ * @template {keyof SVGElementTagNameMap} K
+ * @param {K} tag
+ * @param {Attributes} [attributes]
+ * @param {...(Child | Child[])} children
+ */
+export const svg = (tag, attributes, ...children) =>
+	furnish(document.createElementNS("http://www.w3.org/2000/svg", tag), attributes, children);
+
+/**
+ * @template {HTMLElement | SVGElement} E
+ * @param {E} element @param {Attributes} attributes @param {(Child | Child[])[]} children
+ */
+function furnish(element, attributes = {}, children) {
 	for (const [name, value] of Object.entries(attributes)) {
 		if (value === null || value === undefined || value === false) continue;
 		if (name.startsWith("on"))
@@ -166,14 +182,8 @@ export function choices(select, choices, chosen) {
 }
 
 /** @param {string} name  of a symbol in the page  @param {string} [kind]  further classes */
-export function icon(name, kind = "") {
-	const ns = "http://www.w3.org/2000/svg";
-	const svg = document.createElementNS(ns, "svg");
-	svg.setAttribute("class", `i ${kind}`);
-	svg.append(document.createElementNS(ns, "use"));
-	svg.firstElementChild?.setAttribute("href", `#${name}`);
-	return svg;
-}
+export const icon = (name, kind = "") =>
+	svg("svg", { class: `i ${kind}` }, svg("use", { href: `#${name}` }));
 
 /** 1 … 24: colour follows the id and never the rank. @param {number} id */
 export const colourIndex = (id) => ((((id - 1) % 24) + 24) % 24) + 1;

@@ -39,10 +39,11 @@ const called = ({ id, ariaLabel, form, textContent }) =>
  */
 export function redraw(root, ...children) {
 	const held = all(":focus", root)[0];
-	const at = all(CONTROLS, root).indexOf(held);
+	const stops = `${CONTROLS}, [tabindex]`;
+	const at = all(stops, root).indexOf(held);
 	adapt(root, h("div", {}, ...children));
 	if (!held || held.isConnected) return;
-	const now = all(CONTROLS, root);
+	const now = all(stops, root);
 	(now.find((control) => called(control) === called(held)) ?? now[at] ?? root).focus();
 }
 

@@ -1,6 +1,9 @@
 /** The sheet that opens recordings: by a key, by a drop anywhere, from files or from the disk. */
-import { all, h, one, write } from "../elements/dom.js";
+import { all, h, one } from "../elements/dom.js";
+import { redraw } from "../elements/drawn.js";
 import { ApiError, fetcher, getJson, request, sendJson } from "../state/api.js";
+import { draftSheet } from "./draft.js";
+import { startSheet } from "./start.js";
 
 /* ---------- Files that a person drops or chooses, and the way of their bytes to the server. */
 
@@ -78,79 +81,6 @@ async function send(key, numbers, files, signal, tell) {
 	await Promise.all(Array.from({ length: AT_ONCE }, work));
 }
 
-/* ---------- The room from above: the box around it, whose faces are dragged or moved by arrows. */
-
-/**
- * @param {any} svg  as the server draws it, in metres
- * @param {number[][]} room  lowest and highest corner
- * @param {(room: any) => void} put  the corners, when they are let go
- */
-function mountPlan(svg, room, put) {
-	const [left, bottom, high] = JSON.parse(svg.dataset.plan);
-	const at = (/** @type {number} */ x, /** @type {number} */ y) => [x - left, high - (y - bottom)];
-	/** @type {number[] | null} */
-	let held = null;
-
-	function place() {
-		const [[x, v], [u, y]] = [at(room[0][0], room[0][1]), at(room[1][0], room[1][1])];
-		const [width, height] = [u - x, v - y];
-		for (const [name, value] of Object.entries({ x, y, width, height }))
-			one(".box", svg).setAttribute(name, String(value));
-		for (const grip of all(".grip", svg)) {
-			const [axis, end] = (grip.dataset.face ?? "").split(" ").map(Number);
-			const to = axis ? [x + width / 2, end ? y : v] : [end ? u : x, y + height / 2];
-			grip.setAttribute("transform", `translate(${to})`);
-		}
-		all(".length", svg).forEach((text, axis) => {
-			write(text, `${(room[1][axis] - room[0][axis]).toFixed(2)} m`);
-			const to = axis ? [u - width * 0.16, y + height / 2] : [x + width / 2, y + height * 0.1];
-			text.setAttribute("transform", `translate(${to})`);
-		});
-	}
-
-	/** @param {number[]} face  axis and end @param {number} to */
-	function move([axis, end], to) {
-		const rounded = Math.round(to * 20) / 20;
-		if (end ? rounded > room[0][axis] : rounded < room[1][axis]) room[end][axis] = rounded;
-		place();
-	}
-	svg.onpointerdown = (/** @type {any} */ { target, pointerId }) => {
-		if (!target.dataset.face) return;
-		held = target.dataset.face.split(" ").map(Number);
-		svg.setPointerCapture(pointerId);
-		svg.dataset.held = "";
-	};
-	svg.onpointermove = (/** @type {PointerEvent} */ { clientX, clientY }) => {
-		if (!held) return;
-		const { x, y } = new DOMPoint(clientX, clientY).matrixTransform(svg.getScreenCTM().inverse());
-		move(held, [x + left, bottom + high - y][held[0]]);
-	};
-	svg.onpointerup = svg.onpointercancel = () => {
-		delete svg.dataset.held;
-		if (held) put(room);
-		held = null;
-	};
-	svg.onkeydown = (/** @type {KeyboardEvent} */ event) => {
-		const by = { ArrowLeft: -0.05, ArrowRight: 0.05, ArrowDown: -0.05, ArrowUp: 0.05 }[event.key];
-		if (!by) return;
-		event.preventDefault();
-		svg.dataset.held = "";
-		const [axis, end] = [/Left|Right/.test(event.key) ? 0 : 1, event.shiftKey ? 1 : 0];
-		move([axis, end], room[end][axis] + by);
-	};
-	svg.onkeyup = (/** @type {KeyboardEvent} */ { key }) => {
-		if (!key.startsWith("Arrow")) return;
-		delete svg.dataset.held;
-		put(room);
-	};
-	// The key may be let go elsewhere.
-	svg.onblur = () => delete svg.dataset.held;
-	place();
-}
-
-const CONTROLS = "button, input, select, [tabindex]";
-const SCROLLING = ".cams-scroll, .in-scroll, .open-list";
-
 /** @param {Context} context */
 export function mountOpening({ store, actions }) {
 	const dialog = /** @type {any} */ (one("dialog.opener"));
@@ -162,7 +92,7 @@ export function mountOpening({ store, actions }) {
 	let sending = null;
 	/** What was dropped and is on its way: all is looked into when the last of it is here. */
 	let under = 0;
-	let [shown, trouble, turns] = ["", "", 0];
+	let [trouble, turns] = ["", 0];
 	/** What is being wished, one after the other; looking and writing come after it. */
 	let wishing = Promise.resolve();
 
@@ -187,10 +117,12 @@ export function mountOpening({ store, actions }) {
 	}
 
 	async function start() {
-		const { sheet } = await getJson("/api/recordings");
+		const known = await getJson("/api/recordings");
 		if (info) return;
-		show(sheet);
-		if (trouble) dialog.append(h("p", { class: "s-foot say", role: "alert" }, trouble));
+		draw([
+			...startSheet(known),
+			trouble && h("p", { class: "s-foot say", role: "alert" }, trouble),
+		]);
 	}
 
 	/** @param {Server.ImportInfo} next */
@@ -203,7 +135,7 @@ export function mountOpening({ store, actions }) {
 			dialog.close();
 			actions.note("info", `${next.wish.name} was imported`, next.folder);
 		} else {
-			show(next.sheet);
+			draw(draftSheet(next, store.get().schema?.methods ?? {}, (room) => wish({ room })));
 			// It may have been told of before this answer came.
 			void read();
 		}
@@ -227,24 +159,14 @@ export function mountOpening({ store, actions }) {
 	// A server that was started again knows it no more.
 	store.on(["link"], ({ link }) => link === "open" && info && void look(info.key));
 
-	/** @param {string} html */
-	function show(html) {
+	/** @param {Child[]} sheet */
+	function draw(sheet) {
 		const held = document.activeElement;
 		// Whoever types or drags is not disturbed: what he does is sent when he has done it.
 		const types = held instanceof HTMLInputElement && held.value !== held.defaultValue;
 		if ((dialog.contains(held) && types) || one("[data-held]", dialog)) return;
-		if (html !== shown) {
-			const at = all(CONTROLS, dialog).findIndex((control) => control === held);
-			const scrolled = all(SCROLLING, dialog).map(({ scrollTop }) => scrollTop);
-			dialog.innerHTML = shown = html;
-			dialog.classList.toggle("wide", Boolean(info));
-			all(SCROLLING, dialog).forEach((part, k) => (part.scrollTop = scrolled[k] ?? 0));
-			if (at >= 0)
-				((held?.id && document.getElementById(held.id)) || all(CONTROLS, dialog)[at])?.focus();
-			for (const image of all("img", dialog)) image.onerror = () => image.remove();
-			for (const plan of all("[data-plan]", dialog))
-				mountPlan(plan, structuredClone(info?.room ?? []), (room) => wish({ room }));
-		}
+		redraw(dialog, sheet);
+		dialog.classList.toggle("wide", Boolean(info));
 	}
 
 	/** @param {Partial<Server.ImportWish>} changes @param {boolean} [undone] */
@@ -417,7 +339,7 @@ export function mountOpening({ store, actions }) {
 	});
 	dialog.addEventListener("close", () => {
 		// What was sought would take the next Escape for itself.
-		if (!info) dialog.innerHTML = shown = "";
+		if (!info) dialog.replaceChildren();
 	});
 	return {
 		toggle() {

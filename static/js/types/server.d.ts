@@ -564,8 +564,8 @@ declare namespace Server {
 		plan: ImportedPlan | null;
 		/** Where it was written. */
 		folder: string;
-		/** The sheet that shows all this, as HTML. */
-		sheet: string;
+		/** Half width, depth and height of common targets in metres, by their words. */
+		sizes: Record<string, [number, number, number]>;
 	}
 
 	/** What is asked where the files leave open how they are meant. */
@@ -1002,6 +1002,8 @@ declare namespace Server {
 		opened: number;
 		/** Address of its picture; empty where there is none yet. */
 		picture: string;
+		/** Whether it is what is open now. */
+		open: boolean;
 	}
 
 	/** A recording of which runs are kept, or that can be opened. */
@@ -1035,8 +1037,8 @@ declare namespace Server {
 		data: string;
 		/** Bytes on that disk. */
 		free: number;
-		/** The sheet that shows them, as HTML. */
-		sheet: string;
+		/** Bytes that an upload may have. */
+		most: number;
 	}
 
 	/** The volume that people are tracked in. */

@@ -13,7 +13,6 @@ from pathlib import Path
 
 import pytest
 
-from app.web.importing.sheet.start import _ago
 from tests.app.folders import write_crossing
 from tests.library.runs import RECORDING, run
 from tests.studies.small import Serial, definition, made_up
@@ -140,10 +139,3 @@ def test_a_study_tells_every_trial_though_the_clock_goes_back(tmp_path: Path) ->
     assert sorted(heard) == list(range(12))
     assert [one.number for one in sorted(trials, key=lambda one: one.ended)] == list(range(12))
     assert store.status().seconds >= 0.0
-
-
-def test_what_was_opened_tomorrow_was_opened_today() -> None:
-    now = time.time()
-    assert _ago(now + 5 * 86400.0) == "today"
-    assert _ago(now - 1.5 * 86400.0) == "yesterday"
-    assert _ago(now - 5.5 * 86400.0) == "5 days ago"

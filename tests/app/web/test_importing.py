@@ -5,15 +5,12 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Iterator
-from itertools import combinations
 from pathlib import Path
 from typing import Any
 
 import pytest
 from starlette.testclient import TestClient
 
-from app.web.importing.models import ImportInfo
-from app.web.importing.sheet.draft import draft_sheet
 from app.web.server import Settings, create_app
 from tests.app.conftest import ADDRESS, run_is, wait_until
 from tests.io.importing.test_angles import lay_out
@@ -154,7 +151,6 @@ def test_angles_of_which_nothing_tells_the_order_are_asked_for(
     assert info["phase"] == "failed"
     assert "tell their order" in info["error"]
     assert ["zyx", "Rz Ry Rx"] in info["open_turns"]
-    assert 'aria-label="Angles"' in info["sheet"]
     assert "xzy-inverse" in [name for name, _ in info["open_turns"]]
     info = _wish(client, info, turns="xzy-inverse", unit="m")
     assert (info["phase"], info["turns"]) == ("settled", "Rx Rz Ry, into the camera in radians")
@@ -208,7 +204,7 @@ def test_a_folder_that_is_still_being_copied_is_waited_for(
     video.write_bytes(content[: len(content) // 2])
     begun = client.post("/api/import/path", json={"path": "walk"}).json()["draft"]
     address = f"/api/import/{begun['key']}"
-    wait_until(lambda: "cam2.avi is not complete" in client.get(address).json()["sheet"])
+    wait_until(lambda: "cam2.avi is not complete" in client.get(address).json()["under_way"])
     assert client.get(address).json()["phase"] == "reading"
     assert client.post(f"{address}/write", json={"open": False}).status_code == 422
     video.write_bytes(content)
@@ -236,11 +232,11 @@ def test_entrances_and_methods_are_chosen_on_the_sheet(
     assert "has none; name a video" in info["unfit"]["single_view"]["jpda"]
     ((place, sigma),) = info["entrances"]
     assert place == pytest.approx(PLACES[25, 3].tolist(), abs=0.5)
-    assert 'class="entrance suggested"' in info["sheet"]
-    assert "Use it" in info["sheet"]
+    assert info["wish"]["entrances"] == []
+    assert len(info["plan"]["entrances"]) == 1
     methods = {"single_view": None, "fusion_method": "sequential_phd"}
     chosen = _wish(client, info, entrances=[[place, sigma]], methods=methods)
-    assert 'class="entrance"' in chosen["sheet"]
+    assert chosen["wish"]["entrances"] == [[place, sigma]]
     assert chosen["wish"]["methods"] == {"fusion_method": "sequential_phd"}
     wrong = _wish(client, info, methods={"single_view": "guessing"})
     answer = client.post(f"/api/import/{wrong['key']}/write", json={})
@@ -279,7 +275,6 @@ def test_a_recording_is_open_before_its_copies_are_there(
     wait_until(run_is(client, "done"))
     now = client.get(f"/api/import/{info['key']}").json()
     assert now["phase"] == "copying"
-    assert ">Stop<" in now["sheet"]
     key = client.get("/api/state").json()["sequence"]["key"]
     first, own = inside / "cam1.avi", data / "walk-2/cam1.avi"
     assert own.stat().st_ino == first.stat().st_ino
@@ -321,34 +316,6 @@ def test_copying_can_be_stopped(client: TestClient, files: Path, data: Path) -> 
 
 
 @pytest.mark.full
-def test_pairs_of_many_cameras_stand_in_a_square(client: TestClient, files: Path) -> None:
-    info = _settled(client, _send(client, files))
-    assert "pair-grid" not in info["sheet"]
-    many = ImportInfo(**info)
-    names = [f"cam{k}" for k in range(1, 13)]
-    cameras = [many.cameras[0].model_copy(update={"name": name, "key": name}) for name in names]
-    pairs = [
-        many.pairs[0].model_copy(
-            update={
-                "first": a,
-                "second": b,
-                "pixels": 9.5 if b == "cam12" else 1.5,
-                "odd": a == "cam3",
-            }
-        )
-        for a, b in combinations(names, 2)
-    ]
-    sheet = draft_sheet(many.model_copy(update={"cameras": cameras, "pairs": pairs}))
-    grid = sheet[sheet.index("pair-grid") :]
-    assert grid.count("their boxes meet") == 66
-    # what is odd comes first, the farthest apart of it before
-    listed = [part.split("</li>")[0] for part in grid.split("<li")[1:]]
-    assert len(listed) == 8
-    assert listed[0].startswith(' class="w">cam3 – cam12')
-    assert all("cam3 – " in one for one in listed)
-
-
-@pytest.mark.full
 def test_an_import_that_is_given_up_leaves_nothing(
     client: TestClient, files: Path, data: Path
 ) -> None:
@@ -372,7 +339,7 @@ def test_what_cannot_be_imported_is_told(client: TestClient, data: Path, tmp_pat
     info = _settled(client, _send(client, folder))
     assert (info["phase"], info["cameras"]) == ("failed", [])
     assert "no calibration was found" in info["error"]
-    assert "Add a calibration file…" in info["sheet"]
+    assert info["uploaded"]
     written = client.post(f"/api/import/{info['key']}/write", json={})
     assert "No calibration was found" in written.json()["detail"]
     toml(folder)

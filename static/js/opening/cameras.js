@@ -1,0 +1,247 @@
+/** The cameras of an import: a row each, with all that belongs to one and what is odd about it. */
+import { h, icon, show, svg } from "../elements/dom.js";
+import { table } from "../elements/drawn.js";
+import { cut, div, field, numberField, select, small, span, wishing } from "./controls.js";
+
+/** @typedef {Server.ImportInfo} Info */
+/** @typedef {Server.ImportedCamera} Camera */
+
+const HEADS = ["Camera", "Video", "Calibration", "Starts late by, frames", "Detections", "Ready"];
+
+/** All rows, and what is not used, which stays in sight however many cameras there are. @param {Info} info */
+export function camerasTable(info) {
+	const rows = table(
+		"Cameras",
+		HEADS,
+		info.cameras.map((camera, k) => row(info, camera, k)),
+	);
+	rows.className = "cams-in";
+	const left = info.wish.left_out;
+	const words = [
+		...info.files
+			.filter(({ format }) => !format)
+			.map(({ complaint, label }) => complaint || `${label} is not used`),
+		...info.told,
+	].join(" · ");
+	return [
+		div(
+			{ class: "cams-scroll" },
+			rows,
+			left.length > 0 &&
+				h(
+					"p",
+					{ class: "small unused" },
+					`Left out: ${left.join(", ")}`,
+					wishing("Put back", { left_out: [] }),
+				),
+		),
+		words && h("p", { class: "small unused told", title: words, tabindex: 0 }, words),
+	];
+}
+
+/** Whether nothing is to be decided about a camera. @param {Info} info @param {Camera} camera */
+export const isReady = (info, camera) =>
+	!(camera.offset?.sure || missesBoxes(info, camera) || withoutSize(camera));
+
+/** @param {Info} info @param {Camera} camera */
+const missesBoxes = ({ cameras }, { detections }) =>
+	!detections && cameras.some((other) => other.detections);
+
+/** Whether the way its boxes are read leaves none of them. @param {Camera} camera */
+const withoutSize = ({ detections, boxes_per_step }) => Boolean(detections) && !boxes_per_step;
+
+/** @param {string} first @param {string} second @param {string} [whole] */
+const two = (first, second, whole = first) => [cut(first, "", whole), cut(second, "small")];
+
+/** @param {Info} info @param {Camera} camera @param {number} k @returns {(Child | Child[])[]} */
+function row(info, camera, k) {
+	const { key, name, video, detections, frames } = camera;
+	// The file is named for the browser, which shows an address that it has shown before as it was.
+	const query = new URLSearchParams({ camera: key, of: video });
+	return [
+		div(
+			{ class: "pic" },
+			span(
+				{ class: "shot" },
+				span({ class: "blank" }, icon("i-folder")),
+				video && h("img", { src: `/api/import/${info.key}/picture?${query}`, alt: "" }),
+			),
+			field(
+				`in-name-${k}`,
+				`Name of ${key}`,
+				name,
+				{ names: { ...info.wish.names, [key]: "$" } },
+				{ maxlength: 60 },
+			),
+		),
+		two(
+			video || "no video",
+			`${frames ? `${frames} frames · ${show(camera.fps)} fps · ` : ""}${camera.width} × ${camera.height}`,
+		),
+		two(camera.calibration, `${key} · ${info.unit} → m`),
+		sync(info, camera, k),
+		detections
+			? two(
+					short(info, detections),
+					`${show(camera.boxes_per_step)} boxes a step · ${camera.boxes_format}`,
+					detections,
+				)
+			: [
+					span({ class: missesBoxes(info, camera) ? "missing" : "small" }, "none found"),
+					small(video ? "a video only" : ""),
+				],
+		stateOf(info, camera, k),
+	];
+}
+
+/** A file without its folders, as far as cameras stay told apart. @param {Info} info @param {string} label */
+function short({ cameras }, label) {
+	const others = cameras.map(({ detections }) => detections).filter((other) => other !== label);
+	const end = (/** @type {string} */ path, /** @type {number} */ count) =>
+		path.split("/").slice(-count).join("/");
+	for (let count = 1; count < label.split("/").length; count += 1)
+		if (others.every((other) => end(other, count) !== end(label, count))) return end(label, count);
+	return label;
+}
+
+/** @param {Info} info @param {Camera} camera @param {number} k */
+function sync(info, { key, name, seconds_late, offset }, k) {
+	const { fps, wish } = info;
+	const late = Math.round(seconds_late * fps * 10) / 10;
+	const offsets = (/** @type {number | string} */ to) => ({
+		offsets: { ...wish.offsets, [key]: to },
+	});
+	const step = (/** @type {string} */ sign, /** @type {number} */ by, /** @type {string} */ word) =>
+		h(
+			"button",
+			{
+				"data-wish": JSON.stringify(offsets(-(late + by) / fps)),
+				"aria-label": `${name}: a frame ${word}`,
+			},
+			sign,
+		);
+	const words = offset
+		? `Agreement over the offset, best ${(late + offset.steps).toFixed(1)} frames late`
+		: "Nothing to compare";
+	return div(
+		{ class: "sync" },
+		span(
+			{ class: "stepper" },
+			step("−", -1, "less"),
+			numberField(
+				`in-late-${k}`,
+				`${name} starts late by, frames`,
+				late,
+				offsets("#"),
+				{ "data-scale": -1 / fps },
+				Number.isInteger(late) ? 0 : 1,
+			),
+			step("+", 1, "more"),
+		),
+		curve(offset, late, words),
+	);
+}
+
+/** @param {string} words @param {...(Child)} buttons */
+const fault = (words, ...buttons) =>
+	div(
+		{ class: "fault" },
+		icon("i-warn", "s"),
+		span({}, words),
+		span({ class: "group" }, ...buttons),
+	);
+
+/** @param {Info} info @param {Camera} camera @param {number} k */
+function stateOf(info, camera, k) {
+	const { offset, key, name } = camera;
+	const { wish, fps, offered } = info;
+	if (offset?.sure) {
+		const late = camera.seconds_late * fps + offset.steps;
+		const whole = Math.abs(late).toFixed(0);
+		return fault(
+			`starts ${whole} frames ${late > 0 ? "late" : "early"}`,
+			wishing(`Apply ${late < 0 ? "−" : ""}${whole}`, {
+				offsets: { ...wish.offsets, [key]: -late / fps },
+			}),
+		);
+	}
+	if (withoutSize(camera))
+		return fault(
+			"none of its boxes is left as they are read",
+			(wish.boxes || wish.first_index !== null) &&
+				wishing("As found", { boxes: null, normalised: null, first_index: null }),
+		);
+	if (missesBoxes(info, camera))
+		return fault(
+			"without boxes it cannot help",
+			offered.length > 0 &&
+				select(
+					`in-boxes-${k}`,
+					`Boxes of ${name}`,
+					[["", "Choose…"], ...offered.map((one) => /** @type {const} */ ([one, one]))],
+					"",
+					{ files: [...wish.files, [key, "$"]] },
+				),
+			wishing("Leave out", { left_out: [...wish.left_out, key] }, ""),
+		);
+	return span({ class: "okay" }, icon("i-tick"), "ready");
+}
+
+/* ---------- How well a camera agrees with the others when it is shifted. */
+
+const [WIDTH, HEIGHT] = [140, 42];
+const BASE = HEIGHT - 12.5;
+
+/** Frames on either side that a curve shows at least. */
+const REACH = 30;
+
+/**
+ * @param {Server.ImportedOffset | null} found  beyond what it is shifted by
+ * @param {number} late  frames, that it is shifted by
+ * @param {string} words  what the picture says
+ */
+const curve = (found, late, words) =>
+	svg(
+		"svg",
+		{ class: "curve", role: "img", "aria-label": words, viewBox: `0 0 ${WIDTH} ${HEIGHT}` },
+		svg("path", { class: "base", d: `M0 ${BASE}h${WIDTH}` }),
+		found
+			? agreement(found, late)
+			: svg("text", { x: WIDTH / 2, y: BASE - 6 }, "nothing to compare"),
+	);
+
+/** @param {Server.ImportedOffset} found @param {number} late */
+function agreement({ steps, offsets, agreement, sure }, late) {
+	const reach = Math.max(REACH, Math.ceil(Math.abs(steps) + 5));
+	const across = (/** @type {number} */ by) => WIDTH / 2 + (by / reach) * (WIDTH / 2 - 6);
+	const near = offsets.flatMap((offset, k) => {
+		const value = agreement[k];
+		return value !== null && Math.abs(offset) <= reach ? [{ offset, value }] : [];
+	});
+	const values = near.map(({ value }) => value);
+	const low = values.length ? Math.min(...values) : 0;
+	const span = (values.length ? Math.max(...values) : 1) - low || 1;
+	const points = near.map(({ offset, value }) => [
+		across(offset),
+		BASE - 2 - ((value - low) / span) * (BASE - 6),
+	]);
+	const label = (/** @type {number} */ by, anchor = "middle", x = across(by)) =>
+		svg(
+			"text",
+			{ x, y: HEIGHT - 2, "text-anchor": anchor },
+			(late + by).toFixed(0).replace("-", "−"),
+		);
+	return [
+		svg("polyline", {
+			points: points.map(([x, y]) => `${x.toFixed(1)},${y.toFixed(1)}`).join(" "),
+			class: sure && "sure",
+		}),
+		svg("path", { class: "now", d: `M${across(0)} 2V${BASE}` }),
+		label(-reach, "start", 0),
+		label(0),
+		label(reach, "end", WIDTH),
+		sure &&
+			svg("circle", { cx: across(steps), cy: Math.min(4, ...points.map(([, y]) => y)), r: 3 }),
+		sure && label(steps),
+	];
+}

@@ -1,0 +1,148 @@
+/** The sheet once files are there: cameras, room, checks, target, and what happens next. */
+import { h, icon, show } from "../elements/dom.js";
+import { many, size } from "../library/words.js";
+import { camerasTable, isReady } from "./cameras.js";
+import { CALIBRATIONS, button, capital, close, cut, div, field, grow, span } from "./controls.js";
+import { anglesChoice, checksPart, roomPart, targetPart } from "./settings.js";
+
+/**
+ * @param {Server.ImportInfo} info
+ * @param {Record<string, string[]>} methods  that there are
+ * @param {(room: Server.ImportWish["room"]) => void} moved  the room's faces
+ */
+export function draftSheet(info, methods, moved) {
+	const asked = anglesChoice(info);
+	return [
+		head(info),
+		...(info.cameras.length
+			? [
+					...camerasTable(info),
+					div(
+						{ class: "in-body" },
+						roomPart(info, moved),
+						checksPart(info),
+						targetPart(info, methods),
+					),
+				]
+			: [
+					files(info),
+					asked && div({ class: "in-asked" }, asked),
+					!info.busy && ["failed", "settled"].includes(info.phase) && adding(info),
+				]),
+		foot(info),
+	];
+}
+
+/** @param {Server.ImportInfo} info */
+function head({ files, frames, cameras, fps, wish, uploaded, phase }) {
+	const used = files.filter(({ format }) => format).length;
+	const facts = frames
+		? `${cameras.length} cameras · ${show(fps)} Hz · ${frames} steps · ${(frames / fps).toFixed(1)} s · ${used} of ${files.length} files used`
+		: files.length
+			? many(files.length, "file")
+			: "";
+	return h(
+		"header",
+		{ class: "s-head" },
+		button(icon("i-prev"), "give-up", "icon start", { "aria-label": "Back to recent" }),
+		h("h2", {}, "Import"),
+		field("in-name", "Name", wish.name, { name: "$" }, { maxlength: 80 }),
+		cut(facts, "sub"),
+		grow(),
+		uploaded && phase !== "uploading" && button("Add files…", "files", ""),
+		close(),
+	);
+}
+
+/** @param {Server.ImportInfo} info */
+const files = ({ files, coming }) =>
+	div(
+		{ class: "in-scroll in-files", tabindex: 0 },
+		files.map(({ label, complaint, format }) => {
+			const why = complaint.startsWith(`${label}: `)
+				? complaint.slice(label.length + 2)
+				: complaint;
+			return h("p", {}, h("b", {}, label), ` ${why || format || "is not used"}`);
+		}),
+		coming.map((name) => h("p", { class: "coming" }, cut(name))),
+	);
+
+/** What may be missing where the files give no camera, and the way to add it. @param {Server.ImportInfo} info */
+const adding = ({ uploaded }) =>
+	div(
+		{ class: "in-asked in-add" },
+		h(
+			"p",
+			{},
+			`Cameras need a calibration: ${CALIBRATIONS}.`,
+			!uploaded && " Put its file into the folder and open the folder again.",
+		),
+		uploaded && button("Add a calibration file…", "files"),
+	);
+
+/** How far copying is. @param {Server.ImportInfo} info */
+const copying = ({ copied, bytes, megabytes_per_second: speed }) =>
+	copied ? `, ${size(copied)} of ${size(bytes)} copied, ${speed.toFixed(0)} MB/s` : "";
+
+/** What there is to say now. @param {Server.ImportInfo} info @param {number} done  cameras that are ready @param {number} odd  things to decide */
+function stateOf(info, done, odd) {
+	if (info.error) return capital(info.error);
+	switch (info.phase) {
+		case "uploading":
+			return "Uploading";
+		case "reading":
+			return info.under_way || "Reading the files";
+		case "writing":
+			return `Writing the recording${copying(info)}`;
+		case "copying":
+			return `It is open${copying(info)}; until then the files are links`;
+	}
+	// What is odd is not known yet while something is looked at.
+	const things = info.busy
+		? info.under_way
+			? `looking at the ${info.under_way}`
+			: "looking again"
+		: odd
+			? `${many(odd, "thing")} to decide`
+			: "nothing to decide";
+	return `${done} of ${info.cameras.length} cameras ready, ${things}. Nothing is written before you import.`;
+}
+
+/** @param {Server.ImportInfo} info */
+function foot(info) {
+	const { phase, busy, cameras, checks, copied, bytes, received } = info;
+	const done = cameras.filter((camera) => isReady(info, camera)).length;
+	const warnings = checks.filter(({ status }) => status === "warning").length;
+	const odd = Math.max(warnings + Number(Boolean(info.undecided)), cameras.length - done);
+	const kind = info.error ? "bad" : busy || phase !== "settled" ? "busy" : odd ? "warn" : "good";
+	const words = stateOf(info, done, odd);
+	const uploads = phase === "uploading";
+	const moving = uploads || (["writing", "copying"].includes(phase) && copied > 0);
+	const part = Math.min(1, bytes ? (uploads ? received : copied) / bytes : 1);
+	const pictured = cameras.every(({ video, detections }) => video || detections);
+	const disabled = phase !== "settled" || !pictured || Boolean(info.undecided);
+	const stops = ["uploading", "writing", "copying"].includes(phase);
+	return h(
+		"footer",
+		{ class: "s-foot" },
+		span({ class: `dot ${kind}` }),
+		span(
+			{
+				class: "bar",
+				role: "progressbar",
+				"aria-label": uploads ? "Upload" : "Copy",
+				"aria-valuemin": 0,
+				"aria-valuemax": 100,
+				"aria-valuenow": Math.round(100 * part),
+				"--part": part.toFixed(4),
+				hidden: !moving,
+			},
+			h("i"),
+		),
+		span({ class: "cut say", role: "status", title: words }, words),
+		grow(),
+		button(stops ? "Stop" : "Cancel", "give-up", "tall"),
+		button("Only import", "import", "box tall", { disabled }),
+		button(["Import and track", h("kbd", {}, "Ctrl ↵")], "track", "main tall", { disabled }),
+	);
+}

@@ -1,0 +1,192 @@
+/** The room of an import from above: the box around it, whose faces are dragged or moved by arrows. */
+import { all, one, svg, write } from "../elements/dom.js";
+
+/** About how many pixels the plan has; lengths of its signs are by these. */
+const SIZE = [330, 360];
+
+/** How long a camera is in the plan: metres, and at least so many pixels. */
+const CAMERA = [0.7, 18];
+
+/** Of a length or a place in the plan: to the millimetre. @param {number} value */
+const mm = (value) => value.toFixed(3);
+
+/**
+ * In metres, y up.
+ * @param {Server.ImportInfo} info @param {string} words  what it says
+ * @param {(room: Server.ImportWish["room"]) => void} moved  where its faces are when they are let go
+ */
+export function planPicture(info, words, moved) {
+	const { plan, room, wish } = info;
+	const named = { class: "plan", role: "img", "aria-label": words };
+	if (!plan || !room) return svg("svg", named);
+	const [wide, high] = [plan.width * plan.cell, plan.height * plan.cell];
+	const pixel = Math.max(wide / SIZE[0], high / SIZE[1]);
+	const at = (/** @type {number} */ x, /** @type {number} */ y) => [
+		x - plan.x,
+		high - (y - plan.y),
+	];
+	const drawing = svg(
+		"svg",
+		{
+			...named,
+			tabindex: 0,
+			viewBox: `0 0 ${mm(wide)} ${mm(high)}`,
+			"--pixel": `${pixel.toFixed(5)}px`,
+		},
+		tint(plan),
+		svg("path", {
+			class: "feet",
+			d: plan.feet.map(([x, y]) => `M${at(x, y).map(mm).join(" ")}h0`).join(""),
+		}),
+		plan.entrances.map(([x, y, width, depth]) => {
+			const [cx, cy] = at(x, y).map(mm);
+			// Hollow while it is only suggested.
+			return svg("ellipse", {
+				class: wish.entrances.length ? "entrance" : "entrance suggested",
+				cx,
+				cy,
+				rx: mm(Math.max(width, 4 * pixel)),
+				ry: mm(Math.max(depth, 4 * pixel)),
+			});
+		}),
+		plan.cameras.flatMap(([x, y, way, half], k) => {
+			const [u, v] = at(x, y);
+			const length = Math.max(CAMERA[0], CAMERA[1] * pixel);
+			const ends = [-half, half].map(
+				(turn) =>
+					`L${mm(u + length * Math.cos(way + turn))} ${mm(v - length * Math.sin(way + turn))}`,
+			);
+			const name = info.cameras[k]?.name ?? "";
+			const side = Math.min(3.5 * name.length * pixel, wide / 2);
+			return [
+				svg("path", { class: "camera", d: `M${mm(u)} ${mm(v)}${ends.join("")}z` }),
+				svg(
+					"text",
+					{
+						x: mm(Math.min(Math.max(u, side), wide - side)),
+						y: mm(Math.min(Math.max(v - 4 * pixel, 12 * pixel), high - 4 * pixel)),
+					},
+					name,
+				),
+			];
+		}),
+		svg("rect", { class: "box" }),
+		[0, 1].flatMap((axis) =>
+			[0, 1].map((end) => {
+				const [x, y] = axis ? [13, 4] : [4, 13];
+				return svg("rect", {
+					class: "grip",
+					"data-face": `${axis} ${end}`,
+					x: -x * pixel,
+					y: -y * pixel,
+					width: 2 * x * pixel,
+					height: 2 * y * pixel,
+					rx: 3 * pixel,
+				});
+			}),
+		),
+		svg("text", { class: "length" }),
+		svg("text", { class: "length" }),
+		svg("path", {
+			class: "scale",
+			d: `M${mm(wide - 1 - 8 * pixel)} ${mm(high - 10 * pixel)}h1`,
+		}),
+		svg("text", { x: wide - 0.5 - 8 * pixel, y: high - 14 * pixel }, "1 m"),
+	);
+	mountFaces(drawing, room, at, moved);
+	return drawing;
+}
+
+/** The floor by how many cameras see it: cells of a row that are alike in one piece. @param {Server.ImportedPlan} plan */
+function tint({ seen, width, height, cell }) {
+	const pieces = ["", "", "", "", ""];
+	for (let row = 0; row < height; row += 1) {
+		const count = (/** @type {number} */ column) => Math.min(4, seen[row * width + column]);
+		const top = mm((height - 1 - row) * cell);
+		for (let column = 0, end = 0; column < width; column = end) {
+			while (end < width && count(end) === count(column)) end += 1;
+			const length = (end - column) * cell;
+			pieces[count(column)] +=
+				`M${mm(column * cell)} ${top}h${mm(length)}v${mm(cell)}h${mm(-length)}z`;
+		}
+	}
+	return pieces.map((d, k) => k > 0 && d && svg("path", { class: `floor seen-${k}`, d }));
+}
+
+/**
+ * @param {SVGSVGElement} drawing
+ * @param {[number, number, number][]} room  lowest and highest corner
+ * @param {(x: number, y: number) => number[]} at  where a place is drawn
+ * @param {(room: any) => void} moved  the corners, when they are let go
+ */
+function mountFaces(drawing, room, at, moved) {
+	/** As it is dragged. */
+	let now = structuredClone(room);
+	/** @type {number[] | null} */
+	let held = null;
+
+	function place() {
+		const [[x, v], [u, y]] = [at(now[0][0], now[0][1]), at(now[1][0], now[1][1])];
+		const [width, height] = [u - x, v - y];
+		for (const [name, value] of Object.entries({ x, y, width, height }))
+			one(".box", drawing).setAttribute(name, String(value));
+		for (const grip of all(".grip", drawing)) {
+			const [axis, end] = (grip.dataset.face ?? "").split(" ").map(Number);
+			const to = axis ? [x + width / 2, end ? y : v] : [end ? u : x, y + height / 2];
+			grip.setAttribute("transform", `translate(${to})`);
+		}
+		all(".length", drawing).forEach((text, axis) => {
+			write(text, `${(now[1][axis] - now[0][axis]).toFixed(2)} m`);
+			const to = axis ? [u - width * 0.16, y + height / 2] : [x + width / 2, y + height * 0.1];
+			text.setAttribute("transform", `translate(${to})`);
+		});
+	}
+
+	/** What was let go before and not taken is forgotten. */
+	function hold() {
+		if (!("held" in drawing.dataset)) now = structuredClone(room);
+		drawing.dataset.held = "";
+	}
+
+	/** @param {number[]} face  axis and end @param {number} to */
+	function move([axis, end], to) {
+		const rounded = Math.round(to * 20) / 20;
+		if (end ? rounded > now[0][axis] : rounded < now[1][axis]) now[end][axis] = rounded;
+		place();
+	}
+	drawing.onpointerdown = ({ target, pointerId }) => {
+		const { face } = /** @type {SVGElement} */ (target).dataset;
+		if (!face) return;
+		held = face.split(" ").map(Number);
+		drawing.setPointerCapture(pointerId);
+		hold();
+	};
+	drawing.onpointermove = ({ clientX, clientY }) => {
+		const matrix = held && drawing.getScreenCTM()?.inverse();
+		if (!held || !matrix) return;
+		const { x, y } = new DOMPoint(clientX, clientY).matrixTransform(matrix);
+		const [left, top] = at(0, 0);
+		move(held, [x - left, top - y][held[0]]);
+	};
+	drawing.onpointerup = drawing.onpointercancel = () => {
+		delete drawing.dataset.held;
+		if (held) moved(now);
+		held = null;
+	};
+	drawing.onkeydown = (event) => {
+		const by = { ArrowLeft: -0.05, ArrowRight: 0.05, ArrowDown: -0.05, ArrowUp: 0.05 }[event.key];
+		if (!by) return;
+		event.preventDefault();
+		hold();
+		const [axis, end] = [/Left|Right/.test(event.key) ? 0 : 1, event.shiftKey ? 1 : 0];
+		move([axis, end], now[end][axis] + by);
+	};
+	drawing.onkeyup = ({ key }) => {
+		if (!key.startsWith("Arrow")) return;
+		delete drawing.dataset.held;
+		moved(now);
+	};
+	// The key may be let go elsewhere.
+	drawing.onblur = () => delete drawing.dataset.held;
+	place();
+}

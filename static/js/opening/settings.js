@@ -1,0 +1,433 @@
+/** What was found out of an import: room, checks, target; each can be had otherwise. */
+import { h, icon, show } from "../elements/dom.js";
+import { size } from "../library/words.js";
+import {
+	capital,
+	cut,
+	div,
+	grow,
+	heading,
+	numberField,
+	segment,
+	select,
+	small,
+	span,
+	wishing,
+} from "./controls.js";
+import { planPicture } from "./plan.js";
+
+/** @typedef {Server.ImportInfo} Info */
+/** @typedef {[number, number, number]} Vector */
+
+const AXES = ["x", "y", "z"];
+const UPS = ["x", "y", "z", "-x", "-y", "-z"];
+const LAYOUTS = ["ltwh", "xyxy", "yxyx", "cxcywh"];
+
+/** Letters of the folder of recordings; of a longer one the end is shown. */
+const LONGEST_PLACE = 30;
+
+/** Cameras whose pairs are listed one by one; those of more stand in a square. */
+const MOST_LISTED = 6;
+const MOST_WORST = 8;
+
+/** @type {[keyof Server.ImportWish["methods"], string][]} */
+const STAGES = [
+	["single_view", "In each camera"],
+	["fusion_method", "Fusion"],
+	["smoothing_method", "Smoothing"],
+];
+
+const SIGNS = {
+	good: ["tick", "good"],
+	warning: ["warn", "warn"],
+	absent: ["minus", "none"],
+};
+
+/** @param {string} words @param {string} note */
+const label = (words, note) => div({ class: "lab" }, span({}, words), cut(note));
+
+/** Where a value is from. @param {Info} info @param {"up" | "unit"} what */
+function why({ wish, found }, what) {
+	if (wish[what] !== null) return "as you say";
+	const told = found.find(([name]) => name === what)?.[1];
+	if (told === undefined) return "as the file says";
+	const [first] = told.split(";");
+	return `found: ${first.split(", ").slice(1).join(", ") || told}`;
+}
+
+/* ---------- The room from above, its faces, and how the files are read. */
+
+/** @param {Info} info @param {(room: Server.ImportWish["room"]) => void} moved  its faces */
+export function roomPart(info, moved) {
+	const { wish, room } = info;
+	if (!room) return null;
+	const words = AXES.map((axis, k) => `${axis} ${show(room[0][k])} to ${show(room[1][k])} m`);
+	const keys = "Arrows move its near faces, with Shift the far ones";
+	const face = (/** @type {number} */ end, /** @type {number} */ axis) =>
+		numberField(
+			`in-room-${end}-${axis}`,
+			`Room, ${["from", "to"][end]} ${AXES[axis]}, metres`,
+			room[end][axis],
+			{
+				room: room.map((corner, k) =>
+					k === end ? corner.with(axis, /** @type {any} */ ("#")) : corner,
+				),
+			},
+			{ step: 0.05 },
+		);
+	const side = div(
+		{ class: "rf" },
+		div(
+			{},
+			label("From, to", "metres"),
+			div(
+				{ class: "xyz" },
+				AXES.flatMap((letter, axis) => [span({}, letter), face(0, axis), face(1, axis)]),
+			),
+		),
+		div({}, label("Up", why(info, "up")), segment("Up", UPS, info.up, "up")),
+		div(
+			{},
+			label("File's unit", why(info, "unit")),
+			segment("Unit", ["mm", "cm", "m"], info.unit, "unit"),
+		),
+		choice("Poses", "pose", wish.pose, info.pose, ["world-to-camera", "camera-to-world"]),
+		choice("Axes", "axes", wish.axes, info.axes, ["opencv", "opengl"]),
+		choice("Boxes", "boxes", wish.boxes, "", LAYOUTS),
+		anglesChoice(info),
+		choice("First frame", "first_index", wish.first_index, "", ["0", "1"]),
+		entrances(info),
+		div(
+			{},
+			label("Floor seen by", "cameras"),
+			div(
+				{ class: "keyline small" },
+				[1, 2, 3, 4].map((count) =>
+					span({}, h("i", { class: `seen-${count}` }), count < 4 ? count : "4 +"),
+				),
+			),
+		),
+		wish.room && wishing([icon("i-reset", "s"), "As suggested"], { room: null }),
+	);
+	return h(
+		"section",
+		{ "aria-label": "Room" },
+		heading("Room", small("suggested where people were seen or views overlap; drag its faces")),
+		div(
+			{ class: "roomy" },
+			planPicture(info, `Room from above, ${words.join(", ")}. ${keys}`, moved),
+			side,
+		),
+	);
+}
+
+/** Where people come in, as tracks of a first run show it; used where that is wished. @param {Info} info */
+function entrances({ wish: { entrances: used }, entrances: found }) {
+	if (used.length)
+		return div(
+			{ class: "lab" },
+			`${used.length} entrances used`,
+			wishing("Use none", { entrances: [] }),
+		);
+	return (
+		found.length > 0 &&
+		div(
+			{ class: "lab" },
+			"Entrances, where tracks begin",
+			wishing(found.length === 1 ? "Use it" : `Use all ${found.length}`, { entrances: found }),
+		)
+	);
+}
+
+/** How rotations given by three angles are composed, where their names leave it open. @param {Info} info */
+export const anglesChoice = ({ open_turns: open, wish, turns }) =>
+	open.length > 1 && choice("Angles", "turns", wish.turns, turns, open);
+
+/**
+ * A choice among values, each with words of its own or called as it is.
+ * @param {string} words @param {string} what @param {string | number | null} wished
+ * @param {string} found @param {(string | [string, string])[]} values
+ */
+const choice = (words, what, wished, found, values) =>
+	h(
+		"label",
+		{ class: "lab" },
+		words,
+		select(
+			`in-${what}`,
+			words,
+			[
+				["", found && wished === null ? `${found} (found)` : "as found"],
+				...values.map((one) =>
+					typeof one === "string" ? /** @type {[string, string]} */ ([one, one]) : one,
+				),
+			],
+			String(wished ?? ""),
+			{ [what]: what === "first_index" ? "#" : "$" },
+		),
+	);
+
+/* ---------- All checks, what is odd first; the pairs of cameras; the truth. */
+
+/** @param {Info} info */
+export function checksPart(info) {
+	const { checks, under_way: now, truth } = info;
+	const of = (/** @type {Server.ImportedCheck["status"]} */ kind) =>
+		checks.filter(({ status }) => status === kind);
+	const [odd, fine] = [of("warning"), of("good")];
+	return h(
+		"section",
+		{ class: "in-scroll", tabindex: 0, "aria-label": "Checks" },
+		heading(
+			"Checks",
+			small(now ? `looking at the ${now}…` : ""),
+			grow(),
+			small(`${fine.length} fine · ${odd.length} to look at`),
+		),
+		div({ class: "checks" }, undecided(info), [...odd, ...fine, ...of("absent")].map(check)),
+		pairs(info),
+		line(
+			truth ? "good" : "absent",
+			"truth",
+			truth ? `${truth} people: runs are scored against it.` : "None found: runs are not scored.",
+		),
+	);
+}
+
+/** What has to be decided before anything is written, with a button for each way. @param {Info} info */
+function undecided({ undecided: words, question, wish }) {
+	if (!words) return null;
+	if (!question)
+		return line(
+			"warning",
+			"unexplained",
+			words,
+			wishing("Import it as it is", { ...wish, accept_best: true }, "box", {
+				title: "--accept-best",
+			}),
+		);
+	return line(
+		"warning",
+		"open",
+		question.difference,
+		...question.wishes.map((own, k) =>
+			wishing(capital(question.interpretations[k]), { ...own }, "box", {
+				title: question.flags[k],
+			}),
+		),
+	);
+}
+
+/** @param {Server.ImportedCheck} one */
+const check = ({ status, name, sentence, remedy, mend }) =>
+	line(
+		status,
+		name,
+		remedy && !mend ? `${sentence}: ${remedy}` : sentence,
+		mend &&
+			wishing("Apply", { ...mend }, "main", { title: remedy, "aria-label": `Apply ${remedy}` }),
+	);
+
+/** @param {Server.ImportedCheck["status"]} status @param {string} name @param {string} words @param {...Child} more */
+function line(status, name, words, ...more) {
+	const [sign, kind] = SIGNS[status];
+	return div(
+		{ class: "chk" },
+		icon(`i-${sign}`, kind),
+		h("p", {}, h("b", {}, capital(name)), " ", capital(words)),
+		...more,
+	);
+}
+
+/** @param {Server.ImportedPair} pair @param {string} [sign] */
+const pixels = ({ pixels: value }, sign = "") =>
+	value === null ? "none" : `${value.toFixed(1)}${sign}`;
+
+/** @param {Server.ImportedPair} pair */
+const meeting = ({ share }) => `${(100 * share).toFixed(0)} % of their boxes meet`;
+
+/** @param {Info} info */
+function pairs({ pairs: found, cameras }) {
+	if (!found.length) return null;
+	if (cameras.length > MOST_LISTED) return grid(found, cameras);
+	return div(
+		{
+			class: "pairs",
+			role: "group",
+			"aria-label": "How far boxes of two cameras miss each other",
+		},
+		found.map((pair) =>
+			span(
+				{ class: pair.odd && "w", title: meeting(pair) },
+				`${pair.first} – ${pair.second} `,
+				h("b", {}, pixels(pair, " px")),
+			),
+		),
+	);
+}
+
+/** All pairs as a square, pixels without their sign, and the worst beside it. @param {Server.ImportedPair[]} found @param {Server.ImportedCamera[]} cameras */
+function grid(found, cameras) {
+	const of = (/** @type {string} */ one, /** @type {string} */ other) =>
+		found.find(
+			({ first, second }) =>
+				(first === one && second === other) || (first === other && second === one),
+		);
+	const names = cameras.map(({ name }) => name);
+	const worst = [...found].sort(
+		(a, b) => Number(b.odd) - Number(a.odd) || (b.pixels ?? 0) - (a.pixels ?? 0),
+	);
+	return div(
+		{ class: "pair-grid" },
+		h(
+			"table",
+			{ "aria-label": "How far boxes of two cameras miss each other, pixels" },
+			h(
+				"thead",
+				{},
+				h(
+					"tr",
+					{},
+					h("td"),
+					names.map((title, k) => h("th", { title }, k + 1)),
+				),
+			),
+			h(
+				"tbody",
+				{},
+				names.map((name, k) =>
+					h(
+						"tr",
+						{},
+						h("th", { scope: "row" }, `${k + 1} ${name}`),
+						names.slice(0, k).map((other) => {
+							const pair = of(name, other);
+							const words = pair ? meeting(pair) : "nothing to compare";
+							return h(
+								"td",
+								{ class: pair?.odd && "w", title: `${name} – ${other}: ${words}` },
+								pair && pixels(pair),
+							);
+						}),
+					),
+				),
+			),
+		),
+		div(
+			{},
+			small("worst first"),
+			h(
+				"ol",
+				{},
+				worst
+					.slice(0, MOST_WORST)
+					.map((pair) =>
+						h(
+							"li",
+							{ class: pair.odd && "w" },
+							`${pair.first} – ${pair.second} `,
+							h("b", {}, pixels(pair, " px")),
+						),
+					),
+			),
+		),
+	);
+}
+
+/* ---------- What is tracked, where the recording is kept, and what it is tracked with. */
+
+/** @param {Info} info @param {Record<string, string[]>} methods  that there are */
+export function targetPart(info, methods) {
+	const { half_extents: half, suggested_half_extents: suggested, sizes } = info;
+	if (!half || !suggested) return null;
+	/** @type {[string, Vector, Vector | null][]} */
+	const rows = [
+		["Suggested", suggested, null],
+		...Object.entries(sizes).map(
+			([words, own]) => /** @type {[string, Vector, Vector]} */ ([words, own, own]),
+		),
+	];
+	const pressed = rows.findIndex(([, own]) =>
+		own.every((side, k) => Math.abs(side - half[k]) < 2e-3),
+	);
+	return h(
+		"section",
+		{ class: "in-scroll", tabindex: 0, "aria-label": "Target and place" },
+		heading("Target"),
+		div(
+			{ class: "choices" },
+			rows.map(([words, own, value], k) =>
+				chosen(words, `${own.map((side) => (2 * side).toFixed(2)).join(" × ")} m`, k === pressed, {
+					half_extents: value,
+				}),
+			),
+			div(
+				{ class: "choice own", "aria-current": pressed < 0 && "true" },
+				h("b", {}, "Own size"),
+				span(
+					{},
+					["Width", "Depth", "Height"].map((words, axis) =>
+						numberField(
+							`in-size-${axis}`,
+							`${words} of the target, metres`,
+							2 * half[axis],
+							{ half_extents: half.with(axis, /** @type {any} */ ("#")) },
+							{ "data-scale": 0.5, step: 0.01, min: 0.02 },
+						),
+					),
+				),
+			),
+		),
+		heading("Kept"),
+		kept(info),
+		heading("Then track with"),
+		h(
+			"p",
+			{},
+			info.has_boxes
+				? "By the boxes: no templates are needed."
+				: "By what moves, until boxes are dragged on the pictures for colours.",
+		),
+		STAGES.map(([key, words]) => {
+			const fits = info.fitting[key];
+			return h(
+				"label",
+				{ class: "lab" },
+				words,
+				select(
+					`in-${key}`,
+					words,
+					[
+						["", fits ? `${fits} (fits)` : "as found"],
+						...(methods[key] ?? []).map((one) => /** @type {const} */ ([one, one])),
+					],
+					info.wish.methods[key] ?? "",
+					{ methods: { ...info.wish.methods, [key]: "$" } },
+					info.unfit[key],
+				),
+			);
+		}),
+	);
+}
+
+/** @param {string} words @param {string} value @param {boolean} pressed @param {Record<string, unknown>} wish @param {string} [note] */
+const chosen = (words, value, pressed, wish, note) =>
+	h(
+		"button",
+		{ class: "choice", "aria-pressed": String(pressed), "data-wish": JSON.stringify(wish) },
+		h("b", {}, words),
+		span({}, value),
+		note && small(note),
+	);
+
+/** @param {Info} info */
+function kept({ uploaded, bytes, free, home, wish: { copy_files: copies } }) {
+	const place = home.length > LONGEST_PLACE ? `…${home.slice(1 - LONGEST_PLACE)}` : home;
+	const there = `${size(free)} free there`;
+	if (uploaded) return h("p", { title: home }, `${size(bytes)} uploaded to ${place}, ${there}.`);
+	return div(
+		{ class: "choices" },
+		chosen("Link", "", !copies, { copy_files: false }, "The videos stay where they are."),
+		chosen("Copy", size(bytes), copies, { copy_files: true }, `Into ${place}, ${there}.`),
+	);
+}
