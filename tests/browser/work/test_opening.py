@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from collections.abc import Iterator
+from itertools import combinations
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Browser, Page, Route, expect
 
 from tests.browser.access.test_accessibility import found
 from tests.browser.conftest import opened
 from tests.browser.serving import Server
 from tests.browser.walkers import write_walkers
+from tests.io.importing.test_angles import lay_out
 from tests.io.read.recorded import detections, toml, videos
 
 LONG = 300_000
@@ -306,3 +309,58 @@ def test_nothing_serious_stands_in_the_way_of_anybody(flat_page: Page, files: Pa
                 .map((part) => part.outerHTML.slice(0, 120))"""
         )
         assert wider == [], size
+
+
+def test_pairs_of_many_cameras_stand_in_a_square(flat_page: Page, files: Path) -> None:
+    """What is odd comes first, the farthest apart of it before."""
+    page = flat_page
+    names = [f"cam{number}" for number in range(1, 13)]
+
+    def of_twelve(route: Route) -> None:
+        answer = route.fetch()
+        told = answer.json()
+        info = told.get("draft") or told
+        if info.get("pairs"):
+            (camera, *_), (pair, *_) = info["cameras"], info["pairs"]
+            info["cameras"] = [{**camera, "name": name, "key": name} for name in names]
+            info["pairs"] = [
+                {
+                    **pair,
+                    "first": a,
+                    "second": b,
+                    "pixels": 9.5 if b == "cam12" else 1.5,
+                    "odd": a == "cam3",
+                }
+                for a, b in combinations(names, 2)
+            ]
+        route.fulfill(response=answer, json=told)
+
+    page.route(re.compile("/api/import/[^/?]+(/arrived|/wish)?$"), of_twelve)
+    drop(page, files)
+    settled(page)
+    grid = page.locator(".opener .pair-grid")
+    expect(grid.locator("td[title*='their boxes meet']")).to_have_count(66)
+    listed = grid.locator("li")
+    expect(listed).to_have_count(8)
+    expect(listed.first).to_have_text("cam3 – cam12 9.5 px")
+    expect(grid.locator("li.w", has_text="cam3 – ")).to_have_count(8)
+
+
+def test_what_the_files_leave_open_is_asked_for(flat_page: Page, tmp_path: Path) -> None:
+    """A calibration where there is none, and how angles are meant that no video shows."""
+    page = flat_page
+    alone, angles = tmp_path / "alone", tmp_path / "angles"
+    for folder in (alone, angles):
+        folder.mkdir()
+    detections(alone)
+    lay_out(angles, "into the camera", seen=False)
+    sheet = page.locator("dialog.opener")
+    drop(page, alone)
+    expect(sheet.get_by_role("button", name="Add a calibration file…")).to_be_visible(timeout=LONG)
+    sheet.get_by_role("button", name="Back to recent").click()
+    sheet.locator("#open-path").fill(str(angles))
+    page.keyboard.press("Enter")
+    expect(sheet.get_by_label("Angles")).to_be_visible(timeout=LONG)
+    expect(sheet.locator(".say")).to_contain_text("tell their order")
+    sheet.get_by_role("button", name="Cancel").click()
+    expect(sheet).to_contain_text("Open a recording")

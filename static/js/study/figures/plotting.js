@@ -15,17 +15,15 @@ let reading = null;
 
 /** Read when the first figure is wanted: it is larger than all else of the page. */
 function plotly() {
-	reading ??= new Promise((resolve, reject) => {
-		const script = h("script", { src: "/plotly/plotly.min.js" });
-		script.onload = () => resolve(/** @type {any} */ (window).Plotly);
-		script.onerror = () => {
-			reading = null;
-			reject(new Error("The figures could not be read."));
-		};
-		document.head.append(
-			...STYLED.map((id) => h("meta", { id, class: "no-inline-styles" })),
-			script,
-		);
+	reading ??= (async () => {
+		document.head.append(...STYLED.map((id) => h("meta", { id, class: "no-inline-styles" })));
+		// By name, for nothing of it is known to the compiler.
+		const address = "/plotly/plotly.min.js";
+		await import(address);
+		return /** @type {any} */ (window).Plotly;
+	})().catch(() => {
+		reading = null;
+		throw new Error("The figures could not be read.");
 	});
 	return reading;
 }
