@@ -357,7 +357,9 @@ def test_the_page_and_its_files_are_checked_by_their_etag(client: TestClient) ->
         assert answer.headers["cache-control"] == "no-cache"
         again = client.get(path, headers={"if-none-match": answer.headers["etag"]})
         assert again.status_code == 304
-    assert "script-src 'self';" in client.get("/").headers["content-security-policy"]
+    policy = client.get("/").headers["content-security-policy"]
+    assert "script-src 'self';" in policy
+    assert policy.endswith("require-trusted-types-for 'script'; trusted-types 'none'")
 
 
 @pytest.mark.full

@@ -206,7 +206,7 @@ def test_what_is_changed_is_looked_into_again(flat_page: Page, files: Path) -> N
     seated.click()
     expect(seated).to_have_attribute("aria-pressed", "true")
     settled(page)  # what is looked into again may suggest another room
-    plan = sheet.locator("[data-plan]")
+    plan = sheet.locator(".plan")
     before = sheet.get_by_label("Room, to x, metres").input_value()
     plan.focus()
     page.keyboard.press("Shift+ArrowRight")
