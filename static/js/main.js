@@ -1,6 +1,6 @@
 /** Wires the page: one store, one socket, one playback, and the panes that look at them. */
 import { mountCameras } from "./cameras/cameras.js";
-import { one, mountTips } from "./elements/dom.js";
+import { one } from "./elements/dom.js";
 import { mountSide } from "./inspector/side.js";
 import { mountDoor, mountControls, pressed } from "./panes/controls.js";
 import { mountLayout } from "./panes/layout.js";
@@ -59,7 +59,6 @@ mountCameras(one(".cams"), context);
 mountSide(one(".side"), context);
 const timeline = mountTimeline(one(".time"), context);
 mountDoor(context);
-mountTips();
 mountLayout(context);
 /**
  * What is read after the first picture, or when it is first wanted; what it brings may be asked for

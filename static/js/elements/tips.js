@@ -1,0 +1,65 @@
+/** The one tip of the page: what a control does, its key, and why it cannot be pressed. */
+import { fill, h } from "./dom.js";
+
+/** A pointer rests on a control for so long before its tip comes, milliseconds. */
+const AFTER = 350;
+/** CSS pixels from a control to its tip, and from there to the edges of the window. */
+const [AWAY, RIM] = [6, 4];
+
+export function mountTips() {
+	const tip = h("div", { class: "tip", popover: "manual", role: "tooltip" });
+	document.body.append(tip);
+	/** Whose tip is there, or will be. @type {HTMLElement | null} */
+	let over = null;
+	/** Who came by Tab asks what a control is; who gets the focus back from a dialog does not. */
+	let tabbed = false;
+	/** @type {Timer} */
+	let waiting;
+
+	function hide() {
+		clearTimeout(waiting);
+		over = null;
+		if (tip.matches(":popover-open")) tip.hidePopover();
+	}
+	/** @param {HTMLElement} control */
+	function show(control) {
+		if (!control.checkVisibility()) return hide();
+		const { tip: words = "", key = "" } = control.dataset;
+		fill(tip, [words, key && h("span", { class: "key" }, key), control.ariaDescription]);
+		tip.showPopover();
+		const at = control.getBoundingClientRect();
+		const { width, height } = tip.getBoundingClientRect();
+		const left = at.left + (at.width - width) / 2;
+		const below = at.bottom + AWAY;
+		tip.style.left = `${Math.max(RIM, Math.min(innerWidth - width - RIM, left))}px`;
+		tip.style.top = `${below + height + RIM > innerHeight ? at.top - AWAY - height : below}px`;
+	}
+	/** @param {EventTarget | null} target @param {number} after */
+	function ask(target, after) {
+		const control = /** @type {HTMLElement | null} */ (
+			target instanceof Element ? target.closest("[data-tip]") : null
+		);
+		if (control === over) return;
+		hide();
+		// Who is there needs no word on where it leads.
+		if (!control || control.ariaCurrent === "page") return;
+		over = control;
+		waiting = setTimeout(show, after, control);
+	}
+	document.addEventListener(
+		"pointerover",
+		({ target, pointerType }) => pointerType !== "touch" && ask(target, AFTER),
+	);
+	document.addEventListener("focusin", ({ target }) => tabbed && ask(target, 0));
+	document.addEventListener("focusout", hide);
+	document.documentElement.addEventListener("pointerleave", hide);
+	for (const kind of ["pointerdown", "wheel"]) document.addEventListener(kind, hide, true);
+	document.addEventListener(
+		"keydown",
+		({ key }) => {
+			tabbed = key === "Tab";
+			hide();
+		},
+		true,
+	);
+}
