@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from app.errors import sentence
-from app.state.snapshot import Change, Snapshot
+from app.state.snapshot import DRAG_SECONDS, PRESET_ORIGIN, Change, Snapshot
 from app.state.workbench import Workbench
 from tracker.corrections import Correction, CorrectionError
 from tracker.files.validated import read_as, write_json
@@ -39,9 +39,6 @@ EVERYWHERE: frozenset[Part] = frozenset({"presets", "runs"})
 
 MOST = 500
 """Edits that can be undone, of a recording and of what belongs to none."""
-
-DRAG_SECONDS = 1.2
-"""Numbers that change again within this time are still being dragged: one edit."""
 
 WRITES_AFTER = 0.5
 """Time after an edit at which it is written, seconds: a slider that is dragged is written once."""
@@ -248,7 +245,7 @@ class Edits:
             parts: Parts = {
                 part: (last.parts[part][0], after) for part, (_, after) in edit.parts.items()
             }
-            edit = Edit(edit.words, parts, edit.time)
+            edit = Edit(_words_of_number(parts) or edit.words, parts, edit.time)
             self._done.pop()
         self._undone.clear()
         self._origin, self._at = origin, now
@@ -268,6 +265,12 @@ class Edits:
     # parameters and what was taught
 
     def _on_change(self, change: Change) -> None:
+        if change in ("run", "progress"):
+            with self._lock:
+                now_at = time.monotonic()
+                if now_at - self._at < DRAG_SECONDS:  # a slow browser moves on with each result
+                    self._at = now_at
+            return
         if change not in ("sequence", "taught", "parameters"):
             return
         with self._lock:
@@ -427,25 +430,43 @@ def _edit_of(sequence: Sequence, parameters: RunParameters, now: Snapshot) -> Ed
         values = changed_values(now.parameters, parameters)
         if values:
             parts["parameters"] = {key: value_of(parameters, key) for key in values}, dict(values)
-            words = words or [_words_of(values, now)]
+            words = words or [_words_of(parts, now)]
     if not parts:
         return None
     more = f" and {len(words) - 2} more" if len(words) > 2 else ""
     return Edit("; ".join(words[:2]) + more, parts, time.time())
 
 
-def _words_of(values: Mapping[str, Any], now: Snapshot) -> str:
-    """What changes of parameters are called; a number that is being dragged keeps its words."""
-    if len(values) == 1:
-        ((key, value),) = values.items()
-        known = PARAMETERS.get(key)
-        label = known.label if known is not None else key.replace("_", " ")
+def _words_of(parts: Parts, now: Snapshot) -> str:
+    """What changes of parameters are called."""
+    after = parts["parameters"][1]
+    if now.parameters_origin.startswith(PRESET_ORIGIN):
+        return now.parameters_origin
+    if len(after) == 1:
+        ((key, value),) = after.items()
         if isinstance(value, bool):
-            return f"{label} {'on' if value else 'off'}"
-        return f"{label} {value}" if isinstance(value, str) else label
+            return f"{_label_of(key)} {'on' if value else 'off'}"
+        return _words_of_number(parts) or f"{_label_of(key)} {value}"
     if now.parameters == now.defaults:
         return "all parameters reset"
-    return f"preset {now.preset}" if now.preset is not None else f"{len(values)} parameters"
+    return f"preset {now.preset}" if now.preset is not None else f"{len(after)} parameters"
+
+
+def _words_of_number(parts: Parts) -> str | None:
+    """``Survival probability 0.95 → 0.9``; None where something else than one number changed."""
+    if parts.keys() != {"parameters"} or len(parts["parameters"][1]) != 1:
+        return None
+    before, after = parts["parameters"]
+    ((key, value),) = after.items()
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return None
+    unit = PARAMETERS[key].unit
+    return f"{_label_of(key)} {before[key]:.6g} → {value:.6g}{unit and ' '}{unit}"
+
+
+def _label_of(key: str) -> str:
+    known = PARAMETERS.get(key)
+    return known.label if known is not None else key.replace("_", " ")
 
 
 def _moved(parts: Parts) -> set[tuple[Any, ...]] | None:

@@ -47,6 +47,14 @@ Presets = Mapping[str, Mapping[str, Any]]
 CLAMPED_ORIGIN = "viser"
 """Whose numbers are moved into their range rather than refused: viser clamps nothing itself."""
 
+PRESET_ORIGIN = "preset "
+"""What the origin of parameters begins with where a preset was applied; its name follows."""
+
+DRAG_SECONDS = 3.0
+"""A number that changes again within this time after its last change, or after the last news of the
+run with it, is still being dragged: one edit, one row of runs and one kept run. viser does not say
+when a slider is let go, and a browser that draws slowly moves one only between two results."""
+
 
 @dataclass(frozen=True, slots=True)
 class Trail:

@@ -17,6 +17,7 @@ from app.state.shown_run import ShownRun
 from app.state.snapshot import (
     CLAMPED_ORIGIN,
     LAYERS,
+    PRESET_ORIGIN,
     Command,
     Ghosts,
     Level,
@@ -92,7 +93,8 @@ class Workbench(ShownRun):
                     "GET /api/schema has the built-in presets, GET /api/state your own.",
                 )
             changes = {"single_view": now.parameters.single_view, **presets[name]}
-            parameters = self._put_parameters(with_values(now.defaults, changes), f"preset {name}")
+            values = with_values(now.defaults, changes)
+            parameters = self._put_parameters(values, f"{PRESET_ORIGIN}{name}")
         self.note_removed(changes)
         return parameters
 

@@ -14,6 +14,10 @@ def test_the_page_and_the_3d_view_recover_where_they_were(page: Page, server: Se
     for _ in range(2):
         page.keyboard.press("PageDown")
     until(page, lambda: readout(page) == "20", "step 20")
+    theme = page.locator("html").get_attribute("data-theme")
+    page.keyboard.press("Shift+D")
+    chosen = "light" if theme == "dark" else "dark"
+    server.wait(lambda state: state["theme"] == chosen)
     server.stop()
     expect(page.get_by_text("No connection since")).to_be_visible(timeout=20_000)
     expect(page.get_by_text("3D view lost")).to_be_visible()
@@ -23,6 +27,8 @@ def test_the_page_and_the_3d_view_recover_where_they_were(page: Page, server: Se
     until(page, lambda: readout(page) == "20", "the page is where it was")
     scene = viser(page)
     until(page, lambda: shown_in_3d(scene) == "20", "so is the 3D view")
+    server.wait(lambda state: state["theme"] == chosen)
+    expect(page.locator("html")).to_have_attribute("data-theme", chosen)
 
 
 def test_a_new_start_takes_up_where_this_browser_was(flat_page: Page, server: Server) -> None:

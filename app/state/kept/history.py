@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from app.state.snapshot import Change, RunState
+from app.state.snapshot import DRAG_SECONDS, Change, RunState
 from app.state.workbench import Workbench
 from tracker.parameters.catalogue import METHODS, PARAMETERS, RunParameters
 from tracker.parameters.values import ParameterError, changed_values, value_of
@@ -16,10 +16,6 @@ from tracker.sequences.writing.teaching import Values, taught_values
 
 MOST_RUNS = 50
 """Older ones are forgotten."""
-
-DRAG_SECONDS = 1.5
-"""Runs that follow each other within this time and differ in the same values are one drag of a
-slider: where it came to rest is worth a row, the way there is not."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,8 +39,8 @@ class PastRun:
     """The templates and the room that its sequence had."""
     moved: frozenset[str] = frozenset()
     """The keys in which it differs from the one before."""
-    asked: float = 0.0
-    """When it was asked for, monotonic seconds."""
+    heard: float = 0.0
+    """When it was last heard of, monotonic seconds."""
 
 
 class History:
@@ -97,23 +93,23 @@ class History:
                 return
             for index, run in enumerate(self._runs):
                 if run.state.key == state.key:
-                    self._runs[index] = replace(run, state=state)
+                    self._runs[index] = replace(run, state=state, heard=time.monotonic())
                     return
             # a run that was superseded before its first step is not worth a row
             earlier = [r for r in self._runs if r.state.state != "computing" or r.state.done]
-            moved, asked = frozenset[str](), time.monotonic()
+            moved, heard = frozenset[str](), time.monotonic()
             taught = taught_values(sequence)
             if earlier and earlier[0].recording == now.sequence_key:
                 moved = _differing(earlier[0].parameters, now.parameters)
                 same = moved and moved == earlier[0].moved and taught == earlier[0].taught
-                if same and asked - earlier[0].asked < DRAG_SECONDS:
+                if same and heard - earlier[0].heard < DRAG_SECONDS:
                     self._counted = earlier.pop(0).number - 1
             self._counted += 1
             changes = len(changed_values(now.parameters, now.defaults))
             at = time.strftime("%H:%M:%S")
             new = PastRun(
                 self._counted, at, sequence.name, now.sequence_key, now.parameters, changes, state,
-                taught, moved, asked,
+                taught, moved, heard,
             )  # fmt: skip
             self._runs = [new, *earlier][:MOST_RUNS]
 

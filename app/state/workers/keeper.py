@@ -17,7 +17,7 @@ import numpy as np
 
 from app.errors import sentence
 from app.state.opening_step import is_settled
-from app.state.snapshot import Change, Snapshot
+from app.state.snapshot import DRAG_SECONDS, Change, Snapshot
 from app.state.workbench import Workbench
 from app.state.workers.threads import CLOSING_SECONDS, be_nice
 from tracker.library import KEEP
@@ -34,10 +34,6 @@ from tracker.runs.gaps import gaps
 from tracker.sequences.sequence import Sequence
 
 logger = logging.getLogger("app")
-
-SETTLED_SECONDS = 1.0
-"""A finished run is kept when no other one has taken its place for so long: who drags a slider
-wants one of the runs that he passed, not all."""
 
 
 RETRY_SECONDS = 20.0
@@ -165,11 +161,20 @@ class Keeper:
         key = now.run_state.key
         if key in self._kept:
             return
-        if sequence.ground_truth is None:  # else it was settled before it was scored
-            self._news.wait(SETTLED_SECONDS)
+        if self._stays(key):
+            self._keep_run(now, key)
+
+    def _stays(self, key: str) -> bool:
+        """Whether no other run takes the place of a finished one: of those that a dragged slider
+        passes none is kept. The wait ends with the workbench."""
+        until = time.monotonic() + DRAG_SECONDS
+        while not self._closed and (left := until - time.monotonic()) > 0.0:
+            self._news.wait(left)
             if self._workbench.snapshot().run_state.key != key:
-                return
-        self._keep_run(now, key)
+                self._news.set()
+                return False
+            self._news.clear()
+        return True
 
     def _keep_run(self, now: Snapshot, key: str) -> None:
         run, scored = now.run, now.scores.shown

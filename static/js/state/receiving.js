@@ -79,8 +79,9 @@ export function createReceiver({ store, playback, actions, address, isOld }) {
 		// Another's news may come before the answer to what was just switched here.
 		const layers3d = { ...server.layers, ...store.get().wished3d };
 		store.set({ server, run: server.run, layers3d });
-		// The first word on the theme is this browser's, later ones are everybody's.
-		if (before) store.set({ theme: server.theme });
+		// The first word on the theme after a start of the server is this browser's, later ones are
+		// everybody's.
+		if (before?.session === server.session) store.set({ theme: server.theme });
 		else if (server.theme !== store.get().theme)
 			void actions.ask("POST", "theme", { theme: store.get().theme });
 		if (changed || address.waitsFor(server)) address.arrive(server);

@@ -68,7 +68,7 @@ def test_a_drag_is_one_edit_and_two_sliders_are_two(
     bench.set_parameters({P_S: 0.9}, "viser")
     now += module.DRAG_SECONDS
     bench.set_parameters({P_S: 0.8}, "viser")
-    assert bench.snapshot().undo_words == "Survival probability"
+    assert bench.snapshot().undo_words == "Survival probability 0.9 → 0.8"
     found = []
     for _ in range(3):
         edits.undo()
@@ -81,6 +81,42 @@ def test_a_drag_is_one_edit_and_two_sliders_are_two(
     assert values(bench) == (0.7, 0.8)
     with pytest.raises(EditError, match="nothing to redo"):
         edits.redo()
+
+
+def test_a_slow_drag_is_one_edit_that_names_both_ends(
+    bench: Workbench, edits: Edits, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A browser that draws slowly moves a slider only between two results."""
+    now = 100.0
+    monkeypatch.setattr(module.time, "monotonic", lambda: now)
+    before = values(bench)
+    for value in (0.8, 0.7, 0.6):
+        bench.set_parameters({P_D: value}, "viser")
+        bench.run_begins(f"run {value}")
+        now += module.DRAG_SECONDS - 0.1
+        bench.run_ends(f"run {value}", "done")
+        now += module.DRAG_SECONDS - 0.1
+    assert bench.snapshot().undo_words == f"Detection probability {before[0]:g} → 0.6"
+    now += 0.2
+    bench.set_parameters({P_D: 0.7}, "viser")
+    assert bench.snapshot().undo_words == "Detection probability 0.6 → 0.7"
+    for _ in range(2):
+        edits.undo()
+    assert values(bench) == before
+
+
+def test_a_preset_that_brings_the_defaults_is_called_by_its_name(
+    bench: Workbench, edits: Edits
+) -> None:
+    bench.set_parameters({P_D: 0.5, P_S: 0.8}, "api")
+    bench.apply_preset("robust")
+    assert bench.snapshot().undo_words == "preset robust"
+    bench.set_parameters({P_D: 0.5}, "api")
+    bench.apply_preset("robust")
+    assert bench.snapshot().undo_words == "preset robust"
+    bench.set_parameters({P_D: 0.5, P_S: 0.8}, "api")
+    bench.reset_parameters()
+    assert bench.snapshot().undo_words == "all parameters reset"
 
 
 def test_a_slider_that_comes_back_to_where_it_was_is_no_edit(
@@ -198,11 +234,11 @@ def test_edits_are_taken_up_after_a_start_where_they_still_fit(
     assert shown == [{"mine": None}]
     edits.undo()
     assert values(again)[0] == 0.5
-    assert again.snapshot().redo_words == "Detection probability"
+    assert again.snapshot().redo_words == "Detection probability 0.5 → 0.6"
     edits.close()
     (tmp_path / "everywhere.json").write_text("{}")
     edits = followed(opened(crossing), tmp_path)
-    assert edits._done[-1].words == "Detection probability"
+    assert edits._done[-1].words == "Detection probability 0.95 → 0.5"
     edits.close()
 
 
@@ -223,5 +259,5 @@ def test_a_note_says_what_was_undone(crossing: Path) -> None:
         "Undone: preset mine saved",
         "Done again: preset mine saved",
         "Undone: preset mine saved",
-        "Undone: Detection probability",
+        "Undone: Detection probability 0.95 → 0.5",
     ]
