@@ -8,7 +8,7 @@ import {
   unbroken,
   whereIs,
 } from "../../static/js/check/words.js";
-import { livesAMinute, whereabouts } from "../../static/js/library/words.js";
+import { livesAMinute, madeWhen, whereabouts } from "../../static/js/library/words.js";
 
 test("a number and its unit stay on one line, other words do not", () => {
   assert.equal(
@@ -99,4 +99,13 @@ test("recordings of one name are told apart by the end of their paths", () => {
     "/data/friday/take": "/data/friday/take",
     "D:\\old\\friday\\take": "…/old/friday/take",
   });
+});
+
+test("a run that was made again within the same minute says its time once", () => {
+  const now = new Date(2026, 10, 27, 12, 0);
+  const at = (hour, minute, second) => new Date(2026, 10, 27, hour, minute, second) / 1000;
+  const began = at(8, 34, 5);
+  assert.equal(madeWhen({ began, latest: began }, now), "08:34");
+  assert.equal(madeWhen({ began, latest: at(8, 34, 50) }, now), "08:34");
+  assert.equal(madeWhen({ began, latest: at(9, 1, 0) }, now), "08:34, again 09:01");
 });

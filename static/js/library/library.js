@@ -324,12 +324,14 @@ export function mountLibrary(root, { store, actions }) {
 			fill(
 				empty,
 				h("h3", {}, runs.length ? "No run matches" : "Nothing kept yet"),
-				h("p", {}, library.error ?? "Every run that comes to its end is kept here."),
-				h(
-					"button",
-					{ class: "btn main", onclick: () => recording && openRecording(recording) },
-					`Open ${recording.name}`,
-				),
+				h("p", {}, library.error ?? "Every run is kept here a few seconds after its end."),
+				// The one that is open is only a tab away.
+				recording.place !== store.get().sequence?.opened_as &&
+					h(
+						"button",
+						{ class: "btn main", onclick: () => recording && openRecording(recording) },
+						`Open ${recording.name}`,
+					),
 			);
 		table.show(matching, chosen, focused, recording);
 		gone.show(recording);

@@ -1,7 +1,7 @@
 /** The table of a recording's runs. */
 import { fill, h, icon, symbolOf } from "../elements/dom.js";
 import { grid } from "../elements/grid.js";
-import { figure, livesAMinute, when } from "./words.js";
+import { figure, livesAMinute, madeWhen } from "./words.js";
 
 /** Figures with a bar: what the bar is from and to, and which end is the better. */
 const FIGURES = /** @type {const} */ ([
@@ -131,8 +131,7 @@ export function runsTable(on) {
 			word: "When",
 			kind: "q",
 			by: (run) => run.latest,
-			cell: (run) =>
-				run.latest > run.began ? `${when(run.began)}, again ${when(run.latest)}` : when(run.began),
+			cell: (run) => madeWhen(run),
 		},
 		{
 			word: "Methods",

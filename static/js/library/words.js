@@ -17,6 +17,15 @@ export function when(seconds, now = new Date()) {
 	return date.toLocaleDateString("en-GB", { day: "numeric", month: "short", year: "numeric" });
 }
 
+/**
+ * When a run was made, and when again, where that reads differently.
+ * @param {{began: number, latest: number}} run  @param {Date} [now]
+ */
+export function madeWhen({ began, latest }, now = new Date()) {
+	const [first, last] = [when(began, now), when(latest, now)];
+	return first === last ? first : `${first}, again ${last}`;
+}
+
 /** @param {number} count @param {string} word */
 export const many = (count, word) => `${count} ${word}${count === 1 ? "" : "s"}`;
 
