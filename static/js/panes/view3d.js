@@ -1,7 +1,6 @@
 /** The 3D pane: viser's page inside ours, with its layers and view points. */
 import { drawing } from "../draw/canvas.js";
 import { all, fill, h, icon, one, parts } from "../elements/dom.js";
-import { takeWholeNumbers } from "./numbers.js";
 
 /* ---------- How often another document of this window draws: viser goes on drawing for a while
    after each change, and where there is no graphics card each of its frames is one that pictures
@@ -69,6 +68,58 @@ function softwareRenderer() {
 	const name = String((info && gl?.getParameter(info.UNMASKED_RENDERER_WEBGL)) ?? "");
 	gl?.getExtension("WEBGL_lose_context")?.loseContext();
 	return /swiftshader|llvmpipe|softpipe|software/i.test(name) ? name : "";
+}
+
+/* ---------- Numbers of viser's panel count when they are finished: it takes each letter for a
+   number, and a 0 on the way to 0.9 for the least one that is allowed ---------- */
+
+const FIELD = ".mantine-NumberInput-input";
+
+/** Keys that end a number, or change it by a step. */
+const ENDS = ["Enter", "ArrowUp", "ArrowDown"];
+
+/** Have the fields of a document keep what is typed until it is finished; Escape takes it back. @param {Document} page */
+function takeWholeNumbers(page) {
+	let passing = false;
+	let before = "";
+	/** @param {Event} event */
+	const fieldOf = ({ target }) => {
+		const element = /** @type {HTMLInputElement} */ (target);
+		return element.matches?.(FIELD) ? element : null;
+	};
+	/** @param {HTMLInputElement} field */
+	const pass = (field) => {
+		passing = true;
+		field.dispatchEvent(new Event("input", { bubbles: true }));
+		passing = false;
+		before = field.value;
+	};
+	page.addEventListener("focusin", (event) => (before = fieldOf(event)?.value ?? ""), true);
+	page.addEventListener(
+		"input",
+		(event) => {
+			if (!passing && fieldOf(event)) event.stopImmediatePropagation();
+		},
+		true,
+	);
+	page.addEventListener(
+		"keydown",
+		(event) => {
+			const field = fieldOf(event);
+			if (!field) return;
+			if (ENDS.includes(event.key)) pass(field);
+			if (event.key === "Escape") field.value = before;
+		},
+		true,
+	);
+	page.addEventListener(
+		"focusout",
+		(event) => {
+			const field = fieldOf(event);
+			if (field) pass(field);
+		},
+		true,
+	);
 }
 
 /** The 3D view waits no longer than this for the first pictures, milliseconds. */

@@ -215,26 +215,32 @@ def test_what_gets_into_the_page_does_not_run(browser: Browser, server: Server) 
     page.route("**/viser/**", lambda route: route.abort())
     page.goto(server.address)
     page.locator(".cam canvas").first.wait_for()
-    ran = page.evaluate(
+    ran, refused = page.evaluate(
         """async () => {
           window.ran = [];
+          const refused = [];
+          const place = document.createElement('div');
+          const script = document.createElement('script');
+          const far = document.createElement('script');
           const inside = `<img src=x onerror="ran.push('handler')">
             <svg onload="ran.push('svg')"></svg><style>body { color: red }</style>
             <iframe srcdoc="<script>parent.ran.push('srcdoc')</script>"></iframe>`;
-          const place = document.createElement('div');
-          place.innerHTML = inside;
-          document.body.append(place);
-          const script = document.createElement('script');
-          script.textContent = "ran.push('inline')";
-          document.body.append(script);
-          const far = document.createElement('script');
-          far.src = "data:text/javascript,ran.push('data')";
-          document.body.append(far);
-          setTimeout("ran.push('timer')");
+          const ways = {
+            html: () => (place.innerHTML = inside),
+            inline: () => (script.textContent = "ran.push('inline')"),
+            data: () => (far.src = "data:text/javascript,ran.push('data')"),
+            timer: () => setTimeout("ran.push('timer')"),
+            name: () => script.append("ran.push('name')"),
+          };
+          for (const [name, way] of Object.entries(ways)) {
+            try { way(); } catch (error) { refused.push(name); }
+          }
+          document.body.append(place, script, far);
           await new Promise((done) => setTimeout(done, 500));
           if (getComputedStyle(document.body).color === 'rgb(255, 0, 0)') ran.push('style');
-          return ran;
+          return [ran, refused];
         }"""
     )
     page.close()
     assert ran == []
+    assert refused == ["html", "inline", "data", "timer"]

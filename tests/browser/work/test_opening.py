@@ -346,10 +346,12 @@ def test_pairs_of_many_cameras_stand_in_a_square(flat_page: Page, files: Path) -
     expect(grid.locator("li.w", has_text="cam3 – ")).to_have_count(8)
 
 
-def test_what_the_files_leave_open_is_asked_for(flat_page: Page, tmp_path: Path) -> None:
+def test_what_the_files_leave_open_is_asked_for(
+    flat_page: Page, folder: Path, tmp_path: Path
+) -> None:
     """A calibration where there is none, and how angles are meant that no video shows."""
     page = flat_page
-    alone, angles = tmp_path / "alone", tmp_path / "angles"
+    alone, angles = tmp_path / "alone", folder / "data/angles"
     for folder in (alone, angles):
         folder.mkdir()
     detections(alone)
