@@ -119,6 +119,9 @@ function cards(words, note, recordings, ...beside) {
 	];
 }
 
+/** What cannot be shown leaves the sign under it in sight. @param {Event} event */
+const away = ({ currentTarget }) => /** @type {Element} */ (currentTarget).remove();
+
 /** @param {Server.RecordingCard} recording @param {boolean} named  its name is enough; else its folder is told */
 function card(recording, named) {
 	const { name, opens, description, cameras, frames, fps, opened, picture } = recording;
@@ -138,7 +141,7 @@ function card(recording, named) {
 			{ class: "shot" },
 			// Under its picture; what was opened and has none has boxes alone.
 			span({ class: "blank" }, icon(opened ? "i-boxes" : "i-folder", "l")),
-			picture && h("img", { src: picture, alt: "", loading: "lazy" }),
+			picture && h("img", { src: picture, alt: "", loading: "lazy", onerror: away }),
 			small(many(cameras, "camera"), { class: "small lens" }),
 		),
 		h("b", {}, name),
