@@ -128,9 +128,9 @@ export function idTag(id) {
 	return h("span", { class: "id", "--c": `var(--id-${n})`, "--on-id": `var(--on-${n})` }, id);
 }
 
-/** A parameter's symbol with its index set low. @param {string} symbol  such as p_D */
+/** A parameter's symbol with its index set low; a method's key is words. @param {string} symbol  such as p_D */
 export function symbolOf(symbol, kind = "sym") {
-	const [letter, index] = symbol.split("_", 2);
+	const [, letter, index] = symbol.match(/^(.{1,4})_(.+)/) ?? [0, symbol.replaceAll("_", " ")];
 	return h("span", { class: kind }, letter, index ? h("sub", {}, index) : null);
 }
 

@@ -47,8 +47,19 @@ export function chosenBar({ store, actions, chosen, none, refresh }) {
 
 	function compare() {
 		const dialog = /** @type {any} */ (one(".compare"));
-		fill(dialog, comparison(chosen()));
-		dialog.onclick = () => dialog.close();
+		const close = () => dialog.close();
+		fill(
+			dialog,
+			h(
+				"header",
+				{},
+				h("h2", {}, "Runs side by side"),
+				h("button", { class: "btn icon", "aria-label": "Close", onclick: close }, icon("i-close")),
+			),
+			comparison(chosen()),
+		);
+		// beside it; what is in it can be marked and copied
+		dialog.onclick = (/** @type {Event} */ { target }) => target === dialog && close();
 		dialog.showModal();
 	}
 

@@ -226,6 +226,7 @@ export function comparison(runs) {
 	]))
 		if (new Set(runs.map(of)).size > 1) rows.push([word, runs.map(of)]);
 	const known = new Map(runs.flatMap(({ changes }) => changes).map((one) => [one.key, one]));
+	for (const method of ["single_view", "fusion_method"]) known.delete(method); // told above
 	for (const change of known.values())
 		rows.push([
 			named(change),

@@ -110,6 +110,11 @@ def test_runs_stand_side_by_side(library: Page, server: Server) -> None:
     expect(dialog.get_by_role("row", name="MOTA")).to_be_visible()
     names = [run["name"] or f"Run {run['id']}" for run in kept(server, 2)]
     expect(dialog.get_by_role("columnheader")).to_have_text(["What", *names])
+    dialog.get_by_role("row", name="MOTA").click()  # what is told can be marked
+    expect(dialog.get_by_role("heading", name="Runs side by side")).to_be_visible()
+    dialog.get_by_role("button", name="Close").click()
+    expect(dialog).to_have_count(0)
+    library.get_by_role("button", name="Compare").click()
     library.keyboard.press("Escape")
     expect(dialog).to_have_count(0)
 
