@@ -132,7 +132,7 @@ def test_notes_name_a_late_camera_and_one_that_is_out_of_line() -> None:
     (note,) = camera_notes(run)
     name = late.views[2].camera.name
     assert f'camera "{name}" is 0.' in note
-    assert " steps, late" in note
+    assert " steps) late" in note
     assert run.smoothed is not None
     assert run.smoothed.cameras is not None
     assert run.smoothed.cameras.delays[2] == pytest.approx(0.09, rel=0.3)

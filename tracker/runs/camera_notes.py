@@ -43,7 +43,7 @@ def camera_notes(run: Run) -> list[str]:
     delays = _delays(errors, names, off / _WALKING, run.sequence.fps)
     if delays:
         found.append(
-            f"by its boxes, {'; '.join(delays)}; nothing is corrected: multiview-phd check "
+            f"by the boxes, {'; '.join(delays)}; nothing is corrected: multiview-phd check "
             "measures this by itself and says whether frames are missing, or what to write as "
             "time_offset in sequence.toml"
         )
@@ -54,8 +54,8 @@ def _delays(errors: CameraErrors, names: list[str], least: float, fps: float) ->
     """Describe the delays of more than ``least`` seconds that are significant."""
     bound = np.maximum(least, significance(len(names)) * errors.delay_sigmas)
     return [
-        f'camera "{names[camera]}" is {abs(errors.delays[camera]):.2f} s, or '
-        f"{abs(errors.delays[camera]) * fps:.1f} steps, "
+        f'camera "{names[camera]}" is {abs(errors.delays[camera]):.2f} s '
+        f"({abs(errors.delays[camera]) * fps:.1f} steps) "
         + ("late" if errors.delays[camera] > 0.0 else "early")
         for camera in np.flatnonzero(np.abs(errors.delays) > bound).tolist()
     ]

@@ -230,9 +230,9 @@ def describe_clocks(clocks: Mapping[int, ClockFit], names: Sequence[str]) -> lis
     """Return a sentence for each camera whose clock jumps or drifts."""
     return [
         f"{names[camera]}: about step {fit.jump} its clock jumps by {fit.ends - fit.begins} steps, "
-        f"or it drifts: it is {fit.begins} steps late in the first third of the recording and "
-        f"{fit.ends} in the last; frames were lost, or its rate is another one: nothing is "
-        "corrected; a file with the time of each frame, named by timestamps in sequence.toml, does"
+        f"or it drifts: it is late by {fit.begins} in the first third of the recording and by "
+        f"{fit.ends} in the last; frames were lost, or its rate is another one: give the time of "
+        "each frame, timestamps in sequence.toml"
         for camera, fit in clocks.items()
         if not fit.steady
     ]
