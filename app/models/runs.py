@@ -33,7 +33,7 @@ class Changes(Model):
 
     changed: list[ChangedValue]
     curves: list[CurveInfo]
-    """Of the parameters that somebody asked for."""
+    """The curves of the parameters that somebody asked for."""
 
 
 class PastRunInfo(Model):
@@ -45,7 +45,7 @@ class PastRunInfo(Model):
     at: str
     """Time of day at which it began, as text."""
     sequence: str
-    """Its name then."""
+    """The sequence's name at that time."""
     same_recording: bool
     """Whether it is of the recording that is open, so that its parameters can be used again."""
     single_view: str

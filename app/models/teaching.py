@@ -74,7 +74,7 @@ class TemplateInfo(Model):
 
     name: str
     camera: str
-    """Its name."""
+    """The camera's name."""
     step: int
     box: Box
 
@@ -93,7 +93,7 @@ class DetectorInfo(Model):
 
     name: str
     path: str | None
-    """That somebody named for this recording; null for a fetched one, which serves all."""
+    """The file that somebody named for this recording; null for a fetched network."""
 
 
 class Taught(Model):

@@ -82,10 +82,10 @@ def recordings(request: Request, desk: AtDesk, bench: Bench) -> Recordings:
         open_as.append(str(snapshot.sequence.folder.absolute()))
     cards = [
         RecordingCard(
-            name=one.name, opens=built_in_name(Path(one.folder)) or one.folder, kind="recent",
-            description="", cameras=one.cameras,
+            name=one.name, opens=(opens := built_in_name(Path(one.folder)) or one.folder),
+            kind="recent", description="", cameras=one.cameras,
             frames=one.frames, fps=one.fps, opened=one.opened,
-            picture=f"/api/recordings/picture?recent={number}", open=False,
+            picture=f"/api/recordings/picture?recent={number}", open=opens in open_as,
         )
         for number, one in enumerate(recents.all())
     ]  # fmt: skip
@@ -95,13 +95,12 @@ def recordings(request: Request, desk: AtDesk, bench: Bench) -> Recordings:
         RecordingCard(
             name=entry.name, opens=entry.name, kind=entry.kind, description=entry.description,
             cameras=entry.cameras, frames=entry.frames, fps=0.0, opened=0.0,
-            picture=f"/api/recordings/picture?name={quote(entry.name)}", open=False,
+            picture=f"/api/recordings/picture?name={quote(entry.name)}",
+            open=entry.name in open_as,
         )
         for entry in entries
         if str(entry.folder.absolute()) not in listed and entry.error is None
     ]  # fmt: skip
-    for card in cards:
-        card.open = card.opens in open_as
     return Recordings(
         recordings=cards,
         folders=desk.folders(),

@@ -128,11 +128,15 @@ export function idTag(id) {
 	return h("span", { class: "id", "--c": `var(--id-${n})`, "--on-id": `var(--on-${n})` }, id);
 }
 
-/** A parameter's symbol with its index set low; a method's key is words. @param {string} symbol  such as p_D */
-export function symbolOf(symbol, kind = "sym") {
+/** A symbol's letter, and its index set low; a method's key is words. @param {string} symbol  such as p_D */
+export function symbolParts(symbol) {
 	const [, letter, index] = symbol.match(/^(.{1,4})_(.+)/) ?? [0, symbol.replaceAll("_", " ")];
-	return h("span", { class: kind }, letter, index ? h("sub", {}, index) : null);
+	return /** @type {const} */ ([letter, index ? h("sub", {}, index) : null]);
 }
+
+/** @param {string} symbol */
+export const symbolOf = (symbol, kind = "sym") =>
+	h("span", { class: kind }, ...symbolParts(symbol));
 
 /** @param {number} value  @returns {string} as short as it stays readable */
 export function show(value) {

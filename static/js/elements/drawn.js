@@ -1,5 +1,5 @@
 /** Panels that are drawn anew while somebody works in them, and what they are written with. */
-import { all, h } from "./dom.js";
+import { all, h, symbolParts } from "./dom.js";
 
 /** Elements that are replaced as a whole where they differ: what they do is made with what they say. */
 const CONTROLS = "button, a, input, select";
@@ -49,8 +49,8 @@ export function redraw(root, ...children) {
 
 /** A parameter: its words with its symbol; what it means comes with the pointer. @param {Server.ParameterInfo} of */
 export function parameterName({ label, symbol, help }) {
-	const [letter, index] = symbol.split("_", 2);
-	return h("span", { title: help }, `${label} `, h("i", {}, letter), index && h("sub", {}, index));
+	const [letter, index] = symbolParts(symbol);
+	return h("span", { title: help }, `${label} `, h("i", {}, letter), index);
 }
 
 /** Text in a muted colour. @param {...(Child | Child[])} children */

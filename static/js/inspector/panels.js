@@ -282,9 +282,13 @@ function checked(state, actions) {
 
 /* ---------- What differs from the defaults, and what parameters would change. */
 
+/** @param {State} state @param {string} key  of a parameter; nothing is found for a method's */
+const parameterOf = ({ schema }, key) =>
+	schema?.parameters.find((parameter) => parameter.key === key);
+
 /** @param {State} state @param {string} key */
-function nameOf({ schema }, key) {
-	const known = schema?.parameters.find((parameter) => parameter.key === key);
+function nameOf(state, key) {
+	const known = parameterOf(state, key);
 	return known ? parameterName(known) : key.replaceAll("_", " ");
 }
 
@@ -302,8 +306,6 @@ function stageOf({ schema }, key) {
 
 /** @param {State} state @param {Server.Changes} told @param {Actions} actions */
 export function changeTables(state, { changed, curves: found }, actions) {
-	const known = (/** @type {string} */ key) =>
-		state.schema?.parameters.find((parameter) => parameter.key === key);
 	const rows = found.flatMap(({ key, measure, values, scores }) =>
 		values.map((value, k) => [
 			stageOf(state, key),
@@ -330,21 +332,24 @@ export function changeTables(state, { changed, curves: found }, actions) {
 		table(
 			"Changed parameters",
 			["Stage", "Parameter", "#Default", "#Now", "#"],
-			changed.map(({ key, default: before, now }) => [
-				stageOf(state, key),
-				nameOf(state, key),
-				quiet(valueOf(before)),
-				[valueOf(now), quiet(known(key)?.unit && ` ${known(key)?.unit}`)],
-				h(
-					"button",
-					{
-						class: "btn",
-						"aria-label": `Reset ${known(key)?.label ?? key.replaceAll("_", " ")}`,
-						onclick: () => actions.reset(key),
-					},
-					"reset",
-				),
-			]),
+			changed.map(({ key, default: before, now }) => {
+				const known = parameterOf(state, key);
+				return [
+					stageOf(state, key),
+					nameOf(state, key),
+					quiet(valueOf(before)),
+					[valueOf(now), quiet(known?.unit && ` ${known.unit}`)],
+					h(
+						"button",
+						{
+							class: "btn",
+							"aria-label": `Reset ${known?.label ?? key.replaceAll("_", " ")}`,
+							onclick: () => actions.reset(key),
+						},
+						"reset",
+					),
+				];
+			}),
 		),
 		beside,
 	];

@@ -53,28 +53,35 @@ export const livesAMinute = ({ targets, steps }, fps) =>
 export const titleOf = (run) => run.name || `Run ${run.id}`;
 
 /**
+ * The shortest end of a path that none of the others has; null where each end has another.
+ * @param {string} path @param {string[]} others
+ */
+export function ownEnd(path, others) {
+	const foldersOf = (/** @type {string} */ place) => place.split(/[\\/]/).filter(Boolean);
+	const end = (/** @type {string} */ place, /** @type {number} */ count) =>
+		foldersOf(place).slice(-count).join("/");
+	for (let count = 1; count < foldersOf(path).length; count += 1)
+		if (others.every((other) => end(other, count) !== end(path, count))) return end(path, count);
+	return null;
+}
+
+/**
  * Where recordings lie that have a name in common: the end of each one's path that no other has, by
  * its path. Those with a name of their own are left out.
  * @param {Pick<Server.RecordingInfo, "name" | "place">[]} recordings
  * @returns {Map<string, string>}
  */
 export function whereabouts(recordings) {
-	const foldersOf = (/** @type {string} */ place) => place.split(/[\\/]/).filter(Boolean);
 	/** @type {Map<string, string>} */
 	const found = new Map();
 	for (const { name, place } of recordings) {
 		const others = recordings.filter((other) => other.name === name && other.place !== place);
 		if (!others.length) continue;
-		const own = foldersOf(place);
-		const end = (/** @type {string[]} */ folders, /** @type {number} */ count) =>
-			folders.slice(-count).join("/");
-		let count = 1;
-		while (
-			count < own.length &&
-			others.some((other) => end(foldersOf(other.place), count) === end(own, count))
-		)
-			count += 1;
-		found.set(place, count < own.length ? `…/${end(own, count)}` : place);
+		const end = ownEnd(
+			place,
+			others.map((other) => other.place),
+		);
+		found.set(place, end === null ? place : `…/${end}`);
 	}
 	return found;
 }

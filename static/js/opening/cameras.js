@@ -1,6 +1,7 @@
 /** The cameras of an import: a row each, with all that belongs to one and what is odd about it. */
 import { h, icon, show, svg } from "../elements/dom.js";
 import { table } from "../elements/drawn.js";
+import { ownEnd } from "../library/words.js";
 import { cut, div, field, numberField, select, small, span, wishing } from "./controls.js";
 
 /** @typedef {Server.ImportInfo} Info */
@@ -97,11 +98,7 @@ function row(info, camera, k) {
 /** A file without its folders, as far as cameras stay told apart. @param {Info} info @param {string} label */
 function short({ cameras }, label) {
 	const others = cameras.map(({ detections }) => detections).filter((other) => other !== label);
-	const end = (/** @type {string} */ path, /** @type {number} */ count) =>
-		path.split("/").slice(-count).join("/");
-	for (let count = 1; count < label.split("/").length; count += 1)
-		if (others.every((other) => end(other, count) !== end(label, count))) return end(label, count);
-	return label;
+	return ownEnd(label, others) ?? label;
 }
 
 /** @param {Info} info @param {Camera} camera @param {number} k */

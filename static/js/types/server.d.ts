@@ -148,7 +148,7 @@ declare namespace Server {
 	/** What differs from the defaults, and what parameters would change. */
 	interface Changes {
 		changed: ChangedValue[];
-		/** Of the parameters that somebody asked for. */
+		/** The curves of the parameters that somebody asked for. */
 		curves: CurveInfo[];
 	}
 
@@ -282,7 +282,7 @@ declare namespace Server {
 	/** A detection network that is at hand. */
 	interface DetectorInfo {
 		name: string;
-		/** That somebody named for this recording; null for a fetched one, which serves all. */
+		/** The file that somebody named for this recording; null for a fetched network. */
 		path: string | null;
 	}
 
@@ -860,7 +860,7 @@ declare namespace Server {
 		key: string;
 		/** Time of day at which it began, as text. */
 		at: string;
-		/** Its name then. */
+		/** The sequence's name at that time. */
 		sequence: string;
 		/** Whether it is of the recording that is open, so that its parameters can be used again. */
 		same_recording: boolean;
@@ -1382,7 +1382,7 @@ declare namespace Server {
 	/** A box whose colours model a person. */
 	interface TemplateInfo {
 		name: string;
-		/** Its name. */
+		/** The camera's name. */
 		camera: string;
 		step: number;
 		box: [number, number, number, number];

@@ -450,7 +450,6 @@ def _candidates(
         if best is None or best.prior < 0.0 or best.evidence.share < _PLAINLY:
             found += _reassigned(likelihood, readings, each)
     found.sort(key=lambda one: -one.score)
-    leaders = found[:1]
     if open_.orders and found:
         starts = found[:1]
         if found[0].evidence.share < _EXPLAINED and len(cameras) < EVERY_ORDER:
@@ -458,7 +457,8 @@ def _candidates(
         for start in starts:
             found += _with_orders(likelihood, start, each)
         found.sort(key=lambda one: -one.score)
-        leaders = found[:1]
+    leaders = found[:1]
+    if open_.orders and found:
         worst = min(found[0].evidence.of_cameras().values(), default=0.0)
         if worst < _WELL and each < NAME_PRIOR["name"]:
             # a mirror and an exchange together: most cameras of a regular rig agree without both,

@@ -74,7 +74,7 @@ class LogLikelihood(NamedTuple):
     value: float
     """The log likelihood."""
     gradient: BoxErrors
-    """Its derivatives by each number of the noise."""
+    """The derivatives by each number of the noise."""
 
 
 class _Window(NamedTuple):
@@ -213,7 +213,7 @@ def _filter(
         windows: All windows.
         window: Index of the window.
         residuals: (O, m, R), R sets of residuals, of which the first has the windows' drifts.
-        motion: Of the deviation from the states at which these were computed.
+        motion: The motion of the deviation from the states at which these were computed.
         errors: The noise.
     """
     d, m = windows.drifts.shape[1], len(errors.white)
@@ -345,7 +345,7 @@ def log_likelihood(windows: Windows, motion: DeviationMotion, errors: BoxErrors)
 
     Args:
         windows: Residuals and derivatives of the boxes.
-        motion: Of the deviation from the states at which these were computed.
+        motion: The motion of the deviation from the states at which these were computed.
         errors: The noise.
     """
     d, m = windows.drifts.shape[1], len(errors.white)
@@ -394,7 +394,7 @@ def normalised_innovations(
 
     Args:
         windows: Residuals and derivatives of the boxes.
-        motion: Of the deviation from the states at which these were computed.
+        motion: The motion of the deviation from the states at which these were computed.
         errors: The noise.
         added: (O, m, R), R sets of what may be added to the residuals.
 
