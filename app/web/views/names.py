@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from tracker.runs.pipeline import Run
-from tracker.sequences.sequence import Sequence
 
 SURE = 0.6
 """Mean probability from which on a track has a name: less is anybody's."""
@@ -18,17 +17,17 @@ class Names:
         self._sums: dict[int, np.ndarray] = {}
         self._done = 0
 
-    def told(self, sequence: Sequence, run: Run) -> dict[int, str]:
+    def told(self, run: Run) -> dict[int, str]:
         """The name of each track that has one, as far as the run is computed.
 
         The mean over the boxes that fed a track of the probability that their colours are those
         of each person, each with the share that the box had in the track.
 
         Args:
-            sequence: Its templates name the people.
-            run: Of which each step is looked at once.
+            run: Always of the same tracks, of which each step is looked at once. The templates of
+                its own recording name the people: the open one may have others by now.
         """
-        people = list(dict.fromkeys(template.name for template in sequence.templates))
+        people = list(dict.fromkeys(template.name for template in run.sequence.templates))
         done = min(run.done, len(run.fused), len(run.views))
         if len(people) < 2:
             return {}

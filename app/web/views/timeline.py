@@ -157,6 +157,7 @@ class Timelines:
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._run: Run | None = None
+        self._revision = 0
         self._cardinality: list[float] = []
         self._deviation: list[float] = []
         self._names = Names()
@@ -186,7 +187,12 @@ class Timelines:
     ) -> models.Timeline:
         if run is not self._run:
             self._run, self._cardinality, self._counted = run, [], None
-            self._deviation, self._names = [], Names()
+            self._deviation, self._names, self._revision = [], Names(), 0
+        if run is not None:
+            # the thread that computes it goes on, and replaces its tracks
+            run = run.snapshot()
+            if run.revision != self._revision:
+                self._revision, self._names = run.revision, Names()
         if sequence is not self._sequence:
             self._sequence, self._truth = sequence, _truth_counts(sequence)
         done, count = 0, np.zeros(0, dtype=np.int64)
@@ -216,7 +222,7 @@ class Timelines:
             events = sorted([*events, *found], key=lambda e: e[:2])[:MOST_EVENTS]
             # what somebody said goes before what the colours say
             said = given_names(run)
-            names = {**self._names.told(sequence, run), **said}
+            names = {**self._names.told(run), **said}
             for life in lives:
                 life.name = names.get(life.id)
         return models.Timeline(

@@ -19,6 +19,7 @@ from tracker.fusion.trajectories import Trajectories
 from tracker.parameters.catalogue import RunParameters
 from tracker.runs import pipeline
 from tracker.runs.pipeline import Run
+from tracker.sequences.sequence import Template
 
 
 def run_of(frames: int, rows: list[tuple[int, int, bool]]) -> Run:
@@ -150,6 +151,34 @@ def test_a_growing_run_is_counted_on() -> None:
         assert getattr(after, name).low[:15] == getattr(before, name).low
     assert max(track.last for track in before.tracks) <= 14
     assert after == Timelines().of(whole, run, window)
+
+
+def test_names_are_those_of_the_run_while_its_templates_are_renamed() -> None:
+    frames, people = 40, ("Ann", "Bob", "Cleo")
+    boxes = [Template(name, "cam0", 0, np.array([0.0, 0.0, 9.0, 20.0])) for name in people]
+    taught = replace(sequence(crossing(frames), frames), templates=tuple(boxes))
+    run = pipeline.compute(taught, RunParameters(single_view="none"))
+    like_the_third = [
+        tuple(
+            replace(view, likenesses=np.tile([0.1, 0.1, 0.8], (len(view.boxes), 1)))
+            for view in views
+        )
+        for views in run.views
+    ]
+    run.views = run.views.alike(like_the_third)
+    one_name = tuple(replace(template, name="Dan") for template in boxes[:2])
+    renamed = replace(taught, templates=(*one_name, replace(boxes[2], name="Eve")))
+    timelines, window = Timelines(), Window.of(frames)
+    smoothed, run.tracks = run.tracks, run.filtered
+    for open_ in (taught, renamed, replace(renamed, templates=()), taught):
+        told = timelines.of(open_, run, window)
+        assert {track.name for track in told.tracks} == {"Cleo"}
+    # its tracks are replaced: an id may be another person's by now
+    run.tracks = smoothed.take(smoothed.frames >= frames // 2)
+    run.tracks = replace(run.tracks, ids=run.tracks.ids + 100)
+    assert {track.name for track in timelines.of(renamed, run, window).tracks} == {"Cleo"}
+    assert timelines.of(renamed, run, window) == Timelines().of(renamed, run, window)
+    assert set(timelines._names.told(run)) == set(run.tracks.ids.tolist())
 
 
 @pytest.mark.full
