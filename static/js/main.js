@@ -4,7 +4,7 @@ import { one } from "./elements/dom.js";
 import { mountSide } from "./inspector/side.js";
 import { mountDoor, mountControls, pressed } from "./panes/controls.js";
 import { mountLayout } from "./panes/layout.js";
-import { mountNotes, mountTour } from "./panes/notes.js";
+import { mountNotes } from "./panes/notes.js";
 import { mountPlaces, mountTop } from "./panes/top.js";
 import { mountView3d } from "./panes/view3d.js";
 import { createPlayback } from "./play/playback.js";
@@ -53,7 +53,6 @@ const context = {
 mountTop(one(".top"), context);
 mountPlaces(one(".places"), context);
 mountNotes(one(".notes"), context);
-mountTour(one(".tour"), context);
 mountView3d(one(".view"), context);
 mountCameras(one(".cams"), context);
 mountSide(one(".side"), context);

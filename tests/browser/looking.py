@@ -112,7 +112,7 @@ def ask(server: Server, method: str, path: str, body: dict | None = None) -> dic
 
 
 def still(locator: Locator) -> FloatRect:
-    """Where an element is once it stands still: a note that arrives moves the panes."""
+    """Where an element is once it stands still: rows that arrive move those below."""
     before, box = None, locator.bounding_box()
     while box is None or box != before:
         locator.page.wait_for_timeout(300)

@@ -3,11 +3,12 @@ import assert from "node:assert/strict";
 import test from "node:test";
 
 import { createActions } from "../../static/js/state/actions.js";
+import { createReceiver } from "../../static/js/state/receiving.js";
 import { createStore } from "../../static/js/state/store.js";
 
 /** @param {[number, object][]} answers  status and body, one for each request */
 function page(answers) {
-  const store = createStore({ notes: [], dismissed: [] });
+  const store = createStore({ notes: [], dismissed: [], server: null });
   globalThis.fetch = async () => {
     const [status, body] = answers.shift();
     return new Response(JSON.stringify(body), { status });
@@ -35,4 +36,61 @@ test("what was refused is said until the like is accepted", async () => {
   actions.note("warn", "Worth knowing", "");
   await actions.ask("POST", "corrections", {});
   assert.deepEqual(said(), ["Worth knowing"]);
+});
+
+test("the same thing said again is one note, the newest, that counts", () => {
+  const { store, actions } = page([]);
+  actions.note("info", "No event after step 39", "");
+  actions.note("info", "Copied", "");
+  actions.note("info", "No event after step 39", "");
+  const said = store.get().notes.map(({ title, times }) => [title, times]);
+  assert.deepEqual(said, [
+    ["Copied", 1],
+    ["No event after step 39", 2],
+  ]);
+});
+
+test("a note on an edit offers to undo that edit alone", async () => {
+  const edits = { undo: "run 3 deleted", redo: null };
+  const { store, actions } = page([
+    [200, { version: 7, edits }],
+    [200, { version: 8, edits: { undo: null, redo: null } }],
+  ]);
+  await actions.noteEdit("Run 3 deleted, 4 MB", "");
+  await actions.noteEdit("Run 4 deleted, 4 MB", "");
+  const offered = store.get().notes.map(({ remedy }) => remedy?.edit);
+  assert.deepEqual(offered, ["run 3 deleted", undefined]);
+});
+
+test("only a recording that this window did not ask for was opened in another", async () => {
+  for (const [ask, told] of [
+    [(actions) => actions.openRun(3, "hall"), []],
+    [(actions) => actions.open("/data/hall"), []],
+    [() => {}, ["hall was opened in another window"]],
+  ]) {
+    const { store, actions } = page(Array.from({ length: 9 }, () => [200, {}]));
+    const nothing = () => {};
+    const receiver = createReceiver({
+      store,
+      actions,
+      playback: { clear: nothing },
+      address: { begin: nothing, arrive: nothing },
+      isOld: () => false,
+    });
+    const state = (name) => ({
+      version: 1,
+      parameters: {},
+      methods: {},
+      layers: {},
+      run: { key: name },
+      sequence: { key: name, name, opened_as: `/data/${name}`, cameras: [] },
+    });
+    receiver.receiveState(state("room"), true);
+    await ask(actions);
+    receiver.receiveState(state("hall"), true);
+    assert.deepEqual(
+      store.get().notes.map(({ title }) => title),
+      told,
+    );
+  }
 });

@@ -471,10 +471,7 @@ export function mountCorrecting(context, timeline) {
 	/** @param {Wish} wish @param {string} words  of what was done */
 	async function say(wish, words) {
 		if (!(await check.say([wish])) || store.get().place === "check") return;
-		actions.note("info", words, "It holds after every change of parameters.", {
-			word: "Undo",
-			act: () => void actions.undo(-1),
-		});
+		await actions.noteEdit(words, "It holds after every change of parameters.");
 	}
 
 	/** @param {number} one @param {number} other */

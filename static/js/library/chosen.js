@@ -72,10 +72,7 @@ export function chosenBar({ store, actions, chosen, none, refresh }) {
 		await refresh();
 		if (!deleted) return;
 		const what = ids.length === 1 ? `Run ${ids[0]}` : many(ids.length, "run");
-		actions.note("info", `${what} deleted, ${size(deleted.bytes)}`, "", {
-			word: "Undo",
-			act: () => void actions.undo(-1),
-		});
+		await actions.noteEdit(`${what} deleted, ${size(deleted.bytes)}`, "");
 	}
 
 	return {

@@ -22,7 +22,7 @@ export function preview({ store, actions }, written) {
 
 	/** Show it in the workbench as it was. @param {Server.KeptRunInfo} run */
 	async function open(run) {
-		const state = await actions.ask("POST", `library/runs/${run.id}/open`);
+		const state = await actions.openRun(run.id, run.recording_name);
 		if (!state) return;
 		location.hash = "#tune";
 		const older = state.run.stands_for;
@@ -45,7 +45,7 @@ export function preview({ store, actions }, written) {
 	/** A study varies what is on the sliders, so the run's values come there. */
 	/** @param {Server.KeptRunInfo} run */
 	async function study(run) {
-		if (!(await actions.ask("POST", `library/runs/${run.id}/open`))) return;
+		if (!(await actions.openRun(run.id, run.recording_name))) return;
 		store.set({ wantsStudy: true });
 		location.hash = "#study";
 	}

@@ -1,119 +1,11 @@
-/** What the page says by itself: notes under the top bar, and three things to try. */
+/** What the page says by itself: notes that lie over it. */
 import { fill, h, icon } from "../elements/dom.js";
-import { keyLabel } from "../state/commands.js";
 
-/* ---------- What is seen, and three things to try: a card in the 3D view, until it is closed or
-   all three were done. Help shows it again. */
+/** Notes that are seen at once; the others wait behind a line that counts them. */
+const MOST = 3;
 
-/** Its name among what was closed for good. */
-const TOUR = "tour";
-
-const key = (/** @type {string} */ name) => h("kbd", {}, keyLabel(name));
-
-/**
- * What can be tried, and how it is seen that somebody has.
- * @type {{
- *   word: string,
- *   key: string,
- *   text: (state: Readonly<PageState>) => Child[],
- *   done: (state: Readonly<PageState>) => boolean,
- * }[]}
- */
-const THINGS = [
-	{
-		word: "Play on",
-		key: "Space",
-		text: ({ timeline }) =>
-			timeline?.events.length
-				? [key("n"), " goes to the next birth, end or exchange of numbers."]
-				: ["The pictures, the room and the curves keep to the same step."],
-		done: ({ playing }) => playing !== 0,
-	},
-	{
-		word: "Doubt the cameras",
-		key: "",
-		text: ({ server }) => [
-			`Detection probability is at ${server?.parameters["fusion.detection_probability"] ?? "–"}. `,
-			"Pull its slider down: who is hidden then fades sooner.",
-		],
-		done: ({ server }) => Boolean(server?.changed.length),
-	},
-	{
-		word: "Compare two settings",
-		key: "p",
-		text: () => [
-			"It pins this run as A. Change a value: ",
-			h("b", {}, "Compare"),
-			" says which is better.",
-		],
-		done: ({ server }) => Boolean(server?.pinned),
-	},
-];
-
-/** @type {Pane} */
-export function mountTour(root, { store }) {
-	/** @type {boolean[]} */
-	let done = THINGS.map(() => false);
-	const close = () => store.set({ dismissed: [...new Set([...store.get().dismissed, TOUR])] });
-
-	function render() {
-		const state = store.get();
-		const { sequence, dismissed, run } = state;
-		const shown = Boolean(sequence) && !dismissed.includes(TOUR);
-		root.hidden = !shown;
-		if (!shown) {
-			done = THINGS.map(() => false);
-			return;
-		}
-		done = THINGS.map(
-			(thing, index) => done[index] || (run?.state === "done" && thing.done(state)),
-		);
-		if (done.every(Boolean)) return close();
-		const count = sequence?.cameras.length ?? 0;
-		const cameras = count === 1 ? "One camera watches" : `${count} cameras watch`;
-		const next = done.indexOf(false);
-		fill(
-			root,
-			h(
-				"div",
-				{ class: "tour-head" },
-				h("h2", {}, "What you see"),
-				h(
-					"button",
-					{
-						class: "btn icon",
-						"aria-label": "Close for good; Help shows it again",
-						"data-tip": "Close for good; Help shows it again",
-						onclick: close,
-					},
-					icon("i-close"),
-				),
-			),
-			h(
-				"p",
-				{ class: "seen" },
-				`${cameras} one room. A coloured body is a person the filter believes in, the line on `,
-				"the floor where it came from; dashed in the pictures is the truth.",
-			),
-			THINGS.map(({ word, key: name, text }, index) =>
-				h(
-					"div",
-					{ class: `thing${done[index] ? " done" : index === next ? " next" : ""}` },
-					h("span", { class: "step" }, done[index] ? icon("i-tick", "s") : index + 1),
-					h(
-						"h3",
-						{},
-						word,
-						name ? key(name) : "",
-						done[index] && h("span", { class: "vh" }, "done"),
-					),
-					index === next && h("p", {}, ...text(state)),
-				),
-			),
-		);
-	}
-	store.watch(["sequence", "dismissed", "playing", "server", "timeline"], render);
-}
+/** How long a note stands that only tells what was done, milliseconds. */
+const STANDS_MS = 6000;
 
 /** @type {Pane} */
 export function mountNotes(root, { store, actions, retry }) {
@@ -123,6 +15,19 @@ export function mountNotes(root, { store, actions, retry }) {
 	let standing = "";
 	/** @type {Timer} */
 	let ticking;
+	/** Notes that go by themselves. @type {Set<number>} */
+	const going = new Set();
+
+	/** A note that is read or about to be pressed stays. @param {number} id */
+	function expire(id) {
+		if (root.matches(":hover, :focus-within")) return void setTimeout(expire, 1000, id);
+		going.delete(id);
+		remove([id]);
+	}
+
+	/** @param {number[]} ids */
+	const remove = (ids) =>
+		store.set({ notes: store.get().notes.filter(({ id }) => !ids.includes(id)) });
 
 	/** @type {(kind: string, title: string, text: string, buttons: (Node | null)[]) => HTMLElement} */
 	const note = (kind, title, text, buttons) =>
@@ -189,25 +94,43 @@ export function mountNotes(root, { store, actions, retry }) {
 			render();
 		};
 		if (odd && odd !== heard) all.push(note("warn", "Worth knowing", odd, [close(hide)]));
-		for (const { id, level, title, text, remedy } of notes) {
+		// What takes back an edit says so while that is the last one.
+		const current = notes.filter(
+			({ remedy }) => !remedy?.edit || remedy.edit === server?.edits.undo,
+		);
+		for (const { id, level, title, text, remedy, times } of current.toReversed()) {
 			const kind = { error: "bad", warn: "warn", info: "busy" }[level];
-			const gone = () => store.set({ notes: store.get().notes.filter((other) => other.id !== id) });
+			const gone = () => remove([id]);
 			const mend = () => {
 				gone();
 				remedy?.act();
 			};
-			all.push(note(kind, title, text, [remedy ? button(remedy.word, mend) : null, close(gone)]));
+			const words = times > 1 ? `${title} (${times} times)` : title;
+			all.push(note(kind, words, text, [remedy ? button(remedy.word, mend) : null, close(gone)]));
+			if (level !== "info" || going.has(id)) continue;
+			going.add(id);
+			setTimeout(expire, STANDS_MS, id);
+		}
+		const more = all.length - MOST;
+		if (more > 0) {
+			all.length = MOST;
+			const ids = notes.map(({ id }) => id);
+			all.push(note("", `${more} more`, "", [button("Dismiss all", () => remove(ids))]));
 		}
 		// A run tells ten times a second how far it is: what stands there stays, or the button under a
 		// pointer would be another before it is let go.
 		const whose = [run?.state === "failed" && run.key, ...notes.map(({ id }) => id)];
 		const now = [...whose, ...all.map(({ outerHTML }) => outerHTML)].join();
-		if (now !== standing) fill(root, all);
+		if (now !== standing) {
+			const held = root.contains(document.activeElement);
+			fill(root, all);
+			if (held) root.querySelector("button")?.focus();
+		}
 		standing = now;
 		clearInterval(ticking);
 		if (link === "lost")
 			ticking = setInterval(() => root.contains(document.activeElement) || render(), 1000);
 	}
 
-	store.watch(["link", "retryAt", "run", "basis", "notes"], render);
+	store.watch(["link", "retryAt", "run", "basis", "notes", "server"], render);
 }

@@ -1,11 +1,14 @@
 /** What a person can do: the page's own state at once, the server's by request. */
-import { ApiError, request, sendJson } from "./api.js";
+import { ApiError, getJson, request, sendJson } from "./api.js";
 import { SPEEDS, clampStep } from "../play/clock.js";
 import { eventsNow, nextEvent, nextLayers, ordered } from "./events.js";
 
 /** What differs from the defaults. @param {Pick<Server.State, "changed" | "parameters">} server */
 export const valuesOf = ({ changed, parameters }) =>
 	Object.fromEntries(changed.map((key) => [key, parameters[key]]));
+
+/** Notes that are kept besides the newest: who dismisses one sees the next. */
+const MOST_NOTES = 19;
 
 /** Arrangements of the panes by name: shares of the window. @type {Record<string, PageState["layout"]>} */
 const LAYOUTS = {
@@ -49,18 +52,36 @@ export function createActions({ store, seek, send, receive }) {
 	let smoothing;
 	const frames = () => store.get().frames;
 
+	/**
+	 * Have the server open a recording: this window knows then that nobody else did.
+	 * @param {string} name  of the recording, or what opens it
+	 * @param {string} path @param {object} [body]
+	 */
+	async function opening(name, path, body) {
+		store.set({ asked: name });
+		const state = await actions.ask("POST", path, body);
+		if (!state) store.set({ asked: "" });
+		return state;
+	}
+
 	/** @type {Actions} */
 	const actions = {
 		note(level, title, text, remedy, about) {
 			const id = (noteId += 1);
 			// The same thing said twice is one note.
-			const others = store.get().notes.filter((other) => other.title !== title);
-			store.set({ notes: [...others.slice(-3), { id, level, title, text, remedy, about }] });
-			if (level === "info")
-				setTimeout(
-					() => store.set({ notes: store.get().notes.filter((other) => other.id !== id) }),
-					6000,
-				);
+			const { notes } = store.get();
+			const times = 1 + (notes.find((other) => other.title === title)?.times ?? 0);
+			const others = notes.filter((other) => other.title !== title);
+			store.set({
+				notes: [...others.slice(-MOST_NOTES), { id, level, title, text, remedy, about, times }],
+			});
+		},
+		async noteEdit(title, text) {
+			const state = await getJson("/api/state").catch(() => null);
+			if (state) receive(state);
+			const edit = state?.edits.undo;
+			const act = () => void actions.undo(-1);
+			actions.note("info", title, text, edit && { word: "Undo", act, edit });
 		},
 		refused(error, about) {
 			if (!(error instanceof ApiError)) throw error;
@@ -208,10 +229,8 @@ export function createActions({ store, seek, send, receive }) {
 		},
 
 		// runs and parameters
-		open(name) {
-			store.set({ asked: name });
-			return actions.ask("POST", "sequence", { name });
-		},
+		open: (name) => opening(name, "sequence", { name }),
+		openRun: (number, recording) => opening(recording, `library/runs/${number}/open`),
 		change: (changes) => actions.ask("PATCH", "parameters", { changes }),
 		reset: (...keys) => void actions.ask("POST", "parameters/reset", keys.length ? { keys } : {}),
 		preset: (name) => void actions.ask("POST", "parameters/preset", { name }),

@@ -331,7 +331,7 @@ export function createAddress(store, actions) {
 
 	/** Open the place's sequence; where that fails, what is open is looked at as usual. */
 	function open() {
-		if (keptRun) void actions.ask("POST", `library/runs/${keptRun}/open`);
+		if (keptRun) void actions.openRun(keptRun, place.sequence ?? "");
 		else if (place.sequence) void actions.open(place.sequence);
 		keptRun = null;
 	}

@@ -50,7 +50,12 @@ type Buckets = { first: number; stride: number };
 type Summary = { low: number[]; high: number[]; mean: number[] };
 
 /** What a note offers to do about it. */
-type Remedy = { word: string; act: () => void };
+type Remedy = {
+	word: string;
+	act: () => void;
+	/** The edit that it takes back, in the server's words: offered while that is the last one. */
+	edit?: string;
+};
 
 type Note = {
 	id: number;
@@ -60,6 +65,8 @@ type Note = {
 	remedy?: Remedy;
 	/** What was refused: gone once the like is accepted. */
 	about?: string;
+	/** How often it was said. */
+	times: number;
 };
 
 interface PageState {
@@ -199,6 +206,8 @@ interface Actions {
 		/** Of what was refused: the first part of its path. */
 		about?: string,
 	) => void;
+	/** Says what was just edited, with a button that takes it back. */
+	noteEdit: (title: string, text: string) => Promise<void>;
 	/** Null after a failure, which is told. */
 	/** Says what the server told of it; throws what is no answer of the server. */
 	refused: (error: unknown, about: string) => void;
@@ -231,6 +240,8 @@ interface Actions {
 	toggleLayer2d: (layer: string) => void;
 	toggleLayer3d: (layer: string) => void;
 	open: (name: string) => Promise<any>;
+	/** A run of the library, as it was, and its recording. */
+	openRun: (number: number, recording: string) => Promise<any>;
 	openSheet: () => void;
 	change: (changes: Record<string, any>) => Promise<any>;
 	reset: (...keys: string[]) => void;

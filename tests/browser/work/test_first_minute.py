@@ -84,6 +84,25 @@ def test_a_note_under_the_pointer_stays_while_a_run_goes_on(
     as_at_first(server)
 
 
+def test_notes_lie_over_the_page_and_a_few_are_seen(flat_page: Page, server: Server) -> None:
+    page = flat_page
+    as_at_first(server)
+    notes, timeline = page.locator(".note"), page.locator(".time")
+    last = server.get("/api/state").json()["sequence"]["frames"] - 1
+    before = timeline.bounding_box()
+    for step in range(last, last - 4, -1):
+        ask(server, "POST", "seek", {"step": step})
+        until(page, lambda step=step: readout(page) == str(step), "the step")
+        page.keyboard.press("n")
+        expect(notes.first).to_contain_text(f"after step {step}")
+    expect(notes).to_have_count(4)
+    expect(notes.last).to_contain_text("1 more")
+    assert timeline.bounding_box() == before
+    notes.last.get_by_role("button", name="Dismiss all").click()
+    expect(notes).to_have_count(0)
+    as_at_first(server)
+
+
 def test_who_did_not_open_the_other_recording_is_told_with_the_way_back(
     flat_page: Page, server: Server, tmp_path: Path
 ) -> None:
