@@ -1,5 +1,5 @@
 /** The cameras of an import: a row each, with all that belongs to one and what is odd about it. */
-import { h, icon, show, svg } from "../elements/dom.js";
+import { h, icon, one, show, svg } from "../elements/dom.js";
 import { table } from "../elements/drawn.js";
 import { ownEnd } from "../library/words.js";
 import { cut, div, field, numberField, select, small, span, wishing } from "./controls.js";
@@ -67,13 +67,7 @@ function row(info, camera, k) {
 				span({ class: "blank" }, icon("i-folder")),
 				video && h("img", { src: `/api/import/${info.key}/picture?${query}`, alt: "" }),
 			),
-			field(
-				`in-name-${k}`,
-				`Name of ${key}`,
-				name,
-				{ names: { ...info.wish.names, [key]: "$" } },
-				{ maxlength: 60 },
-			),
+			field(`in-name-${k}`, `Name of ${key}`, name, { names: { [key]: "$" } }, { maxlength: 60 }),
 		),
 		two(
 			video || "no video",
@@ -103,17 +97,19 @@ function short({ cameras }, label) {
 
 /** @param {Info} info @param {Camera} camera @param {number} k */
 function sync(info, { key, name, seconds_late, offset }, k) {
-	const { fps, wish } = info;
+	const { fps } = info;
 	const late = Math.round(seconds_late * fps * 10) / 10;
-	const offsets = (/** @type {number | string} */ to) => ({
-		offsets: { ...wish.offsets, [key]: to },
-	});
+	// From what the field has by now: two clicks are two frames, also before the first is answered.
 	const step = (/** @type {string} */ sign, /** @type {number} */ by, /** @type {string} */ word) =>
 		h(
 			"button",
 			{
-				"data-wish": JSON.stringify(offsets(-(late + by) / fps)),
 				"aria-label": `${name}: a frame ${word}`,
+				onclick(/** @type {any} */ { currentTarget }) {
+					const input = one("input", currentTarget.parentElement);
+					input.value = String(Math.round((Number(input.value) + by) * 10) / 10);
+					input.dispatchEvent(new Event("change", { bubbles: true }));
+				},
 			},
 			sign,
 		);
@@ -129,7 +125,7 @@ function sync(info, { key, name, seconds_late, offset }, k) {
 				`in-late-${k}`,
 				`${name} starts late by, frames`,
 				late,
-				offsets("#"),
+				{ offsets: { [key]: "#" } },
 				{ "data-scale": -1 / fps },
 				Number.isInteger(late) ? 0 : 1,
 			),
@@ -158,7 +154,7 @@ function stateOf(info, camera, k) {
 		return fault(
 			`starts ${whole} frames ${late > 0 ? "late" : "early"}`,
 			wishing(`Apply ${late < 0 ? "−" : ""}${whole}`, {
-				offsets: { ...wish.offsets, [key]: -late / fps },
+				offsets: { [key]: -late / fps },
 			}),
 		);
 	}

@@ -173,7 +173,16 @@ export function mountOpening({ store, actions }) {
 	function wish(changes, undone) {
 		if (!info) return;
 		if (!undone) past.push(info.wish);
-		const told = { ...info.wish, ...changes };
+		// Of another camera meanwhile more may be wished than a control was drawn with.
+		const [{ names, offsets }, before] = [changes, info.wish];
+		const told = undone
+			? { ...before, ...changes }
+			: {
+					...before,
+					...changes,
+					names: { ...before.names, ...names },
+					offsets: { ...before.offsets, ...offsets },
+				};
 		info = { ...info, wish: told };
 		const { key } = info;
 		const turn = (turns += 1);

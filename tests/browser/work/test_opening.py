@@ -214,7 +214,16 @@ def test_what_is_changed_is_looked_into_again(flat_page: Page, files: Path) -> N
     expect(sheet.get_by_label("Room, to x, metres")).to_have_value(moved)
     sheet.get_by_role("button", name="As suggested").click()
     expect(sheet.get_by_label("Room, to x, metres")).to_have_value(before)
-    late = sheet.get_by_label("cam2 starts late by, frames")
+    late, other = (
+        sheet.get_by_label(f"{name} starts late by, frames") for name in ("cam2", "cam1")
+    )
+    more = sheet.get_by_role("button", name=re.compile("a frame more"))
+    more.evaluate_all("all => [all[1], all[0], all[1]].forEach(button => button.click())")
+    settled(page)
+    expect(late).to_have_value("2")  # also what was pressed before the first was answered
+    expect(other).to_have_value("1")
+    other.fill("0")
+    other.press("Enter")
     late.fill("6")
     late.press("Enter")
     expect(sheet.locator("tbody tr").nth(1)).to_contain_text("Apply 0")
