@@ -29,7 +29,8 @@ from tracker.library.keeping import (
 )
 from tracker.library.records import KeptRun, Recording, Result
 from tracker.library.store import Library
-from tracker.parameters.catalogue import PARAMETERS
+from tracker.parameters.catalogue import METHODS, PARAMETERS, RunParameters
+from tracker.parameters.values import value_of
 from tracker.sequences import library as sequences
 from tracker.sequences.reader import FILE
 
@@ -276,18 +277,23 @@ def _result(opened: Library, number: int) -> Result:
 
 
 def _info(run: KeptRun) -> models.KeptRunInfo:
-    changes = []
-    for key, value in run.changes.items():
-        parameter = PARAMETERS.get(key)
-        changes.append(
-            models.ChangeInfo(
-                key=key,
-                symbol=parameter.symbol if parameter is not None else key,
-                default=_text(parameter.default) if parameter is not None else "",
-                value=_text(value),
-            )
+    changes = [
+        models.ChangeInfo(
+            key=key,
+            symbol=PARAMETERS[key].symbol if key in PARAMETERS else key,
+            default=_text(_default(key)),
+            value=_text(value),
         )
+        for key, value in run.changes.items()
+    ]
     return models.run_info(run, changes, run.code != code_version())
+
+
+def _default(key: str) -> object:
+    """The default of a value; empty for the single-view method, which the recording decides, and
+    for what this version does not know."""
+    known = key in PARAMETERS or (key in METHODS and key != "single_view")
+    return value_of(RunParameters(), key) if known else ""
 
 
 def _text(value: object) -> str:

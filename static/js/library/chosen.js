@@ -56,10 +56,10 @@ export function chosenBar({ store, actions, chosen, none, refresh }) {
 				h("h2", {}, "Runs side by side"),
 				h("button", { class: "btn icon", "aria-label": "Close", onclick: close }, icon("i-close")),
 			),
-			comparison(chosen()),
+			...comparison(chosen(), store.get().schema),
 		);
 		// beside it; what is in it can be marked and copied
-		dialog.onclick = (/** @type {Event} */ { target }) => target === dialog && close();
+		dialog.onclick = (/** @type {Event} */ { target }) => void (target === dialog && close());
 		dialog.showModal();
 	}
 

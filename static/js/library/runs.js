@@ -1,7 +1,7 @@
 /** The table of a recording's runs. */
 import { fill, h, icon, symbolOf } from "../elements/dom.js";
 import { grid } from "../elements/grid.js";
-import { figure, livesAMinute, madeWhen } from "./words.js";
+import { figure, isMethod, livesAMinute, madeWhen, methodWord } from "./words.js";
 
 /** Figures with a bar: what the bar is from and to, and which end is the better. */
 const FIGURES = /** @type {const} */ ([
@@ -25,12 +25,15 @@ const PILLS = 3;
 
 /** @param {Server.KeptRunInfo} run */
 function pills(run) {
-	if (!run.changes.length && !run.corrected) return h("span", { class: "q" }, "–");
-	const all = run.changes.map(({ key, value }) => `${key} ${value}`).join("\n");
-	const shown = run.changes
+	const changes = run.changes.filter(({ key }) => !isMethod(key));
+	if (!changes.length && !run.corrected) return h("span", { class: "q" }, "–");
+	const all = changes.map(({ key, value }) => `${key} ${value}`).join("\n");
+	const shown = changes
 		.slice(0, PILLS)
-		.map((change) => h("span", { class: "pc" }, symbolOf(change.symbol, "q"), " ", change.value));
-	const more = run.changes.length - PILLS;
+		.map(({ symbol, value }) =>
+			h("span", { class: "pc" }, symbolOf(symbol, "q"), " ", methodWord(value)),
+		);
+	const more = changes.length - PILLS;
 	return h(
 		"span",
 		{ title: all },
@@ -135,7 +138,11 @@ export function runsTable(on) {
 		},
 		{
 			word: "Methods",
-			cell: (run) => [run.single_view, h("span", { class: "q" }, " › "), run.fusion_method],
+			cell: (run) => [
+				methodWord(run.single_view),
+				h("span", { class: "q" }, " › "),
+				methodWord(run.fusion_method),
+			],
 		},
 		{ word: "Differs from default", kind: "chs", cell: pills },
 		...FIGURES.map(([key, word, from, to]) => ({

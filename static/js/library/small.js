@@ -1,6 +1,7 @@
 /** A kept run in small, and runs side by side: what of them is drawn. */
 import { colourIndex, h, idTag, symbolOf } from "../elements/dom.js";
-import { figure, titleOf } from "./words.js";
+import { parameterName } from "../elements/drawn.js";
+import { METHODS, figure, isMethod, methodWord, titleOf } from "./words.js";
 
 /** Lanes that are drawn: those of the longest tracks. */
 const MOST_LANES = 6;
@@ -189,14 +190,18 @@ function facts(run) {
 	const error = figure(run.position_error);
 	/** @type {[Child, Child[]][]} */
 	const rows = [
-		["Note", [note]],
-		...run.changes.map(
-			(change) =>
-				/** @type {[Child, Child[]]} */ ([
-					named(change),
-					[quiet(`${change.default} → `), change.value],
-				]),
+		...METHODS.map(
+			([key, word]) => /** @type {[Child, Child[]]} */ ([word, [methodWord(run[key])]]),
 		),
+		...run.changes
+			.filter(({ key }) => !isMethod(key))
+			.map(
+				(change) =>
+					/** @type {[Child, Child[]]} */ ([
+						named(change),
+						[quiet(change.default && `${methodWord(change.default)} → `), methodWord(change.value)],
+					]),
+			),
 	];
 	if (run.corrected) rows.push(["Corrections of a person", [run.corrected]]);
 	if (run.provisional) rows.push(["Figures", [`provisional: ${PROVISIONAL}`]]);
@@ -208,59 +213,98 @@ function facts(run) {
 		["Seed", [run.seed]],
 		["Program", [programOf(run)]],
 	);
-	return rows.flatMap(([word, value]) => [h("dt", {}, word), h("dd", {}, value)]);
+	return [
+		h("dt", { class: "vh" }, "Note"),
+		h("dd", { class: "whole" }, note),
+		...rows.flatMap(([word, value]) => [h("dt", {}, word), h("dd", {}, value)]),
+	];
 }
 
-/* ---------- Runs side by side: what differs, and their figures, the best of each bold. ---------- */
+/* ---------- Runs side by side: their figures, the best of each bold, and what differs. ---------- */
 
-/** @param {Server.KeptRunInfo[]} runs */
-export function comparison(runs) {
-	/** @type {[Child, Child[]][]} */
-	const rows = [];
-	for (const [word, of] of /** @type {[string, (run: Server.KeptRunInfo) => Child][]} */ ([
-		["Single view", (run) => run.single_view],
-		["Fusion", (run) => run.fusion_method],
-		["Seed", (run) => run.seed],
-		["Corrections", (run) => run.corrected],
-		["Program", programOf],
-	]))
-		if (new Set(runs.map(of)).size > 1) rows.push([word, runs.map(of)]);
-	const known = new Map(runs.flatMap(({ changes }) => changes).map((one) => [one.key, one]));
-	for (const method of ["single_view", "fusion_method"]) known.delete(method); // told above
-	for (const change of known.values())
-		rows.push([
-			named(change),
-			runs.map((run) => run.changes.find(({ key }) => key === change.key)?.value ?? change.default),
-		]);
-	rows.push(...FIGURES.map((one) => sideBySide(runs, one)));
-	if (runs.some(({ provisional }) => provisional))
-		rows.push(["Figures", runs.map(({ provisional }) => (provisional ? PROVISIONAL : ""))]);
-	return h(
-		"table",
-		{ "aria-label": "Runs side by side" },
-		h(
-			"thead",
-			{},
+/** @typedef {[Child, Child[]]} Row  a word, and a value for each run */
+
+/**
+ * @param {Server.KeptRunInfo[]} runs
+ * @param {Server.Schema | null} schema
+ * @returns {Child[]} the table of what differs, and what is alike, folded
+ */
+export function comparison(runs, schema) {
+	/** @type {(rows: Row[]) => Child[]} */
+	const lines = (rows) =>
+		rows.map(([word, values]) =>
 			h(
 				"tr",
 				{},
-				h("th", { scope: "col" }, "What"),
-				runs.map((run) => h("th", { scope: "col", class: "num" }, titleOf(run))),
+				h("td", {}, word),
+				values.map((value) => h("td", { class: "num" }, value)),
 			),
-		),
+		);
+	const figures = FIGURES.map((one) => sideBySide(runs, one));
+	if (runs.some(({ provisional }) => provisional))
+		figures.push(["Figures", runs.map(({ provisional }) => (provisional ? PROVISIONAL : ""))]);
+	const all = causes(runs, schema);
+	const alike = all.filter(([, values]) => new Set(values).size === 1);
+	const differing = all.filter((row) => !alike.includes(row));
+	return [
 		h(
-			"tbody",
-			{},
-			rows.map(([word, values]) =>
+			"table",
+			{ "aria-label": "Runs side by side" },
+			h(
+				"thead",
+				{},
 				h(
 					"tr",
 					{},
-					h("td", {}, word),
-					values.map((value) => h("td", { class: "num" }, value)),
+					h("th", { scope: "col" }, "What"),
+					runs.map((run) => h("th", { scope: "col", class: "num" }, titleOf(run))),
 				),
 			),
+			h("tbody", {}, lines(figures)),
+			h("tbody", {}, lines(differing)),
 		),
-	);
+		alike.length > 0 &&
+			h(
+				"details",
+				{},
+				h("summary", {}, `${alike.length} equal`),
+				h(
+					"table",
+					{ "aria-label": "Equal in all of them" },
+					h("tbody", {}, lines(alike.map(([word, [value]]) => [word, [value]]))),
+				),
+			),
+	];
+}
+
+/**
+ * What runs were made with: methods, corrections, program, and each value that one of them changed.
+ * @param {Server.KeptRunInfo[]} runs @param {Server.Schema | null} schema
+ * @returns {[Child, string[]][]}
+ */
+function causes(runs, schema) {
+	const changes = new Map(runs.flatMap((run) => run.changes).map((one) => [one.key, one]));
+	const change = (/** @type {Server.KeptRunInfo} */ run, /** @type {string} */ key) =>
+		run.changes.find((one) => one.key === key);
+	return [
+		...METHODS.map(
+			([key, word]) =>
+				/** @type {[Child, string[]]} */ ([word, runs.map((run) => methodWord(run[key]))]),
+		),
+		...[...changes.values()]
+			.filter(({ key }) => !isMethod(key))
+			.map((one) => {
+				const known = schema?.parameters.find(({ key }) => key === one.key);
+				const word = known ? parameterName(known) : methodWord(one.key);
+				return /** @type {[Child, string[]]} */ ([
+					h("span", {}, word, quiet(known?.unit ? ` ${known.unit}` : "")),
+					runs.map((run) => methodWord(change(run, one.key)?.value ?? one.default)),
+				]);
+			}),
+		["Seed", runs.map(({ seed }) => String(seed))],
+		["Corrections of a person", runs.map(({ corrected }) => String(corrected))],
+		["Program", runs.map(programOf)],
+	];
 }
 
 /**

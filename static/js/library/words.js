@@ -49,6 +49,18 @@ export const figure = (value, digits = 3) => (value === null ? "–" : value.toF
 export const livesAMinute = ({ targets, steps }, fps) =>
 	fps && steps ? (60 * targets * fps) / steps : null;
 
+/** The methods that every run has, and what their stage is called. */
+export const METHODS = /** @type {const} */ ([
+	["single_view", "Single view"],
+	["fusion_method", "Fusion"],
+]);
+
+/** Whether a change is told with the methods. @param {string} key */
+export const isMethod = (key) => METHODS.some(([method]) => method === key);
+
+/** A method, or a choice, in words. @param {string} key */
+export const methodWord = (key) => key.replaceAll("_", " ");
+
 /** @param {Server.KeptRunInfo} run */
 export const titleOf = (run) => run.name || `Run ${run.id}`;
 

@@ -62,6 +62,10 @@ def test_finished_runs_are_kept_with_their_figures(kept: TestClient) -> None:
     # what was never opened can be opened from there all the same
     (never,) = [r for r in listed["recordings"] if r["name"] == "numbers"]
     assert (never["id"], never["runs"]) == (None, 0)
+    kept.patch("/api/parameters", json={"changes": {"smoothing_method": "none"}})
+    wait_until(lambda: len(runs_of(kept)) == 3)
+    method = runs_of(kept)[0]["changes"][0]
+    assert (method["default"], method["value"]) == ("identities", "none")
 
 
 @pytest.mark.full

@@ -55,7 +55,11 @@ def test_runs_are_listed_with_what_differs(library: Page, screenshots: Path | No
     for word in ("People over time", "OSPA over time", "Ways from above"):
         expect(small.get_by_role("img", name=word)).to_be_visible()
     assert small.locator("polyline").count() == 4, "two curves and the ways of two tracks"
-    expect(small.locator("dd").nth(1)).to_have_text("0.95 → 0.8")
+    expect(small.locator("dd").nth(3)).to_have_text("0.95 → 0.8")
+    note, part = (
+        small.locator(one).evaluate("one => one.clientWidth") for one in (".addnote", "dl")
+    )
+    assert note > 0.8 * part, "a note has room"
     if screenshots:
         for theme in ("dark", "light"):
             library.emulate_media(color_scheme=theme)  # type: ignore[arg-type]
@@ -110,6 +114,13 @@ def test_runs_stand_side_by_side(library: Page, server: Server) -> None:
     expect(dialog.get_by_role("row", name="MOTA")).to_be_visible()
     names = [run["name"] or f"Run {run['id']}" for run in kept(server, 2)]
     expect(dialog.get_by_role("columnheader")).to_have_text(["What", *names])
+    rows = dialog.get_by_role("table").first.locator("tbody tr")
+    expect(rows.first).to_contain_text("MOTA")  # figures first, then what differs
+    expect(rows.last).to_contain_text("Detection probability")
+    alike = dialog.get_by_role("table", name="Equal in all of them")
+    expect(alike).to_be_hidden()
+    dialog.get_by_text("5 equal").click()
+    expect(alike).to_contain_text("multi bernoulli")
     dialog.get_by_role("row", name="MOTA").click()  # what is told can be marked
     expect(dialog.get_by_role("heading", name="Runs side by side")).to_be_visible()
     dialog.get_by_role("button", name="Close").click()
