@@ -11,11 +11,14 @@ from numpy import ndarray
 from numpy.testing import assert_allclose, assert_array_equal
 
 from tests import world
+from tests.random_rooms import random_room
 from tests.smoothing.known import CAMERAS, PLAIN, Known, backwards, known
 from tracker.corrections.kinds import make
 from tracker.corrections.outcomes import outcomes
+from tracker.evaluation import evaluate_sequence
 from tracker.parameters.catalogue import RunParameters
 from tracker.parameters.values import with_values
+from tracker.runs import pipeline
 from tracker.smoothing import create
 from tracker.smoothing.result import Smoothed
 
@@ -271,3 +274,18 @@ def test_who_comes_back_on_the_other_side_is_known_by_looks(weight: float) -> No
     # where looks count for nothing, nobody is asked whether he is one of those who left
     assert found.joined is not None
     assert len(found.joined.gains) == (4 if weight else 0)
+
+
+def test_with_unscented_points_gaps_are_judged_by_the_cameras_as_with_the_linear_update() -> None:
+    """The empty places of a gap have no covariance from which points could be drawn."""
+    room = random_room(4, cameras=2, people=4, steps=60)
+    scores = [
+        evaluate_sequence(
+            room,
+            pipeline.compute(
+                room, with_values(RunParameters(), {"single_view": "none", "fusion.update": kind})
+            ).tracks,
+        )["idf1"]
+        for kind in ("extended", "unscented")
+    ]
+    assert scores[1] == pytest.approx(scores[0], abs=0.01)

@@ -281,7 +281,7 @@ def _seen_empty_at(smoother: Smoother, paths: Paths, pairs: Pairs) -> Float[ndar
     steps = paths.lasts[pairs.earlier][pair] + step
     model, p = smoother.model, smoother.parameters
     for c, camera in enumerate(smoother.cameras):
-        expected = model.target.expected(model.cameras[c], states, spread)
+        expected = model.target.expected(model.cameras[c], states)
         chances = p.detection_probability * visibility.inside_probability(
             model.cameras[c], expected, spread, soft=p.edge == "soft"
         )
