@@ -33,7 +33,7 @@ const called = ({ id, ariaLabel, form, textContent }) =>
 /**
  * Draw anew what somebody may be working in. What is as it was is not touched: what is typed stays
  * as long as the value under it does. A control that is replaced hands its focus to the one of its
- * name, else to the one in its place.
+ * name, else to the one in its place, to the last one, or to the panel.
  * @param {HTMLElement} root
  * @param {...(Child | Child[])} children
  */
@@ -44,7 +44,11 @@ export function redraw(root, ...children) {
 	adapt(root, h("div", {}, ...children));
 	if (!held || held.isConnected) return;
 	const now = all(stops, root);
-	(now.find((control) => called(control) === called(held)) ?? now[at] ?? root).focus();
+	const next = now.find((control) => called(control) === called(held)) ?? now[at] ?? now.at(-1);
+	if (next) return next.focus();
+	const panel = /** @type {HTMLElement} */ (root.closest("[role=tabpanel]") ?? root);
+	panel.tabIndex = -1;
+	panel.focus();
 }
 
 /** A parameter: its words with its symbol; what it means comes with the pointer. @param {Server.ParameterInfo} of */

@@ -233,12 +233,13 @@ export function mountSide(root, context) {
 	for (const tab of tabs) {
 		tab.addEventListener("click", () => store.set({ tab: nameOf(tab) }));
 		tab.addEventListener("keydown", (event) => {
-			const turn = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
-			if (!turn) return;
+			const there = tabs.filter(({ hidden }) => !hidden);
+			const [at, count] = [there.indexOf(tab), there.length];
+			const to = { ArrowRight: at + 1, ArrowLeft: at - 1, Home: 0, End: -1 }[event.key];
+			if (to === undefined) return;
 			event.preventDefault();
 			event.stopPropagation();
-			const there = tabs.filter(({ hidden }) => !hidden);
-			const next = there[(there.indexOf(tab) + turn + there.length) % there.length];
+			const next = there[(to + count) % count];
 			store.set({ tab: nameOf(next) });
 			next.focus();
 		});

@@ -263,6 +263,7 @@ export function mountTables(root, { store, actions }) {
 		presets.disabled = savePreset.disabled = locked;
 		renamePreset.hidden = removePreset.hidden = !own.includes(now);
 		resetAll.disabled = locked || changed.length === 0;
+		if (resetAll.disabled && document.activeElement === resetAll) presets.focus();
 		write(code, server?.command ?? "");
 		unpin.hidden = swap.hidden = !server?.pinned;
 		const unfinished = locked

@@ -265,7 +265,10 @@ export function mountTeach(mosaic, { store, actions }) {
 		const keeps = event.key === "Enter" || ((event.ctrlKey || event.metaKey) && event.key === "s");
 		if (keeps && field.id === asked) asked = "";
 		if (event.key === "Escape") field.value = field.defaultValue;
-		if (event.key === "Escape" || (event.key === "Enter" && !field.form)) field.blur();
+		if (event.key === "Escape") field.blur();
+		if (event.key !== "Enter" || field.form) return;
+		const stops = all("input, select, button", panel);
+		(stops[stops.indexOf(/** @type {any} */ (field)) + 1] ?? panel).focus();
 	});
 	panel.addEventListener("focusout", () => {
 		asked = "";

@@ -10,9 +10,9 @@ import { many, size } from "./words.js";
  * @param {Actions} how.actions
  * @param {() => Server.KeptRunInfo[]} how.chosen
  * @param {() => void} how.none  choose none
- * @param {() => Promise<void>} how.refresh  runs are others now
+ * @param {() => () => Promise<void>} how.leave  runs are about to go; the answer shows who is left
  */
-export function chosenBar({ store, actions, chosen, none, refresh }) {
+export function chosenBar({ store, actions, chosen, none, leave }) {
 	const numbers = () => chosen().map(({ id }) => id);
 	const picked = h("b");
 	const line = h("span", { role: "status", class: "gone-line" });
@@ -66,10 +66,11 @@ export function chosenBar({ store, actions, chosen, none, refresh }) {
 	/** @param {number[]} ids */
 	async function remove(ids) {
 		if (!ids.length) return;
+		const showRest = leave();
 		/** @type {Server.Deleted | null} */
 		const deleted = await actions.ask("POST", "library/delete", { runs: ids });
 		none();
-		await refresh();
+		await showRest();
 		if (!deleted) return;
 		const what = ids.length === 1 ? `Run ${ids[0]}` : many(ids.length, "run");
 		await actions.noteEdit(`${what} deleted, ${size(deleted.bytes)}`, "");

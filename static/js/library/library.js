@@ -1,5 +1,5 @@
 /** The place Library: recordings, the runs of one, and one run in small. */
-import { fill, h, icon, write } from "../elements/dom.js";
+import { all, fill, h, icon, write } from "../elements/dom.js";
 import { getJson } from "../state/api.js";
 import { chosenBar } from "./chosen.js";
 import { preview } from "./preview.js";
@@ -240,7 +240,7 @@ export function mountLibrary(root, { store, actions }) {
 		actions,
 		chosen: () => runs.filter(({ id }) => chosen.has(id)),
 		none: chooseNone,
-		refresh,
+		leave,
 	});
 	const title = h("h2", { class: "pane-title" }, "Runs");
 	const sub = h("span", { class: "sub" });
@@ -373,6 +373,17 @@ export function mountLibrary(root, { store, actions }) {
 		focused = id;
 		show();
 		await small.show(focusedRun());
+	}
+
+	/** Once runs are deleted the focus is on the row in the place of the one that was looked at. */
+	function leave() {
+		const rows = () => all("tr[data-run]", root);
+		const at = rows().findIndex(({ dataset }) => Number(dataset.run) === focused);
+		return async () => {
+			await refresh();
+			const left = rows();
+			(left[Math.max(0, Math.min(at, left.length - 1))] ?? recordings.find).focus();
+		};
 	}
 
 	/** @param {number} id */

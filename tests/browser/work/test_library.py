@@ -81,6 +81,7 @@ def test_keys_choose_star_name_and_delete(library: Page, server: Server) -> None
     library.keyboard.press("Delete")
     expect(library.locator("tr[data-run]")).to_have_count(1)
     expect(library.get_by_text("Run 1 deleted")).to_be_visible()
+    expect(library.locator('tr[data-run="2"]')).to_be_focused()
     library.keyboard.press("Control+z")
     expect(library.locator("tr[data-run]")).to_have_count(2)
     expect(library.get_by_text("Undone: run 1 deleted")).to_be_visible()

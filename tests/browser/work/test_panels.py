@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 from playwright.sync_api import Locator, Page, expect
@@ -90,6 +91,29 @@ def test_events_are_listed_and_can_be_gone_to(flat_page: Page, server: Server) -
     page.get_by_role("combobox", name="Kind of event").select_option("removed")
     expect(page.locator("#panel-events")).to_contain_text("No such event")
     page.get_by_role("combobox", name="Kind of event").select_option("")
+    as_at_first(server)
+
+
+def test_the_focus_goes_on_to_what_is_left(flat_page: Page, server: Server) -> None:
+    page = flat_page
+    as_at_first(server)
+    changes = {"fusion.detection_probability": 0.6, "fusion.clutter_rate": 2.0}
+    ask(server, "PATCH", "parameters", {"changes": changes})
+    page.get_by_role("tab", name="Tracks").focus()
+    page.keyboard.press("End")
+    expect(page.get_by_role("tab", name="Runs")).to_be_focused()
+    page.keyboard.press("Home")
+    expect(page.get_by_role("tab", name="Tracks")).to_be_focused()
+    panel = shown(page, "Changes")
+    resets = panel.get_by_role("button", name=re.compile("^Reset "))
+    expect(resets).to_have_count(2)
+    resets.first.focus()
+    page.keyboard.press("Enter")
+    expect(resets).to_have_count(1)
+    expect(resets.first).to_be_focused()
+    page.keyboard.press("Enter")
+    expect(resets).to_have_count(0)
+    expect(page.locator("#panel-changes")).to_be_focused()
     as_at_first(server)
 
 
