@@ -16,6 +16,7 @@ from numpy import ndarray
 
 from tests import world
 from tracker.corrections import Correction, CorrectionError, Place
+from tracker.corrections.constraints import Constraints
 from tracker.corrections.contradictions import along, find_repeated, refuse_contradiction
 from tracker.corrections.kinds import content_of, digest, leeway, make
 from tracker.corrections.lookup import TrackIndex, mostly_inside
@@ -590,11 +591,21 @@ def test_a_correction_is_complete_or_refused(values: dict, wrong: str) -> None:
 def test_a_correction_speaks_of_its_places() -> None:
     one = make(kind="exchanged", places=[at(4, 1.0), at(3, 2.0), at(6, 3.0), at(5, 4.0)])
     a, b, c, d = one.places
-    assert (one.pairs, one.apart, one.steps) == (((a, c), (b, d)), ((a, d), (b, c)), (3, 6))
+    assert (one.constraints.must_link, one.constraints.cannot_link, one.steps) == (
+        ((a, c), (b, d)),
+        ((a, d), (b, c)),
+        (3, 6),
+    )
     assert one.words == "exchanged from here, steps 3 – 6"
     same, different = (make(kind=kind, places=[at(1), at(4)]) for kind in ("same", "different"))
-    assert (same.pairs, same.apart) == ((same.places,), ())
-    assert (different.pairs, different.apart) == ((), (different.places,))
+    assert same.constraints == Constraints(must_link=(same.places,))
+    assert different.constraints == Constraints(cannot_link=(different.places,))
+    own = frozenset({Place(*at(7))})
+    assert make(kind="came", places=[at(7)]).constraints == Constraints(firsts=own)
+    assert make(kind="left", places=[at(7)]).constraints == Constraints(lasts=own)
+    assert make(kind="nobody", places=[at(7)]).constraints == Constraints(clutter=own)
+    assert make(kind="here", places=[at(7), at(7, 2.0)]).constraints == Constraints(targets=own)
+    assert not make(kind="name", places=[at(7)], name="Anna").constraints
     here = make(kind="here", places=[at(7)])
     assert (here.words, here.accuracy, here.steps) == ("is here, step 7", 0.1, (7, 7))
     assert make(kind="nobody", places=[at(7)]).accuracy == 0.5

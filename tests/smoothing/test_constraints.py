@@ -10,11 +10,11 @@ from numpy import ndarray
 
 from tests.smoothing.test_boundaries import fitted, standing
 from tracker.corrections import Correction
+from tracker.corrections.constraints import Constraints
 from tracker.corrections.kinds import make
 from tracker.smoothing.identity.constraints import (
-    Constraint,
     ConstraintResolver,
-    LinkConstraints,
+    of_chains,
     possible,
 )
 from tracker.smoothing.paths import Paths
@@ -80,34 +80,32 @@ def test_who_is_not_the_same_later_is_cut_before_the_largest_jump_in_between() -
 @pytest.mark.parametrize(
     ("told", "constraints"),
     [
-        ([said("same", at(2), at(5, 5.0))], LinkConstraints()),  # both are there at once
-        ([said("same", at(8), at(15))], LinkConstraints(((2, 4),), targets=frozenset({2, 4}))),
+        ([said("same", at(2), at(5, 5.0))], Constraints()),  # both are there at once
+        ([said("same", at(8), at(15))], Constraints(((2, 4),), targets=frozenset({2, 4}))),
         # before the first place what ends is meant, after the second what begins
-        ([said("same", at(3), at(14))], LinkConstraints(((0, 4),), targets=frozenset({0, 4}))),
-        ([said("same", at(3), at(6))], LinkConstraints(((0, 2),), targets=frozenset({0, 2}))),
-        ([said("same", at(2), at(4))], LinkConstraints(((0, 1),), targets=frozenset({0, 1}))),
-        ([said("same", at(4), at(5))], LinkConstraints()),
-        ([said("different", at(3), at(6))], LinkConstraints(cannot_link=((0, 2),))),
-        ([said("different", at(2), at(6))], LinkConstraints(cannot_link=((0, 2),))),
-        ([said("same", at(8), at(15, 2.0))], LinkConstraints()),  # nobody is at the second place
-        ([said("came", at(6))], LinkConstraints(targets=frozenset({2}), firsts=frozenset({2}))),
-        ([said("left", at(6))], LinkConstraints(targets=frozenset({1}), lasts=frozenset({1}))),
-        ([said("here", at(6))], LinkConstraints(targets=frozenset({1}))),
-        ([said("here", at(6, 2.0), at(6))], LinkConstraints(targets=frozenset({1}))),
-        ([said("nobody", at(4), at(5))], LinkConstraints(clutter=frozenset({1}))),
-        ([said("nobody", at(0), at(9))], LinkConstraints(clutter=frozenset({0, 1, 2}))),
-        ([said("name", at(4), name="Anna")], LinkConstraints()),
-        ([make(kind="checked", first=0, last=9)], LinkConstraints()),
+        ([said("same", at(3), at(14))], Constraints(((0, 4),), targets=frozenset({0, 4}))),
+        ([said("same", at(3), at(6))], Constraints(((0, 2),), targets=frozenset({0, 2}))),
+        ([said("same", at(2), at(4))], Constraints(((0, 1),), targets=frozenset({0, 1}))),
+        ([said("same", at(4), at(5))], Constraints()),
+        ([said("different", at(3), at(6))], Constraints(cannot_link=((0, 2),))),
+        ([said("different", at(2), at(6))], Constraints(cannot_link=((0, 2),))),
+        ([said("same", at(8), at(15, 2.0))], Constraints()),  # nobody is at the second place
+        ([said("came", at(6))], Constraints(targets=frozenset({2}), firsts=frozenset({2}))),
+        ([said("left", at(6))], Constraints(targets=frozenset({1}), lasts=frozenset({1}))),
+        ([said("here", at(6))], Constraints(targets=frozenset({1}))),
+        ([said("here", at(6, 2.0), at(6))], Constraints(targets=frozenset({1}))),
+        ([said("nobody", at(4), at(5))], Constraints(clutter=frozenset({1}))),
+        ([said("nobody", at(0), at(9))], Constraints(clutter=frozenset({0, 1, 2}))),
+        ([said("name", at(4), name="Anna")], Constraints()),
+        ([make(kind="checked", first=0, last=9)], Constraints()),
         # whom one correction joins the next does not take away
         ([said("same", at(8), at(15)), said("nobody", at(7), at(9))],
-         LinkConstraints(((2, 4),), targets=frozenset({2, 4}))),
+         Constraints(((2, 4),), targets=frozenset({2, 4}))),
         ([said("nobody", at(7), at(9)), said("same", at(8), at(15))],
-         LinkConstraints(clutter=frozenset({2}))),
+         Constraints(clutter=frozenset({2}))),
     ],
 )  # fmt: skip
-def test_what_a_correction_says_of_pieces(
-    told: list[Correction], constraints: LinkConstraints
-) -> None:
+def test_what_a_correction_says_of_pieces(told: list[Correction], constraints: Constraints) -> None:
     assert resolver(*told).constraints(*pieces()) == constraints
 
 
@@ -138,52 +136,52 @@ def test_all_pieces_that_are_spoken_of_are_meant() -> None:
 
 def test_limits_and_ties_of_chains_are_those_of_their_pieces() -> None:
     cut, _ = pieces()
-    constraints = LinkConstraints(
+    constraints = Constraints(
         must_link=((2, 4),), cannot_link=((0, 3),), firsts=frozenset({0}), lasts=frozenset({4})
     )
-    found = constraints.of_chains([[0, 1], [2], [3], [4]], cut)
+    found = of_chains(constraints, [[0, 1], [2], [3], [4]], cut)
     assert found is not None
     assert (found.must_link, found.cannot_link) == (((1, 3),), ((0, 2),))
     assert (found.firsts, found.lasts) == ({0}, {3})
     assert found.targets == {0, 1, 3}
     # who is in no chain says nothing; two of one person's that overlap cannot both be
     assert (
-        LinkConstraints(cannot_link=((0, 3),), firsts=frozenset({3})).of_chains([[0]], cut)
-        == LinkConstraints()
+        of_chains(Constraints(cannot_link=((0, 3),), firsts=frozenset({3})), [[0]], cut)
+        == Constraints()
     )
-    assert LinkConstraints(must_link=((0, 3),)).of_chains([[0], [3]], cut) is None
+    assert of_chains(Constraints(must_link=((0, 3),)), [[0], [3]], cut) is None
 
 
 @pytest.mark.parametrize(
     "kind", ["must_link", "cannot_link", "targets", "clutter", "firsts", "lasts"]
 )
 def test_one_constraint_of_any_kind_is_something_to_obey(kind: str) -> None:
-    assert not LinkConstraints()
+    assert not Constraints()
     pairs = kind in ("must_link", "cannot_link")
-    assert replace(LinkConstraints(), **{kind: ((0, 1),) if pairs else frozenset({0})})
+    assert replace(Constraints(), **{kind: ((0, 1),) if pairs else frozenset({0})})
 
 
 def test_one_person_is_in_one_place_whatever_the_order_of_pairs() -> None:
     firsts, lasts = np.array([0, 5, 10, 7]), np.array([4, 9, 14, 12])
-    found = possible(firsts, lasts, [Constraint([(1, 2)]), Constraint([(0, 2)])])
+    found = possible(firsts, lasts, [Constraints(((1, 2),)), Constraints(((0, 2),))])
     assert found is not None
     assert found.must_link == ((0, 1), (1, 2))
     # the fourth overlaps two of them
-    assert possible(firsts, lasts, [Constraint([(0, 1)]), Constraint([(0, 3)])]) == LinkConstraints(
+    assert possible(firsts, lasts, [Constraints(((0, 1),)), Constraints(((0, 3),))]) == Constraints(
         ((0, 1),), targets=frozenset({0, 1})
     )
     # two of one person who are told apart later, and two who are told apart joined by a third
     later = possible(
         firsts,
         lasts,
-        [Constraint([(0, 1)]), Constraint([(1, 2)]), Constraint(cannot_link=[(0, 2)])],
+        [Constraints(((0, 1),)), Constraints(((1, 2),)), Constraints(cannot_link=((0, 2),))],
     )
     assert later is not None
     assert (later.cannot_link, later.must_link) == ((), ((0, 1), (1, 2)))
     first = possible(
         firsts,
         lasts,
-        [Constraint(cannot_link=[(0, 2)]), Constraint([(0, 1)]), Constraint([(1, 2)])],
+        [Constraints(cannot_link=((0, 2),)), Constraints(((0, 1),)), Constraints(((1, 2),))],
     )
     assert first is not None
     assert (first.cannot_link, first.must_link) == (((0, 2),), ((0, 1),))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tracker.smoothing.identity.constraints import LinkConstraints
+from tracker.corrections.constraints import Constraints
 from tracker.smoothing.identity.identities import PriorLinks
 from tracker.smoothing.identity.solver import TrackletGraph, link_tracklets
 from tracker.smoothing.identity.tracklets import Pairs
@@ -26,7 +26,7 @@ PAIRS = Pairs(EARLIER, LATER, np.full(5, 2), np.array([5.0, 5.0, 5.0, 5.5, 5.5])
 """All three best go on as themselves; two alone, the first as the second and he as the third."""
 
 
-def joined(gains: np.ndarray, constraints: LinkConstraints) -> list[list[int]]:
+def joined(gains: np.ndarray, constraints: Constraints) -> list[list[int]]:
     alone = np.full(PIECES, 1.0)
     graph = TrackletGraph(np.full(PIECES, -9.0), alone, alone, EARLIER, LATER, -gains)
     return link_tracklets(graph, constraints)
@@ -35,8 +35,8 @@ def joined(gains: np.ndarray, constraints: LinkConstraints) -> list[list[int]]:
 def test_who_is_parted_takes_nobody_elses_place() -> None:
     rows = np.arange(2 * PIECES)
     plain, prior_links = PriorLinks(), PriorLinks(WHO)
-    assert joined(plain.gains(PAIRS, CUT, rows), LinkConstraints()) == [[0, 3], [1, 4], [2, 5]]
-    said = LinkConstraints(cannot_link=((0, 3),), targets=frozenset({3}))
+    assert joined(plain.gains(PAIRS, CUT, rows), Constraints()) == [[0, 3], [1, 4], [2, 5]]
+    said = Constraints(cannot_link=((0, 3),), targets=frozenset({3}))
     moved = joined(plain.gains(PAIRS, CUT, rows), said)
     assert moved != [[0], [1, 4], [2, 5], [3]], "its own odds would move those nobody spoke of"
     assert joined(prior_links.gains(PAIRS, CUT, rows), said) == [[0], [1, 4], [2, 5], [3]]

@@ -9,11 +9,12 @@ import pytest
 from numpy import ndarray
 
 from tests.smoothing.test_joining import chains, graph_of, value_of, worth_of
-from tracker.smoothing.identity.constraints import Constraint, LinkConstraints, possible
+from tracker.corrections.constraints import Constraints
+from tracker.smoothing.identity.constraints import possible
 from tracker.smoothing.identity.solver import TrackletGraph, link_tracklets
 
 
-def obeys(following: tuple[int, ...], used: tuple[bool, ...], constraints: LinkConstraints) -> bool:
+def obeys(following: tuple[int, ...], used: tuple[bool, ...], constraints: Constraints) -> bool:
     """Whether chains are as constraints want them."""
     of = {piece: number for number, chain in enumerate(chains(following, used)) for piece in chain}
     followed = {j for j in following if j >= 0}
@@ -32,7 +33,7 @@ def obeys(following: tuple[int, ...], used: tuple[bool, ...], constraints: LinkC
     )
 
 
-def drawn_ties(rng: np.random.Generator, count: int) -> LinkConstraints:
+def drawn_ties(rng: np.random.Generator, count: int) -> Constraints:
     """Some that can be obeyed: pieces begin one after another."""
     firsts = np.arange(count) * 10
     lasts = firsts + rng.integers(1, 9, count)
@@ -42,12 +43,12 @@ def drawn_ties(rng: np.random.Generator, count: int) -> LinkConstraints:
         return [(pair[0], pair[1])] if rng.random() < 0.6 else []
 
     told = [
-        Constraint(
+        Constraints(
             pairs(),
             pairs(),
-            {int(rng.integers(count))} if rng.random() < 0.2 else set(),
-            first=int(rng.integers(count)) if rng.random() < 0.1 else -1,
-            last=int(rng.integers(count)) if rng.random() < 0.1 else -1,
+            clutter=frozenset({int(rng.integers(count))} if rng.random() < 0.2 else ()),
+            firsts=frozenset({int(rng.integers(count))} if rng.random() < 0.1 else ()),
+            lasts=frozenset({int(rng.integers(count))} if rng.random() < 0.1 else ()),
         )
         for _ in range(3)
     ]
@@ -99,14 +100,29 @@ def test_what_lies_between_two_who_are_one_leads_from_the_one_to_the_other() -> 
         np.full(4, -9.0), -alone, -alone, earlier, later, -np.array(list(gains.values()))
     )
     assert link_tracklets(plain) == [[0, 1], [2, 3]]
-    assert link_tracklets(plain, LinkConstraints(must_link=((0, 3),))) == [[0, 1, 3], [2]]
-    assert link_tracklets(plain, LinkConstraints(cannot_link=((0, 1),))) == [[0], [1], [2, 3]]
+    assert link_tracklets(plain, Constraints(must_link=((0, 3),))) == [[0, 1, 3], [2]]
+    assert link_tracklets(plain, Constraints(cannot_link=((0, 1),))) == [[0], [1], [2, 3]]
 
 
 def test_the_earlier_of_two_that_cannot_both_be_counts() -> None:
     firsts, lasts = np.array([0, 5, 20]), np.array([10, 15, 30])
-    constraints = possible(firsts, lasts, [Constraint([(0, 2)]), Constraint([(1, 2)])])
-    assert constraints == LinkConstraints(((0, 2),), targets=frozenset({0, 2}))
-    assert possible(firsts, lasts, [Constraint([(0, 2), (1, 2)])], strict=True) is None
-    parted = possible(firsts, lasts, [Constraint(cannot_link=[(0, 2)]), Constraint([(0, 2)])])
-    assert parted == LinkConstraints(cannot_link=((0, 2),))
+    constraints = possible(firsts, lasts, [Constraints(((0, 2),)), Constraints(((1, 2),))])
+    assert constraints == Constraints(((0, 2),), targets=frozenset({0, 2}))
+    assert (
+        possible(
+            firsts,
+            lasts,
+            [
+                Constraints(
+                    (
+                        (0, 2),
+                        (1, 2),
+                    )
+                )
+            ],
+            strict=True,
+        )
+        is None
+    )
+    parted = possible(firsts, lasts, [Constraints(cannot_link=((0, 2),)), Constraints(((0, 2),))])
+    assert parted == Constraints(cannot_link=((0, 2),))

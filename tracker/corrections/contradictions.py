@@ -107,7 +107,7 @@ class _People:
         """Group the places of corrections by person: the two places of each pair are of one."""
         people = cls()
         for one in corrections:
-            for earlier, later in one.pairs:
+            for earlier, later in one.constraints.must_link:
                 people.unite(people.of(earlier, one), people.of(later, one))
         return people
 
@@ -143,7 +143,7 @@ def _check_all(corrections: list[Correction]) -> None:
     """Raise :class:`_Contradiction` if corrections cannot be true together."""
     people = _People.from_corrections(corrections)
     for one in corrections:
-        for earlier, later in one.apart:
+        for earlier, later in one.constraints.cannot_link:
             a, b = people.of(earlier, one), people.of(later, one)
             if people.root(a) == people.root(b):
                 uniting = next(
@@ -151,7 +151,7 @@ def _check_all(corrections: list[Correction]) -> None:
                         other
                         for other in reversed(corrections)
                         if other is not one
-                        and other.pairs
+                        and other.constraints.must_link
                         and any(_has_place_at(other, p) for p in (earlier, later))
                     ),
                     one,

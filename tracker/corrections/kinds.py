@@ -14,6 +14,8 @@ from jaxtyping import Float
 from numpy import ndarray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from tracker.corrections.constraints import Constraints
+
 Kind = Literal[
     "same", "different", "exchanged", "here", "nobody", "came", "left", "name", "checked"
 ]
@@ -188,24 +190,30 @@ class Correction(BaseModel):
         return min(steps), max(steps)
 
     @property
-    def pairs(self) -> tuple[tuple[Place, Place], ...]:
-        """Pairs of places of one person, the earlier first."""
-        if self.kind == "same":
-            return ((self.places[0], self.places[1]),)
-        if self.kind == "exchanged":
-            one, other, after, other_after = self.places
-            return ((one, after), (other, other_after))
-        return ()
-
-    @property
-    def apart(self) -> tuple[tuple[Place, Place], ...]:
-        """Pairs of places of two people, the earlier first."""
-        if self.kind == "different":
-            return ((self.places[0], self.places[1]),)
-        if self.kind == "exchanged":
-            one, other, after, other_after = self.places
-            return ((one, other_after), (other, after))
-        return ()
+    def constraints(self) -> Constraints[Place]:
+        """The constraints that the correction states of its places."""
+        one = frozenset(self.places[:1])
+        match self.kind:
+            case "same":
+                return Constraints(must_link=((self.places[0], self.places[1]),))
+            case "different":
+                return Constraints(cannot_link=((self.places[0], self.places[1]),))
+            case "exchanged":
+                first, second, third, fourth = self.places
+                return Constraints(
+                    must_link=((first, third), (second, fourth)),
+                    cannot_link=((first, fourth), (second, third)),
+                )
+            case "here":
+                return Constraints(targets=one)
+            case "nobody":
+                return Constraints(clutter=frozenset(self.places))
+            case "came":
+                return Constraints(firsts=one)
+            case "left":
+                return Constraints(lasts=one)
+            case _:
+                return Constraints()
 
     @property
     def words(self) -> str:

@@ -146,13 +146,14 @@ def relabelled(
     segments = _Segments(frames, ids, positions, leeway)
     gone: set[int] = set()
     for one in corrections:
-        if one.kind in ("same", "exchanged"):
+        constraints = one.constraints
+        if constraints.must_link:
             _link(segments, one)
-        elif one.kind == "different":
+        elif constraints.cannot_link:
             _separate(segments, one)
-        elif one.kind in ("came", "left"):
+        elif constraints.firsts or constraints.lasts:
             _cut_ends(segments, one)
-        elif one.kind == "nobody":
+        elif constraints.clutter:
             inside = segments.index.inside(one)
             for number in mostly_inside(segments.of_row, frames, inside, one):
                 rows = segments.rows[number]
@@ -174,7 +175,7 @@ def _link(segments: _Segments, one: Correction) -> None:
 
     Tracks that exist at the same time are split at the step at which they are nearest.
     """
-    found = [(segments.row_at(a), segments.row_at(b)) for a, b in one.pairs]
+    found = [(segments.row_at(a), segments.row_at(b)) for a, b in one.constraints.must_link]
     if any(a is None or b is None for a, b in found):
         return
     pairs: list[tuple[int, int]] = [(a, b) for a, b in found if a is not None and b is not None]
@@ -226,7 +227,7 @@ def _cut_ends(segments: _Segments, one: Correction) -> None:
     row = segments.row_at(one.places[0])
     if row is None:
         return
-    if one.kind == "came":
+    if one.constraints.firsts:
         segments.cut(row)
         segments.separate(int(segments.of_row[row]))
         return

@@ -18,6 +18,9 @@ from tracker.review.queue.linking import Move, Tracklet
 from tracker.review.queue.other_run import OtherRun
 from tracker.review.queue.ranking import IdentityReach, _with_none_of_them
 
+PAIRED = ("same", "different", "exchanged")
+"""Kinds of corrections of two places or more of one person or of two."""
+
 
 @pytest.mark.parametrize("smoothing", short(["identities", "positions", "none"]))
 def test_who_was_away_is_asked_for_first_and_not_again(smoothing: str) -> None:
@@ -113,10 +116,17 @@ def test_none_of_those_who_are_told_may_be_said() -> None:
     run = run_of(with_a_gap())
     for one in queue(run).items:
         parted = [a for a in one.alternatives if all(c.kind == "different" for c in a.corrections)]
-        told = {pair for a in one.alternatives for c in a.corrections for pair in c.pairs}
+        told = {
+            pair
+            for a in one.alternatives
+            for c in a.corrections
+            for pair in c.constraints.must_link
+        }
         if one.kind != "short":
             assert parted
-            assert {pair for c in parted[-1].corrections for pair in c.apart} & told
+            assert {
+                pair for c in parted[-1].corrections for pair in c.constraints.cannot_link
+            } & told
 
 
 def test_who_says_that_it_is_as_it_is_changes_nothing() -> None:
@@ -125,7 +135,10 @@ def test_who_says_that_it_is_as_it_is_changes_nothing() -> None:
         told = [
             one.alternatives[0].corrections
             for one in queue(plain).items
-            if any(c.pairs or c.apart for c in one.alternatives[0].corrections)
+            if any(
+                c.constraints.must_link or c.constraints.cannot_link
+                for c in one.alternatives[0].corrections
+            )
         ]
         assert told or len(set(plain.tracks.ids.tolist())) == 2
         for corrections in told:
@@ -153,7 +166,7 @@ def test_none_of_those_who_are_told_parts_from_all_of_them() -> None:
     came = Alternative("2 goes on", 0.2, proposed("same", (other.end, after.begin)))
     none = _with_none_of_them(move, now, [goes_on, came])[-1]
     assert none.words == "none of these"
-    apart = {(a.step, b.step) for told in none.corrections for a, b in told.apart}
+    apart = {(a.step, b.step) for told in none.corrections for a, b in told.constraints.cannot_link}
     assert apart == {(10, 20), (10, 22), (12, 20)}
 
 

@@ -134,7 +134,9 @@ def once_each(ordered: Iterable[ReviewItem], pause: int) -> Iterable[ReviewItem]
     known: set[object] = set()
     moments: dict[frozenset[int], list[tuple[int, int]]] = {}
     for one in ordered:
-        same = frozenset(pair for made in one.alternatives[1].corrections for pair in made.pairs)
+        same = frozenset(
+            pair for made in one.alternatives[1].corrections for pair in made.constraints.must_link
+        )
         if one.weight < LEAST or one.id in known or (same and same in known):
             continue
         if len(one.tracks) == 2:
@@ -287,7 +289,7 @@ def _with_none_of_them(
         (a, b)
         for one in (now, *others)
         for made in one.corrections
-        for a, b in made.pairs
+        for a, b in made.constraints.must_link
         if _is(a, first) or _is(b, last)
     )
     apart = [one for pair in pairs for one in proposed("different", pair)]
@@ -348,8 +350,8 @@ def is_answered(item: ReviewItem, corrections: Many[Correction], steps: int) -> 
                 if own.kind in ("same", "different", "exchanged") and one.kind in (
                     "same", "different", "exchanged",
                 ):  # fmt: skip
-                    pairs = (*own.pairs, *own.apart)
-                    others = (*one.pairs, *one.apart)
+                    pairs = (*own.constraints.must_link, *own.constraints.cannot_link)
+                    others = (*one.constraints.must_link, *one.constraints.cannot_link)
                     if any(near(a, c) and near(b, d) for a, b in pairs for c, d in others):
                         return True
                 elif own.kind == one.kind and any(

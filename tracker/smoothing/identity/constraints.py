@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from collections.abc import Sequence as Many
-from collections.abc import Set as AbstractSet
-from dataclasses import dataclass, replace
-from typing import NamedTuple
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Bool, Int
 from numpy import ndarray
 
 from tracker.corrections import Correction, Place
+from tracker.corrections.constraints import Constraints
 from tracker.corrections.lookup import TrackIndex, mostly_inside
 from tracker.smoothing.identity.exchanges import turn
 from tracker.smoothing.paths import Paths
@@ -22,140 +21,80 @@ from tracker.smoothing.smoother import Fitted
 _EVER = int(np.iinfo(np.int64).max)
 
 
-@dataclass(frozen=True, slots=True)
-class LinkConstraints:
-    """Consistent constraints on the linking of n tracklets, which are given by their indices."""
+def parted(
+    constraints: Constraints[int], tracklets: Paths, longest: int
+) -> tuple[Constraints[int], Constraints[int]]:
+    """Split the constraints into those for links over short gaps and those over long ones.
 
-    must_link: tuple[tuple[int, int], ...] = ()
-    """Pairs of one person's tracklets, the earlier first; further ones may lie between."""
-    cannot_link: tuple[tuple[int, int], ...] = ()
-    """Pairs of tracklets of two people."""
-    targets: frozenset[int] = frozenset()
-    """Tracklets that are targets for certain."""
-    clutter: frozenset[int] = frozenset()
-    """Tracklets that are false for certain."""
-    firsts: frozenset[int] = frozenset()
-    """Tracklets that are the first of their track."""
-    lasts: frozenset[int] = frozenset()
-    """Tracklets that are the last of their track."""
-
-    def __bool__(self) -> bool:
-        return bool(self.must_link or self.cannot_link or self.targets or self.clutter
-                    or self.firsts or self.lasts)  # fmt: skip
-
-    def within(self, nodes: Int[ndarray, " K"]) -> LinkConstraints:
-        """Restrict the constraints to K tracklets, renumbered by their place among these.
-
-        Args:
-            nodes: Indices of the K tracklets.
-        """
-        if not self:
-            return self
-        place = {tracklet: k for k, tracklet in enumerate(nodes.tolist())}
-
-        def pairs(of: tuple[tuple[int, int], ...]) -> tuple[tuple[int, int], ...]:
-            return tuple((place[i], place[j]) for i, j in of if i in place and j in place)
-
-        def tracklets(of: frozenset[int]) -> frozenset[int]:
-            return frozenset(place[i] for i in of if i in place)
-
-        return LinkConstraints(
-            pairs(self.must_link),
-            pairs(self.cannot_link),
-            *map(tracklets, (self.targets, self.clutter, self.firsts, self.lasts)),
-        )
-
-    def parted(self, tracklets: Paths, longest: int) -> tuple[LinkConstraints, LinkConstraints]:
-        """Split the constraints into those for links over short gaps and those over long ones.
-
-        Args:
-            tracklets: The tracklets.
-            longest: Longest gap, in steps, over which tracklets are linked by motion alone.
-        """
-        near = tuple(
-            (i, j) for i, j in self.must_link if tracklets.firsts[j] - tracklets.lasts[i] <= longest
-        )
-        far = tuple(pair for pair in self.must_link if pair not in near)
-        return replace(self, must_link=near), replace(self, must_link=far)
-
-    def limits(self, chains: Many[Many[int]], tracklets: Paths) -> dict[int, tuple[int, int]]:
-        """The first and the last step at which the tracks of some chains may exist.
-
-        A track ends before the tracklet that it must not be linked to begins.
-
-        Args:
-            chains: The tracklets of each track, in the order of time.
-            tracklets: The tracklets.
-
-        Returns:
-            First and last step by the index of the chain, for the chains that are limited.
-        """
-        number = {tracklet: k for k, chain in enumerate(chains) for tracklet in chain}
-        found: dict[int, tuple[int, int]] = {}
-
-        def limit(tracklet: int, first: int, last: int) -> None:
-            k = number.get(tracklet, -1)
-            if k >= 0:
-                low, high = found.get(k, (0, _EVER))
-                begins, ends = tracklet == chains[k][0], tracklet == chains[k][-1]
-                found[k] = max(low, first if begins else 0), min(high, last if ends else high)
-
-        for one, other in self.cannot_link:
-            i, j = (
-                (one, other) if tracklets.firsts[one] <= tracklets.firsts[other] else (other, one)
-            )
-            if tracklets.lasts[i] < tracklets.firsts[j]:
-                limit(i, 0, int(tracklets.firsts[j]) - 1)
-                limit(j, int(tracklets.lasts[i]) + 1, _EVER)
-        for tracklet in self.firsts:
-            limit(tracklet, int(tracklets.firsts[tracklet]), _EVER)
-        for tracklet in self.lasts:
-            limit(tracklet, 0, int(tracklets.lasts[tracklet]))
-        return found
-
-    def of_chains(self, chains: Many[Many[int]], tracklets: Paths) -> LinkConstraints | None:
-        """The same constraints on chains of tracklets, by their indices.
-
-        Returns:
-            The constraints; None where two chains that must be linked overlap in time.
-        """
-        number = {tracklet: k for k, chain in enumerate(chains) for tracklet in chain}
-        pairs = Constraint(
-            [(number[i], number[j]) for i, j in self.must_link],
-            [(number[i], number[j]) for i, j in self.cannot_link if i in number and j in number],
-        )
-        ends = [
-            Constraint(first=number[tracklet])
-            for tracklet in sorted(self.firsts)
-            if tracklet in number
-        ]
-        ends += [
-            Constraint(last=number[tracklet])
-            for tracklet in sorted(self.lasts)
-            if tracklet in number
-        ]
-        firsts = np.array([tracklets.firsts[chain[0]] for chain in chains], dtype=np.int64)
-        lasts = np.array([tracklets.lasts[chain[-1]] for chain in chains], dtype=np.int64)
-        return possible(firsts, lasts, [pairs, *ends], strict=True)
+    Args:
+        constraints: Constraints on the tracklets.
+        tracklets: The tracklets.
+        longest: Longest gap, in steps, over which tracklets are linked by motion alone.
+    """
+    near = tuple(
+        (i, j)
+        for i, j in constraints.must_link
+        if tracklets.firsts[j] - tracklets.lasts[i] <= longest
+    )
+    far = tuple(pair for pair in constraints.must_link if pair not in near)
+    return replace(constraints, must_link=near), replace(constraints, must_link=far)
 
 
-class Constraint(NamedTuple):
-    """The constraint of one correction on tracklets, which are given by their indices."""
+def limits(
+    constraints: Constraints[int], chains: Many[Many[int]], tracklets: Paths
+) -> dict[int, tuple[int, int]]:
+    """The first and the last step at which the tracks of some chains may exist.
 
-    must_link: Many[tuple[int, int]] = ()
-    """Pairs of one person's tracklets, the earlier first."""
-    cannot_link: Many[tuple[int, int]] = ()
-    """Pairs of tracklets of two people."""
-    clutter: AbstractSet[int] = frozenset()
-    """Tracklets that are false."""
-    first: int = -1
-    """The tracklet with which its track begins, -1 for none."""
-    last: int = -1
-    """The tracklet with which its track ends, -1 for none."""
-    meant: AbstractSet[int] = frozenset()
-    """All tracklets that the correction refers to."""
-    targets: AbstractSet[int] = frozenset()
-    """Tracklets that are targets for certain."""
+    A track ends before the tracklet that it must not be linked to begins.
+
+    Args:
+        constraints: Constraints on the tracklets.
+        chains: The tracklets of each track, in the order of time.
+        tracklets: The tracklets.
+
+    Returns:
+        First and last step by the index of the chain, for the chains that are limited.
+    """
+    number = {tracklet: k for k, chain in enumerate(chains) for tracklet in chain}
+    found: dict[int, tuple[int, int]] = {}
+
+    def limit(tracklet: int, first: int, last: int) -> None:
+        k = number.get(tracklet, -1)
+        if k >= 0:
+            low, high = found.get(k, (0, _EVER))
+            begins, ends = tracklet == chains[k][0], tracklet == chains[k][-1]
+            found[k] = max(low, first if begins else 0), min(high, last if ends else high)
+
+    for one, other in constraints.cannot_link:
+        i, j = (one, other) if tracklets.firsts[one] <= tracklets.firsts[other] else (other, one)
+        if tracklets.lasts[i] < tracklets.firsts[j]:
+            limit(i, 0, int(tracklets.firsts[j]) - 1)
+            limit(j, int(tracklets.lasts[i]) + 1, _EVER)
+    for tracklet in constraints.firsts:
+        limit(tracklet, int(tracklets.firsts[tracklet]), _EVER)
+    for tracklet in constraints.lasts:
+        limit(tracklet, 0, int(tracklets.lasts[tracklet]))
+    return found
+
+
+def of_chains(
+    constraints: Constraints[int], chains: Many[Many[int]], tracklets: Paths
+) -> Constraints[int] | None:
+    """The same constraints on chains of tracklets, by their indices.
+
+    Args:
+        constraints: Constraints on the tracklets, each of which is in a chain.
+        chains: The tracklets of each chain, in the order of time.
+        tracklets: The tracklets.
+
+    Returns:
+        The constraints; None where two chains that must be linked overlap in time.
+    """
+    number = {tracklet: k for k, chain in enumerate(chains) for tracklet in chain}
+    found = replace(constraints, targets=frozenset(), clutter=frozenset()).mapped(number)
+    firsts = np.array([tracklets.firsts[chain[0]] for chain in chains], dtype=np.int64)
+    lasts = np.array([tracklets.lasts[chain[-1]] for chain in chains], dtype=np.int64)
+    return possible(firsts, lasts, [found], strict=True)
 
 
 class ConstraintResolver:
@@ -220,7 +159,7 @@ class ConstraintResolver:
         other; where two places of two people lie on one path, it is split between them.
         """
         found: list[int] = []
-        for a, b in one.pairs:
+        for a, b in one.constraints.must_link:
             earlier, later = self._rows[a], self._rows[b]
             if earlier is None or later is None or self._owners[earlier] == self._owners[later]:
                 continue
@@ -234,7 +173,7 @@ class ConstraintResolver:
                 self._fitted, int(self._owners[earlier]), int(self._owners[later]),
                 int(self._steps[before].max()), int(self._steps[after].min()),
             )  # fmt: skip
-        for a, b in one.apart:
+        for a, b in one.constraints.cannot_link:
             earlier, later = self._rows[a], self._rows[b]
             if earlier is None or later is None or earlier >= later or self._jumps is None:
                 continue
@@ -250,59 +189,51 @@ class ConstraintResolver:
             tracklets: The tracklets, with M rows.
             source_rows: Index of each of the M rows in the paths before the splits.
         """
-        return {
-            tracklet for one in self._constraints(tracklets, source_rows) for tracklet in one.meant
-        }
+        found: set[int] = set()
+        for one in self._corrections:
+            found |= set(self._tracklets(one, tracklets, source_rows).values())
+            found |= self._resolved(one, tracklets, source_rows).clutter
+        return found - {-1}
 
-    def constraints(self, tracklets: Paths, source_rows: Int[ndarray, " M"]) -> LinkConstraints:
+    def constraints(self, tracklets: Paths, source_rows: Int[ndarray, " M"]) -> Constraints[int]:
         """The constraints of all corrections on the tracklets, as far as they are consistent.
 
         Args:
             tracklets: The tracklets, with M rows.
             source_rows: Index of each of the M rows in the paths before the splits.
         """
-        found = possible(
-            tracklets.firsts, tracklets.lasts, self._constraints(tracklets, source_rows)
-        )
+        wanted = [self._resolved(one, tracklets, source_rows) for one in self._corrections]
+        found = possible(tracklets.firsts, tracklets.lasts, wanted)
         assert found is not None
         return found
 
-    def _constraints(
-        self, tracklets: Paths, source_rows: Int[ndarray, " M"]
-    ) -> Iterator[Constraint]:
-        """The constraint of each correction, in their order."""
-        for one in self._corrections:
-            if one.kind == "nobody":
-                inside = self._inside[one.id][source_rows]
-                gone = mostly_inside(tracklets.owners, tracklets.steps, inside, one)
-                yield Constraint(clutter=gone, meant=gone)
-            elif one.kind == "here":
-                tracklet = self._tracklet(one.places[0], tracklets, source_rows, before=True)
-                yield Constraint(meant={tracklet} - {-1}, targets={tracklet} - {-1})
-            elif one.kind != "checked":
-                yield self._of_people(one, tracklets, source_rows)
-
-    def _of_people(
+    def _resolved(
         self, one: Correction, tracklets: Paths, source_rows: Int[ndarray, " M"]
-    ) -> Constraint:
+    ) -> Constraints[int]:
+        """The constraints of one correction on tracklets, none where a place has no tracklet."""
+        if one.kind == "nobody":
+            inside = self._inside[one.id][source_rows]
+            gone = mostly_inside(tracklets.owners, tracklets.steps, inside, one)
+            return Constraints(clutter=frozenset(gone))
+        own = self._tracklets(one, tracklets, source_rows)
+        return Constraints() if -1 in own.values() else one.constraints.mapped(own)
+
+    def _tracklets(
+        self, one: Correction, tracklets: Paths, source_rows: Int[ndarray, " M"]
+    ) -> dict[Place, int]:
+        """The tracklet that each place of a correction refers to, -1 for none."""
+        if one.kind in ("nobody", "checked"):  # of areas and steps
+            return {}
+        if one.kind == "here":  # the second place is where a run had the person
+            place = one.places[0]
+            return {place: self._tracklet(place, tracklets, source_rows, before=True)}
         later = {"same": 1, "different": 1, "exchanged": 2}.get(one.kind, 0)
-        own = {
+        return {
             place: self._tracklet(
                 place, tracklets, source_rows, before=number < later or one.kind == "left"
             )
             for number, place in enumerate(one.places)
         }
-        meant = {tracklet for tracklet in own.values() if tracklet >= 0}
-        if len(meant) < len(set(own.values())):
-            return Constraint(meant=meant)  # a place has no tracklet
-        first = own[one.places[0]]
-        return Constraint(
-            [(own[a], own[b]) for a, b in one.pairs],
-            [(own[a], own[b]) for a, b in one.apart],
-            first=first if one.kind == "came" else -1,
-            last=first if one.kind == "left" else -1,
-            meant=meant,
-        )
 
     def _tracklet(
         self,
@@ -339,10 +270,10 @@ class ConstraintResolver:
 def possible(
     firsts: Int[ndarray, " n"],
     lasts: Int[ndarray, " n"],
-    wanted: Iterable[Constraint],
+    wanted: Iterable[Constraints[int]],
     *,
     strict: bool = False,
-) -> LinkConstraints | None:
+) -> Constraints[int] | None:
     """Combine the constraints of corrections, in their order, as far as they are consistent.
 
     The tracklets of one person must follow one another in time. Of two constraints that
@@ -351,7 +282,7 @@ def possible(
     Args:
         firsts: The first step of each of n tracklets.
         lasts: The last step of each tracklet.
-        wanted: The constraint of each correction.
+        wanted: The constraints of each correction.
         strict: Whether None is returned where not all of them are consistent.
     """
     groups: dict[int, list[int]] = {}
@@ -391,13 +322,13 @@ def possible(
             continue
         groups, cannot_link = grown, [*cannot_link, *more]
         clutter |= {tracklet for tracklet in one.clutter if tracklet not in groups}
-        came |= {one.first} - {-1}
-        left |= {one.last} - {-1}
+        came |= one.firsts
+        left |= one.lasts
         targets |= one.targets
     members = {tuple(group) for group in groups.values()}
     must_link = [pair for group in sorted(members) for pair in itertools.pairwise(group)]
     sure = {tracklet for group in members for tracklet in group} | came | left | targets
-    return LinkConstraints(
+    return Constraints(
         tuple(must_link),
         tuple(cannot_link),
         frozenset(sure - clutter),

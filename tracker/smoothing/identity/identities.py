@@ -16,13 +16,19 @@ from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
 from tracker.corrections import Correction
+from tracker.corrections.constraints import Constraints
 from tracker.corrections.kinds import OF_PEOPLE, digest
 from tracker.corrections.kinds import leeway as corrections_leeway
 from tracker.corrections.outcomes import outcomes
 from tracker.geometry.assignment import names_by_majority
 from tracker.parameters.groups.smoothing import SmoothingParams
 from tracker.smoothing.identity import odds, splitting
-from tracker.smoothing.identity.constraints import ConstraintResolver, LinkConstraints
+from tracker.smoothing.identity.constraints import (
+    ConstraintResolver,
+    limits,
+    of_chains,
+    parted,
+)
 from tracker.smoothing.identity.ends import Ends
 from tracker.smoothing.identity.people import Seen, template_log_odds
 from tracker.smoothing.identity.people import of_chains as people_of_chains
@@ -111,7 +117,9 @@ def resolve_identities(
     """
     earlier = earlier or EmptyStore()
     leeway = corrections_leeway(tracked.smoother.model.step_time)
-    waiting = [one for one in corrections if one.pairs or one.apart]
+    waiting = [
+        one for one in corrections if one.constraints.must_link or one.constraints.cannot_link
+    ]
     plain: splitting.Splits | None = None
     prior_links = PriorLinks()
     turn = 0
@@ -218,9 +226,9 @@ def _linked(
     pairs = short_gap_odds.pairs(alone)
     people = template_log_odds(refitted.paths, links, smoother, seen, parameters.appearance)
     longest = max(round(parameters.longest / smoother.model.step_time), 1)
-    now, later = constraints.parted(tracklets, longest)
+    now, later = parted(constraints, tracklets, longest)
 
-    def best_chains(pairs: Pairs, constraints: LinkConstraints) -> list[list[int]]:
+    def best_chains(pairs: Pairs, constraints: Constraints[int]) -> list[list[int]]:
         """Find the most likely chains of tracklets under some constraints."""
         gains = prior_links.gains(pairs, tracklets, source_rows)
         graph = TrackletGraph(-worths, -births, -deaths, pairs.earlier, pairs.later, -gains, people)
@@ -242,12 +250,10 @@ def _linked(
         if again == first:
             break
         first = again
-    of_chains = later.of_chains(first, tracklets)
-    if of_chains is None:  # the chains cannot be linked so, since tracklets lie between
+    on_chains = of_chains(later, first, tracklets)
+    if on_chains is None:  # the chains cannot be linked so, since tracklets lie between
         first = best_chains(pairs, constraints)
-        of_chains = (
-            replace(constraints, must_link=()).of_chains(first, tracklets) or LinkConstraints()
-        )
+        on_chains = of_chains(replace(constraints, must_link=()), first, tracklets) or Constraints()
     # chains linked by motion have better embeddings than single tracklets
     back = odds.long_gap_odds(
         smoother, refitted.paths, links, first, parameters, seen.embeddings, rates
@@ -256,10 +262,10 @@ def _linked(
         np.zeros(len(first)), -births[[c[0] for c in first]], -deaths[[c[-1] for c in first]],
         back.earlier, back.later, -back.gains, people_of_chains(people, first),
     )  # fmt: skip
-    of_chains = replace(of_chains, targets=frozenset(range(len(first))))  # accepted above
+    on_chains = replace(on_chains, targets=frozenset(range(len(first))))  # accepted above
     chains = [
         [tracklet for number in numbers for tracklet in first[number]]
-        for numbers in link_tracklets(of_firsts, of_chains)
+        for numbers in link_tracklets(of_firsts, on_chains)
     ]
     pairs = pairs.with_more(back.of_ends(first))
     labels = _labels(tracklets, chains)
@@ -287,12 +293,12 @@ def _linked(
         places[tracklets.starts[:-1]], places[tracklets.starts[1:] - 1],
         worths, births, deaths, pairs.earlier, pairs.later, pairs.gains,
     )  # fmt: skip
-    limits = {labels[k]: span for k, span in constraints.limits(chains, tracklets).items()}
+    spans = {labels[k]: span for k, span in limits(constraints, chains, tracklets).items()}
     origins_of = np.array(origins, dtype=np.int64)
     whose = np.full(rows_before, -1, dtype=np.int64)
     whose[source_rows] = of_tracklets[tracklets.owners]
     return LinkedTracks(
-        paths, links, origins_of, of_tracklet, names_of, decisions, joined, limits, whose
+        paths, links, origins_of, of_tracklet, names_of, decisions, joined, spans, whose
     )
 
 

@@ -19,12 +19,12 @@ from numpy import ndarray
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import breadth_first_order, connected_components
 
-from tracker.smoothing.identity.constraints import LinkConstraints
+from tracker.corrections.constraints import Constraints
 
 if TYPE_CHECKING:
     from scipy.optimize import LinearConstraint
 
-_FREE = LinkConstraints()
+_FREE: Constraints[int] = Constraints()
 
 _LITTLE = 1.0
 """Loss by colours, in log odds, below which the best chains without colours are accepted. It bounds
@@ -73,7 +73,7 @@ class TrackletGraph:
         )
 
 
-def link_tracklets(graph: TrackletGraph, constraints: LinkConstraints = _FREE) -> list[list[int]]:
+def link_tracklets(graph: TrackletGraph, constraints: Constraints[int] = _FREE) -> list[list[int]]:
     """Find the chains of tracklets of the least total cost that satisfy the constraints, exactly.
 
     A tracklet is clutter, or it begins a chain or follows another tracklet, and ends the chain or
@@ -110,7 +110,8 @@ def link_tracklets(graph: TrackletGraph, constraints: LinkConstraints = _FREE) -
             if (used or i in constraints.targets) and i not in constraints.clutter:
                 found.append([i])
             continue
-        part = _solve(graph.part(nodes, links), constraints.within(nodes))
+        place = {tracklet: k for k, tracklet in enumerate(nodes.tolist())}
+        part = _solve(graph.part(nodes, links), constraints.mapped(place))
         found += [nodes[chain].tolist() for chain in part]
     return sorted(found)
 
@@ -132,7 +133,7 @@ def _components(graph: TrackletGraph) -> Iterator[tuple[Int[ndarray, " K"], Int[
     )
 
 
-def _with_required_links(graph: TrackletGraph, constraints: LinkConstraints) -> TrackletGraph:
+def _with_required_links(graph: TrackletGraph, constraints: Constraints[int]) -> TrackletGraph:
     """Add the links that constraints require and remove those that they forbid.
 
     For a pair (i, j) that must be linked, the successor of i is j or lies on a path of links from
@@ -175,7 +176,7 @@ def _reached(ways: csr_array, tracklet: int) -> Bool[ndarray, " N"]:
     return found
 
 
-def _solve(graph: TrackletGraph, constraints: LinkConstraints) -> list[list[int]]:
+def _solve(graph: TrackletGraph, constraints: Constraints[int]) -> list[list[int]]:
     """Find the chains of a connected graph: without templates' colours first, which bounds them."""
     chains = _Flow(replace(graph, templates=None), constraints).chains()
     if graph.templates is None or graph.templates.shape[1] < 2:
@@ -199,7 +200,7 @@ class _Flow:
     problem [DFJ54].
     """
 
-    def __init__(self, graph: TrackletGraph, constraints: LinkConstraints) -> None:
+    def __init__(self, graph: TrackletGraph, constraints: Constraints[int]) -> None:
         """Write down costs and bounds; edges without an end have -1 there."""
         self._constraints, self._size = constraints, len(graph)
         nodes, none = np.arange(len(graph)), np.full(len(graph), -1)
