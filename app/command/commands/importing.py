@@ -47,6 +47,7 @@ def _import(command: Import) -> int:
     from tracker.io.conventions.questions import Undecided, Unexplained
     from tracker.io.importing.arriving import gather_whole
     from tracker.io.importing.settling import settle
+    from tracker.io.importing.usage import file_uses
     from tracker.io.importing.writing import FILE, write
     from tracker.sequences import library
 
@@ -74,9 +75,11 @@ def _import(command: Import) -> int:
         return REFUSED
     print()
     print_table(("found out", "as"), [*settled.found, *(("note", t) for t in settled.told)])
+    uses = file_uses(taken, settled.sources)
     facts = (
         f"{len(settled.views)} cameras, {settled.frames} steps at {settled.fps:g} a second, "
-        f"{'with' if settled.truth is not None else 'without'} truth"
+        f"{'with' if settled.truth is not None else 'without'} truth, "
+        f"{sum(one.used for one in uses):,} of {sum(one.files.count for one in uses):,} files used"
     )
     if command.dry_run or command.output is None:
         say(f"{facts}; nothing was written")
@@ -107,6 +110,8 @@ def _rows(taken: Sequence[ParsedFiles]) -> Iterator[tuple[str, str, str]]:
             label = f"{label[: LONGEST_LABEL // 2]}…{label[-LONGEST_LABEL // 2 + 1 :]}"
         if one.pieces:
             yield label, one.format, one.complaint
+        elif one.read_with:
+            yield label, f"read with {one.read_with}", ""
         elif one.complaint:
             yield label, "–", one.complaint
         else:

@@ -46,7 +46,15 @@ class ImportedFile(Model):
 
     label: str
     format: str
-    complaint: str
+    """What it was taken for; empty where it is read with another file, or not at all."""
+    read_with: str
+    """The label of the file that it is read with; empty for the others."""
+    why: str
+    """Why it is not used, as far as it is known of the file alone; else empty."""
+    count: int
+    """The number of files."""
+    used: int
+    """The number of them that the recording is made of."""
 
 
 class ImportedOffset(Model):
@@ -156,6 +164,11 @@ class ImportInfo(Model):
     """Bytes."""
     bytes: int
     files: list[ImportedFile]
+    """The first of them: those that are used, then those that are not for a reason of their own."""
+    files_there: int
+    """The number of all files."""
+    files_used: int
+    """The number of those that the recording is made of."""
     coming: list[str]
     """Files that were announced and are not yet understood, the first of them."""
     offered: list[str]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import shutil
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -26,6 +26,7 @@ from app.web.importing.models import (
 from tracker.io.checks import Check
 from tracker.io.checks.synchronisation import CameraOffset
 from tracker.io.importing.finding.angles import open_turns, product_in_words, turns_in_words
+from tracker.io.importing.usage import FileUse, file_uses
 from tracker.io.read.pieces import CalibrationPiece, DetectionPiece
 
 if TYPE_CHECKING:
@@ -49,6 +50,7 @@ def info_of(draft: Draft) -> ImportInfo:
     """Everything that is known."""
     known, upload = draft.known, draft.upload
     settled, looked = known.settled, known.looked
+    uses = file_uses(known.taken, None if settled is None else settled.sources)
     return ImportInfo(
         key=draft.key,
         version=known.version,
@@ -61,7 +63,9 @@ def info_of(draft: Draft) -> ImportInfo:
         wish=known.wish,
         received=draft.size if upload is None else upload.received,
         bytes=draft.size,
-        files=_files(known),
+        files=_files(uses),
+        files_there=sum(one.files.count for one in uses),
+        files_used=sum(one.used for one in uses),
         coming=[] if upload is None or known.taken else upload.names(MOST_LISTED),
         offered=list(places(known.taken))[:MOST_LISTED],
         uploaded=upload is not None,
@@ -127,17 +131,19 @@ def _vector(values: np.ndarray) -> tuple[float, float, float]:
     return x, y, z
 
 
-def _files(known: Known) -> list[ImportedFile]:
+def _files(uses: Sequence[FileUse]) -> list[ImportedFile]:
+    # among thousands what is used comes first, then what has a reason
+    order = sorted(uses, key=lambda one: (not one.used, not one.files.complaint))
     return [
         ImportedFile(
-            label=one.label,
-            format=one.format if one.pieces else "",
-            complaint=one.complaint,
+            label=one.files.label,
+            format=one.files.format if one.files.pieces else "",
+            read_with=one.files.read_with,
+            why=one.why,
+            count=one.files.count,
+            used=one.used,
         )
-        # among thousands what is used comes first, then what has a reason
-        for one in sorted(known.taken, key=lambda one: (not one.pieces, not one.complaint))[
-            :MOST_LISTED
-        ]
+        for one in order[:MOST_LISTED]
     ]
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -47,6 +47,17 @@ class ParsedFiles:
     files: tuple[Path, ...] = ()
     mostly_spoilt: bool = False
     """Whether it is a table of text most rows of which cannot be read."""
+    companions: tuple[Path, ...] = ()
+    """Other files whose content was read with these."""
+    read_with: str = ""
+    """The label of the files that it was read with, where it has nothing of its own."""
+    unopened: int = 0
+    """The number of files that were not opened, which have no path here."""
+
+    @property
+    def count(self) -> int:
+        """The number of files."""
+        return len(self.files) + self.unopened
 
 
 def gather(sources: Sequence[Path]) -> list[ParsedFiles]:
@@ -78,7 +89,14 @@ def gather(sources: Sequence[Path]) -> list[ParsedFiles]:
             crowd.add(series, known=any(one.format for one in found))
             taken += found
         taken += [crowd.told(kind, root) for kind, crowd in crowds.items() if crowd.passed]
-    return taken
+    readers = {path: one.label for one in taken if one.pieces for path in one.companions}
+    return [replace(one, read_with=_read_with(one, readers)) for one in taken]
+
+
+def _read_with(one: ParsedFiles, readers: Mapping[Path, str]) -> str:
+    """The label of the files that others were read with; empty where it is not all of them."""
+    labels = [readers.get(path, "") for path in one.files]
+    return labels[0] if labels and all(labels) and not one.pieces and not one.complaint else ""
 
 
 class _Crowd:
@@ -123,7 +141,8 @@ class _Crowd:
             f"{where}: {self._refused:,} of these files are of no format that is read, so "
             f"{self.passed:,} more of like size were not opened; name those that are wanted"
         )
-        return ParsedFiles(f"{where} ({self.passed:,})", "", Certainty.NO, complaint=complaint)
+        label = f"{where} ({self.passed:,})"
+        return ParsedFiles(label, "", Certainty.NO, complaint=complaint, unopened=self.passed)
 
 
 def _walk(source: Path, root: Path) -> tuple[list[Path], list[ParsedFiles]]:
@@ -165,7 +184,7 @@ def _stays(path: Path, home: Path) -> bool:
 
 def _stray(path: Path, root: Path, why: str) -> ParsedFiles:
     where = SourceFile(path, root).where
-    return ParsedFiles(where, "", Certainty.NO, complaint=f"{where}: {why}")
+    return ParsedFiles(where, "", Certainty.NO, complaint=f"{where}: {why}", unopened=1)
 
 
 def _series(files: Sequence[Path]) -> Iterator[tuple[Path, ...]]:
@@ -307,4 +326,7 @@ def _pieces(found: Format, certainty: Certainty, file: SourceFile, label: str) -
     except Exception as error:  # or a field of a kind that the reader does not foresee
         told = error if isinstance(error, FormatError) else unforeseen(file, found, error)
         return ParsedFiles(label, found.NAME, certainty, complaint=str(told), files=file.series)
-    return ParsedFiles(label, found.NAME, certainty, pieces, files=file.series)
+    companions = tuple(dict.fromkeys(file.companions))
+    return ParsedFiles(
+        label, found.NAME, certainty, pieces, files=file.series, companions=companions
+    )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from pathlib import Path
 from typing import NamedTuple, get_args
 
 import numpy as np
@@ -120,6 +121,8 @@ class ImportPlan:
     """What was not in the files or had to be chosen, and why it is so."""
     told: tuple[str, ...]
     """Sentences about what is not used or odd."""
+    sources: frozenset[Path]
+    """The files that it is made of; of pictures, all."""
     open: Undecided | Unexplained | None = None
     """What is left open though the likeliest interpretation was accepted."""
 
@@ -222,8 +225,19 @@ def settle(taken: Sequence[ParsedFiles], options: ImportOptions | None = None) -
         reading,
         tuple(found),
         tuple(told),
+        _sources(matched),
         open_[0] if open_ else None,
     )
+
+
+def _sources(matched: Matched) -> frozenset[Path]:
+    """The files of a recording."""
+    found = {piece.source for _, piece in matched.truths}
+    for camera in matched.cameras:
+        found |= {camera.video.path} if camera.video is not None else set()
+        found |= set(camera.images.files) if camera.images is not None else set()
+        found |= {piece.source for piece in (camera.detections, camera.times) if piece is not None}
+    return matched.sources | found
 
 
 def _spare(matched: Matched) -> list[RawCamera]:

@@ -91,6 +91,8 @@ class SourceFile:
         """
         self.path = path
         self.series = series or (path,)
+        self.companions: list[Path] = []
+        """The other files whose content was read with this one's."""
         self._root = root
 
     @property
@@ -102,7 +104,9 @@ class SourceFile:
 
     def member(self, path: Path) -> SourceFile:
         """Return another file of the series or of the folder."""
-        return SourceFile(path, self._root)
+        member = SourceFile(path, self._root)
+        member.companions = self.companions
+        return member
 
     @property
     def label(self) -> str:
@@ -358,6 +362,7 @@ class FileOfLines(SourceFile):
             lines: The lines that count.
         """
         super().__init__(file.path, file._root)
+        self.companions = file.companions
         self._data = "\n".join([*lines, ""]).encode()
 
     def member(self, path: Path) -> SourceFile:

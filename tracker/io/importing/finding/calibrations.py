@@ -23,6 +23,8 @@ class CameraSet:
     label: str
     format: str
     cameras: tuple[RawCamera, ...]
+    sources: frozenset[Path]
+    """The files that the cameras are of."""
 
     @property
     def posed(self) -> bool:
@@ -78,7 +80,7 @@ def camera_sets(taken: Sequence[ParsedFiles]) -> tuple[list[CameraSet], list[str
                 "left out with what it saw"
             )
         elif one in lenses:
-            if not poses:
+            if not any(f"{one.label}: " in sentence for sentence in told):
                 told.append(f"{one.label}: has lenses, but no file has the poses of these cameras")
         else:
             told.append(_mixed(one))
@@ -118,7 +120,7 @@ def _mixed(one: CameraSet) -> str:
 def _sets(taken: Sequence[ParsedFiles]) -> list[CameraSet]:
     """Files with several cameras each, and the files of a folder with one camera each."""
     sets: list[CameraSet] = []
-    single: dict[tuple[str, str, bool], list[tuple[str, RawCamera]]] = {}
+    single: dict[tuple[str, str, bool], list[tuple[str, Path, RawCamera]]] = {}
     beside = _in_a_folder_each(taken)
     for one in taken:
         for piece in one.pieces:
@@ -130,22 +132,24 @@ def _sets(taken: Sequence[ParsedFiles]) -> list[CameraSet]:
                     f"{MOST_CAMERAS}; leave out those of other recordings"
                 )
             if len(piece.cameras) > 1:
-                sets.append(CameraSet(one.label, piece.format, piece.cameras))
+                own = frozenset({piece.source})
+                sets.append(CameraSet(one.label, piece.format, piece.cameras, own))
                 continue
             camera = piece.cameras[0]
             has_pose = camera.rotation is not None or camera.projection is not None
             key = (_place(piece.source, beside), piece.format, has_pose)
-            single.setdefault(key, []).append((one.label, camera))
+            single.setdefault(key, []).append((one.label, piece.source, camera))
     for (_, format_, _), rows in single.items():
-        labels = [label.rsplit(".", 1)[0] for label, _ in rows]
-        given = [camera.name for _, camera in rows]
-        own = len(set(given)) == len(given) and all(given)
-        names = given if own else short_names(labels)
+        labels = [label.rsplit(".", 1)[0] for label, _, _ in rows]
+        given = [camera.name for _, _, camera in rows]
+        stated = len(set(given)) == len(given) and all(given)
+        names = given if stated else short_names(labels)
         cameras = tuple(
-            replace(camera, name=name) for name, (_, camera) in zip(names, rows, strict=True)
+            replace(camera, name=name) for name, (_, _, camera) in zip(names, rows, strict=True)
         )
         label = rows[0][0] if len(rows) == 1 else f"{rows[0][0]} … ({len(rows)})"
-        sets.append(CameraSet(label, format_, cameras))
+        sources = frozenset(source for _, source, _ in rows)
+        sets.append(CameraSet(label, format_, cameras, sources))
     return sets
 
 
@@ -188,4 +192,5 @@ def _join(pose: CameraSet, lens: CameraSet) -> CameraSet | None:
         )
         for n, camera in enumerate(pose.cameras)
     )
-    return CameraSet(f"{pose.label} with {lens.label}", pose.format, cameras)
+    sources = pose.sources | lens.sources
+    return CameraSet(f"{pose.label} with {lens.label}", pose.format, cameras, sources)

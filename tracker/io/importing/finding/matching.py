@@ -60,6 +60,8 @@ class Matched:
     truths: list[tuple[str, TruthPiece]]
     told: list[str]
     """Sentences about what is not used."""
+    sources: frozenset[Path]
+    """The files of the calibration."""
     spare: list[MatchedCamera] = field(default_factory=list)
     """Cameras of the calibration without any file."""
 
@@ -120,7 +122,7 @@ def match_all(
             f"{', '.join(left[:8])}{' …' if len(left) > 8 else ''}"
         )
     spare = [c for c in cameras if used and c not in used]
-    return Matched(used or cameras, chosen.format, truths, told, spare)
+    return Matched(used or cameras, chosen.format, truths, told, chosen.sources, spare)
 
 
 def _check_read(names: Sequence[str], taken: Sequence[ParsedFiles]) -> None:

@@ -106,6 +106,7 @@ def _halves(file: SourceFile) -> tuple[Float[ndarray, "3 3"], Float[ndarray, " 3
             if path is None:
                 return None
             member = file.member(path)
+            file.companions.append(path)
         words = re.findall(NUMBER, member.head_text) if member.size < _SHORT else []
         if re.sub(rf"{NUMBER}|[\s,;\[\]]", "", member.head_text) or len(words) not in (3, 9):
             return None

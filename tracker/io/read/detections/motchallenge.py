@@ -94,7 +94,10 @@ def read(file: SourceFile) -> Iterator[Piece]:
     placed = np.zeros(len(table), dtype=bool)
     if columns == 10:
         placed = (table[:, 7:10] != -1.0).any(axis=1) & (ids >= 0)
-    if placed.any() or (file.path.parent.parent / SEQUENCE).is_file():
+    challenge = file.path.parent.parent / SEQUENCE
+    if challenge.is_file():
+        file.companions.append(challenge)
+    if placed.any() or challenge.is_file():
         boxes = boxes - [1.0, 1.0, 0.0, 0.0]
     yield DetectionPiece(
         source=file.path,
@@ -124,6 +127,7 @@ def _people(file: SourceFile) -> tuple[int, ...]:
     labels = file.path.parent / LABELS
     if labels.is_symlink() or not labels.is_file() or labels.stat().st_size > _MOST_LABELS:
         return PEOPLE
+    file.companions.append(labels)
     names = labels.read_text("utf-8", "replace").splitlines()
     found = [n for n, name in enumerate(names, 1) if name.strip().lower() in _PEOPLE_WORDS]
     return tuple(found) or PEOPLE

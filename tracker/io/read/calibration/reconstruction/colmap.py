@@ -133,6 +133,7 @@ class _Form:
                 f"has COLMAP's poses, but cameras{self.suffix} with the lenses is not "
                 "beside it; copy it there"
             )
+        file.companions.append(lenses.path)
         try:
             by_key = {key: _lens(lenses, key, *own) for key, *own in self.lenses(lenses)}
             images = list(self.images(file))
