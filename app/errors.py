@@ -118,6 +118,17 @@ def sentence(error: BaseException) -> str:
     return words or type(error).__name__
 
 
+def as_sentence(words: str) -> str:
+    """Words with a full stop and a capital letter, unless they begin with a name.
+
+    A camera, a file or a field is called as it is called: a first word that a colon or a comma
+    follows, or that has anything but small letters, stays.
+    """
+    first = words.split(" ", 1)[0]
+    plain = first.isalpha() and first.islower()
+    return f"{words[:1].upper() if plain else words[:1]}{words[1:]}."
+
+
 def install(app: FastAPI) -> None:
     """Make every failure of the application answer in the one shape."""
 

@@ -11,7 +11,7 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Query, Request, Response
 
 from app import models
-from app.errors import ApiError
+from app.errors import ApiError, as_sentence
 from app.state.edits import Edit, EditError
 from app.state.kept.history import History
 from app.state.snapshot import Snapshot
@@ -148,10 +148,8 @@ def _turn(bench: Workbench, what: str, act: Callable[[], Edit]) -> None:
     try:
         edit = act()
     except EditError as error:
-        words = str(error)
-        raise ApiError(
-            409, "no_edit", f"{words[:1].upper()}{words[1:]}.", hint="Nothing was changed."
-        ) from None
+        words = as_sentence(str(error))
+        raise ApiError(409, "no_edit", words, hint="Nothing was changed.") from None
     bench.notify("info", f"{what}: {edit.words}")
 
 

@@ -11,7 +11,7 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Path, Request, Response
 
 from app import models
-from app.errors import ApiError, sentence
+from app.errors import ApiError, as_sentence, sentence
 from app.models.teaching import (
     CopyRequest,
     DetectorInfo,
@@ -57,9 +57,7 @@ def _complaining(code: str = "cannot_teach") -> Iterator[None]:
     try:
         yield
     except (ValueError, OSError) as error:
-        words = sentence(error)
-        words = words[:1].upper() + words[1:] + "."
-        raise ApiError(422, code, words, hint=NOTHING_LOST) from None
+        raise ApiError(422, code, as_sentence(sentence(error)), hint=NOTHING_LOST) from None
 
 
 @router.get("")

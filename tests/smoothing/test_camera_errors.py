@@ -11,9 +11,11 @@ from numpy.testing import assert_allclose
 
 from tests.random_rooms import random_room
 from tests.smoothing.test_noise import STEP, TRUE, motion_of, simulated
+from tracker.io.checks import check
 from tracker.runs.camera_notes import camera_notes
 from tracker.runs.fitting import default_parameters
 from tracker.runs.pipeline import compute
+from tracker.sequences.sequence import Detections
 from tracker.smoothing.camera_errors import (
     FACTOR,
     CameraErrors,
@@ -124,6 +126,23 @@ def test_of_two_cameras_none_is_out_of_line() -> None:
 @pytest.mark.parametrize(("cameras", "normal"), [(1, 2.5758), (4, 3.0233)])
 def test_the_bound_of_delays_counts_cameras_and_both_sides(cameras: int, normal: float) -> None:
     assert significance(cameras) == pytest.approx(normal, abs=1e-3)
+
+
+def test_notes_say_where_a_camera_lost_frames_as_the_check_says_it() -> None:
+    sequence = random_room(5, cameras=4, fps=10.0, steps=300, people=3)
+    view = sequence.views[2]
+    own = view.detections
+    assert own is not None
+    frames = own.frames - 12 * (own.frames >= 162)
+    kept = (own.frames < 150) | (own.frames >= 162)
+    lost = replace(view, detections=Detections(frames[kept], own.boxes[kept], own.scores[kept]))
+    views = (*sequence.views[:2], lost, *sequence.views[3:])
+    sequence = replace(sequence, views=views)
+    found = [one.sentence for one in check(sequence) if "jumps" in one.sentence]
+    assert found
+    notes = camera_notes(compute(sequence, default_parameters(sequence)))
+    assert [note for note in notes if "jumps" in note] == found
+    assert not any(" early" in note for note in notes)
 
 
 def test_notes_name_a_late_camera_and_one_that_is_out_of_line() -> None:

@@ -4,7 +4,7 @@ person and track."""
 from __future__ import annotations
 
 from collections.abc import Sequence as Items
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,7 @@ from tracker.evaluation.positions import POSITIONS, positions
 from tracker.evaluation.settings import EvaluationSettings
 from tracker.evaluation.tables import PersonRow, TrackRow, person_rows, track_rows
 from tracker.geometry.camera import Camera
+from tracker.io.checks.truth import check_truth
 from tracker.sequences.sequence import GroundTruth, Sequence
 
 DEFINITIONS: tuple[Definition[Any], ...] = (
@@ -220,8 +221,11 @@ def evaluate_sequence(
         tracks: Steps, ids and positions by columns.
         settings: Distance, gate and so on; the defaults if None.
         steps: The number of steps that a run has computed; all of the sequence if None.
+
+    Returns:
+        All figures; its notes say where the truth contradicts the boxes.
     """
-    return evaluate(
+    evaluation = evaluate(
         sequence.ground_truth,
         tracks,
         settings,
@@ -229,6 +233,10 @@ def evaluate_sequence(
         half_extents=sequence.target_half_extents,
         cameras=sequence.cameras,
     )
+    agreement = check_truth(sequence)
+    if agreement.status != "warning":
+        return evaluation
+    return replace(evaluation, notes=(f"{agreement.sentence}.", *evaluation.notes))
 
 
 def _score(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from tracker.io.checks.timing import uneven_clocks
 from tracker.runs.run import Run
 from tracker.smoothing.camera_errors import CameraErrors, Quantity, significance
 
@@ -22,7 +23,7 @@ def camera_notes(run: Run) -> list[str]:
     """Describe which camera's boxes err more than those of the others, and which cameras are late.
 
     A delay is named where it is significant, and somebody who walks moves by more in this time than
-    the boxes of a camera are off.
+    the boxes of a camera are off. A camera that lost frames is named in the check's words.
     """
     smoothed = run.smoothed
     if smoothed is None or smoothed.cameras is None or smoothed.noise is None:
@@ -41,7 +42,9 @@ def camera_notes(run: Run) -> list[str]:
         )
     off = float(smoothed.noise.persistent[0] * run.sequence.target_half_extents[2])
     delays = _delays(errors, names, off / _WALKING, run.sequence.fps)
-    if delays:
+    uneven = uneven_clocks(run.sequence)
+    found += uneven
+    if delays and not uneven:  # where a clock jumps, a mean delay says nothing
         found.append(
             f"by the boxes, {'; '.join(delays)}; nothing is corrected: multiview-phd check "
             "measures this by itself and says whether frames are missing, or what to write as "

@@ -17,7 +17,6 @@ from tracker.evaluation import Evaluation, EvaluationSettings, evaluate_sequence
 from tracker.evaluation.figures import number
 from tracker.export.reading import read_tracks
 from tracker.export.tracks_csv import TrackFile
-from tracker.io.checks.truth import check_truth
 from tracker.parameters.values import ParameterError
 from tracker.sequences import library
 from tracker.sequences.sequence import Sequence
@@ -57,9 +56,6 @@ def evaluate(command: Evaluate) -> None:
     check_fit(sequence, tracks, str(command.tracks))
     for sentence in (*sequence.warnings, *tracks.remarks):
         say(sentence)
-    agreement = check_truth(sequence)
-    if agreement.status == "warning":
-        say(f"{agreement.name}: {agreement}")
     evaluation = evaluate_sequence(sequence, tracks, settings, steps=tracks.done)
     if command.html is not None:
         from tracker.evaluation.report.page import write_report  # brings plotly

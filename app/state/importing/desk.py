@@ -81,13 +81,14 @@ class Desk:
             place = place.parent
         if (place / FILE).is_file():
             return place
+        if not place.exists():
+            where = "" if given.is_absolute() else f" in {self._data}"
+            raise UploadError(f"{path}: there is no such file or folder{where}")
         if not any(place.is_relative_to(root.resolve()) for root in self._roots):
             raise UploadError(
                 f"{path}: expected files below the data folder {self._data}; move them there, or "
                 "start the workbench with --data"
             )
-        if not place.exists():
-            raise UploadError(f"{path}: there is no such file or folder in {self._data}")
         return self._new(place.stem if place.is_file() else place.name, place)
 
     def folders(self) -> list[str]:

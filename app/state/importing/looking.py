@@ -16,6 +16,7 @@ from tracker.io.checks.boxes import check_boxes, listen
 from tracker.io.checks.cameras import check_lenses, check_places
 from tracker.io.checks.synchronisation import CameraOffset, synchronise
 from tracker.io.checks.timing import check_counting, check_time
+from tracker.io.checks.truth import check_truth
 from tracker.io.conventions.readings import EVERY_ORDER
 from tracker.io.importing.preview import as_sequence
 from tracker.io.importing.remedies import for_import
@@ -89,6 +90,8 @@ def look_into(settled: ImportPlan, name: str, cancelled: Callable[[], bool]) -> 
     if not mistaken:
         checks += check_places(sequence.cameras, sequence.room)
     counting = [] if told is None else [check_counting(sequence, places=not mistaken)]
+    if not mistaken:
+        counting.append(check_truth(sequence))
     agreed = None if told is None else told.given.consensus
     looked = replace(
         looked,

@@ -9,7 +9,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends, Request, Response
 
-from app.errors import ApiError
+from app.errors import ApiError, as_sentence
 from app.models.correcting import (
     AlternativePreview,
     AnswerRequest,
@@ -57,8 +57,7 @@ def _complaining(status: int = 422) -> Iterator[None]:
     try:
         yield
     except CorrectionError as error:
-        words = str(error)
-        words = f"{words[:1].upper()}{words[1:]}."
+        words = as_sentence(str(error))
         raise ApiError(status, "cannot_correct", words, hint=NOTHING_CHANGED) from None
 
 

@@ -11,7 +11,7 @@ from urllib.parse import quote
 
 from fastapi import APIRouter, Depends, Query, Request, Response
 
-from app.errors import ApiError, sentence
+from app.errors import ApiError, as_sentence, sentence
 from app.state.importing.desk import Desk
 from app.state.importing.draft import Draft
 from app.state.importing.uploads import MOST_BYTES, Announced, UploadError
@@ -67,8 +67,7 @@ def _complaining() -> Iterator[None]:
     try:
         yield
     except (UploadError, FormatError, ParameterError, OSError) as error:
-        words = sentence(error)
-        raise ApiError(422, "cannot_import", f"{words[:1].upper()}{words[1:]}.") from None
+        raise ApiError(422, "cannot_import", as_sentence(sentence(error))) from None
 
 
 @router.get("/recordings")

@@ -20,8 +20,8 @@ export function camerasTable(info) {
 	const left = info.wish.left_out;
 	const words = [
 		...info.files
-			.filter(({ format }) => !format)
-			.map(({ complaint, label }) => complaint || `${label} is not used`),
+			.filter(({ why }) => why)
+			.map(({ why, label }) => (why.startsWith(label) ? why : `${label}: ${why}`)),
 		...info.told,
 	].join(" · ");
 	return [

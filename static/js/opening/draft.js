@@ -2,7 +2,7 @@
 import { h, icon, show } from "../elements/dom.js";
 import { many, size } from "../library/words.js";
 import { camerasTable, isReady } from "./cameras.js";
-import { CALIBRATIONS, button, capital, close, cut, div, field, grow, span } from "./controls.js";
+import { CALIBRATIONS, button, close, cut, div, field, grow, span } from "./controls.js";
 import { anglesChoice, checksPart, roomPart, targetPart } from "./settings.js";
 
 /**
@@ -34,12 +34,11 @@ export function draftSheet(info, methods, moved) {
 }
 
 /** @param {Server.ImportInfo} info */
-function head({ files, frames, cameras, fps, wish, uploaded, phase }) {
-	const used = files.filter(({ format }) => format).length;
+function head({ files_there, files_used, frames, cameras, fps, wish, uploaded, phase }) {
 	const facts = frames
-		? `${cameras.length} cameras · ${show(fps)} Hz · ${frames} steps · ${(frames / fps).toFixed(1)} s · ${used} of ${files.length} files used`
-		: files.length
-			? many(files.length, "file")
+		? `${cameras.length} cameras · ${show(fps)} Hz · ${frames} steps · ${(frames / fps).toFixed(1)} s · ${files_used} of ${many(files_there, "file")} used`
+		: files_there
+			? many(files_there, "file")
 			: "";
 	return h(
 		"header",
@@ -58,11 +57,10 @@ function head({ files, frames, cameras, fps, wish, uploaded, phase }) {
 const files = ({ files, coming }) =>
 	div(
 		{ class: "in-scroll in-files", tabindex: 0 },
-		files.map(({ label, complaint, format }) => {
-			const why = complaint.startsWith(`${label}: `)
-				? complaint.slice(label.length + 2)
-				: complaint;
-			return h("p", {}, h("b", {}, label), ` ${why || format || "is not used"}`);
+		files.map(({ label, why, format, read_with }) => {
+			const short = why.startsWith(`${label}: `) ? why.slice(label.length + 2) : why;
+			const words = short || (read_with ? `read with ${read_with}` : format);
+			return h("p", {}, h("b", {}, label), ` ${words}`);
 		}),
 		coming.map((name) => h("p", { class: "coming" }, cut(name))),
 	);
@@ -86,7 +84,7 @@ const copying = ({ copied, bytes, megabytes_per_second: speed }) =>
 
 /** What there is to say now. @param {Server.ImportInfo} info @param {number} done  cameras that are ready @param {number} odd  things to decide */
 function stateOf(info, done, odd) {
-	if (info.error) return capital(info.error);
+	if (info.error) return info.error;
 	switch (info.phase) {
 		case "uploading":
 			return "Uploading";

@@ -171,7 +171,7 @@ const choice = (words, what, wished, found, values) =>
 
 /** @param {Info} info */
 export function checksPart(info) {
-	const { checks, under_way: now, truth } = info;
+	const { checks, under_way: now } = info;
 	const of = (/** @type {Server.ImportedCheck["status"]} */ kind) =>
 		checks.filter(({ status }) => status === kind);
 	const [odd, fine] = [of("warning"), of("good")];
@@ -186,11 +186,6 @@ export function checksPart(info) {
 		),
 		div({ class: "checks" }, undecided(info), [...odd, ...fine, ...of("absent")].map(check)),
 		pairs(info),
-		line(
-			truth ? "good" : "absent",
-			"truth",
-			truth ? `${truth} people: runs are scored against it.` : "None found: runs are not scored.",
-		),
 	);
 }
 
@@ -234,7 +229,7 @@ function line(status, name, words, ...more) {
 	return div(
 		{ class: "chk" },
 		icon(`i-${sign}`, kind),
-		h("p", {}, h("b", {}, capital(name)), " ", capital(words)),
+		h("p", {}, h("b", {}, capital(name)), " ", words),
 		...more,
 	);
 }

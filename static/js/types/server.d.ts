@@ -519,7 +519,14 @@ declare namespace Server {
 		/** Bytes. */
 		received: number;
 		bytes: number;
+		/**
+		 * The first of them: those that are used, then those that are not for a reason of their own.
+		 */
 		files: ImportedFile[];
+		/** The number of all files. */
+		files_there: number;
+		/** The number of those that the recording is made of. */
+		files_used: number;
 		/** Files that were announced and are not yet understood, the first of them. */
 		coming: string[];
 		/** Labels of pictures and boxes that a camera may be given. */
@@ -673,8 +680,16 @@ declare namespace Server {
 	/** A file, or a series of numbered ones, and what it was taken for. */
 	interface ImportedFile {
 		label: string;
+		/** What it was taken for; empty where it is read with another file, or not at all. */
 		format: string;
-		complaint: string;
+		/** The label of the file that it is read with; empty for the others. */
+		read_with: string;
+		/** Why it is not used, as far as it is known of the file alone; else empty. */
+		why: string;
+		/** The number of files. */
+		count: number;
+		/** The number of them that the recording is made of. */
+		used: number;
 	}
 
 	/** How late a camera is against the others, as it is now. */

@@ -172,7 +172,7 @@ def test_what_does_not_fit_says_so_and_changes_nothing(client: TestClient) -> No
     post, patch = client.post, client.patch
     small = {**BOX, "width": 2, "height": 2}
     assert complaint(post("/api/teach/templates", json=small)) == (
-        "Walkers/sequence.toml, new template, box: expected at least 4 pixels a side inside the "
+        "walkers/sequence.toml, new template, box: expected at least 4 pixels a side inside the "
         "picture, found 2 × 2; drag a larger one."
     )
     words = complaint(post("/api/teach/templates", json={**BOX, "camera": "cam7"}))
@@ -182,7 +182,7 @@ def test_what_does_not_fit_says_so_and_changes_nothing(client: TestClient) -> No
     words = complaint(patch("/api/teach/room/min/2", json={"value": 5}))
     assert "[room], max: expected z above that of min, 5, found 2" in words
     words = complaint(patch("/api/teach/entrances/4/sigma/0", json={"value": 1}))
-    assert words == "Entrances: expected one of 1, found number 5."
+    assert words == "entrances: expected one of 1, found number 5."
     words = complaint(patch("/api/teach/entrances/0/sigma/0", json={"value": 0}))
     assert "sigma: expected 3 positive numbers" in words
     assert patch("/api/teach/room/max/0", json={"value": "NaN"}).status_code == 422
@@ -333,7 +333,7 @@ def test_a_rendered_room_is_offered_as_a_copy(
     assert panel(client)["built_in"]
     assert panel(client)["read_only"].startswith("walkers lies in the cache, ")
     words = complaint(client.post("/api/teach/save"))
-    assert words.startswith("Walkers/sequence.toml: cannot be saved, since walkers lies in the ")
+    assert words.startswith("walkers/sequence.toml: cannot be saved, since walkers lies in the ")
     assert state(client)["teaching"]["unsaved"] == 1
 
 

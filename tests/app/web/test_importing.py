@@ -15,6 +15,7 @@ from app.web.server import Settings, create_app
 from tests.app.conftest import ADDRESS, run_is, wait_until
 from tests.io.importing.test_angles import lay_out
 from tests.io.read.recorded import PLACES, detections, settled_of, toml, videos
+from tracker.io.checks.truth import check_truth
 from tracker.io.importing import bringing
 from tracker.io.importing.writing import write
 from tracker.runs.pipeline import Cancelled
@@ -92,8 +93,12 @@ def test_files_that_are_sent_become_a_recording(
     assert info["wish"]["name"] == "session"
     assert [camera["name"] for camera in info["cameras"]] == ["cam1", "cam2", "cam3", "cam4"]
     assert info["cameras"][0]["detections"] == "cam1.csv"
-    assert {one["label"] for one in info["files"] if not one["format"]} == {"session/notes.txt"}
-    assert {one["status"] for one in info["checks"]} == {"good"}
+    (unused,) = (one for one in info["files"] if not one["used"])
+    assert (unused["label"], unused["why"]) == ("session/notes.txt", "no format that is read")
+    assert (info["files_used"], info["files_there"]) == (5, 6)
+    assert {one["status"] for one in info["checks"]} == {"good", "absent"}
+    (absent,) = (one for one in info["checks"] if one["status"] == "absent")
+    assert absent["sentence"] == "there is no truth, so that runs are not scored"
     assert len(info["pairs"]) == 6
     assert not any(pair["odd"] for pair in info["pairs"])
     plan = info["plan"]
@@ -214,7 +219,7 @@ def test_a_folder_that_is_still_being_copied_is_waited_for(
     video.write_bytes(content + b"more")
     answer = client.post(f"{address}/write", json={"open": False})
     assert answer.status_code == 422
-    assert "Cam2.avi came or was changed" in answer.text
+    assert "cam2.avi came or was changed" in answer.text
     _settled(client, begun["key"])
     assert client.post(f"{address}/write", json={"open": False}).status_code == 200
     wait_until(lambda: (data / "walk-2").exists())
@@ -315,6 +320,23 @@ def test_copying_can_be_stopped(client: TestClient, files: Path, data: Path) -> 
     assert read_sequence(folder).frames == 60
 
 
+def test_truth_that_stands_elsewhere_is_told_as_the_check_tells_it(
+    client: TestClient, files: Path, data: Path
+) -> None:
+    rows = "".join(f"{k},1,{90000 + 0.02 * k},90000,0.9\n" for k in range(60))
+    (files / "ground_truth.csv").write_text(f"frame,id,x,y,z\n{rows}")
+    info = _settled(client, _send(client, files))
+    assert info["truth"] == 1
+    (told,) = (one for one in info["checks"] if "truth's places" in one["sentence"])
+    client.post(f"/api/import/{info['key']}/write", json={"open": True})
+    wait_until(lambda: client.get("/api/state").json()["sequence"] is not None)
+    wait_until(lambda: client.get("/api/evaluation").status_code == 200)
+    found = check_truth(read_sequence(data / info["wish"]["name"]))
+    assert (told["status"], told["sentence"]) == (found.status, found.sentence)
+    assert found.status == "warning"
+    assert f"{found.sentence}." in client.get("/api/evaluation").json()["notes"]
+
+
 @pytest.mark.full
 def test_an_import_that_is_given_up_leaves_nothing(
     client: TestClient, files: Path, data: Path
@@ -328,6 +350,9 @@ def test_an_import_that_is_given_up_leaves_nothing(
 
 @pytest.mark.full
 def test_what_cannot_be_imported_is_told(client: TestClient, data: Path, tmp_path: Path) -> None:
+    for nowhere in (str(tmp_path / "nowhere"), "nowhere"):
+        answer = client.post("/api/import/path", json={"path": nowhere}).json()
+        assert f"{nowhere}: there is no such file or folder" in answer["detail"]
     outside = client.post("/api/import/path", json={"path": str(tmp_path)}).json()
     assert "expected files below the data folder" in outside["detail"]
     bad = client.post("/api/import", json={"files": [{"path": "../a", "bytes": 1}]})

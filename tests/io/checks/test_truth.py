@@ -11,6 +11,7 @@ import pytest
 from tests.app.conftest import Runs, run
 from tests.app.folders import write_crossing
 from tests.random_rooms import random_room
+from tracker.evaluation import evaluate_sequence
 from tracker.io.checks import check
 from tracker.io.checks.truth import check_truth
 from tracker.sequences.sequence import Sequence
@@ -35,7 +36,7 @@ def test_right_truth_raises_no_alarm_and_another_unit_or_origin_does(seed: int) 
     for factor, by in ((100.0, 0.0), (0.01, 0.0), (1.0, 20.0)):
         wrong = check_truth(moved(sequence, factor, by))
         assert wrong.status == "warning", (factor, by, wrong.sentence)
-        assert "origin, axes or unit may be others" in wrong.sentence
+        assert "origin, axes, grid or unit may be others" in wrong.sentence
     found = {one.name: one.status for one in check(moved(sequence, 100.0, 0.0), quick=True)}
     assert found[right.name] == "warning"
 
@@ -60,7 +61,7 @@ def test_evaluate_says_it(run: Runs, tmp_path: Path) -> None:
         )
     )
     status, _, stderr = run("evaluate", folder, tracks)
-    assert (status, "stands where the boxes" in stderr) == (0, False), stderr
+    assert (status, "lie in boxes" in stderr) == (0, False), stderr
     path.write_text(
         "\n".join(
             [
@@ -75,4 +76,14 @@ def test_evaluate_says_it(run: Runs, tmp_path: Path) -> None:
     )
     status, _, stderr = run("evaluate", folder, tracks)
     assert status == 0
-    assert "the truth stands where the boxes are: 0 % of its places lie in boxes" in stderr
+    assert stderr.count("0 % of the truth's places lie in boxes of the cameras that see them") == 1
+
+
+def test_figures_against_truth_that_stands_elsewhere_say_so() -> None:
+    right = random_room(0)
+    wrong = moved(right, 1.0, 20.0)
+    truth = right.ground_truth
+    assert truth is not None
+    assert not any("boxes" in note for note in evaluate_sequence(right, truth).notes)
+    note, *_ = evaluate_sequence(wrong, truth).notes
+    assert note == f"{check_truth(wrong).sentence}."

@@ -41,6 +41,7 @@ def check(
             calibrations exchanged among many cameras.
         reader: Of the pictures; one is opened where it is needed and none is given.
     """
+    truth = check_truth(sequence)
     sequence = _surest(sequence)
     told = listen(sequence, exchanges=not quick or len(sequence.views) <= EVERY_ORDER)
     found = [*check_boxes(sequence, told)]
@@ -55,7 +56,7 @@ def check(
         found += check_time(sequence, reader, clocks=clocks)
     if told is not None:
         found.append(check_counting(sequence))
-    found.append(check_truth(sequence))
+    found.append(truth)
     return found
 
 

@@ -74,13 +74,8 @@ def raw_cameras(sequence: Sequence) -> tuple[RawCamera, ...]:
     )
 
 
-def listen(sequence: Sequence, *, exchanges: bool = True) -> BoxesTell | None:
-    """Judge all usual readings of a sequence; None where fewer than two cameras have boxes.
-
-    Args:
-        sequence: Whose cameras and boxes.
-        exchanges: Whether to look for calibrations that are exchanged.
-    """
+def seen_boxes(sequence: Sequence) -> list[Seen | None]:
+    """The boxes of each camera that are compared; None for a camera without any."""
     seen: list[Seen | None] = []
     for view in sequence.views:
         own = view.detections
@@ -89,6 +84,17 @@ def listen(sequence: Sequence, *, exchanges: bool = True) -> BoxesTell | None:
             continue
         kept = own.scores >= SCORE_THRESHOLD
         seen.append(Seen(own.frames[kept], own.boxes[kept]))
+    return seen
+
+
+def listen(sequence: Sequence, *, exchanges: bool = True) -> BoxesTell | None:
+    """Judge all usual readings of a sequence; None where fewer than two cameras have boxes.
+
+    Args:
+        sequence: Whose cameras and boxes.
+        exchanges: Whether to look for calibrations that are exchanged.
+    """
+    seen = seen_boxes(sequence)
     cameras = raw_cameras(sequence)
     tried = Open(orders=exchanges)
     verdict = find_reading(cameras, seen, fps=sequence.fps, tried=tried, names="number")

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from functools import lru_cache
 
 import numpy as np
 
+from tracker.io.checks.boxes import AS_GIVEN, raw_cameras, seen_boxes
 from tracker.io.checks.synchronisation import LEAST_STEPS, CameraOffset, synchronise
 from tracker.io.conventions.questions import describe_clocks
-from tracker.io.conventions.search import ClockFit
+from tracker.io.conventions.search import ClockFit, clocks_by
 from tracker.sequences.finding import Check, Remedy, absent, good, warning
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
@@ -55,6 +57,20 @@ def check_time(
         )
     if not late and not uneven:
         yield _agreeing(name, found)
+
+
+@lru_cache(maxsize=1)
+def uneven_clocks(sequence: Sequence) -> tuple[str, ...]:
+    """Return a sentence for each camera whose clock jumps or drifts, as the check says it.
+
+    The runs of a recording differ in parameters, which say nothing of its clocks: the last one that
+    was asked for is remembered.
+
+    Args:
+        sequence: Read rightly. Its boxes tell; without boxes there is nothing to say.
+    """
+    clocks = clocks_by(raw_cameras(sequence), seen_boxes(sequence), AS_GIVEN, sequence.fps)
+    return tuple(describe_clocks(clocks, [camera.name for camera in sequence.cameras]))
 
 
 def _agreeing(name: str, found: tuple[CameraOffset, ...]) -> Check:

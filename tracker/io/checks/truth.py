@@ -33,19 +33,19 @@ def check_truth(sequence: Sequence) -> Check:
     truth = sequence.ground_truth
     detections = [view.detections for view in sequence.views]
     if truth is None or not len(truth.frames):
-        return absent(name, "there is no truth")
+        return absent(name, "there is no truth, so that runs are not scored")
     if not any(own is not None and len(own.frames) for own in detections):
         return absent(name, "there are no boxes")
     share = share_in_boxes(truth.frames, truth.positions, sequence.cameras, detections)
     if contradicts(share, truth.frames, truth.positions, sequence.cameras, detections):
         return warning(
             name,
-            f"{percent(share)} of its places lie in boxes of the cameras that see them: its "
-            "origin, axes or unit may be others than the calibration's, and figures against it "
-            "mean nothing",
+            f"{percent(share)} of the truth's places lie in boxes of the cameras that see them: "
+            "its origin, axes, grid or unit may be others than the calibration's, and figures "
+            "against it mean nothing",
             share=share,
         )
-    return good(name, f"{percent(share)} of its places lie in boxes", share=share)
+    return good(name, f"{percent(share)} of the truth's places lie in boxes", share=share)
 
 
 def contradicts(

@@ -763,6 +763,26 @@ def _clocks_at(
     return fit_clocks(likelihood, best, dict(confirmed), fps)
 
 
+def clocks_by(
+    cameras: Many[RawCamera], seen: Many[Seen | None], reading: Reading, fps: float
+) -> dict[int, ClockFit]:
+    """Find the clocks by one reading alone, which is not questioned; none where no boxes meet.
+
+    Args:
+        cameras: As their files give them.
+        seen: The boxes of each, None for a camera without any.
+        reading: How both are meant.
+        fps: Steps a second.
+    """
+    likelihood = Likelihood(cameras, seen, fps)
+    if not likelihood.judge.possible:
+        return {}
+    best = likelihood.score(likelihood.judge.turned(reading), axes=True)
+    if best is None:
+        return {}
+    return fit_clocks(likelihood, best, confirm_moments(likelihood, best), fps)
+
+
 def fit_clocks(
     likelihood: Likelihood, best: Interpretation, confirmed: dict[int, float], fps: float
 ) -> dict[int, ClockFit]:

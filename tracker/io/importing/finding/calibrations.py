@@ -74,11 +74,7 @@ def camera_sets(taken: Sequence[ParsedFiles]) -> tuple[list[CameraSet], list[str
         whole = _whole(one)
         if whole is not None:
             complete.append(whole)
-            lacking = [c.name for c in one.cameras if c not in whole.cameras]
-            told.append(
-                f"{one.label}: {', '.join(lacking)}: no pose and lens, as the others have; "
-                "left out with what it saw"
-            )
+            told += _lacking(one, whole)
         elif one in lenses:
             if not any(f"{one.label}: " in sentence for sentence in told):
                 told.append(f"{one.label}: has lenses, but no file has the poses of these cameras")
@@ -100,6 +96,21 @@ def _whole(one: CameraSet) -> CameraSet | None:
         if c.projection is not None or (c.rotation is not None and c.intrinsics is not None)
     )
     return replace(one, cameras=whole) if len(whole) > 1 else None
+
+
+def _lacking(one: CameraSet, whole: CameraSet) -> list[str]:
+    """What the other cameras of a set lack, a sentence for each kind."""
+    lacking: dict[str, list[str]] = {}
+    for camera in one.cameras:
+        if camera not in whole.cameras:
+            posed, lensed = camera.rotation is not None, camera.intrinsics is not None
+            what = "no pose" if lensed else "no lens" if posed else "neither lens nor pose"
+            lacking.setdefault(what, []).append(camera.name)
+    return [
+        f"{one.label}: {', '.join(names)}: {what}, unlike the others; left out with the boxes and "
+        "pictures"
+        for what, names in lacking.items()
+    ]
 
 
 def _mixed(one: CameraSet) -> str:

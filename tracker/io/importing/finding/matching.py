@@ -24,6 +24,9 @@ from tracker.io.read.pieces import (
 ASPECT_TOLERANCE = 0.01
 """By how much a picture's width by height may differ from the calibration's: rounding."""
 
+_NAMED = 8
+"""Files or cameras that a sentence names one by one."""
+
 _LAST_CHOICE = ("ground truth",)
 """Formats whose boxes are annotations: taken where no detector's are there."""
 
@@ -259,11 +262,24 @@ def _match_pictures(cameras: list[MatchedCamera], pictures: _Pictures, told: lis
         for name, own in several.items()
     ]
     explained = {label for own in several.values() for label in own}
+    strangers = []
     for place, (label, piece) in enumerate(pictures):
         if place in pairs:
             _give_pictures(free[pairs[place]], piece, how)
         elif label not in explained:
-            told.append(f"{label}: belongs to no camera of the calibration; --camera NAME=FILE")
+            strangers.append(label)
+    told += _of_no_camera(strangers, cameras)
+
+
+def _of_no_camera(labels: Sequence[str], cameras: Sequence[MatchedCamera]) -> list[str]:
+    """One sentence on all files that belong to no camera; none where there are none."""
+    if not labels:
+        return []
+    files = f"{', '.join(labels[:_NAMED])}{' …' if len(labels) > _NAMED else ''}"
+    names = [camera.raw.name for camera in cameras]
+    known = f"{', '.join(names[:_NAMED])}{' …' if len(names) > _NAMED else ''}"
+    belong = "belongs" if len(labels) == 1 else "belong"
+    return [f"{files}: {belong} to no camera of the calibration ({known}); --camera NAME=FILE"]
 
 
 def _in_folders_of(cameras: Sequence[MatchedCamera], labels: Sequence[str]) -> dict[str, list[str]]:
@@ -358,15 +374,17 @@ def _match_boxes(
         pairs, how = found or ({}, "name")
         results.append((len(pairs), not annotated, pairs, how, rows))
     results.sort(key=lambda result: (result[1] and result[0] > 0, result[0]), reverse=True)
+    strangers = []
     for place, (_, _, pairs, how, rows) in enumerate(results):
         for n, (label, piece) in enumerate(rows):
             if n not in pairs:
-                told.append(f"{label}: belongs to no camera of the calibration; --camera NAME=FILE")
+                strangers.append(label)
             elif place:
                 told.append(f"{label}: has boxes too ({piece.format}); they are not used")
             else:
                 free[pairs[n]].detections = piece
                 free[pairs[n]].how["detections"] = how
+    told += _of_no_camera(strangers, cameras)
 
 
 def _by_pictures(
