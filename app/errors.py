@@ -105,7 +105,7 @@ def parameter_detail(error: ParameterError) -> ErrorDetail:
         code="bad_parameter",
         message=str(error),
         field=error.key,
-        hint=error.hint or "GET /api/schema lists every parameter with its range.",
+        hint=error.hint or "The manual lists every parameter with its range.",
     )
 
 

@@ -90,7 +90,7 @@ class Workbench(ShownRun):
                 raise ParameterError(
                     "preset",
                     f"expected one of {known}, got {name!r}",
-                    "GET /api/schema has the built-in presets, GET /api/state your own.",
+                    "The tab Changes lists the built-in presets and your own.",
                 )
             changes = {"single_view": now.parameters.single_view, **presets[name]}
             values = with_values(now.defaults, changes)
@@ -145,7 +145,7 @@ class Workbench(ShownRun):
                 raise ParameterError(
                     f"layers.{name}",
                     f"expected one of {', '.join(LAYERS)}",
-                    "GET /api/state has the layers.",
+                    "The head of the 3D view has the layers.",
                 )
         with self._edit() as now:
             layers = {**now.layers, **{k: bool(v) for k, v in changes.items()}}
@@ -197,7 +197,7 @@ class Workbench(ShownRun):
                 raise ParameterError(
                     "camera",
                     f"expected an index below {cameras}, top or null, got {view}",
-                    "GET /api/state has the cameras of the open sequence.",
+                    "The head of the 3D view has the cameras.",
                 )
             if view != now.view:
                 self._put("view", view=view)

@@ -82,7 +82,7 @@ async def open_sequence(wish: models.OpenRequest, bench: Bench, jobs: Work) -> m
     with told_in_the_answer(
         wish.name,
         field="name",
-        hint="What was open still is. GET /api/sequences lists what there is.",
+        hint="What was open still is; Open lists what there is.",
     ):
         await begun(jobs.open(wish.name))
     return results.state_of(bench.snapshot())

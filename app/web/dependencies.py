@@ -77,7 +77,7 @@ def nothing_open() -> ApiError:
         409,
         "nothing_open",
         "No sequence is open.",
-        hint="Open one with POST /api/sequence.",
+        hint="Open one first.",
     )
 
 
@@ -88,7 +88,7 @@ def not_finished(what: str, done: int, steps: int) -> ApiError:
         409,
         "not_finished",
         f"Only a finished run {what}: {there}.",
-        hint="Wait for its end, or go on with it by POST /api/run.",
+        hint="Wait for its end, or go on with it.",
     )
 
 

@@ -15,6 +15,7 @@ import {
 } from "../../static/js/state/events.js";
 import { lensOf } from "../../static/js/draw/overlay.js";
 import { magnified } from "../../static/js/cameras/cameras.js";
+import { compareCells } from "../../static/js/elements/drawn.js";
 import { kindsOf } from "../../static/js/inspector/side.js";
 import { strands } from "../../static/js/timeline/reading.js";
 import { matching, offersOf, valueOf } from "../../static/js/sheets/sheets.js";
@@ -490,4 +491,13 @@ test("one large picture and the others stand close together in a wide pane", () 
     const last = cells.find(({ x }) => x === lefts.at(-1));
     assert.ok(Math.abs(lefts[0] - (1280 - last.x - last.width)) <= 3, "in the middle");
   }
+});
+
+test("cells are sorted as numbers or as words, and what is none stands last", () => {
+  const sorted = (cells, number, down = false) =>
+    [...cells].sort((a, b) => compareCells(a, b, number, down));
+  const numbers = ["10 px", "–", "−0.5", "9"];
+  assert.deepEqual(sorted(numbers, true), ["−0.5", "9", "10 px", "–"]);
+  assert.deepEqual(sorted(numbers, true, true), ["10 px", "9", "−0.5", "–"]);
+  assert.deepEqual(sorted(["cam10", "Cam2", "birth"], false), ["birth", "Cam2", "cam10"]);
 });

@@ -216,7 +216,8 @@ def test_a_method_that_cannot_work_is_known_with_the_reason(recording: Sequence)
     own = unfit_methods(replace(recording, detector=None), defaults)["single_view"]
     assert own == {
         "onnx_detector": "onnx_detector runs a detection network, and none is at hand; fetch one "
-        "by `multiview-phd detector get`, or start the program with --detector model.onnx."
+        "under Teach or by `multiview-phd detector get`, or start the program with --detector "
+        "model.onnx."
     }
     dark = unfit_methods(without(recording, "pictures"), defaults)["single_view"]
     assert set(dark) >= {"colour_phd", "jpda", "pseudo_particle", "association_matrix"}
@@ -288,7 +289,7 @@ def test_a_fetched_network_is_the_default_for_large_standing_people(recording: S
     without_any = replace(untaught, detector=None)
     words = advice(without_any, RunParameters(single_view="shapes"))
     assert words is not None
-    assert "`multiview-phd detector get` fetches one" in words
+    assert "Teach fetches one, or `multiview-phd detector get`" in words
     assert advice(without_any, RunParameters(single_view="jpda")) is None
     assert advice(untaught, RunParameters(single_view="shapes")) is None
 

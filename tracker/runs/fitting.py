@@ -72,7 +72,7 @@ def advice(sequence: Sequence, parameters: RunParameters) -> str | None:
         return None
     return (
         "people are found by shape, which misses some who keep still; a detection network finds "
-        "them too: `multiview-phd detector get` fetches one"
+        "them too: Teach fetches one, or `multiview-phd detector get`"
     )
 
 
@@ -115,8 +115,8 @@ def _lacks(
         )
     if used.detector and sequence.detector is None:
         return (
-            f"{name} runs a detection network, and none is at hand; fetch one by `multiview-phd "
-            "detector get`, or start the program with --detector model.onnx."
+            f"{name} runs a detection network, and none is at hand; fetch one under Teach or by "
+            "`multiview-phd detector get`, or start the program with --detector model.onnx."
         )
     if used.templates == "needed" and not templates:
         return (

@@ -74,7 +74,7 @@ class History:
             raise ParameterError(
                 "number",
                 f"expected the number of a listed run, got {number}",
-                "GET /api/runs lists them.",
+                "The tab Runs lists them.",
             )
         keys = (*METHODS, *PARAMETERS)
         values = {key: value_of(run.parameters, key) for key in keys}

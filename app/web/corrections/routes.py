@@ -174,7 +174,7 @@ def _there(found: ReviewItem | None, identity: str) -> ReviewItem:
     if found is None:
         raise ApiError(
             404, "no_doubt", f"There is no doubtful place {identity} any more.",
-            hint="GET /api/corrections/queue has those of the shown run.",
+            hint="The list of places to check has those of the shown run.",
         )  # fmt: skip
     return found
 

@@ -86,7 +86,7 @@ def begin(check: Check, bench: Bench) -> IdentityInfo:
             409,
             "not_finished",
             f"Identities are checked of a run that was computed to its end: {error}.",
-            hint="Wait for its end, or compute it again with POST /api/run.",
+            hint="Wait for its end, or compute it again.",
         ) from None
 
 

@@ -43,7 +43,7 @@ def _evaluated(snapshot: Snapshot, scored: Scored | None) -> tuple[Scored, Evalu
             409,
             "nothing_evaluated",
             "No run has been set against the truth yet.",
-            hint="Wait for the message evaluation of the stream, or start the run again.",
+            hint="Wait a moment, or compute the run again.",
         )
     return scored, scored.evaluation
 
@@ -112,7 +112,7 @@ def _nothing_to_compare() -> ApiError:
         409,
         "nothing_to_compare",
         "There is no run to compare with: none is pinned, and none was finished before.",
-        hint="Pin the finished run with POST /api/run/pin, or change a parameter.",
+        hint="Pin the finished run, or change a parameter.",
     )
 
 

@@ -181,6 +181,6 @@ def file(exporter: Out) -> FileResponse:
     """What the newest export wrote."""
     path = exporter.file
     if path is None:
-        raise ApiError(409, "nothing_written", "No export is finished.", hint="Begin one by POST.")
+        raise ApiError(409, "nothing_written", "No export is finished.", hint="Begin one first.")
     media = FORMATS[exporter.now.format].media
     return FileResponse(path, media_type=media, filename=path.name)

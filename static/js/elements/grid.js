@@ -89,7 +89,10 @@ export function grid(
 	function show(next) {
 		rows = next;
 		const value = columns.find(({ word }) => word === by)?.by;
-		const sorted = value ? [...rows].sort((a, b) => (value(a) - value(b)) * (down ? -1 : 1)) : rows;
+		const turn = down ? -1 : 1;
+		const compare = (/** @type {string | number} */ a, /** @type {string | number} */ b) =>
+			turn * (typeof a === "string" ? a.localeCompare(String(b)) : a - Number(b));
+		const sorted = value ? [...rows].sort((a, b) => compare(value(a), value(b))) : rows;
 		const keys = new Set(rows.map(key));
 		for (const [name, { element }] of kept)
 			if (!keys.has(name)) (element.remove(), kept.delete(name));

@@ -91,6 +91,7 @@ export function stepTables(state, series) {
 				vector(sigma),
 				fixed(errors.get(id), 3),
 			]),
+			{ sorts: true },
 		),
 		table(
 			"Tracks in the pictures",
@@ -106,12 +107,14 @@ export function stepTables(state, series) {
 					sides(track.box),
 				]),
 			),
+			{ sorts: true },
 		),
 		unowned.length > 0 &&
 			table(
 				"Detections that are nobody's",
 				["Camera", "Nobody's", "#Score", "Nearest track", "#σ away", "#Gate, σ", BOX],
 				unowned,
+				{ sorts: true },
 			),
 		curves(state, result, series),
 	];
@@ -182,6 +185,7 @@ export function eventTable(state, _, actions) {
 								why,
 								ids.map(idTag),
 							]),
+						{ sorts: true, goes: true },
 					)
 				: line("All ways to look agree: no moment is doubtful."),
 		];
@@ -215,6 +219,7 @@ export function eventTable(state, _, actions) {
 					why.get(`${step} ${id} ${kind}`) ?? kind,
 					idTag(id),
 				]),
+			{ sorts: true, goes: true },
 		),
 		more > 0 && line(`and ${more} more`),
 	];
@@ -320,6 +325,7 @@ export function changeTables(state, { changed, curves: found }, actions) {
 			"What parameters would change",
 			["Stage", "What it would change", "#Value", `#${found[0].measure}`],
 			rows,
+			{ sorts: true },
 		);
 	if (!changed.length)
 		return beside
@@ -350,6 +356,7 @@ export function changeTables(state, { changed, curves: found }, actions) {
 					),
 				];
 			}),
+			{ sorts: true },
 		),
 		beside,
 	];
@@ -386,7 +393,7 @@ export function compareTables(state, comparison, actions) {
 			...identity,
 			line(
 				quiet(
-					`${sequence?.name} names no file of true positions ([ground_truth] in sequence.toml), so its tracks cannot be scored.`,
+					`${sequence?.name} has no file of true positions, so its tracks cannot be scored; one can be named in its sequence.toml.`,
 				),
 			),
 		];
@@ -444,6 +451,7 @@ export function compareTables(state, comparison, actions) {
 				"Parameters that differ",
 				["B differs in", "#A", "#B"],
 				parameters.map((one) => [nameOf(state, one.key), quiet(valueOf(one.a)), valueOf(one.b)]),
+				{ sorts: true },
 			),
 		...notes,
 		...identity,
@@ -494,5 +502,6 @@ export function runTable({ run: now }, { runs }, actions) {
 						: quiet("another sequence"),
 			];
 		}),
+		{ sorts: true },
 	);
 }

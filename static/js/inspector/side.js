@@ -107,7 +107,13 @@ function mountTracks(root, { store, actions, playback }) {
 			by: (t) => t.cameras.filter(Boolean).length,
 			live: true,
 		},
-		{ word: "Weight", kind: "num", cell: (t) => here(t)?.existence.toFixed(2) ?? "–", live: true },
+		{
+			word: "Weight",
+			kind: "num",
+			cell: (t) => here(t)?.existence.toFixed(2) ?? "–",
+			by: (t) => here(t)?.existence ?? -1,
+			live: true,
+		},
 		{
 			word: "x, y, z  m",
 			kind: "num",

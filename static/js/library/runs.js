@@ -138,13 +138,19 @@ export function runsTable(on) {
 		},
 		{
 			word: "Methods",
+			by: (run) => `${run.single_view} ${run.fusion_method}`,
 			cell: (run) => [
 				methodWord(run.single_view),
 				h("span", { class: "q" }, " › "),
 				methodWord(run.fusion_method),
 			],
 		},
-		{ word: "Differs from default", kind: "chs", cell: pills },
+		{
+			word: "Differs from default",
+			kind: "chs",
+			by: (run) => run.changes.length,
+			cell: pills,
+		},
 		...FIGURES.map(([key, word, from, to]) => ({
 			word,
 			kind: "num met",
@@ -172,7 +178,7 @@ export function runsTable(on) {
 			by: (run) => run.steps_per_second,
 			cell: (run) => (run.steps_per_second ? Math.round(run.steps_per_second) : "–"),
 		},
-		{ word: "Note", kind: "q note-cell", cell: (run) => run.note },
+		{ word: "Note", kind: "q note-cell", by: (run) => run.note, cell: (run) => run.note },
 	];
 	const table = grid("Runs", columns, {
 		key: (run) => run.id,

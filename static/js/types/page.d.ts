@@ -462,7 +462,7 @@ interface Column<R> {
 	help?: string;
 	cell: (row: R) => string | number | Child | Child[];
 	/** Makes it sortable. */
-	by?: (row: R) => number;
+	by?: (row: R) => number | string;
 	/** Changes with the shown step. */
 	live?: boolean;
 }

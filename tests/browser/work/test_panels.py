@@ -86,8 +86,16 @@ def test_events_are_listed_and_can_be_gone_to(flat_page: Page, server: Server) -
     expect(listed).to_have_count(len(births))
     step, track = births[-1]
     assert rows(page, "Events")[-1] == [str(step), number(step / 25, 2), "birth", str(track)]
-    listed.last.get_by_role("button").click()
+    listed.last.get_by_text("birth").click()  # a row as a whole goes there
     server.wait(lambda state: (state["playhead"], state["selection"]) == (step, track))
+    head = page.get_by_role("table", name="Events").get_by_role("columnheader", name="Step")
+    for _ in range(2):
+        head.get_by_role("button").click()
+    expect(head).to_have_attribute("aria-sort", "descending")
+    page.get_by_role("combobox", name="Kind of event").select_option("")
+    expect(listed).to_have_count(len(timeline["events"]) + len(switches))
+    steps = [int(row[0]) for row in rows(page, "Events")]
+    assert steps == sorted(steps, reverse=True), "also when the table is drawn anew"
     page.get_by_role("combobox", name="Kind of event").select_option("removed")
     expect(page.locator("#panel-events")).to_contain_text("No such event")
     page.get_by_role("combobox", name="Kind of event").select_option("")

@@ -48,8 +48,8 @@ class OnnxDetector:
         model = sequence.detector
         if model is None:
             raise ValueError(
-                f"{sequence.name} has no detector; fetch one by `multiview-phd detector get`, "
-                "start with --detector model.onnx, or choose another single_view"
+                f"{sequence.name} has no detector; fetch one under Teach or by `multiview-phd "
+                "detector get`, start with --detector model.onnx, or choose another single_view"
             )
         p = self._parameters = parameters.of(OnnxDetectorParams)
         self._sequence, self._camera = sequence, sequence.views[camera_index].camera
