@@ -13,7 +13,12 @@ from tracker.geometry.consistency.consensus import Consensus
 from tracker.geometry.consistency.observed import pose_of
 from tracker.geometry.consistency.suggestion import LEAST_AGREEING, Suggestion, stands, suggest
 from tracker.io.conventions.level import confirmed, upwards
-from tracker.io.conventions.questions import LAYOUTS, PARTS, describe_moved
+from tracker.io.conventions.questions import (
+    LAYOUTS,
+    PARTS,
+    describe_moved,
+    describe_unconfirmed,
+)
 from tracker.io.conventions.reading import Reading, exchanged, exchanges
 from tracker.io.conventions.readings import LEAST_SHARE, Judge, Judged, Open, Seen
 from tracker.io.conventions.search import Verdict, as_meant, find_reading
@@ -322,8 +327,16 @@ def _inside(sequence: Sequence, told: BoxesTell) -> Check:
 
 
 def _stray_cameras(sequence: Sequence, told: BoxesTell) -> Iterator[Check]:
-    """A camera that has no box where others see somebody: its own pose or clock is off."""
-    if len(sequence.views) < 3:
+    """A camera whose boxes agree with no other's, or that has none where others see somebody: its
+    own pose or clock is off."""
+    name_of_check = "every camera agrees with another"
+    names = [camera.name for camera in sequence.cameras]
+    doubtful = describe_unconfirmed(told.verdict, names)
+    if doubtful.alone:
+        yield warning(name_of_check, doubtful.alone)
+    if doubtful.others:
+        yield absent(name_of_check, doubtful.others)
+    if len(sequence.views) < 3 or doubtful.alone:
         return
     shares: dict[str, float] = {}
     for index, view in enumerate(sequence.views):
@@ -333,13 +346,13 @@ def _stray_cameras(sequence: Sequence, told: BoxesTell) -> Iterator[Check]:
     for name, share in shares.items():
         if share < _OWN_SHARE:
             yield warning(
-                "every camera agrees with another",
+                name_of_check,
                 f"{name} has a box at {percent(share)} of the places where others' boxes meet and "
                 "it sees: its calibration, its file of boxes or its clock is another one's",
                 share=share,
             )
-    if shares and min(shares.values()) >= _OWN_SHARE:
-        yield good("every camera agrees with another", "each one's boxes meet others'")
+    if shares and min(shares.values()) >= _OWN_SHARE and not doubtful.others:
+        yield good(name_of_check, "each one's boxes meet others'")
 
 
 def _moved_cameras(sequence: Sequence, told: BoxesTell) -> Iterator[Check]:

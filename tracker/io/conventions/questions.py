@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, get_args
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
@@ -238,12 +238,19 @@ def describe_clocks(clocks: Mapping[int, ClockFit], names: Sequence[str]) -> lis
     ]
 
 
-def describe_moments(verdict: Verdict, names: Sequence[str]) -> list[str]:
-    """Return sentences on cameras whose boxes nothing confirms to show the others' moments."""
+class Unconfirmed(NamedTuple):
+    """Sentences on cameras whose boxes nothing confirms to show the others' moments."""
+
+    alone: str
+    """Those whose boxes agree with those of no other camera; empty where there are none."""
+    others: str
+    """Those whose boxes agree, but as well with those of other moments; empty likewise."""
+
+
+def describe_unconfirmed(verdict: Verdict, names: Sequence[str]) -> Unconfirmed:
+    """Describe the cameras that nothing confirms: an import and the check of what it wrote say it
+    in these words."""
     confirmed = verdict.confirmed
-    told = []
-    if len(confirmed) == 2 and verdict.kind == "decided":
-        told.append(OF_TWO)
     failing = [
         camera
         for camera, odds in confirmed.items()
@@ -254,14 +261,14 @@ def describe_moments(verdict: Verdict, names: Sequence[str]) -> list[str]:
     alone = [c for c in failing if log_odds(evidence.of_camera(c), nothing) < DECISIVE]
     if 2 * len(failing) >= len(confirmed):
         alone = []  # it is not known which of them are the ones that do not belong
-    if alone:
-        told.append(
-            f"{', '.join(names[c] for c in alone)}: boxes agree with those of no other camera: "
-            "another recording, a camera that was moved, or late by more than 10 s"
-        )
-    if rest := [names[c] for c in failing if c not in alone]:
-        told.append(f"{', '.join(rest)}: nothing confirms that these show the same moments")
-    return told
+    rest = [names[c] for c in failing if c not in alone]
+    return Unconfirmed(
+        f"{', '.join(names[c] for c in alone)}: boxes agree with those of no other camera: "
+        "another recording, a camera that was moved, or late by more than 10 s"
+        if alone
+        else "",
+        f"{', '.join(rest)}: nothing confirms that these show the same moments" if rest else "",
+    )
 
 
 def describe_moved(moved: Mapping[int, float], names: Sequence[str]) -> list[str]:

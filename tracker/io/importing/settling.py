@@ -24,14 +24,15 @@ from tracker.io.conventions.orders import MOST_CAMERAS
 from tracker.io.conventions.questions import (
     ACCEPT,
     OF_ONE,
+    OF_TWO,
     PARTS,
     UNPROVEN,
     Undecided,
     Unexplained,
     check_verdict,
     describe_clocks,
-    describe_moments,
     describe_moved,
+    describe_unconfirmed,
     rearranged,
 )
 from tracker.io.conventions.reading import Reading, read_boxes, to_camera
@@ -527,7 +528,9 @@ def _read(
         every, told_ = rearranged([*raws, *spare], reading)
         raws = every[: len(raws)]
         found += told_
-        told += describe_moments(verdict, [raw.name for raw in raws])
+        if len(verdict.confirmed) == 2 and verdict.kind == "decided":
+            told.append(OF_TWO)
+        told += filter(None, describe_unconfirmed(verdict, [raw.name for raw in raws]))
         told += describe_moved(verdict.moved, [raw.name for raw in raws])
     if any(raw.turns for raw in raws):
         found.append(("angles", f"{turns_in_words(reading.turns)}, {why}; --euler"))
