@@ -167,6 +167,8 @@ class DoubtQueue(Model):
     """By what they were judged."""
     answered: int
     """Places that corrections settle."""
+    cameras: list[str]
+    """Sentences about cameras whose boxes err more than those of the others."""
     doubts: list[DoubtInfo]
 
 

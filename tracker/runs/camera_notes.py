@@ -28,20 +28,10 @@ def camera_notes(run: Run) -> list[str]:
     smoothed = run.smoothed
     if smoothed is None or smoothed.cameras is None or smoothed.noise is None:
         return []
-    errors = smoothed.cameras
     names = [view.camera.name for view in run.sequence.views]
-    found = []
-    if errors.out_of_line is not None:
-        camera, quantity = errors.out_of_line
-        factor = errors.of(camera, quantity)
-        found.append(
-            f'the boxes of camera "{names[camera]}" are out of line: {_ERRING[quantity]} '
-            f"{factor:.1f} times as much as the other cameras'; its calibration is turned, or its "
-            "boxes are worse, see multiview-phd check; sigma is too small where it alone sees "
-            "somebody"
-        )
+    found = out_of_line_notes(run)
     off = float(smoothed.noise.persistent[0] * run.sequence.target_half_extents[2])
-    delays = _delays(errors, names, off / _WALKING, run.sequence.fps)
+    delays = _delays(smoothed.cameras, names, off / _WALKING, run.sequence.fps)
     uneven = uneven_clocks(run.sequence)
     found += uneven
     if delays and not uneven:  # where a clock jumps, a mean delay says nothing
@@ -51,6 +41,21 @@ def camera_notes(run: Run) -> list[str]:
             "time_offset in sequence.toml"
         )
     return found
+
+
+def out_of_line_notes(run: Run) -> list[str]:
+    """Describe which camera's boxes err more than those of the others; empty for none."""
+    errors = None if run.smoothed is None else run.smoothed.cameras
+    if errors is None or errors.out_of_line is None:
+        return []
+    camera, quantity = errors.out_of_line
+    factor = errors.of(camera, quantity)
+    return [
+        f'the boxes of camera "{run.sequence.views[camera].camera.name}" are out of line: '
+        f"{_ERRING[quantity]} {factor:.1f} times as much as the other cameras'; its calibration is "
+        "turned, or its boxes are worse, see multiview-phd check; sigma is too small where it "
+        "alone sees somebody"
+    ]
 
 
 def _delays(errors: CameraErrors, names: list[str], least: float, fps: float) -> list[str]:

@@ -27,6 +27,7 @@ from tracker.corrections.truth import checked_ranges
 from tracker.fusion.trajectories import Trajectories, corrected
 from tracker.review.queue import Queue, ReviewItem
 from tracker.review.queue.item import TrackRows
+from tracker.runs.camera_notes import out_of_line_notes
 from tracker.runs.pipeline import Run
 
 GHOST_SECONDS = 5.0
@@ -88,6 +89,7 @@ def queue_of(snapshot: Snapshot, found: Queue, skipped: AbstractSet[str]) -> Dou
         complete=run is not None and run.complete,
         how=found.how,
         answered=found.answered,
+        cameras=[] if run is None else out_of_line_notes(run),
         doubts=[_doubt(one, run) for one in found.items if one.id not in skipped],
     )
 

@@ -30,6 +30,7 @@ export function mountQueue(root, { store, actions }, check, crops) {
 		tabindex: 0,
 	});
 	const blank = h("div", { class: "qblank", hidden: true });
+	const cameras = h("p", { class: "small keepnote", hidden: true });
 	const count = h("span", { class: "count" });
 	/** @param {"undo" | "redo"} what @param {-1 | 1} direction */
 	const turn = (what, direction) =>
@@ -75,6 +76,7 @@ export function mountQueue(root, { store, actions }, check, crops) {
 			h("span", { class: "grow" }),
 			order,
 		),
+		cameras,
 		places,
 		blank,
 		h(
@@ -214,6 +216,18 @@ export function mountQueue(root, { store, actions }, check, crops) {
 					: ""
 				: `${left} left · ${answered} done${computing ? " · computing" : ""}`,
 		);
+		const words = queue?.cameras ?? [];
+		cameras.hidden = !words.length;
+		if (words.length)
+			fill(
+				cameras,
+				icon("i-warn", "s"),
+				h(
+					"span",
+					{},
+					words.map((one) => `${one[0].toUpperCase()}${one.slice(1)}. `),
+				),
+			);
 		places.hidden = left === 0;
 		order.hidden = left < 2;
 		blank.hidden = left > 0;

@@ -314,6 +314,8 @@ declare namespace Server {
 		how: string;
 		/** Places that corrections settle. */
 		answered: number;
+		/** Sentences about cameras whose boxes err more than those of the others. */
+		cameras: string[];
 		doubts: app__models__correcting__DoubtInfo[];
 	}
 
