@@ -161,3 +161,11 @@ def test_nobody_at_all() -> None:
     assert len(new) == len(kept) == 0
     found = outcomes(nothing, nothing, np.zeros((0, 3)), told, leeway=LEEWAY)
     assert [one.met for one in found] == [False, True]
+
+
+def test_an_exchange_of_whom_one_is_not_there_changes_nothing() -> None:
+    steps, ids, places = walkers(3)
+    told = make(kind="exchanged", places=[at(1, 9), at(7, 9), at(2, 10), at(1, 10)])
+    found, kept = relabelled(steps, ids, places, [told], leeway=LEEWAY)
+    assert found.tolist() == ids.tolist()
+    assert kept.tolist() == list(range(len(ids)))

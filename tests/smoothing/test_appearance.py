@@ -143,6 +143,24 @@ def test_the_covariances_are_those_the_data_were_drawn_with() -> None:
     assert_allclose(np.cov((within @ mixing @ projection).T), np.eye(4), atol=0.05)
 
 
+def test_parts_of_less_than_one_box_in_all_do_not_count() -> None:
+    """Two boxes that are mostly covered tell nothing of what differs within a part."""
+    rng = np.random.default_rng(4)
+    parts = np.repeat(np.arange(40), 6)
+    vectors = rng.normal(scale=2.0, size=(40, 3))[parts] + rng.normal(size=(240, 3))
+    usual = learn_covariances(vectors, np.ones(240), parts)
+    covered = rng.normal(scale=9.0, size=(20, 3))
+    found = learn_covariances(
+        np.concatenate([vectors, covered]),
+        np.concatenate([np.ones(240), np.full(20, 0.4)]),
+        np.concatenate([parts, 40 + np.repeat(np.arange(10), 2)]),
+    )
+    assert usual is not None
+    assert found is not None
+    assert_allclose(found[1], usual[1], rtol=1e-9)
+    assert_allclose(np.abs(found[0]), np.abs(usual[0]), rtol=1e-6)
+
+
 def test_nothing_is_learnt_from_few_parts_or_parts_that_do_not_differ() -> None:
     rng = np.random.default_rng(5)
 

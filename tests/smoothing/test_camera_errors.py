@@ -72,6 +72,16 @@ def test_a_camera_with_three_times_the_noise_is_named(camera: int) -> None:
     assert errors_of(*noisier(camera, camera, 0.5 + FACTOR / 2.0)).out_of_line is None
 
 
+def test_errors_of_heights_are_none_across_the_picture() -> None:
+    paths, seen = noisier(0, 1, 3.0)
+    _, usual = simulated(0, TRUE, 600)
+    residuals = seen.residuals.copy()
+    residuals[:, 0] = usual.residuals[:, 0]
+    found = errors_of(paths, replace(seen, residuals=residuals))
+    assert found.factors[1, 0] == pytest.approx(1.0, abs=0.25)
+    assert found.factors[1, 1:].min() > 1.8
+
+
 def test_a_camera_that_is_turned_up_is_named_also_by_its_known_offset() -> None:
     paths, seen = simulated(1, TRUE, 600)
     aside = np.array([0.0, 0.3, 0.3])

@@ -155,6 +155,10 @@ def test_looks_weigh_in_a_link_and_in_a_return(weight: float) -> None:
     assert_allclose(found.gains, newcomer - np.log(6.0) + weight * ratio)
     assert found.earlier.tolist() == list(range(6))
     assert found.later.tolist() == [6] * 6
+    # who comes in the last step of the others is none of them
+    at_once = standing(*pieces, (6, 7, 14, 0.1))
+    found = odds.long_gap_odds(smoother(camera), at_once, links, chains, p, [embeddings], RATES)
+    assert len(found.gains) == 0
 
 
 # ── what is told of them

@@ -6,7 +6,6 @@ import json
 import re
 import shutil
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,16 +14,11 @@ import pytest
 from starlette.testclient import TestClient
 
 from app.state.doubting import Doubting
-from app.state.snapshot import Snapshot
-from app.web.corrections.views import queue_of
 from app.web.server import Settings, create_app
 from tests.app.conftest import ADDRESS, Runs, connect, run_is, wait_until
-from tests.random_rooms import random_room
 from tracker.corrections.log import read_log
 from tracker.review.queue import Alternative, Queue, ReviewItem
 from tracker.review.queue.item import TrackRows, proposed
-from tracker.runs.fitting import default_parameters
-from tracker.runs.pipeline import compute
 from tracker.sequences.reader import read_sequence
 
 PLACE = "/api/corrections"
@@ -382,20 +376,3 @@ def test_who_may_be_missing_is_shown_where_each_camera_would_have_him(
     assert desk.get(f"{PLACE}/queue/{told['id']}/1").status_code == 200
     answer = desk.post(f"{PLACE}/answers", json={"doubt": told["id"], "alternative": 1})
     assert [one["kind"] for one in answer.json()["corrections"]] == ["here", "here"]
-
-
-def test_the_queue_names_a_camera_that_is_out_of_line() -> None:
-    room = random_room(1, cameras=4, people=3, steps=120)
-    run = compute(room, default_parameters(room))
-    nothing = Queue((), 0, "the run")
-    assert queue_of(Snapshot(run=run), nothing, frozenset()).cameras == []
-    smoothed = run.smoothed
-    assert smoothed is not None
-    assert smoothed.cameras is not None
-    factors = np.ones((4, 4))
-    factors[1, 3] = 2.6
-    odd = replace(smoothed.cameras, factors=factors, least=0.9 * factors)
-    run.smoothed = replace(smoothed, cameras=odd)
-    (note,) = queue_of(Snapshot(run=run), nothing, frozenset()).cameras
-    assert note.startswith(f'the boxes of camera "{room.views[1].camera.name}" are out of line')
-    assert queue_of(Snapshot(), nothing, frozenset()).cameras == []
