@@ -126,7 +126,7 @@ class Edits:
         self._left: dict[str, Any] = {}
         """What differed from the defaults when the recording was left: a page that comes back to
         it after a start of the program edits nothing."""
-        self._origin, self._at = "", 0.0
+        self._origin, self._at, self._edited_at = "", 0.0, 0.0
         self._restoring = 0
         """The thread that puts an edit back: its changes are none of their own."""
         self._timer: threading.Timer | None = None
@@ -248,7 +248,7 @@ class Edits:
             edit = Edit(_words_of_number(parts) or edit.words, parts, edit.time)
             self._done.pop()
         self._undone.clear()
-        self._origin, self._at = origin, now
+        self._origin, self._at, self._edited_at = origin, now, now
         if any(before != after for before, after in edit.parts.values()):
             self._done.append(edit)
             own = [one for one in self._done if _is_everywhere(one) == _is_everywhere(edit)]
@@ -268,7 +268,9 @@ class Edits:
         if change in ("run", "progress"):
             with self._lock:
                 now_at = time.monotonic()
-                if now_at - self._at < DRAG_SECONDS:  # a slow browser moves on with each result
+                # a slow browser moves on with each result; news of a long run are no drag
+                recent = now_at - self._edited_at < 2.0 * DRAG_SECONDS
+                if recent and now_at - self._at < DRAG_SECONDS:
                     self._at = now_at
             return
         if change not in ("sequence", "taught", "parameters"):

@@ -139,6 +139,12 @@ const stream = openStream("/api/stream", {
 	message: receiver.receive,
 });
 
+// Who has chosen no theme has the system's.
+const bright = matchMedia("(prefers-color-scheme: light)");
+bright.onchange = () => {
+	if (!("theme" in localStorage)) actions.toggleTheme(bright.matches ? "light" : "dark");
+};
+
 store.on(["theme"], ({ theme }) => {
 	document.documentElement.dataset.theme = theme;
 	playback.repaint();

@@ -13,6 +13,8 @@ import cv2
 import numpy as np
 
 from tracker import __version__
+from tracker.corrections.kinds import leeway, make
+from tracker.corrections.outcomes import outcomes
 from tracker.evaluation import Evaluation
 from tracker.library.columns import KeptTracks
 from tracker.library.records import HEADLINES, NewRecording, NewRun, Result, Source
@@ -208,7 +210,8 @@ def remarks_of(result: Result) -> tuple[str, ...]:
 
 
 def run_for_display(sequence: Sequence, result: Result) -> Run:
-    """Return a run for display: the tracks of a stored run, without results of the stages.
+    """Return a run for display: the tracks of a stored run and the outcomes of its corrections, by
+    which people have names, without results of the stages.
 
     Args:
         sequence: The recording as it is now, which may have changed since the run.
@@ -236,4 +239,14 @@ def run_for_display(sequence: Sequence, result: Result) -> Run:
     run.tracks = kept.tracks.take(rows)
     run.done = steps
     run.finished = run.complete
+    run.corrections = tuple(make(**values) for values in result.corrections)
+    run.corrected = True
+    tracks = run.tracks
+    run.outcomes = outcomes(
+        tracks.frames,
+        tracks.ids,
+        tracks.positions,
+        run.corrections,
+        leeway=leeway(sequence.step_time),
+    )
     return run

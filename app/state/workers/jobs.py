@@ -37,7 +37,6 @@ from tracker.runs.pipeline import Cancelled, Progress, Run
 from tracker.runs.stage_cache import StageCache
 from tracker.runs.warm_up import COMPILING
 from tracker.sequences.pictures.frames import CACHE_BYTES, FrameReader
-from tracker.sequences.sequence import Sequence
 
 logger = logging.getLogger("app")
 
@@ -168,8 +167,8 @@ class Jobs:
     def show_kept(self, result: Result) -> None:
         """Show a run of the library, of the open recording, instead of computing one.
 
-        Where this code and this recording would give other tracks, it is another run than the
-        one that a computation gives.
+        Where this code, this recording and its corrections would give other tracks, it is another
+        run than the one that a computation gives.
 
         Raises:
             ValueError: If the recording does not fit it any more.
@@ -179,17 +178,15 @@ class Jobs:
             if snapshot.sequence is None:
                 raise ValueError("no recording is open")
             run = run_for_display(snapshot.sequence, result)
-            wanted = self.key_of(snapshot.sequence, result)
+            wanted = pipeline.stage_keys(
+                snapshot.sequence, result.parameters, self._seed, snapshot.corrections
+            )["tracks"]
             if self._under_way is not None:
                 self._under_way.cancelled.set()
             self._wanted = None
             stands_for = "" if run.key == wanted else wanted
             warnings = (*result.run.removed, *_beyond_the_end(run, result))
             self._workbench.show_kept(run, result.run.id, stands_for, warnings)
-
-    def key_of(self, sequence: Sequence, result: Result) -> str:
-        """The key that a computation with a kept run's values would have now."""
-        return pipeline.stage_keys(sequence, result.parameters, self._seed)["tracks"]
 
     def cancel(self) -> None:
         """Stop the run under way; its steps stay shown."""

@@ -323,7 +323,11 @@ export function mountLibrary(root, { store, actions }) {
 		if (recording)
 			fill(
 				empty,
-				h("h3", {}, runs.length ? "No run matches" : "Nothing kept yet"),
+				h(
+					"h3",
+					{},
+					runs.length ? "No run matches" : isUnderWay() ? "A run is under way" : "Nothing kept yet",
+				),
 				h("p", {}, library.error ?? "Every run is kept here a few seconds after its end."),
 				// The one that is open is only a tab away.
 				recording.place !== store.get().sequence?.opened_as &&
@@ -336,6 +340,12 @@ export function mountLibrary(root, { store, actions }) {
 		table.show(matching, chosen, focused, recording);
 		gone.show(recording);
 		bar.show();
+	}
+
+	/** Whether a run of the recording that is looked at is being computed. */
+	function isUnderWay() {
+		const { sequence, run } = store.get();
+		return recording?.place === sequence?.opened_as && run?.state === "computing";
 	}
 
 	/** @param {Server.RecordingInfo} one */
@@ -473,10 +483,14 @@ export function mountLibrary(root, { store, actions }) {
 
 	/** @type {Timer} */
 	let waiting;
+	/** @type {Server.RunInfo["state"] | undefined} */
+	let before;
 	store.watch(["place", "run"], ({ place, run }) => {
 		if (place !== "library") return;
 		clearTimeout(waiting);
 		if (!library) return void refresh();
+		if (!runs.length && run?.state !== before) show();
+		before = run?.state;
 		if (run?.state === "done" || run?.state === "idle")
 			waiting = setTimeout(() => void refresh(), KEPT_MS);
 	});

@@ -66,6 +66,9 @@ const ALWAYS = ["Ctrl+k", "Ctrl+s", "Ctrl+o"];
  */
 const early = [];
 
+/** What undoes and redoes. */
+const TURNS = ["Ctrl+z", "Ctrl+y", "Ctrl+Shift+z"];
+
 /** @param {Context} context */
 export function mountControls({ store, actions, press }) {
 	for (const control of all("[data-command], [data-command-key]")) {
@@ -149,7 +152,10 @@ export function pressed(event, store, actions) {
 	const key = keyOf(event);
 	const target = /** @type {HTMLElement} */ (event.target);
 	const open = document.querySelector("dialog[open]");
-	if (open && !(open.matches(".help") ? key === "?" : key === "Ctrl+k")) return false;
+	// In a dialog a key closes it, or undoes; an import has steps of its own.
+	const closes = open?.matches(".help") ? key === "?" : key === "Ctrl+k";
+	const undoes = TURNS.includes(key) && !open?.matches(".opener") && !event.defaultPrevented;
+	if (open && !closes && !undoes) return false;
 	// An open menu is closed by it, by the browser.
 	if (key === "Escape" && document.querySelector(":popover-open:not(.tip)")) return false;
 	const types = target.matches?.(TYPING);

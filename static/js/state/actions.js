@@ -292,11 +292,11 @@ export function createActions({ store, seek, send, receive }) {
 			}),
 		showTour: () =>
 			store.set({ dismissed: store.get().dismissed.filter((name) => name !== "tour") }),
-		toggleTheme() {
-			const theme = store.get().theme === "dark" ? "light" : "dark";
+		toggleTheme(wished) {
+			const theme = wished ?? (store.get().theme === "dark" ? "light" : "dark");
 			store.set({ theme });
 			try {
-				localStorage.setItem("theme", theme);
+				if (!wished) localStorage.setItem("theme", theme);
 			} catch {
 				// Without storage the next start follows the system again.
 			}

@@ -272,7 +272,8 @@ interface Actions {
 	saveTaught: () => void;
 	showTab: (tab: PageState["tab"]) => void;
 	showTour: () => void;
-	toggleTheme: () => void;
+	/** To the other one; to the system's, which nobody chose, where one is given. */
+	toggleTheme: (wished?: PageState["theme"]) => void;
 	/** Null: all panes as they were at first. */
 	maximise: (pane: PaneName | null) => void;
 	help: () => void;

@@ -83,6 +83,25 @@ def test_a_drag_is_one_edit_and_two_sliders_are_two(
         edits.redo()
 
 
+def test_two_values_during_one_long_run_are_two_edits(
+    bench: Workbench, edits: Edits, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is typed while news of a run arrive all the time is no drag."""
+    now = 100.0
+    monkeypatch.setattr(module.time, "monotonic", lambda: now)
+    before = values(bench)
+    bench.set_parameters({P_D: 0.8}, "viser")
+    bench.run_begins("run")
+    for _ in range(20):
+        now += 1.0
+        bench.run_waits("run", f"smoothing for {now:.0f} s")
+    bench.set_parameters({P_D: 0.6}, "viser")
+    edits.undo()
+    assert values(bench)[0] == 0.8
+    edits.undo()
+    assert values(bench) == before
+
+
 def test_a_slow_drag_is_one_edit_that_names_both_ends(
     bench: Workbench, edits: Edits, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -69,6 +69,22 @@ def test_finished_runs_are_kept_with_their_figures(kept: TestClient) -> None:
 
 
 @pytest.mark.full
+def test_a_kept_run_names_its_people(kept: TestClient) -> None:
+    track = kept.get("/api/timeline").json()["tracks"][0]
+    wish = {"kind": "name", "tracks": [track["id"]], "name": "Anna", "step": track["first"] + 9}
+    kept.post("/api/corrections", json={"corrections": [wish]})
+    wait_until(lambda: len(runs_of(kept)) == 3)
+    named, *_, default = runs_of(kept)
+    for run, name in ((default, None), (named, "Anna")):
+        state = kept.post(f"/api/library/runs/{run['id']}/open").json()
+        assert state["run"]["kept"] == run["id"]  # whatever was corrected since
+        (shown,) = [
+            life for life in kept.get("/api/timeline").json()["tracks"] if life["id"] == track["id"]
+        ]
+        assert shown["name"] == name
+
+
+@pytest.mark.full
 def test_a_preview_has_the_distance_to_the_truth_in_small(kept: TestClient) -> None:
     changed, _ = runs_of(kept)
     ospa = kept.get("/api/evaluation/series").json()["ospa"]

@@ -66,6 +66,32 @@ def test_undo_is_offered_only_where_there_is_something_to_undo(
     as_at_first(server)
 
 
+def test_what_was_edited_is_undone_inside_a_dialog_too(flat_page: Page, server: Server) -> None:
+    page = flat_page
+    as_at_first(server)
+    ask(server, "PATCH", "parameters", {"changes": {P_D: 0.6}})
+    expect(page.locator("#tab-changes .count")).to_have_text("1")
+    page.keyboard.press("?")
+    expect(page.locator("dialog.help")).to_be_visible()
+    page.keyboard.press("Control+z")
+    server.wait(lambda state: state["changed"] == [])
+    page.keyboard.press("Escape")
+    as_at_first(server)
+
+
+def test_the_theme_is_the_systems_until_one_is_chosen(flat_page: Page, server: Server) -> None:
+    page, whole = flat_page, flat_page.locator("html")
+    for theme in ("dark", "light", "dark"):
+        page.emulate_media(color_scheme=theme)  # type: ignore[arg-type]
+        expect(whole).to_have_attribute("data-theme", theme)
+    page.locator("[data-command=theme]").first.click()
+    expect(whole).to_have_attribute("data-theme", "light")
+    page.emulate_media(color_scheme="light")
+    page.emulate_media(color_scheme="dark")
+    page.wait_for_timeout(300)
+    expect(whole).to_have_attribute("data-theme", "light")
+
+
 def test_a_note_under_the_pointer_stays_while_a_run_goes_on(
     flat_page: Page, server: Server
 ) -> None:
