@@ -88,9 +88,9 @@ class Truthful:
         if one.kind in ("came", "left"):
             return self._at_an_end(one.places[0], before=one.kind == "came")
         who = {place: self.who(place) for place in one.places}
-        same = [who[a] is not None and who[a] == who[b] for a, b in one.pairs]
+        same = [who[a] is not None and who[a] == who[b] for a, b in one.constraints.must_link]
         # somebody and nobody are not one person either
-        apart = [who[a] != who[b] for a, b in one.apart]
+        apart = [who[a] != who[b] for a, b in one.constraints.cannot_link]
         return all(same) and all(apart)
 
     def wrong(self, doubt: ReviewItem) -> bool:
@@ -112,7 +112,7 @@ class Truthful:
         return confirmed(
             as_it_is
             if as_it_is in true
-            else max(true, key=lambda told: sum(len(one.pairs) for one in told))
+            else max(true, key=lambda told: sum(len(one.constraints.must_link) for one in told))
         )
 
 
