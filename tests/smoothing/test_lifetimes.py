@@ -20,8 +20,9 @@ HIT = -np.log(0.05)
 """Log odds by which a camera of p_D = 0.95 votes."""
 
 
-def odds_of(cameras: int, log_ratio: float | None) -> float:
-    """Of somebody whom so many cameras show, whose every box looks so much like a person."""
+def odds_of(cameras: int, log_ratio: float | None, *, after: int = 0) -> float:
+    """Of somebody whom so many cameras show, whose every box looks so much like a person, and who
+    is gone for so many steps at the end of the recording."""
     scene = known(world.stand((0.3, 0.2), STEPS)[:, None], cameras=world.ring(cameras))
     views = scene.views
     if log_ratio is not None:
@@ -30,6 +31,7 @@ def odds_of(cameras: int, log_ratio: float | None) -> float:
             for step in views
         ]
     smoother = Smoother(scene.whole, PLAIN.fusion, views)
+    smoother.frames += after
     paths, links = scene.paths()
     nothing = np.zeros((cameras, STEPS))
     shared = BoxAssociations(links, nothing, nothing, nothing.astype(np.int64))
@@ -60,6 +62,15 @@ def test_what_cameras_and_looks_say_of_a_whole_life(
         assert odds_of(cameras, log_ratio) < 0.0
         return
     assert odds_of(cameras, log_ratio) == pytest.approx(expected, rel=1e-6)
+
+
+def test_who_leaves_has_a_quarter_of_the_log_odds_of_coming_and_leaving() -> None:
+    """Both ends have the same, so that a recording seen backwards in time gives the same."""
+    steps = 1.0 / independence(0.1, PLAIN.smoothing.memory)
+    come = np.log(PLAIN.fusion.birth_rate * steps * 0.1)
+    leave = np.log(1.0 - PLAIN.fusion.survival_probability**steps)
+    expected = odds_of(2, None) + (come + leave) / 4.0
+    assert odds_of(2, None, after=5) == pytest.approx(expected, rel=1e-3)
 
 
 def test_a_miss_says_as_much_against_somebody_as_the_camera_should_have_seen() -> None:
