@@ -13,6 +13,7 @@ from scipy.linalg import block_diag
 from scipy.stats import multivariate_normal
 
 from tests.random_rooms import random_room
+from tests.smoothing.test_boundaries import standing
 from tracker.filters.models import Motion, constant_velocity
 from tracker.kernels.smoothing.innovations import (
     BoxErrors,
@@ -219,6 +220,13 @@ def test_rows_are_windows_that_two_cameras_see() -> None:
     assert choose_rows(paths, few) is None
     few[LEAST_ROWS - 1] = 2
     assert choose_rows(paths, few) is not None
+
+
+def test_a_path_of_a_single_row_tells_nothing_of_the_noise() -> None:
+    spans = [(1, 0, 59, 0.0), (2, 3, 3, 2.0), (3, 5, 6, 4.0)]
+    rows = choose_rows(standing(*spans), np.full(63, 2))
+    assert rows is not None
+    assert rows.tolist() == [*range(60), 61, 62]
 
 
 def test_what_does_not_average_is_considered() -> None:
