@@ -82,6 +82,6 @@ def filled(path: Path, count: int) -> Library:
 def made_by_the_version_before(path: Path) -> None:
     """Have the file as it was before it told final figures from provisional ones."""
     with closing(sqlite3.connect(path, isolation_level=None)) as connection:
-        for column in ("final", "latest"):
+        for column in ("final", "latest", "taught"):
             connection.execute(f"ALTER TABLE runs DROP COLUMN {column}")
         connection.execute("PRAGMA user_version = 2")

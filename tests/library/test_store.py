@@ -55,6 +55,19 @@ def test_the_same_run_computed_again_is_one_run(path: Path) -> None:
         assert (result.run.mota, result.run.idf1, result.figures) == (0.5, None, {"mota": 0.5})
 
 
+def test_templates_and_names_are_listed_with_a_run(path: Path) -> None:
+    with filled(path, 1) as library:
+        assert (library.run(1).templates, library.run(1).names) == ([], {})
+        library._set(1, "taught", "{}")  # as a version before stored it
+        assert (library.run(1).templates, library.run(1).names) == (None, {})
+        taught = {"templates": ("Zoë, cam1, step 20",), "names": {3: "Zoë"}}
+        library.keep(RECORDING, run(0, **taught))
+        assert (library.run(1).templates, library.run(1).names) == (
+            ["Zoë, cam1, step 20"],
+            {3: "Zoë"},
+        )
+
+
 def test_untouched_runs_beyond_the_budget_fall_out_and_others_never(path: Path) -> None:
     with filled(path, 6) as library:
         library.star(1)

@@ -8,7 +8,12 @@ import {
   unbroken,
   whereIs,
 } from "../../static/js/check/words.js";
-import { livesAMinute, madeWhen, whereabouts } from "../../static/js/library/words.js";
+import {
+  livesAMinute,
+  madeWhen,
+  templateWords,
+  whereabouts,
+} from "../../static/js/library/words.js";
 
 test("a number and its unit stay on one line, other words do not", () => {
   assert.equal(
@@ -108,4 +113,14 @@ test("a run that was made again within the same minute says its time once", () =
   assert.equal(madeWhen({ began, latest: began }, now), "08:34");
   assert.equal(madeWhen({ began, latest: at(8, 34, 50) }, now), "08:34");
   assert.equal(madeWhen({ began, latest: at(9, 1, 0) }, now), "08:34, again 09:01");
+});
+
+test("runs that differ in their templates say which, and how many each has", () => {
+  const [anna, bob] = ["Anna, cam1, step 20", "Bob, cam2, step 7"];
+  assert.deepEqual(templateWords([{ templates: [anna, bob] }, { templates: [anna] }]), [
+    `2; ${bob}`,
+    "1",
+  ]);
+  assert.deepEqual(templateWords([{ templates: [anna] }, { templates: [anna] }]), ["1", "1"]);
+  assert.deepEqual(templateWords([{ templates: [anna] }, { templates: null }]), ["1", "not known"]);
 });

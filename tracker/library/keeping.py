@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import hashlib
 import platform
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -22,7 +23,7 @@ from tracker.parameters.values import changed_values
 from tracker.runs.fitting import default_parameters
 from tracker.runs.gaps import gaps
 from tracker.runs.numbers_version import numbers_version
-from tracker.runs.run import Run
+from tracker.runs.run import Run, given_names
 from tracker.sequences.built_in import opens_by_name
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
@@ -123,6 +124,7 @@ def record_of_run(
     began: float,
     seconds: float,
     evaluation: Evaluation | None = None,
+    names: Mapping[int, str] | None = None,
 ) -> NewRun:
     """Return the record of a finished run, to be inserted into a library.
 
@@ -132,6 +134,7 @@ def record_of_run(
         began: The time when the computation began, seconds since 1970.
         seconds: The duration of the computation, seconds.
         evaluation: The evaluation of the run's tracks, if there is ground truth.
+        names: The names of tracks, by id; None for those that people were given by hand.
 
     Raises:
         ValueError: If the run is not finished, or the evaluation does not cover all its steps.
@@ -167,6 +170,10 @@ def record_of_run(
         corrections=tuple(
             one.model_dump(mode="json", exclude_none=True) for one in run.corrections
         ),
+        templates=tuple(
+            f"{one.name}, {one.camera}, step {one.frame}" for one in run.sequence.templates
+        ),
+        names=dict(given_names(run) if names is None else names),
     )
 
 
@@ -239,6 +246,7 @@ def run_for_display(sequence: Sequence, result: Result) -> Run:
     run.tracks = kept.tracks.take(rows)
     run.done = steps
     run.finished = run.complete
+    run.stored_names = stored.names
     run.corrections = tuple(make(**values) for values in result.corrections)
     run.corrected = True
     tracks = run.tracks

@@ -129,6 +129,10 @@ class NewRun(_Run):
     """OSPA over time, in the form of :attr:`Result.ospa`."""
     corrections: tuple[dict[str, Any], ...] = ()
     """The corrections of the run, each in the form of a line of the log of corrections."""
+    templates: tuple[str, ...] = ()
+    """The colour templates of the run: the name, camera and step of each."""
+    names: dict[int, str] = field(default_factory=dict)
+    """The names of tracks, by id."""
     name: str = ""
     """The name of the run, or an empty string."""
     note: str = ""
@@ -172,6 +176,21 @@ class KeptRun(_Run):
     and corrections. Earlier versions also stored figures of unfinished runs."""
     latest: float = 0.0
     """The time when the last computation began, seconds since 1970."""
+    taught_json: str = field(default="{}", metadata={"expression": "runs.taught"})
+    """The values of :attr:`templates` and :attr:`names`, as JSON."""
+
+    @property
+    def templates(self) -> list[str] | None:
+        """The colour templates of the run: the name, camera and step of each. None for a run of a
+        version that did not store them."""
+        stored: list[str] | None = json.loads(self.taught_json).get("templates")
+        return stored
+
+    @property
+    def names(self) -> dict[int, str]:
+        """The names of tracks, by id."""
+        names = json.loads(self.taught_json).get("names", {})
+        return {int(track): str(name) for track, name in names.items()}
 
     @property
     def provisional(self) -> bool:
@@ -207,9 +226,11 @@ class KeptRun(_Run):
     def to_json(self) -> dict[str, Any]:
         """Return all fields as plain values."""
         values = asdict(self)
-        del values["changes_json"], values["tags_json"], values["final"]
+        del values["changes_json"], values["tags_json"], values["taught_json"], values["final"]
         return {
             **values,
+            "templates": self.templates,
+            "names": self.names,
             "star": bool(self.star),
             "changes": self.changes,
             "tags": self.tags,
@@ -263,5 +284,8 @@ def inserted(record: NewRecording | NewRun) -> dict[str, Any]:
     if isinstance(record, NewRecording):
         return asdict(record)
     names = [*(one.name for one in fields(_Run)), "name", "note"]
-    changes = json.dumps(record.changes, ensure_ascii=False)
-    return {name: getattr(record, name) for name in names} | {"changes": changes}
+    taught = {"templates": record.templates, "names": record.names}
+    return {name: getattr(record, name) for name in names} | {
+        "changes": json.dumps(record.changes, ensure_ascii=False),
+        "taught": json.dumps(taught, ensure_ascii=False),
+    }

@@ -88,6 +88,10 @@ MIGRATIONS: tuple[tuple[str, ...], ...] = (
         "ALTER TABLE runs ADD COLUMN latest REAL NOT NULL DEFAULT 0.0",
         "UPDATE runs SET latest = began",
     ),
+    (
+        # the colour templates of the run and the names of its tracks, as JSON
+        "ALTER TABLE runs ADD COLUMN taught TEXT NOT NULL DEFAULT '{}'",
+    ),
 )
 """The statements that migrate a file from each version to the next, the first from an empty
 file."""

@@ -218,7 +218,8 @@ class Library:
             ).fetchone()
             number = known[0] if known else self._insert(connection, place, new)
             connection.execute(
-                "UPDATE runs SET latest = ?, deleted = NULL WHERE id = ?", (new.began, number)
+                "UPDATE runs SET latest = ?, taught = ?, deleted = NULL WHERE id = ?",
+                (new.began, inserted(new)["taught"], number),
             )
             if new.figures or not known:  # other settings of the evaluation give other figures
                 self._list_figures(connection, number, new.figures)

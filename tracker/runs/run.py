@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import hashlib
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -81,6 +82,8 @@ class Run:
     stored_probabilities: Float[ndarray, "N C"] | None = None
     """The detection probability of each row of :attr:`tracks` in each camera, for a run from the
     library: it has these and the tracks, and no results of the stages. None for other runs."""
+    stored_names: Mapping[int, str] = field(default_factory=dict)
+    """The names of tracks, by id, for a run from the library; empty for other runs."""
     views: Steps[tuple[ViewResult, ...]] = field(init=False)
     """The results of stage 1 of each step, one for each camera."""
     fused: Steps[FusionResult] = field(init=False)

@@ -11,6 +11,7 @@ from __future__ import annotations
 import logging
 import threading
 import time
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -31,6 +32,7 @@ from tracker.library.keeping import (
 )
 from tracker.library.store import Library, open_library
 from tracker.runs.gaps import gaps
+from tracker.runs.run import Run, given_names
 from tracker.sequences.sequence import Sequence
 
 logger = logging.getLogger("app")
@@ -44,19 +46,26 @@ again after so long."""
 class Keeper:
     """Writes down recordings that are opened and runs that come to their end."""
 
-    def __init__(self, workbench: Workbench, path: Path | None, keep: int = KEEP) -> None:
+    def __init__(
+        self,
+        workbench: Workbench,
+        path: Path | None,
+        keep: int = KEEP,
+        names: Callable[[Run], Mapping[int, str]] = given_names,
+    ) -> None:
         """Follow a workbench.
 
         Args:
             workbench: Whose runs.
             path: The library's file; None keeps nothing.
             keep: How many untouched runs stay; 0 keeps no run by itself.
+            names: The names of a finished run's tracks, by id.
         """
         self.path = path
         self.error: str | None = None
         """Why there is no library, in one sentence."""
         self._workbench = workbench
-        self._keep = keep
+        self._keep, self._names = keep, names
         self._lock = threading.Lock()
         self._library: Library | None = None
         self._opened: Sequence | None = None
@@ -191,6 +200,7 @@ class Keeper:
             began=began,
             seconds=run.done / speed if speed > 0.0 else 0.0,
             evaluation=None if scored is None else scored.evaluation,
+            names=self._names(run),
         )
         library.keep(record_of_recording(now.named(run.sequence), now.opened_as), new, self._keep)
         self._kept.add(key)

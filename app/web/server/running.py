@@ -43,7 +43,7 @@ from app.web.pictures.swatches import Swatches
 from app.web.server.room import Room, start_room
 from app.web.server.settings import Settings
 from app.web.stream import Stream
-from app.web.views.timeline import Timelines
+from app.web.views.timeline import Timelines, names_of
 from tracker.files.folders import settings_folder
 from tracker.library.records import Result
 from tracker.runs.pipeline import Cancelled
@@ -108,7 +108,7 @@ async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         workbench, lambda: jobs.use_detector(None)
     )
     sensitivity = app.state.sensitivity = Sensitivity(workbench, settings.seed)
-    keeper = app.state.keeper = Keeper(workbench, settings.library, settings.keep)
+    keeper = app.state.keeper = Keeper(workbench, settings.library, settings.keep, names_of)
     app.state.marking = Marking(workbench, edits, keeper.library)
     study_desk = app.state.studies = StudyDesk(workbench, studies_folder())
     told = app.state.stream = Stream(workbench)

@@ -151,6 +151,12 @@ class _Spans:
         return _Spans(ids[starts], frames[starts], frames[ends - 1], seen[starts], sights)
 
 
+def names_of(run: Run) -> dict[int, str]:
+    """The names of a finished run's tracks, by id: what somebody said goes before what the colours
+    say."""
+    return {**Names().told(run), **given_names(run)}
+
+
 class Timelines:
     """Makes timelines; remembers what it counted of the run it was asked for last."""
 
@@ -222,7 +228,7 @@ class Timelines:
             events = sorted([*events, *found], key=lambda e: e[:2])[:MOST_EVENTS]
             # what somebody said goes before what the colours say
             said = given_names(run)
-            names = {**self._names.told(run), **said}
+            names = {**self._names.told(run), **run.stored_names, **said}
             for life in lives:
                 life.name = names.get(life.id)
         return models.Timeline(

@@ -1,7 +1,7 @@
 /** The table of a recording's runs. */
 import { fill, h, icon, symbolOf } from "../elements/dom.js";
 import { grid } from "../elements/grid.js";
-import { figure, isMethod, livesAMinute, madeWhen, methodWord } from "./words.js";
+import { figure, isMethod, livesAMinute, madeWhen, many, methodWord } from "./words.js";
 
 /** Figures with a bar: what the bar is from and to, and which end is the better. */
 const FIGURES = /** @type {const} */ ([
@@ -23,10 +23,11 @@ const LIVES = "Tracks/min";
 
 const PILLS = 3;
 
-/** @param {Server.KeptRunInfo} run */
-function pills(run) {
+/** @param {Server.KeptRunInfo} run @param {boolean} taught  whether runs differ in their templates */
+function pills(run, taught) {
 	const changes = run.changes.filter(({ key }) => !isMethod(key));
-	if (!changes.length && !run.corrected) return h("span", { class: "q" }, "–");
+	if (!changes.length && !run.corrected && !(taught && run.templates))
+		return h("span", { class: "q" }, "–");
 	const all = changes.map(({ key, value }) => `${key} ${value}`).join("\n");
 	const shown = changes
 		.slice(0, PILLS)
@@ -37,6 +38,13 @@ function pills(run) {
 	return h(
 		"span",
 		{ title: all },
+		taught &&
+			run.templates &&
+			h(
+				"span",
+				{ class: "pc", title: run.templates.join("\n") },
+				many(run.templates.length, "template"),
+			),
 		shown,
 		more > 0 && h("span", { class: "pc" }, `+${more}`),
 		run.corrected > 0 &&
@@ -76,6 +84,8 @@ export function runsTable(on) {
 	let ticked = new Set();
 	/** Of the recording, and whether it has a truth. */
 	let [fps, scored] = [0, true];
+	/** Whether its runs differ in their templates. */
+	let taught = false;
 	/** @type {Record<string, number | null>} the best of each column */
 	const best = {};
 
@@ -149,7 +159,7 @@ export function runsTable(on) {
 			word: "Differs from default",
 			kind: "chs",
 			by: (run) => run.changes.length,
-			cell: pills,
+			cell: (run) => pills(run, taught),
 		},
 		...FIGURES.map(([key, word, from, to]) => ({
 			word,
@@ -247,6 +257,7 @@ export function runsTable(on) {
 		show(runs, chosen, focused, recording) {
 			ticked = chosen;
 			[fps, scored] = [recording?.fps ?? 0, recording?.people !== null];
+			taught = new Set(runs.flatMap(({ templates }) => templates?.join() ?? [])).size > 1;
 			for (const [key, , , , sign] of FIGURES) {
 				const values = runs.map((run) => final(run, key)).filter((value) => value !== null);
 				best[key] = values.length > 1 ? sign * Math.max(...values.map((v) => sign * v)) : null;

@@ -1,7 +1,7 @@
 /** A kept run in small, and runs side by side: what of them is drawn. */
 import { colourIndex, h, idTag, symbolOf } from "../elements/dom.js";
 import { parameterName } from "../elements/drawn.js";
-import { METHODS, figure, isMethod, methodWord, titleOf } from "./words.js";
+import { METHODS, figure, isMethod, methodWord, templateWords, titleOf } from "./words.js";
 
 /** Lanes that are drawn: those of the longest tracks. */
 const MOST_LANES = 6;
@@ -301,6 +301,7 @@ function causes(runs, schema) {
 					runs.map((run) => methodWord(change(run, one.key)?.value ?? one.default)),
 				]);
 			}),
+		["Colour templates", templateWords(runs)],
 		["Seed", runs.map(({ seed }) => String(seed))],
 		["Corrections of a person", runs.map(({ corrected }) => String(corrected))],
 		["Program", runs.map(programOf)],

@@ -49,6 +49,19 @@ export const figure = (value, digits = 3) => (value === null ? "–" : value.toF
 export const livesAMinute = ({ targets, steps }, fps) =>
 	fps && steps ? (60 * targets * fps) / steps : null;
 
+/**
+ * The colour templates of each run: how many, and which of them not all runs have.
+ * @param {Pick<Server.KeptRunInfo, "templates">[]} runs
+ * @returns {string[]}
+ */
+export const templateWords = (runs) =>
+	runs.map(({ templates }) => {
+		if (!templates) return "not known";
+		const others = runs.map((run) => run.templates ?? templates);
+		const own = templates.filter((one) => others.some((other) => !other.includes(one)));
+		return [String(templates.length), ...own].join("; ");
+	});
+
 /** The methods that every run has, and what their stage is called. */
 export const METHODS = /** @type {const} */ ([
 	["single_view", "Single view"],

@@ -11,7 +11,7 @@ import pytest
 from starlette.testclient import TestClient
 
 from app.state.workers import keeper
-from app.web.server import Settings, create_app
+from app.web.server import Settings, create_app, running
 from tests.app.conftest import ADDRESS, is_evaluated, run_is, wait_until
 from tests.library.runs import made_by_the_version_before
 from tracker.library.errors import LibraryError
@@ -82,6 +82,19 @@ def test_a_kept_run_names_its_people(kept: TestClient) -> None:
             life for life in kept.get("/api/timeline").json()["tracks"] if life["id"] == track["id"]
         ]
         assert shown["name"] == name
+
+
+@pytest.mark.full
+def test_a_kept_run_names_whom_its_colours_named(
+    data: Path, path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(running, "names_of", lambda run: {int(run.tracks.ids[0]): "Bo"})
+    with application(data, path) as client:
+        wait_until(lambda: len(runs_of(client)) == 1)
+        before = [life["name"] for life in client.get("/api/timeline").json()["tracks"]]
+        client.post(f"/api/library/runs/{runs_of(client)[0]['id']}/open")
+        after = [life["name"] for life in client.get("/api/timeline").json()["tracks"]]
+    assert (before, after) == ([None, None], ["Bo", None])
 
 
 @pytest.mark.full
