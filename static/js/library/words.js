@@ -49,6 +49,9 @@ export const figure = (value, digits = 3) => (value === null ? "–" : value.toF
 export const livesAMinute = ({ targets, steps }, fps) =>
 	fps && steps ? (60 * targets * fps) / steps : null;
 
+/** Templates that are named of a run. */
+const MOST_TEMPLATES = 3;
+
 /**
  * The colour templates of each run: how many, and which of them not all runs have.
  * @param {Pick<Server.KeptRunInfo, "templates">[]} runs
@@ -59,7 +62,8 @@ export const templateWords = (runs) =>
 		if (!templates) return "not known";
 		const others = runs.map((run) => run.templates ?? templates);
 		const own = templates.filter((one) => others.some((other) => !other.includes(one)));
-		return [String(templates.length), ...own].join("; ");
+		const more = own.length > MOST_TEMPLATES ? [`and ${own.length - MOST_TEMPLATES} more`] : [];
+		return [String(templates.length), ...own.slice(0, MOST_TEMPLATES), ...more].join("; ");
 	});
 
 /** The methods that every run has, and what their stage is called. */

@@ -25,6 +25,18 @@ export function planPicture(info, words, moved) {
 		x - plan.x,
 		high - (y - plan.y),
 	];
+	const labels = plan.cameras.map(([x, y], k) => {
+		const [u, v] = at(x, y);
+		const name = info.cameras[k]?.name ?? "";
+		const half = Math.min(3.5 * name.length * pixel, wide / 2);
+		return {
+			name,
+			half,
+			x: Math.min(Math.max(u, half), wide - half),
+			y: Math.min(Math.max(v - 4 * pixel, 12 * pixel), high - 4 * pixel),
+		};
+	});
+	const [scaleX, scaleY] = freeCorner(labels, wide, high, pixel);
 	const drawing = svg(
 		"svg",
 		{
@@ -56,18 +68,10 @@ export function planPicture(info, words, moved) {
 				(turn) =>
 					`L${mm(u + length * Math.cos(way + turn))} ${mm(v - length * Math.sin(way + turn))}`,
 			);
-			const name = info.cameras[k]?.name ?? "";
-			const side = Math.min(3.5 * name.length * pixel, wide / 2);
+			const { name, x: left, y: base } = labels[k];
 			return [
 				svg("path", { class: "camera", d: `M${mm(u)} ${mm(v)}${ends.join("")}z` }),
-				svg(
-					"text",
-					{
-						x: mm(Math.min(Math.max(u, side), wide - side)),
-						y: mm(Math.min(Math.max(v - 4 * pixel, 12 * pixel), high - 4 * pixel)),
-					},
-					name,
-				),
+				svg("text", { x: mm(left), y: mm(base) }, name),
 			];
 		}),
 		svg("rect", { class: "box" }),
@@ -89,12 +93,34 @@ export function planPicture(info, words, moved) {
 		svg("text", { class: "length" }),
 		svg("path", {
 			class: "scale",
-			d: `M${mm(wide - 1 - 8 * pixel)} ${mm(high - 10 * pixel)}h1`,
+			d: `M${mm(scaleX - 0.5)} ${mm(scaleY)}h1`,
 		}),
-		svg("text", { x: wide - 0.5 - 8 * pixel, y: high - 14 * pixel }, "1 m"),
+		svg("text", { x: mm(scaleX), y: mm(scaleY - 4 * pixel) }, "1 m"),
 	);
 	mountFaces(drawing, room, at, moved);
 	return drawing;
+}
+
+/**
+ * The middle of a bar of one metre in a corner of the plan where no camera's name lies, metres from
+ * its upper left; at the lower right where names lie in all of them.
+ * @param {{x: number, y: number, half: number}[]} labels  where names stand, and half their widths
+ * @param {number} wide @param {number} high @param {number} pixel  of the plan, metres
+ */
+export function freeCorner(labels, wide, high, pixel) {
+	const [left, right] = [0.5 + 8 * pixel, wide - 0.5 - 8 * pixel];
+	const [top, bottom] = [22 * pixel, high - 10 * pixel];
+	const corners = [
+		[right, bottom],
+		[left, bottom],
+		[right, top],
+		[left, top],
+	];
+	const isFree = (/** @type {number[]} */ [x, y]) =>
+		labels.every(
+			(label) => Math.abs(label.x - x) > label.half + 0.5 || Math.abs(label.y - y) > 20 * pixel,
+		);
+	return corners.find(isFree) ?? corners[0];
 }
 
 /** The floor by how many cameras see it: cells of a row that are alike in one piece. @param {Server.ImportedPlan} plan */
