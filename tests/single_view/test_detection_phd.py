@@ -15,9 +15,10 @@ from tracker.parameters.catalogue import RunParameters
 from tracker.parameters.values import with_values
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
+from tracker.single_view.box_phd import BoxPhdState
 from tracker.single_view.box_sizes import entrance_boxes
 from tracker.single_view.colour_phd import ColourPhd, ColourPhdState
-from tracker.single_view.detection_phd import DetectionPhd, DetectionPhdState
+from tracker.single_view.detection_phd import DetectionPhd
 from tracker.single_view.detector_boxes import trust
 
 NUMBERS: dict[str, object] = {
@@ -55,7 +56,7 @@ def walked(boxes: ndarray, time: float = 1.0 / FPS) -> ndarray:
 def test_a_step_is_bayes_rule_with_a_clutter_that_falls_with_the_score() -> None:
     p = parameters()
     method = DetectionPhd(detected([SEEN], SCORES, fps=FPS), 0, p)
-    state = DetectionPhdState(people(KNOWN, [0.9, 0.6]), np.zeros((0, 4)), next_label=3)
+    state = BoxPhdState(people(KNOWN, [0.9, 0.6]), np.zeros((0, 4)), next_label=3)
     after, result = method.step(state, 0, None, np.random.default_rng(0))
     width, height = CAMERA.image_size
     clutter = 3.0 * np.exp(2.0 * 2.0 * (0.5 - np.array(SCORES))) / (width * height) ** 2 * 4.0
@@ -93,7 +94,7 @@ def test_a_newcomer_begins_where_a_box_was_left_unexplained_as_unsure_as_box_and
     for rate, weight in ((0.7, 0.07), (50.0, 1.0)):  # at most one person a box
         p = parameters(birth_rate=rate)
         method = DetectionPhd(detected([[], []], fps=FPS), 0, p)
-        state = DetectionPhdState(GaussianMixture.empty(4), SEEN, next_label=5)
+        state = BoxPhdState(GaussianMixture.empty(4), SEEN, next_label=5)
         after, _ = method.step(state, 0, None, np.random.default_rng(0))
         assert_allclose(after.mixture.weights, 0.2 * weight)
         assert_array_equal(np.sort(after.mixture.labels), [5, 6, 7])
@@ -113,7 +114,7 @@ def test_a_newcomer_begins_where_a_box_was_left_unexplained_as_unsure_as_box_and
 
 def test_estimates_go_on_where_asked_as_sure_as_the_filter() -> None:
     method = DetectionPhd(detected([SEEN], SCORES, fps=FPS), 0, parameters(output="estimates"))
-    state = DetectionPhdState(people(KNOWN, [0.9, 0.9]), np.zeros((0, 4)), next_label=3)
+    state = BoxPhdState(people(KNOWN, [0.9, 0.9]), np.zeros((0, 4)), next_label=3)
     after, result = method.step(state, 0, None, np.random.default_rng(0))
     assert len(result.boxes) > 0
     assert_array_equal(result.boxes, result.estimates)
@@ -153,8 +154,9 @@ def test_without_a_picture_people_walk_and_begin_where_the_parameters_say(
     method = colour_phd(heads, reader, birth=birth)
     time = heads.step_time
     known, peaks = np.array([[30.0, 30.0, 3.0, 5.0]]), np.array([[60.0, 40.0, 4.0, 6.0]])
-    before = ColourPhdState(people(known, [0.7]), peaks, 5, None)
-    after, result = method.step(before, 3, None, np.random.default_rng(0))
+    before = ColourPhdState(BoxPhdState(people(known, [0.7]), peaks, 5), None)
+    state, result = method.step(before, 3, None, np.random.default_rng(0))
+    after = state.targets
     entrances = entrance_boxes(heads.cameras[0], heads.room, heads.target_half_extents, 0.8 * time)
     assert entrances.size == 2
     count = {"peaks": 1, "entrances": 2, "both": 3}[birth]

@@ -15,12 +15,12 @@ import numpy as np
 from jaxtyping import Float, UInt8
 from numpy import ndarray
 
-from tracker.filters import gaussian_mixture, models, phd
+from tracker.filters import gaussian_mixture
 from tracker.filters.gaussian_mixture import GaussianMixture
-from tracker.kernels.kalman import Expected
 from tracker.parameters.groups.colour_phd import ColourPhdParams
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
+from tracker.single_view.box_phd import BoxPhd, BoxPhdState
 from tracker.single_view.box_sizes import entrance_boxes
 from tracker.single_view.colour.peaks import PeakFinder, Peaks
 from tracker.single_view.dropped import Dropped
@@ -30,21 +30,13 @@ from tracker.single_view.protocol import ViewResult, pack_samples
 if TYPE_CHECKING:
     from tracker.parameters.catalogue import RunParameters
 
-EXPLAINED = 0.5
-"""Expected number of targets below which a peak may be of a new target: it is more likely
-unexplained than not."""
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ColourPhdState:
-    """The posterior of a step and all that the next step needs of it."""
+    """The state after a step."""
 
-    mixture: GaussianMixture
-    """The intensity over boxes."""
-    unexplained: Float[ndarray, "B 4"]
-    """Peaks that no component explained, at which targets may be born."""
-    next_label: int
-    """The first label that is free."""
+    targets: BoxPhdState
+    """The state of the filter."""
     foreground: Any
     """The state of the foreground model."""
 
@@ -79,8 +71,7 @@ class ColourPhd:
         """
         self._parameters = p = parameters.of(ColourPhdParams)
         self._finder = PeakFinder(sequence, camera_index, p, parameters.foreground, reader)
-        self._gate = gaussian_mixture.gate_distance(p.gate_probability, 4)
-        self._step_time = sequence.step_time
+        self._filter = BoxPhd(p, sequence.step_time)
         camera = sequence.cameras[camera_index]
         births = GaussianMixture.empty(4)
         if p.birth != "peaks":
@@ -88,7 +79,7 @@ class ColourPhd:
                 camera, sequence.room, sequence.target_half_extents, p.birth_rate
             )
         self._entrances = GaussianMixture(
-            births.weights * self._step_time, births.means, births.covariances, births.labels
+            births.weights * sequence.step_time, births.means, births.covariances, births.labels
         )
         width, height = camera.image_size
         # uniform over the image and the range of half sizes, each of at least a pixel
@@ -99,7 +90,7 @@ class ColourPhd:
 
     def start(self) -> ColourPhdState:
         """The state without targets, before the first step."""
-        return ColourPhdState(GaussianMixture.empty(4), np.zeros((0, 4)), 1, self._finder.start())
+        return ColourPhdState(self._filter.start(), self._finder.start())
 
     def step(
         self,
@@ -109,61 +100,22 @@ class ColourPhd:
         rng: np.random.Generator,
     ) -> tuple[ColourPhdState, ViewResult]:
         """Predict one step, and update by the peaks of the image, if there is one."""
-        p = self._parameters
-        births = models.label_births(self._births(state.unexplained), state.next_label)
-        predicted = gaussian_mixture.concatenate([self._predict(state.mixture), births])
-        next_label = state.next_label + births.size
+        predicted = self._filter.predict(state.targets, self._births(state.targets.unexplained))
         if picture is None:
-            mixture = self._reduce(predicted)
-            after = ColourPhdState(mixture, np.zeros((0, 4)), next_label, state.foreground)
-            return after, self._result(mixture)
-
-        background, peaks = self._finder.find(state.foreground, picture, predicted, rng)
-        noise = self._finder.sigmas(peaks.boxes)[:, :, None] ** 2 * np.eye(4)
-        updated = phd.update(
-            predicted,
-            peaks.boxes,
-            expected=Expected.of(predicted.means, np.eye(4)[None]),
-            noise=noise,
-            detection_probability=p.detection_probability,
-            clutter_intensity=self._clutter,
-            gate=self._gate,
+            targets = self._filter.reduce(predicted)
+            return ColourPhdState(targets, state.foreground), self._result(targets.mixture)
+        background, peaks = self._finder.find(state.foreground, picture, predicted.mixture, rng)
+        targets, _ = self._filter.update(
+            predicted, peaks.boxes, self._finder.sigmas(peaks.boxes), self._clutter
         )
-        mixture = self._reduce(updated.posterior)
-        unexplained = peaks.boxes[updated.measurement_weights < EXPLAINED]
-        after = ColourPhdState(mixture, unexplained, next_label, background)
-        return after, self._result(mixture, peaks)
+        return ColourPhdState(targets, background), self._result(targets.mixture, peaks)
 
     def _births(self, unexplained: Float[ndarray, "B 4"]) -> GaussianMixture:
         """Return the birth components: around unexplained peaks, at the entrances, or both."""
-        p = self._parameters
-        if p.birth == "entrances":
+        if self._parameters.birth == "entrances":
             return self._entrances
-        around = GaussianMixture(
-            weights=np.full(len(unexplained), min(1.0, p.birth_rate * self._step_time)),
-            means=unexplained,
-            covariances=self._finder.sigmas(unexplained)[:, :, None] ** 2 * np.eye(4),
-            labels=np.zeros(len(unexplained), dtype=np.int64),
-        )
+        around = self._filter.births(unexplained, self._finder.sigmas(unexplained) ** 2)
         return gaussian_mixture.concatenate([around, self._entrances])
-
-    def _predict(self, mixture: GaussianMixture) -> GaussianMixture:
-        """Predict by a random walk, in half sizes: a person nearby moves more pixels."""
-        p = self._parameters
-        half_sizes = np.maximum(mixture.means[:, 2:], 0.5)
-        sigmas = np.concatenate([p.motion_sigma * half_sizes, p.growth_sigma * half_sizes], axis=1)
-        noise = sigmas[:, :, None] ** 2 * np.eye(4) * self._step_time
-        return gaussian_mixture.predict(mixture, np.eye(4), noise, p.survival_probability)
-
-    def _reduce(self, mixture: GaussianMixture) -> GaussianMixture:
-        p = self._parameters
-        reduced, _ = gaussian_mixture.reduce(
-            mixture,
-            pruning_threshold=p.pruning_threshold,
-            merging_threshold=p.merging_threshold,
-            max_components=p.max_components,
-        )
-        return reduced
 
     def _result(self, mixture: GaussianMixture, peaks: Peaks | None = None) -> ViewResult:
         """Return the result of a step."""
@@ -171,11 +123,9 @@ class ColourPhd:
         found = np.zeros((0, 4)) if peaks is None else peaks.boxes
         ratios = np.zeros(0)
         scores = np.zeros(0) if peaks is None else peaks.scores
-        chosen = phd.extract(mixture, p.extraction_threshold)
-        estimates, weights = mixture.means[chosen], mixture.weights[chosen]
-        labels = mixture.labels[chosen]
+        estimates = self._filter.estimates(mixture)
         if p.output == "estimates":
-            boxes, box_weights, box_labels = estimates, weights, labels
+            boxes, box_weights, box_labels = estimates.means, estimates.weights, estimates.labels
             sigmas = self._finder.sigmas(boxes)
         else:
             boxes, box_weights, sigmas = found, scores, self._finder.sigmas(found)
@@ -193,9 +143,9 @@ class ColourPhd:
             labels=box_labels,
             sigmas=sigmas,
             log_ratios=ratios,
-            estimates=estimates,
-            estimate_weights=weights,
-            estimate_labels=labels,
+            estimates=estimates.means,
+            estimate_weights=estimates.weights,
+            estimate_labels=estimates.labels,
             measurements=found,
             measurement_scores=scores,
             samples=pack_samples(samples, sample_weights),
