@@ -15,6 +15,7 @@ from tests import world
 from tests.single_view.detected import CAMERA, detected, run
 from tracker import single_view
 from tracker.geometry.boxes import Boxes
+from tracker.geometry.camera import Camera
 from tracker.parameters.catalogue import RunParameters
 from tracker.parameters.groups.detections import DetectionBoxParams
 from tracker.parameters.values import with_values
@@ -237,14 +238,23 @@ def test_targets_are_as_large_as_those_who_walk_and_else_as_those_who_sit() -> N
 # ── which boxes of a detector contradict the room
 
 
-@given(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0), st.floats(0.05, 0.5))
-def test_a_box_tells_where_its_target_stands(x: float, y: float, error: float) -> None:
+@given(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0), st.floats(0.05, 0.5), st.booleans())
+def test_a_box_tells_where_its_target_stands(
+    x: float, y: float, error: float, upside_down: bool
+) -> None:
     place = np.array([[x, y, 0.85]])
-    # of somebody straight ahead top and bottom of the box are head and foot
+    # of somebody straight ahead top and bottom of the box are head and foot, or foot and head
     camera = world.look_at("cam", CAMERA.centre.tolist(), (x, y, 0.85))
+    if upside_down:
+        turn = np.diag([-1.0, -1.0, 1.0])
+        camera = Camera(
+            "cam", camera.image_size, camera.intrinsics,
+            turn @ camera.rotation, turn @ camera.translation, camera.distortion,
+        )  # fmt: skip
     (head, foot), _ = camera.project(np.array([[x, y, 1.7], [x, y, 0.0]]))
+    assert (foot[1] < head[1]) == upside_down
     box = np.array([[(head[0] + foot[0]) / 2.0, (head[1] + foot[1]) / 2.0, 9.0,
-                     (foot[1] - head[1]) / 2.0]])  # fmt: skip
+                     abs(foot[1] - head[1]) / 2.0]])  # fmt: skip
     near, far = standing_between(camera, box, 0.85, np.zeros(1))
     assert_allclose(near, place, atol=1e-6)
     assert_allclose(near, far)

@@ -164,8 +164,8 @@ def standing_between(
 ) -> tuple[Float[ndarray, "N 3"], Float[ndarray, "N 3"]]:
     """Compute the nearest and the farthest place of an upright target that gives each box.
 
-    The rays through the middle of the box's top and of its bottom meet an upright segment of the
-    target's height where
+    The rays through the middle of the box's top and of its bottom, the other way round for a
+    camera upside down, meet an upright segment of the target's height where
 
         s u − t v = (0, 0, 2h)
 
@@ -179,8 +179,10 @@ def standing_between(
         relative_error: Largest relative error of a box's height; from 1 on a box that is
             far too tall may belong to a target at any distance.
     """
-    heads = camera.back_project(boxes[:, :2] - boxes[:, 3:] * [0.0, 1.0])
-    feet = camera.back_project(boxes[:, :2] + boxes[:, 3:] * [0.0, 1.0])
+    # in the picture of a camera that hangs upside down, heads are at the bottoms of the boxes
+    down = [0.0, 1.0 if camera.rotation[1, 2] <= 0.0 else -1.0]
+    heads = camera.back_project(boxes[:, :2] - boxes[:, 3:] * down)
+    feet = camera.back_project(boxes[:, :2] + boxes[:, 3:] * down)
     together = (heads * feet).sum(axis=1)
     rise = 2.0 * half_height
     # the normal equations of [u, −v] [s; t] = (0, 0, 2h), for unit vectors

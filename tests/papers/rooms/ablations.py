@@ -152,6 +152,8 @@ def fill(rows: Rows, seeds: range, steps: int, methods: tuple[str, ...], folder:
         if not (room / "sequence.toml").is_file():
             render_random(seed, room, detections=True, frames=steps)
         for given, sequence in _given(read_sequence(room)).items():
+            if given == "templates" and not sequence.templates:
+                continue  # nobody of this room stands free in these steps
             with FrameReader(sequence) as reader:
                 for trial in missing:
                     if METHODS[trial.method] != given:
