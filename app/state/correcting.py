@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 from collections.abc import Sequence
 from pathlib import Path
@@ -136,14 +137,17 @@ class Correcting:
             raise CorrectionError("no recording is open")
         if self._log.problem is not None:
             raise CorrectionError(f"{self._log.problem}; mend the file, or move it away")
-        path = writing_place(self._recording.folder)
+        path, own = writing_place(self._recording.folder), own_place(self._recording.folder)
         try:
             write_log(path, corrections)
         except OSError as error:
-            if path == own_place(self._recording.folder):
+            if path == own:
                 raise CorrectionError(str(error)) from None
-            path = own_place(self._recording.folder)
+            path = own
             write_log(path, corrections)
+        if self._log.path == own != path:  # the folder has again what was kept in the settings
+            with contextlib.suppress(OSError):
+                own.unlink()
         self._log, self._mark = Log(path, corrections), _mark_of(path)
         self._workbench.correct(self._recording, corrections)
 

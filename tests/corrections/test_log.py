@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -282,3 +283,20 @@ def test_a_malformed_log_is_reported_and_empty(tmp_path: Path) -> None:
         read_log(tmp_path / FILE)
     opened = open_log(tmp_path)
     assert (opened.corrections, opened.problem) == ((), str(error.value))
+
+
+def test_what_was_said_while_a_folder_could_not_be_written_to_counts_afterwards(
+    settings: Path, tmp_path: Path
+) -> None:
+    folder = tmp_path / "recording"
+    folder.mkdir()
+    told = parse(LOG, "log")
+    write_log(folder / FILE, told[:1])
+    own = own_place(folder)
+    write_log(own, told)  # as the workbench does when the folder refuses
+    assert (place_of(folder), writing_place(folder)) == (own, folder / FILE)
+    assert remark_on(folder) is None
+    write_log(folder / FILE, told[1:])  # another program
+    os.utime(own, (1.0, 1.0))
+    assert place_of(folder) == folder / FILE
+    assert str(own) in str(remark_on(folder))

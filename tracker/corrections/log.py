@@ -1,7 +1,7 @@
 """The log of corrections, ``corrections.toml``: its place, its reading and its atomic writing.
 
 The file lies beside ``sequence.toml``; for a folder that is read-only or part of the program it
-lies in the user's settings.
+lies in the user's settings, and is taken from there when the folder can be written to again.
 """
 
 from __future__ import annotations
@@ -50,16 +50,25 @@ def place_of(folder: Path) -> Path:
     Args:
         folder: Folder of the recording.
     """
-    beside = folder / FILE
+    beside, own = folder / FILE, own_place(folder)
     if opens_by_name(folder):
         return _earlier_if_alone(folder)
     if _leads_out(beside):
-        return own_place(folder)
-    if os.access(beside if beside.exists() else folder, os.W_OK):
-        return beside
-    own = own_place(folder)
+        return own
+    if own.exists() and (_is_read_only(folder) or _written_later(own, beside)):
+        return own
     # the log beside a read-only recording is used until a correction is added
-    return own if own.exists() or not beside.exists() else beside
+    return beside if beside.exists() or not _is_read_only(folder) else own
+
+
+def _is_read_only(folder: Path) -> bool:
+    beside = folder / FILE
+    return not os.access(beside if beside.exists() else folder, os.W_OK)
+
+
+def _written_later(own: Path, beside: Path) -> bool:
+    """Whether a recording was read-only, or its disk full, when its log was last written."""
+    return not beside.exists() or own.stat().st_mtime_ns >= beside.stat().st_mtime_ns
 
 
 def _leads_out(beside: Path) -> bool:
@@ -87,21 +96,24 @@ def _earlier_if_alone(folder: Path) -> Path:
 
 
 def remark_on(folder: Path) -> str | None:
-    """The remark that a recording's log is of an earlier rendering; None where it is not."""
-    earlier = earlier_key(folder)
-    if earlier is None or place_of(folder) != _kept_as(earlier):
-        return None
-    return f"The corrections were {EARLIER}."
+    """The remark that a recording's log is of an earlier rendering, or that it has another one
+    which was written later; None where neither is so."""
+    earlier, place, own = earlier_key(folder), place_of(folder), own_place(folder)
+    if earlier is not None and place == _kept_as(earlier):
+        return f"The corrections were {EARLIER}."
+    if earlier is None and place != own and own.exists():
+        return (
+            f"Other corrections of this recording, made while its folder could not be written to, "
+            f"are in {own}: `multiview-phd corrections merge` joins them with those of the folder."
+        )
+    return None
 
 
 def writing_place(folder: Path) -> Path:
     """The path to which the log of a recording is written."""
-    if opens_by_name(folder):
+    if opens_by_name(folder) or _leads_out(folder / FILE) or _is_read_only(folder):
         return own_place(folder)
-    found = place_of(folder)
-    if found.parent == folder and not os.access(found if found.exists() else folder, os.W_OK):
-        return own_place(folder)
-    return found
+    return folder / FILE
 
 
 def read_log(path: Path) -> tuple[Correction, ...]:

@@ -93,7 +93,7 @@ def _named(name: str) -> Path:
     if path.is_file():
         return path
     if path.is_dir() and (path / FILE).is_file():
-        return path / FILE
+        return place_of(path)
     try:
         return place_of(library.open_sequence(name).folder)
     except ValueError as error:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,8 @@ from starlette.testclient import TestClient
 from app.state.doubting import Doubting
 from app.web.server import Settings, create_app
 from tests.app.conftest import ADDRESS, Runs, connect, run_is, wait_until
-from tracker.corrections.log import read_log
+from tracker.corrections import Correction
+from tracker.corrections.log import own_place, read_log, write_log
 from tracker.review.queue import Alternative, Queue, ReviewItem
 from tracker.review.queue.item import TrackRows, proposed
 from tracker.sequences.reader import read_sequence
@@ -124,6 +125,32 @@ def test_what_can_be_taken_back_survives_a_start(own: Path) -> None:
         client.post("/api/undo")
         assert client.get(PLACE).json()["corrections"] == []
         assert client.post("/api/undo").status_code == 409
+
+
+@pytest.mark.full
+def test_what_a_full_disk_kept_elsewhere_is_there_after_a_start_and_goes_back(
+    own: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    wishes = [{"kind": "checked", "first": first, "last": first} for first in (2, 20, 40)]
+    log = own / "corrections.toml"
+
+    def full(path: Path, corrections: Iterable[Correction]) -> None:
+        if path == log:
+            raise OSError(f"{path}: cannot be written (No space left on device)")
+        write_log(path, corrections)
+
+    with started(own) as client:
+        client.post(PLACE, json={"corrections": wishes[:1]})
+        with monkeypatch.context() as patched:
+            patched.setattr("app.state.correcting.write_log", full)
+            assert client.post(PLACE, json={"corrections": wishes[1:2]}).status_code == 200
+        assert len(read_log(log)) == 1
+    with started(own) as client:
+        assert client.get(PLACE).json()["checked"] == [[2, 2], [20, 20]]
+        client.post(PLACE, json={"corrections": wishes[2:]})
+        assert client.get(PLACE).json()["checked"] == [[2, 2], [20, 20], [40, 40]]
+    assert len(read_log(log)) == 3
+    assert not own_place(own).exists()
 
 
 @pytest.mark.full
