@@ -8,8 +8,8 @@ from typing import Any
 
 FILE = "rooms.jsonl"
 
-Rows = dict[tuple[int, str], dict[str, Any]]
-"""By the room's seed and the key of the case."""
+Rows = dict[tuple[int | str, str], dict[str, Any]]
+"""By the room's seed, or the recording's name, and the key of the case."""
 
 
 def read_rows(folder: Path | None) -> Rows:
