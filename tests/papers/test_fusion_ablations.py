@@ -12,10 +12,10 @@ from tests.papers.rooms.fusion_ablations import (
     FIGURES,
     FILTERS,
     RANGES,
-    RECORDINGS,
     Scenes,
     effects,
     fill,
+    groups_of,
     is_flat,
     judged,
     table,
@@ -27,7 +27,7 @@ from tracker.parameters.catalogue import PARAMETERS, RunParameters
 from tracker.parameters.values import value_of, with_values
 
 ROOMS = ["1", "2"]
-GROUPS = {"rooms": ROOMS, "recordings": list(RECORDINGS)}
+GROUPS = groups_of(ROOMS)
 
 
 def test_each_parameter_is_judged_at_other_values_within_its_range() -> None:

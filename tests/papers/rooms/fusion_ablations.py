@@ -3,8 +3,8 @@
 ``python -m tests.papers.rooms.fusion_ablations -o FOLDER`` renders random rooms with a detector's
 boxes, tracks in them and in pieces of recordings what no earlier start tracked, one row a run, and
 writes the table. What is flat in the first rooms is judged in more. A parameter counts as flat
-where no value of it changes the mean of any figure, over the rooms or over the recordings, by as
-much as :data:`~tests.papers.rooms.ablations.LEAST`, with either filter.
+where no value of it changes the mean of any figure, over the rooms, over random crowds or over the
+recordings, by as much as :data:`~tests.papers.rooms.ablations.LEAST`, with either filter.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ import numpy as np
 from tests.conftest import DATA
 from tests.papers.rooms.ablations import LEAST, ends
 from tests.papers.rooms.kept import Rows, keep_row, read_rows
+from tests.random_rooms import random_room
 from tests.rooms import render_random
 from tests.rooms.random_rooms import VERSION
 from tracker.evaluation import evaluate_sequence
@@ -41,6 +42,12 @@ RECORDINGS = {
     "wildtrack-points-300": 100,
 }  # fmt: skip
 """Recordings of a detector's boxes, and the number of steps from the beginning."""
+
+CROWDS = {f"crowd {seed}": seed for seed in range(911, 915)}
+"""Random crowds of ten people before three cameras at 4 steps/s, by their seeds: rules of identity
+are made for them."""
+
+CROWD_STEPS = 160
 
 TWO_CAMERAS = "cmc2-looks"
 """The recording of which two cameras are tracked: with more, appearance has nothing to decide."""
@@ -151,6 +158,11 @@ def trials(key: str, fusion: str) -> tuple[Trial, ...]:
     return tuple(Trial(fusion, single_view, condition, key, value) for value in values_of(key))
 
 
+def steps_of(name: str, steps: int) -> int:
+    """The number of steps of a sequence that are tracked; in rooms ``steps``."""
+    return CROWD_STEPS if name in CROWDS else RECORDINGS.get(name, steps)
+
+
 class Scenes:
     """The sequences of a study; what trials are compared with is computed once for each."""
 
@@ -161,11 +173,16 @@ class Scenes:
 
     def steps(self, name: str) -> int:
         """The number of steps of a sequence that are tracked."""
-        return RECORDINGS.get(name, self._steps)
+        return steps_of(name, self._steps)
 
     def open(self, name: str) -> Sequence:
         """A recording by its name, or a room by its seed, rendered where it is not there yet."""
         if name not in self._sequences:
+            if name in CROWDS:
+                self._sequences[name] = random_room(
+                    CROWDS[name], cameras=3, people=10, fps=4.0, steps=CROWD_STEPS
+                )
+                return self._sequences[name]
             folder = DATA / name if name in RECORDINGS else self._folder / name
             if name not in RECORDINGS and not (folder / "sequence.toml").is_file():
                 render_random(int(name), folder, detections=True, frames=self._steps)
@@ -209,7 +226,7 @@ def fill(rows: Rows, names: Iterable[str], keys: Iterable[str], steps: int, fold
     for name in names:
         scenes = Scenes(folder, steps)
         for trial in (one for key in keys for fusion in FILTERS for one in trials(key, fusion)):
-            if trial.single_view != "none" and name in RECORDINGS:
+            if trial.single_view != "none" and (name in RECORDINGS or name in CROWDS):
                 continue
             for one in (trial.usual, trial):
                 own = (name, one.row_key(scenes.steps(name)))
@@ -220,11 +237,16 @@ def fill(rows: Rows, names: Iterable[str], keys: Iterable[str], steps: int, fold
                     rows[own] = row
 
 
+def groups_of(rooms: Iterable[str]) -> dict[str, Iterable[str]]:
+    """The groups of sequences over which means are taken."""
+    return {"rooms": rooms, "crowds": CROWDS, "recordings": RECORDINGS}
+
+
 def changes(rows: Rows, trial: Trial, names: Iterable[str], steps: int) -> list[float]:
     """The change of each figure's mean over the sequences that have both rows; empty for none."""
     both = []
     for name in names:
-        length = RECORDINGS.get(name, steps)
+        length = steps_of(name, steps)
         own = [rows.get((name, one.row_key(length))) for one in (trial.usual, trial)]
         if own[0] is not None and own[1] is not None:
             both.append([own[1][f] - own[0][f] for f in FIGURES])
@@ -264,28 +286,31 @@ def table(rows: Rows, keys: Iterable[str], rooms: Mapping[str, Iterable[str]], s
     lines = [
         "# Fusion and smoothing: what each parameter changes",
         "",
-        f"Random rooms with a detector's boxes, {steps} steps, and the beginnings of recordings "
+        f"Random rooms with a detector's boxes, {steps} steps, {len(CROWDS)} random crowds of ten "
+        f"people before three cameras, {CROWD_STEPS} steps, and the beginnings of recordings "
         f"({pieces}; of {TWO_CAMERAS} two cameras): change of the means of recall, "
         "false positives by true position, and IDF1 against the defaults, with the "
         "multi-Bernoulli filter and, after a slash, with the sequential PHD. Published and "
-        f"essential parameters are not judged; {BY_COLOUR}… with `colour_phd`. *flat*: every change is below {LEAST:g}. "
+        f"essential parameters are not judged; {BY_COLOUR}… with `colour_phd`. *flat*: every "
+        f"change is below {LEAST:g}. "
         "Made by `python -m tests.papers.rooms.fusion_ablations`.",
         "",
-        "| parameter | value | rooms | recall, false, IDF1 in rooms | in recordings | |",
-        "|---|---|---|---|---|---|",
+        "| parameter | value | rooms | in rooms | in crowds | in recordings | |",
+        "|---|---|---|---|---|---|---|",
     ]
     for key in keys:
         names = list(rooms[key])
-        found = effects(rows, key, {"rooms": names, "recordings": RECORDINGS}, steps)
+        found = effects(rows, key, groups_of(names), steps)
         for value in dict.fromkeys(trial.value for trial in found):
             own = [groups for trial, groups in found.items() if trial.value == value]
             cells = [
                 " / ".join(" ".join(f"{c:+.3f}" for c in groups[name]) for groups in own)
-                for name in ("rooms", "recordings")
+                for name in groups_of(names)
             ]
             shown = f"{value:g}" if isinstance(value, float) else value
             flat = "flat" if is_flat(found) else ""
-            lines.append(f"| {key} | {shown} | {len(names)} | {cells[0]} | {cells[1]} | {flat} |")
+            there = sum(all(changes(rows, one, [name], steps) for one in found) for name in names)
+            lines.append(f"| {key} | {shown} | {there} | {' | '.join(cells)} | {flat} |")
     return "\n".join(lines) + "\n"
 
 
@@ -298,13 +323,16 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--count", type=int, default=6, help="number of rooms for all")
     parser.add_argument("--more", type=int, default=20, help="number of rooms for flat ones")
     parser.add_argument("--steps", type=int, default=100)
+    parser.add_argument("--table-only", action="store_true", help="of what was run before")
     given = parser.parse_args(arguments)
     seeds = [str(seed) for seed in range(given.first, given.first + given.more)]
     rows, keys, folder = read_rows(given.output), judged(), given.output
     few = seeds[: given.count]
-    fill(rows, [*RECORDINGS, *few], keys, given.steps, folder)
-    groups = {"rooms": few, "recordings": list(RECORDINGS)}
-    flat = [key for key in keys if is_flat(effects(rows, key, groups, given.steps))]
+    if given.table_only:
+        given.table.write_text(table(rows, keys, dict.fromkeys(keys, seeds), given.steps), "utf-8")
+        return 0
+    fill(rows, [*RECORDINGS, *CROWDS, *few], keys, given.steps, folder)
+    flat = [key for key in keys if is_flat(effects(rows, key, groups_of(few), given.steps))]
     fill(rows, seeds, flat, given.steps, folder)
     rooms = {key: seeds if key in flat else few for key in keys}
     given.table.write_text(table(rows, keys, rooms, given.steps), encoding="utf-8")

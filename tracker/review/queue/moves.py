@@ -13,9 +13,10 @@ from tracker.runs.run import Run
 from tracker.smoothing import names_of
 from tracker.smoothing.result import Joined
 
-_TEMPERED = 3.0
+_TEMPERED = 6.0
 """Divisor of the log odds of the association, whose model takes dependent boxes as independent and
-is therefore too certain."""
+is therefore too certain. Of 1, 2, 3, 6 and 12 it is the one whose probabilities predict best what
+is wrong in twelve random crowds: log loss 0.83, 0.81, 0.79, 0.77 and 0.77 an item."""
 
 _LONGEST = 20.0
 """Longest time after which a lost person may come back, and time constant of the probability of it,
