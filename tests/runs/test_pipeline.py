@@ -327,7 +327,7 @@ def test_one_step_is_a_sequence_too() -> None:
 def test_the_keys_follow_the_stages() -> None:
     keys = stage_keys(WHOLE, BOXES, 0)
     tracks = stage_keys(WHOLE, changed(extraction_threshold=0.7), 0)
-    smoothing = stage_keys(WHOLE, with_values(BOXES, {"smoothing.reach": 0.5}), 0)
+    smoothing = stage_keys(WHOLE, with_values(BOXES, {"smoothing.jump": 50.0}), 0)
     fusion = stage_keys(WHOLE, changed(clutter_rate=2.0), 0)
     views = stage_keys(WHOLE, with_values(BOXES, {"detection_boxes.size_sigma": 0.3}), 0)
     seed = stage_keys(WHOLE, BOXES, 1)

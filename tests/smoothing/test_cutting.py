@@ -17,8 +17,14 @@ from tracker.smoothing.identity.odds import Rates
 from tracker.smoothing.identity.splitting import Splits, Tracked, find_splits, split_tracks
 
 STEPS = 30
-P = SmoothingParams(change=20.0, gap=0.5)
-"""Nobody is away for a moment; five steps are the longest gap."""
+P = SmoothingParams(change=20.0)
+"""Nobody is away for a moment."""
+
+
+@pytest.fixture(autouse=True)
+def short_gap(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Five steps are the longest gap."""
+    monkeypatch.setattr("tracker.smoothing.identity.splitting.GAP", 0.5)
 
 
 def tracked(scene: Known, **known_of: ndarray) -> Tracked:

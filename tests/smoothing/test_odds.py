@@ -129,7 +129,7 @@ def test_who_comes_back_is_one_of_those_who_left() -> None:
     found = odds.long_gap_odds(smoother(), paths, NOBODYS, chains, P, None, RATES)
     newcomer = np.log(BIRTH * STEP * (1.0 - SURVIVAL))
     assert list(zip(found.earlier.tolist(), found.later.tolist(), strict=True)) == [(0, 2)]
-    assert found.gains == pytest.approx([newcomer + P.keeping])
+    assert found.gains == pytest.approx([newcomer + odds.KEEPING])
     assert found.gaps.tolist() == [6]
     # of one chain already, or overlapping, nothing is said
     assert (

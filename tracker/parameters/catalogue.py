@@ -79,6 +79,9 @@ REMOVED: Mapping[str, str] = {
     "foreground.update_limit": "the adaptive background follows differences below 6 grey levels",
     "foreground.update_frames": "the adaptive background follows pixels after 10 steps",
     "foreground.update_rate": "the adaptive background goes a tenth of the way to each picture",
+    "smoothing.reach": "further boxes of a track are sought for 1 s before and after it",
+    "smoothing.gap": "a track is split where no camera detected it for more than 1 s",
+    "smoothing.keeping": "the filter's label adds log odds of 2 to links over longer gaps",
 }
 """The keys of parameters of earlier versions that no longer exist, and what holds instead: files,
 addresses and commands that name them are read without them, and a note says so."""

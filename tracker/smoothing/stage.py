@@ -32,6 +32,11 @@ from tracker.smoothing.result import Decision, Joined, Smoothed
 from tracker.smoothing.smoother import BoxAssociations, Fitted, Smoother
 from tracker.steps import Steps
 
+REACH = 1.0
+"""Time before the first and after the last box of a track in which further boxes are sought,
+seconds. From 0.2 to 3 s, no figure of the random rooms, random crowds and recordings of
+``tests/papers/rooms/fusion_ablations.md`` changes by more than 0.002."""
+
 _SEEN = 0.5
 """Association probability above which a camera counts as detecting a track."""
 
@@ -317,7 +322,7 @@ def _finished(
     fitted, shared, learnt = _fit_and_share(smoother, begin, p, learnt, check, turns)
     del shared
     longer, existences = lifetimes.extended(
-        smoother, fitted.paths, round(p.reach / smoother.model.step_time)
+        smoother, fitted.paths, round(REACH / smoother.model.step_time)
     )
     del fitted
     away = _outside(longer, decided.limits)

@@ -72,12 +72,9 @@ RANGES: dict[str, tuple[Any, ...]] = {
     "fusion.recognition_own_odds": (1.0, 10.0),
     "smoothing.memory": (0.05, 2.0),
     "smoothing.change": (0.0, 10.0),
-    "smoothing.reach": (0.2, 3.0),
     "smoothing.jump": (15.0, 150.0),
     "smoothing.exchange": (-8.0, 8.0),
-    "smoothing.gap": (0.3, 4.0),
     "smoothing.longest": (0.5, 6.0),
-    "smoothing.keeping": (0.0, 8.0),
     "smoothing.rounds": (1, 3),
     "smoothing.appearance": (0.0, 2.0),
 }

@@ -32,9 +32,6 @@ class SmoothingParams(Params):
     change: Annotated[float, Field(ge=0.0, le=20.0), ui("c", step=0.5)] = 4.0
     """Log odds against a person becoming absent within a track, and against a return."""
 
-    reach: Annotated[float, Field(ge=0.0, le=10.0), ui("t_e", unit="s", step=0.1)] = 1.0
-    """Time before the first and after the last box of a track in which further boxes are sought."""
-
     ambiguity_threshold: Annotated[float, Field(ge=0.05, le=1.0), ui("d", step=0.05)] = 0.6
     """Identities: a track is split where this share of its boxes may as well belong to another
     track."""
@@ -47,15 +44,9 @@ class SmoothingParams(Params):
     """Identities: log odds of a swap of two tracks from which both are split, and then linked
     again."""
 
-    gap: Annotated[float, Field(ge=0.1, le=30.0), ui("t_g", unit="s", step=0.1)] = 1.0
-    """Identities: a track is split where no camera detected it for longer."""
-
     longest: Annotated[float, Field(ge=0.1, le=60.0), ui("t_j", unit="s", step=0.5)] = 2.0
     """Identities: tracklets are linked by motion over gaps up to this, by appearance over
     longer."""
-
-    keeping: Annotated[float, Field(ge=0.0, le=20.0), ui("k", step=0.5)] = 2.0
-    """Identities: log odds that the filter's label adds to links over longer gaps."""
 
     rounds: Annotated[int, Field(ge=1, le=5), ui("n_i", step=1)] = 2
     """Identities: number of resolutions, each from the tracks of the one before."""
@@ -65,7 +56,7 @@ class SmoothingParams(Params):
 
 
 _IDENTITIES_ONLY = frozenset(
-    {"ambiguity_threshold", "jump", "exchange", "gap", "longest", "keeping", "rounds", "appearance"}
+    {"ambiguity_threshold", "jump", "exchange", "longest", "rounds", "appearance"}
 )
 
 NONE = Method(

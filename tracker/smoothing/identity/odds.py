@@ -23,6 +23,10 @@ from tracker.smoothing.smoother import BoxAssociations, Fitted, Smoother
 FASTEST = 3.0
 """Largest speed of a person in a room over several steps, metres per second."""
 
+KEEPING = 2.0
+"""Log odds that the filter's label adds to a link over a longer gap. From 0 to 8, no figure of the
+random rooms, random crowds and recordings of ``tests/papers/rooms/fusion_ablations.md`` changes."""
+
 _LEAST = 1e-6
 """Least probability that a person leaves, or that none comes."""
 
@@ -187,7 +191,7 @@ def long_gap_odds(
         paths: The n tracklets.
         links: Association probabilities of their rows and boxes.
         chains: The tracklets of each chain.
-        p: Weights of the appearance and of the filter's labels.
+        p: Weight of the appearance.
         embeddings: A unit vector for each box of each camera; None without appearance.
         rates: How often people come and leave.
 
@@ -218,7 +222,7 @@ def long_gap_odds(
             place = int(np.searchsorted(keys, key))
             there = place < len(keys) and keys[place] == key
             gain = kept.get(key, float(gains[place]) if there else -np.inf)
-            kept[key] = max(gain, newcomer) + p.keeping
+            kept[key] = max(gain, newcomer) + KEEPING
     # of two gains of one pair the first
     keys, first = np.unique(
         np.concatenate([np.array(list(kept), dtype=np.int64), keys]), return_index=True

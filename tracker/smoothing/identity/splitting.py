@@ -17,6 +17,11 @@ from tracker.smoothing.lifetimes import independence, lifetimes
 from tracker.smoothing.paths import Paths
 from tracker.smoothing.smoother import BoxAssociations, Fitted, Smoother
 
+GAP = 1.0
+"""Time without a detection from which a track is split, seconds. From 0.3 to 4 s, no figure of the
+random rooms, random crowds and recordings of ``tests/papers/rooms/fusion_ablations.md`` changes by
+as much as 0.001: the parts are linked again."""
+
 _FED = 0.3
 """Sum of association probabilities over all cameras above which a row counts as detected."""
 
@@ -76,7 +81,7 @@ def find_splits(tracked: Tracked, p: SmoothingParams) -> Splits:
     Rows are left out where a share of ``p.ambiguity_threshold`` of the boxes may belong to another
     track, around a jump (the squared Mahalanobis distance between the estimates from the past and
     from the future exceeds ``p.jump``), and where no camera detected the track for longer than
-    ``p.gap``. Tracks are also split where a swap with another track has log odds of at least
+    1 s. Tracks are also split where a swap with another track has log odds of at least
     ``p.exchange``.
     """
     smoother, fitted, shared = tracked.smoother, tracked.fitted, tracked.shared
@@ -86,7 +91,7 @@ def find_splits(tracked: Tracked, p: SmoothingParams) -> Splits:
     reasons = np.zeros(rows, dtype=np.int64)
     fed = np.bincount(shared.links.rows, shared.links.shares, rows) > _FED
     fed[smoother.rows_with_places(paths)[0]] = True
-    too_long = round(p.gap / step_time)
+    too_long = round(GAP / step_time)
     away = _long_gaps(paths, fed, too_long) | (there < 0.5)
     reasons[away | _not_bridged(paths, tracked.had, away, too_long)] = 3
     around = round(_AROUND / step_time)
