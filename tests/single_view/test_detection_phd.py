@@ -12,6 +12,7 @@ from tests.single_view.detected import ANYWHERE, CAMERA, detected, normal
 from tracker import single_view
 from tracker.filters.gaussian_mixture import GaussianMixture, gate_distance
 from tracker.parameters.catalogue import RunParameters
+from tracker.parameters.groups.detections import DetectionPhdParams
 from tracker.parameters.values import with_values
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
@@ -23,11 +24,17 @@ from tracker.single_view.detector_boxes import trust
 
 NUMBERS: dict[str, object] = {
     "clutter_rate": 3.0, "score_clutter": 2.0, "detection_probability": 0.8,
-    "survival_probability": 0.95, "birth_rate": 0.7, "motion_sigma": 0.9, "growth_sigma": 0.3,
-    "gate_probability": 0.9999, "merging_threshold": 1e-6, "pruning_threshold": 1e-8,
+    "birth_rate": 0.7, "motion_sigma": 0.9, "growth_sigma": 0.3, "merging_threshold": 1e-6,
     "extraction_threshold": 0.4,
 }  # fmt: skip
 FPS = 10.0
+
+
+@pytest.fixture(autouse=True)
+def numbers(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Constants that keep every component, and a survival that shows."""
+    monkeypatch.setattr(DetectionPhdParams, "survival_probability", 0.95)
+    monkeypatch.setattr(DetectionPhdParams, "pruning_threshold", 1e-8)
 
 
 def parameters(**changes: object) -> RunParameters:

@@ -82,6 +82,9 @@ REMOVED: Mapping[str, str] = {
     "smoothing.reach": "further boxes of a track are sought for 1 s before and after it",
     "smoothing.gap": "a track is split where no camera detected it for more than 1 s",
     "smoothing.keeping": "the filter's label adds log odds of 2 to links over longer gaps",
+    "detection_phd.survival_probability": "a person in the picture is there a step later by 0.99",
+    "detection_phd.pruning_threshold": "components lighter than 0.0001 are dropped",
+    "detection_phd.gate_probability": "a person's own box lies in the gate by 0.9999",
 }
 """The keys of parameters of earlier versions that no longer exist, and what holds instead: files,
 addresses and commands that name them are read without them, and a note says so."""
