@@ -198,14 +198,17 @@ def effects(rows: Rows, seeds: range, steps: int, methods: tuple[str, ...]) -> l
 
 def table(found: list[Mapping[str, Any]], seeds: range, steps: int) -> str:
     """The effects as a Markdown table."""
+    methods = dict.fromkeys(one["method"] for one in found)
     lines = [
         "# Stage 1: what each parameter changes in random rooms",
         "",
         f"Rooms {seeds.start} to {seeds.stop - 1}, {steps} steps, seed 0: change of the means of "
         "recall, false positives a step and IDF1 against the defaults. Published and essential "
         f"parameters are not judged. *flat*: every change is below {LEAST:g}; *same*: every number "
-        "of the tracks is as without the change. Made by "
-        "`python -m tests.papers.rooms.ablations`.",
+        "of the tracks is as without the change. A parameter that no longer exists was judged "
+        "before it went. Made by `python -m tests.papers.rooms.ablations -o FOLDER --first "
+        f"{seeds.start} --count {len(seeds)} --steps {steps}"
+        f"{''.join(f' --method {name}' for name in methods)}`.",
         "",
         "| method | parameter | value | rooms | recall | false | IDF1 | |",
         "|---|---|---|---|---|---|---|---|",
