@@ -76,6 +76,9 @@ class Import:
     accept_best: FlagCreatePairsOff[bool] = False
     """Take the likeliest interpretation where the files leave open how they are meant (status 3),
     or where none explains the boxes (status 4)."""
+    as_named: FlagCreatePairsOff[bool] = False
+    """Leave calibrations with the cameras of their names, though boxes may meet better with some
+    of them exchanged."""
     camera: Annotated[
         UseAppendAction[tuple[str, ...]],
         arg(metavar="NAME=FILE", help_behavior_hint="(repeatable)"),

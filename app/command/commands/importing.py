@@ -147,6 +147,7 @@ def _options(command: Import) -> Any:
         "first_index": command.first_index,
         "fps": command.fps,
         "accept_best": command.accept_best,
+        "as_named": command.as_named,
         "cameras": tuple(_pairs("--camera", "NAME=FILE", command.camera)),
         "swap": tuple(_pairs("--swap", "NAME=NAME", command.swap)),
     }

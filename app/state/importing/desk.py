@@ -56,7 +56,6 @@ class Desk:
         name = first if any("/" in file.path for file in files) else "recording"
         draft = self._new(name, None)
         try:
-            assert draft.upload is not None
             draft.upload.announce(files)
         except UploadError:
             self.discard(draft.key)

@@ -97,10 +97,11 @@ class Draft:
         self.home = home
         self.folder = home / f".import-{key}"
         self.folder.mkdir(parents=True)
-        self.upload = None if source is not None else Upload(self.folder / FILES)
-        if self.upload is not None:
+        self.uploaded = source is None
+        self.upload = Upload(self.folder / FILES)
+        if self.uploaded:
             self.upload.folder.mkdir()
-        self.source = source or self.folder / FILES
+        self._source = source
         self._lock = threading.RLock()
         self._known = Known("uploading" if source is None else "reading", ImportWish(name=name))
         self._gathered = False
@@ -118,9 +119,15 @@ class Draft:
         return self._known
 
     @property
+    def sources(self) -> list[Path]:
+        """The files that it is made of: those that were there, and those that were sent."""
+        sent = [self.upload.folder] if self.upload.folder.is_dir() else []
+        return sent if self._source is None else [self._source, *sent]
+
+    @property
     def size(self) -> int:
         """Of all videos, pictures and boxes that it is made of."""
-        if self.upload is not None:
+        if self.uploaded:
             return self.upload.size
         # as they were when they were read: the page asks again and again
         return sum(
@@ -209,7 +216,7 @@ class Draft:
             with self._lock:
                 wish, taken, gathered = self._known.wish, self._known.taken, self._gathered
             if not gathered:
-                found, read = gather_whole([self.source], lambda t: tell(waiting=t), sleep)
+                found, read = gather_whole(self.sources, lambda t: tell(waiting=t), sleep)
                 taken = tuple(found)
                 with self._lock:
                     tell(taken=taken, waiting="")
@@ -283,7 +290,7 @@ class Draft:
         """
         from tracker.io.importing.arriving import changed_since
 
-        changed = changed_since([self.source], self._read)
+        changed = changed_since(self.sources, self._read)
         if changed:
             self._gathered = False
             self._look_again()
@@ -319,7 +326,7 @@ class Draft:
                 if self._given_up:
                     shutil.rmtree(self.folder, ignore_errors=True)
             return
-        if not wish.copy_files or self.upload is not None or not links_in(place):
+        if not wish.copy_files or self.uploaded or not links_in(place):
             self._tell(phase="written", folder=place, told=tuple(told))
             then(place)
             return

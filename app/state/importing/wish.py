@@ -95,8 +95,10 @@ def mended(wish: ImportWish, remedies: Sequence[Remedy]) -> dict[str, Any]:
     room: dict[str, Any] = {}
     for remedy in remedies:
         flag, value = remedy.flag.removeprefix("--"), remedy.value
-        if flag in ("pose", "axes", "up") or (flag == "unit" and value in METRES):
+        if flag in ("pose", "axes", "up"):
             changes[flag] = value
+        elif flag == "unit":
+            changes[flag] = value if value in METRES else float(value)
         elif flag == "boxes":
             layout, _, normalised = value.partition("-")
             changes |= {"boxes": layout, "normalised": True if normalised else None}

@@ -84,6 +84,8 @@ class ImportedCamera(Model):
     height: int
     calibration: str
     """What the calibration's file was recognised as."""
+    calibration_of: str
+    """The camera whose calibration it has by its file: its own, unless they are exchanged."""
     detections: str
     boxes_format: str
     boxes_per_step: float
@@ -100,7 +102,7 @@ class ImportedCheck(Model):
     status: Status
     sentence: str
     remedy: str
-    """As the command line has it; empty where there is none."""
+    """The field of the sheet and what it should be; empty where there is none."""
     mend: ImportWish | None
     """The wish that mends it; null where nothing here does."""
 
@@ -140,8 +142,8 @@ class ImportQuestion(Model):
     interpretations: tuple[str, str]
     """In words, the likelier one first."""
     difference: str
-    flags: tuple[str, str]
-    """The flags of the command line for each."""
+    chosen: tuple[str, str]
+    """The fields of the sheet that each states, and how."""
     wishes: tuple[ImportWish, ImportWish]
     """What decides for each here."""
 
@@ -176,6 +178,8 @@ class ImportInfo(Model):
     uploaded: bool
     """Whether the files were sent by a page."""
     home: str
+    place: str
+    """The name of its folder there, which has no signs that not every file system takes."""
     free: int
     """Bytes on the disk of the recordings."""
     fps: float

@@ -162,8 +162,6 @@ def show(draft: Own) -> ImportInfo:
 def add(wish: AnnouncedFiles, draft: Own) -> Begun:
     """More files are to come."""
     with _complaining():
-        if draft.upload is None:
-            raise UploadError("files cannot be added to a folder on the disk; put them there")
         draft.check_open()
         first = draft.upload.announce([Announced(file.path, file.bytes) for file in wish.files])
         draft.awaits()
@@ -181,8 +179,6 @@ async def receive(
     """The next piece of a file."""
     data = await request.body()
     with _complaining():
-        if draft.upload is None:
-            raise UploadError("this import takes no files")
         draft.upload.receive(number, offset, data)
 
 
@@ -190,8 +186,8 @@ async def receive(
 def arrived(draft: Own) -> ImportInfo:
     """All files were sent: look into them."""
     with _complaining():
-        if draft.upload is not None and not draft.upload.complete:
-            upload = draft.upload
+        upload = draft.upload
+        if not upload.complete:
             raise UploadError(
                 f"expected {upload.size:,} bytes, {upload.received:,} are here; drop the rest"
             )

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from app.models.base import Vector
-from app.state.importing.draft import Draft, Known
+from app.state.importing.draft import Draft, Known, folder_name
 from app.state.importing.wish import ImportWish, mended, places
 from app.web.importing.models import (
     ImportedCamera,
@@ -23,6 +23,7 @@ from app.web.importing.models import (
     ImportInfo,
     ImportQuestion,
 )
+from app.web.importing.words import on_page
 from tracker.io.checks import Check
 from tracker.io.checks.synchronisation import CameraOffset
 from tracker.io.importing.finding.angles import open_turns, product_in_words, turns_in_words
@@ -57,21 +58,23 @@ def info_of(draft: Draft) -> ImportInfo:
         phase=known.phase,
         busy=known.busy,
         under_way=known.waiting or (looked.under_way if looked is not None and known.busy else ""),
-        error=known.error,
-        undecided=known.undecided,
+        error=on_page(known.error),
+        undecided=on_page(known.undecided),
         question=None if known.question is None else _question(known.question, known.wish),
         wish=known.wish,
-        received=draft.size if upload is None else upload.received,
-        bytes=draft.size,
+        received=upload.received if upload.files else draft.size,
+        bytes=upload.size if known.phase == "uploading" else draft.size,
         files=_files(uses),
         files_there=sum(one.files.count for one in uses),
         files_used=sum(one.used for one in uses),
-        coming=[] if upload is None or known.taken else upload.names(MOST_LISTED),
+        coming=[] if known.taken else upload.names(MOST_LISTED),
         offered=list(places(known.taken))[:MOST_LISTED],
-        uploaded=upload is not None,
+        uploaded=draft.uploaded,
         home=str(draft.home),
         free=shutil.disk_usage(draft.home).free,
         **_recording(settled),
+        told=_told(settled, looked),
+        place=folder_name(known.wish.name),
         open_turns=_open_turns(known),
         cameras=[] if settled is None else [_camera(view, known) for view in settled.views],
         checks=[] if looked is None else [_check(one, known.wish) for one in looked.checks],
@@ -79,7 +82,7 @@ def info_of(draft: Draft) -> ImportInfo:
         plan=None if looked is None else _plan(looked, known.wish),
         entrances=[] if looked is None else [_door(one) for one in looked.doors],
         fitting={} if looked is None else dict(looked.fitting),
-        unfit={} if looked is None else {key: dict(why) for key, why in looked.unfit.items()},
+        unfit={} if looked is None else {key: _unfit(why) for key, why in looked.unfit.items()},
         copied=known.copied,
         megabytes_per_second=_speed(known),
         folder="" if known.folder is None else str(known.folder),
@@ -91,7 +94,7 @@ def _recording(settled: ImportPlan | None) -> dict[str, Any]:
         return {
             "fps": 0.0, "frames": 0, "unit": "", "up": "", "pose": "", "axes": "", "turns": "",
             "room": None, "suggested": None, "half_extents": None, "suggested_half_extents": None,
-            "truth": 0, "has_boxes": False, "found": [], "told": [],
+            "truth": 0, "has_boxes": False, "found": [],
         }  # fmt: skip
     room, own = settled.room, settled.suggested
     return {
@@ -108,9 +111,21 @@ def _recording(settled: ImportPlan | None) -> dict[str, Any]:
         "suggested_half_extents": _vector(own.half_extents),
         "truth": 0 if settled.truth is None else len(np.unique(settled.truth.ids)),
         "has_boxes": all(view.detections is not None for view in settled.views),
-        "found": list(settled.found),
-        "told": list(settled.told),
+        "found": [(what, on_page(how)) for what, how in settled.found],
     }
+
+
+def _unfit(methods: Mapping[str, str]) -> dict[str, str]:
+    return {name: on_page(why) for name, why in methods.items()}
+
+
+def _told(settled: ImportPlan | None, looked: Looked | None) -> list[str]:
+    """What is said besides the checks: what one of these says as well stands there alone."""
+    if settled is None:
+        return []
+    checked = [] if looked is None else [one.sentence for one in looked.checks]
+    alone = [own for own in settled.told if not any(own in sentence for sentence in checked)]
+    return [on_page(own) for own in alone]
 
 
 def _turns(settled: ImportPlan) -> str:
@@ -139,7 +154,7 @@ def _files(uses: Sequence[FileUse]) -> list[ImportedFile]:
             label=one.files.label,
             format=one.files.format if one.files.pieces else "",
             read_with=one.files.read_with,
-            why=one.why,
+            why=on_page(one.why),
             count=one.files.count,
             used=one.used,
         )
@@ -163,6 +178,7 @@ def _camera(view: PlannedView, known: Known) -> ImportedCamera:
         width=camera.image_size[0],
         height=camera.image_size[1],
         calibration=settled.calibration,
+        calibration_of=matched.calibration_of,
         detections="" if own is None else _label(known, own),
         boxes_format="" if own is None else own.format,
         boxes_per_step=0.0 if boxes is None else round(len(boxes.frames) / settled.frames, 1),
@@ -202,7 +218,7 @@ def _question(question: Question, wish: ImportWish) -> ImportQuestion:
         code=question.code,
         interpretations=question.interpretations,
         difference=question.difference,
-        flags=question.flags,
+        chosen=(on_page(question.flags[0]), on_page(question.flags[1])),
         wishes=(wishes[0], wishes[1]),
     )
 
@@ -212,8 +228,8 @@ def _check(one: Check, wish: ImportWish) -> ImportedCheck:
     return ImportedCheck(
         name=one.name,
         status=one.status,
-        sentence=one.sentence,
-        remedy=" ".join(str(remedy) for remedy in one.remedies),
+        sentence=on_page(one.sentence),
+        remedy=on_page(" ".join(str(remedy) for remedy in one.remedies)),
         mend=_changed(wish, changes) if changes else None,
     )
 

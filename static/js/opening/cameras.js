@@ -73,7 +73,12 @@ function row(info, camera, k) {
 			video || "no video",
 			`${frames ? `${frames} frames · ${show(camera.fps)} fps · ` : ""}${camera.width} × ${camera.height}`,
 		),
-		two(camera.calibration, `${key} · ${info.unit} → m`),
+		two(
+			camera.calibration,
+			camera.calibration_of === key
+				? `${key} · ${info.unit} → m`
+				: `that of ${camera.calibration_of} · ${info.unit} → m`,
+		),
 		sync(info, camera, k),
 		detections
 			? two(

@@ -27,14 +27,14 @@ export function draftSheet(info, methods, moved) {
 			: [
 					files(info),
 					asked && div({ class: "in-asked" }, asked),
-					!info.busy && ["failed", "settled"].includes(info.phase) && adding(info),
+					!info.busy && ["failed", "settled"].includes(info.phase) && adding(),
 				]),
 		foot(info),
 	];
 }
 
 /** @param {Server.ImportInfo} info */
-function head({ files_there, files_used, frames, cameras, fps, wish, uploaded, phase }) {
+function head({ files_there, files_used, frames, cameras, fps, wish, phase }) {
 	const facts = frames
 		? `${cameras.length} cameras · ${show(fps)} Hz · ${frames} steps · ${(frames / fps).toFixed(1)} s · ${files_used} of ${many(files_there, "file")} used`
 		: files_there
@@ -48,7 +48,7 @@ function head({ files_there, files_used, frames, cameras, fps, wish, uploaded, p
 		field("in-name", "Name", wish.name, { name: "$" }, { maxlength: 80 }),
 		cut(facts, "sub"),
 		grow(),
-		uploaded && phase !== "uploading" && button("Add files…", "files", ""),
+		!["uploading", "writing", "copying"].includes(phase) && button("Add files…", "files", ""),
 		close(),
 	);
 }
@@ -65,25 +65,21 @@ const files = ({ files, coming }) =>
 		coming.map((name) => h("p", { class: "coming" }, cut(name))),
 	);
 
-/** What may be missing where the files give no camera, and the way to add it. @param {Server.ImportInfo} info */
-const adding = ({ uploaded }) =>
+/** What may be missing where the files give no camera, and the way to add it. */
+const adding = () =>
 	div(
-		{ class: "in-asked in-add" },
-		h(
-			"p",
-			{},
-			`Cameras need a calibration: ${CALIBRATIONS}.`,
-			!uploaded && " Put its file into the folder and open the folder again.",
-		),
-		uploaded && button("Add a calibration file…", "files"),
+		{ class: "dropzone in-asked in-add" },
+		icon("i-import", "l"),
+		h("p", {}, `Cameras need a calibration: ${CALIBRATIONS}. Drop what is missing, or`),
+		button("Add a file…", "files"),
 	);
 
 /** How far copying is. @param {Server.ImportInfo} info */
 const copying = ({ copied, bytes, megabytes_per_second: speed }) =>
 	copied ? `, ${size(copied)} of ${size(bytes)} copied, ${speed.toFixed(0)} MB/s` : "";
 
-/** What there is to say now. @param {Server.ImportInfo} info @param {number} done  cameras that are ready @param {number} odd  things to decide */
-function stateOf(info, done, odd) {
+/** What there is to say now. @param {Server.ImportInfo} info @param {number} done  cameras that are ready @param {number} odd  things to decide @param {number} known  warnings with nothing to decide */
+function stateOf(info, done, odd, known) {
 	if (info.error) return info.error;
 	switch (info.phase) {
 		case "uploading":
@@ -102,7 +98,9 @@ function stateOf(info, done, odd) {
 			: "looking again"
 		: odd
 			? `${many(odd, "thing")} to decide`
-			: "nothing to decide";
+			: known
+				? `nothing to decide, ${many(known, "warning")}`
+				: "nothing to decide";
 	return `${done} of ${info.cameras.length} cameras ready, ${things}. Nothing is written before you import.`;
 }
 
@@ -110,10 +108,21 @@ function stateOf(info, done, odd) {
 function foot(info) {
 	const { phase, busy, cameras, checks, copied, bytes, received } = info;
 	const done = cameras.filter((camera) => isReady(info, camera)).length;
-	const warnings = checks.filter(({ status }) => status === "warning").length;
-	const odd = Math.max(warnings + Number(Boolean(info.undecided)), cameras.length - done);
-	const kind = info.error ? "bad" : busy || phase !== "settled" ? "busy" : odd ? "warn" : "good";
-	const words = stateOf(info, done, odd);
+	const warnings = checks.filter(({ status }) => status === "warning");
+	// What there is a button or a field for is to be decided; the rest is to be known.
+	const odd = Math.max(
+		warnings.filter(({ mend }) => mend).length + Number(Boolean(info.undecided)),
+		cameras.length - done,
+	);
+	const known = warnings.filter(({ mend }) => !mend).length;
+	const kind = info.error
+		? "bad"
+		: busy || phase !== "settled"
+			? "busy"
+			: odd || known
+				? "warn"
+				: "good";
+	const words = stateOf(info, done, odd, known);
 	const uploads = phase === "uploading";
 	const moving = uploads || (["writing", "copying"].includes(phase) && copied > 0);
 	const part = Math.min(1, bytes ? (uploads ? received : copied) / bytes : 1);

@@ -46,7 +46,7 @@ const SIGNS = {
 /** @param {string} words @param {string} note */
 const label = (words, note) => div({ class: "lab" }, span({}, words), cut(note));
 
-/** Where a value is from. @param {Info} info @param {"up" | "unit"} what */
+/** Where a value is from. @param {Info} info @param {"up" | "unit" | "fps"} what */
 function why({ wish, found }, what) {
 	if (wish[what] !== null) return "as you say";
 	const told = found.find(([name]) => name === what)?.[1];
@@ -84,6 +84,11 @@ export function roomPart(info, moved) {
 				{ class: "xyz" },
 				AXES.flatMap((letter, axis) => [span({}, letter), face(0, axis), face(1, axis)]),
 			),
+		),
+		div(
+			{},
+			label("Rate, steps a second", why(info, "fps")),
+			numberField("in-fps", "Rate, steps a second", info.fps, { fps: "#" }, { min: 0.01 }),
 		),
 		div({}, label("Up", why(info, "up")), segment("Up", UPS, info.up, "up")),
 		div(
@@ -184,7 +189,12 @@ export function checksPart(info) {
 			grow(),
 			small(`${fine.length} fine · ${odd.length} to look at`),
 		),
-		div({ class: "checks" }, undecided(info), [...odd, ...fine, ...of("absent")].map(check)),
+		div(
+			{ class: "checks" },
+			undecided(info),
+			exchanged(info),
+			[...odd, ...fine, ...of("absent")].map(check),
+		),
 		pairs(info),
 	);
 }
@@ -197,9 +207,7 @@ function undecided({ undecided: words, question, wish }) {
 			"warning",
 			"unexplained",
 			words,
-			wishing("Import it as it is", { ...wish, accept_best: true }, "box", {
-				title: "--accept-best",
-			}),
+			wishing("Import it as it is", { ...wish, accept_best: true }),
 		);
 	return line(
 		"warning",
@@ -207,9 +215,25 @@ function undecided({ undecided: words, question, wish }) {
 		question.difference,
 		...question.wishes.map((own, k) =>
 			wishing(capital(question.interpretations[k]), { ...own }, "box", {
-				title: question.flags[k],
+				title: question.chosen[k],
 			}),
 		),
+	);
+}
+
+/** Calibrations that are other cameras' than their names say, and the other choice. @param {Info} info */
+function exchanged({ cameras, wish: { as_named: kept } }) {
+	const moved = cameras.filter(({ key, calibration_of: of }) => of !== key);
+	if (moved.length === 0 && !kept) return null;
+	return line(
+		moved.length ? "warning" : "good",
+		"calibrations",
+		moved.length
+			? `by the boxes ${moved.map(({ name, calibration_of: of }) => `${name} has that of ${of}`).join(", ")}`
+			: "as the cameras are named",
+		kept
+			? wishing("As the boxes meet", { as_named: false })
+			: wishing("As named", { as_named: true, swap: [] }),
 	);
 }
 
@@ -416,10 +440,11 @@ const chosen = (words, value, pressed, wish, note) =>
 	);
 
 /** @param {Info} info */
-function kept({ uploaded, bytes, free, home, wish: { copy_files: copies } }) {
-	const place = home.length > LONGEST_PLACE ? `…${home.slice(1 - LONGEST_PLACE)}` : home;
+function kept({ uploaded, bytes, free, home, place: name, wish: { copy_files: copies } }) {
+	const whole = `${home}/${name}`;
+	const place = whole.length > LONGEST_PLACE ? `…${whole.slice(1 - LONGEST_PLACE)}` : whole;
 	const there = `${size(free)} free there`;
-	if (uploaded) return h("p", { title: home }, `${size(bytes)} uploaded to ${place}, ${there}.`);
+	if (uploaded) return h("p", { title: whole }, `${size(bytes)} uploaded to ${place}, ${there}.`);
 	return div(
 		{ class: "choices" },
 		chosen("Link", "", !copies, { copy_files: false }, "The videos stay where they are."),

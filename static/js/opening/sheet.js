@@ -214,7 +214,7 @@ export function mountOpening({ store, actions }) {
 		if (!files.length) return;
 		if (!dialog.open) dialog.showModal();
 		void attempt(async () => {
-			const more = info?.uploaded ? info : null;
+			const more = info;
 			if (!more) await giveUp();
 			let path = more ? `/api/import/${more.key}/files` : "/api/import";
 			/** @type {number[]} */

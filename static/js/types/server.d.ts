@@ -536,6 +536,8 @@ declare namespace Server {
 		/** Whether the files were sent by a page. */
 		uploaded: boolean;
 		home: string;
+		/** The name of its folder there, which has no signs that not every file system takes. */
+		place: string;
 		/** Bytes on the disk of the recordings. */
 		free: number;
 		fps: number;
@@ -584,8 +586,8 @@ declare namespace Server {
 		/** In words, the likelier one first. */
 		interpretations: [string, string];
 		difference: string;
-		/** The flags of the command line for each. */
-		flags: [string, string];
+		/** The fields of the sheet that each states, and how. */
+		chosen: [string, string];
 		/** What decides for each here. */
 		wishes: [ImportWish, ImportWish];
 	}
@@ -617,6 +619,11 @@ declare namespace Server {
 		accept_best: boolean;
 		/** Two cameras each whose calibrations are exchanged, one exchange after the other. */
 		swap: [string, string][];
+		/**
+		 * Whether calibrations stay with the cameras of their names, though boxes may meet better with
+		 * some of them exchanged.
+		 */
+		as_named: boolean;
 		/** Cameras of the calibration that are not wanted. */
 		left_out: string[];
 		/** What cameras are to be called, by their name in the calibration. */
@@ -659,6 +666,8 @@ declare namespace Server {
 		height: number;
 		/** What the calibration's file was recognised as. */
 		calibration: string;
+		/** The camera whose calibration it has by its file: its own, unless they are exchanged. */
+		calibration_of: string;
 		detections: string;
 		boxes_format: string;
 		boxes_per_step: number;
@@ -673,7 +682,7 @@ declare namespace Server {
 		name: string;
 		status: "good" | "warning" | "absent";
 		sentence: string;
-		/** As the command line has it; empty where there is none. */
+		/** The field of the sheet and what it should be; empty where there is none. */
 		remedy: string;
 		/** The wish that mends it; null where nothing here does. */
 		mend: ImportWish | null;

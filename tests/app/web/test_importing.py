@@ -123,7 +123,7 @@ def test_files_that_are_sent_become_a_recording(
 def test_a_wish_is_looked_into_and_can_be_taken_back(client: TestClient, files: Path) -> None:
     info = _settled(client, _send(client, files))
     other = _wish(client, info, pose="camera-to-world")
-    assert other["undecided"].startswith("with --pose camera-to-world ")
+    assert other["undecided"].startswith("with “Poses” camera-to-world ")
     assert "poses world-to-camera" in other["undecided"]
     refused = client.post(f"/api/import/{info['key']}/write", json={})
     assert refused.status_code == 422
@@ -160,7 +160,7 @@ def test_angles_of_which_nothing_tells_the_order_are_asked_for(
     info = _wish(client, info, turns="xzy-inverse", unit="m")
     assert (info["phase"], info["turns"]) == ("settled", "Rx Rz Ry, into the camera in radians")
     wrong = _wish(client, info, turns="sideways")
-    assert (wrong["phase"], "expected --euler" in wrong["error"]) == ("failed", True)
+    assert (wrong["phase"], "expected “Angles”" in wrong["error"]) == ("failed", True)
 
 
 def test_pictures_of_cameras_are_shown(client: TestClient, tmp_path: Path) -> None:

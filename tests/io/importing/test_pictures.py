@@ -24,6 +24,7 @@ def matched(
     return [
         MatchedCamera(
             replace(raw, image_size=size),
+            raw.name,
             VideoPiece(folder / f"{raw.name}.mp4", frames=10, fps=25.0, size=own),
         )
         for raw, size, own in zip(raws, calibrated, filmed, strict=False)

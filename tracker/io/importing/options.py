@@ -51,6 +51,9 @@ class CommonImportOptions(BaseModel):
     or where none explains the boxes."""
     swap: tuple[tuple[str, str], ...] = Field(default=(), max_length=MOST)
     """Two cameras each whose calibrations are exchanged, one exchange after the other."""
+    as_named: bool = False
+    """Whether calibrations stay with the cameras of their names, though boxes may meet better with
+    some of them exchanged."""
     left_out: tuple[str, ...] = Field(default=(), max_length=MOST)
     """Cameras of the calibration that are not wanted."""
     names: Mapping[str, str] = Field(default={}, max_length=MOST)

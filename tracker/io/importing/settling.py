@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -152,7 +153,8 @@ def settle(taken: Sequence[ParsedFiles], options: ImportOptions | None = None) -
     check_lenses([camera.raw for camera in cameras + matched.spare], matched.format)
     plain = [scaled(camera.raw, size) for camera, size in zip(cameras, sizes, strict=True)]
     raws = [_told(raw, options) for raw in plain]
-    spare = [_told(raw, options) for raw in _spare(matched)]
+    unused = _spare(matched)
+    spare = [_told(camera.raw, options) for camera in unused]
     if not any(c.video or c.images or c.detections is not None for c in cameras):
         raise nothing_of(cameras, taken, told)
     times = settle_times(cameras, matched.truths, options, found)
@@ -163,6 +165,7 @@ def settle(taken: Sequence[ParsedFiles], options: ImportOptions | None = None) -
         raws, plain, spare, cameras, boxes, times, arbitrary, options, found, told, open_
     )
     names = [raw.name for raw in raws]
+    _exchange_found([*cameras, *unused], verdict)
     clocks = {} if verdict is None else verdict.clocks
     late = _late(clocks, names, options)
     if late:
@@ -208,10 +211,11 @@ def settle(taken: Sequence[ParsedFiles], options: ImportOptions | None = None) -
         options.first_index,
         found,
     )
+    named = _renamed(settled, options, found)
     views = tuple(
         PlannedView(camera, own, boxes_, time, at)
         for camera, own, boxes_, time, at in zip(
-            _renamed(settled, options), cameras, detections, times.cameras, looked_at, strict=True
+            named, cameras, detections, times.cameras, looked_at, strict=True
         )
     )
     return ImportPlan(
@@ -241,11 +245,25 @@ def _sources(matched: Matched) -> frozenset[Path]:
     return matched.sources | found
 
 
-def _spare(matched: Matched) -> list[RawCamera]:
+def _exchange_found(cameras: Sequence[MatchedCamera], verdict: Verdict | None) -> None:
+    """Note whose calibration each camera has by the boxes.
+
+    Args:
+        cameras: Those that were judged, in their order.
+        verdict: What the boxes tell, where they tell anything.
+    """
+    order = None if verdict is None else verdict.best.reading.order
+    if order is not None:
+        owners = [camera.calibration_of for camera in cameras]
+        for camera, own in zip(cameras, order, strict=True):
+            camera.calibration_of = owners[own]
+
+
+def _spare(matched: Matched) -> list[MatchedCamera]:
     """Calibrations without files that may be those of boxes which no name gave to a camera."""
     known = [camera for camera in matched.spare if camera.raw.image_size is not None]
     few = len(matched.cameras) + len(known) <= MOST_CAMERAS
-    return [camera.raw for camera in known] if few and matched_by(matched.cameras) != "name" else []
+    return known if few and matched_by(matched.cameras) != "name" else []
 
 
 def _late(
@@ -304,9 +322,27 @@ def at_steps_of(own: Detections, time: CameraTime) -> Detections:
     return Detections(steps[rows], own.boxes[rows], own.scores[rows])
 
 
-def _renamed(cameras: Sequence[Camera], options: ImportOptions) -> list[Camera]:
-    """Cameras under the names that are wished."""
-    renamed = [replace(c, name=options.names.get(c.name, c.name).strip()) for c in cameras]
+def plain_name(name: str) -> str:
+    """A name without what heads no CSV column."""
+    return re.sub(r'[,"#\s]+', "_", name).strip("_") or "camera"
+
+
+def _renamed(
+    cameras: Sequence[Camera], options: ImportOptions, found: list[tuple[str, str]]
+) -> list[Camera]:
+    """Cameras under the names that are wished, and that can be written."""
+    renamed: list[Camera] = []
+    for camera in cameras:
+        wished = options.names.get(camera.name, camera.name).strip()
+        name = plain_name(wished) if wished else ""
+        if name != wished and camera.name in options.names:
+            raise FormatError(
+                f"name of {camera.name}: expected one without blanks, commas, quotes and #, since "
+                f'it heads columns of tables, found "{wished}"; "{name}" would do'
+            )
+        if name != wished:
+            found.append(("name", f'"{camera.name}" is called {name}: names head columns of CSV'))
+        renamed.append(replace(camera, name=name))
     names = [camera.name for camera in renamed]
     for name in names:
         if not name or names.count(name) > 1:
@@ -469,7 +505,7 @@ def _read(
         )
     layouts: tuple[Layout, ...] = get_args(Layout) if open_boxes else ("ltwh",)
     convention = raws[0].convention
-    free = not options.swap and not options.cameras
+    free = not options.swap and not options.cameras and not options.as_named
     find = partial(
         find_reading,
         seen=[*seen, *[None] * len(spare)],

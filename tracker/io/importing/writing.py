@@ -13,7 +13,7 @@ from numpy import ndarray
 from tracker.files.atomic import replacing, write_whole
 from tracker.io.conventions.questions import ACCEPT
 from tracker.io.importing.bringing import Told, bring, bring_images
-from tracker.io.importing.settling import ImportPlan, PlannedView
+from tracker.io.importing.settling import ImportPlan, PlannedView, plain_name
 from tracker.io.read.pieces import FormatError
 from tracker.sequences.writing.csv_files import steps_without_boxes, write_boxes, write_truth
 
@@ -95,7 +95,7 @@ def _camera(
     view: PlannedView, name: str, folder: Path, copy: bool, copied: Told, told: list[str]
 ) -> str:
     camera = view.camera
-    lines = ["[[camera]]", f"name = {_text(_plain_name(camera.name))}"]
+    lines = ["[[camera]]", f"name = {_text(plain_name(camera.name))}"]
     lines.append(f"image_size = [{camera.image_size[0]}, {camera.image_size[1]}]")
     matched = view.matched
     if matched.video is not None:
@@ -133,11 +133,6 @@ def _camera(
         "",
     ]
     return "\n".join(lines)
-
-
-def _plain_name(name: str) -> str:
-    """Without what heads no CSV column."""
-    return re.sub(r'[,"#\s]+', "_", name).strip("_") or "camera"
 
 
 def _file_names(names: Sequence[str]) -> list[str]:

@@ -36,6 +36,8 @@ class MatchedCamera:
     """One camera with what belongs to it."""
 
     raw: RawCamera
+    calibration_of: str
+    """The camera whose calibration it has by its file: its own, unless they are exchanged."""
     video: VideoPiece | None = None
     images: ImagesPiece | None = None
     detections: DetectionPiece | None = None
@@ -102,7 +104,7 @@ def match_all(
     for other in sets:
         if other is not chosen:
             told.append(f"{other.label}: is another calibration; it is not used")
-    cameras = [MatchedCamera(raw) for raw in chosen.cameras]
+    cameras = [MatchedCamera(raw, raw.name) for raw in chosen.cameras]
     _by_flag(cameras, videos, detections, options)
     _match_pictures(cameras, videos, told)
     _match_boxes(cameras, detections, _spoilt(taken), told)
@@ -237,6 +239,7 @@ def _exchange(cameras: list[MatchedCamera], options: ImportOptions) -> None:
     for first, second in options.swap:
         one, other = (_named(cameras, name, "--swap") for name in (first, second))
         one.raw, other.raw = replace(other.raw, name=first), replace(one.raw, name=second)
+        one.calibration_of, other.calibration_of = other.calibration_of, one.calibration_of
 
 
 def _give_pictures(camera: MatchedCamera, piece: VideoPiece | ImagesPiece, how: How) -> None:

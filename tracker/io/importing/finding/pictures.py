@@ -53,6 +53,7 @@ def exchange_by_shape(cameras: Sequence[MatchedCamera], found: list[tuple[str, s
         cameras: The cameras, whose calibrations are replaced.
         found: What was found out is added.
     """
+    whose = {camera.raw.name: camera.calibration_of for camera in cameras}
     wrong = [
         (camera, camera.raw, camera.raw.image_size, camera.picture_size)
         for camera in cameras
@@ -84,6 +85,7 @@ def exchange_by_shape(cameras: Sequence[MatchedCamera], found: list[tuple[str, s
             )
         )
         camera.raw = replace(wrong[owner][1], name=raw.name)
+        camera.calibration_of = whose[wrong[owner][1].name]
 
 
 def _size(camera: MatchedCamera, found: list[tuple[str, str]]) -> tuple[int, int] | None:
