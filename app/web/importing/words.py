@@ -24,12 +24,15 @@ FIELDS = {
 """What the sheet of *Open* calls a flag of the import, or a field of ``sequence.toml``."""
 
 _WHOLE = (
-    (r"; --camera \S+=FILE$", "; choose it in the row of its camera, or name it after its camera"),
+    (
+        r"; --camera \S+=FILE(?=\)?$)",
+        "; choose it in the row of its camera, or name it after its camera",
+    ),
     (r"by --camera \S+=FILE", "by the name of its camera, with the others left out"),
     (r" \(`multiview-phd formats` lists them\)", ""),
     (r"timestamps in sequence\.toml", "in a file of time stamps"),
     (r"name (a video or images|a file of detections) in sequence\.toml", r"add \1"),
-    (r" or by `[^`]*`", ""),
+    (r" or by `[^`]*`, or start the program with --detector model\.onnx", ""),
 )
 """What the page says in place of words that name more than a flag."""
 

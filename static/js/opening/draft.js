@@ -68,7 +68,7 @@ const files = ({ files, coming }) =>
 /** What may be missing where the files give no camera, and the way to add it. */
 const adding = () =>
 	div(
-		{ class: "dropzone in-asked in-add" },
+		{ class: "in-asked in-add" },
 		icon("i-import", "l"),
 		h("p", {}, `Cameras need a calibration: ${CALIBRATIONS}. Drop what is missing, or`),
 		button("Add a file…", "files"),

@@ -187,7 +187,7 @@ export function checksPart(info) {
 			"Checks",
 			small(now ? `looking at the ${now}…` : ""),
 			grow(),
-			small(`${fine.length} fine · ${odd.length} to look at`),
+			small(`${fine.length} fine · ${odd.length + Number(hasMoved(info))} to look at`),
 		),
 		div(
 			{ class: "checks" },
@@ -221,9 +221,17 @@ function undecided({ undecided: words, question, wish }) {
 	);
 }
 
+/** @param {Server.ImportedCamera} camera */
+const isMoved = ({ key, calibration_of: of }) => of !== key;
+
+/** @param {Info} info */
+const hasMoved = ({ cameras }) => cameras.some(isMoved);
+
 /** Calibrations that are other cameras' than their names say, and the other choice. @param {Info} info */
-function exchanged({ cameras, wish: { as_named: kept } }) {
-	const moved = cameras.filter(({ key, calibration_of: of }) => of !== key);
+function exchanged(info) {
+	const { cameras, wish } = info;
+	const kept = wish.as_named;
+	const moved = cameras.filter(isMoved);
 	if (moved.length === 0 && !kept) return null;
 	return line(
 		moved.length ? "warning" : "good",

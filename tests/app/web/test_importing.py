@@ -234,7 +234,7 @@ def test_entrances_and_methods_are_chosen_on_the_sheet(
     detections(files, places=places)
     info = _settled(client, _send(client, files))
     assert info["fitting"]["single_view"] == "none"
-    assert "has none; name a video" in info["unfit"]["single_view"]["jpda"]
+    assert "has none; add a video" in info["unfit"]["single_view"]["jpda"]
     ((place, sigma),) = info["entrances"]
     assert place == pytest.approx(PLACES[25, 3].tolist(), abs=0.5)
     assert info["wish"]["entrances"] == []
