@@ -1,8 +1,18 @@
 /** The sheet once files are there: cameras, room, checks, target, and what happens next. */
-import { h, icon, show } from "../elements/dom.js";
+import { h, icon } from "../elements/dom.js";
 import { many, size } from "../library/words.js";
 import { camerasTable, isReady } from "./cameras.js";
-import { CALIBRATIONS, button, close, cut, div, field, grow, span } from "./controls.js";
+import {
+	CALIBRATIONS,
+	button,
+	close,
+	cut,
+	div,
+	field,
+	grow,
+	numberField,
+	span,
+} from "./controls.js";
 import { anglesChoice, checksPart, roomPart, targetPart } from "./settings.js";
 
 /**
@@ -35,8 +45,9 @@ export function draftSheet(info, methods, moved) {
 
 /** @param {Server.ImportInfo} info */
 function head({ files_there, files_used, frames, cameras, fps, wish, phase }) {
+	const used = `${files_used} of ${many(files_there, "file")} used`;
 	const facts = frames
-		? `${cameras.length} cameras · ${show(fps)} Hz · ${frames} steps · ${(frames / fps).toFixed(1)} s · ${files_used} of ${many(files_there, "file")} used`
+		? `Hz · ${cameras.length} cameras · ${frames} steps · ${(frames / fps).toFixed(1)} s · ${used}`
 		: files_there
 			? many(files_there, "file")
 			: "";
@@ -46,6 +57,14 @@ function head({ files_there, files_used, frames, cameras, fps, wish, phase }) {
 		button(icon("i-prev"), "give-up", "icon start", { "aria-label": "Back to recent" }),
 		h("h2", {}, "Import"),
 		field("in-name", "Name", wish.name, { name: "$" }, { maxlength: 80 }),
+		frames > 0 &&
+			numberField(
+				"in-fps",
+				"Rate, steps a second",
+				fps,
+				{ fps: "#" },
+				{ min: 0.01, class: "rate" },
+			),
 		cut(facts, "sub"),
 		grow(),
 		!["uploading", "writing", "copying"].includes(phase) && button("Add files…", "files", ""),

@@ -23,8 +23,8 @@ const AXES = ["x", "y", "z"];
 const UPS = ["x", "y", "z", "-x", "-y", "-z"];
 const LAYOUTS = ["ltwh", "xyxy", "yxyx", "cxcywh"];
 
-/** Letters of the folder of recordings; of a longer one the end is shown. */
-const LONGEST_PLACE = 30;
+/** Letters of a recording's folder; of a longer name the beginning is shown. */
+const LONGEST_PLACE = 24;
 
 /** Cameras whose pairs are listed one by one; those of more stand in a square. */
 const MOST_LISTED = 6;
@@ -46,7 +46,7 @@ const SIGNS = {
 /** @param {string} words @param {string} note */
 const label = (words, note) => div({ class: "lab" }, span({}, words), cut(note));
 
-/** Where a value is from. @param {Info} info @param {"up" | "unit" | "fps"} what */
+/** Where a value is from. @param {Info} info @param {"up" | "unit"} what */
 function why({ wish, found }, what) {
 	if (wish[what] !== null) return "as you say";
 	const told = found.find(([name]) => name === what)?.[1];
@@ -84,11 +84,6 @@ export function roomPart(info, moved) {
 				{ class: "xyz" },
 				AXES.flatMap((letter, axis) => [span({}, letter), face(0, axis), face(1, axis)]),
 			),
-		),
-		div(
-			{},
-			label("Rate, steps a second", why(info, "fps")),
-			numberField("in-fps", "Rate, steps a second", info.fps, { fps: "#" }, { min: 0.01 }),
 		),
 		div({}, label("Up", why(info, "up")), segment("Up", UPS, info.up, "up")),
 		div(
@@ -450,7 +445,7 @@ const chosen = (words, value, pressed, wish, note) =>
 /** @param {Info} info */
 function kept({ uploaded, bytes, free, home, place: name, wish: { copy_files: copies } }) {
 	const whole = `${home}/${name}`;
-	const place = whole.length > LONGEST_PLACE ? `…${whole.slice(1 - LONGEST_PLACE)}` : whole;
+	const place = name.length > LONGEST_PLACE ? `${name.slice(0, LONGEST_PLACE)}…` : name;
 	const there = `${size(free)} free there`;
 	if (uploaded) return h("p", { title: whole }, `${size(bytes)} uploaded to ${place}, ${there}.`);
 	return div(

@@ -33,7 +33,7 @@ def check_truth(sequence: Sequence) -> Check:
     truth = sequence.ground_truth
     detections = [view.detections for view in sequence.views]
     if truth is None or not len(truth.frames):
-        return absent(name, "there is no truth, so that runs are not scored")
+        return absent(name, "there is no truth")
     if not any(own is not None and len(own.frames) for own in detections):
         return absent(name, "there are no boxes")
     share = share_in_boxes(truth.frames, truth.positions, sequence.cameras, detections)
