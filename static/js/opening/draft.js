@@ -90,7 +90,7 @@ const adding = () =>
 		{ class: "in-asked in-add" },
 		icon("i-import", "l"),
 		h("p", {}, `Cameras need a calibration: ${CALIBRATIONS}. Drop what is missing, or`),
-		button("Add a file…", "files"),
+		button("Add a calibration file…", "files"),
 	);
 
 /** How far copying is. @param {Server.ImportInfo} info */

@@ -84,7 +84,7 @@ def test_dropped_files_become_tracks(
     expect(sheet.locator("tbody tr")).to_have_count(4)
     expect(sheet.locator("tbody tr").first).to_contain_text("cam1.avi")
     expect(sheet.locator("tbody tr").first).to_contain_text("60 frames · 20 fps · 640 × 360")
-    expect(sheet.locator(".told")).to_contain_text("session/notes.txt is not used")
+    expect(sheet.locator(".told")).to_contain_text("session/notes.txt: no format that is read")
     expect(sheet.locator(".told")).to_be_in_viewport()
     expect(sheet.get_by_role("group", name="Unit").locator("[aria-pressed=true]")).to_have_text(
         "cm"
@@ -186,14 +186,14 @@ def test_what_is_changed_is_looked_into_again(flat_page: Page, files: Path) -> N
     sheet = page.locator("dialog.opener")
     sheet.get_by_label("Poses").select_option("camera-to-world")
     settled(page)
-    expect(sheet.get_by_role("button", name="Apply --pose world-to-camera")).to_be_visible()
+    expect(sheet.get_by_role("button", name="Apply “Poses” world-to-camera")).to_be_visible()
     page.locator("h2", has_text="Import").click()
     page.keyboard.press("Control+z")
-    expect(sheet.get_by_role("button", name="Apply --pose world-to-camera")).to_have_count(0)
+    expect(sheet.get_by_role("button", name="Apply “Poses” world-to-camera")).to_have_count(0)
     settled(page)
     sheet.get_by_role("group", name="Unit").get_by_role("button", name="mm").click()
-    sheet.get_by_role("button", name="Apply --unit cm").click()
-    expect(sheet.get_by_role("button", name="Apply --unit cm")).to_have_count(0)
+    sheet.get_by_role("button", name="Apply “File's unit” cm").click()
+    expect(sheet.get_by_role("button", name="Apply “File's unit” cm")).to_have_count(0)
     sheet.get_by_label("Boxes", exact=True).select_option("xyxy")
     first = sheet.locator("tbody tr").first
     expect(first).to_contain_text("none of its boxes is left as they are read")
