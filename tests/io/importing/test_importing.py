@@ -590,3 +590,42 @@ def test_times_of_cameras_with_other_rates_are_steps_of_one(tmp_path: Path) -> N
         assert view.detections is not None
         frames = boxes(camera, PLACES)[0]
         np.testing.assert_array_equal(view.detections.frames, frames[frames % every == 0])
+
+
+def test_a_folder_that_is_imported_into_itself_keeps_its_own_files(tmp_path: Path) -> None:
+    toml(tmp_path)
+    detections(tmp_path)
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    settled = settled_of(tmp_path)
+    write(settled, tmp_path, "itself")
+    assert {name: (tmp_path / name).read_bytes() for name in before} == before
+    read = read_sequence(tmp_path)
+    assert [view.detections is not None for view in read.views] == [True] * 4
+
+
+@pytest.mark.parametrize("own", [False, True])
+def test_an_import_that_cannot_be_written_to_its_end_leaves_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, own: bool
+) -> None:
+    source, target = tmp_path / "source", tmp_path / "target"
+    source.mkdir()
+    toml(source)
+    detections(source)
+    if own:
+        target = source
+    before = {path.name: path.read_bytes() for path in source.iterdir()}
+    settled = settled_of(source)
+    calls: list[Path] = []
+
+    def full(path: Path, *given: object, **more: object) -> None:
+        calls.append(path)
+        path.write_text("frame,left\n")
+        if len(calls) == 3:
+            raise OSError(f"{path}: cannot be written (No space left on device)")
+
+    monkeypatch.setattr("tracker.io.importing.writing.write_boxes", full)
+    with pytest.raises(OSError, match="No space left"):
+        write(settled, target, "case")
+    assert len(calls) == 3
+    assert target.exists() == own
+    assert {path.name: path.read_bytes() for path in source.iterdir()} == before

@@ -16,6 +16,15 @@ Told = Callable[[int], None]
 """Called with how many more bytes are copied; what it raises ends the copying."""
 
 
+def free_place(path: Path) -> Path:
+    """A path at which there is nothing yet: this one, or with a number after its name. A folder
+    that is imported into itself keeps its own files."""
+    number, found = 2, path
+    while found.exists() or found.is_symlink():
+        number, found = number + 1, path.with_name(f"{path.stem}-{number}{path.suffix}")
+    return found
+
+
 def bring(path: Path, folder: Path, name: str, copy: bool, told: Told) -> tuple[str, bool]:
     """A file in the folder: where it lies if it is inside, else a link to it, or a copy.
 
@@ -31,9 +40,9 @@ def bring(path: Path, folder: Path, name: str, copy: bool, told: Told) -> tuple[
         another file system, or one without links.
     """
     real, home = path.resolve(), folder.resolve()
-    if not copy and real.is_relative_to(home):
+    if real.is_relative_to(home):
         return real.relative_to(home).as_posix(), False
-    target = folder / f"{name}{path.suffix.lower()}"
+    target = free_place(folder / f"{name}{path.suffix.lower()}")
     linked = _place(real, target, copy, told)
     return target.name, not copy and not linked
 
@@ -42,20 +51,19 @@ def bring_images(
     files: Sequence[Path], folder: Path, name: str, copy: bool, told: Told
 ) -> tuple[str, bool]:
     """Pictures under numbers that sort as they follow each other; as :func:`bring`."""
-    own = folder / name
-    own.mkdir(exist_ok=True)
+    own = free_place(folder / name)
+    own.mkdir()
     width = len(str(len(files)))
     linked = [
         _place(path.resolve(), own / f"{number:0{width}}{path.suffix.lower()}", copy, told)
         for number, path in enumerate(files)
         if path.exists()  # one missing in the row of their numbers stays missing
     ]
-    return f"{name}/*{files[0].suffix.lower()}", not copy and not all(linked)
+    return f"{own.name}/*{files[0].suffix.lower()}", not copy and not all(linked)
 
 
 def _place(real: Path, target: Path, copy: bool, told: Told) -> bool:
     """Whether it is a link."""
-    target.unlink(missing_ok=True)
     if not copy:
         try:
             os.link(real, target)

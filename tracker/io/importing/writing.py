@@ -10,9 +10,9 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from tracker.files.atomic import replacing, write_whole
+from tracker.files.atomic import new_folder, replacing, write_whole
 from tracker.io.conventions.questions import ACCEPT
-from tracker.io.importing.bringing import Told, bring, bring_images
+from tracker.io.importing.bringing import Told, bring, bring_images, free_place
 from tracker.io.importing.settling import ImportPlan, PlannedView, plain_name
 from tracker.io.read.pieces import FormatError
 from tracker.sequences.writing.csv_files import steps_without_boxes, write_boxes, write_truth
@@ -45,10 +45,26 @@ def write(
 
     Raises:
         FormatError: If there is a sequence in the folder already.
+        OSError: If it cannot be written; nothing of it is left then.
     """
     if (folder / FILE).exists():
         raise FormatError(f"{folder}: holds a {FILE} already; name another folder, or remove it")
-    folder.mkdir(parents=True, exist_ok=True)
+    if not folder.is_dir() or not any(folder.iterdir()):
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        with new_folder(folder) as place:
+            return _write_into(place, settled, name, copy, copied)
+    before = set(folder.rglob("*"))
+    try:
+        return _write_into(folder, settled, name, copy, copied)
+    except BaseException:
+        for path in sorted(set(folder.rglob("*")) - before, reverse=True):
+            path.rmdir() if path.is_dir() and not path.is_symlink() else path.unlink()
+        raise
+
+
+def _write_into(
+    folder: Path, settled: ImportPlan, name: str, copy: bool, copied: Told
+) -> list[str]:
     names = _file_names([view.camera.name for view in settled.views])
     told: list[str] = []
     tables = []
@@ -56,8 +72,9 @@ def write(
         tables.append(_camera(view, own, folder, copy, copied, told))
     truth = ""
     if settled.truth is not None:
-        write_truth(folder / "ground_truth.csv", settled.truth, decimals=".5f")
-        truth = '\n[ground_truth]\nfile = "ground_truth.csv"\n'
+        file = free_place(folder / "ground_truth.csv")
+        write_truth(file, settled.truth, decimals=".5f")
+        truth = f"\n[ground_truth]\nfile = {_text(file.name)}\n"
     head = [
         *([] if settled.open is None else [f"# by {ACCEPT}: {settled.open}"]),
         "format = 1",
@@ -113,17 +130,17 @@ def _camera(
     lines += [] if timing.fps is None else [f"fps = {_number(timing.fps)}"]
     lines += [f"time_offset = {_number(timing.time_offset)}"] if timing.time_offset else []
     if timing.stamps is not None:
-        file = f"{name}_times.csv"
+        file = free_place(folder / f"{name}_times.csv")
         rows = "\n".join(map(_number, timing.stamps))
-        write_whole(folder / file, f"frame_time\n{rows}\n".encode())
-        lines.append(f"timestamps = {_text(file)}")
+        write_whole(file, f"frame_time\n{rows}\n".encode())
+        lines.append(f"timestamps = {_text(file.name)}")
     if view.detections is not None:
-        file = f"{name}.csv"
+        file = free_place(folder / f"{name}.csv")
         looked_at = np.zeros(0, dtype=np.int64) if view.looked_at is None else view.looked_at
         empty = steps_without_boxes(view.detections, looked_at)
-        write_boxes(folder / file, view.detections, empty, decimals=(".3f", ".4f"))
+        write_boxes(file, view.detections, empty, decimals=(".3f", ".4f"))
         lines += ['detected_steps = "listed"'] if view.looked_at is not None else []
-        lines.append(f"detections = {_text(file)}")
+        lines.append(f"detections = {_text(file.name)}")
     lines += [
         f"K = {_rows(camera.intrinsics)}",
         f"distortion = {_list(camera.distortion)}",
