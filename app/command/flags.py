@@ -58,7 +58,8 @@ def has_screen() -> bool:
 
 
 def set_values(items: tuple[str, ...]) -> dict[str, str]:
-    """The values of ``--set`` by key, without parameters that no longer exist, which it says.
+    """The values of ``--set`` by the keys of now, without parameters that no longer exist; what has
+    another key now, or is gone, is said.
 
     Raises:
         ParameterError: If one is not KEY=VALUE.
@@ -68,7 +69,10 @@ def set_values(items: tuple[str, ...]) -> dict[str, str]:
         key, mark, text = item.partition("=")
         if not mark:
             raise ParameterError("--set", f"expected KEY=VALUE, got {item!r}")
-        values[current_key(key.strip())] = text.strip()
+        given = key.strip()
+        if (now := current_key(given)) != given:
+            say(f"{given} is called {now} now")
+        values[now] = text.strip()
     for sentence in removed_notes(values):
         say(sentence)
     return {key: text for key, text in values.items() if key not in REMOVED}

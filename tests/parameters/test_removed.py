@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from app.command.flags import set_values
 from tests.library.runs import RECORDING, run
 from tests.parameters.test_renamed import stored
 from tracker.library.store import Library, parameters_of
@@ -34,6 +35,17 @@ def test_values_beside_those_of_removed_parameters_count() -> None:
     assert changed_values(with_values(RunParameters(), {**GONE, **MEANT})) == MEANT
     parameters, unknown = parameters_of(stored({**GONE, **MEANT}))
     assert (changed_values(parameters), unknown) == (MEANT, ())
+
+
+def test_the_command_line_says_what_a_renamed_parameter_is_called(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    old, new = next(iter(RENAMED.items()))
+    assert set_values((f"{old}=0.3", "fusion.clutter_rate=2")) == {
+        new: "0.3",
+        "fusion.clutter_rate": "2",
+    }
+    assert f"{old} is called {new} now" in capsys.readouterr().err
 
 
 def test_a_run_of_the_library_says_which_changes_no_longer_exist(tmp_path: Path) -> None:

@@ -140,7 +140,7 @@ RunsAction = (
 
 @dataclass
 class Runs:
-    """What is kept of runs: list, show, open, export, rename, star, delete, compare."""
+    """What is kept of runs: list, show, open, export, rename, star, delete, diff."""
 
     action: OmitSubcommandPrefixes[RunsAction] = field(default_factory=ListRuns)
 

@@ -355,6 +355,6 @@ def test_provisional_figures_are_marked_and_made_anew_when_their_run_is_opened(
         assert small["room"] is None, "another recording is open"
         client.post(f"/api/library/runs/{true['id']}/open")
         wait_until(lambda: not runs_of(client)[0]["provisional"])
-        assert runs_of(client) == [true]
+        assert runs_of(client) == [{**true, "templates": None}], "its file did not tell them"
         small = client.get(f"/api/library/runs/{true['id']}").json()
         assert small["ospa"] == ospa
