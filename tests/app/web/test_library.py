@@ -69,7 +69,7 @@ def test_finished_runs_are_kept_with_their_figures(kept: TestClient) -> None:
 
 
 @pytest.mark.full
-def test_a_kept_run_names_its_people(kept: TestClient) -> None:
+def test_a_kept_run_names_its_people(kept: TestClient, data: Path) -> None:
     track = kept.get("/api/timeline").json()["tracks"][0]
     wish = {"kind": "name", "tracks": [track["id"]], "name": "Anna", "step": track["first"] + 9}
     kept.post("/api/corrections", json={"corrections": [wish]})
@@ -82,6 +82,7 @@ def test_a_kept_run_names_its_people(kept: TestClient) -> None:
             life for life in kept.get("/api/timeline").json()["tracks"] if life["id"] == track["id"]
         ]
         assert shown["name"] == name
+    (data / "crossing" / "corrections.toml").unlink()  # other tests open it without
 
 
 @pytest.mark.full
