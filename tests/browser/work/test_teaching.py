@@ -256,7 +256,8 @@ def test_a_template_by_numbers_is_added_once_and_named(flat_page: Page, server: 
     page.keyboard.type("Dora")
     page.keyboard.press("Enter")
     expect(name).to_have_value("Dora")
-    expect(page.get_by_role("button", name="Go to step 20, camera cam1")).to_be_focused()
+    row = page.get_by_role("row", name="Box of Dora, cam1, step 20")
+    expect(row.get_by_role("button", name="Go to step 20, camera cam1")).to_be_focused()
     expect(page.locator("#new-left")).to_have_value("")
     # what is beside a new row keeps the focus
     save = page.get_by_role("button", name="Add an entrance")
