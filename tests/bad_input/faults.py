@@ -19,6 +19,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import json
+import math
 import os
 import re
 import shutil
@@ -30,7 +31,7 @@ import tempfile
 import time
 import zipfile
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from random import Random
@@ -39,7 +40,7 @@ import httpx2
 import psutil
 
 from tests.app.folders import write_crossing
-from tests.browser.serving import Server
+from tests.browser.serving import Server, folders_in
 from tests.io.read.recorded import detections, toml
 from tests.studies.small import definition
 from tracker.corrections.kinds import make
@@ -105,31 +106,28 @@ def environment(home: Path) -> dict[str, str]:
     """Return the environment of a person whose files are all in one folder."""
     return {
         **os.environ,
-        "MULTIVIEW_PHD_CACHE": str(home / "home" / "cache"),
-        "MULTIVIEW_PHD_SETTINGS": str(home / "home" / "settings"),
-        "MULTIVIEW_PHD_LIBRARY": str(home / "home" / "library.sqlite3"),
-        "MULTIVIEW_PHD_STUDIES": str(home / "home" / "studies"),
+        **folders_in(home / "home"),
         "NUMBA_CACHE_DIR": str(kernel_folder()),
         "TMPDIR": str(home / "tmp"),
     }
 
 
-def start(home: Path, job: Job, said: Path, more: dict[str, str]) -> subprocess.Popen[bytes]:
+def start(home: Path, job: Job, said: Path) -> subprocess.Popen[bytes]:
     """Start a command in a session of its own; what it says goes into a file elsewhere."""
     with said.open("wb") as file:
         return subprocess.Popen(
             [sys.executable, "-m", "app", *job.arguments],
             cwd=home,
-            env=environment(home) | more,
+            env=environment(home),
             stdout=file,
             stderr=subprocess.STDOUT,
             start_new_session=True,
         )
 
 
-def run(home: Path, job: Job, said: Path, more: dict[str, str] | None = None) -> int:
+def run(home: Path, job: Job, said: Path) -> int:
     """Run a command to its end and return its status."""
-    process = start(home, job, said, more or {})
+    process = start(home, job, said)
     try:
         return process.wait(LONGEST_SECONDS)
     except subprocess.TimeoutExpired:
@@ -145,7 +143,7 @@ def kill_all(process: subprocess.Popen[bytes]) -> None:
 
 
 def make_home(home: Path) -> None:
-    """Make a recording, files to import, corrections, a kept run and a study that was finished."""
+    """Make a recording, files to import, corrections, a kept run and a study to be run."""
     for name in ("out", "home", "source", "tmp"):
         (home / name).mkdir(parents=True)
     write_crossing(home / "recording", STEPS)
@@ -161,7 +159,7 @@ def make_home(home: Path) -> None:
         raise Fell(said.read_text())
     for form in FORMS:
         (home / "out" / f"run.{form}").write_text("of an earlier run")
-    shutil.rmtree(home / "home" / "cache", ignore_errors=True)
+    shutil.rmtree(home / "home" / "stages", ignore_errors=True)  # what is tried computes its own
 
 
 def files(home: Path) -> dict[str, bytes]:
@@ -185,12 +183,7 @@ def _content(path: Path) -> bytes:
 
 def _is_own(place: Path) -> bool:
     """Whether a file is the program's own: a cache, a lock, a database that is judged apart."""
-    return (
-        place.parts[:2] in {("home", "cache"), ("home", "studies"), ("home", "settings")}
-        or place.parts[0] == "tmp"
-        or place.name.startswith("library.sqlite3")
-        or place.name.endswith(".lock")
-    )
+    return place.parts[0] in ("home", "tmp") or place.name.endswith(".lock")
 
 
 def written(job: Job, contents: dict[str, bytes]) -> dict[str, bytes]:
@@ -248,7 +241,7 @@ def can_mount() -> bool:
 
 
 @contextlib.contextmanager
-def full(home: Path, disk_folder: Path, room: int) -> Iterator[None]:
+def full(disk_folder: Path, room: int) -> Iterator[None]:
     """Leave a disk so many bytes, rounded up to pages."""
     used = shutil.disk_usage(disk_folder).used
     line = ["mount", "-o", f"remount,size={used + room}", str(disk_folder)]
@@ -332,15 +325,16 @@ def try_one(base: Path, job: Job, fault: str, chance: Random, known: Usual, plac
     home = place / "home"
     shutil.copytree(base, home)
     before, kept, done = files(home), runs_kept(home), trials_done(home)
+    own = written(job, before)
     said = place.parent / "said.txt"
     with contextlib.ExitStack() as held:
         if fault == "full disk":
-            held.enter_context(full(home, place, int(chance.random() ** 2 * known.used)))
+            held.enter_context(full(place, int(chance.random() ** 2 * known.used)))
         elif fault == "read only":
             which = chance.choice(("out", "recording", "home", "."))
             held.enter_context(read_only(home / which))
         if fault == "kill":
-            process = start(home, job, said, {})
+            process = start(home, job, said)
             kill_at(process, chance.uniform(0.0, 1.1 * known.seconds), chance)
             status = process.returncode
         else:
@@ -352,10 +346,9 @@ def try_one(base: Path, job: Job, fault: str, chance: Random, known: Usual, plac
         raise Fell(f"a traceback: {words[-1500:]}")
     after = files(home)
     theirs = written(job, after)
-    if lost := [name for name, data in before.items() if name not in written(job, before)
-                and after.get(name) != data]:  # fmt: skip
+    if lost := [n for n, data in before.items() if n not in own and after.get(n) != data]:
         raise Fell(f"lost or altered: {lost}")
-    if theirs not in (written(job, before), known.written):
+    if theirs not in (own, known.written):
         raise Fell(f"half written: {sorted(theirs)}")
     if new := [name for name in after if name not in before and name not in known.written
                and ".part." not in name]:  # fmt: skip
@@ -401,61 +394,59 @@ def try_served(base: Path, fault: str, chance: Random, place: Path) -> str:
     """
     home = place / "home"
     shutil.copytree(base, home)
-    log = home / "recording" / "corrections.toml"
     before = {name: data for name, data in files(home).items() if name != SERVED.writes}
-    confirmed = len(read_log(log))
-    refused = 0
-    with tempfile.TemporaryDirectory() as name:
-        settings = home / "home" / "settings"
-        server = Server(home / "recording", settings, kernels=kernel_folder())
-        try:
-            server.wait_for_run()
-            with contextlib.ExitStack() as held:
-                if fault == "full disk":
-                    held.enter_context(full(home, place, int(chance.random() * 8192)))
-                elif fault == "read only":
-                    held.enter_context(read_only(home / "recording"))
-                process = psutil.Process(server.process.pid)
-                family = [process, *process.children(recursive=True)]
-                deadline = time.monotonic() + chance.uniform(0.0, 0.4)
-                for number in range(1, 40):
-                    if fault == "kill" and time.monotonic() > deadline:
-                        break
-                    wish = {"kind": "checked", "first": number, "last": number}
-                    answer = httpx2.post(
-                        f"{server.address}api/corrections",
-                        json={"corrections": [wish]},
-                        timeout=30.0,
-                    )
-                    if answer.status_code == 200:
-                        confirmed += 1
-                    elif answer.status_code < 500 or answer.status_code == 507:
-                        refused += 1
-                    else:
-                        raise Fell(f"status {answer.status_code}: {answer.text[:500]}")
-                    if fault != "kill" and number >= 6:
-                        break
-                if fault == "kill":
-                    for one in family:
-                        with contextlib.suppress(psutil.NoSuchProcess):
-                            one.kill()
-        finally:
-            with contextlib.suppress(Exception):
-                server.stop()
-            server.process.kill()
-            shutil.rmtree(name, ignore_errors=True)
+    server = Server(home / "recording", home / "home", kernels=kernel_folder())
+    try:
+        server.wait_for_run()
+        family = [psutil.Process(server.process.pid), server.serving]
+        with contextlib.ExitStack() as held:
+            if fault == "full disk":
+                held.enter_context(full(place, int(chance.random() * 8192)))
+            elif fault == "read only":
+                held.enter_context(read_only(home / "recording"))
+            until = time.monotonic() + chance.uniform(0.0, 0.4) if fault == "kill" else math.inf
+            confirmed, refused = correct_until(server, until)
+        for one in family if fault == "kill" else ():
+            one.kill()
+    finally:
+        with contextlib.suppress(Exception):
+            server.stop()
+        server.process.kill()
     after = {name: data for name, data in files(home).items() if name != SERVED.writes}
     if lost := [name for name, data in before.items() if after.get(name) != data]:
         raise Fell(f"lost or altered: {lost}")
     listed = Job("list", ("corrections", "list", "recording", "--json"), "")
     listing = place / "listed.json"
-    server_settings = {"MULTIVIEW_PHD_SETTINGS": str(settings / "settings")}
-    if run(home, listed, listing, server_settings):
+    if run(home, listed, listing):
         raise Fell(listing.read_text())
+    expected = confirmed + len(read_log(base / SERVED.writes))
     there = len(json.loads(listing.read_text()))
-    if not confirmed <= there <= confirmed + 1:
-        raise Fell(f"{confirmed} corrections were confirmed, {there} are there")
+    if not expected <= there <= expected + 1:
+        raise Fell(f"{expected} corrections were confirmed, {there} are there")
     return "killed" if fault == "kill" else "refused" if refused else "done"
+
+
+def correct_until(server: Server, until: float) -> tuple[int, int]:
+    """Make corrections one after the other, six unless there is a time to end at.
+
+    Returns:
+        How many were confirmed, and how many refused.
+
+    Raises:
+        Fell: If the workbench fails instead of refusing one.
+    """
+    confirmed = refused = 0
+    for number in range(1, 7 if until == math.inf else 40):
+        if time.monotonic() > until:
+            break
+        wish = {"kind": "checked", "first": number, "last": number}
+        place, asked = f"{server.address}api/corrections", {"corrections": [wish]}
+        answer = httpx2.post(place, json=asked, timeout=30.0)
+        if answer.status_code >= 500 and answer.status_code != 507:
+            raise Fell(f"status {answer.status_code}: {answer.text[:500]}")
+        confirmed += answer.status_code == 200
+        refused += answer.status_code != 200
+    return confirmed, refused
 
 
 def main() -> int:
@@ -482,15 +473,12 @@ def main() -> int:
             fault = faults[trial % len(faults)]
             job = chance.choice([*jobs(), SERVED])
             place = folder / "trial"
-            mounted: Callable[[], contextlib.AbstractContextManager[None]] = (
-                (lambda: disk(place, DISK_MB)) if fault != "kill" else contextlib.nullcontext  # noqa: B023
-            )
             place.mkdir(exist_ok=True)
             if job is not SERVED and job.name not in usuals:
                 usuals[job.name] = usual(base, job, place)
             why = ""
             try:
-                with mounted():
+                with contextlib.nullcontext() if fault == "kill" else disk(place, DISK_MB):
                     if job is SERVED:
                         outcome = try_served(base, fault, chance, place)
                     else:
@@ -499,9 +487,10 @@ def main() -> int:
                 outcome, why = "fell", f"{type(error).__name__}: {error}"
                 print(f"FELL: trial {trial}, {job.name}, {fault}: {why}", flush=True)
             shutil.rmtree(place)
-            told[trial] = {"trial": trial, "job": job.name, "fault": fault, "outcome": outcome, "why": why}  # fmt: skip # noqa: E501
+            row = {"trial": trial, "job": job.name, "fault": fault, "outcome": outcome, "why": why}
+            told[trial] = row
             with arguments.file.open("a", encoding="utf-8") as file:
-                file.write(json.dumps(told[trial]) + "\n")
+                file.write(json.dumps(row) + "\n")
     counts = Counter((one["fault"], one["outcome"]) for one in told.values())
     words = ", ".join(f"{fault}: {count} {how}" for (fault, how), count in sorted(counts.items()))
     print(f"faults: {len(told)} trials: {words}", flush=True)

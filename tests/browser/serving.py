@@ -18,6 +18,16 @@ from tracker.kernels.compilation import kernel_folder
 from tracker.studies.store import stores
 
 
+def folders_in(home: Path) -> dict[str, str]:
+    """The environment of a person whose caches, settings, library and studies are in a folder."""
+    return {
+        "MULTIVIEW_PHD_CACHE": str(home),
+        "MULTIVIEW_PHD_SETTINGS": str(home / "settings"),
+        "MULTIVIEW_PHD_LIBRARY": str(home / "library.sqlite3"),
+        "MULTIVIEW_PHD_STUDIES": str(home / "studies"),
+    }
+
+
 class Server:
     """`multiview-phd serve` as a person starts it, on a free port."""
 
@@ -44,10 +54,7 @@ class Server:
         self.use(token)
         self._environment["NUMBA_CACHE_DIR"] = str(kernels or kernel_folder())
         if cache is not None:
-            self._environment["MULTIVIEW_PHD_CACHE"] = str(cache)
-            self._environment["MULTIVIEW_PHD_SETTINGS"] = str(cache / "settings")
-            self._environment["MULTIVIEW_PHD_LIBRARY"] = str(cache / "library.sqlite3")
-            self._environment["MULTIVIEW_PHD_STUDIES"] = str(cache / "studies")
+            self._environment |= folders_in(cache)
         self.port = 0
         self.start()
         if wait:

@@ -96,8 +96,8 @@ def _earlier_if_alone(folder: Path) -> Path:
 
 
 def remark_on(folder: Path) -> str | None:
-    """The remark that a recording's log is of an earlier rendering, or that it has another one
-    which was written later; None where neither is so."""
+    """The remark that a recording's log is of an earlier rendering, or that there is another one in
+    the settings, which was written before; None where neither is so."""
     earlier, place, own = earlier_key(folder), place_of(folder), own_place(folder)
     if earlier is not None and place == _kept_as(earlier):
         return f"The corrections were {EARLIER}."

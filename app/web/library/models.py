@@ -92,7 +92,8 @@ class KeptRunInfo(Model):
     corrected: int
     """How many corrections of a person it obeys."""
     templates: list[str] | None
-    """Its colour templates: name, camera and step of each; null where they are not known."""
+    """The colour templates of the run: name, camera and step of each; null where they are not
+    known."""
     provisional: bool
     """Whether its figures were made before it was finished; opening it computes them again."""
 

@@ -1,6 +1,6 @@
 /** The inspector's tab Place: one doubtful moment in pictures, what it could be, what to do. */
 import { palette } from "../draw/canvas.js";
-import { all, choices, colourIndex, fill, h, icon, idTag } from "../elements/dom.js";
+import { all, capital, choices, colourIndex, fill, h, icon, idTag } from "../elements/dom.js";
 import { commandOf, keyLabel, perform } from "../state/commands.js";
 import { scoresOf, shownVersion } from "../state/events.js";
 import { drawCrop } from "./crops.js";
@@ -95,9 +95,6 @@ const OF_OTHERS = ["check-exchange", "check-split"];
 const OF_NOBODY = ["missing", "begins", "ends"];
 /** So many alternatives stand side by side, and in a pane narrower than that; others are in a list. */
 const BESIDE = { wide: 3, narrow: 2, below: 460 };
-
-/** @param {string} words */
-const sentence = (words) => words.charAt(0).toUpperCase() + words.slice(1);
 
 /** What is to be done while somebody is placed. */
 /** @param {NonNullable<ReturnType<Check["state"]["get"]>["placing"]>} placing */
@@ -291,7 +288,7 @@ export function mountPlace(root, { store, actions, playback }, check, crops) {
 		fill(
 			why,
 			h("b", {}, unbroken(chosen.title)),
-			`${chosen.title.endsWith("?") ? "" : "."} ${unbroken(sentence(chosen.why))}.`,
+			`${chosen.title.endsWith("?") ? "" : "."} ${unbroken(capital(chosen.why))}.`,
 			h(
 				"span",
 				{ class: "q" },
@@ -319,7 +316,7 @@ export function mountPlace(root, { store, actions, playback }, check, crops) {
 			h("span", { class: "grow" }),
 			main === "check-apply" &&
 				(OF_NOBODY.includes(chosen.kind)
-					? button(main, "i-here", sentence(alternative), true)
+					? button(main, "i-here", capital(alternative), true)
 					: button(main, "i-tick", "Apply", true)),
 			button("check-skip", "i-next", "Skip", false),
 			button("check-confirm", "i-tick", "Confirm", main === "check-confirm"),

@@ -1,5 +1,5 @@
 /** The queue of doubtful places where the sliders stand, and under it what was put right. */
-import { fill, h, icon, idTag, write } from "../elements/dom.js";
+import { capital, fill, h, icon, idTag, write } from "../elements/dom.js";
 import { commandOf, keyLabel } from "../state/commands.js";
 import { shownVersion } from "../state/events.js";
 import { offerTurn } from "../panes/controls.js";
@@ -225,7 +225,7 @@ export function mountQueue(root, { store, actions }, check, crops) {
 				h(
 					"span",
 					{},
-					words.map((one) => `${one[0].toUpperCase()}${one.slice(1)}. `),
+					words.map((one) => `${capital(one)}. `),
 				),
 			);
 		places.hidden = left === 0;

@@ -145,3 +145,6 @@ export function show(value) {
 		? value.toExponential().replace("e-", "e−")
 		: String(Number(value.toPrecision(5)));
 }
+
+/** @param {string} words  @returns {string} as a sentence begins */
+export const capital = (words) => words.slice(0, 1).toUpperCase() + words.slice(1);

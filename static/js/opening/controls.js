@@ -93,6 +93,3 @@ export const segment = (label, choices, now, key) =>
 			),
 		),
 	);
-
-/** @param {string} words  @returns {string} as a sentence begins */
-export const capital = (words) => words.slice(0, 1).toUpperCase() + words.slice(1);

@@ -1,8 +1,7 @@
 /** What was found out of an import: room, checks, target; each can be had otherwise. */
-import { h, icon, show } from "../elements/dom.js";
+import { capital, h, icon, show } from "../elements/dom.js";
 import { size } from "../library/words.js";
 import {
-	capital,
 	cut,
 	div,
 	grow,

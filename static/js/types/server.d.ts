@@ -776,7 +776,10 @@ declare namespace Server {
 		tags: string[];
 		/** How many corrections of a person it obeys. */
 		corrected: number;
-		/** Its colour templates: name, camera and step of each; null where they are not known. */
+		/**
+		 * The colour templates of the run: name, camera and step of each; null where they are not
+		 * known.
+		 */
 		templates: string[] | null;
 		/** Whether its figures were made before it was finished; opening it computes them again. */
 		provisional: boolean;

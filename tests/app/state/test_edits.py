@@ -45,6 +45,19 @@ def edits(bench: Workbench) -> Iterator[Edits]:
     edits.close()
 
 
+class Clock:
+    """What the edits take the time from."""
+
+    now = 100.0
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+    clock = Clock()
+    monkeypatch.setattr(module.time, "monotonic", lambda: clock.now)
+    return clock
+
+
 def followed(bench: Workbench, folder: Path | None = None) -> Edits:
     edits = Edits(bench, folder)
     edits._open(bench.snapshot())
@@ -57,16 +70,14 @@ def values(bench: Workbench) -> tuple[Any, ...]:
 
 
 def test_a_drag_is_one_edit_and_two_sliders_are_two(
-    bench: Workbench, edits: Edits, monkeypatch: pytest.MonkeyPatch
+    bench: Workbench, edits: Edits, clock: Clock
 ) -> None:
-    now = 100.0
-    monkeypatch.setattr(module.time, "monotonic", lambda: now)
     before = values(bench)
     for value in (0.9, 0.8, 0.7):
-        now += 0.3
+        clock.now += 0.3
         bench.set_parameters({P_D: value}, "viser")
     bench.set_parameters({P_S: 0.9}, "viser")
-    now += module.DRAG_SECONDS
+    clock.now += module.DRAG_SECONDS
     bench.set_parameters({P_S: 0.8}, "viser")
     assert bench.snapshot().undo_words == "Survival probability 0.9 → 0.8"
     found = []
@@ -84,17 +95,15 @@ def test_a_drag_is_one_edit_and_two_sliders_are_two(
 
 
 def test_two_values_during_one_long_run_are_two_edits(
-    bench: Workbench, edits: Edits, monkeypatch: pytest.MonkeyPatch
+    bench: Workbench, edits: Edits, clock: Clock
 ) -> None:
     """What is typed while news of a run arrive all the time is no drag."""
-    now = 100.0
-    monkeypatch.setattr(module.time, "monotonic", lambda: now)
     before = values(bench)
     bench.set_parameters({P_D: 0.8}, "viser")
     bench.run_begins("run")
     for _ in range(20):
-        now += 1.0
-        bench.run_waits("run", f"smoothing for {now:.0f} s")
+        clock.now += 1.0
+        bench.run_waits("run", f"smoothing for {clock.now:.0f} s")
     bench.set_parameters({P_D: 0.6}, "viser")
     edits.undo()
     assert values(bench)[0] == 0.8
@@ -103,20 +112,18 @@ def test_two_values_during_one_long_run_are_two_edits(
 
 
 def test_a_slow_drag_is_one_edit_that_names_both_ends(
-    bench: Workbench, edits: Edits, monkeypatch: pytest.MonkeyPatch
+    bench: Workbench, edits: Edits, clock: Clock
 ) -> None:
     """A browser that draws slowly moves a slider only between two results."""
-    now = 100.0
-    monkeypatch.setattr(module.time, "monotonic", lambda: now)
     before = values(bench)
     for value in (0.8, 0.7, 0.6):
         bench.set_parameters({P_D: value}, "viser")
         bench.run_begins(f"run {value}")
-        now += module.DRAG_SECONDS - 0.1
+        clock.now += module.DRAG_SECONDS - 0.1
         bench.run_ends(f"run {value}", "done")
-        now += module.DRAG_SECONDS - 0.1
+        clock.now += module.DRAG_SECONDS - 0.1
     assert bench.snapshot().undo_words == f"Detection probability {before[0]:g} → 0.6"
-    now += 0.2
+    clock.now += 0.2
     bench.set_parameters({P_D: 0.7}, "viser")
     assert bench.snapshot().undo_words == "Detection probability 0.6 → 0.7"
     for _ in range(2):

@@ -13,6 +13,7 @@ import json
 import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -69,12 +70,26 @@ class Trial:
 
     def row_key(self, steps: int) -> str:
         """The key of a row: code, values and number of steps."""
-        stages: tuple[Stage, ...] = ("single_view", "fusion", "smoothing", "tracks")
-        code = [numbers_version(stage) for stage in stages]
-        own = method_version(method_of("single_view", self.method))
-        values = self.parameters.model_dump(mode="json")
-        parts = [VERSION, code, own, values, METHODS[self.method], steps]
-        return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()[:16]
+        return row_key(self.method, self.parameters, METHODS[self.method], steps)
+
+
+def row_key(method: str, parameters: RunParameters, *more: Any) -> str:
+    """The key of a row: the code of all stages, values, and what else a run depends on."""
+    parts = [_code(method), parameters.model_dump(mode="json"), *more]
+    return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()[:16]
+
+
+@cache
+def _code(method: str) -> tuple[Any, ...]:
+    """The versions of the code on which the rows of a single-view method depend."""
+    stages: tuple[Stage, ...] = ("single_view", "fusion", "smoothing", "tracks")
+    own = method_version(method_of("single_view", method))
+    return (VERSION, [numbers_version(stage) for stage in stages], own)
+
+
+def is_free(key: str) -> bool:
+    """Whether a parameter may go: one without a published value that is not essential."""
+    return PARAMETERS[key].published is None and not PARAMETERS[key].essential
 
 
 def judged(method: str) -> tuple[str, ...]:
@@ -83,10 +98,7 @@ def judged(method: str) -> tuple[str, ...]:
     return tuple(
         key
         for key in shown_keys(defaults)
-        if key in PARAMETERS
-        and PARAMETERS[key].stage == "single_view"
-        and PARAMETERS[key].published is None
-        and not PARAMETERS[key].essential
+        if key in PARAMETERS and PARAMETERS[key].stage == "single_view" and is_free(key)
     )
 
 
@@ -225,14 +237,20 @@ def table(found: list[Mapping[str, Any]], seeds: range, steps: int) -> str:
     return "\n".join(lines) + "\n"
 
 
+def common_arguments(module: str, table: Path, first: int) -> argparse.ArgumentParser:
+    """The arguments that the studies of parameters share."""
+    parser = argparse.ArgumentParser(prog=f"python -m tests.papers.rooms.{module}")
+    parser.add_argument("-o", "--output", type=Path, required=True, help="rows and rooms")
+    parser.add_argument("--table", type=Path, default=table, help="the Markdown file")
+    parser.add_argument("--first", type=int, default=first, help="seed of the first room")
+    parser.add_argument("--count", type=int, default=6, help="number of rooms for all")
+    parser.add_argument("--steps", type=int, default=100)
+    return parser
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Measure what is missing and write the table; returns the exit status."""
-    parser = argparse.ArgumentParser(prog="python -m tests.papers.rooms.ablations")
-    parser.add_argument("-o", "--output", type=Path, required=True, help="rows and rooms")
-    parser.add_argument("--table", type=Path, default=TABLE, help="the Markdown file")
-    parser.add_argument("--first", type=int, default=401, help="seed of the first room")
-    parser.add_argument("--count", type=int, default=6, help="number of rooms")
-    parser.add_argument("--steps", type=int, default=100)
+    parser = common_arguments("ablations", TABLE, 401)
     parser.add_argument("--method", action="append", choices=list(METHODS), help="repeatable")
     given = parser.parse_args(arguments)
     seeds, methods = range(given.first, given.first + given.count), tuple(given.method or METHODS)

@@ -9,30 +9,23 @@ recordings, by as much as :data:`~tests.papers.rooms.ablations.LEAST`, with eith
 
 from __future__ import annotations
 
-import argparse
-import hashlib
-import json
 import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from tests.conftest import DATA
-from tests.papers.rooms.ablations import LEAST, ends
+from tests.papers.rooms.ablations import LEAST, common_arguments, ends, is_free, row_key
 from tests.papers.rooms.kept import Rows, keep_row, read_rows
 from tests.random_rooms import random_room
 from tests.rooms import render_random
-from tests.rooms.random_rooms import VERSION
 from tracker.evaluation import evaluate_sequence
-from tracker.parameters import Stage
-from tracker.parameters.catalogue import PARAMETERS, RunParameters, method_of
+from tracker.parameters.catalogue import PARAMETERS, RunParameters
 from tracker.parameters.values import with_values
 from tracker.runs import pipeline
-from tracker.runs.numbers_version import method_version, numbers_version
 from tracker.runs.run import Run
 from tracker.sequences.reader import read_sequence
 from tracker.sequences.sequence import Sequence
@@ -116,27 +109,13 @@ class Trial:
 
     def row_key(self, steps: int) -> str:
         """The key of a row: code, values and number of steps."""
-        values = self.parameters.model_dump(mode="json")
-        parts = [_code(self.single_view), values, steps]
-        return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()[:16]
-
-
-@cache
-def _code(single_view: str) -> tuple[Any, ...]:
-    """The versions of the code on which rows depend."""
-    stages: tuple[Stage, ...] = ("single_view", "fusion", "smoothing", "tracks")
-    own = method_version(method_of("single_view", single_view))
-    return (VERSION, [numbers_version(stage) for stage in stages], own)
+        return row_key(self.single_view, self.parameters, steps)
 
 
 def judged() -> tuple[str, ...]:
     """The parameters of fusion and smoothing, less published and essential ones."""
     return tuple(
-        key
-        for key, parameter in PARAMETERS.items()
-        if key.startswith(("fusion.", "smoothing."))
-        and parameter.published is None
-        and not parameter.essential
+        key for key in PARAMETERS if key.startswith(("fusion.", "smoothing.")) and is_free(key)
     )
 
 
@@ -313,13 +292,8 @@ def table(rows: Rows, keys: Iterable[str], rooms: Mapping[str, Iterable[str]], s
 
 def main(arguments: list[str] | None = None) -> int:
     """Measure what is missing and write the table; returns the exit status."""
-    parser = argparse.ArgumentParser(prog="python -m tests.papers.rooms.fusion_ablations")
-    parser.add_argument("-o", "--output", type=Path, required=True, help="rows and rooms")
-    parser.add_argument("--table", type=Path, default=TABLE, help="the Markdown file")
-    parser.add_argument("--first", type=int, default=911, help="seed of the first room")
-    parser.add_argument("--count", type=int, default=6, help="number of rooms for all")
+    parser = common_arguments("fusion_ablations", TABLE, 911)
     parser.add_argument("--more", type=int, default=20, help="number of rooms for flat ones")
-    parser.add_argument("--steps", type=int, default=100)
     parser.add_argument("--table-only", action="store_true", help="of what was run before")
     given = parser.parse_args(arguments)
     seeds = [str(seed) for seed in range(given.first, given.first + given.more)]

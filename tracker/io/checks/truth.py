@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence as Many
+from functools import lru_cache
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -23,8 +24,12 @@ _SAMPLED = 300
 """Places that are compared with the boxes."""
 
 
+@lru_cache(maxsize=1)
 def check_truth(sequence: Sequence) -> Check:
     """Compare the places of the truth with the boxes of the cameras that see them.
+
+    Every score of a run says it, and the runs of a recording have one truth: the last recording
+    that was asked for is remembered.
 
     Args:
         sequence: With a calibration that is read rightly.

@@ -769,9 +769,9 @@ def clocks_by(
     """Find the clocks by one reading alone, which is not questioned; none where no boxes meet.
 
     Args:
-        cameras: As their files give them.
+        cameras: The cameras as their files give them.
         seen: The boxes of each, None for a camera without any.
-        reading: How both are meant.
+        reading: The way in which both are meant.
         fps: Steps a second.
     """
     likelihood = Likelihood(cameras, seen, fps)
