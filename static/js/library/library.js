@@ -225,6 +225,8 @@ export function mountLibrary(root, { store, actions }) {
 	const chosen = new Set();
 	/** @type {number | null} */
 	let focused = null;
+	/** The last reading, under way or over. */
+	let refreshing = Promise.resolve();
 	let starred = false;
 	let writing = false;
 
@@ -354,7 +356,12 @@ export function mountLibrary(root, { store, actions }) {
 		location.hash = "#tune";
 	}
 
-	async function refresh() {
+	/** One after the other: of two at once the earlier would end before what it shows is there. */
+	function refresh() {
+		return (refreshing = refreshing.catch(() => {}).then(readAgain));
+	}
+
+	async function readAgain() {
 		library = /** @type {Server.LibraryInfo} */ (await getJson("/api/library"));
 		const { sequence } = store.get();
 		const same = (/** @type {Server.RecordingInfo} */ one) =>

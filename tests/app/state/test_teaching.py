@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import re
+import threading
 import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -370,6 +371,8 @@ def test_what_is_not_saved_outlives_the_server(
         """A server of its own, and what its first page is told."""
         with TestClient(create_app(settings), base_url=ADDRESS) as client:
             wait_until(lambda: state(client)["sequence"] is not None)
+            # what was not saved is taken up, or is not, before the thread that opens ends
+            wait_until(lambda: all(one.name != "opening" for one in threading.enumerate()))
             with connect(client) as socket:
                 heard = socket.receive_json()
                 while heard["type"] == "playhead":  # the step that the recording opens at
