@@ -64,6 +64,14 @@ def test_a_camera_that_turns_about_the_middle_of_its_picture_is_not_shifted() ->
     assert np.abs((forth - back)[:2] / (2.0 * angle)).max() < 0.2
 
 
+def test_a_picture_on_its_side_is_evened_alike() -> None:
+    picture = scene(np.random.default_rng(5))
+    sideways = np.ascontiguousarray(picture.transpose(1, 0, 2))
+    evened = _evened(picture, 1.0)
+    assert evened.std() > 20.0  # there is something to be evened
+    assert np.abs(_evened(sideways, 1.0).T.astype(int) - evened).max() <= 1
+
+
 def test_people_light_and_noise_are_no_shake() -> None:
     found = StaticScene.learn(shaken(np.random.default_rng(4), 0.0), None, 0.2)
     assert found is not None
