@@ -16,15 +16,15 @@ from scipy.stats import multivariate_normal
 from tests.smoothing.test_boundaries import standing
 from tracker.kernels import boxes as box_kernels
 from tracker.kernels.gating import Measurements
-from tracker.smoothing.identity.appearance import (
+from tracker.smoothing.paths import Links, Paths
+from tracker.smoothing.recording import CameraBoxes
+from tracker.smoothing.tracklets.appearance import (
     AppearanceModel,
     Means,
     learn_covariances,
     log_ratio_of,
     logistic_slope,
 )
-from tracker.smoothing.paths import Links, Paths
-from tracker.smoothing.recording import CameraBoxes
 
 STEP = 0.25
 

@@ -11,18 +11,11 @@ from scipy.stats import multivariate_normal
 from tracker.corrections.constraints import Constraints
 from tracker.filters.models import Motion
 from tracker.parameters.groups.fusion import FusionParams
-from tracker.smoothing.identity.constraints import limits, parted, possible
-from tracker.smoothing.identity.ends import Ends
-from tracker.smoothing.identity.tracklets import (
-    Pairs,
-    log_integral,
-    motion_gains,
-    near_pairs,
-    same_label,
-)
 from tracker.smoothing.lifetimes import independence
-from tracker.smoothing.paths import Paths
+from tracker.smoothing.paths import Paths, same_label
 from tracker.smoothing.smoother import Fitted
+from tracker.smoothing.tracklets.constraints import limits, parted, possible
+from tracker.smoothing.tracklets.motion import Ends, Pairs, log_integral, motion_gains, near_pairs
 
 PRIOR = np.diag([100.0] * 3 + [0.49] * 3)
 

@@ -12,12 +12,12 @@ from tests.smoothing.test_boundaries import fitted, standing
 from tracker.corrections import Correction
 from tracker.corrections.constraints import Constraints
 from tracker.corrections.kinds import make
-from tracker.smoothing.identity.constraints import (
+from tracker.smoothing.paths import Paths
+from tracker.smoothing.tracklets.constraints import (
     ConstraintResolver,
     of_chains,
     possible,
 )
-from tracker.smoothing.paths import Paths
 
 PATHS = standing((1, 0, 9, 0.0), (2, 0, 9, 5.0), (3, 14, 19, 0.0))
 """Rows 0 to 9, 10 to 19 and 20 to 25."""

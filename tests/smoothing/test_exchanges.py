@@ -8,8 +8,8 @@ from numpy import ndarray
 from scipy.stats import multivariate_normal
 
 from tests.smoothing.measured import STEP, fitted_to, measured
-from tracker.smoothing.identity.exchanges import exchange_breaks, gains_of, turn
 from tracker.smoothing.smoother import Fitted
+from tracker.smoothing.tracklets.exchanges import exchange_breaks, gains_of, turn
 
 SIGMA = 0.05
 

@@ -12,10 +12,10 @@ from numpy import ndarray
 
 from tracker.kernels.gating import Measurements
 from tracker.single_view.protocol import ViewResult
-from tracker.smoothing.identity.people import Seen, of_chains, template_log_odds
 from tracker.smoothing.paths import Links, Paths
 from tracker.smoothing.recording import CameraBoxes
 from tracker.smoothing.smoother import Smoother
+from tracker.smoothing.tracklets.people import Seen, of_chains, template_log_odds
 from tracker.steps import Steps
 
 STEP = 0.2

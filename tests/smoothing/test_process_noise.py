@@ -11,9 +11,9 @@ from tests.smoothing.known import PLAIN
 from tests.smoothing.measured import PRIOR, STEP, fitted_to, measured
 from tracker.filters.models import Motion
 from tracker.kernels.smoothing import passes
-from tracker.smoothing.identity.ends import Ends
 from tracker.smoothing.paths import Paths
 from tracker.smoothing.smoother import Fitted, process_noise_scales
+from tracker.smoothing.tracklets.motion import Ends
 
 SIGMA = 0.03
 

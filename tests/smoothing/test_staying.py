@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from tracker.corrections.constraints import Constraints
-from tracker.smoothing.identity.identities import PriorLinks
-from tracker.smoothing.identity.solver import TrackletGraph, link_tracklets
-from tracker.smoothing.identity.tracklets import Pairs
 from tracker.smoothing.paths import Paths
+from tracker.smoothing.tracklets.linking import PriorLinks
+from tracker.smoothing.tracklets.motion import Pairs
+from tracker.smoothing.tracklets.solver import TrackletGraph, link_tracklets
 
 PIECES = 6
 """Three people, each in two pieces of two rows: 0 and 3, 1 and 4, 2 and 5."""

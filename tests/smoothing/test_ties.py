@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from numpy import ndarray
 
-from tests.smoothing.test_joining import chains, graph_of, value_of, worth_of
+from tests.smoothing.test_linking import chains, graph_of, value_of, worth_of
 from tracker.corrections.constraints import Constraints
-from tracker.smoothing.identity.constraints import possible
-from tracker.smoothing.identity.solver import TrackletGraph, link_tracklets
+from tracker.smoothing.tracklets.constraints import possible
+from tracker.smoothing.tracklets.solver import TrackletGraph, link_tracklets
 
 
 def obeys(following: tuple[int, ...], used: tuple[bool, ...], constraints: Constraints) -> bool:

@@ -6,7 +6,7 @@ from collections.abc import Sequence as Many
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
 
@@ -134,3 +134,121 @@ class Links:
         return Links(
             self.cameras[chosen], self.rows[chosen], self.boxes[chosen], self.shares[chosen]
         )
+
+
+def contested_shares(paths: Paths, links: Links) -> Float[ndarray, " N"]:
+    """Compute the share of each row's boxes that may belong to another path as well.
+
+        Σ_z min(a_i(z), max_{j≠i} a_j(z)) / Σ_z a_i(z)
+
+    over the boxes z of all cameras with association probabilities a: 0 where they belong to no
+    other path, 1 where another path is at least as likely.
+    """
+    rows = len(paths.states)
+    own = np.bincount(links.rows, links.shares, rows)
+    if not len(links.rows):
+        return np.zeros(rows)
+    order = np.lexsort((-links.shares, links.boxes, links.cameras))
+    camera, box, share = links.cameras[order], links.boxes[order], links.shares[order]
+    first = np.ones(len(order), dtype=bool)
+    first[1:] = (np.diff(camera) != 0) | (np.diff(box) != 0)
+    leader = np.maximum.accumulate(np.where(first, np.arange(len(order)), 0))
+    follows = np.zeros(len(order))
+    second = np.flatnonzero(~first & (leader == np.arange(len(order)) - 1))
+    follows[leader[second]] = share[second]
+    rival = np.where(first, follows[leader], share[leader])
+    lost = np.bincount(links.rows[order], np.minimum(share, rival), rows)
+    return np.asarray(np.where(own > 0.0, lost / np.maximum(own, 1e-12), 0.0))
+
+
+def split_paths(
+    paths: Paths, clear: Bool[ndarray, " N"], breaks: Bool[ndarray, " N"]
+) -> tuple[Paths, Int[ndarray, " M"]]:
+    """Split paths into the runs of clear rows.
+
+    Args:
+        paths: The paths, with N rows.
+        clear: The rows that remain.
+        breaks: The rows before which a path is split even where both sides are clear.
+
+    Returns:
+        The runs as paths with M rows, and the index of each of these rows in ``paths``.
+    """
+    source_rows = np.flatnonzero(clear)
+    owners = paths.owners[source_rows]
+    begins = np.ones(len(source_rows), dtype=bool)
+    begins[1:] = (np.diff(source_rows) > 1) | (np.diff(owners) != 0) | breaks[source_rows[1:]]
+    firsts = np.flatnonzero(begins)
+    starts = np.append(firsts, len(source_rows)).astype(np.int64)
+    return (
+        Paths(
+            paths.labels[owners[firsts]],
+            paths.steps[source_rows[firsts]],
+            starts,
+            paths.states[source_rows],
+            paths.covariances[source_rows],
+        ),
+        source_rows,
+    )
+
+
+def select_rows(links: Links, source_rows: Int[ndarray, " M"], rows: int) -> Links:
+    """Select the links of M of N rows, and renumber the rows.
+
+    Args:
+        links: Links of N rows.
+        source_rows: Index of each of the M rows among the N.
+        rows: N, the number of rows before the selection.
+    """
+    place = np.full(rows, -1, dtype=np.int64)
+    place[source_rows] = np.arange(len(source_rows))
+    return renumber_rows(links, place)
+
+
+def renumber_rows(links: Links, place: Int[ndarray, " N"]) -> Links:
+    """Renumber the links by the new index of each row, -1 for rows whose links are removed."""
+    new = place[links.rows]
+    chosen = links.take(new >= 0)
+    return Links(chosen.cameras, new[new >= 0], chosen.boxes, chosen.shares)
+
+
+def same_label(paths: Paths) -> list[tuple[int, int]]:
+    """List the pairs of each tracklet and the next one in time with the same label of the
+    filter."""
+    order = np.lexsort((paths.firsts, paths.labels))
+    one, other = order[:-1], order[1:]
+    same = (paths.labels[one] == paths.labels[other]) & (paths.lasts[one] < paths.firsts[other])
+    return list(zip(one[same].tolist(), other[same].tolist(), strict=True))
+
+
+def join_chains(
+    tracklets: Paths, chains: list[list[int]], labels: list[int]
+) -> tuple[Paths, Int[ndarray, " M"]]:
+    """Join the tracklets of each chain to one path, by linear interpolation in the gaps.
+
+    Args:
+        tracklets: The tracklets, with M rows.
+        chains: The tracklets of each chain, in the order of time.
+        labels: Label of each chain.
+
+    Returns:
+        The paths, and the index of each of the M rows in these, -1 for tracklets in no chain.
+    """
+    dimension = tracklets.states.shape[1]
+    steps, place = tracklets.steps, np.full(len(tracklets.states), -1, dtype=np.int64)
+    firsts = [int(tracklets.firsts[chain[0]]) for chain in chains]
+    lasts = [int(tracklets.lasts[chain[-1]]) for chain in chains]
+    lengths = [last + 1 - first for first, last in zip(firsts, lasts, strict=True)]
+    found = Paths.blank(labels, firsts, lengths, dimension)
+    for path, chain in enumerate(chains):
+        rows = np.concatenate(
+            [np.arange(tracklets.starts[k], tracklets.starts[k + 1]) for k in chain]
+        )
+        own, within = steps[rows], found.rows_of(path)
+        every = np.arange(own[0], own[-1] + 1)
+        for axis in range(dimension):
+            found.states[within, axis] = np.interp(every, own, tracklets.states[rows, axis])
+        found.covariances[within] = np.eye(dimension)
+        place[rows] = within.start + own - own[0]
+        found.covariances[place[rows]] = tracklets.covariances[rows]
+    return found, place

@@ -22,14 +22,14 @@ from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult
 from tracker.smoothing import lifetimes
 from tracker.smoothing.calibration import Calibration
-from tracker.smoothing.identity import identities, tracklets
-from tracker.smoothing.identity.people import Seen
-from tracker.smoothing.identity.splitting import Tracked
-from tracker.smoothing.paths import Links, Paths
+from tracker.smoothing.paths import Links, Paths, contested_shares
 from tracker.smoothing.protocol import EmptyStore, ResultStore
 from tracker.smoothing.recording import CameraBoxes
 from tracker.smoothing.result import Decision, Joined, Smoothed
 from tracker.smoothing.smoother import BoxAssociations, Fitted, Smoother
+from tracker.smoothing.tracklets import linking
+from tracker.smoothing.tracklets.people import Seen
+from tracker.smoothing.tracklets.splitting import Tracked
 from tracker.steps import Steps
 
 REACH = 1.0
@@ -184,7 +184,7 @@ class Identities(Positions):
         )
         learnt, first = start.learnt, start.first
         del start
-        found, key = identities.resolve_identities(tracked, p, seen, corrections, earlier)
+        found, key = linking.resolve_identities(tracked, p, seen, corrections, earlier)
         check()
         begin.replace(found.paths, np.where(found.had, 1.0, lifetimes.UNSURE), found.links)
         gone = np.flatnonzero(~np.isin(first.paths.labels, found.names)).tolist()
@@ -203,7 +203,7 @@ class Identities(Positions):
     ) -> _Start:
         """Run all rounds but the last resolution, the only one with corrections of identity."""
         p = self._parameters.smoothing
-        contested = tracklets.contested(begin.paths, begin.links)
+        contested = contested_shares(begin.paths, begin.links)
         had = begin.existences == 1.0
         names = np.where(had, begin.paths.labels[begin.paths.owners], -1)
         fitted, shared, learnt = _fit_and_share(smoother, begin, p, None, check, p.iterations)
@@ -212,7 +212,7 @@ class Identities(Positions):
         for _ in range(p.rounds - 1):
             tracked = Tracked(smoother, fitted, shared, contested, had, names)
             del fitted, shared
-            found, _key = identities.resolve_identities(tracked, p, seen)
+            found, _key = linking.resolve_identities(tracked, p, seen)
             del tracked
             check()
             had, names = found.had, found.names
@@ -221,7 +221,7 @@ class Identities(Positions):
             del found
             # resolved identities improve the association of boxes, and the association identities
             fitted, shared, learnt = _fit_and_share(smoother, begin, p, learnt, check, 1)
-            contested = tracklets.contested(fitted.paths, shared.links)
+            contested = contested_shares(fitted.paths, shared.links)
         return _Start(fitted, shared, learnt, contested, had, names, first)
 
 

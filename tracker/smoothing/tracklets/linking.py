@@ -22,29 +22,29 @@ from tracker.corrections.kinds import leeway as corrections_leeway
 from tracker.corrections.outcomes import outcomes
 from tracker.geometry.assignment import names_by_majority
 from tracker.parameters.groups.smoothing import SmoothingParams
-from tracker.smoothing.identity import odds, splitting
-from tracker.smoothing.identity.constraints import (
-    ConstraintResolver,
-    limits,
-    of_chains,
-    parted,
-)
-from tracker.smoothing.identity.ends import Ends
-from tracker.smoothing.identity.people import Seen, template_log_odds
-from tracker.smoothing.identity.people import of_chains as people_of_chains
-from tracker.smoothing.identity.solver import TrackletGraph, link_tracklets
-from tracker.smoothing.identity.splitting import Tracked
-from tracker.smoothing.identity.tracklets import (
-    Pairs,
+from tracker.smoothing.paths import (
+    Links,
+    Paths,
     join_chains,
     renumber_rows,
     same_label,
     select_rows,
 )
-from tracker.smoothing.paths import Links, Paths
 from tracker.smoothing.protocol import EmptyStore, ResultStore
 from tracker.smoothing.result import Decision, Joined
 from tracker.smoothing.smoother import BoxAssociations
+from tracker.smoothing.tracklets import costs, splitting
+from tracker.smoothing.tracklets.constraints import (
+    ConstraintResolver,
+    limits,
+    of_chains,
+    parted,
+)
+from tracker.smoothing.tracklets.motion import Ends, Pairs
+from tracker.smoothing.tracklets.people import Seen, template_log_odds
+from tracker.smoothing.tracklets.people import of_chains as people_of_chains
+from tracker.smoothing.tracklets.solver import TrackletGraph, link_tracklets
+from tracker.smoothing.tracklets.splitting import Tracked
 
 _CAREFUL = 3
 """Number of rounds in which an unmet correction is enforced only if no earlier unmet one refers to
@@ -217,10 +217,10 @@ def _linked(
         shared.missed[:, source_rows],
         shared.hidden_by[:, source_rows],
     )
-    worths, births, deaths = odds.tracklet_odds(smoother, refitted, own, parameters, rates)
+    worths, births, deaths = costs.tracklet_odds(smoother, refitted, own, parameters, rates)
     del own, shared
     alone = Ends.alone(refitted, smoother.prior)
-    short_gap_odds = odds.ShortGapOdds(
+    short_gap_odds = costs.ShortGapOdds(
         smoother, refitted.paths, links, parameters, seen.embeddings, rates
     )
     pairs = short_gap_odds.pairs(alone)
@@ -255,7 +255,7 @@ def _linked(
         first = best_chains(pairs, constraints)
         on_chains = of_chains(replace(constraints, must_link=()), first, tracklets) or Constraints()
     # chains linked by motion have better embeddings than single tracklets
-    back = odds.long_gap_odds(
+    back = costs.long_gap_odds(
         smoother, refitted.paths, links, first, parameters, seen.embeddings, rates
     )
     of_firsts = TrackletGraph(
@@ -335,7 +335,7 @@ def split_decisions(
         before: The paths before the splits, with N rows.
         source_rows: Index of each of the M rows in ``before``.
         reasons: Why each of the N rows was left out, as in
-            :class:`tracker.smoothing.identity.splitting.Splits`.
+            :class:`tracker.smoothing.tracklets.splitting.Splits`.
         chains: The tracklets of each track.
         labels: Label of each track.
     """

@@ -14,12 +14,11 @@ from tests.smoothing.test_boundaries import PRIOR, fitted, standing
 from tracker.filters.models import Motion
 from tracker.parameters.groups.fusion import FusionParams
 from tracker.parameters.groups.smoothing import SmoothingParams
-from tracker.smoothing.identity import identities, odds
-from tracker.smoothing.identity.appearance import AppearanceModel
-from tracker.smoothing.identity.ends import Ends
-from tracker.smoothing.identity.tracklets import Pairs, motion_gains
 from tracker.smoothing.paths import Links
 from tracker.smoothing.smoother import BoxAssociations
+from tracker.smoothing.tracklets import costs, linking
+from tracker.smoothing.tracklets.appearance import AppearanceModel
+from tracker.smoothing.tracklets.motion import Ends, Pairs, motion_gains
 
 STEP, FRAMES, SURVIVAL, BIRTH = 0.1, 20, 0.9, 0.4
 
@@ -37,7 +36,7 @@ def smoother(*cameras: object) -> Any:
 NOBODYS = Links(*(np.zeros(0, dtype=np.int64) for _ in range(3)), np.zeros(0))
 P = SmoothingParams(memory=0.25)
 """Two fifths of a step's evidence are new."""
-RATES = odds.Rates(BIRTH * STEP, 1.0 - SURVIVAL)
+RATES = costs.Rates(BIRTH * STEP, 1.0 - SURVIVAL)
 
 
 def test_a_piece_is_worth_its_boxes_less_its_misses_and_comes_and_goes_inside_the_recording() -> (
@@ -51,7 +50,7 @@ def test_a_piece_is_worth_its_boxes_less_its_misses_and_comes_and_goes_inside_th
     chances, missed = np.full((2, rows), 0.5), np.zeros((2, rows))
     chances[1], missed[0, 0], missed[1, 20] = 1.0, 1.0, 0.5
     shared = BoxAssociations(NOBODYS, chances, missed, np.full((2, rows), -1))
-    worths, births, deaths = odds.tracklet_odds(smoother(), own, shared, P, RATES)
+    worths, births, deaths = costs.tracklet_odds(smoother(), own, shared, P, RATES)
     bounds = ((0, 19), (19, 38), (38, 41))
     expected = [own.odds[a:b].sum() + (b - a) * np.log(SURVIVAL) + 1.5 for a, b in bounds]
     expected[0] += 0.4 * np.log(0.5)
@@ -75,13 +74,13 @@ def test_rates_are_those_of_the_tracks_and_of_the_parameters_where_these_tell_no
     long = smoother()
     long.frames = steps
     everyone = np.ones(len(begins), dtype=bool)
-    found = odds.Rates.of(long, paths, everyone)
+    found = costs.Rates.of(long, paths, everyone)
     assert found.birth == pytest.approx(birth, rel=0.25)
     assert found.death == pytest.approx(death, rel=0.25)
-    few = odds.Rates.of(long, paths, everyone & (np.arange(len(begins)) % 2 > 0))
+    few = costs.Rates.of(long, paths, everyone & (np.arange(len(begins)) % 2 > 0))
     assert few.birth == pytest.approx(found.birth / 2.0, rel=0.1)
     assert few.death == pytest.approx(found.death, rel=0.25)
-    never = odds.Rates.of(smoother(), standing((1, 0, FRAMES - 1, 0.0)), np.zeros(1, dtype=bool))
+    never = costs.Rates.of(smoother(), standing((1, 0, FRAMES - 1, 0.0)), np.zeros(1, dtype=bool))
     assert never.death == pytest.approx(1.0 - SURVIVAL)
     assert never.birth == pytest.approx(1.0 / (FRAMES + 1.0 / (BIRTH * STEP)))
     assert_allclose(np.exp([found.survival, found.leave]), [1.0 - found.death, found.death])
@@ -90,7 +89,7 @@ def test_rates_are_those_of_the_tracks_and_of_the_parameters_where_these_tell_no
 def test_who_is_there_at_both_ends_of_the_recording_has_neither_come_nor_left() -> None:
     one = np.ones(1, dtype=bool)
     whole, later, earlier = (
-        odds.Rates.of(smoother(), standing((1, first, last, 0.0)), one)
+        costs.Rates.of(smoother(), standing((1, first, last, 0.0)), one)
         for first, last in ((0, FRAMES - 1), (1, FRAMES - 1), (0, FRAMES - 2))
     )
     assert later.birth == pytest.approx(2.0 * whole.birth)
@@ -102,7 +101,7 @@ def test_who_is_there_at_both_ends_of_the_recording_has_neither_come_nor_left() 
 def test_a_link_survives_its_gap_and_its_motion_tells_as_much_as_is_new() -> None:
     paths = standing((1, 0, 4, 0.0), (2, 5, 9, 0.1), (3, 8, 12, 0.2), (4, 26, 28, 0.2))
     known = Ends.alone(fitted(paths), PRIOR)
-    found = odds.ShortGapOdds(smoother(), paths, NOBODYS, P, None, RATES).pairs(known)
+    found = costs.ShortGapOdds(smoother(), paths, NOBODYS, P, None, RATES).pairs(known)
     pairs = Pairs(np.array([0, 0, 1, 2]), np.array([1, 2, 3, 3]), np.array([1, 4, 17, 14]),
                   np.zeros(4))  # fmt: skip
     for name in ("earlier", "later", "gaps"):
@@ -116,7 +115,7 @@ def test_a_link_survives_its_gap_and_its_motion_tells_as_much_as_is_new() -> Non
 def test_the_longest_gap_is_two_seconds_and_the_fastest_goes_three_metres_in_one() -> None:
     p = SmoothingParams(longest=0.6)
     paths = standing((1, 0, 4, 0.0), (2, 10, 12, 2.8), (3, 10, 12, 2.8001), (4, 11, 12, 0.0))
-    found = odds.ShortGapOdds(smoother(), paths, NOBODYS, p, None, RATES).pairs(
+    found = costs.ShortGapOdds(smoother(), paths, NOBODYS, p, None, RATES).pairs(
         Ends.alone(fitted(paths), PRIOR)
     )
     assert list(zip(found.earlier.tolist(), found.later.tolist(), strict=True)) == [(0, 1)]
@@ -126,14 +125,14 @@ def test_who_comes_back_is_one_of_those_who_left() -> None:
     """By the label of the filter alone; by looks as likely as one of all who were gone."""
     paths = standing((5, 0, 2, 0.0), (6, 0, 3, 3.0), (5, 8, 9, 0.0), (7, 3, 4, 0.0))
     chains = [[0], [1], [2], [3]]
-    found = odds.long_gap_odds(smoother(), paths, NOBODYS, chains, P, None, RATES)
+    found = costs.long_gap_odds(smoother(), paths, NOBODYS, chains, P, None, RATES)
     newcomer = np.log(BIRTH * STEP * (1.0 - SURVIVAL))
     assert list(zip(found.earlier.tolist(), found.later.tolist(), strict=True)) == [(0, 2)]
-    assert found.gains == pytest.approx([newcomer + odds.KEEPING])
+    assert found.gains == pytest.approx([newcomer + costs.KEEPING])
     assert found.gaps.tolist() == [6]
     # of one chain already, or overlapping, nothing is said
     assert (
-        len(odds.long_gap_odds(smoother(), paths, NOBODYS, [[0, 2], [1]], P, None, RATES).gains)
+        len(costs.long_gap_odds(smoother(), paths, NOBODYS, [[0, 2], [1]], P, None, RATES).gains)
         == 0
     )
 
@@ -150,14 +149,14 @@ def test_looks_weigh_in_a_link_and_in_a_return(weight: float) -> None:
     assert known.all()
     assert ratio[::2].min() > ratio[1::2].max()
     chains = [[k] for k in range(7)]
-    found = odds.long_gap_odds(smoother(camera), later, links, chains, p, [embeddings], RATES)
+    found = costs.long_gap_odds(smoother(camera), later, links, chains, p, [embeddings], RATES)
     newcomer = np.log(BIRTH * STEP * (1.0 - SURVIVAL))
     assert_allclose(found.gains, newcomer - np.log(6.0) + weight * ratio)
     assert found.earlier.tolist() == list(range(6))
     assert found.later.tolist() == [6] * 6
     # who comes in the last step of the others is none of them
     at_once = standing(*pieces, (6, 7, 14, 0.1))
-    found = odds.long_gap_odds(smoother(camera), at_once, links, chains, p, [embeddings], RATES)
+    found = costs.long_gap_odds(smoother(camera), at_once, links, chains, p, [embeddings], RATES)
     assert len(found.gains) == 0
 
 
@@ -178,18 +177,18 @@ def test_a_cut_is_told_where_a_track_does_not_go_on_as_the_filter_had_it() -> No
         every = np.full(20, 3)
         every[4:6] = reasons
         every[[3, 6]] = 1  # the pieces' own rows do not count
-        found = identities.split_decisions(cut, before, kept, every, [[0], [1], [2, 3]], [4, 9, 6])
+        found = linking.split_decisions(cut, before, kept, every, [[0], [1], [2, 3]], [4, 9, 6])
         (one,) = found
         assert (one.kind, one.step, one.label, one.other) == ("cut", 8, 4, 4)
         assert one.reason.startswith(why)
-    assert identities.split_decisions(cut, before, kept, every, [[1], [2, 3]], [9, 6]) == []
+    assert linking.split_decisions(cut, before, kept, every, [[1], [2, 3]], [9, 6]) == []
 
 
 def test_a_join_is_told_with_its_odds_against_the_best_other() -> None:
     cut = standing((4, 0, 5, 0.0), (7, 6, 9, 0.0), (8, 0, 4, 1.0), (9, 12, 14, 0.0), (9, 16, 19, 0))
     pairs = Pairs(np.array([0, 2, 1]), np.array([1, 1, 3]), np.array([1, 2, 3]),
                   np.array([2.0, 1.0, -1.0]))  # fmt: skip
-    found = identities.join_decisions(cut, pairs, [[0, 1, 3, 4], [2]], [4, 8], -3.0, set())
+    found = linking.join_decisions(cut, pairs, [[0, 1, 3, 4], [2]], [4, 8], -3.0, set())
     weights = np.exp([2.0, 1.0, -3.0])
     first, second = found
     assert (first.step, first.label, first.other) == (6, 4, 7)
@@ -197,7 +196,7 @@ def test_a_join_is_told_with_its_odds_against_the_best_other() -> None:
     assert first.reason == "one person goes on"
     assert (second.step, second.other, second.reason) == (12, 9, "one person")
     assert second.probability == pytest.approx(1.0 / (1.0 + np.exp(-2.0)))
-    told = identities.join_decisions(cut, pairs, [[0, 1], [2]], [7, 8], -3.0, {(0, 1)})[0]
+    told = linking.join_decisions(cut, pairs, [[0, 1], [2]], [7, 8], -3.0, {(0, 1)})[0]
     assert (told.other, told.probability, told.reason) == (4, 1.0, "a person said so")
-    (tied,) = identities.join_decisions(cut, pairs, [[2, 3]], [8], -3.0, set())
+    (tied,) = linking.join_decisions(cut, pairs, [[2, 3]], [8], -3.0, set())
     assert tied.reason == "a person said so"

@@ -9,13 +9,12 @@ from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
 from tracker.parameters.groups.smoothing import SmoothingParams
-from tracker.smoothing.identity.constraints import ConstraintResolver
-from tracker.smoothing.identity.exchanges import exchange_breaks
-from tracker.smoothing.identity.odds import FASTEST, Rates
-from tracker.smoothing.identity.tracklets import split_paths
 from tracker.smoothing.lifetimes import independence, lifetimes
-from tracker.smoothing.paths import Paths
+from tracker.smoothing.paths import Paths, split_paths
 from tracker.smoothing.smoother import BoxAssociations, Fitted, Smoother
+from tracker.smoothing.tracklets.constraints import ConstraintResolver
+from tracker.smoothing.tracklets.costs import FASTEST, Rates
+from tracker.smoothing.tracklets.exchanges import exchange_breaks
 
 GAP = 1.0
 """Time without a detection from which a track is split, seconds. From 0.3 to 4 s, no figure of the

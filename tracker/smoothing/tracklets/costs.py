@@ -12,13 +12,11 @@ from numpy import ndarray
 from tracker.fusion import visibility
 from tracker.kernels.smoothing import evidence
 from tracker.parameters.groups.smoothing import SmoothingParams
-from tracker.smoothing.identity import tracklets
-from tracker.smoothing.identity.appearance import AppearanceModel
-from tracker.smoothing.identity.ends import Ends
-from tracker.smoothing.identity.tracklets import Pairs, join_chains, same_label
 from tracker.smoothing.lifetimes import independence, misses
-from tracker.smoothing.paths import Links, Paths
+from tracker.smoothing.paths import Links, Paths, join_chains, renumber_rows, same_label
 from tracker.smoothing.smoother import BoxAssociations, Fitted, Smoother
+from tracker.smoothing.tracklets.appearance import AppearanceModel
+from tracker.smoothing.tracklets.motion import Ends, Pairs, motion_gains, near_pairs
 
 FASTEST = 3.0
 """Largest speed of a person in a room over several steps, metres per second."""
@@ -142,7 +140,7 @@ class ShortGapOdds:
         """
         self._smoother, self._paths, self._rates = smoother, paths, rates
         self._share = independence(smoother.model.step_time, p.memory)
-        self._near = near = tracklets.near_pairs(
+        self._near = near = near_pairs(
             paths,
             longest=max(round(p.longest / smoother.model.step_time), 1),
             fastest=FASTEST * smoother.model.step_time,
@@ -159,7 +157,7 @@ class ShortGapOdds:
         """Return the possible pairs with their log odds, given the estimates at the tracklets'
         ends."""
         smoother, near = self._smoother, self._near
-        motion = tracklets.motion_gains(
+        motion = motion_gains(
             self._paths,
             near,
             known.discounted(self._share),
@@ -204,7 +202,7 @@ def long_gap_odds(
     lasts = np.array([paths.lasts[chain[-1]] for chain in chains], dtype=np.int64)
     if embeddings is not None:
         whole, rows = join_chains(paths, chains, list(range(len(chains))))
-        own = tracklets.renumber_rows(links, rows)
+        own = renumber_rows(links, rows)
         alike = AppearanceModel(whole, own, smoother.cameras, embeddings, smoother.model.step_time)
         before = lasts[:, None] < firsts[None, :]
         gone = np.maximum(before.sum(axis=0), 1)

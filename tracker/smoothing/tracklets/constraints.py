@@ -14,9 +14,9 @@ from numpy import ndarray
 from tracker.corrections import Correction, Place
 from tracker.corrections.constraints import Constraints
 from tracker.corrections.lookup import TrackIndex, mostly_inside
-from tracker.smoothing.identity.exchanges import turn
 from tracker.smoothing.paths import Paths
 from tracker.smoothing.smoother import Fitted
+from tracker.smoothing.tracklets.exchanges import turn
 
 _EVER = int(np.iinfo(np.int64).max)
 

@@ -6,8 +6,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
-from tracker.smoothing.identity.tracklets import log_integral
 from tracker.smoothing.smoother import Fitted
+from tracker.smoothing.tracklets.motion import log_integral
 
 _BEYOND = 1e-9
 """Share of the prior information that is left, so that a row without boxes has about 0."""

@@ -1,96 +1,112 @@
-"""Tracklets: parts of tracks without ambiguous association, and the motion odds of linking them."""
+"""Motion between tracklets: estimates at their ends, and the log odds of linking them."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence as Many
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 from numpy import ndarray
 
 from tracker.filters.models import Motion
-from tracker.smoothing.identity.ends import Ends
-from tracker.smoothing.paths import Links, Paths
+from tracker.smoothing.paths import Paths, same_label
+from tracker.smoothing.smoother import Fitted
+
+_BEYOND = 1e-9
+"""Share of the prior information that is left, so that a tracklet without boxes has about 0."""
 
 _CHANGES = 0.1
 """Probability that a person's process noise returns to the model's within a gap."""
 
 
-def contested(paths: Paths, links: Links) -> Float[ndarray, " N"]:
-    """Compute the share of each row's boxes that may belong to another path as well.
+@dataclass(frozen=True, slots=True, eq=False)
+class Ends:
+    """The ends of n tracklets, in the units of the state: metres and seconds."""
 
-        Σ_z min(a_i(z), max_{j≠i} a_j(z)) / Σ_z a_i(z)
+    ends: Float[ndarray, "n d"]
+    """The last state of each tracklet, filtered from the boxes up to it."""
+    covariances: Float[ndarray, "n d d"]
+    """The covariance of each last state."""
+    information: Float[ndarray, "n d d"]
+    """Information matrix Λ on the first state of each tracklet, of the boxes from it on."""
+    vectors: Float[ndarray, "n d"]
+    """Information vector η of the same."""
+    noise_scales: Float[ndarray, "n 2"]
+    """Factor s on the process noise at the first and at the last state."""
 
-    over the boxes z of all cameras with association probabilities a: 0 where they belong to no
-    other path, 1 where another path is at least as likely.
-    """
-    rows = len(paths.states)
-    own = np.bincount(links.rows, links.shares, rows)
-    if not len(links.rows):
-        return np.zeros(rows)
-    order = np.lexsort((-links.shares, links.boxes, links.cameras))
-    camera, box, share = links.cameras[order], links.boxes[order], links.shares[order]
-    first = np.ones(len(order), dtype=bool)
-    first[1:] = (np.diff(camera) != 0) | (np.diff(box) != 0)
-    leader = np.maximum.accumulate(np.where(first, np.arange(len(order)), 0))
-    follows = np.zeros(len(order))
-    second = np.flatnonzero(~first & (leader == np.arange(len(order)) - 1))
-    follows[leader[second]] = share[second]
-    rival = np.where(first, follows[leader], share[leader])
-    lost = np.bincount(links.rows[order], np.minimum(share, rival), rows)
-    return np.asarray(np.where(own > 0.0, lost / np.maximum(own, 1e-12), 0.0))
+    @staticmethod
+    def alone(fitted: Fitted, prior: Float[ndarray, "d d"]) -> Ends:
+        """Estimate the ends from the boxes of each tracklet alone.
 
+        Args:
+            fitted: The tracklets, each fitted to its own boxes.
+            prior: Prior covariance of a first state in the fit.
+        """
+        tracklets = fitted.paths
+        ends, begins = tracklets.starts[1:] - 1, tracklets.starts[:-1]
+        inverse, origin = np.linalg.inv(tracklets.covariances[begins]), np.linalg.inv(prior)
+        centre = tracklets.states[begins].copy()
+        centre[:, 3:] = 0.0
+        return Ends(
+            tracklets.states[ends],
+            tracklets.covariances[ends],
+            inverse - origin,
+            np.einsum("pij,pj->pi", inverse, tracklets.states[begins]) - centre @ origin,
+            np.stack([fitted.noise_scales[begins], fitted.noise_scales[ends]], axis=1),
+        )
 
-def split_paths(
-    paths: Paths, clear: Bool[ndarray, " N"], breaks: Bool[ndarray, " N"]
-) -> tuple[Paths, Int[ndarray, " M"]]:
-    """Split paths into the runs of clear rows.
+    def discounted(self, share: float) -> Ends:
+        """Discount the information of the boxes to a share, since errors of boxes are correlated.
 
-    Args:
-        paths: The paths, with N rows.
-        clear: The rows that remain.
-        breaks: The rows before which a path is split even where both sides are clear.
+        Args:
+            share: Share of the information that is independent, 0 … 1.
+        """
+        return replace(
+            self,
+            covariances=self.covariances / share,
+            information=self.information * share,
+            vectors=self.vectors * share,
+        )
 
-    Returns:
-        The runs as paths with M rows, and the index of each of these rows in ``paths``.
-    """
-    source_rows = np.flatnonzero(clear)
-    owners = paths.owners[source_rows]
-    begins = np.ones(len(source_rows), dtype=bool)
-    begins[1:] = (np.diff(source_rows) > 1) | (np.diff(owners) != 0) | breaks[source_rows[1:]]
-    firsts = np.flatnonzero(begins)
-    starts = np.append(firsts, len(source_rows)).astype(np.int64)
-    return (
-        Paths(
-            paths.labels[owners[firsts]],
-            paths.steps[source_rows[firsts]],
-            starts,
-            paths.states[source_rows],
-            paths.covariances[source_rows],
-        ),
-        source_rows,
-    )
+    def in_chains(
+        self, tracklets: Paths, chains: Fitted, rows: Int[ndarray, " M"], motion: Motion
+    ) -> Ends:
+        """Estimate the ends from all boxes of the chains that the tracklets are in.
 
+        A tracklet of one step has no information about velocity; the tracklets before and after
+        it have. The filtered state of a row is obtained from the prediction of the next row by
+        inverting one step of the motion,
 
-def select_rows(links: Links, source_rows: Int[ndarray, " M"], rows: int) -> Links:
-    """Select the links of M of N rows, and renumber the rows.
+            m = F⁻¹ m⁻,   P = F⁻¹ (P⁻ − s Q) F⁻ᵀ
 
-    Args:
-        links: Links of N rows.
-        source_rows: Index of each of the M rows among the N.
-        rows: N, the number of rows before the selection.
-    """
-    place = np.full(rows, -1, dtype=np.int64)
-    place[source_rows] = np.arange(len(source_rows))
-    return renumber_rows(links, place)
-
-
-def renumber_rows(links: Links, place: Int[ndarray, " N"]) -> Links:
-    """Renumber the links by the new index of each row, -1 for rows whose links are removed."""
-    new = place[links.rows]
-    chosen = links.take(new >= 0)
-    return Links(chosen.cameras, new[new >= 0], chosen.boxes, chosen.shares)
+        Args:
+            tracklets: The tracklets, with M rows.
+            chains: The chains, fitted to their boxes.
+            rows: The row of the chains for each of the M rows; -1 for tracklets in no chain, whose
+                ends do not change.
+            motion: The motion model of both.
+        """
+        firsts, lasts = rows[tracklets.starts[:-1]], rows[tracklets.starts[1:] - 1]
+        joined = np.flatnonzero(firsts >= 0)
+        first, last, paths = firsts[joined], lasts[joined], chains.paths
+        ends, covariances = self.ends.copy(), self.covariances.copy()
+        ends[joined], covariances[joined] = paths.states[last], paths.covariances[last]
+        goes_on = ~np.isin(last, paths.starts[1:] - 1)
+        after, back = last[goes_on] + 1, np.linalg.inv(motion.transition)
+        added = chains.noise_scales[after, None, None] * motion.noise
+        ends[joined[goes_on]] = chains.ahead[after] @ back.T
+        covariances[joined[goes_on]] = back @ (chains.ahead_covariances[after] - added) @ back.T
+        inverse = np.linalg.inv(paths.covariances[first])
+        before = (1.0 - _BEYOND) * np.linalg.inv(chains.ahead_covariances[first])
+        information, vectors = self.information.copy(), self.vectors.copy()
+        information[joined] = inverse - before
+        vectors[joined] = np.einsum("pij,pj->pi", inverse, paths.states[first])
+        vectors[joined] -= np.einsum("pij,pj->pi", before, chains.ahead[first])
+        noise_scales = self.noise_scales.copy()
+        noise_scales[joined, 0] = chains.noise_scales[first]
+        noise_scales[joined, 1] = chains.noise_scales[last]
+        return Ends(ends, covariances, information, vectors, noise_scales)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -232,45 +248,3 @@ def log_integral(
     fixed = np.einsum("pi,pi->p", means, vectors)
     fixed -= 0.5 * np.einsum("pi,pij,pj->p", means, information, means)
     return np.asarray(fixed + 0.5 * np.einsum("pi,pi->p", residual, shift) - 0.5 * log_determinant)
-
-
-def same_label(paths: Paths) -> list[tuple[int, int]]:
-    """List the pairs of each tracklet and the next one in time with the same label of the
-    filter."""
-    order = np.lexsort((paths.firsts, paths.labels))
-    one, other = order[:-1], order[1:]
-    same = (paths.labels[one] == paths.labels[other]) & (paths.lasts[one] < paths.firsts[other])
-    return list(zip(one[same].tolist(), other[same].tolist(), strict=True))
-
-
-def join_chains(
-    tracklets: Paths, chains: list[list[int]], labels: list[int]
-) -> tuple[Paths, Int[ndarray, " M"]]:
-    """Join the tracklets of each chain to one path, by linear interpolation in the gaps.
-
-    Args:
-        tracklets: The tracklets, with M rows.
-        chains: The tracklets of each chain, in the order of time.
-        labels: Label of each chain.
-
-    Returns:
-        The paths, and the index of each of the M rows in these, -1 for tracklets in no chain.
-    """
-    dimension = tracklets.states.shape[1]
-    steps, place = tracklets.steps, np.full(len(tracklets.states), -1, dtype=np.int64)
-    firsts = [int(tracklets.firsts[chain[0]]) for chain in chains]
-    lasts = [int(tracklets.lasts[chain[-1]]) for chain in chains]
-    lengths = [last + 1 - first for first, last in zip(firsts, lasts, strict=True)]
-    found = Paths.blank(labels, firsts, lengths, dimension)
-    for path, chain in enumerate(chains):
-        rows = np.concatenate(
-            [np.arange(tracklets.starts[k], tracklets.starts[k + 1]) for k in chain]
-        )
-        own, within = steps[rows], found.rows_of(path)
-        every = np.arange(own[0], own[-1] + 1)
-        for axis in range(dimension):
-            found.states[within, axis] = np.interp(every, own, tracklets.states[rows, axis])
-        found.covariances[within] = np.eye(dimension)
-        place[rows] = within.start + own - own[0]
-        found.covariances[place[rows]] = tracklets.covariances[rows]
-    return found, place

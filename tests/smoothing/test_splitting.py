@@ -12,9 +12,9 @@ from numpy.testing import assert_array_equal
 from tests import world
 from tests.smoothing.known import Known, known
 from tracker.parameters.groups.smoothing import SmoothingParams
-from tracker.smoothing.identity.constraints import ConstraintResolver
-from tracker.smoothing.identity.odds import Rates
-from tracker.smoothing.identity.splitting import Splits, Tracked, find_splits, split_tracks
+from tracker.smoothing.tracklets.constraints import ConstraintResolver
+from tracker.smoothing.tracklets.costs import Rates
+from tracker.smoothing.tracklets.splitting import Splits, Tracked, find_splits, split_tracks
 
 STEPS = 30
 P = SmoothingParams(change=20.0)
@@ -24,7 +24,7 @@ P = SmoothingParams(change=20.0)
 @pytest.fixture(autouse=True)
 def short_gap(monkeypatch: pytest.MonkeyPatch) -> None:
     """Five steps are the longest gap."""
-    monkeypatch.setattr("tracker.smoothing.identity.splitting.GAP", 0.5)
+    monkeypatch.setattr("tracker.smoothing.tracklets.splitting.GAP", 0.5)
 
 
 def tracked(scene: Known, **known_of: ndarray) -> Tracked:

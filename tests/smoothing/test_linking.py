@@ -10,9 +10,8 @@ from numpy import ndarray
 from numpy.testing import assert_allclose
 
 from tracker.kernels.smoothing.presence import ExistenceTransitions, presence
-from tracker.smoothing.identity.solver import TrackletGraph, link_tracklets
-from tracker.smoothing.identity.tracklets import contested, split_paths
-from tracker.smoothing.paths import Links, Paths
+from tracker.smoothing.paths import Links, Paths, contested_shares, split_paths
+from tracker.smoothing.tracklets.solver import TrackletGraph, link_tracklets
 
 
 def chains(following: tuple[int, ...], used: tuple[bool, ...]) -> list[list[int]]:
@@ -194,9 +193,9 @@ def test_boxes_that_are_as_well_anothers_are_contested() -> None:
         np.array([0, 0, 1, 2]),
         np.array([0.5, 0.5, 1.0, 1.0]),
     )
-    assert_allclose(contested(paths, links), [1.0, 0.0, 1.0, 0.0])
+    assert_allclose(contested_shares(paths, links), [1.0, 0.0, 1.0, 0.0])
     uneven = Links(links.cameras, links.rows, links.boxes, np.array([0.8, 0.2, 1.0, 1.0]))
-    assert_allclose(contested(paths, uneven), [0.25, 0.0, 1.0, 0.0])
+    assert_allclose(contested_shares(paths, uneven), [0.25, 0.0, 1.0, 0.0])
 
 
 def test_a_cut_leaves_the_clear_rows_where_they_were() -> None:
