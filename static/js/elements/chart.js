@@ -36,7 +36,7 @@ import { fill, h, show, svg } from "./dom.js";
  */
 
 /** CSS pixels between two ticks at least. */
-const [ACROSS, UP] = [48, 28];
+const [ACROSS, UP] = [40, 28];
 /** CSS pixels from a dot to its note, and those of a letter across and of a line. */
 const [AWAY, LETTER, LINE] = [8, 6.5, 16];
 
@@ -134,7 +134,7 @@ export function plot({ x, y, marks, margin, aside }, width, height) {
 			);
 		if (!free) return;
 		placed.push({ left: free[0], top: free[1], width: long });
-		word(text, free[0] < a ? "note before" : "note", free[0] < a ? a - AWAY : free[0], free[1]);
+		word(text, free[0] < a ? "noted before" : "noted", free[0] < a ? a - AWAY : free[0], free[1]);
 	}
 
 	/** @type {Record<Mark["kind"], (mark: Mark) => Element[]>} */
@@ -200,12 +200,18 @@ export function plot({ x, y, marks, margin, aside }, width, height) {
 		...level.map(([value]) => `M${across.at(value)} ${top}V${height - bottom}`),
 		...upright.map(([value]) => `M${left} ${up.at(value)}H${width - right}`),
 	];
-	// What is larger than the axes is cut at them, dots at an end are whole.
-	const box = { x: left, y: top, width: width - left - right, height: height - top - bottom };
+	// What is larger than the axes is cut a pixel beyond them, where half of a line is; dots are whole.
+	const [wide, tall] = [width - left - right, height - top - bottom];
+	const box = {
+		x: left - 1,
+		y: top - 1,
+		width: Math.max(0, wide + 2),
+		height: Math.max(0, tall + 2),
+	};
 	const within = { ...box, viewBox: Object.values(box).join(" ") };
 	const element = h(
 		"div",
-		{ class: "plot", "--left": `${left}px`, "--room": `${box.height}px` },
+		{ class: "figure", "--left": `${left}px`, "--room": `${tall}px` },
 		svg(
 			"svg",
 			{ width, height, "aria-hidden": "true" },
@@ -243,7 +249,7 @@ export function chart() {
 	/** Where a range along x began, CSS pixels. @type {number | null} */
 	let from = null;
 	const stage = h("div");
-	const card = h("div", { class: "card", role: "status" });
+	const card = h("div", { class: "says", role: "status" });
 	const ring = h("i", { class: "at", hidden: true });
 	const range = h("i", { class: "range", hidden: true });
 	const element = h(
@@ -254,7 +260,10 @@ export function chart() {
 			"aria-roledescription": "chart",
 			tabindex: 0,
 			onpointermove: (event) => {
-				if (from !== null && event.buttons) return span(placeOf(event)[0]);
+				if (figure?.brush && from !== null && event.buttons) {
+					mean(undefined);
+					return span(placeOf(event)[0]);
+				}
 				mean(nearest(...placeOf(event)));
 			},
 			onpointerdown: (/** @type {PointerEvent} */ event) => {

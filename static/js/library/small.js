@@ -112,7 +112,7 @@ function curve(word, unit, values, frames, every) {
 				}),
 			},
 		],
-		margin: [0, 1, 0, 1],
+		margin: [0, 7, 0, 3],
 	});
 	return h(
 		"div",

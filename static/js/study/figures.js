@@ -199,7 +199,7 @@ function bestSoFar(trials, y, of) {
 			colour: "p-grid",
 			points: [trials.length, of].map((x) => ({ x, y: high })),
 		},
-		{ kind: "steps", colour: "ink-1", points: best },
+		{ kind: "steps", colour: "ink-1", size: 1.5, points: best },
 	];
 	return { x: { ends: [0, of] }, y: { ends: [low, high] }, marks, margin: [48, 6, 12, 20] };
 }
