@@ -52,11 +52,12 @@ export function roundTicks([low, high], most) {
 	const power = 10 ** Math.floor(Math.log10(least));
 	const apart = power * ([1, 2, 5].find((k) => k * power >= least) ?? 10);
 	const digits = Math.max(0, -Math.floor(Math.log10(apart)));
+	const tiny = Math.max(-low, high) < 1e-3;
 	// an end that is a tick is one in spite of the last bit of a division
 	const [first, last] = [Math.ceil(low / apart - 1e-9), Math.floor(high / apart + 1e-9)];
 	return Array.from({ length: last - first + 1 }, (_, k) => {
 		const value = (first + k) * apart;
-		const text = digits > 4 ? show(Number(value.toPrecision(3))) : value.toFixed(digits);
+		const text = tiny ? show(Number(value.toPrecision(3))) : value.toFixed(digits);
 		return [value, Number(text) < 0 ? text.replace("-", "−") : text.replace("-", "")];
 	});
 }
