@@ -1,7 +1,7 @@
 // What the figures of a study are made of.
 import assert from "node:assert/strict";
 import { test } from "node:test";
-import { unbeaten } from "../../static/js/study/figures/overview.js";
+import { unbeaten } from "../../static/js/study/figures.js";
 import { placeOf } from "../../static/js/study/where.js";
 import { lineOf } from "../../static/js/study/words.js";
 

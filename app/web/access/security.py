@@ -31,14 +31,14 @@ READING = frozenset({"GET", "HEAD", "OPTIONS"})
 LOOPBACK_NAMES = frozenset({"localhost", "127.0.0.1", "::1"})
 
 CONTENT_POLICY = (
-    "default-src 'none'; script-src 'self'; style-src-elem 'self'; style-src-attr 'unsafe-inline'; "
+    "default-src 'none'; script-src 'self'; style-src 'self'; "
     "img-src 'self' blob: data:; connect-src 'self'; frame-src 'self'; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'; "
     "require-trusted-types-for 'script'; trusted-types 'none'"
 )
-"""Of the page itself: no script or style sheet in it, nothing from another host, and no other page
-may frame it. Colours and lengths are in attributes. No text becomes an element or a script
-(Trusted Types): the page makes its elements one by one."""
+"""Of the page itself: no script or style in it, nothing from another host, and no other page may
+frame it. No text becomes an element or a script (Trusted Types): the page makes its elements one
+by one."""
 
 NOTHING = (
     "default-src 'none'; style-src 'unsafe-inline'; "

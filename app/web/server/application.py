@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from importlib.util import find_spec
-from pathlib import Path
-
 from fastapi import FastAPI, Request
 from fastapi.responses import Response
 from fastapi.staticfiles import StaticFiles
@@ -90,17 +87,8 @@ def create_app(settings: Settings) -> FastAPI:
         return response
 
     app.mount("/static", files, name="static")
-    app.mount("/plotly", StaticFiles(directory=_plotly()), name="plotly")
     app.mount("/manual", Manual(), name="manual")
     return app
-
-
-def _plotly() -> Path:
-    """The folder of the script that draws figures; it is found without reading the package."""
-    found = find_spec("plotly")
-    assert found is not None
-    assert found.origin is not None
-    return Path(found.origin).parent / "package_data"
 
 
 class _PageFiles(StaticFiles):

@@ -1,5 +1,6 @@
 /** A kept run in small, and runs side by side: what of them is drawn. */
-import { colourIndex, h, idTag, symbolOf } from "../elements/dom.js";
+import { chart, roundTicks } from "../elements/chart.js";
+import { colourIndex, h, idTag, svg, symbolOf } from "../elements/dom.js";
 import { parameterName } from "../elements/drawn.js";
 import { METHODS, figure, isMethod, methodWord, templateWords, titleOf } from "./words.js";
 
@@ -20,17 +21,6 @@ const FIGURES = /** @type {const} */ ([
 ]);
 
 const PROVISIONAL = "made before the run was finished; opening it computes them again";
-
-/**
- * An element of a drawing.
- * @param {string} tag @param {Record<string, string | number>} attributes @param {Element[]} children
- */
-function svg(tag, attributes, ...children) {
-	const element = document.createElementNS("http://www.w3.org/2000/svg", tag);
-	for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, String(value));
-	element.append(...children);
-	return element;
-}
 
 /** @param {unknown} text */
 const quiet = (text) => h("span", { class: "q" }, String(text));
@@ -74,7 +64,9 @@ function lanes({ run, frames, tracks }) {
 		h(
 			"span",
 			{ class: "ends" },
-			ticks(frames).map((step) => h("span", { "--at": at(step) }, step)),
+			roundTicks([0, frames - 1], Math.min(8, frames - 1)).map(([step, text]) =>
+				h("span", { "--at": at(step) }, text),
+			),
 		),
 		...longest
 			.sort((a, b) => a.first - b.first)
@@ -96,39 +88,37 @@ function lanes({ run, frames, tracks }) {
 	);
 }
 
-/** Round steps, four to ten of them. @param {number} frames */
-function ticks(frames) {
-	const most = Math.max(10, frames) / 4;
-	const power = 10 ** Math.floor(Math.log10(most));
-	const apart = Math.max(1, [5, 2, 1].map((k) => k * power).find((step) => step <= most) ?? 1);
-	return Array.from({ length: Math.ceil(frames / apart) }, (_, k) => k * apart);
-}
-
 /**
- * A staircase over the steps; people are whole, everything else ends where it is largest.
+ * A staircase over the steps, from zero to where it is largest.
  * @param {string} word @param {string} unit @param {number[]} values @param {number} frames
  * @param {number} every  steps that a value stands for: one of fewer steps than the run ends early
  */
 function curve(word, unit, values, frames, every) {
 	const most = Math.max(unit ? 0.1 : 1, ...values);
-	const top = most.toFixed(unit ? 2 : 0);
-	const points = values.flatMap((value, k) =>
-		[k, k + 1].map((at) => `${Math.min(at * every, frames)},${most - value}`),
-	);
+	const said = (/** @type {number} */ value) => value.toFixed(unit || value % 1 ? 2 : 0) + unit;
+	const figure = chart();
+	figure.show({
+		label: `${word} over time, at most ${said(most)}`,
+		x: { ends: [0, frames], ticks: [] },
+		y: { ends: [0, most], ticks: [] },
+		marks: [
+			{
+				kind: "steps",
+				colour: "p-est",
+				size: 1.25,
+				points: [...values, ...values.slice(-1)].map((y, k) => {
+					const x = Math.min(k * every, frames);
+					return { x, y, key: x, says: `step ${x}\n${word} ${said(y)}` };
+				}),
+			},
+		],
+		margin: [0, 7, 0, 3],
+	});
 	return h(
 		"div",
 		{ class: "crowd" },
-		h("span", {}, `${word}${unit}`, h("br"), quiet(`0–${top}`)),
-		svg(
-			"svg",
-			{
-				viewBox: `0 0 ${Math.max(1, frames)} ${most}`,
-				preserveAspectRatio: "none",
-				role: "img",
-				"aria-label": `${word} over time, at most ${top}${unit}`,
-			},
-			svg("polyline", { points: points.join(" ") }),
-		),
+		h("span", {}, `${word}${unit}`, h("br"), quiet(`0–${most.toFixed(unit ? 2 : 0)}`)),
+		figure.element,
 	);
 }
 
@@ -155,17 +145,15 @@ function ways({ courses, room }) {
 			role: "img",
 			"aria-label": "Ways from above",
 		},
-		...(room ? outline(room) : []),
-		...courses.map(({ id, points: way }) => {
+		room && outline(room),
+		courses.map(({ id, points: way }) => {
 			const [x, y] = way[way.length - 1];
-			const drawing = svg(
+			return svg(
 				"g",
-				{},
+				{ "--c": `var(--id-${colourIndex(id)})` },
 				svg("polyline", { points: way.map(([u, v]) => `${u},${-v}`).join(" ") }),
 				svg("circle", { cx: x, cy: -y, r: side / 60 }),
 			);
-			drawing.style.setProperty("--c", `var(--id-${colourIndex(id)})`);
-			return drawing;
 		}),
 	);
 }

@@ -1,5 +1,6 @@
 /** The cameras of an import: a row each, with all that belongs to one and what is odd about it. */
-import { h, icon, one, show, svg } from "../elements/dom.js";
+import { plot } from "../elements/chart.js";
+import { h, icon, one, show } from "../elements/dom.js";
 import { table } from "../elements/drawn.js";
 import { ownEnd } from "../library/words.js";
 import { cut, div, field, numberField, select, small, span, wishing } from "./controls.js";
@@ -187,8 +188,8 @@ function stateOf(info, camera, k) {
 
 /* ---------- How well a camera agrees with the others when it is shifted. */
 
+/** Of a curve, CSS pixels. */
 const [WIDTH, HEIGHT] = [140, 42];
-const BASE = HEIGHT - 12.5;
 
 /** Frames on either side that a curve shows at least. */
 const REACH = 30;
@@ -199,47 +200,37 @@ const REACH = 30;
  * @param {string} words  what the picture says
  */
 const curve = (found, late, words) =>
-	svg(
-		"svg",
-		{ class: "curve", role: "img", "aria-label": words, viewBox: `0 0 ${WIDTH} ${HEIGHT}` },
-		svg("path", { class: "base", d: `M0 ${BASE}h${WIDTH}` }),
-		found
-			? agreement(found, late)
-			: svg("text", { x: WIDTH / 2, y: BASE - 6 }, "nothing to compare"),
+	div(
+		{ class: "curve", role: "img", "aria-label": words },
+		found ? plot(agreement(found, late), WIDTH, HEIGHT).element : "nothing to compare",
 	);
 
 /** @param {Server.ImportedOffset} found @param {number} late */
 function agreement({ steps, offsets, agreement, sure }, late) {
 	const reach = Math.max(REACH, Math.ceil(Math.abs(steps) + 5));
-	const across = (/** @type {number} */ by) => WIDTH / 2 + (by / reach) * (WIDTH / 2 - 6);
-	const near = offsets.flatMap((offset, k) => {
-		const value = agreement[k];
-		return value !== null && Math.abs(offset) <= reach ? [{ offset, value }] : [];
+	const points = offsets.flatMap((x, k) => {
+		const y = agreement[k];
+		return y !== null && Math.abs(x) <= reach ? [{ x, y }] : [];
 	});
-	const values = near.map(({ value }) => value);
-	const low = values.length ? Math.min(...values) : 0;
-	const span = (values.length ? Math.max(...values) : 1) - low || 1;
-	const points = near.map(({ offset, value }) => [
-		across(offset),
-		BASE - 2 - ((value - low) / span) * (BASE - 6),
-	]);
-	const label = (/** @type {number} */ by, anchor = "middle", x = across(by)) =>
-		svg(
-			"text",
-			{ x, y: HEIGHT - 2, "text-anchor": anchor },
-			(late + by).toFixed(0).replace("-", "−"),
-		);
-	return [
-		svg("polyline", {
-			points: points.map(([x, y]) => `${x.toFixed(1)},${y.toFixed(1)}`).join(" "),
-			class: sure && "sure",
-		}),
-		svg("path", { class: "now", d: `M${across(0)} 2V${BASE}` }),
-		label(-reach, "start", 0),
-		label(0),
-		label(reach, "end", WIDTH),
-		sure &&
-			svg("circle", { cx: across(steps), cy: Math.min(4, ...points.map(([, y]) => y)), r: 3 }),
-		sure && label(steps),
+	const values = points.map(({ y }) => y);
+	const [low, high] = values.length ? [Math.min(...values), Math.max(...values)] : [0, 1];
+	const labelled = [-reach, 0, reach, ...(sure ? [steps] : [])];
+	/** @type {import("../elements/chart.js").Mark[]} */
+	const marks = [
+		{ kind: "line", colour: "ink-3", points: [-reach, reach].map((x) => ({ x, y: low })) },
+		{ kind: "line", colour: "ink-3", points: [low, high].map((y) => ({ x: 0, y })) },
+		{ kind: "line", colour: sure ? "warn" : "ink-2", size: 1.5, points },
+		{ kind: "dots", colour: "warn", points: sure ? [{ x: steps, y: high }] : [] },
 	];
+	return {
+		x: {
+			ends: [-reach, reach],
+			ticks: labelled.map(
+				(by) => /** @type {const} */ ([by, (late + by).toFixed(0).replace("-", "−")]),
+			),
+		},
+		y: { ends: [low, high], ticks: [] },
+		marks,
+		margin: [10, 4, 10, 13],
+	};
 }

@@ -2,7 +2,7 @@
 import { choices, fill, h, icon, write } from "../elements/dom.js";
 import { getJson } from "../state/api.js";
 import { bestTrials } from "./best.js";
-import { overview } from "./figures/overview.js";
+import { overview } from "./figures.js";
 import { definition } from "./form.js";
 import { placeOf } from "./where.js";
 import { lasting, lineOf, nameOf } from "./words.js";
@@ -392,7 +392,7 @@ export function mountStudy(root, { store, actions }) {
 		if (!news) return;
 		const done = [...trials.values()].sort((a, b) => a.ended - b.ended);
 		best.show(study, done);
-		void figures.show(study, done, chosen);
+		figures.show(study, done, chosen);
 	}
 
 	/** @param {number} number */
@@ -428,7 +428,8 @@ export function mountStudy(root, { store, actions }) {
 				return;
 			}
 			const act = KEYS[event.key];
-			if (!act || (target.closest("button, a") && ["Enter", " "].includes(event.key))) return;
+			if (!act || (target.closest("button, a, .chart") && ["Enter", " "].includes(event.key)))
+				return;
 			act();
 			event.preventDefault();
 			event.stopPropagation();
@@ -450,7 +451,6 @@ export function mountStudy(root, { store, actions }) {
 	store.on(["place"], ({ place }) => {
 		if (place === "study") void refreshList();
 	});
-	store.on(["theme"], () => show(true));
 	/** Somebody comes from a run, to try values around its own. */
 	const wanted = () => {
 		if (!store.get().wantsStudy) return false;

@@ -358,7 +358,7 @@ def test_the_page_and_its_files_are_checked_by_their_etag(client: TestClient) ->
         again = client.get(path, headers={"if-none-match": answer.headers["etag"]})
         assert again.status_code == 304
     policy = client.get("/").headers["content-security-policy"]
-    assert "script-src 'self';" in policy
+    assert "script-src 'self'; style-src 'self';" in policy
     assert policy.endswith("require-trusted-types-for 'script'; trusted-types 'none'")
 
 

@@ -8,7 +8,7 @@ import pytest
 from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Page, Route, expect
 
-from tests.browser.looking import ask
+from tests.browser.looking import ask, until
 from tests.browser.serving import Server
 
 TRIALS = 4
@@ -50,8 +50,8 @@ def study(flat_page: Page) -> Page:
 def test_trials_stand_against_each_other(study: Page, screenshots: Path | None) -> None:
     expect(study.locator("main")).to_be_hidden()
     expect(study.locator("tr[data-trial]").last).to_contain_text("default")
-    figure = study.locator(".scat .fill")
-    expect(figure.locator("path.point:not([display=none])").first).to_be_visible()
+    figure = study.locator(".scat .chart")
+    expect(figure.locator("circle").first).to_be_visible()
     assert "IDF1 against Position error" in (figure.get_attribute("aria-label") or "")
     expect(study.locator(".mp")).to_have_count(2)
     study.get_by_role("button", name="IDF1 · time").click()
@@ -62,6 +62,90 @@ def test_trials_stand_against_each_other(study: Page, screenshots: Path | None) 
         for theme in ("dark", "light"):
             study.emulate_media(color_scheme=theme)  # type: ignore[arg-type]
             study.screenshot(path=screenshots / f"study-{theme}.png")
+
+
+def test_a_point_says_what_it_is_and_a_click_chooses_it(study: Page) -> None:
+    for chart in (study.locator(".scat .chart"), study.locator(".mp .chart").first):
+        chart.locator("circle").first.wait_for()
+        box = chart.locator(".diamond path").bounding_box()
+        assert box is not None
+        study.locator("tr[data-trial]").first.click()
+        expect(study.locator("tr[aria-selected=true]")).not_to_have_attribute("data-trial", "0")
+        study.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+        expect(chart.locator(".says")).to_contain_text("IDF1 ")
+        said = chart.locator(".says").inner_text().splitlines()
+        study.mouse.down()
+        study.mouse.up()
+        chosen = study.locator("tr[aria-selected=true] td").first.inner_text()
+        assert said[0].split(",")[0].removeprefix("trial ") == chosen.split()[0], (said, chosen)
+        study.mouse.move(0, 0)
+        expect(chart.locator(".says")).to_be_hidden()
+
+
+def test_the_keys_walk_through_the_points_of_a_chart_and_choose_one(study: Page) -> None:
+    chart = study.get_by_role("application", name="IDF1 against")
+    chart.focus()
+    words = []
+    for key in ("Home", "ArrowRight", "ArrowRight", "ArrowLeft"):
+        study.keyboard.press(key)
+        words.append(chart.get_by_role("status").inner_text())
+    assert words[1] == words[3], words
+    assert len(set(words)) == 3, words
+    errors = [float(said.split("Position error ")[1].split()[0]) for said in words[:3]]
+    assert errors == sorted(errors), "along the axis"
+    study.keyboard.press("Enter")
+    number = study.locator("tr[aria-selected=true]").get_attribute("data-trial")
+    assert words[3].startswith("default" if number == "0" else f"trial {number}") or (
+        words[3].startswith(f"best, trial {number}")
+    )
+    expect(chart).to_be_focused()
+
+
+@pytest.mark.parametrize("by", ["pointer", "keys"])
+def test_a_range_of_a_parameter_is_narrowed_in_its_chart(study: Page, by: str) -> None:
+    chart = study.get_by_role("application", name="Clutter rate against")
+    chart.locator("circle").first.wait_for()
+    if by == "pointer":
+        box = chart.bounding_box()
+        assert box is not None
+        middle = box["x"] + box["width"] / 2
+        study.mouse.move(middle, box["y"] + 30)
+        study.mouse.down()
+        study.mouse.move(middle + 40, box["y"] + 40, steps=3)
+        expect(chart.locator(".range")).to_be_visible()
+        study.mouse.up()
+    else:
+        chart.focus()
+        for key in ("Home", "Shift+End"):
+            study.keyboard.press(key)
+        expect(chart.locator(".range")).to_be_visible()
+        study.keyboard.press("Enter")
+    expect(study.get_by_text("What it will take")).to_be_visible()
+    low, high = (
+        float(study.get_by_label(f"Clutter rate {end}").input_value()) for end in ("from", "to")
+    )
+    draft = {"low": 0.75, "high": 12.0}
+    assert draft["low"] <= low < high <= draft["high"]
+    assert (low, high) != (draft["low"], draft["high"])
+    assert low > draft["low"] or by == "keys"
+
+
+def test_charts_follow_the_window_and_the_theme(study: Page) -> None:
+    chart = study.locator(".scat .chart")
+
+    def drawn() -> tuple[float, str]:
+        line = chart.locator("polyline").first
+        colour: str = line.evaluate("line => getComputedStyle(line).stroke")
+        return float(chart.locator("svg").first.get_attribute("width") or 0), colour
+
+    study.emulate_media(color_scheme="dark")
+    width, colour = drawn()
+    study.set_viewport_size({"width": 1280, "height": 720})
+    study.emulate_media(color_scheme="light")
+    until(study, lambda: drawn()[0] < width and drawn()[1] != colour, "the chart is drawn anew")
+    box = chart.bounding_box()
+    assert box is not None
+    assert drawn()[0] == pytest.approx(box["width"], abs=1.0)
 
 
 def test_keys_walk_through_the_trials_and_use_one(study: Page, server: Server) -> None:
