@@ -165,8 +165,6 @@ export function mountView3d(root, { store, actions, playback, retry, press }) {
 		cover();
 		if (!reachable) return;
 		pace(view, playback.after3d);
-		// Its panel leaves out what the page around it says already.
-		view.document.documentElement.classList.add("mvp-inside");
 		takeWholeNumbers(view.document);
 		view.addEventListener(
 			"keydown",
