@@ -249,10 +249,8 @@ export function mountParameters(root, { store, actions }) {
 		const name = h(
 			"button",
 			{ class: "name", "aria-expanded": "false", title: of.help, onclick: () => unfold(key) },
+			h("i", {}, letter, index),
 			h("span", {}, label),
-			" ",
-			h("i", {}, letter),
-			index,
 			h("span", { class: "q" }, ` ${group.replaceAll("_", " ")}`),
 		);
 		const reset = h(
@@ -406,6 +404,7 @@ export function mountParameters(root, { store, actions }) {
 			const own = all("input, select", focused.closest("tr") ?? root).find((one) =>
 				one.checkVisibility(),
 			);
+			root.tabIndex = -1;
 			(own ?? next ?? stops.at(-1) ?? root).focus();
 		}
 	}
