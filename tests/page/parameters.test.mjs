@@ -33,7 +33,10 @@ test("both ends and any value between stand on the slider, and come back", () =>
 });
 
 test("a logarithmic slider moves by decades, a whole number stays whole", () => {
-  assert.deepEqual(placesOf(log).map((place) => Number(place.toFixed(9))), [-6, -1, 0.01]);
+  assert.deepEqual(
+    placesOf(log).map((place) => Number(place.toFixed(9))),
+    [-6, -1, 0.01],
+  );
   assert.equal(valueAt(log, -4.005), 9.89e-5);
   assert.equal(valueAt(count, 2.5), 316);
   assert.deepEqual(placesOf({ ...count, log: false, step: 0.5 }), [10, 5000, 1]);

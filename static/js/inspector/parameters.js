@@ -182,7 +182,9 @@ export function mountParameters(root, { store, actions }) {
 	function make(of) {
 		const { key, label, symbol, unit, kind, group } = of;
 		const id = `value-${key}`;
-		const called = { "aria-label": label, "aria-describedby": `help-${key}` };
+		// Several methods have a parameter of this name.
+		const whose = `${label}, ${group.replaceAll("_", " ")}`;
+		const called = { "aria-label": whose, "aria-describedby": `help-${key}` };
 		/** @type {Part | undefined} */
 		let slider;
 		/** @type {Part} */
@@ -255,7 +257,7 @@ export function mountParameters(root, { store, actions }) {
 		);
 		const reset = h(
 			"button",
-			{ class: "btn icon", "aria-label": `Reset ${label}`, onclick: () => actions.reset(key) },
+			{ class: "btn icon", "aria-label": `Reset ${whose}`, onclick: () => actions.reset(key) },
 			icon("i-reset", "s"),
 		);
 		const effect = h("td", { class: "effect" });

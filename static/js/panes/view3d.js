@@ -73,7 +73,8 @@ function softwareRenderer() {
 /* ---------- Numbers of viser's panel count when they are finished: it takes each letter for a
    number, and a 0 on the way to 0.9 for the least one that is allowed ---------- */
 
-const FIELD = ".mantine-NumberInput-input";
+/** Fields of numbers ask touch screens for digits. */
+const FIELD = "input[inputmode=decimal]";
 
 /** Keys that end a number, or change it by a step. */
 const ENDS = ["Enter", "ArrowUp", "ArrowDown"];
