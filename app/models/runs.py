@@ -26,6 +26,11 @@ class CurveInfo(Model):
     """Ascending, or the choices."""
     scores: list[float | None]
     """One a value; null where the run failed."""
+    whole: bool
+    """Whether there is nothing more to come."""
+    share: float | None
+    """Share of the variance of the measure that the parameter explains alone, among those whose
+    curves are whole, as studies report it; null where there are not two of them."""
 
 
 class Changes(Model):

@@ -131,10 +131,10 @@ class EditsInfo(Model):
 
 
 class TaskInfo(Model):
-    """Work in the background: an export, a check of identities, an import."""
+    """Work in the background: an export, a check of identities, an import, parameters' effects."""
 
     of: str
-    """The number of an export, the key of a run, or that of an import."""
+    """The number of an export, the key of a run, that of an import, or that of a recording."""
     state: str
     done: int
     """What is done of :attr:`total`; of an import it is the version that can be read."""
@@ -207,7 +207,7 @@ class State(Model):
 
 
 class ParameterInfo(Model):
-    """One parameter: what a slider needs."""
+    """One parameter: what its row in the table of parameters needs."""
 
     key: str
     group: str
@@ -218,6 +218,8 @@ class ParameterInfo(Model):
     unit: str
     stage: str
     """The first stage that a change re-runs."""
+    topic: str
+    """What it is about, such as "Birth"."""
     kind: Literal["float", "int", "bool", "choice"]
     default: Any
     minimum: float | None
@@ -241,6 +243,8 @@ class Schema(Model):
     """Every parameter, method and preset."""
 
     groups: list[GroupInfo]
+    topics: list[str]
+    """What parameters are about, in the order of a filter's step."""
     parameters: list[ParameterInfo]
     methods: dict[str, list[str]]
     presets: dict[str, dict[str, Any]]

@@ -33,6 +33,9 @@ from tracker.sequences.sequence import Room
 
 Rgb = UInt8[np.ndarray, "H W 3"]
 
+BELOW = 1e9
+"""Place of the written step in the panel: after all inputs, which viser numbers as they are made."""
+
 PICTURE_SECONDS = 20.0
 """A browser without a graphics card takes a while to draw."""
 
@@ -58,7 +61,8 @@ class Scene:
         self._theme: Theme | None = None
         server.scene.set_up_direction("+z")
         server.scene.world_axes.visible = False
-        self._status = server.gui.add_html(status_html(self._shown, None))
+        # below the sliders: inside the page its transport says the same
+        self._status = server.gui.add_html(status_html(self._shown, None), order=BELOW)
         self._room = RoomNodes(server)
         self._frusta = FrustumNodes(server, self._look_through)
         self._reference = ReferenceNodes(server)
@@ -317,11 +321,14 @@ def shown_run(snapshot: Snapshot) -> Run | None:
     return run
 
 
+STATUS_STYLE = "padding: 4px 12px; font-size: 11px; line-height: 15px"
+
+
 def status_html(snapshot: Snapshot, run: Run | None) -> str:
-    """The shown step in words, for the head of the panel."""
+    """The shown step in words, for the foot of the panel."""
     sequence, step = snapshot.sequence, snapshot.playhead
     if sequence is None:
-        return '<div class="mvp-status" data-state="empty">No sequence is open</div>'
+        return f'<div style="{STATUS_STYLE}" data-state="empty">No sequence is open</div>'
     if run is not None:
         now = run.tracks.at(step)
         count = now.stop - now.start
@@ -333,9 +340,7 @@ def status_html(snapshot: Snapshot, run: Run | None) -> str:
     size = " × ".join(f"{side:.1f}" for side in sequence.room.maximum - sequence.room.minimum)
     mass = round(100 * geometry.DEFAULT_MASS)
     return (
-        f'<div class="mvp-status" data-step="{step}" data-state="{state}">'
-        f"<p><b>{step}</b> / {sequence.frames - 1} · <b>{step / sequence.fps:.2f}</b> s"
-        f"<span>{words}</span></p>"
-        f"<small>grid {geometry.grid_cell(sequence.room):g} m · {size} m"
-        f" · ellipsoids {mass} %</small></div>"
+        f'<div style="{STATUS_STYLE}" data-step="{step}" data-state="{state}">'
+        f"{step} / {sequence.frames - 1} · {step / sequence.fps:.2f} s · {words}<br>"
+        f"grid {geometry.grid_cell(sequence.room):g} m · {size} m · ellipsoids {mass} %</div>"
     )

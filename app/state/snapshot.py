@@ -102,7 +102,8 @@ class Task:
     """Work in the background that somebody waits for; the pages are told of it as it goes on."""
 
     of: str
-    """What it is done for: the key of a run or of an import, or the number of an export."""
+    """What it is done for: the key of a run, a recording or an import, or the number of an
+    export."""
     state: str
     done: int = 0
     total: int = 0
@@ -183,7 +184,7 @@ class Snapshot:
     marks: int = 0
     """Grows when kept runs are named, marked, deleted or restored."""
     tasks: Mapping[str, Task] = field(default_factory=lambda: MappingProxyType({}))
-    """The newest of each kind: ``export``, ``identity``, and ``import`` with its key."""
+    """The newest of each kind: ``export``, ``identity``, ``effects``, and ``import`` with its key."""
     playhead: int = 0
     playhead_origin: str = ""
     sought: bool = False

@@ -90,7 +90,7 @@ class Workbench(ShownRun):
                 raise ParameterError(
                     "preset",
                     f"expected one of {known}, got {name!r}",
-                    "The tab Changes lists the built-in presets and your own.",
+                    "The tab Parameters lists the built-in presets and your own.",
                 )
             changes = {"single_view": now.parameters.single_view, **presets[name]}
             values = with_values(now.defaults, changes)

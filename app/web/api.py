@@ -17,7 +17,7 @@ from app.state.kept.history import History
 from app.state.snapshot import Snapshot
 from app.state.teaching import Teaching
 from app.state.workbench import Workbench
-from app.state.workers.sensitivity import Sensitivity
+from app.state.workers.sensitivity import Sensitivity, shares
 from app.web.dependencies import (
     ERRORS,
     FOR_EVER,
@@ -207,7 +207,8 @@ async def use_again(request: Request, number: int, bench: Bench) -> models.State
 def changes(request: Request, bench: Bench) -> models.Changes:
     """What differs from the defaults, and what parameters would change."""
     snapshot = bench.snapshot()
-    sensitivity: Sensitivity = request.app.state.sensitivity
+    curves = request.app.state.sensitivity.curves()
+    explained = shares(curves)
     return models.Changes(
         changed=[
             models.ChangedValue(key=key, default=value_of(snapshot.defaults, key), now=value)
@@ -219,8 +220,10 @@ def changes(request: Request, bench: Bench) -> models.Changes:
                 measure=curve.measure,
                 values=list(curve.values),
                 scores=list(curve.scores),
+                whole=curve.whole,
+                share=explained.get(key),
             )
-            for key, curve in sensitivity.curves().items()
+            for key, curve in curves.items()
         ],
     )
 
@@ -229,7 +232,7 @@ def changes(request: Request, bench: Bench) -> models.Changes:
 async def compute_curves(request: Request, wish: models.CurveRequest, bench: Bench) -> models.State:
     """Compute in the background what some parameters would change, until somebody works.
 
-    ``GET /api/changes`` and the 3D view's panel show it.
+    ``GET /api/changes`` has it, and the tasks of the state how far it is: ``effects``.
     """
     sensitivity: Sensitivity = request.app.state.sensitivity
     sensitivity.ask(wish.keys)

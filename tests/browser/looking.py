@@ -97,7 +97,7 @@ def readout(page: Page) -> str:
 def shown_in_3d(frame: Frame) -> str | None:
     """The step that the 3D view says it shows; none while it is being loaded."""
     try:
-        status = frame.query_selector(".mvp-status")
+        status = frame.query_selector("[data-state][data-step]")
         return status.get_attribute("data-step") if status else None
     except Error:  # loaded again in between: after a loss the page does so by itself
         return None

@@ -62,7 +62,7 @@ test("the address round-trips and names what it does not know", () => {
     selection: 7,
     camera: 1,
     look: "top",
-    view: { tab: "changes", zoom: "20-90", layers: "boxes.truth" },
+    view: { tab: "parameters", zoom: "20-90", layers: "boxes.truth" },
     values: { "fusion.detection_probability": "0.6", fusion_method: "sequential_phd" },
     pinned: { "fusion.memory": "2" },
   };
@@ -110,6 +110,8 @@ test("how it is looked at: only what is not as at first is written, and it is re
   assert.deepEqual(back.span, [20, 80]);
   assert.deepEqual(back.zooms, other.zooms);
   assert.deepEqual(back.layers3d, other.layers3d);
+  // a tab under its name in earlier addresses
+  assert.deepEqual(viewOf({ ...viewFrom({ tab: "changes" }), frames: 9 }), { tab: "parameters" });
   const senseless = { tab: "x", zoom: "9-3", speed: "7", loop: "a-b", layers: "none" };
   assert.deepEqual(Object.keys(viewOf({ ...viewFrom(senseless), frames: 9 })), ["layers"]);
 });

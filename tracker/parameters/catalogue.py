@@ -295,6 +295,9 @@ class Parameter:
     """Keys of other parameters, and the values of each with which this one has an effect."""
     essential: bool
     """Whether the parameter is among the few that the page shows first."""
+    slider: tuple[float, float, float] | None
+    """The least value, the largest and the step of the linear slider of an essential parameter;
+    None for the others."""
 
 
 def _group_stage(group: str) -> Stage:
@@ -303,6 +306,11 @@ def _group_stage(group: str) -> Stage:
     if group == "smoothing" or group in smoothed:
         return "smoothing"
     return "fusion" if group == "fusion" or group in fused else "single_view"
+
+
+def _slider(bounds: Mapping[str, Any], extra: Mapping[str, Any]) -> Any:
+    """Return the linear slider over the whole range of an essential parameter, else None."""
+    return (bounds["ge"], bounds["le"], extra["step"]) if extra["essential"] else None
 
 
 def _describe(group: str, model: type[Params], name: str, field: FieldInfo) -> Parameter:
@@ -335,6 +343,7 @@ def _describe(group: str, model: type[Params], name: str, field: FieldInfo) -> P
         advanced=extra["advanced"],
         when={f"{group}.{other}": tuple(values) for other, values in extra["when"].items()},
         essential=extra["essential"],
+        slider=extra["slider"] or _slider(bounds, extra),
     )
 
 

@@ -30,6 +30,7 @@ def ui(
     advanced: bool = False,
     when: Mapping[str, tuple[Any, ...]] = NO_CONDITION,
     essential: bool = False,
+    slider: tuple[float, float, float] | None = None,
 ) -> Any:
     """Return a pydantic field with the presentation of a parameter, beyond range and help.
 
@@ -45,6 +46,8 @@ def ui(
         when: Other parameters of the same group and the values of each with which this one has
             an effect; with any other value it is not shown.
         essential: Whether the parameter is among the few that the page shows first.
+        slider: The least value, the largest and the step of the linear slider beside the 3D view,
+            where the range is logarithmic; the published value and the default lie within.
     """
     extra = {
         "symbol": symbol,
@@ -57,6 +60,7 @@ def ui(
         "advanced": advanced,
         "when": {name: list(values) for name, values in when.items()},
         "essential": essential,
+        "slider": slider,
     }
     return Field(json_schema_extra={"x-ui": extra})
 

@@ -10,12 +10,12 @@ from __future__ import annotations
 import logging
 import math
 import threading
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from app.errors import sentence
-from app.state.snapshot import Change, Snapshot
+from app.state.snapshot import Change, Snapshot, Task
 from app.state.workbench import Workbench
 from app.state.workers.threads import CLOSING_SECONDS, be_nice
 from tracker.evaluation import EvaluationSettings, evaluate_sequence
@@ -78,6 +78,28 @@ def values_to_try(parameter: Parameter, now: Any) -> tuple[Any, ...]:
     return tuple(sorted(inside | {now}))
 
 
+def shares(curves: Mapping[str, Curve]) -> dict[str, float]:
+    """Return the share of the variance of the measure that each parameter explains alone, by key.
+
+    The variance is that of the scores along the parameter's curve, and the shares sum to one over
+    all curves that are whole. It is the first-order share of fANOVA [HHL14]_, which studies report,
+    where one parameter is moved at a time and the others stay. Empty for fewer than two parameters.
+
+    Args:
+        curves: The curves to compare, by key.
+    """
+    spread: dict[str, float] = {}
+    for key, curve in curves.items():
+        known = [score for score in curve.scores if score is not None]
+        if curve.whole and len(known) > 1:
+            mean = sum(known) / len(known)
+            spread[key] = sum((score - mean) ** 2 for score in known) / len(known)
+    total = sum(spread.values())
+    if len(spread) < 2:
+        return {}
+    return {key: one / total if total else 0.0 for key, one in spread.items()}
+
+
 class Sensitivity:
     """Computes curves in a thread of its own; the newest request wins."""
 
@@ -98,14 +120,11 @@ class Sensitivity:
         self._curves: dict[tuple[str, str], Curve] = {}
         self._last: Run | None = None
         """Stages are taken from it where the shown run is not finished; not kept for longer."""
-        self._listeners: list[Callable[[], None]] = []
+        self._done = self._total = 0
+        """Runs of what was asked for last."""
         self._unsubscribe = workbench.subscribe(self._on_change)
         self._thread = threading.Thread(target=self._work, name="sensitivity", daemon=True)
         self._thread.start()
-
-    def subscribe(self, callback: Callable[[], None]) -> None:
-        """Be told when there is more to show; the callback must return fast."""
-        self._listeners.append(callback)
 
     def ask(self, keys: Iterable[str]) -> None:
         """Compute the curves of some parameters, one after the other.
@@ -117,11 +136,14 @@ class Sensitivity:
         for key in keys:
             if key not in PARAMETERS:
                 with_values(now.parameters, {key: None})  # says what is wrong
+        tried = [values_to_try(PARAMETERS[key], value_of(now.parameters, key)) for key in keys]
         with self._condition:
             self._cancelled.set()
             self._cancelled = threading.Event()
             self._wanted = keys
+            self._done, self._total = 0, sum(map(len, tried))
             self._condition.notify_all()
+        self._tell()
 
     @property
     def under_way(self) -> list[str]:
@@ -166,14 +188,19 @@ class Sensitivity:
             if change == "sequence":
                 self._curves.clear()
                 self._last = None
-            if self._wanted:
-                self._wanted = []
-                self._cancelled.set()
+                self._total = 0
+            elif not self._wanted:
+                return
+            self._wanted = []
+            self._cancelled.set()
         self._tell()
 
     def _tell(self) -> None:
-        for listener in self._listeners:
-            listener()
+        with self._condition:
+            of = self._workbench.snapshot().sequence_key
+            state = "computing" if self._wanted else "done"
+            told = Task(of, state, self._done, self._total) if self._total else None
+        self._workbench.show_task("effects", told)
 
     def _work(self) -> None:
         be_nice()
@@ -217,6 +244,7 @@ class Sensitivity:
                 known[value] = self._score(now, parameters, cancelled)
             there = [value for value in values if value in known]
             with self._condition:
+                self._done = min(self._done + 1, self._total)
                 self._curves[key, basis] = Curve(
                     key,
                     measure,

@@ -36,17 +36,15 @@ HAS_FOCUS = b"<script>Document.prototype.hasFocus=()=>true</script>"
 """Makes ``document.hasFocus()`` true: viser's client reconnects only while its document has the
 focus, which inside a frame it mostly has not."""
 
-LABELS_LEAD_TO_THE_MANUAL = b"""<script>
-addEventListener("click", (event) => {
-  const label = event.target.closest?.("label[for]");
-  const place = label && document.getElementById(`help-${label.htmlFor}`)?.dataset.manual;
-  if (!place) return;
-  event.preventDefault();
-  open(place, "manual");
-}, true);
-</script>"""
-"""viser's labels are plain text with a hint; a click on one opens what the panel says of it,
-in :meth:`app.scene.panel.controls.Controls`, as ``<i id="help-UUID" data-manual="...">``."""
+RENDERER_IS_TOLD_OUTSIDE = b"""<script>if (parent !== window) {
+const gl = WebGL2RenderingContext.prototype;
+const { getExtension } = gl;
+gl.getExtension = function (name) {
+  return name === "WEBGL_debug_renderer_info" ? null : getExtension.call(this, name);
+};
+}</script>"""
+"""viser warns of rendering in software at each load; the page around it says so once, and in its
+own words."""
 
 BACKS_WRITE_NO_DEPTH = b"""<script>{
 const gl = WebGL2RenderingContext.prototype;
@@ -108,7 +106,7 @@ class Gateway:
 
         page = Path(viser.__file__).parent / "client" / "build" / "index.html"
         head, mark, rest = page.read_bytes().partition(b"<head>")
-        whole = head + mark + HAS_FOCUS + BACKS_WRITE_NO_DEPTH + LABELS_LEAD_TO_THE_MANUAL + rest
+        whole = head + mark + HAS_FOCUS + RENDERER_IS_TOLD_OUTSIDE + BACKS_WRITE_NO_DEPTH + rest
         nonce = secrets.token_urlsafe(16)
         said = f'nonce="{nonce}"'.encode()
         self._page = whole.replace(b"<script", b"<script " + said).replace(

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 from app.errors import sentence
 from app.state.teaching import Teaching
 from app.state.workbench import Workbench
-from app.state.workers.sensitivity import Sensitivity
 from app.web.access.gateway import Gateway
 from app.web.access.viewer import Entrance, start_viser
 
@@ -23,16 +22,15 @@ logger = logging.getLogger("app")
 class Room:
     """viser's server with what is in it."""
 
-    def __init__(self, workbench: Workbench, teaching: Teaching, sensitivity: Sensitivity) -> None:
+    def __init__(self, workbench: Workbench, teaching: Teaching) -> None:
         self._workbench = workbench
-        self._sensitivity = sensitivity
         self._teaching = teaching
         self.scene: Scene | None = None
         self._parts: list[Callable[[], object]] = []
 
     def open(self, entrance: Entrance) -> None:
         """Start viser behind its entrance and build scene and sliders in it."""
-        from app.scene.panel.controls import Controls
+        from app.scene.panel import Panel
         from app.scene.room.editing import RoomEditing
         from app.scene.scene import Scene
 
@@ -41,7 +39,7 @@ class Room:
         self.scene = Scene(server, self._workbench)
         self._parts.append(self.scene.close)
         self._parts.append(RoomEditing(server, self._workbench, self._teaching).close)
-        self._parts.append(Controls(server, self._workbench, self._sensitivity).close)
+        self._parts.append(Panel(server, self._workbench).close)
 
     def close(self) -> None:
         """Take it down in the opposite order."""

@@ -117,7 +117,7 @@ async def lifespan(app: FastAPI) -> AsyncIterator[None]:
     for crash in crashed:
         settings.say(crash.words)
     opening_step.follow(workbench)
-    room = app.state.room = Room(workbench, teaching, sensitivity)
+    room = app.state.room = Room(workbench, teaching)
     if settings.with_viser:
         door.prepare()
         # the page is served meanwhile; requests for the 3D view wait

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from typing import Any
+from typing import Any, get_args
 
 from numpy import ndarray
 
@@ -11,6 +11,7 @@ from app import models
 from app.state.snapshot import Snapshot
 from app.web.command_line import command_line
 from app.web.corrections import views as corrections
+from tracker.parameters import Topic
 from tracker.parameters.catalogue import GROUPS, METHODS, PARAMETERS, PRESETS
 from tracker.parameters.values import changed_values, shown_keys, value_of
 from tracker.sequences.sequence import Room
@@ -100,6 +101,7 @@ def schema() -> models.Schema:
     """Every parameter, method and preset."""
     return models.Schema(
         groups=[models.GroupInfo(name=name, help=text) for name, text in GROUPS.items()],
+        topics=list(get_args(Topic)),
         parameters=[
             models.ParameterInfo(
                 **{name: getattr(p, name) for name in models.ParameterInfo.model_fields}

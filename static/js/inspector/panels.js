@@ -1,4 +1,4 @@
-/** What the panels beside the pictures tell: the shown step, events, changes, figures and runs. */
+/** What the panels beside the pictures tell: the shown step, events, figures and runs. */
 import { h, idTag, show } from "../elements/dom.js";
 import { fixed, line, nothing, parameterName, quiet, table } from "../elements/drawn.js";
 import { getJson } from "../state/api.js";
@@ -285,7 +285,7 @@ function checked(state, actions) {
 	];
 }
 
-/* ---------- What differs from the defaults, and what parameters would change. */
+/* ---------- Parameters that differ between two runs. */
 
 /** @param {State} state @param {string} key  of a parameter; nothing is found for a method's */
 const parameterOf = ({ schema }, key) =>
@@ -295,71 +295,6 @@ const parameterOf = ({ schema }, key) =>
 function nameOf(state, key) {
 	const known = parameterOf(state, key);
 	return known ? parameterName(known) : key.replaceAll("_", " ");
-}
-
-/** The stage that a value belongs to. @param {State} state @param {string} key */
-function stageOf({ schema }, key) {
-	const [group] = key.split(".");
-	return quiet(
-		schema?.methods[group]
-			? "method"
-			: schema?.methods.single_view.includes(group)
-				? group
-				: group.replaceAll("_", " "),
-	);
-}
-
-/** @param {State} state @param {Server.Changes} told @param {Actions} actions */
-export function changeTables(state, { changed, curves: found }, actions) {
-	const rows = found.flatMap(({ key, measure, values, scores }) =>
-		values.map((value, k) => [
-			stageOf(state, key),
-			nameOf(state, key),
-			valueOf(value),
-			fixed(scores[k], measure === "MOTA" ? 3 : 0),
-		]),
-	);
-	const beside =
-		rows.length > 0 &&
-		table(
-			"What parameters would change",
-			["Stage", "What it would change", "#Value", `#${found[0].measure}`],
-			rows,
-			{ sorts: true },
-		);
-	if (!changed.length)
-		return beside
-			? [line("All parameters stand at their defaults."), beside]
-			: nothing(
-					"All parameters stand at their defaults",
-					"Move a slider in the panel of the 3D view; what differs is listed here.",
-				);
-	return [
-		table(
-			"Changed parameters",
-			["Stage", "Parameter", "#Default", "#Now", "#"],
-			changed.map(({ key, default: before, now }) => {
-				const known = parameterOf(state, key);
-				return [
-					stageOf(state, key),
-					nameOf(state, key),
-					quiet(valueOf(before)),
-					[valueOf(now), quiet(known?.unit && ` ${known.unit}`)],
-					h(
-						"button",
-						{
-							class: "btn",
-							"aria-label": `Reset ${known?.label ?? key.replaceAll("_", " ")}`,
-							onclick: () => actions.reset(key),
-						},
-						"reset",
-					),
-				];
-			}),
-			{ sorts: true },
-		),
-		beside,
-	];
 }
 
 /* ---------- The shown run, B, against the truth, beside A: the pinned run or the one before. */

@@ -7,14 +7,7 @@ import { all, allow, choices, one, parts, write, fill, h, icon } from "../elemen
 import { redraw } from "../elements/drawn.js";
 import { fetcher, getJson } from "../state/api.js";
 import { eventsNow, scoresOf } from "../state/events.js";
-import {
-	changeTables,
-	compareTables,
-	eventTable,
-	runTable,
-	seriesOf,
-	stepTables,
-} from "./panels.js";
+import { compareTables, eventTable, runTable, seriesOf, stepTables } from "./panels.js";
 import { teachPanel } from "./taught.js";
 
 /* ---------- The check of identities without truth: begun and stopped. ---------- */
@@ -150,11 +143,6 @@ const TABLES = {
 		draw: eventTable,
 	},
 	teach: { keys: ["server"], read: () => getJson("/api/teach"), draw: teachPanel },
-	changes: {
-		keys: ["server", "schema"],
-		read: () => getJson("/api/changes"),
-		draw: changeTables,
-	},
 	compare: {
 		keys: ["scores", "basis", "every", "identity", "schema"],
 		read: async ({ scores }) => (scores?.reference ? getJson("/api/evaluation/comparison") : null),
@@ -164,26 +152,9 @@ const TABLES = {
 };
 
 /** @type {Pane} */
-export function mountTables(root, { store, actions }) {
-	const {
-		kind,
-		presets,
-		presetName,
-		savePreset,
-		renamePreset,
-		removePreset,
-		code,
-		pin,
-		unpin,
-		swap,
-		place,
-		more,
-		resetAll,
-		report,
-		leaving,
-		stopLeaving,
-		leave,
-	} = parts(root);
+export function mountTables(root, context) {
+	const { store, actions } = context;
+	const { kind, pin, unpin, swap, place, more, report, leaving, stopLeaving, leave } = parts(root);
 	for (const [name, { keys, read, draw }] of Object.entries(TABLES)) {
 		const body = one(`#panel-${name} [data-fill]`, root);
 		const refresh = fetcher(async () => {
@@ -203,25 +174,6 @@ export function mountTables(root, { store, actions }) {
 		store.set({ eventKind: /** @type {LaneEvent["kind"]} */ (kind.value) }),
 	);
 	more.addEventListener("click", () => store.set({ every: !store.get().every }));
-	presets.addEventListener("change", () => actions.preset(presets.value));
-	for (const button of [savePreset, renamePreset]) {
-		button.addEventListener("click", () => {
-			const old = button === renamePreset ? presets.value : "";
-			Object.assign(presetName, { value: old, hidden: false });
-			presetName.select();
-			presetName.onkeydown = async (event) => {
-				event.stopPropagation();
-				if (
-					event.key === "Enter" &&
-					!(await (old
-						? actions.renamePreset(old, presetName.value)
-						: actions.savePreset(presetName.value)))
-				)
-					return;
-				if (event.key === "Enter" || event.key === "Escape") presets.focus();
-			};
-		});
-	}
 	// The run that is shown leaves in the same forms as those of the library.
 	/** @type {Promise<void> | undefined} */
 	let exports;
@@ -243,28 +195,20 @@ export function mountTables(root, { store, actions }) {
 			() => void (exports = undefined),
 		);
 	});
-	presetName.addEventListener("blur", () => (presetName.hidden = true));
-	removePreset.addEventListener("click", () => actions.removePreset(presets.value));
+	/** @type {Promise<void> | undefined} */
+	let parameters;
+	store.watch(["tab"], ({ tab }) => {
+		if (tab !== "parameters") return;
+		parameters ??= import("./parameters.js").then(
+			({ mountParameters }) => mountParameters(one("#panel-parameters", root), context),
+			() => void (parameters = undefined),
+		);
+	});
 
 	function controls() {
 		const state = store.get();
-		const { server, sequence, schema, run, link, every } = state;
-		const changed = server?.changed ?? [];
+		const { server, sequence, run, link, every } = state;
 		const locked = link !== "open" || !sequence;
-		const [own, now] = [server?.presets ?? [], server?.preset ?? ""];
-		choices(
-			presets,
-			[...(now ? [] : [""]), ...Object.keys(schema?.presets ?? {}), ...own].map((name) => [
-				name,
-				name || "own values",
-			]),
-			now,
-		);
-		presets.disabled = savePreset.disabled = locked;
-		renamePreset.hidden = removePreset.hidden = !own.includes(now);
-		resetAll.disabled = locked || changed.length === 0;
-		if (resetAll.disabled && document.activeElement === resetAll) presets.focus();
-		write(code, server?.command ?? "");
 		unpin.hidden = swap.hidden = !server?.pinned;
 		const unfinished = locked
 			? "There is no run."
@@ -289,10 +233,7 @@ export function mountTables(root, { store, actions }) {
 			allow(button, run?.done ? "" : "There are no tracks yet.");
 		write(more, every ? "Headlines" : "All figures");
 	}
-	store.watch(
-		["server", "schema", "link", "run", "every", "sequence", "scores", "basis"],
-		controls,
-	);
+	store.watch(["server", "link", "run", "every", "sequence", "scores", "basis"], controls);
 	store.watch(["shown", "timeline", "scores", "eventKind"], (state) => {
 		const events = eventsNow(state);
 		const past = events.filter(({ step }) => step <= state.shown).length;

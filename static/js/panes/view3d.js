@@ -73,7 +73,8 @@ function softwareRenderer() {
 /* ---------- Numbers of viser's panel count when they are finished: it takes each letter for a
    number, and a 0 on the way to 0.9 for the least one that is allowed ---------- */
 
-const FIELD = ".mantine-NumberInput-input";
+/** Fields of numbers ask touch screens for digits. */
+const FIELD = "input[inputmode=decimal]";
 
 /** Keys that end a number, or change it by a step. */
 const ENDS = ["Enter", "ArrowUp", "ArrowDown"];
@@ -165,8 +166,6 @@ export function mountView3d(root, { store, actions, playback, retry, press }) {
 		cover();
 		if (!reachable) return;
 		pace(view, playback.after3d);
-		// Its panel leaves out what the page around it says already.
-		view.document.documentElement.classList.add("mvp-inside");
 		takeWholeNumbers(view.document);
 		view.addEventListener(
 			"keydown",

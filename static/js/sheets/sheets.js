@@ -236,7 +236,15 @@ export function mountSheets({ store, actions }) {
 		const typed = input.value ? valueOf(parameter, input.value) : null;
 		if (typed !== null) return [set(typed)];
 		const words = kind === "choice" ? choices : kind === "bool" ? [true, false] : [];
-		return input.value ? [] : words.map(set);
+		const listed = {
+			title: `Show ${label} among the parameters`,
+			keys: [],
+			run() {
+				store.set({ sought: key });
+				actions.showTab("parameters");
+			},
+		};
+		return input.value ? [] : [...words.map(set), listed];
 	}
 	function offer() {
 		found = offered();

@@ -53,7 +53,7 @@ export const isBench = (place) => PLACES.some(({ name, bench }) => bench && name
    Nothing here touches the page. */
 
 const EVENTS = ["birth", "death", "switch", "long miss", "joined", "cut", "removed", "doubt"];
-const TABS = ["tracks", "step", "events", "teach", "changes", "compare", "runs", "place"];
+const TABS = ["tracks", "step", "events", "teach", "parameters", "compare", "runs", "place"];
 
 /** @param {Record<string, boolean>} all @param {string} text  those that are on */
 const readLayers = (all, text) =>
@@ -86,7 +86,10 @@ const KEYS = {
 		first: { tab: "tracks" },
 		// That of Check is there alone.
 		write: ({ tab, place }) => (tab === "place" && place !== "check" ? "tracks" : tab),
-		read: (text) => (TABS.includes(text) ? { tab: /** @type {PageState["tab"]} */ (text) } : null),
+		read(text) {
+			const tab = text === "changes" ? "parameters" : text; // its name in earlier addresses
+			return TABS.includes(tab) ? { tab: /** @type {PageState["tab"]} */ (tab) } : null;
+		},
 	},
 	zoom: {
 		first: { span: null },

@@ -102,6 +102,7 @@ export function initialState() {
 		used: [],
 		large: null,
 		tab: "tracks",
+		sought: "",
 		eventKind: "",
 		every: false,
 		scores: null,

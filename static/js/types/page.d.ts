@@ -136,7 +136,9 @@ interface PageState {
 	bookmarks: Bookmark[];
 	/** The camera that is shown large; null: all alike. */
 	large: number | null;
-	tab: "tracks" | "step" | "events" | "place" | "teach" | "changes" | "compare" | "runs";
+	tab: "tracks" | "step" | "events" | "place" | "teach" | "parameters" | "compare" | "runs";
+	/** Words of the parameters that are listed; all where empty. */
+	sought: string;
 	/** The events that are listed and gone to; all where empty. */
 	eventKind: "" | LaneEvent["kind"];
 	/** Whether all figures are compared, or the headlines. */

@@ -263,6 +263,13 @@ declare namespace Server {
 		values: any[];
 		/** One a value; null where the run failed. */
 		scores: (number | null)[];
+		/** Whether there is nothing more to come. */
+		whole: boolean;
+		/**
+		 * Share of the variance of the measure that the parameter explains alone, among those whose
+		 * curves are whole, as studies report it; null where there are not two of them.
+		 */
+		share: number | null;
 	}
 
 	/** What smoothing made otherwise than the filter, and why. */
@@ -861,7 +868,7 @@ declare namespace Server {
 		b: any;
 	}
 
-	/** One parameter: what a slider needs. */
+	/** One parameter: what its row in the table of parameters needs. */
 	interface ParameterInfo {
 		key: string;
 		group: string;
@@ -872,6 +879,8 @@ declare namespace Server {
 		unit: string;
 		/** The first stage that a change re-runs. */
 		stage: string;
+		/** What it is about, such as "Birth". */
+		topic: string;
 		kind: "float" | "int" | "bool" | "choice";
 		default: any;
 		minimum: number | null;
@@ -1114,6 +1123,8 @@ declare namespace Server {
 	/** Every parameter, method and preset. */
 	interface Schema {
 		groups: GroupInfo[];
+		/** What parameters are about, in the order of a filter's step. */
+		topics: string[];
 		parameters: ParameterInfo[];
 		methods: Record<string, string[]>;
 		presets: Record<string, Record<string, any>>;
@@ -1361,9 +1372,9 @@ declare namespace Server {
 		half_extents: [number, number, number];
 	}
 
-	/** Work in the background: an export, a check of identities, an import. */
+	/** Work in the background: an export, a check of identities, an import, parameters' effects. */
 	interface TaskInfo {
-		/** The number of an export, the key of a run, or that of an import. */
+		/** The number of an export, the key of a run, that of an import, or that of a recording. */
 		of: string;
 		state: string;
 		/** What is done of :attr:`total`; of an import it is the version that can be read. */

@@ -9,10 +9,9 @@ from typing import Any
 
 import pytest
 
-from app.scene.panel.curves import drawing_of, style_of, words_of
 from app.state.workbench import Workbench
 from app.state.workers import sensitivity as module
-from app.state.workers.sensitivity import Curve, Sensitivity, values_to_try
+from app.state.workers.sensitivity import Curve, Sensitivity, shares, values_to_try
 from tracker.evaluation import evaluate_sequence
 from tracker.parameters.catalogue import PARAMETERS, RunParameters
 from tracker.parameters.values import ParameterError, value_of, with_values
@@ -118,17 +117,26 @@ def test_what_is_no_parameter_is_refused(curves: Sensitivity) -> None:
         curves.ask(["fusion.nothing"])
 
 
-def test_the_panel_says_it_in_words_and_draws_it() -> None:
-    curve = Curve(P_D, "MOTA", (0.2, 0.5, 0.95), (0.913, None, 0.978), whole=True)
-    assert words_of(curve) == "0.2 … 0.95: MOTA 0.91 … 0.98"
-    falling = Curve(P_D, "MOTA", (0.2, 0.5, 0.95), (0.95, 0.978, 0.913), whole=True)
-    assert words_of(falling) == "0.2 … 0.95: MOTA 0.98 … 0.91"
-    assert drawing_of(curve, 0.95).count("<circle") == 1
-    style = style_of([(curve, 0.95, ["x"])])
-    assert 'label[for="x"]' in style
-    # the words never make the panel wider, nor are they cut off
-    assert "width: 0; min-width: 100%" in style
-    assert "nowrap" not in style
-    flat = Curve(P_D, "tracks", (1, 2), (4.0, 4.0), whole=False)
-    assert words_of(flat) == "1 … 2: tracks 4 throughout, computing"
-    assert words_of(Curve(P_D, "MOTA", (1, 2), (None, None), whole=True)).startswith("no run")
+def test_pages_are_told_how_far_it_is_and_that_it_ended(
+    bench: Workbench, curves: Sensitivity
+) -> None:
+    curves.ask([T_E])
+    task = bench.snapshot().tasks["effects"]
+    tried = len(values_to_try(PARAMETERS[T_E], PARAMETERS[T_E].default))
+    assert (task.of, task.total) == (bench.snapshot().sequence_key, tried)
+    until(lambda: bench.snapshot().tasks["effects"].state == "done")
+    assert bench.snapshot().tasks["effects"].done == tried
+
+
+def test_shares_of_the_variance_are_those_of_the_curves_that_are_whole() -> None:
+    steep = Curve(P_D, "MOTA", (0.2, 0.5, 0.8), (0.9, 0.6, 0.9), whole=True)
+    flat = Curve(T_E, "MOTA", (0.2, 0.5, 0.8), (0.9, None, 0.8), whole=True)
+    part = Curve("fusion.memory", "MOTA", (0.0, 3.0), (0.1, 0.9), whole=False)
+    # variances 0.02 and 0.0025
+    assert shares({P_D: steep, T_E: flat, "fusion.memory": part}) == {
+        P_D: pytest.approx(8 / 9),
+        T_E: pytest.approx(1 / 9),
+    }
+    assert shares({P_D: steep, "fusion.memory": part}) == {}, "there is nothing to compare with"
+    level = Curve(T_E, "MOTA", (0.2, 0.5), (0.9, 0.9), whole=True)
+    assert shares({P_D: level, T_E: level}) == {P_D: 0.0, T_E: 0.0}

@@ -98,7 +98,7 @@ def test_what_was_asked_for_wrongly_is_told_where_to_find_what_there_is(
     wrong = client.patch("/api/parameters", json={"changes": {"fusion.clutter_rate": -1.0}})
     assert hint(wrong) == "The manual lists every parameter with its range."
     preset = client.post("/api/parameters/preset", json={"name": "nobody's"})
-    assert hint(preset).startswith("The tab Changes lists the built-in presets ")
+    assert hint(preset).startswith("The tab Parameters lists the built-in presets ")
     assert hint(client.post("/api/run/again/999")) == "The tab Runs lists them."
     assert "the cameras" in hint(client.post("/api/view", json={"camera": 9}))
     assert "the layers" in hint(client.patch("/api/layers", json={"changes": {"walls": True}}))

@@ -37,12 +37,20 @@ OUTSIDE = """() => {
 }"""
 
 
-SLIDERS = """() => [...document.querySelectorAll('.mantine-Slider-root')].filter((e) => {
+SLIDERS = """() => [...document.querySelectorAll('[role=slider]')].filter((e) => {
   const { x, y, width, height, bottom } = e.getBoundingClientRect();
   const top = document.elementFromPoint(x + width / 2, y + height / 2);
   return height > 0 && bottom <= innerHeight && e.contains(top);
 }).length"""
 """How many sliders of viser's panel are wholly in sight."""
+
+
+IN_SIGHT = """row => {
+  const { x, top, bottom, height } = row.getBoundingClientRect();
+  const at = (y) => row.contains(document.elementFromPoint(x + 20, y));
+  return height > 0 && at(top + 2) && at(bottom - 2);
+}"""
+"""Whether a row is wholly in sight."""
 
 
 def keep(page: Page, folder: Path | None, name: str, tmp_path: Path) -> None:
@@ -103,15 +111,22 @@ def states(page: Page, size: str, seen: Callable[[str], None]) -> None:
         row = page.locator("#panel-tracks tbody tr").first
         height = page.locator("#panel-tracks .scroll").evaluate("e => e.clientHeight")
         assert height > 6 * row.evaluate("e => e.clientHeight"), "a head and five rows fit"
+        page.get_by_role("tab", name="Parameters").click()
+        rows = page.locator("#panel-parameters tr[data-key]")
+        expect(rows.first).to_be_visible()
+        assert sum(row.evaluate(IN_SIGHT) for row in rows.all()[:12]) >= 5, "five parameters fit"
+        assert panel.evaluate(SLIDERS) >= 8
+        page.get_by_role("tab", name="Tracks").click()
         assert page.locator(".cam:visible").count() == 2
     else:
         head.scroll_into_view_if_needed()
         expect(head).to_be_in_viewport()
     seen("tracks")
     if size != "wide":
-        for tab in ("Step", "Changes", "Compare", "Runs"):
+        for tab in ("Step", "Parameters", "Compare", "Runs"):
             page.get_by_role("tab", name=tab).click()
-            expect(page.locator(f"#panel-{tab.lower()} [data-fill] > *").first).to_be_visible()
+            drawn = page.locator(f"#panel-{tab.lower()} :is([data-fill] > *, tr[data-key])")
+            expect(drawn.first).to_be_visible()
             seen(tab.lower())
         wide = page.locator("#panel-runs [data-fill]").evaluate(
             "e => e.scrollWidth - e.clientWidth"

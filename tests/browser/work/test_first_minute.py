@@ -20,7 +20,7 @@ def test_reset_all_resets_all(flat_page: Page, server: Server) -> None:
     as_at_first(server)
     for way in ("button", "palette"):
         ask(server, "PATCH", "parameters", {"changes": {P_D: 0.6}})
-        page.get_by_role("tab", name=re.compile("Changes")).click()
+        page.get_by_role("tab", name=re.compile("Parameters")).click()
         button = page.get_by_role("button", name="Reset all", exact=True)
         expect(button).to_be_enabled()
         if way == "button":
@@ -40,7 +40,7 @@ def test_lists_of_choices_stay_as_they_are_while_they_have_the_same(
     mark = "all => all.forEach(list => [...list.options].forEach(one => (one.same = true)))"
     page.locator(lists).evaluate_all(mark)
     ask(server, "PATCH", "parameters", {"changes": {P_D: 0.6}})
-    expect(page.get_by_role("tab", name=re.compile("Changes"))).to_contain_text("1")
+    expect(page.get_by_role("tab", name=re.compile("Parameters"))).to_contain_text("1")
     kept = "all => all.map(list => [...list.options].every(one => one.same))"
     assert page.locator(lists).evaluate_all(kept) == [True, True]
     as_at_first(server)
@@ -55,7 +55,7 @@ def test_undo_is_offered_only_where_there_is_something_to_undo(
         httpx2.post(server.address + "api/undo")  # what other tests did with this server
     # not reloaded: the address may name what was undone only just now, and would bring it back
     page.goto(server.address)
-    page.get_by_role("tab", name=re.compile("Changes")).click()
+    page.get_by_role("tab", name=re.compile("Parameters")).click()
     undo = page.get_by_role("button", name="Undo", exact=True)
     expect(undo).to_be_disabled()
     ask(server, "PATCH", "parameters", {"changes": {P_D: 0.6}})
@@ -70,7 +70,7 @@ def test_what_was_edited_is_undone_inside_a_dialog_too(flat_page: Page, server: 
     page = flat_page
     as_at_first(server)
     ask(server, "PATCH", "parameters", {"changes": {P_D: 0.6}})
-    expect(page.locator("#tab-changes .count")).to_have_text("1")
+    expect(page.locator("#tab-parameters .count")).to_have_text("1")
     page.keyboard.press("?")
     expect(page.locator("dialog.help")).to_be_visible()
     page.keyboard.press("Control+z")
@@ -101,7 +101,7 @@ def test_a_note_under_the_pointer_stays_while_a_run_goes_on(
     close = page.locator(".note", has_text="unknown parts").get_by_role("button", name="Dismiss")
     close.evaluate("button => (button.isTheOne = true)")
     ask(server, "PATCH", "parameters", {"changes": {P_D: 0.6}})
-    expect(page.locator("#tab-changes .count")).to_have_text("1")
+    expect(page.locator("#tab-parameters .count")).to_have_text("1")
     server.wait_for_run()
     expect(page.locator(".status")).to_contain_text("computed")
     assert close.evaluate("button => button.isTheOne")

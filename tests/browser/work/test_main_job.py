@@ -22,6 +22,7 @@ from tests.browser.looking import (
     painted,
     readout,
     shown_in_3d,
+    still,
     until,
     viser,
 )
@@ -47,10 +48,9 @@ MOVED = {
 """Where the sliders are moved to, of the methods that a built-in sequence is tracked with: its
 fusion merges nobody who was detected, so that merging is that of the single view."""
 
-UNFOLD = """label => {
-  for (let one = label; one; one = one.parentElement)
-    if (getComputedStyle(one).display === 'none') one.previousElementSibling?.click();
-}"""
+
+THUMB = 16
+"""Width of the thumb of the browser's own sliders in pixels: its middle stands at a value."""
 
 
 @pytest.mark.short
@@ -86,7 +86,7 @@ def test_main_job(browser: Browser, tmp_path: Path) -> None:
             ask(server, "PATCH", "parameters", {"changes": {"smoothing_method": "none"}})
             run, found = results(server, after=run)
             for key, to in MOVED.items():
-                move_slider(server, scene, key, to)
+                move_slider(server, page, key, to)
                 before = found
                 run, found = results(server, after=run)
                 assert found != before, key
@@ -96,8 +96,8 @@ def test_main_job(browser: Browser, tmp_path: Path) -> None:
 
 def test_a_typed_number_counts_when_it_is_finished(page: Page, server: Server) -> None:
     key = "fusion.survival_probability"
-    row = row_of(viser(page), key)
-    field = row.locator("input:visible")
+    slider = essential(viser(page), key)
+    field = slider.locator("xpath=..").locator("input[inputmode=decimal]")
     for delay, end in ((0, "Enter"), (250, "Enter"), (30, "Tab")):
         as_at_first(server)
         default = server.get("/api/state").json()["parameters"][key]
@@ -108,7 +108,7 @@ def test_a_typed_number_counts_when_it_is_finished(page: Page, server: Server) -
         assert server.get("/api/state").json()["parameters"][key] == default
         field.press(end)
         server.wait(lambda state: state["parameters"][key] == 0.9)
-        thumb = row.get_by_role("slider")
+        thumb = slider.get_by_role("slider")
         until(page, lambda: thumb.get_attribute("aria-valuenow") == "0.9", "the slider at 0.9")  # noqa: B023
         assert field.input_value() == "0.9"
     as_at_first(server)
@@ -177,30 +177,34 @@ def sent_to_3d(page: Page) -> dict[str, dict[str, Any]]:
     return nodes
 
 
-def move_slider(server: Server, scene: Frame, key: str, to: float) -> None:
-    """Click on a parameter's slider where a value is, and wait until it holds."""
+def move_slider(server: Server, page: Page, key: str, to: float) -> None:
+    """Click on a parameter's slider where a value is, and wait until it holds: beside the 3D view
+    on those of the essential ones, on the page on the others."""
+    parameter = PARAMETERS[key]
     before = server.get("/api/state").json()["parameters"][key]
-    row = row_of(scene, key)
-    thumb = row.get_by_role("slider").first
-    low, high = (float(thumb.get_attribute(f"aria-value{end}") or "nan") for end in ("min", "max"))
-    place = np.log10(to) if PARAMETERS[key].log else to
-    whole = row.locator(".mantine-Slider-root").first
-    box = whole.bounding_box()
-    assert box is not None
-    x = box["width"] * (place - low) / (high - low)
-    whole.click(position={"x": x, "y": box["height"] / 2})
+    if parameter.slider is not None:
+        slider = essential(viser(page), key)
+        low, high, _ = parameter.slider
+        share, rim = (to - low) / (high - low), 0.0
+    else:
+        page.get_by_role("tab", name="Parameters").click()
+        page.get_by_label("Find a parameter").fill(key)
+        slider = page.locator(f'tr[data-key="{key}"]').get_by_role("slider")
+        assert parameter.log
+        ends = parameter.minimum, parameter.maximum, to
+        low, high, place = (np.log10(end) for end in ends)  # type: ignore[arg-type]
+        share, rim = (place - low) / (high - low), THUMB / 2
+    box = still(slider)
+    x = rim + (box["width"] - 2 * rim) * share
+    slider.click(position={"x": x, "y": box["height"] / 2})
     moved = server.wait(lambda state: state["parameters"][key] != before)["parameters"][key]
     assert moved == pytest.approx(to, rel=0.2)
 
 
-def row_of(scene: Frame, key: str) -> Locator:
-    """The row of a parameter in the panel, unfolded."""
-    place = scene.locator(f'i[data-manual="/manual/tuning/#{key}"]')
-    identifier = (place.get_attribute("id") or "").removeprefix("help-")
-    label = scene.locator(f'label[for="{identifier}"]')
-    label.evaluate(UNFOLD)
-    label.wait_for()
-    return label.locator("xpath=../../..")
+def essential(scene: Frame, key: str) -> Locator:
+    """The slider of an essential parameter, by the words beside it."""
+    label = scene.locator("label", has_text=re.compile(f"^{PARAMETERS[key].label}$"))
+    return scene.locator(f'[id="{label.get_attribute("for")}"]')
 
 
 def results(server: Server, *, after: str) -> tuple[str, list[Any]]:

@@ -112,7 +112,8 @@ def test_the_focus_goes_on_to_what_is_left(flat_page: Page, server: Server) -> N
     expect(page.get_by_role("tab", name="Runs")).to_be_focused()
     page.keyboard.press("Home")
     expect(page.get_by_role("tab", name="Tracks")).to_be_focused()
-    panel = shown(page, "Changes")
+    panel = shown(page, "Parameters")
+    panel.get_by_role("button", name="changed only").click()
     resets = panel.get_by_role("button", name=re.compile("^Reset "))
     expect(resets).to_have_count(2)
     resets.first.focus()
@@ -121,7 +122,7 @@ def test_the_focus_goes_on_to_what_is_left(flat_page: Page, server: Server) -> N
     expect(resets.first).to_be_focused()
     page.keyboard.press("Enter")
     expect(resets).to_have_count(0)
-    expect(page.locator("#panel-changes")).to_be_focused()
+    expect(page.locator("#panel-parameters")).to_be_focused()
     as_at_first(server)
 
 

@@ -6,8 +6,9 @@ from urllib.parse import urlsplit
 
 from playwright.sync_api import Page, expect
 
-from tests.browser.looking import as_at_first, ask, until
+from tests.browser.looking import as_at_first, ask, by_palette, still, until, viser
 from tests.browser.serving import Server
+from tests.browser.work.test_main_job import essential
 from tests.browser.work.test_panels import number
 from tracker.evaluation import compare, evaluate_sequence
 from tracker.parameters.catalogue import PARAMETERS
@@ -116,7 +117,7 @@ def test_presets_of_ones_own_by_keyboard(flat_page: Page, server: Server) -> Non
     page = flat_page
     as_at_first(server)
     ask(server, "PATCH", "parameters", {"changes": {P_D: 0.6}})
-    page.get_by_role("tab", name="Changes").click()
+    page.get_by_role("tab", name="Parameters").click()
     preset = page.get_by_role("combobox", name="Preset")
     expect(preset).to_have_value("")  # own values
     page.get_by_role("button", name="Save as").focus()
@@ -140,7 +141,8 @@ def test_presets_of_ones_own_by_keyboard(flat_page: Page, server: Server) -> Non
     preset.select_option("quick")
     server.wait(lambda state: state["parameters"][P_D] == 0.6)
     # the page takes back what it knows of
-    expect(page.locator("#panel-changes")).to_contain_text("0.6")
+    field = page.locator(f'#panel-parameters tr[data-key="{P_D}"] .num')
+    expect(field).to_have_value("0.6")
     page.keyboard.press("Control+z")
     state = server.wait(lambda state: state["parameters"][P_D] != 0.6)
     assert state["parameters"][P_D] == PARAMETERS[P_D].default
@@ -151,4 +153,91 @@ def test_presets_of_ones_own_by_keyboard(flat_page: Page, server: Server) -> Non
     page.get_by_role("button", name="Remove").click()
     server.wait(lambda state: state["presets"] == [])
     assert server.get("/api/state").json()["parameters"][P_D] == 0.6, "the values stay"
+    as_at_first(server)
+
+
+def test_one_value_on_the_page_beside_the_3d_view_and_back(page: Page, server: Server) -> None:
+    as_at_first(server)
+    scene = viser(page)
+    page.get_by_role("tab", name="Parameters").click()
+    row = page.locator(f'#panel-parameters tr[data-key="{P_D}"]')
+    field, slider = row.locator(".num"), row.get_by_role("slider")
+    field.fill("0,6")
+    page.keyboard.press("Enter")
+    server.wait(lambda state: state["parameters"][P_D] == 0.6)
+    beside = essential(scene, P_D).get_by_role("slider")
+    expect(beside).to_have_attribute("aria-valuenow", "0.6")
+    beside.focus()
+    beside.press("ArrowRight")
+    server.wait(lambda state: state["parameters"][P_D] == 0.61)
+    expect(field).to_have_value("0.61")
+    slider.focus()
+    for _ in range(3):
+        slider.press("ArrowLeft")
+    server.wait(lambda state: state["parameters"][P_D] == 0.58)
+    expect(field).to_have_value("0.58")
+    expect(beside).to_have_attribute("aria-valuenow", "0.58")
+    as_at_first(server)
+
+
+def test_who_holds_a_slider_or_types_is_not_written_over(flat_page: Page, server: Server) -> None:
+    page = flat_page
+    as_at_first(server)
+    page.get_by_role("tab", name="Parameters").click()
+    row = page.locator(f'#panel-parameters tr[data-key="{P_D}"]')
+    field, slider = row.locator(".num"), row.get_by_role("slider")
+    box = still(slider)
+    page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    page.mouse.down()
+    held = server.wait(lambda state: state["parameters"][P_D] < 0.9)["parameters"][P_D]
+    where = slider.input_value()
+    ask(server, "PATCH", "parameters", {"changes": {P_D: 0.2, "fusion.memory": 9.0}})
+    memory = page.locator('#panel-parameters tr[data-key="fusion.memory"] .num')
+    expect(memory).to_have_value("9")  # the page knows of both
+    assert (slider.input_value(), field.input_value()) == (where, f"{held:g}")
+    page.mouse.up()
+    expect(field).to_have_value("0.2")
+    field.fill("0.7")
+    ask(server, "PATCH", "parameters", {"changes": {P_D: 0.3, "fusion.memory": 8.0}})
+    expect(memory).to_have_value("8")
+    expect(field).to_have_value("0.7")
+    page.keyboard.press("Escape")
+    expect(field).to_have_value("0.3")
+    as_at_first(server)
+
+
+def test_a_parameter_is_found_explained_and_its_effect_measured(
+    flat_page: Page, server: Server
+) -> None:
+    page = flat_page
+    as_at_first(server)
+    server.wait_for_run()
+    by_palette(page, "extraction threshold")
+    page.get_by_role("option", name="Show Extraction threshold among the parameters").click()
+    panel = page.locator("#panel-parameters")
+    find = panel.get_by_label("Find a parameter")
+    expect(find).to_have_value("fusion.extraction_threshold")
+    rows = panel.locator("tr[data-key]:visible")
+    expect(rows).to_have_count(1)
+    find.fill("clutter rate fusion")
+    expect(rows).to_have_count(1)
+    rows.get_by_role("button", name="Clutter rate").click()
+    parameter = PARAMETERS["fusion.clutter_rate"]
+    help_line = panel.locator("tr.more:visible")
+    expect(help_line).to_contain_text(parameter.help)
+    expect(help_line).to_contain_text(f"as published {parameter.published:g}")
+    manual = help_line.get_by_role("link", name="In the manual")
+    expect(manual).to_have_attribute("href", "/manual/tuning/#fusion.clutter_rate")
+    find.fill("threshold fusion extraction")
+    panel.locator("[data-ref=effects]").click()
+    curve = rows.first.locator(".curve")
+    expect(curve).to_be_visible(timeout=60_000)
+    server.wait(lambda state: state["tasks"]["effects"]["state"] == "done")
+    told = server.get("/api/changes").json()["curves"]
+    assert [one["key"] for one in told][:1] == ["fusion.extraction_threshold"]
+    assert all(one["whole"] for one in told)
+    find.fill("no such words")
+    expect(panel.get_by_text("No parameter has “no such words”.")).to_be_visible()
+    find.press("Escape")
+    expect(rows.nth(20)).to_be_visible()
     as_at_first(server)

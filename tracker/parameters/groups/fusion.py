@@ -42,6 +42,7 @@ class FusionParams(Params):
             log=True,
             published=0.5,
             essential=True,
+            slider=(0.1, 10.0, 0.1),
         ),
     ] = 3.0
     """Expected number of false boxes that a camera gives at each step."""
@@ -49,7 +50,15 @@ class FusionParams(Params):
     birth_rate: Annotated[
         float,
         Field(ge=1e-4, le=10.0),
-        ui("γ", "Birth", unit="1/(entrance·s)", log=True, published=0.5, essential=True),
+        ui(
+            "γ",
+            "Birth",
+            unit="1/(entrance·s)",
+            log=True,
+            published=0.5,
+            essential=True,
+            slider=(0.01, 1.0, 0.01),
+        ),
     ] = 0.05
     """Expected number of people who come in at each entrance in one second."""
 
@@ -81,7 +90,16 @@ class FusionParams(Params):
     acceleration_sigma: Annotated[
         float,
         Field(ge=0.05, le=10.0),
-        ui("σ_a", "Motion", unit="m/s per √s", step=0.05, log=True, when=_VELOCITY, essential=True),
+        ui(
+            "σ_a",
+            "Motion",
+            unit="m/s per √s",
+            step=0.05,
+            log=True,
+            when=_VELOCITY,
+            essential=True,
+            slider=(0.05, 3.0, 0.05),
+        ),
     ] = 0.6
     """Constant velocity: standard deviation of the change of a person's velocity in one second,
     along each horizontal axis."""

@@ -1,1 +1,0 @@
-"""viser's panel of sliders, made from the parameters' definitions."""
