@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -102,7 +103,9 @@ def test_the_keys_walk_through_the_points_of_a_chart_and_choose_one(study: Page)
 
 
 @pytest.mark.parametrize("by", ["pointer", "keys"])
-def test_a_range_of_a_parameter_is_narrowed_in_its_chart(study: Page, by: str) -> None:
+def test_a_range_of_a_parameter_is_narrowed_in_its_chart(
+    study: Page, server: Server, by: str
+) -> None:
     chart = study.get_by_role("application", name="Clutter rate against")
     chart.locator("circle").first.wait_for()
     if by == "pointer":
@@ -124,10 +127,13 @@ def test_a_range_of_a_parameter_is_narrowed_in_its_chart(study: Page, by: str) -
     low, high = (
         float(study.get_by_label(f"Clutter rate {end}").input_value()) for end in ("from", "to")
     )
-    draft = {"low": 0.75, "high": 12.0}
-    assert draft["low"] <= low < high <= draft["high"]
-    assert (low, high) != (draft["low"], draft["high"])
-    assert low > draft["low"] or by == "keys"
+    (tried,) = (
+        one
+        for one in server.get("/api/studies/short").json()["varied"]
+        if one["key"] == "fusion.clutter_rate"
+    )
+    assert tried["low"] <= low < high <= tried["high"]
+    assert (low, high) != (tried["low"], tried["high"])
 
 
 def test_charts_follow_the_window_and_the_theme(study: Page) -> None:
@@ -162,6 +168,21 @@ def test_keys_walk_through_the_trials_and_use_one(study: Page, server: Server) -
     assert {key: now[key] for key in values} == pytest.approx(values)
     study.keyboard.press("Escape")
     expect(study.locator("main")).to_be_visible()
+
+
+def test_trials_are_sorted_by_a_column(study: Page) -> None:
+    head = study.get_by_role("columnheader", name="Position error m")
+    column = head.evaluate("head => head.cellIndex")
+    expect(head).not_to_have_attribute("aria-sort", re.compile("."))
+    for order, turn in (("ascending", 1), ("descending", -1)):
+        head.get_by_role("button").click()
+        expect(head).to_have_attribute("aria-sort", order)
+        errors = [
+            float(row.locator("td").nth(column).inner_text().split()[0])
+            for row in study.locator("tr[data-trial]").all()
+        ]
+        assert errors == sorted(errors, reverse=turn < 0), errors
+        assert len(set(errors)) > 1
 
 
 def test_a_copy_is_changed_and_what_is_wrong_is_said(study: Page) -> None:
