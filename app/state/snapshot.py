@@ -184,7 +184,7 @@ class Snapshot:
     marks: int = 0
     """Grows when kept runs are named, marked, deleted or restored."""
     tasks: Mapping[str, Task] = field(default_factory=lambda: MappingProxyType({}))
-    """The newest of each kind: ``export``, ``identity``, ``effects``, and ``import`` with its key."""
+    """The newest of each kind: ``export``, ``identity``, ``effects``, ``import`` with its key."""
     playhead: int = 0
     playhead_origin: str = ""
     sought: bool = False
