@@ -34,7 +34,7 @@ from tracker.sequences.sequence import Room
 Rgb = UInt8[np.ndarray, "H W 3"]
 
 BELOW = 1e9
-"""Place of the written step in the panel: after all inputs, which viser numbers as they come."""
+"""Place of the written step in the panel: after all inputs, which viser counts from 1 on."""
 
 PICTURE_SECONDS = 20.0
 """A browser without a graphics card takes a while to draw."""

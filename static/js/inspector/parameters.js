@@ -268,7 +268,7 @@ export function mountParameters(root, { store, actions }) {
 			h("td", {}, name),
 			slider
 				? [h("td", { class: "slider" }, slider), h("td", { class: "field" }, field)]
-				: h("td", { class: "choice", colspan: 2 }, field),
+				: h("td", { class: "pick", colspan: 2 }, field),
 			h("td", { class: "unit", title: unit }, unit),
 			effect,
 			h("td", {}, reset),

@@ -186,6 +186,7 @@ def test_who_holds_a_slider_or_types_is_not_written_over(flat_page: Page, server
     page.get_by_role("tab", name="Parameters").click()
     row = page.locator(f'#panel-parameters tr[data-key="{P_D}"]')
     field, slider = row.locator(".num"), row.get_by_role("slider")
+    slider.scroll_into_view_if_needed()
     box = still(slider)
     page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
     page.mouse.down()
