@@ -46,6 +46,11 @@ def is_evaluated(client: TestClient) -> Callable[[], bool]:
     return holds
 
 
+def command(client: TestClient, name: str, **fields: Any) -> Any:
+    """The answer to a command."""
+    return client.post("/api/commands", json={"name": name, **fields})
+
+
 def connect(client: TestClient, path: str = "/api/stream", **headers: str) -> Any:
     """A socket as a page of ours opens it; the test client knows its host for requests only."""
     return client.websocket_connect(path, headers={"host": "127.0.0.1:8000", **headers})

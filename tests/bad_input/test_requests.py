@@ -11,6 +11,7 @@ import pytest
 from starlette.testclient import TestClient
 
 from app.web.access import security
+from tests.app.conftest import command
 from tracker.parameters.catalogue import METHODS, PARAMETERS
 
 HUGE = [2**63, -(2**63) - 1, 10**400]
@@ -40,14 +41,14 @@ def test_there_is_no_such_run(shared: TestClient, number: int) -> None:
         ("POST", f"/api/library/runs/{number}/pin"),
         ("POST", f"/api/run/again/{number}"),
         ("GET", f"/api/step/{number - 2}"),
-        ("DELETE", f"/api/teach/entrances/{number - 2}"),
-        ("DELETE", f"/api/teach/templates/{number - 2}"),
     ]:
         refused(shared.request(method, path))
     for path, body in [
-        ("/api/library/delete", {"runs": [number]}),
+        ("/api/commands", {"name": "delete_runs", "runs": [number]}),
         ("/api/exports", {"run": number, "format": "csv"}),
         ("/api/view", {"camera": number - 2}),
+        ("/api/commands", {"name": "remove_entrance", "index": number - 2}),
+        ("/api/commands", {"name": "remove_template", "index": number - 2}),
     ]:
         refused(shared.post(path, json=body))
 
@@ -61,7 +62,7 @@ def test_names_that_no_file_can_have(shared: TestClient, name: str) -> None:
     ]:
         refused(shared.post(path, json={field: name}))
     if name in IMPOSSIBLE:
-        refused(shared.post("/api/teach/copy", json={"folder": name}))
+        refused(command(shared, "copy_taught", folder=name))
 
 
 def test_a_preset_has_a_name_that_can_be_seen(shared: TestClient) -> None:

@@ -28,6 +28,7 @@ from starlette.testclient import TestClient
 
 from app.command.main import main
 from app.web.server import Settings, create_app
+from tests.app import conftest
 from tests.studies.small import Serial, run
 from tracker.export import read_tracks_csv
 from tracker.kernels.compilation import kernel_folder
@@ -424,8 +425,8 @@ def test_what_was_taught_and_not_saved_is_taken_up_again(home: Home) -> None:
     with page(home, "crossing", draft=True) as client:
         state = state_of(client)
         assert state["teaching"]["unsaved"] > 0
-        copied = client.post("/api/teach/copy", json={"folder": str(home.folder / "taught")})
-        assert copied.status_code == 200, copied.text
+        copied = conftest.command(client, "copy_taught", folder=str(home.folder / "taught"))
+        assert copied.status_code == 204, copied.text
     taught = open_sequence(home.folder / "taught")
     assert taught.room.maximum.tolist() == [1.5, 1.5, 2.25]
     assert taught.target_half_extents.tolist() == [0.1, 0.11, 0.125]

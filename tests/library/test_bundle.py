@@ -133,7 +133,7 @@ def test_it_is_served_read_only(served: TestClient) -> None:
         ("PATCH", "/api/parameters", {"changes": {}}),
         ("POST", "/api/run", {}),
         ("POST", "/api/sequence", {"name": "room44-3p"}),
-        ("POST", "/api/teach/save", {}),
+        ("POST", "/api/commands", {"name": "save_taught"}),
         ("DELETE", "/api/run/pin", {}),
     ):
         answer = served.request(method, path, json=body)

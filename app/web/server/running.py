@@ -36,6 +36,7 @@ from app.state.workers.keeper import Keeper
 from app.state.workers.sensitivity import Sensitivity
 from app.state.workers.threads import in_background
 from app.web.access.gateway import Gateway
+from app.web.commands.command import Owners
 from app.web.library import routes as library
 from app.web.pictures.jpegs import Pictures
 from app.web.pictures.likelihood import Likelihoods
@@ -94,7 +95,7 @@ async def lifespan(app: FastAPI) -> AsyncIterator[None]:
     )
     correcting = app.state.correcting = Correcting(workbench, edits)
     edits.follow()
-    app.state.doubting = Doubting()
+    doubting = app.state.doubting = Doubting()
     given = Path(settings.sequence or "").expanduser()
     roots = [given] if settings.sequence and given.is_dir() else []
     desk = app.state.desk = Desk(workbench, settings.data, roots)
@@ -109,7 +110,8 @@ async def lifespan(app: FastAPI) -> AsyncIterator[None]:
     )
     sensitivity = app.state.sensitivity = Sensitivity(workbench, settings.seed)
     keeper = app.state.keeper = Keeper(workbench, settings.library, settings.keep, names_of)
-    app.state.marking = Marking(workbench, edits, keeper.library)
+    marking = Marking(workbench, edits, keeper.library)
+    app.state.owners = Owners(workbench, teaching, correcting, doubting, marking)
     study_desk = app.state.studies = StudyDesk(workbench, studies_folder())
     told = app.state.stream = Stream(workbench)
     door = app.state.gateway = Gateway()

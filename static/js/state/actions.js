@@ -1,5 +1,5 @@
 /** What a person can do: the page's own state at once, the server's by request. */
-import { ApiError, getJson, request, sendJson } from "./api.js";
+import { ApiError, getJson, request, sendCommand, sendJson } from "./api.js";
 import { SPEEDS, clampStep } from "../play/clock.js";
 import { eventsNow, nextEvent, nextLayers, ordered } from "./events.js";
 
@@ -103,6 +103,17 @@ export function createActions({ store, seek, send, receive }) {
 				return answer;
 			} catch (error) {
 				actions.refused(error, about);
+				return null;
+			}
+		},
+
+		async command(name, fields) {
+			try {
+				const answer = await sendCommand(name, fields);
+				actions.accepted(name);
+				return answer ?? true;
+			} catch (error) {
+				actions.refused(error, name);
 				return null;
 			}
 		},
@@ -281,8 +292,8 @@ export function createActions({ store, seek, send, receive }) {
 
 		drawTemplate() {},
 		editRoom: () =>
-			void actions.ask("POST", "teach/editing", { on: !store.get().server?.teaching.editing_room }),
-		saveTaught: () => void actions.ask("POST", "teach/save"),
+			void actions.command("edit_room", { on: !store.get().server?.teaching.editing_room }),
+		saveTaught: () => void actions.command("save_taught"),
 
 		// page
 		showTab: (tab) =>

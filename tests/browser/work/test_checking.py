@@ -34,7 +34,7 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
 def as_it_was(server: Server) -> None:
     """No correction, and the defaults."""
     for one in corrections(server)["corrections"]:
-        ask(server, "DELETE", f"corrections/{one['id']}")
+        server.command("drop_correction", id=one["id"])
     ask(server, "POST", "parameters/reset", {})
     server.wait_for_run()
 
