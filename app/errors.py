@@ -151,7 +151,7 @@ def install(app: FastAPI) -> None:
             detail = ErrorDetail(
                 code="bad_request",
                 message=f"The body is not JSON: {why}, at byte {byte}.",
-                hint='Send an object such as {"name": "remove_template", "index": 0}.',
+                hint='Send an object such as {"name": "set_parameters", "changes": {}}.',
             )
             return _answer(422, detail)
         place = [str(part) for part in first["loc"]]

@@ -97,7 +97,7 @@ def client(shared: TestClient) -> TestClient:
         shared.post("/api/sequence", json={"name": "crossing"})
         wait_until(run_is(shared, "done"))
     shared.delete("/api/run/pin")
-    shared.post("/api/parameters/reset", json={})
+    command(shared, "reset_parameters")
     shared.post("/api/select", json={"id": None})
     wait_until(run_is(shared, "done"))
     wait_until(is_evaluated(shared))

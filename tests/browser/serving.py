@@ -103,7 +103,9 @@ class Server:
         """Have a command done."""
         headers = {"Authorization": f"Bearer {self.token}"}
         body = {"name": name, **fields}
-        answer = httpx2.post(f"{self.address}api/commands", json=body, headers=headers)
+        answer = httpx2.post(
+            f"{self.address}api/commands", json=body, headers=headers, timeout=30.0
+        )
         answer.raise_for_status()
 
     def wait(self, condition: Callable[[dict], bool], seconds: float = 300.0) -> dict:

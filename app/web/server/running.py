@@ -80,14 +80,14 @@ async def lifespan(app: FastAPI) -> AsyncIterator[None]:
     )
     pictures = app.state.pictures = Pictures(workbench)
     app.state.timelines = Timelines()
-    app.state.history = History(workbench)
+    history = app.state.history = History(workbench)
     edits = app.state.edits = Edits(
         workbench,
         settings_folder() / "edits" if kept else None,
         settings_folder() / "corrections" if kept else None,
     )
     own_presets = settings_folder() / "presets.json" if kept else None
-    app.state.presets = OwnPresets(workbench, edits, own_presets)
+    presets = app.state.presets = OwnPresets(workbench, edits, own_presets)
     app.state.likelihoods = Likelihoods()
     app.state.swatches = Swatches()
     teaching = app.state.teaching = Teaching(
@@ -111,8 +111,18 @@ async def lifespan(app: FastAPI) -> AsyncIterator[None]:
     sensitivity = app.state.sensitivity = Sensitivity(workbench, settings.seed)
     keeper = app.state.keeper = Keeper(workbench, settings.library, settings.keep, names_of)
     marking = Marking(workbench, edits, keeper.library)
-    app.state.owners = Owners(workbench, teaching, correcting, doubting, marking)
     study_desk = app.state.studies = StudyDesk(workbench, studies_folder())
+    app.state.owners = Owners(
+        workbench=workbench,
+        edits=edits,
+        presets=presets,
+        history=history,
+        teaching=teaching,
+        correcting=correcting,
+        doubting=doubting,
+        marking=marking,
+        studies=study_desk,
+    )
     told = app.state.stream = Stream(workbench)
     door = app.state.gateway = Gateway()
     told.start(_of_crash(crashed[-1], settings.ended is not None) if crashed else None)

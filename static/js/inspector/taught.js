@@ -126,7 +126,7 @@ function templates(sequence, { templates, method, looking }) {
 		looking &&
 			line(
 				`The run's single-view method, ${method}, looks at no templates. `,
-				send(`Use ${looking}`, "PATCH parameters", {
+				send(`Use ${looking}`, "set_parameters", {
 					body: { changes: { single_view: looking } },
 				}),
 			),

@@ -98,7 +98,7 @@ def test_the_first_template_makes_the_colour_methods_usable(client: TestClient) 
     assert before["teaching"] == {
         "key": before["teaching"]["key"], "unsaved": 0, "editing_room": False
     }  # fmt: skip
-    client.patch("/api/parameters", json={"changes": {"single_view": "colour_phd"}})
+    command(client, "set_parameters", changes={"single_view": "colour_phd"})
     wait_until(run_is(client, "failed"))
     assert "no template" in state(client)["run"]["error"]
     answer = command(client, "add_template", **BOX)
@@ -109,21 +109,21 @@ def test_the_first_template_makes_the_colour_methods_usable(client: TestClient) 
     assert now["teaching"]["unsaved"] == 1
     for method in ("pseudo_particle", "jpda"):
         changes = {"single_view": method, "jpda.measurements": "colour"}
-        client.patch("/api/parameters", json={"changes": changes})
+        command(client, "set_parameters", changes=changes)
         done(client)
 
 
 @pytest.mark.full
 def test_a_run_used_again_brings_its_templates_back(client: TestClient) -> None:
     before, first = state(client), tracks(client)
-    client.patch("/api/parameters", json={"changes": {"single_view": "colour_phd"}})
+    command(client, "set_parameters", changes={"single_view": "colour_phd"})
     command(client, "add_template", **BOX)
     taught = done(client)
     assert tracks(client) != first
     bench: Workbench = client.app.state.workbench  # type: ignore[attr-defined]
     told = []
     end = bench.subscribe(lambda _: told.append(results.state_of(bench.snapshot())))
-    client.post("/api/run/again/1")
+    command(client, "use_again", run=1)
     end()
     both = {(now.teaching.key, now.methods.single_view) for now in told}
     assert len(both) == 1, "one change, so that one undo takes it back"
@@ -132,7 +132,7 @@ def test_a_run_used_again_brings_its_templates_back(client: TestClient) -> None:
     assert again["sequence"]["templates"] == 0
     assert again["parameters"] == before["parameters"]
     assert tracks(client) == first
-    client.post("/api/undo")
+    command(client, "undo")
     assert done(client)["run"]["key"] == taught["run"]["key"]
 
 
@@ -148,14 +148,14 @@ def test_a_template_is_named_renamed_removed_and_brought_back(client: TestClient
     command(client, "remove_template", index=1)
     assert names() == ["Anna", "Bob"]
     for _ in range(2):  # the removal, then the name
-        client.post("/api/undo")
+        command(client, "undo")
     assert names() == ["person1", "person2", "Bob"]
     for _ in range(3):
-        answer = client.post("/api/undo")
+        answer = command(client, "undo")
     assert answer.json()["teaching"]["unsaved"] == 0
     assert answer.json()["edits"] == {"undo": None, "redo": "template person1 added"}
     assert names() == []
-    answer = client.post("/api/undo")
+    answer = command(client, "undo")
     assert answer.status_code == 409
     assert answer.json()["detail"] == "There is nothing to undo."
 
@@ -169,7 +169,7 @@ def test_the_room_changes_the_run_and_undo_brings_it_back_at_once(client: TestCl
     assert changed["run"]["key"] != before["run"]["key"]
     assert tracks(client) != first
     for _ in range(2):
-        client.post("/api/undo")
+        command(client, "undo")
     assert done(client)["run"]["key"] == before["run"]["key"]
     assert tracks(client) == first
 
@@ -242,7 +242,7 @@ def test_templates_that_the_tracks_offer_are_taken_and_taken_back(client: TestCl
     now = done(client)
     assert now["sequence"]["templates"] == now["teaching"]["unsaved"] == 1
     assert panel(client)["offers"] == offers[1:]
-    client.post("/api/undo")
+    command(client, "undo")
     assert done(client)["sequence"]["templates"] == 0
     assert panel(client)["offers"] == offers
 
@@ -273,7 +273,7 @@ def test_an_offer_that_is_none_any_more_is_refused(client: TestClient) -> None:
 
 
 def test_tracks_that_offer_nothing_say_why(client: TestClient) -> None:
-    client.patch("/api/parameters", json={"changes": {"fusion.extraction_threshold": 0.99}})
+    command(client, "set_parameters", changes={"fusion.extraction_threshold": 0.99})
     command(client, "set_room_face", side="max", axis=0, value=-1.2)  # nobody is in what is left
     done(client)
     assert complaint(command(client, "offer_templates")).startswith(
@@ -290,7 +290,7 @@ def test_saving_keeps_a_backup_and_reopens_to_the_same_run(
     command(client, "set_room_face", side="max", axis=0, value=1.3)
     command(client, "add_entrance")
     use = {"single_view": "colour_phd"}
-    client.patch("/api/parameters", json={"changes": use})
+    command(client, "set_parameters", changes=use)
     key = done(client)["run"]["key"]
     assert state(client)["teaching"]["unsaved"] == 3
     saved = changed(client, "save_taught")
@@ -300,7 +300,7 @@ def test_saving_keeps_a_backup_and_reopens_to_the_same_run(
     shown = tracks(client)
     client.post("/api/sequence", json={"name": "walkers"})
     wait_until(run_is(client, "done"))
-    client.patch("/api/parameters", json={"changes": use})
+    command(client, "set_parameters", changes=use)
     again = done(client)
     assert again["sequence"]["room"]["max"][0] == 1.3
     assert len(again["sequence"]["room"]["entrances"]) == 2
@@ -346,7 +346,7 @@ def test_a_rendered_room_is_offered_as_a_copy(
 def test_discard_is_the_file_again_and_undo_knows_what_was_discarded(client: TestClient) -> None:
     command(client, "add_template", **BOX)
     assert changed(client, "discard_taught")["teaching"]["unsaved"] == 0
-    assert client.post("/api/undo").json()["teaching"]["unsaved"] == 1
+    assert command(client, "undo").json()["teaching"]["unsaved"] == 1
 
 
 @pytest.mark.full
@@ -394,7 +394,7 @@ def test_what_is_not_saved_outlives_the_server(
         assert again["run"]["key"] == taught["run"]["key"]
         command(client, "discard_taught")
         assert list((tmp_path / "settings" / "unsaved").iterdir()) == []
-        client.post("/api/undo")
+        command(client, "undo")
     text = (walkers / FILE).read_text("utf-8")
     (walkers / FILE).write_text(
         text.replace("min = [", "min = [-9.0, ", 1).replace(", 0.0]", "]", 1)
@@ -495,10 +495,9 @@ def test_the_first_template_is_looked_at_where_nobody_chose_a_method(
     wait_until(lambda: state(client)["methods"]["single_view"] == "shapes")
     taught = changed(client, "add_template", **BOX)
     assert taught["methods"]["single_view"] == "colour_phd"
-    back = client.post("/api/undo").json()
+    back = command(client, "undo").json()
     assert back["methods"]["single_view"] == "shapes", "and so it is without it"
-    chosen = {"changes": {"single_view": "jpda"}}
-    client.patch("/api/parameters", json=chosen)
+    command(client, "set_parameters", changes={"single_view": "jpda"})
     taught = changed(client, "add_template", **BOX)
     assert taught["methods"]["single_view"] == "jpda", "nobody's choice is taken away"
 
@@ -512,7 +511,7 @@ def test_the_size_of_people_is_taught_saved_and_taken_back(
     assert answer["sequence"]["target"]["half_extents"] == [*half[:2], 0.75]
     assert answer["teaching"]["unsaved"] == 1
     assert [words.partition(" ")[0] for words in panel(client)["unsaved"]] == ["target:"]
-    back = client.post("/api/undo").json()
+    back = command(client, "undo").json()
     assert back["sequence"]["target"]["half_extents"] == half
     command(client, "set_target", half_extents=[0.3, 0.3, 0.65])
     command(client, "save_taught")
@@ -553,7 +552,7 @@ def test_a_detector_is_fetched_by_a_click(
     wait_until(lambda: fetched() == (None, "tiny"))
     assert panel(client)["detector"]["path"] is None
     assert state(client)["methods"]["single_view"] == before
-    client.patch("/api/parameters", json={"changes": {"single_view": "onnx_detector"}})
+    command(client, "set_parameters", changes={"single_view": "onnx_detector"})
     assert done(client)["methods"]["single_view"] == "onnx_detector"
 
 
@@ -563,7 +562,7 @@ def test_a_detector_is_chosen_by_its_path_and_taken_away(
 ) -> None:
     before = state(client)
     change = {"fusion.survival_probability": 0.9}
-    client.patch("/api/parameters", json={"changes": change})
+    command(client, "set_parameters", changes=change)
     model = pooling(tmp_path / "red.onnx")
     client.put("/api/teach/detector", json={"model": str(model)})
     wait_until(lambda: state(client)["methods"]["single_view"] == "onnx_detector")
@@ -588,7 +587,7 @@ def test_a_detector_is_chosen_by_its_path_and_taken_away(
     client.post("/api/sequence", json={"name": str(other)})
     assert state(client)["methods"]["single_view"] == before["methods"]["single_view"]
     client.post("/api/sequence", json={"name": str(walkers)})
-    client.patch("/api/parameters", json={"changes": change})
+    command(client, "set_parameters", changes=change)
     assert state(client)["methods"]["single_view"] == "onnx_detector"
     client.put("/api/teach/detector", json={"model": None})
     wait_until(lambda: state(client)["methods"]["single_view"] != "onnx_detector")

@@ -93,16 +93,16 @@ def test_a_cut_is_obeyed_kept_taken_back_and_said_again(desk: TestClient, own: P
     assert said["undo"] == found["corrections"][0]["words"]
     assert len(tracks(desk)) == len(before) + 1
     assert [c.kind for c in read_log(own / "corrections.toml")] == ["different"]
-    desk.post("/api/undo")
+    command(desk, "undo")
     assert settled(desk)["corrections"] == []
     assert len(tracks(desk)) == len(before)
     assert read_log(own / "corrections.toml") == ()
-    desk.post("/api/redo")
+    command(desk, "redo")
     again = desk.get(PLACE).json()
     assert again["corrections"][0]["id"] == found["corrections"][0]["id"]
     settled(desk)
     assert len(tracks(desk)) == len(before) + 1
-    assert desk.post("/api/redo").status_code == 409
+    assert command(desk, "redo").status_code == 409
     key = desk.get("/api/state").json()["corrections"]
     assert (key["count"], key["unmet"]) == (1, 0)
 
@@ -114,17 +114,17 @@ def test_what_can_be_taken_back_survives_a_start(own: Path) -> None:
         wish = {"kind": "name", "tracks": [lives[0]["id"]], "name": "Anna", "step": 30}
         command(client, "correct", corrections=[wish])
         command(client, "correct", corrections=[{"kind": "checked", "first": 0, "last": 9}])
-        client.post("/api/undo")
+        command(client, "undo")
     with started(own) as client:
         found = settled(client)
         assert found["names"] == {str(lives[0]["id"]): "Anna"}
-        told = client.post("/api/redo").json()
+        told = command(client, "redo").json()
         assert told["edits"] == {"undo": "steps 0 – 9 checked", "redo": None}
         assert client.get(PLACE).json()["checked"] == [[0, 9]]
-        client.post("/api/undo")
-        client.post("/api/undo")
+        command(client, "undo")
+        command(client, "undo")
         assert client.get(PLACE).json()["corrections"] == []
-        assert client.post("/api/undo").status_code == 409
+        assert command(client, "undo").status_code == 409
 
 
 @pytest.mark.full
@@ -223,7 +223,7 @@ def test_the_queue_is_answered_previewed_and_skipped(
     # so that what is hardly doubtful is told, too: who passes metres apart
     monkeypatch.setattr("tracker.review.queue.ranking.LEAST", 0.0)
     monkeypatch.setattr("tracker.review.queue.meetings._CLOSE", 8.0)
-    desk.patch("/api/parameters", json={"changes": {"fusion.survival_probability": 0.97}})
+    command(desk, "set_parameters", changes={"fusion.survival_probability": 0.97})
     settled(desk)
     queue = desk.get(f"{PLACE}/queue").json()
     assert queue["complete"]
@@ -287,10 +287,10 @@ def test_what_is_answered_of_the_run_before_counts_in_the_one_that_came_meanwhil
     queues = iter([Queue((made,), 0, "a test")])
     nothing = Queue((), 0, "a test")
     monkeypatch.setattr("app.state.doubting.queue", lambda run, corrections: next(queues, nothing))
-    desk.patch("/api/parameters", json={"changes": {"fusion.survival_probability": 0.97}})
+    command(desk, "set_parameters", changes={"fusion.survival_probability": 0.97})
     settled(desk)
     (shown,) = desk.get(f"{PLACE}/queue").json()["doubts"]
-    desk.patch("/api/parameters", json={"changes": {"fusion.survival_probability": 0.98}})
+    command(desk, "set_parameters", changes={"fusion.survival_probability": 0.98})
     settled(desk)
     assert desk.get(f"{PLACE}/queue").json()["doubts"] == []
     assert desk.get(f"{PLACE}/queue/{shown['id']}/1").status_code == 404, "of other tracks"
@@ -305,7 +305,7 @@ def test_what_is_checked_leaves_the_queue_though_the_run_stays_the_same(
 ) -> None:
     monkeypatch.setattr("tracker.review.queue.ranking.LEAST", 0.0)
     monkeypatch.setattr("tracker.review.queue.meetings._CLOSE", 8.0)
-    desk.patch("/api/parameters", json={"changes": {"fusion.survival_probability": 0.97}})
+    command(desk, "set_parameters", changes={"fusion.survival_probability": 0.97})
     settled(desk)
     first, last = 0, desk.app.state.workbench.snapshot().sequence.frames - 1  # type: ignore[attr-defined]
     assert desk.get(f"{PLACE}/queue").json()["doubts"] != []
@@ -314,7 +314,7 @@ def test_what_is_checked_leaves_the_queue_though_the_run_stays_the_same(
     (told,) = desk.get(PLACE).json()["corrections"]
     assert told["met"] is True
     assert desk.get(f"{PLACE}/queue").json()["doubts"] == []
-    desk.post("/api/undo")
+    command(desk, "undo")
     assert desk.get(f"{PLACE}/queue").json()["doubts"] != []
 
 

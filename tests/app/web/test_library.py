@@ -35,7 +35,7 @@ def kept(data: Path, path: Path) -> Iterator[TestClient]:
     """The application with two kept runs of ``crossing``: the default, and p_D 0.8, shown."""
     with application(data, path) as client:
         wait_until(lambda: len(runs_of(client)) == 1)
-        client.patch("/api/parameters", json={"changes": {P_D: 0.8}})
+        command(client, "set_parameters", changes={P_D: 0.8})
         wait_until(lambda: len(runs_of(client)) == 2)
         yield client
 
@@ -62,7 +62,7 @@ def test_finished_runs_are_kept_with_their_figures(kept: TestClient) -> None:
     # what was never opened can be opened from there all the same
     (never,) = [r for r in listed["recordings"] if r["name"] == "numbers"]
     assert (never["id"], never["runs"]) == (None, 0)
-    kept.patch("/api/parameters", json={"changes": {"smoothing_method": "none"}})
+    command(kept, "set_parameters", changes={"smoothing_method": "none"})
     wait_until(lambda: len(runs_of(kept)) == 3)
     method = runs_of(kept)[0]["changes"][0]
     assert (method["default"], method["value"]) == ("identities", "none")
@@ -135,7 +135,7 @@ def test_a_run_that_was_deleted_and_is_made_again_is_kept_again(kept: TestClient
     _, default = runs_of(kept)
     command(kept, "delete_runs", runs=[default["id"]])
     assert len(runs_of(kept)) == 1
-    kept.post("/api/parameters/reset", json={"keys": [P_D]})
+    command(kept, "reset_parameters", keys=[P_D])
     wait_until(lambda: [run["id"] for run in runs_of(kept)][:1] == [default["id"]])
 
 
@@ -228,7 +228,7 @@ def test_what_the_cameras_found_comes_back_by_computing_again(kept: TestClient) 
 @pytest.mark.full
 def test_a_moved_slider_computes_on_from_a_kept_run(kept: TestClient) -> None:
     kept.post(f"/api/library/runs/{runs_of(kept)[1]['id']}/open")
-    state = kept.patch("/api/parameters", json={"changes": {P_D: 0.7}}).json()
+    state = command(kept, "set_parameters", changes={P_D: 0.7}).json()
     assert state["run"]["kept"] is None
     wait_until(run_is(kept, "done"))
     wait_until(lambda: len(runs_of(kept)) == 3)
@@ -281,10 +281,10 @@ def test_names_stars_notes_and_deletion(kept: TestClient) -> None:
     gone = command(kept, "delete_runs", runs=[number]).json()
     assert gone["bytes"] > 0
     assert len(runs_of(kept)) == 1
-    told = kept.post("/api/undo").json()
+    told = command(kept, "undo").json()
     assert runs_of(kept)[0]["name"] == "baseline"
     assert told["edits"]["redo"] == f"run {number} deleted"
-    assert kept.post("/api/undo").json()["marks"] > told["marks"]
+    assert command(kept, "undo").json()["marks"] > told["marks"]
     assert {key: runs_of(kept)[0][key] for key in wish} == {
         "name": "", "star": False, "note": "", "tags": []
     }  # fmt: skip

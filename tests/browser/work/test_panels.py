@@ -106,7 +106,7 @@ def test_the_focus_goes_on_to_what_is_left(flat_page: Page, server: Server) -> N
     page = flat_page
     as_at_first(server)
     changes = {"fusion.detection_probability": 0.6, "fusion.clutter_rate": 2.0}
-    ask(server, "PATCH", "parameters", {"changes": changes})
+    server.command("set_parameters", changes=changes)
     page.get_by_role("tab", name="Tracks").focus()
     page.keyboard.press("End")
     expect(page.get_by_role("tab", name="Runs")).to_be_focused()

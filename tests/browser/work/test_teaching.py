@@ -46,7 +46,7 @@ def test_a_box_dragged_on_a_camera_becomes_a_template_and_changes_the_run(
     for _ in range(2):
         page.keyboard.press("PageDown")
     until(page, lambda: readout(page) == "20", "twenty steps on")
-    httpx2.patch(server.address + "api/parameters", json={"changes": {"single_view": "colour_phd"}})
+    server.command("set_parameters", changes={"single_view": "colour_phd"})
     server.wait(lambda state: state["run"]["state"] == "failed")  # there is no template yet
     # which the page says above the pictures: they have moved when it is there
     expect(page.get_by_text("The run stopped at step")).to_be_visible(timeout=20_000)
@@ -121,7 +121,7 @@ def test_a_box_dragged_on_a_camera_becomes_a_template_and_changes_the_run(
         assert (state["methods"] == taught["methods"]) == (templates == 1)
         assert (state["teaching"]["key"] == taught["teaching"]["key"]) == (templates == 1)
         page.wait_for_timeout(300)  # the page hears of it
-    httpx2.post(server.address + "api/parameters/reset", json={})
+    server.command("reset_parameters")
     server.wait_for_run()
 
 
@@ -279,7 +279,7 @@ def test_a_template_that_the_tracks_offer_is_taken_by_keys_and_undone(
     as_at_first(server)
     before = server.get("/api/state").json()["sequence"]["templates"]
     # by the boxes, whatever was taught before: colours of few templates may find nobody
-    ask(server, "PATCH", "parameters", {"changes": {"single_view": "none"}})
+    server.command("set_parameters", changes={"single_view": "none"})
     server.wait(
         lambda state: state["methods"]["single_view"] == "none" and state["run"]["state"] == "done"
     )
