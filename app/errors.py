@@ -158,7 +158,7 @@ def install(app: FastAPI) -> None:
         if first["type"].startswith("union_tag"):
             place += ["name"]
         elif request.url.path == COMMANDS:
-            del place[1]  # the command that is asked for
+            place[1:2] = []  # the command that is asked for
         field = ".".join(place[1:]) or place[0]
         detail = ErrorDetail(
             code="bad_request",
