@@ -57,6 +57,9 @@ class Problem(Described):
 PROBLEM = "application/problem+json"
 """The media type of that body."""
 
+COMMANDS = "/api/commands"
+"""The address of commands."""
+
 
 class ApiError(Exception):
     """A failure that has its words already."""
@@ -141,17 +144,21 @@ def install(app: FastAPI) -> None:
         return _answer(422, parameter_detail(error))
 
     @app.exception_handler(RequestValidationError)
-    async def _request(_: Request, error: RequestValidationError) -> JSONResponse:
+    async def _request(request: Request, error: RequestValidationError) -> JSONResponse:
         first = error.errors()[0]
         if first["type"] == "json_invalid":
             why, byte = first["ctx"]["error"], first["loc"][1]
             detail = ErrorDetail(
                 code="bad_request",
                 message=f"The body is not JSON: {why}, at byte {byte}.",
-                hint='Send an object such as {"changes": {"fusion.clutter_rate": 1.5}}.',
+                hint='Send an object such as {"name": "set_parameters", "changes": {}}.',
             )
             return _answer(422, detail)
         place = [str(part) for part in first["loc"]]
+        if first["type"].startswith("union_tag"):
+            place += ["name"]
+        elif request.url.path == COMMANDS:
+            place[1:2] = []  # the command that is asked for
         field = ".".join(place[1:]) or place[0]
         detail = ErrorDetail(
             code="bad_request",

@@ -48,27 +48,6 @@ class CorrectionWish(Model):
     last: Step | None = None
 
 
-class CorrectionsRequest(Model):
-    """Some things said at once: taken back at once."""
-
-    corrections: list[CorrectionWish] = Field(min_length=1, max_length=50)
-    note: str = Field(default="", max_length=1000)
-
-
-class AnswerRequest(Model):
-    """What is true of a doubtful place."""
-
-    doubt: str = Field(max_length=40)
-    alternative: int = Field(ge=0, le=20)
-    """0: as it is."""
-
-
-class SkipRequest(Model):
-    """A doubtful place to pass over until the program ends."""
-
-    doubt: str = Field(max_length=40)
-
-
 class GhostsRequest(Model):
     """How it would be, to be shown in 3D; or that no more."""
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Literal
 
 from pydantic import Field
 
@@ -14,32 +14,6 @@ class OpenRequest(Model):
 
     name: GivenPath
     """A built-in name, a name of the list, or a folder."""
-
-
-class ParameterChanges(Model):
-    """Values by key; all are taken or none."""
-
-    changes: dict[str, Any]
-    origin: str = Field("", max_length=100)
-
-
-class ResetRequest(Model):
-    """Back to the defaults."""
-
-    keys: list[str] | None = None
-    """All, the methods included, where none are named."""
-
-
-class PresetRequest(Model):
-    """A preset by name."""
-
-    name: str
-
-
-class PresetName(Model):
-    """What a preset is to be called."""
-
-    name: str = Field(max_length=4096)
 
 
 class TrailChanges(Model):

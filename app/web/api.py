@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -11,19 +10,14 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Query, Request, Response
 
 from app import models
-from app.errors import ApiError, as_sentence
-from app.state.edits import Edit, EditError
+from app.errors import ApiError
 from app.state.kept.history import History
 from app.state.snapshot import Snapshot
-from app.state.teaching import Teaching
-from app.state.workbench import Workbench
 from app.state.workers.sensitivity import Sensitivity, shares
 from app.web.dependencies import (
     ERRORS,
     FOR_EVER,
     Bench,
-    Edited,
-    Own,
     Part,
     Work,
     file_name,
@@ -88,71 +82,6 @@ async def open_sequence(wish: models.OpenRequest, bench: Bench, jobs: Work) -> m
     return results.state_of(bench.snapshot())
 
 
-@router.patch("/parameters")
-async def set_parameters(wish: models.ParameterChanges, bench: Bench) -> models.State:
-    """Change some values, all or none; what depends on them is computed anew."""
-    bench.set_parameters(wish.changes, wish.origin or "api")
-    return results.state_of(bench.snapshot())
-
-
-@router.post("/parameters/reset")
-async def reset_parameters(bench: Bench, wish: models.ResetRequest | None = None) -> models.State:
-    """Return some values, or all, to their defaults."""
-    bench.reset_parameters(wish.keys if wish is not None else None)
-    return results.state_of(bench.snapshot())
-
-
-@router.post("/parameters/preset")
-async def apply_preset(wish: models.PresetRequest, bench: Bench) -> models.State:
-    """Take a preset's values, and the defaults where it has none."""
-    bench.apply_preset(wish.name)
-    return results.state_of(bench.snapshot())
-
-
-@router.post("/presets")
-def save_preset(wish: models.PresetName, own: Own, bench: Bench) -> models.State:
-    """Save what differs from the defaults now, under a name."""
-    own.save(wish.name)
-    return results.state_of(bench.snapshot())
-
-
-@router.patch("/presets/{name:path}")
-def rename_preset(name: str, wish: models.PresetName, own: Own, bench: Bench) -> models.State:
-    """Give a saved preset another name."""
-    own.rename(name, wish.name)
-    return results.state_of(bench.snapshot())
-
-
-@router.delete("/presets/{name:path}")
-def remove_preset(name: str, own: Own, bench: Bench) -> models.State:
-    """Forget a saved preset."""
-    own.remove(name)
-    return results.state_of(bench.snapshot())
-
-
-@router.post("/undo")
-def undo(edits: Edited, bench: Bench) -> models.State:
-    """Put back what was before the last edit, whatever it was of; those of an earlier start too."""
-    _turn(bench, "Undone", edits.undo)
-    return results.state_of(bench.snapshot())
-
-
-@router.post("/redo")
-def redo(edits: Edited, bench: Bench) -> models.State:
-    """Do again what was undone last."""
-    _turn(bench, "Done again", edits.redo)
-    return results.state_of(bench.snapshot())
-
-
-def _turn(bench: Workbench, what: str, act: Callable[[], Edit]) -> None:
-    try:
-        edit = act()
-    except EditError as error:
-        words = as_sentence(str(error))
-        raise ApiError(409, "no_edit", words, hint="Nothing was changed.") from None
-    bench.notify("info", f"{what}: {edit.words}")
-
-
 @router.post("/run/cancel")
 async def cancel_run(bench: Bench, jobs: Work) -> models.State:
     """Stop the run under way; its steps so far stay."""
@@ -192,15 +121,6 @@ def past_runs(request: Request, bench: Bench) -> models.PastRuns:
             for run in history.runs
         ]
     )
-
-
-@router.post("/run/again/{number}")
-async def use_again(request: Request, number: int, bench: Bench) -> models.State:
-    """Set all values, and what was taught, to those of a run before, by its number in the table."""
-    history: History = request.app.state.history
-    teaching: Teaching = request.app.state.teaching
-    history.use_again(number, teaching.restore)
-    return results.state_of(bench.snapshot())
 
 
 @router.get("/changes")

@@ -8,8 +8,6 @@ from typing import Annotated, Any
 from fastapi import Depends, Query, Request
 
 from app.errors import ApiError, Problem
-from app.state.edits import Edits
-from app.state.kept.presets import OwnPresets
 from app.state.workbench import Workbench
 from app.state.workers.jobs import Jobs
 from app.web.views.timeline import BUCKETS, Window
@@ -31,16 +29,6 @@ def _workbench(request: Request) -> Workbench:
 def _jobs(request: Request) -> Jobs:
     jobs: Jobs = request.app.state.jobs
     return jobs
-
-
-def _own_presets(request: Request) -> OwnPresets:
-    presets: OwnPresets = request.app.state.presets
-    return presets
-
-
-def _edits(request: Request) -> Edits:
-    edits: Edits = request.app.state.edits
-    return edits
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,8 +54,6 @@ def _shown(
 
 Part = Annotated[Shown, Depends(_shown)]
 Bench = Annotated[Workbench, Depends(_workbench)]
-Edited = Annotated[Edits, Depends(_edits)]
-Own = Annotated[OwnPresets, Depends(_own_presets)]
 Work = Annotated[Jobs, Depends(_jobs)]
 
 

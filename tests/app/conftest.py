@@ -46,6 +46,11 @@ def is_evaluated(client: TestClient) -> Callable[[], bool]:
     return holds
 
 
+def command(client: TestClient, name: str, **fields: Any) -> Any:
+    """The answer to a command."""
+    return client.post("/api/commands", json={"name": name, **fields})
+
+
 def connect(client: TestClient, path: str = "/api/stream", **headers: str) -> Any:
     """A socket as a page of ours opens it; the test client knows its host for requests only."""
     return client.websocket_connect(path, headers={"host": "127.0.0.1:8000", **headers})
@@ -92,7 +97,7 @@ def client(shared: TestClient) -> TestClient:
         shared.post("/api/sequence", json={"name": "crossing"})
         wait_until(run_is(shared, "done"))
     shared.delete("/api/run/pin")
-    shared.post("/api/parameters/reset", json={})
+    command(shared, "reset_parameters")
     shared.post("/api/select", json={"id": None})
     wait_until(run_is(shared, "done"))
     wait_until(is_evaluated(shared))

@@ -13,6 +13,7 @@ from app.state.edits import Edits
 from app.state.kept.presets import OwnPresets
 from app.state.snapshot import Notice
 from app.state.workbench import Workbench
+from tests.app.conftest import command
 from tests.parameters.test_removed import GONE, MEANT, NOTES
 from tracker.files.validated import write_json
 from tracker.parameters.values import changed_values
@@ -47,11 +48,11 @@ def test_a_saved_preset_is_taken_without_them_and_says_so(tmp_path: Path) -> Non
 
 def test_the_page_of_an_older_address_gets_the_rest_and_a_note(client: TestClient) -> None:
     said = notices(client.app.state.workbench)  # type: ignore[attr-defined]
-    answer = client.patch("/api/parameters", json={"changes": {**GONE, **MEANT}})
+    answer = command(client, "set_parameters", changes={**GONE, **MEANT})
     assert answer.status_code == 200
     assert MEANT.items() <= answer.json()["parameters"].items()
     assert tuple(said) == NOTES
-    answer = client.post("/api/parameters/reset", json={"keys": [*GONE, *MEANT]})
+    answer = command(client, "reset_parameters", keys=[*GONE, *MEANT])
     assert not MEANT.keys() & set(answer.json()["changed"])
 
 

@@ -12,6 +12,7 @@ from app.command.flags import parse
 from app.state.edits import Edits
 from app.state.kept.presets import OwnPresets
 from app.state.workbench import Workbench
+from tests.app.conftest import command
 from tests.parameters.test_renamed import DEFAULTS, MEANT, OTHER
 from tracker.files.validated import write_json
 from tracker.parameters.catalogue import RENAMED
@@ -34,9 +35,9 @@ def test_a_saved_preset_has_the_names_of_now(tmp_path: Path) -> None:
 
 
 def test_values_are_set_and_reset_by_the_page_of_an_older_address(client: TestClient) -> None:
-    state = client.patch("/api/parameters", json={"changes": OTHER}).json()
+    state = command(client, "set_parameters", changes=OTHER).json()
     assert {key: state["parameters"][key] for key in MEANT} == MEANT
-    state = client.post("/api/parameters/reset", json={"keys": list(OTHER)}).json()
+    state = command(client, "reset_parameters", keys=list(OTHER)).json()
     assert not set(MEANT) & set(state["changed"])
 
 

@@ -440,12 +440,12 @@ def correct_until(server: Server, until: float) -> tuple[int, int]:
         if time.monotonic() > until:
             break
         wish = {"kind": "checked", "first": number, "last": number}
-        place, asked = f"{server.address}api/corrections", {"corrections": [wish]}
+        place, asked = f"{server.address}api/commands", {"name": "correct", "corrections": [wish]}
         answer = httpx2.post(place, json=asked, timeout=30.0)
         if answer.status_code >= 500 and answer.status_code != 507:
             raise Fell(f"status {answer.status_code}: {answer.text[:500]}")
-        confirmed += answer.status_code == 200
-        refused += answer.status_code != 200
+        confirmed += answer.is_success
+        refused += not answer.is_success
     return confirmed, refused
 
 

@@ -11,6 +11,7 @@ import pytest
 from starlette.testclient import TestClient
 
 from app.web.access import security
+from tests.app.conftest import command
 from tracker.parameters.catalogue import METHODS, PARAMETERS
 
 HUGE = [2**63, -(2**63) - 1, 10**400]
@@ -38,16 +39,16 @@ def test_there_is_no_such_run(shared: TestClient, number: int) -> None:
         ("GET", f"/api/library/compared?runs={number}"),
         ("POST", f"/api/library/runs/{number}/open"),
         ("POST", f"/api/library/runs/{number}/pin"),
-        ("POST", f"/api/run/again/{number}"),
         ("GET", f"/api/step/{number - 2}"),
-        ("DELETE", f"/api/teach/entrances/{number - 2}"),
-        ("DELETE", f"/api/teach/templates/{number - 2}"),
     ]:
         refused(shared.request(method, path))
     for path, body in [
-        ("/api/library/delete", {"runs": [number]}),
+        ("/api/commands", {"name": "use_again", "run": number}),
+        ("/api/commands", {"name": "delete_runs", "runs": [number]}),
         ("/api/exports", {"run": number, "format": "csv"}),
         ("/api/view", {"camera": number - 2}),
+        ("/api/commands", {"name": "remove_entrance", "index": number - 2}),
+        ("/api/commands", {"name": "remove_template", "index": number - 2}),
     ]:
         refused(shared.post(path, json=body))
 
@@ -57,23 +58,23 @@ def test_names_that_no_file_can_have(shared: TestClient, name: str) -> None:
     for path, field in [
         ("/api/sequence", "name"),
         ("/api/import/path", "path"),
-        ("/api/parameters/preset", "name"),
     ]:
         refused(shared.post(path, json={field: name}))
+    refused(command(shared, "apply_preset", preset=name))
     if name in IMPOSSIBLE:
-        refused(shared.post("/api/teach/copy", json={"folder": name}))
+        refused(command(shared, "copy_taught", folder=name))
 
 
 def test_a_preset_has_a_name_that_can_be_seen(shared: TestClient) -> None:
     for name in ("a\0b", "\x1b[31mred", "\u202edesrever", " ", "x" * 61):
-        refused(shared.post("/api/presets", json={"name": name}))
+        refused(command(shared, "save_preset", preset=name))
 
 
 @pytest.mark.full
 @pytest.mark.parametrize("value", [10**400, -(10**400), "9" * 5000, [], {}, None, "\0", [[1]]])
 def test_no_parameter_takes_what_it_does_not_take(shared: TestClient, value: Any) -> None:
     for key in (*PARAMETERS, *METHODS):
-        answer = shared.patch("/api/parameters", json={"changes": {key: value}})
+        answer = command(shared, "set_parameters", changes={key: value})
         assert refused(answer)["field"] == key
 
 
@@ -93,19 +94,23 @@ def test_no_parameter_takes_what_it_does_not_take(shared: TestClient, value: Any
     ],
 )
 def test_bodies_that_are_none(shared: TestClient, body: bytes) -> None:
-    for method, path in [("POST", "/api/seek"), ("PATCH", "/api/parameters")]:
+    for path in ("/api/seek", "/api/commands"):
         headers = {"content-type": "application/json"}
-        refused(shared.request(method, path, content=body, headers=headers))
+        refused(shared.post(path, content=body, headers=headers))
 
 
 def test_words_that_are_no_text_come_back_as_text(shared: TestClient) -> None:
-    for path, body in [
-        ("/api/parameters", b'{"changes":{"\\ud800":1}}'),
-        ("/api/layers", b'{"changes":{"\\ud800":true}}'),
-        ("/api/parameters", b'{"changes":{"fusion.clutter_rate":"\\ud800"}}'),
+    for method, path, body in [
+        ("POST", "/api/commands", b'{"name":"set_parameters","changes":{"\\ud800":1}}'),
+        ("PATCH", "/api/layers", b'{"changes":{"\\ud800":true}}'),
+        (
+            "POST",
+            "/api/commands",
+            b'{"name":"set_parameters","changes":{"fusion.clutter_rate":"\\ud800"}}',
+        ),
     ]:
         headers = {"content-type": "application/json"}
-        refused(shared.patch(path, content=body, headers=headers))
+        refused(shared.request(method, path, content=body, headers=headers))
     refused(shared.get("/api/%ff%fe"))
     refused(shared.get("/static/%00"))
     refused(shared.get("/static/" + "x" * 300))
@@ -120,7 +125,7 @@ def test_a_full_disk_is_said_and_changes_nothing(
     own = client.app.state.presets  # type: ignore[attr-defined]
     monkeypatch.setattr(own, "_path", tmp_path / "presets.json")
     monkeypatch.setattr("app.state.kept.presets.write_json", full)
-    answer = client.post("/api/presets", json={"name": "mine"})
+    answer = command(client, "save_preset", preset="mine")
     assert answer.status_code == 507
     assert answer.json()["code"] == "disk_full"
     assert "No space left on device" in answer.json()["detail"]

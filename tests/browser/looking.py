@@ -123,7 +123,7 @@ def still(locator: Locator) -> FloatRect:
 def as_at_first(server: Server) -> None:
     """Defaults, nothing pinned, nothing selected, nobody alone, the first step; and its run."""
     ask(server, "DELETE", "run/pin")
-    ask(server, "POST", "parameters/reset", {})
+    server.command("reset_parameters")
     ask(server, "POST", "select", {"id": None})
     ask(server, "POST", "seek", {"step": 0})
     # a window that is closed at once takes what it switched last with it

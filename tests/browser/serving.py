@@ -99,6 +99,15 @@ class Server:
         headers = {"Authorization": f"Bearer {self.token}"}
         return httpx2.get(self.address.rstrip("/") + path, headers=headers, timeout=30.0)
 
+    def command(self, name: str, **fields: object) -> None:
+        """Have a command done."""
+        headers = {"Authorization": f"Bearer {self.token}"}
+        body = {"name": name, **fields}
+        answer = httpx2.post(
+            f"{self.address}api/commands", json=body, headers=headers, timeout=30.0
+        )
+        answer.raise_for_status()
+
     def wait(self, condition: Callable[[dict], bool], seconds: float = 300.0) -> dict:
         """The state, once it is as wished."""
         deadline = time.monotonic() + seconds

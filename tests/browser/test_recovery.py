@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from playwright.sync_api import Page, expect
 
-from tests.browser.looking import ask, readout, shown_in_3d, until, viser
+from tests.browser.looking import readout, shown_in_3d, until, viser
 from tests.browser.serving import Server
 
 
@@ -33,7 +33,7 @@ def test_the_page_and_the_3d_view_recover_where_they_were(page: Page, server: Se
 
 def test_a_new_start_takes_up_where_this_browser_was(flat_page: Page, server: Server) -> None:
     page = flat_page
-    ask(server, "PATCH", "parameters", {"changes": {"fusion.detection_probability": 0.8}})
+    server.command("set_parameters", changes={"fusion.detection_probability": 0.8})
     server.wait_for_run()
     page.get_by_role("tab", name="Runs").click()
     page.keyboard.press("Home")
@@ -53,4 +53,4 @@ def test_a_new_start_takes_up_where_this_browser_was(flat_page: Page, server: Se
     # somebody who goes elsewhere on purpose is not taken back
     page.goto(f"{server.address}?step=4")
     until(page, lambda: readout(page) == "4", "the address wins")
-    ask(server, "POST", "parameters/reset", {})
+    server.command("reset_parameters")

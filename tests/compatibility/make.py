@@ -72,14 +72,13 @@ def page(work: Path, do: Callable[[Any], None], library: Path | None = None) -> 
     settings = Settings(sequence=place, with_viser=False, keep_on_disk=True, library=library)
     with TestClient(create_app(settings), base_url="http://127.0.0.1:8000") as client:
 
-        def send(method: str, path: str, **body: Any) -> Any:
-            answer = client.request(method, f"/api/{path}", json=body)
-            assert answer.status_code == 200, answer.text
+        def send(name: str, **fields: Any) -> None:
+            answer = client.post("/api/commands", json={"name": name, **fields})
+            assert answer.is_success, answer.text
             until(lambda: client.get("/api/state").json()["run"]["state"] == "done")
             time.sleep(3.0)  # long enough for a run to be kept
-            return answer.json()
 
-        send("POST", "seek", step=0)
+        client.post("/api/seek", json={"step": 0})
         do(send)
 
 
@@ -91,12 +90,19 @@ def runs(work: Path) -> None:
 
     def worked(send: Callable[..., Any]) -> None:
         checked = {"kind": "checked", "first": 70, "last": 119}
-        send("POST", "corrections", corrections=[checked], note="all of the end")
-        send("PATCH", "parameters", changes={"fusion.detection_probability": 0.8})
-        send("POST", "presets", name="Dim room")
+        send("correct", corrections=[checked], note="all of the end")
+        send(
+            "POST", "commands", name="set_parameters", changes={"fusion.detection_probability": 0.8}
+        )
+        send("save_preset", preset="Dim room")
         changes = {"fusion_method": "sequential_phd", "fusion.clutter_rate": 1.5}
-        send("PATCH", "parameters", changes={**changes, "colour_phd.spread_starts": False})
-        send("POST", "presets", name="Zoë's café, late")
+        send(
+            "POST",
+            "commands",
+            name="set_parameters",
+            changes={**changes, "colour_phd.spread_starts": False},
+        )
+        send("save_preset", preset="Zoë's café, late")
 
     page(work, worked, library)
     csv = work / "tracks.csv"
@@ -127,9 +133,9 @@ def draft(work: Path) -> None:
     """What was taught and not saved; the recording is among the recent ones by that, too."""
 
     def taught(send: Callable[..., Any]) -> None:
-        send("PATCH", "teach/room/max/2", value=2.25)
-        send("POST", "teach/target", half_extents=[0.1, 0.11, 0.125])
-        send("POST", "teach/entrances", position=[0.0, -1.2, 1.0])
+        send("set_room_face", side="max", axis=2, value=2.25)
+        send("set_target", half_extents=[0.1, 0.11, 0.125])
+        send("add_entrance", position=[0.0, -1.2, 1.0])
 
     page(work, taught)
 

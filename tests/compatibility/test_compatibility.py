@@ -28,6 +28,7 @@ from starlette.testclient import TestClient
 
 from app.command.main import main
 from app.web.server import Settings, create_app
+from tests.app import conftest
 from tests.studies.small import Serial, run
 from tracker.export import read_tracks_csv
 from tracker.kernels.compilation import kernel_folder
@@ -374,11 +375,11 @@ def test_what_was_said_last_can_be_taken_back_after_a_start(home: Home) -> None:
     with page(home, "crossing") as client:
         ids = [one["id"] for one in SAID["correction"]]
         until(lambda: state_of(client)["edits"]["undo"] is not None)
-        answer = client.post("/api/undo")
+        answer = conftest.command(client, "undo")
         assert answer.status_code == 200, answer.text
         log = tomllib.loads((home.crossing / "corrections.toml").read_text(encoding="utf-8"))
         assert [one["id"] for one in log["correction"]] == ids[:-1]
-        assert client.post("/api/redo").status_code == 200
+        assert conftest.command(client, "redo").status_code == 200
         log = tomllib.loads((home.crossing / "corrections.toml").read_text(encoding="utf-8"))
         assert log == SAID
 
@@ -413,7 +414,7 @@ def test_presets_of_ones_own_are_listed_and_applied(home: Home) -> None:
                 },
             ),
         ):
-            answer = client.post("/api/parameters/preset", json={"name": name})
+            answer = conftest.command(client, "apply_preset", preset=name)
             assert answer.status_code == 200, answer.text
             now = answer.json()
             assert {key: value_in(now, key) for key in now["changed"]} == values
@@ -424,8 +425,8 @@ def test_what_was_taught_and_not_saved_is_taken_up_again(home: Home) -> None:
     with page(home, "crossing", draft=True) as client:
         state = state_of(client)
         assert state["teaching"]["unsaved"] > 0
-        copied = client.post("/api/teach/copy", json={"folder": str(home.folder / "taught")})
-        assert copied.status_code == 200, copied.text
+        copied = conftest.command(client, "copy_taught", folder=str(home.folder / "taught"))
+        assert copied.status_code == 204, copied.text
     taught = open_sequence(home.folder / "taught")
     assert taught.room.maximum.tolist() == [1.5, 1.5, 2.25]
     assert taught.target_half_extents.tolist() == [0.1, 0.11, 0.125]
@@ -641,11 +642,11 @@ def test_the_values_of_every_address_are_taken(home: Home) -> None:
         for one in ADDRESSES:
             parts = dict(parse_qsl(one["address"].lstrip("?")))
             for head, values in (("p.", one.get("values")), ("a.", one.get("pinned"))):
-                client.post("/api/parameters/reset")
+                conftest.command(client, "reset_parameters")
                 texts = {key[2:]: text for key, text in parts.items() if key.startswith(head)}
                 if not texts:
                     continue
-                answer = client.patch("/api/parameters", json={"changes": texts})
+                answer = conftest.command(client, "set_parameters", changes=texts)
                 assert answer.status_code == 200, answer.text
                 now = answer.json()
                 assert {key: value_in(now, key) for key in values} == values

@@ -130,10 +130,10 @@ def test_it_is_served_read_only(served: TestClient) -> None:
     assert len(step["tracks"]) == 2
     assert served.post("/api/seek", json={"step": 4}).status_code == 200
     for method, path, body in (
-        ("PATCH", "/api/parameters", {"changes": {}}),
+        ("POST", "/api/commands", {"name": "set_parameters", "changes": {}}),
         ("POST", "/api/run", {}),
         ("POST", "/api/sequence", {"name": "room44-3p"}),
-        ("POST", "/api/teach/save", {}),
+        ("POST", "/api/commands", {"name": "save_taught"}),
         ("DELETE", "/api/run/pin", {}),
     ):
         answer = served.request(method, path, json=body)

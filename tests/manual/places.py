@@ -29,12 +29,13 @@ def between(text: str, name: str, made: str) -> str:
 
 def made_pages() -> dict[Path, Callable[[], str]]:
     """Every file that is made, whole or in part, and how."""
-    from tests.manual import command_line, packages, tuning
+    from tests.manual import command_line, commands, packages, tuning
     from tests.manual.records import results
     from tracker.export import json_file
 
     return {
         PAGES / "command-line.md": command_line.page,
+        PAGES / "commands.md": commands.page,
         PAGES / "architecture.md": packages.page,
         PAGES / "tuning.md": tuning.page,
         PAGES / json_file.SCHEMA_PLACE: json_file.published,

@@ -11,7 +11,7 @@ function page(answers) {
   const store = createStore({ notes: [], dismissed: [], server: null });
   globalThis.fetch = async () => {
     const [status, body] = answers.shift();
-    return new Response(JSON.stringify(body), { status });
+    return new Response(body && JSON.stringify(body), { status });
   };
   const none = () => true;
   return { store, actions: createActions({ store, seek: none, send: none, receive: none }) };
@@ -36,6 +36,21 @@ test("what was refused is said until the like is accepted", async () => {
   actions.note("warn", "Worth knowing", "");
   await actions.ask("POST", "corrections", {});
   assert.deepEqual(said(), ["Worth knowing"]);
+});
+
+test("a command is answered by nothing, or by what only who asked needs", async () => {
+  const { store, actions } = page([
+    [204, null],
+    [200, { bytes: 4 }],
+    [409, { detail: "No sequence is open.", code: "nothing_open" }],
+  ]);
+  assert.equal(await actions.command("add_entrance"), true);
+  assert.deepEqual(await actions.command("delete_runs", { runs: [1] }), { bytes: 4 });
+  assert.equal(await actions.command("add_entrance"), null);
+  assert.deepEqual(
+    store.get().notes.map(({ title }) => title),
+    ["No sequence is open."],
+  );
 });
 
 test("the same thing said again is one note, the newest, that counts", () => {

@@ -18,6 +18,7 @@ from app.command.commands.studies import _trials as command_words
 from app.state.studies import StudyDesk
 from app.web.server import Settings, create_app
 from app.web.studies import routes
+from tests.app.conftest import command
 from tests.studies.small import Serial, made_up, recording, run
 from tracker.studies.store import Status, Store, find
 
@@ -48,7 +49,7 @@ def define(client: TestClient, **fields: Any) -> dict[str, Any]:
 
 
 def test_a_draft_has_ranges_around_todays_values(client: TestClient) -> None:
-    client.patch("/api/parameters", json={"changes": {"fusion.clutter_rate": 12}})
+    command(client, "set_parameters", changes={"fusion.clutter_rate": 12})
     draft = client.get("/api/studies/draft").json()
     assert draft["has_truth"]
     assert draft["objectives"] == ["hota", "idf1", "speed"]
@@ -146,7 +147,7 @@ def test_where_the_time_alone_ends_it_no_number_of_trials_is_told(
 @pytest.mark.full
 def test_what_is_on_the_sliders_is_held_and_tried(client: TestClient) -> None:
     changes = {"fusion.clutter_rate": 12, "fusion.acceleration_sigma": 2.5}
-    client.patch("/api/parameters", json={"changes": changes})
+    command(client, "set_parameters", changes=changes)
     made = define(client)
     assert made["info"]["state"] == "new"
     assert made["definition"]["values"] == {"fusion.acceleration_sigma": 2.5}
@@ -173,14 +174,14 @@ def test_trials_are_read_used_and_kept(client: TestClient, tmp_path: Path) -> No
     assert client.get(f"/api/studies/mine/trials?after={trials['last']}").json()["trials"] == []
     detail = client.get(f"/api/studies/mine/trials/{best}").json()
     assert detail["commands"][0].startswith("multiview-phd track ")
-    state = client.post(f"/api/studies/mine/trials/{best}/use").json()
+    state = command(client, "use_trial", study="mine", trial=best).json()
     for key, value in detail["trial"]["values"].items():
         assert state["parameters"][key] == value
     assert set(state["changed"]) <= set(detail["trial"]["values"])
-    kept = client.post(f"/api/studies/mine/trials/{best}/preset", json={"name": "found"}).json()
+    kept = command(client, "keep_trial", study="mine", trial=best, preset="found").json()
     assert kept["presets"] == ["found"]
     assert kept["preset"] == "found"
-    back = client.post("/api/studies/mine/trials/0/use").json()
+    back = command(client, "use_trial", study="mine", trial=0).json()
     assert back["changed"] == []
     report = client.get("/api/studies/mine/export/report.html")
     assert "<h1>Study mine</h1>" in report.text

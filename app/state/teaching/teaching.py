@@ -51,7 +51,7 @@ class Teaching(Taught):
     def add_template(
         self,
         camera: str,
-        step: int,
+        step: int | None,
         box: tuple[float, float, float, float],
         name: str | None = None,
     ) -> None:
@@ -59,7 +59,7 @@ class Teaching(Taught):
 
         Args:
             camera: Its name.
-            step: Of the picture that the box lies in.
+            step: Of the picture that the box lies in; None for the playhead's.
             box: left, top, width, height in pixels; what sticks out is cut off.
             name: Whose it is; a new person's where none is given.
 
@@ -71,6 +71,7 @@ class Teaching(Taught):
         name = name or next(
             word for k in range(1, len(names) + 2) if (word := f"person{k}") not in names
         )
+        step = self._workbench.snapshot().playhead if step is None else step
         template = {
             "name": name, "camera": camera, "frame": step, "box": within(sequence, camera, box)
         }  # fmt: skip

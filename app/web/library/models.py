@@ -7,7 +7,6 @@ from typing import Any, Literal
 from pydantic import Field
 
 from app.models import Model, RoomInfo, TrackLife
-from app.models.base import RowNumber
 from tracker.library.records import KeptRun
 
 
@@ -136,28 +135,6 @@ class Place(Model):
     """Where a recording lies now."""
 
     place: str = Field(min_length=1, max_length=4096)
-
-
-class RunChanges(Model):
-    """What a person says of a run; what is null stays."""
-
-    name: str | None = Field(default=None, max_length=200)
-    star: bool | None = None
-    note: str | None = Field(default=None, max_length=10_000)
-    tags: list[str] | None = Field(default=None, max_length=50)
-
-
-class RunNumbers(Model):
-    """Runs by their numbers."""
-
-    runs: list[RowNumber] = Field(min_length=1, max_length=10_000)
-
-
-class Deleted(Model):
-    """What was deleted."""
-
-    runs: list[int]
-    bytes: int
 
 
 def run_info(run: KeptRun, changes: list[ChangeInfo], older_code: bool) -> KeptRunInfo:

@@ -13,13 +13,13 @@ from fastapi import APIRouter, Depends, Request, Response
 from app.errors import ApiError, sentence
 from app.models import State
 from app.models.base import RowNumber
-from app.state.marking import Marking
 from app.state.workers.keeper import Keeper
 from app.web.dependencies import ERRORS, Bench, Work, nothing_open
 from app.web.library import models, preview
+from app.web.library.errors import no_library
 from app.web.opening import begun, told_in_the_answer
 from app.web.views import results
-from tracker.library.errors import LibraryError, NoSuchRun
+from tracker.library.errors import LibraryError
 from tracker.library.keeping import (
     CURVE,
     code_version,
@@ -45,13 +45,6 @@ def _keeper(request: Request) -> Keeper:
 Kept = Annotated[Keeper, Depends(_keeper)]
 
 
-def no_library(error: LibraryError) -> ApiError:
-    """The answer where the library, or the run, is not as it must be."""
-    if isinstance(error, NoSuchRun):
-        return ApiError(404, "no_run", f"{sentence(error)}.")
-    return ApiError(409, "no_library", f"{sentence(error)}.")
-
-
 def _library(keeper: Kept) -> Library:
     try:
         return keeper.library()
@@ -59,13 +52,7 @@ def _library(keeper: Kept) -> Library:
         raise no_library(error) from None
 
 
-def _marking(request: Request) -> Marking:
-    marking: Marking = request.app.state.marking
-    return marking
-
-
 Opened = Annotated[Library, Depends(_library)]
-Marks = Annotated[Marking, Depends(_marking)]
 
 
 @router.get("")
@@ -189,24 +176,6 @@ def run(number: RowNumber, opened: Opened, bench: Bench) -> models.Preview:
         ospa_every=stride(steps, CURVE),
         room=results.room_of(now.saved.room) if now.saved is not None and known else None,
     )
-
-
-@router.patch("/runs/{number}")
-def change(number: RowNumber, wish: models.RunChanges, marking: Marks) -> models.KeptRunInfo:
-    """Name, star, note and tag a run."""
-    try:
-        return _info(marking.mark(number, wish.model_dump(exclude_none=True)))
-    except LibraryError as error:
-        raise no_library(error) from None
-
-
-@router.post("/delete")
-def delete(wish: models.RunNumbers, marking: Marks) -> models.Deleted:
-    """Delete runs; this can be undone for a day."""
-    try:
-        return models.Deleted(runs=wish.runs, bytes=marking.delete(wish.runs))
-    except LibraryError as error:
-        raise no_library(error) from None
 
 
 @router.post("/runs/{number}/open")

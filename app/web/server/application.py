@@ -14,6 +14,7 @@ from app.web import api, description, stream, teaching_routes
 from app.web.access import gateway
 from app.web.access.security import CONTENT_POLICY, Guard, OnlyLooking, allowed_hosts, is_loopback
 from app.web.access.tokens import Access
+from app.web.commands import routes as commands
 from app.web.corrections import routes as corrections
 from app.web.evaluation import course_routes, identity_routes
 from app.web.evaluation import routes as evaluation
@@ -31,6 +32,7 @@ from tracker.library.records import Result
 
 ROUTERS = (
     api.router,
+    commands.router,
     foreground.router,
     likelihood_routes.router,
     floor_routes.router,

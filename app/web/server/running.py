@@ -36,6 +36,7 @@ from app.state.workers.keeper import Keeper
 from app.state.workers.sensitivity import Sensitivity
 from app.state.workers.threads import in_background
 from app.web.access.gateway import Gateway
+from app.web.commands.command import Owners
 from app.web.library import routes as library
 from app.web.pictures.jpegs import Pictures
 from app.web.pictures.likelihood import Likelihoods
@@ -79,14 +80,14 @@ async def lifespan(app: FastAPI) -> AsyncIterator[None]:
     )
     pictures = app.state.pictures = Pictures(workbench)
     app.state.timelines = Timelines()
-    app.state.history = History(workbench)
+    history = app.state.history = History(workbench)
     edits = app.state.edits = Edits(
         workbench,
         settings_folder() / "edits" if kept else None,
         settings_folder() / "corrections" if kept else None,
     )
     own_presets = settings_folder() / "presets.json" if kept else None
-    app.state.presets = OwnPresets(workbench, edits, own_presets)
+    presets = app.state.presets = OwnPresets(workbench, edits, own_presets)
     app.state.likelihoods = Likelihoods()
     app.state.swatches = Swatches()
     teaching = app.state.teaching = Teaching(
@@ -94,7 +95,7 @@ async def lifespan(app: FastAPI) -> AsyncIterator[None]:
     )
     correcting = app.state.correcting = Correcting(workbench, edits)
     edits.follow()
-    app.state.doubting = Doubting()
+    doubting = app.state.doubting = Doubting()
     given = Path(settings.sequence or "").expanduser()
     roots = [given] if settings.sequence and given.is_dir() else []
     desk = app.state.desk = Desk(workbench, settings.data, roots)
@@ -109,8 +110,19 @@ async def lifespan(app: FastAPI) -> AsyncIterator[None]:
     )
     sensitivity = app.state.sensitivity = Sensitivity(workbench, settings.seed)
     keeper = app.state.keeper = Keeper(workbench, settings.library, settings.keep, names_of)
-    app.state.marking = Marking(workbench, edits, keeper.library)
+    marking = Marking(workbench, edits, keeper.library)
     study_desk = app.state.studies = StudyDesk(workbench, studies_folder())
+    app.state.owners = Owners(
+        workbench=workbench,
+        edits=edits,
+        presets=presets,
+        history=history,
+        teaching=teaching,
+        correcting=correcting,
+        doubting=doubting,
+        marking=marking,
+        studies=study_desk,
+    )
     told = app.state.stream = Stream(workbench)
     door = app.state.gateway = Gateway()
     told.start(_of_crash(crashed[-1], settings.ended is not None) if crashed else None)

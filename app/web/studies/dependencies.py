@@ -8,6 +8,7 @@ from fastapi import Depends, Request
 
 from app.errors import ApiError, sentence
 from app.state.studies import StudyDesk
+from tracker.sequences.errors import SequenceError
 from tracker.studies.errors import StudyError
 from tracker.studies.store import Store
 
@@ -25,11 +26,25 @@ def no_study(error: StudyError | OSError) -> ApiError:
     return ApiError(409, "no_study", f"{sentence(error)}.")
 
 
-def _study(name: str, desk: Desk) -> Store:
+def no_trial(error: StudyError | SequenceError, field: str) -> ApiError:
+    """The answer where a study has no such trial."""
+    return ApiError(404, "no_trial", f"{sentence(error)}.", field=field)
+
+
+def store_of(desk: StudyDesk, name: str) -> Store:
+    """The study of a name.
+
+    Raises:
+        ApiError: If there is none.
+    """
     try:
         return desk.store(name)
     except StudyError as error:
         raise ApiError(404, "no_study", f"{sentence(error)}.", field="name") from None
+
+
+def _study(name: str, desk: Desk) -> Store:
+    return store_of(desk, name)
 
 
 Named = Annotated[Store, Depends(_study)]

@@ -276,12 +276,6 @@ class TrialDetail(Model):
     commands: list[str]
 
 
-class PresetWish(Model):
-    """A name to keep a trial's values under."""
-
-    name: str
-
-
 class TuneWish(Model):
     """The open recording is to be tuned, from today's values."""
 

@@ -8,17 +8,11 @@ from typing import Annotated, Literal
 
 from fastapi import APIRouter, Query, Response
 
-from app.errors import ApiError, sentence
-from app.models import State
-from app.web.dependencies import ERRORS, Bench, Own, file_name, nothing_open
+from app.web.dependencies import ERRORS, file_name
 from app.web.studies import models, views
-from app.web.studies.dependencies import Named, no_study
-from app.web.views import results
-from tracker.parameters.catalogue import METHODS, PARAMETERS
-from tracker.parameters.values import changed_values, value_of, with_values
+from app.web.studies.dependencies import Named, no_study, no_trial
 from tracker.sequences.errors import SequenceError
 from tracker.studies.errors import StudyError
-from tracker.studies.store import Store
 from tracker.studies.summary import track_commands
 
 router = APIRouter(prefix="/api/studies", responses=ERRORS)
@@ -53,7 +47,7 @@ def trial(store: Named, number: int) -> models.TrialDetail:
         found, definition = store.trial(number), store.definition()
         commands = track_commands(definition, found)
     except (StudyError, SequenceError) as error:
-        raise ApiError(404, "no_trial", f"{sentence(error)}.", field="number") from None
+        raise no_trial(error, "number") from None
     runs = []
     for row in found.jobs:
         outcome = store.outcome(row.key)
@@ -68,43 +62,6 @@ def trial(store: Named, number: int) -> models.TrialDetail:
     return models.TrialDetail(trial=views.trial_of(found), runs=runs, commands=commands)
 
 
-@router.post("/{name}/trials/{number}/use")
-def use(store: Named, number: int, bench: Bench) -> State:
-    """Set all parameters to those of a trial, as one step."""
-    bench.set_parameters(_values(store, number, bench), "api")
-    return results.state_of(bench.snapshot())
-
-
-@router.post("/{name}/trials/{number}/preset")
-def preset(store: Named, number: int, wish: models.PresetWish, bench: Bench, own: Own) -> State:
-    """Keep the values of a trial as a preset."""
-    _keep(wish.name, _values(store, number, bench), bench, own)
-    return results.state_of(bench.snapshot())
-
-
-def _keep(name: str, values: dict[str, object], bench: Bench, own: Own) -> None:
-    defaults = bench.snapshot().defaults
-    own.keep(name, changed_values(with_values(defaults, values), defaults))
-
-
-def _values(store: Store, number: int, bench: Bench) -> dict[str, object]:
-    """Of all parameters: a trial's own, what its study holds, and the defaults."""
-    try:
-        found, definition = store.trial(number), store.definition()
-    except StudyError as error:
-        raise ApiError(404, "no_trial", f"{sentence(error)}.", field="number") from None
-    return _all({**definition.held(), **(found.values if number else {})}, bench)
-
-
-def _all(values: dict[str, object], bench: Bench) -> dict[str, object]:
-    """Of all parameters, these and the defaults."""
-    snapshot = bench.snapshot()
-    if snapshot.sequence is None:
-        raise nothing_open()
-    parameters = with_values(snapshot.defaults, values)
-    return {key: value_of(parameters, key) for key in (*METHODS, *PARAMETERS)}
-
-
 @router.get("/{name}/tuned")
 def tuned(store: Named) -> models.Tuned:
     """What a study proposes at its end."""
@@ -113,30 +70,6 @@ def tuned(store: Named) -> models.Tuned:
     except StudyError as error:
         raise no_study(error) from None
     return views.tuned_of(found)
-
-
-@router.post("/{name}/tuned/use")
-def use_tuned(store: Named, bench: Bench) -> State:
-    """Set all parameters to what a study proposes, as one step."""
-    bench.set_parameters(_proposed(store, bench), "api")
-    return results.state_of(bench.snapshot())
-
-
-@router.post("/{name}/tuned/preset")
-def keep_tuned(store: Named, wish: models.PresetWish, bench: Bench, own: Own) -> State:
-    """Keep what a study proposes as a preset."""
-    _keep(wish.name, _proposed(store, bench), bench, own)
-    return results.state_of(bench.snapshot())
-
-
-def _proposed(store: Store, bench: Bench) -> dict[str, object]:
-    try:
-        found, definition = store.fact("tuned"), store.definition()
-    except StudyError as error:
-        raise no_study(error) from None
-    if found is None or not found["better"]:
-        raise ApiError(409, "nothing_better", f"The study {store.name} proposes nothing.")
-    return _all({**definition.held(), **found["values"]}, bench)
 
 
 @router.get(

@@ -1,5 +1,5 @@
 /** What is doubtful and what was put right, fetched and kept; every part of Check looks at this. */
-import { ApiError, fetcher, getJson, sendJson } from "../state/api.js";
+import { ApiError, fetcher, getJson, sendCommand, sendJson } from "../state/api.js";
 import { createStore } from "../state/store.js";
 import { isLike, middleOf } from "./words.js";
 
@@ -101,7 +101,9 @@ function createCheck({ store, actions, playback }) {
 		if (!chosen?.alternatives[other]) return;
 		if (!other) return state.set({ ...hide(), ends });
 		state.set({ other });
-		const preview = await askOfPlace("/ghosts", { doubt: chosen.id, alternative: other });
+		const preview = await ofPlace(
+			sendJson("POST", "/api/corrections/ghosts", { doubt: chosen.id, alternative: other }),
+		);
 		const now = state.get();
 		if (now.chosen?.id === chosen.id && now.other === other) state.set({ preview });
 	}
@@ -109,13 +111,13 @@ function createCheck({ store, actions, playback }) {
 	/**
 	 * Ask something of the chosen place. A run that came meanwhile may not have it any more: then
 	 * the queue is read anew, and nobody did anything wrong.
-	 * @param {string} path @param {{doubt: string, alternative: number}} body
+	 * @param {Promise<any>} asked
 	 */
-	async function askOfPlace(path, body) {
+	async function ofPlace(asked) {
 		try {
-			const answer = await sendJson("POST", `/api/corrections${path}`, body);
+			const answer = await asked;
 			actions.accepted("corrections");
-			return answer;
+			return answer ?? true;
 		} catch (error) {
 			if (!(error instanceof ApiError)) throw error;
 			if (error.code !== "no_doubt") actions.refused(error, "corrections");
@@ -126,14 +128,10 @@ function createCheck({ store, actions, playback }) {
 		}
 	}
 
-	/** Ask, and take over what is told. @param {"POST" | "DELETE"} method @param {string} path @param {object} [body] */
-	const ask = async (method, path, body) =>
-		take(await actions.ask(method, `corrections${path}`, body));
-
-	/** @param {Server.Corrections | null} told  null where it was refused */
-	function take(told) {
-		if (!told) return false;
-		state.set({ ...hide(), told });
+	/** Read anew what was changed. @param {boolean | null} taken  null where it was refused */
+	function changed(taken) {
+		if (!taken) return false;
+		state.set(hide());
 		void refresh();
 		return true;
 	}
@@ -187,9 +185,9 @@ function createCheck({ store, actions, playback }) {
 		state,
 		choose,
 		show: (other) => void show(other),
-		say(corrections) {
+		async say(corrections) {
 			placed = corrections.some(({ kind }) => kind === "here");
-			return ask("POST", "", { corrections });
+			return changed(await actions.command("correct", { corrections }));
 		},
 		async answer(alternative) {
 			const { chosen } = state.get();
@@ -197,7 +195,7 @@ function createCheck({ store, actions, playback }) {
 			answered = true;
 			const { queue } = state.get();
 			const wish = { doubt: chosen.id, alternative };
-			const taken = take(await askOfPlace("/answers", wish));
+			const taken = changed(await ofPlace(sendCommand("answer", wish)));
 			answered &&= taken;
 			if (taken && queue) {
 				gone.set(chosen.id, queue.run);
@@ -206,13 +204,14 @@ function createCheck({ store, actions, playback }) {
 			return taken;
 		},
 		async skip() {
-			const { chosen } = state.get();
-			if (!chosen) return;
+			const { chosen, queue } = state.get();
+			if (!chosen || !queue) return;
 			answered = true;
-			const queue = await actions.ask("POST", "corrections/skips", { doubt: chosen.id });
-			if (queue) receiveQueue(queue);
-			else answered = false;
+			if (await actions.command("skip", { doubt: chosen.id })) {
+				gone.set(chosen.id, queue.run);
+				receiveQueue(queue);
+			} else answered = false;
 		},
-		drop: (id) => ask("DELETE", `/${id}`),
+		drop: async (id) => changed(await actions.command("drop_correction", { id })),
 	};
 }

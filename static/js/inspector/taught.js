@@ -12,7 +12,7 @@ const typed = (value) => String(Number(value.toPrecision(6)));
 
 /**
  * A button that sends something somewhere.
- * @param {string} words @param {string} to  method and path
+ * @param {string} words @param {string} to  a command, or a method and a path
  * @param {{label?: string, body?: object, main?: boolean}} [how]
  */
 const send = (words, to, { label, body = {}, main = false } = {}) =>
@@ -30,23 +30,25 @@ const send = (words, to, { label, body = {}, main = false } = {}) =>
 
 /**
  * A field that is sent once it is left.
- * @param {string} id @param {string} label @param {string} value @param {string} to
+ * @param {string} id @param {string} label @param {string} value
+ * @param {string} to  a command, which has the field by its name @param {object} body
  * @param {Attributes} kind
  */
-const field = (id, label, value, to, kind) =>
+const field = (id, label, value, to, body, kind) =>
 	h("input", {
 		id,
 		"aria-label": label,
-		...kind,
 		name: "value",
+		...kind,
 		value,
 		"data-send": to,
+		"data-body": JSON.stringify(body),
 		autocomplete: "off",
 	});
 
-/** @param {string} id @param {string} label @param {number} value @param {string} to */
-const metres = (id, label, value, to) =>
-	field(id, `${label}, metres`, typed(value), to, { type: "number", step: "0.05" });
+/** @param {string} id @param {string} label @param {number} value @param {string} to @param {object} body */
+const metres = (id, label, value, to, body) =>
+	field(id, `${label}, metres`, typed(value), to, body, { type: "number", step: "0.05" });
 
 /** @param {Attributes} attributes @param {...(Child | Child[])} children */
 const form = (attributes, ...children) => h("form", { class: "row", ...attributes }, ...children);
@@ -109,15 +111,14 @@ function templates(sequence, { templates, method, looking }) {
 					`template-${k}`,
 					`Name of template ${k + 1}`,
 					one.name,
-					`PATCH teach/templates/${k}`,
-					{
-						type: "text",
-						maxlength: 200,
-					},
+					"rename_template",
+					{ index: k },
+					{ type: "text", name: "person", maxlength: 200 },
 				),
 				picture(sequence, one, "histogram"),
 				seenAt(one),
-				send("remove", `DELETE teach/templates/${k}`, {
+				send("remove", "remove_template", {
+					body: { index: k },
 					label: `Remove template ${k + 1}, ${one.name}`,
 				}),
 			]),
@@ -125,7 +126,7 @@ function templates(sequence, { templates, method, looking }) {
 		looking &&
 			line(
 				`The run's single-view method, ${method}, looks at no templates. `,
-				send(`Use ${looking}`, "PATCH parameters", {
+				send(`Use ${looking}`, "set_parameters", {
 					body: { changes: { single_view: looking } },
 				}),
 			),
@@ -134,12 +135,12 @@ function templates(sequence, { templates, method, looking }) {
 
 /** What the tracks offer: one click and it is a template like the others. @param {Sequence} sequence @param {Server.Taught} taught */
 function offers(sequence, { offers }) {
-	const ask = send("Offer from the tracks", "POST teach/offers");
+	const ask = send("Offer from the tracks", "offer_templates");
 	if (!offers)
 		return line(ask, " Boxes of people whom several cameras agree about, to look at and to take.");
-	const forget = send("No more offers", "DELETE teach/offers");
+	const forget = send("No more offers", "forget_offers");
 	if (!offers.length) return line("All offers are taken. ", ask, " ", forget);
-	const every = send("Add all", "POST teach/offers/taken", { label: "Add all offers" });
+	const every = send("Add all", "take_offers", { label: "Add all offers" });
 	return [
 		line(ask, " ", every, " ", forget),
 		drawnTable(
@@ -151,7 +152,8 @@ function offers(sequence, { offers }) {
 				picture(sequence, template, "histogram"),
 				seenAt(template),
 				h("span", { class: "why" }, reason),
-				send("add", `POST teach/offers/${k}/taken`, {
+				send("add", "take_offers", {
+					body: { index: k },
 					label: `Add offer ${k + 1}: ${template.name}, ${template.camera}`,
 				}),
 			]),
@@ -162,7 +164,7 @@ function offers(sequence, { offers }) {
 /** A template without a mouse. @param {Sequence} sequence */
 const byNumbers = ({ cameras, frames }) =>
 	form(
-		{ "aria-label": NUMBERS, "data-send": "POST teach/templates" },
+		{ "aria-label": NUMBERS, "data-send": "add_template" },
 		h(
 			"label",
 			{},
@@ -258,12 +260,10 @@ const room = ({ room }) =>
 		]).map(([side, words]) => [
 			words,
 			...AXES.map((axis, k) =>
-				metres(
-					`room-${side}-${k}`,
-					`Room, ${words} ${axis}`,
-					room[side][k],
-					`PATCH teach/room/${side}/${k}`,
-				),
+				metres(`room-${side}-${k}`, `Room, ${words} ${axis}`, room[side][k], "set_room_face", {
+					side,
+					axis: k,
+				}),
 			),
 		]),
 	);
@@ -281,7 +281,7 @@ function target({ target: { half_extents: half } }, { sizes }) {
 				[
 					"size",
 					...["width", "depth", "height"].map((words, k) =>
-						metres(`target-${k}`, `Target, ${words}`, 2 * half[k], `PATCH teach/target/${k}`),
+						metres(`target-${k}`, `Target, ${words}`, 2 * half[k], "set_target_side", { axis: k }),
 					),
 				],
 			],
@@ -289,7 +289,7 @@ function target({ target: { half_extents: half } }, { sizes }) {
 		line(
 			"Sizes: ",
 			...others.map(([words, own]) =>
-				send(words, "POST teach/target", {
+				send(words, "set_target", {
 					body: { half_extents: own },
 					label: `Target: ${words}`,
 				}),
@@ -316,18 +316,20 @@ function entrances({ room: { entrances } }) {
 							`entrance-${index}-${part}-${k}`,
 							`Entrance ${index + 1}, ${word}`,
 							entrance[part][k],
-							`PATCH teach/entrances/${index}/${part}/${k}`,
+							"set_entrance",
+							{ index, part, axis: k },
 						),
 					),
-					send("remove", `DELETE teach/entrances/${index}`, {
+					send("remove", "remove_entrance", {
+						body: { index },
 						label: `Remove entrance ${index + 1}`,
 					}),
 				]),
 			),
 		line(
-			send("Add an entrance", "POST teach/entrances"),
+			send("Add an entrance", "add_entrance"),
 			" ",
-			send("Suggest from the tracks", "POST teach/entrances/suggested"),
+			send("Suggest from the tracks", "suggest_entrances"),
 			!entrances.length && " People are born anywhere in the room.",
 		),
 	];
@@ -350,13 +352,13 @@ function saving({ unsaved, file, read_only: why, built_in, copy_to: copy }) {
 					]
 				: quiet("All is as the file has it."),
 			h("span", { class: "grow" }),
-			unsaved.length > 0 && send("Discard", "POST teach/discard"),
+			unsaved.length > 0 && send("Discard", "discard_taught"),
 			unsaved.length > 0 &&
 				!why &&
-				send("Save", "POST teach/save", { label: `Save in ${file}`, main: true }),
+				send("Save", "save_taught", { label: `Save in ${file}`, main: true }),
 		),
 		form(
-			{ "data-send": "POST teach/copy" },
+			{ "data-send": "copy_taught" },
 			h(
 				"label",
 				{ class: "wide", title: why ?? "" },

@@ -183,7 +183,7 @@ export function mountTeach(mosaic, { store, actions }) {
 		const camera = store.get().cameras[[...mosaic.children].indexOf(cam)];
 		actions.showTab("teach");
 		added = (store.get().sequence?.templates ?? 0) + 1;
-		void actions.ask("POST", "teach/templates", {
+		void actions.command("add_template", {
 			camera: camera.name,
 			step: Number(cam.dataset.step),
 			...sides,
@@ -252,10 +252,12 @@ export function mountTeach(mosaic, { store, actions }) {
 		true,
 	);
 
-	/** @param {any} from @param {string} kind @param {() => object} body */
+	/** A command, or a method and a path. @param {any} from @param {string} kind @param {() => object} body */
 	function send(from, kind, body) {
-		const [method, path] = from?.matches(kind) ? from.dataset.send.split(" ") : [];
-		if (path) sending = actions.ask(method, path, body());
+		if (!from?.matches(kind)) return;
+		const [name, path] = from.dataset.send.split(" ");
+		const told = { ...JSON.parse(from.dataset.body ?? "{}"), ...body() };
+		sending = path ? actions.ask(name, path, told) : actions.command(name, told);
 	}
 	const { saveTaught } = actions;
 	actions.saveTaught = () => void sending.then(saveTaught);
@@ -276,12 +278,12 @@ export function mountTeach(mosaic, { store, actions }) {
 	});
 	panel.onclick = ({ target }) => {
 		const button = /** @type {HTMLElement} */ (target).closest("button");
-		send(button, "[data-send]", () => JSON.parse(button?.dataset.body ?? "{}"));
+		send(button, "[data-send]", () => ({}));
 	};
 	panel.onchange = ({ target }) => {
 		const field = /** @type {HTMLInputElement} */ (target);
 		if (field.id === asked) field.value = field.defaultValue;
-		else send(field, "[data-send]", () => ({ value: field.value }));
+		else send(field, "[data-send]", () => ({ [field.name]: field.value }));
 	};
 	panel.onsubmit = (event) => {
 		event.preventDefault();

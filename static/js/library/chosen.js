@@ -68,7 +68,7 @@ export function chosenBar({ store, actions, chosen, none, leave }) {
 		if (!ids.length) return;
 		const showRest = leave();
 		/** @type {Server.Deleted | null} */
-		const deleted = await actions.ask("POST", "library/delete", { runs: ids });
+		const deleted = await actions.command("delete_runs", { runs: ids });
 		none();
 		await showRest();
 		if (!deleted) return;

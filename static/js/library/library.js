@@ -409,11 +409,11 @@ export function mountLibrary(root, { store, actions }) {
 		show();
 	}
 
-	/** @param {Server.KeptRunInfo} run @param {object} what */
+	/** @param {Server.KeptRunInfo} run @param {{name?: string, star?: boolean, note?: string}} what */
 	async function change(run, what) {
-		const told = await actions.ask("PATCH", `library/runs/${run.id}`, what);
-		if (!told) return show();
-		runs = runs.map((one) => (one.id === run.id ? told : one));
+		const { name: title, ...marks } = what;
+		if (!(await actions.command("mark_run", { run: run.id, title, ...marks }))) return show();
+		runs = runs.map((one) => (one.id === run.id ? { ...one, ...what } : one));
 		await focus(focused);
 	}
 

@@ -1,5 +1,5 @@
 /** What a person can do: the page's own state at once, the server's by request. */
-import { ApiError, getJson, request, sendJson } from "./api.js";
+import { ApiError, getJson, request, sendCommand, sendJson } from "./api.js";
 import { SPEEDS, clampStep } from "../play/clock.js";
 import { eventsNow, nextEvent, nextLayers, ordered } from "./events.js";
 
@@ -103,6 +103,18 @@ export function createActions({ store, seek, send, receive }) {
 				return answer;
 			} catch (error) {
 				actions.refused(error, about);
+				return null;
+			}
+		},
+
+		async command(name, fields) {
+			try {
+				const answer = await sendCommand(name, fields);
+				actions.accepted(name);
+				if (answer && "version" in answer) receive(answer);
+				return answer ?? true;
+			} catch (error) {
+				actions.refused(error, name);
 				return null;
 			}
 		},
@@ -231,15 +243,14 @@ export function createActions({ store, seek, send, receive }) {
 		// runs and parameters
 		open: (name) => opening(name, "sequence", { name }),
 		openRun: (number, recording) => opening(recording, `library/runs/${number}/open`),
-		change: (changes) => actions.ask("PATCH", "parameters", { changes }),
-		reset: (...keys) => void actions.ask("POST", "parameters/reset", keys.length ? { keys } : {}),
-		preset: (name) => void actions.ask("POST", "parameters/preset", { name }),
-		savePreset: (name) => actions.ask("POST", "presets", { name }),
-		renamePreset: (name, to) =>
-			actions.ask("PATCH", `presets/${encodeURIComponent(name)}`, { name: to }),
-		removePreset: (name) => actions.ask("DELETE", `presets/${encodeURIComponent(name)}`),
+		change: (changes) => actions.command("set_parameters", { changes }),
+		reset: (...keys) => void actions.command("reset_parameters", keys.length ? { keys } : {}),
+		preset: (name) => void actions.command("apply_preset", { preset: name }),
+		savePreset: (name) => actions.command("save_preset", { preset: name }),
+		renamePreset: (name, to) => actions.command("rename_preset", { preset: name, to }),
+		removePreset: (name) => actions.command("remove_preset", { preset: name }),
 		cancel: () => void actions.ask("POST", "run/cancel"),
-		useAgain: (number) => void actions.ask("POST", `run/again/${number}`),
+		useAgain: (number) => void actions.command("use_again", { run: number }),
 		runAgain: () => void actions.ask("POST", "run"),
 		pin: (on) => void actions.ask(on ? "POST" : "DELETE", "run/pin"),
 		hindsight() {
@@ -262,7 +273,7 @@ export function createActions({ store, seek, send, receive }) {
 			// Pressed again before the last answer came, it waits for its turn.
 			const name = direction < 0 ? "undo" : "redo";
 			turn = turn.then(async () => {
-				if (store.get().server?.edits[name]) await actions.ask("POST", name);
+				if (store.get().server?.edits[name]) await actions.command(name);
 				else actions.note("info", `Nothing to ${name}`, "");
 			});
 			return turn;
@@ -281,8 +292,8 @@ export function createActions({ store, seek, send, receive }) {
 
 		drawTemplate() {},
 		editRoom: () =>
-			void actions.ask("POST", "teach/editing", { on: !store.get().server?.teaching.editing_room }),
-		saveTaught: () => void actions.ask("POST", "teach/save"),
+			void actions.command("edit_room", { on: !store.get().server?.teaching.editing_room }),
+		saveTaught: () => void actions.command("save_taught"),
 
 		// page
 		showTab: (tab) =>

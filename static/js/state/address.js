@@ -409,7 +409,7 @@ export function createAddress(store, actions) {
 		);
 		restoring += 1;
 		try {
-			if (others.length) await actions.ask("POST", "parameters/reset", { keys: others });
+			if (others.length) await actions.command("reset_parameters", { keys: others });
 			if (differing.length) await actions.change(Object.fromEntries(differing));
 		} finally {
 			restoring -= 1;

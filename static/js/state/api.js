@@ -45,11 +45,18 @@ export async function getJson(path, options) {
 	return (await request(path, options)).json();
 }
 
-/** @param {"POST" | "PUT" | "PATCH" | "DELETE"} method @param {string} path @param {object} [body] */
+/**
+ * What is answered; null where that is nothing.
+ * @param {"POST" | "PUT" | "PATCH" | "DELETE"} method @param {string} path @param {object} [body]
+ */
 export async function sendJson(method, path, body = {}) {
 	const headers = { "Content-Type": "application/json" };
-	return (await request(path, { method, headers, body: JSON.stringify(body) })).json();
+	const answer = await request(path, { method, headers, body: JSON.stringify(body) });
+	return answer.status === 204 ? null : answer.json();
 }
+
+/** Have the server do something. @param {string} name @param {object} [fields] */
+export const sendCommand = (name, fields) => sendJson("POST", "/api/commands", { name, ...fields });
 
 /**
  * Fetch the newest: never twice at once, and once more where there was news meanwhile.

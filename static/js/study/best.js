@@ -206,7 +206,7 @@ export function bestTrials({ store, actions }, { choose, chosen, name, path }) {
 	);
 	/** @param {number} number */
 	async function use(number) {
-		if (!(await actions.ask("POST", path(`/trials/${number}/use`)))) return;
+		if (!(await actions.command("use_trial", { study: name(), trial: number }))) return;
 		actions.note(
 			"info",
 			`The values of ${number ? `trial ${number}` : "the default"} are on the sliders`,
@@ -221,7 +221,8 @@ export function bestTrials({ store, actions }, { choose, chosen, name, path }) {
 	async function compare() {
 		const number = chosen();
 		if (number === null || !(await actions.ask("POST", "run/pin"))) return;
-		if (await actions.ask("POST", path(`/trials/${number}/use`))) location.hash = "#tune";
+		if (await actions.command("use_trial", { study: name(), trial: number }))
+			location.hash = "#tune";
 		store.set({ tab: "compare" });
 	}
 
@@ -239,7 +240,13 @@ export function bestTrials({ store, actions }, { choose, chosen, name, path }) {
 			over = true;
 			field.replaceWith(keep);
 			if (!kept || !field.value.trim()) return;
-			if (await actions.ask("POST", path(`/trials/${number}/preset`), { name: field.value.trim() }))
+			if (
+				await actions.command("keep_trial", {
+					study: name(),
+					trial: number,
+					preset: field.value.trim(),
+				})
+			)
 				actions.note(
 					"info",
 					`Kept as the preset ${field.value.trim()}`,

@@ -205,7 +205,7 @@ interface Actions {
 		title: string,
 		text: string,
 		remedy?: Remedy,
-		/** Of what was refused: the first part of its path. */
+		/** Of what was refused: its command, or the first part of its path. */
 		about?: string,
 	) => void;
 	/** Says what was just edited, with a button that takes it back. */
@@ -216,6 +216,8 @@ interface Actions {
 	/** What was refused before is no longer said. */
 	accepted: (about: string) => void;
 	ask: (method: "POST" | "PATCH" | "DELETE", path: string, body?: object) => Promise<any>;
+	/** Its answer, or true where it has none; null after a failure, which is told. */
+	command: (name: string, fields?: object) => Promise<any>;
 	togglePlay: () => void;
 	shuttle: (direction: -1 | 0 | 1) => void;
 	stepBy: (steps: number) => void;

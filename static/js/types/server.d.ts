@@ -282,7 +282,7 @@ declare namespace Server {
 
 	/** What was deleted. */
 	interface Deleted {
-		runs: number[];
+		/** Size of the tracks. */
 		bytes: number;
 	}
 

@@ -9,7 +9,7 @@ import pytest
 from starlette.testclient import TestClient
 
 from app.command.flags import Track, parse
-from tests.app.conftest import Runs, run_is, wait_until
+from tests.app.conftest import Runs, command, run_is, wait_until
 from tracker.parameters.catalogue import PARAMETERS, RunParameters
 from tracker.parameters.values import value_of, with_values
 
@@ -17,7 +17,7 @@ from tracker.parameters.values import value_of, with_values
 @pytest.mark.full
 def test_it_gives_the_same_file(client: TestClient, run: Runs, tmp_path: Path) -> None:
     changes = {"fusion.detection_probability": 0.9, "fusion_method": "sequential_phd"}
-    state = client.patch("/api/parameters", json={"changes": changes}).json()
+    state = command(client, "set_parameters", changes=changes).json()
     wait_until(run_is(client, "done"))
     program, *arguments = shlex.split(state["command"])
     assert program == "multiview-phd"
@@ -38,7 +38,7 @@ def test_every_value_goes_the_way_there_and_back(client: TestClient) -> None:
         else:
             changes[key] = parameter.maximum
     client.post("/api/run/cancel")
-    state = client.patch("/api/parameters", json={"changes": changes}).json()
+    state = command(client, "set_parameters", changes=changes).json()
     client.post("/api/run/cancel")
     wish = parse(shlex.split(state["command"])[1:])
     assert isinstance(wish, Track)

@@ -29,12 +29,7 @@ def server(tmp_path: Path) -> Iterator[Server]:
 
 
 def change(server: Server, values: dict[str, float]) -> None:
-    answer = httpx2.patch(
-        f"{server.address}api/parameters",
-        json={"changes": values},
-        headers={"Authorization": f"Bearer {TOKEN}"},
-    )
-    answer.raise_for_status()
+    server.command("set_parameters", changes=values)
 
 
 def post(server: Server, path: str) -> None:

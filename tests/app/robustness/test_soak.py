@@ -77,7 +77,7 @@ def use(running: Server, pages: list[Page], chance: random.Random, seconds: floa
                 page.reload()
             case 1:
                 value = round(chance.uniform(0.5, 3.0), 1)
-                ask(running, "PATCH", "parameters", {"changes": {"fusion.clutter_rate": value}})
+                running.command("set_parameters", changes={"fusion.clutter_rate": value})
             case 2:
                 ask(running, "POST", "select", {"id": chance.choice([None, 1, 2])})
             case 3:

@@ -17,7 +17,7 @@ from app.state.edits import EditError, Edits
 from app.state.snapshot import Event, Notice
 from app.state.workbench import Workbench
 from app.web.server import Settings, create_app
-from tests.app.conftest import ADDRESS, wait_until
+from tests.app.conftest import ADDRESS, command, wait_until
 from tracker.parameters.values import value_of
 from tracker.runs import pipeline
 from tracker.sequences.pictures.frames import FrameReader
@@ -275,12 +275,12 @@ def test_a_note_says_what_was_undone(crossing: Path) -> None:
         heard: list[Event] = []
         bench: Workbench = client.app.state.workbench  # type: ignore[attr-defined]
         bench.subscribe_events(heard.append)
-        client.patch("/api/parameters", json={"changes": {P_D: 0.5}})
-        client.post("/api/presets", json={"name": "mine"})
-        assert client.post("/api/undo").json()["presets"] == []
-        assert client.post("/api/redo").json()["presets"] == ["mine"]
-        client.post("/api/undo")
-        client.post("/api/undo")
+        command(client, "set_parameters", changes={P_D: 0.5})
+        command(client, "save_preset", preset="mine")
+        assert command(client, "undo").json()["presets"] == []
+        assert command(client, "redo").json()["presets"] == ["mine"]
+        command(client, "undo")
+        command(client, "undo")
     assert [one.message for one in heard if isinstance(one, Notice)] == [
         "Undone: preset mine saved",
         "Done again: preset mine saved",

@@ -11,7 +11,7 @@ from app.state.edits import Edits
 from app.state.kept.presets import LONGEST_NAME, OwnPresets
 from app.state.snapshot import Event, Notice
 from app.state.workbench import Workbench
-from tests.app.conftest import run_is, wait_until
+from tests.app.conftest import command, run_is, wait_until
 from tracker.files.folders import settings_folder
 from tracker.parameters.values import ParameterError, value_of
 
@@ -94,17 +94,16 @@ def test_a_value_that_is_no_parameter_any_more_is_told_when_it_is_taken(tmp_path
 
 @pytest.mark.full
 def test_the_routes(client: TestClient) -> None:
-    client.patch("/api/parameters", json={"changes": {P_D: 0.6}})
-    state = client.post("/api/presets", json={"name": "night / cam 2"}).json()
+    command(client, "set_parameters", changes={P_D: 0.6})
+    state = command(client, "save_preset", preset="night / cam 2").json()
     assert (state["presets"], state["preset"]) == (["night / cam 2"], "night / cam 2")
-    address = "/api/presets/night%20%2F%20cam%202"
-    state = client.patch(address, json={"name": "night"}).json()
+    state = command(client, "rename_preset", preset="night / cam 2", to="night").json()
     assert (state["presets"], state["preset"]) == (["night"], "night")
-    client.post("/api/parameters/reset")
-    state = client.post("/api/parameters/preset", json={"name": "night"}).json()
+    command(client, "reset_parameters")
+    state = command(client, "apply_preset", preset="night").json()
     assert state["parameters"][P_D] == 0.6
-    assert client.delete("/api/presets/night").json()["presets"] == []
-    answer = client.delete("/api/presets/night")
+    assert command(client, "remove_preset", preset="night").json()["presets"] == []
+    answer = command(client, "remove_preset", preset="night")
     assert answer.status_code == 422
     assert "none is saved" in answer.json()["detail"]
     wait_until(run_is(client, "done"))

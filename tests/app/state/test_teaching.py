@@ -22,7 +22,7 @@ from app.state.teaching.taught import Taught
 from app.state.workbench import Workbench
 from app.web.server import Settings, create_app
 from app.web.views import results
-from tests.app.conftest import ADDRESS, connect, run_is, wait_until
+from tests.app.conftest import ADDRESS, command, connect, run_is, wait_until
 from tests.browser.walkers import write_walkers
 from tests.single_view.networks import answering, pooling
 from tests.single_view.packages import Npm, files, giving, package, source_of
@@ -52,6 +52,12 @@ def client(walkers: Path) -> Iterator[TestClient]:
 
 def state(client: TestClient) -> dict[str, Any]:
     return client.get("/api/state").json()
+
+
+def changed(client: TestClient, name: str, **fields: Any) -> dict[str, Any]:
+    """The state after a command."""
+    assert command(client, name, **fields).status_code == 204
+    return state(client)
 
 
 def done(client: TestClient) -> dict[str, Any]:
@@ -92,32 +98,32 @@ def test_the_first_template_makes_the_colour_methods_usable(client: TestClient) 
     assert before["teaching"] == {
         "key": before["teaching"]["key"], "unsaved": 0, "editing_room": False
     }  # fmt: skip
-    client.patch("/api/parameters", json={"changes": {"single_view": "colour_phd"}})
+    command(client, "set_parameters", changes={"single_view": "colour_phd"})
     wait_until(run_is(client, "failed"))
     assert "no template" in state(client)["run"]["error"]
-    answer = client.post("/api/teach/templates", json=BOX)
-    assert answer.status_code == 200, answer.text
+    answer = command(client, "add_template", **BOX)
+    assert answer.status_code == 204, answer.text
     now = done(client)
     assert now["sequence"]["templates"] == 1
     assert now["sequence"]["key"] == before["sequence"]["key"]  # pictures stay in the browser
     assert now["teaching"]["unsaved"] == 1
     for method in ("pseudo_particle", "jpda"):
         changes = {"single_view": method, "jpda.measurements": "colour"}
-        client.patch("/api/parameters", json={"changes": changes})
+        command(client, "set_parameters", changes=changes)
         done(client)
 
 
 @pytest.mark.full
 def test_a_run_used_again_brings_its_templates_back(client: TestClient) -> None:
     before, first = state(client), tracks(client)
-    client.patch("/api/parameters", json={"changes": {"single_view": "colour_phd"}})
-    client.post("/api/teach/templates", json=BOX)
+    command(client, "set_parameters", changes={"single_view": "colour_phd"})
+    command(client, "add_template", **BOX)
     taught = done(client)
     assert tracks(client) != first
     bench: Workbench = client.app.state.workbench  # type: ignore[attr-defined]
     told = []
     end = bench.subscribe(lambda _: told.append(results.state_of(bench.snapshot())))
-    client.post("/api/run/again/1")
+    command(client, "use_again", run=1)
     end()
     both = {(now.teaching.key, now.methods.single_view) for now in told}
     assert len(both) == 1, "one change, so that one undo takes it back"
@@ -126,81 +132,80 @@ def test_a_run_used_again_brings_its_templates_back(client: TestClient) -> None:
     assert again["sequence"]["templates"] == 0
     assert again["parameters"] == before["parameters"]
     assert tracks(client) == first
-    client.post("/api/undo")
+    command(client, "undo")
     assert done(client)["run"]["key"] == taught["run"]["key"]
 
 
 def test_a_template_is_named_renamed_removed_and_brought_back(client: TestClient) -> None:
-    for body in (BOX, {**BOX, "step": 6}, {**BOX, "step": 7, "name": "Bob"}):
-        client.post("/api/teach/templates", json=body)
-    client.patch("/api/teach/templates/0", json={"value": "Anna"})
+    for body in (BOX, {**BOX, "step": 6}, {**BOX, "step": 7, "person": "Bob"}):
+        command(client, "add_template", **body)
+    command(client, "rename_template", index=0, person="Anna")
 
     def names() -> list[str]:
         return [str(template["name"]) for template in panel(client)["templates"]]
 
     assert names() == ["Anna", "person2", "Bob"]
-    client.delete("/api/teach/templates/1")
+    command(client, "remove_template", index=1)
     assert names() == ["Anna", "Bob"]
     for _ in range(2):  # the removal, then the name
-        client.post("/api/undo")
+        command(client, "undo")
     assert names() == ["person1", "person2", "Bob"]
     for _ in range(3):
-        answer = client.post("/api/undo")
+        answer = command(client, "undo")
     assert answer.json()["teaching"]["unsaved"] == 0
     assert answer.json()["edits"] == {"undo": None, "redo": "template person1 added"}
     assert names() == []
-    answer = client.post("/api/undo")
+    answer = command(client, "undo")
     assert answer.status_code == 409
     assert answer.json()["detail"] == "There is nothing to undo."
 
 
 def test_the_room_changes_the_run_and_undo_brings_it_back_at_once(client: TestClient) -> None:
     before, first = state(client), tracks(client)
-    client.patch("/api/teach/room/max/0", json={"value": "0.2"})
-    client.patch("/api/teach/entrances/0/position/0", json={"value": -1.0})
+    command(client, "set_room_face", side="max", axis=0, value="0.2")
+    command(client, "set_entrance", index=0, part="position", axis=0, value=-1.0)
     changed = done(client)
     assert changed["sequence"]["room"]["max"][0] == 0.2
     assert changed["run"]["key"] != before["run"]["key"]
     assert tracks(client) != first
     for _ in range(2):
-        client.post("/api/undo")
+        command(client, "undo")
     assert done(client)["run"]["key"] == before["run"]["key"]
     assert tracks(client) == first
 
 
 def test_what_does_not_fit_says_so_and_changes_nothing(client: TestClient) -> None:
     before = state(client)["teaching"]
-    post, patch = client.post, client.patch
     small = {**BOX, "width": 2, "height": 2}
-    assert complaint(post("/api/teach/templates", json=small)) == (
+    assert complaint(command(client, "add_template", **small)) == (
         "walkers/sequence.toml, new template, box: expected at least 4 pixels a side inside the "
         "picture, found 2 × 2; drag a larger one."
     )
-    words = complaint(post("/api/teach/templates", json={**BOX, "camera": "cam7"}))
+    words = complaint(command(client, "add_template", **{**BOX, "camera": "cam7"}))
     assert 'camera: expected one of cam1 and cam2, found "cam7"' in words
-    words = complaint(post("/api/teach/templates", json={**BOX, "step": 60}))
+    words = complaint(command(client, "add_template", **{**BOX, "step": 60}))
     assert "frame: expected a whole number from 0 to 59, found 60" in words
-    words = complaint(patch("/api/teach/room/min/2", json={"value": 5}))
+    words = complaint(command(client, "set_room_face", side="min", axis=2, value=5))
     assert "[room], max: expected z above that of min, 5, found 2" in words
-    words = complaint(patch("/api/teach/entrances/4/sigma/0", json={"value": 1}))
+    words = complaint(command(client, "set_entrance", index=4, part="sigma", axis=0, value=1))
     assert words == "entrances: expected one of 1, found number 5."
-    words = complaint(patch("/api/teach/entrances/0/sigma/0", json={"value": 0}))
+    words = complaint(command(client, "set_entrance", index=0, part="sigma", axis=0, value=0))
     assert "sigma: expected 3 positive numbers" in words
-    assert patch("/api/teach/room/max/0", json={"value": "NaN"}).status_code == 422
-    assert patch("/api/teach/room/up/0", json={"value": 1}).status_code == 422
+    assert command(client, "set_room_face", side="max", axis=0, value="NaN").status_code == 422
+    assert command(client, "set_room_face", side="up", axis=0, value=1).status_code == 422
     assert state(client)["teaching"] == before
 
 
 def test_another_page_may_not_teach(client: TestClient) -> None:
     headers = {"origin": "http://elsewhere.example"}
-    for method, path in (("POST", "copy"), ("POST", "save"), ("PATCH", "room/max/0")):
-        answer = client.request(method, f"/api/teach/{path}", json={}, headers=headers)
+    for method, path in (("POST", "commands"), ("PUT", "teach/detector")):
+        answer = client.request(method, f"/api/{path}", json={}, headers=headers)
         assert answer.status_code == 403
 
 
 def test_a_box_that_sticks_out_is_cut_at_the_border(client: TestClient) -> None:
-    client.post("/api/teach/templates", json={**BOX, "left": -10, "top": 120})
-    client.post("/api/teach/save")
+    command(client, "add_template", **{**BOX, "left": -10, "top": 120})
+    command(client, "save_taught")
     folder = Path(str(client.app.state.workbench.snapshot().sequence.folder))  # type: ignore[attr-defined]
     (template,) = read_sequence(folder).templates
     assert template.box.tolist() == [0.0, 120.0, 14.0, 24.0]
@@ -209,12 +214,12 @@ def test_a_box_that_sticks_out_is_cut_at_the_border(client: TestClient) -> None:
 @pytest.mark.full
 def test_entrances_are_suggested_by_the_tracks(client: TestClient) -> None:
     entrance = state(client)["sequence"]["room"]["entrances"][0]
-    words = complaint(client.post("/api/teach/entrances/suggested"))
+    words = complaint(command(client, "suggest_entrances"))
     assert words.startswith("The tracks begin and end together at no other place")
-    client.delete("/api/teach/entrances/0")
+    command(client, "remove_entrance", index=0)
     done(client)
-    answer = client.post("/api/teach/entrances/suggested")
-    assert answer.status_code == 200, answer.text
+    answer = command(client, "suggest_entrances")
+    assert answer.status_code == 204, answer.text
     (found,) = state(client)["sequence"]["room"]["entrances"]
     assert found["position"][:2] == pytest.approx(entrance["position"][:2], abs=0.4)
 
@@ -223,55 +228,55 @@ def test_entrances_are_suggested_by_the_tracks(client: TestClient) -> None:
 def test_templates_that_the_tracks_offer_are_taken_and_taken_back(client: TestClient) -> None:
     done(client)
     assert panel(client)["offers"] is None
-    answer = client.post("/api/teach/offers")
-    assert answer.status_code == 200, answer.text
-    assert answer.json()["sequence"]["templates"] == 0  # nothing is added by itself
+    answer = command(client, "offer_templates")
+    assert answer.status_code == 204, answer.text
+    assert state(client)["sequence"]["templates"] == 0  # nothing is added by itself
     offers = panel(client)["offers"]
     offered = len(offers)
     assert offered >= 2
     assert "2 cameras agree" in offers[0]["reason"]
     assert client.get(picture_of(client, offers[0]["template"], "swatch")).status_code == 200
 
-    taken = client.post("/api/teach/offers/0/taken")
-    assert taken.status_code == 200, taken.text
+    taken = command(client, "take_offers", index=0)
+    assert taken.status_code == 204, taken.text
     now = done(client)
     assert now["sequence"]["templates"] == now["teaching"]["unsaved"] == 1
     assert panel(client)["offers"] == offers[1:]
-    client.post("/api/undo")
+    command(client, "undo")
     assert done(client)["sequence"]["templates"] == 0
     assert panel(client)["offers"] == offers
 
-    client.post("/api/teach/offers/taken")
+    command(client, "take_offers")
     assert done(client)["sequence"]["templates"] == offered
     assert panel(client)["offers"] == []
-    client.post("/api/teach/save")
+    command(client, "save_taught")
     folder = Path(str(client.app.state.workbench.snapshot().sequence.folder))  # type: ignore[attr-defined]
     assert len(read_sequence(folder).templates) == offered
     for _ in range(offered):  # and each can be removed like any other
-        assert client.delete("/api/teach/templates/0").status_code == 200
+        assert command(client, "remove_template", index=0).status_code == 204
     assert state(client)["sequence"]["templates"] == 0
-    client.delete("/api/teach/offers")
+    command(client, "forget_offers")
     assert panel(client)["offers"] is None
 
 
 def test_an_offer_that_is_none_any_more_is_refused(client: TestClient) -> None:
     done(client)
-    assert complaint(client.post("/api/teach/offers/0/taken")) == (
+    assert complaint(command(client, "take_offers", index=0)) == (
         "That template is offered no more."
     )
-    client.post("/api/teach/offers")
+    command(client, "offer_templates")
     client.post("/api/sequence", json={"name": "walkers"})
     wait_until(run_is(client, "done"))
     assert panel(client)["offers"] is None
-    client.post("/api/teach/offers/taken")  # of nothing, which changes nothing
+    command(client, "take_offers")  # of nothing, which changes nothing
     assert state(client)["teaching"]["unsaved"] == 0
 
 
 def test_tracks_that_offer_nothing_say_why(client: TestClient) -> None:
-    client.patch("/api/parameters", json={"changes": {"fusion.extraction_threshold": 0.99}})
-    client.patch("/api/teach/room/max/0", json={"value": -1.2})  # nobody is in what is left
+    command(client, "set_parameters", changes={"fusion.extraction_threshold": 0.99})
+    command(client, "set_room_face", side="max", axis=0, value=-1.2)  # nobody is in what is left
     done(client)
-    assert complaint(client.post("/api/teach/offers")).startswith(
+    assert complaint(command(client, "offer_templates")).startswith(
         "The tracks offer no further template: nobody is seen whole, apart from others"
     )
 
@@ -281,21 +286,21 @@ def test_saving_keeps_a_backup_and_reopens_to_the_same_run(
     client: TestClient, walkers: Path
 ) -> None:
     text = (walkers / FILE).read_bytes()
-    client.post("/api/teach/templates", json=BOX)
-    client.patch("/api/teach/room/max/0", json={"value": 1.3})
-    client.post("/api/teach/entrances", json={})
+    command(client, "add_template", **BOX)
+    command(client, "set_room_face", side="max", axis=0, value=1.3)
+    command(client, "add_entrance")
     use = {"single_view": "colour_phd"}
-    client.patch("/api/parameters", json={"changes": use})
+    command(client, "set_parameters", changes=use)
     key = done(client)["run"]["key"]
     assert state(client)["teaching"]["unsaved"] == 3
-    saved = client.post("/api/teach/save").json()
+    saved = changed(client, "save_taught")
     assert saved["teaching"]["unsaved"] == 0
     assert saved["run"]["key"] == key  # nothing is computed anew
     assert (walkers / "sequence.toml.bak").read_bytes() == text
     shown = tracks(client)
     client.post("/api/sequence", json={"name": "walkers"})
     wait_until(run_is(client, "done"))
-    client.patch("/api/parameters", json={"changes": use})
+    command(client, "set_parameters", changes=use)
     again = done(client)
     assert again["sequence"]["room"]["max"][0] == 1.3
     assert len(again["sequence"]["room"]["entrances"]) == 2
@@ -307,9 +312,9 @@ def test_a_copy_leaves_the_original_and_goes_on_in_the_copy(
     client: TestClient, walkers: Path
 ) -> None:
     text = (walkers / FILE).read_bytes()
-    client.post("/api/teach/templates", json=BOX)
+    command(client, "add_template", **BOX)
     shown = done(client)
-    answer = client.post("/api/teach/copy", json={"folder": "mine"}).json()
+    answer = changed(client, "copy_taught", folder="mine")
     assert answer["sequence"]["name"] == "mine"
     assert answer["teaching"]["unsaved"] == 0
     assert (answer["run"]["key"], answer["run"]["state"]) == (shown["run"]["key"], "done")
@@ -319,10 +324,10 @@ def test_a_copy_leaves_the_original_and_goes_on_in_the_copy(
     assert all(run["same_recording"] for run in client.get("/api/runs").json()["runs"])
     assert (walkers / FILE).read_bytes() == text
     assert client.get("/api/step/3").json()["computed"]
-    client.delete("/api/teach/templates/0")
-    client.post("/api/teach/save")
+    command(client, "remove_template", index=0)
+    command(client, "save_taught")
     assert "template" not in tomllib.loads((walkers.parent / "mine" / FILE).read_text("utf-8"))
-    words = complaint(client.post("/api/teach/copy", json={"folder": str(walkers)}))
+    words = complaint(command(client, "copy_taught", folder=str(walkers)))
     assert "expected a new or an empty folder" in words
 
 
@@ -330,18 +335,18 @@ def test_a_rendered_room_is_offered_as_a_copy(
     client: TestClient, walkers: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("MULTIVIEW_PHD_CACHE", str(walkers.parent))
-    client.post("/api/teach/entrances", json={})
+    command(client, "add_entrance")
     assert panel(client)["built_in"]
     assert panel(client)["read_only"].startswith("walkers lies in the cache, ")
-    words = complaint(client.post("/api/teach/save"))
+    words = complaint(command(client, "save_taught"))
     assert words.startswith("walkers/sequence.toml: cannot be saved, since walkers lies in the ")
     assert state(client)["teaching"]["unsaved"] == 1
 
 
 def test_discard_is_the_file_again_and_undo_knows_what_was_discarded(client: TestClient) -> None:
-    client.post("/api/teach/templates", json=BOX)
-    assert client.post("/api/teach/discard").json()["teaching"]["unsaved"] == 0
-    assert client.post("/api/undo").json()["teaching"]["unsaved"] == 1
+    command(client, "add_template", **BOX)
+    assert changed(client, "discard_taught")["teaching"]["unsaved"] == 0
+    assert command(client, "undo").json()["teaching"]["unsaved"] == 1
 
 
 @pytest.mark.full
@@ -349,7 +354,7 @@ def test_what_is_not_saved_is_there_again_after_another_sequence(
     client: TestClient, walkers: Path
 ) -> None:
     write_walkers(walkers.parent / "others")
-    client.post("/api/teach/templates", json=BOX)
+    command(client, "add_template", **BOX)
     client.post("/api/sequence", json={"name": "others"})
     wait_until(lambda: state(client)["opening"] is None)
     assert state(client)["teaching"]["unsaved"] == 0
@@ -380,16 +385,16 @@ def test_what_is_not_saved_outlives_the_server(
             yield client, str(heard)
 
     with started() as (client, _):
-        client.post("/api/teach/templates", json=BOX)
+        command(client, "add_template", **BOX)
         taught = done(client)
     with started() as (client, heard):
         assert "1 change of numbers not saved, as you left it" in heard
         again = done(client)
         assert again["teaching"] == taught["teaching"]
         assert again["run"]["key"] == taught["run"]["key"]
-        client.post("/api/teach/discard")
+        command(client, "discard_taught")
         assert list((tmp_path / "settings" / "unsaved").iterdir()) == []
-        client.post("/api/undo")
+        command(client, "undo")
     text = (walkers / FILE).read_text("utf-8")
     (walkers / FILE).write_text(
         text.replace("min = [", "min = [-9.0, ", 1).replace(", 0.0]", "]", 1)
@@ -455,7 +460,7 @@ def test_a_draft_that_cannot_be_read_is_left_alone(
 
 
 def test_a_template_shows_its_box_and_its_colours(client: TestClient) -> None:
-    client.post("/api/teach/templates", json=BOX)
+    command(client, "add_template", **BOX)
     (template,) = panel(client)["templates"]
     crop, bars = (picture_of(client, template, what) for what in ("swatch", "histogram"))
     assert client.get(crop).content.startswith(b"\x89PNG")
@@ -473,7 +478,7 @@ def test_a_template_shows_its_box_and_its_colours(client: TestClient) -> None:
 
 
 def test_defaults_follow_what_the_sequence_has_become(client: TestClient) -> None:
-    client.post("/api/teach/templates", json=BOX)
+    command(client, "add_template", **BOX)
     workbench = client.app.state.workbench  # type: ignore[attr-defined]
     snapshot = workbench.snapshot()
     assert snapshot.defaults == pipeline.default_parameters(snapshot.sequence)
@@ -488,13 +493,12 @@ def test_the_first_template_is_looked_at_where_nobody_chose_a_method(
     (walkers / "sequence.toml").write_text(re.sub(r"detections = .*\n", "", text))
     client.post("/api/sequence", json={"name": str(walkers)})
     wait_until(lambda: state(client)["methods"]["single_view"] == "shapes")
-    taught = client.post("/api/teach/templates", json=BOX).json()
+    taught = changed(client, "add_template", **BOX)
     assert taught["methods"]["single_view"] == "colour_phd"
-    back = client.post("/api/undo").json()
+    back = command(client, "undo").json()
     assert back["methods"]["single_view"] == "shapes", "and so it is without it"
-    chosen = {"changes": {"single_view": "jpda"}}
-    client.patch("/api/parameters", json=chosen)
-    taught = client.post("/api/teach/templates", json=BOX).json()
+    command(client, "set_parameters", changes={"single_view": "jpda"})
+    taught = changed(client, "add_template", **BOX)
     assert taught["methods"]["single_view"] == "jpda", "nobody's choice is taken away"
 
 
@@ -503,18 +507,18 @@ def test_the_size_of_people_is_taught_saved_and_taken_back(
 ) -> None:
     before = state(client)
     half = before["sequence"]["target"]["half_extents"]
-    answer = client.patch("/api/teach/target/2", json={"value": 1.5}).json()
+    answer = changed(client, "set_target_side", axis=2, value=1.5)
     assert answer["sequence"]["target"]["half_extents"] == [*half[:2], 0.75]
     assert answer["teaching"]["unsaved"] == 1
     assert [words.partition(" ")[0] for words in panel(client)["unsaved"]] == ["target:"]
-    back = client.post("/api/undo").json()
+    back = command(client, "undo").json()
     assert back["sequence"]["target"]["half_extents"] == half
-    client.post("/api/teach/target", json={"half_extents": [0.3, 0.3, 0.65]})
-    client.post("/api/teach/save")
+    command(client, "set_target", half_extents=[0.3, 0.3, 0.65])
+    command(client, "save_taught")
     assert read_sequence(walkers).target_half_extents.tolist() == [0.3, 0.3, 0.65]
     for wrong in (0.0, -1.0):
         assert "positive numbers" in complaint(
-            client.patch("/api/teach/target/0", json={"value": wrong})
+            command(client, "set_target_side", axis=0, value=wrong)
         )
 
 
@@ -548,7 +552,7 @@ def test_a_detector_is_fetched_by_a_click(
     wait_until(lambda: fetched() == (None, "tiny"))
     assert panel(client)["detector"]["path"] is None
     assert state(client)["methods"]["single_view"] == before
-    client.patch("/api/parameters", json={"changes": {"single_view": "onnx_detector"}})
+    command(client, "set_parameters", changes={"single_view": "onnx_detector"})
     assert done(client)["methods"]["single_view"] == "onnx_detector"
 
 
@@ -558,7 +562,7 @@ def test_a_detector_is_chosen_by_its_path_and_taken_away(
 ) -> None:
     before = state(client)
     change = {"fusion.survival_probability": 0.9}
-    client.patch("/api/parameters", json={"changes": change})
+    command(client, "set_parameters", changes=change)
     model = pooling(tmp_path / "red.onnx")
     client.put("/api/teach/detector", json={"model": str(model)})
     wait_until(lambda: state(client)["methods"]["single_view"] == "onnx_detector")
@@ -583,7 +587,7 @@ def test_a_detector_is_chosen_by_its_path_and_taken_away(
     client.post("/api/sequence", json={"name": str(other)})
     assert state(client)["methods"]["single_view"] == before["methods"]["single_view"]
     client.post("/api/sequence", json={"name": str(walkers)})
-    client.patch("/api/parameters", json={"changes": change})
+    command(client, "set_parameters", changes=change)
     assert state(client)["methods"]["single_view"] == "onnx_detector"
     client.put("/api/teach/detector", json={"model": None})
     wait_until(lambda: state(client)["methods"]["single_view"] != "onnx_detector")

@@ -17,7 +17,7 @@ from starlette.testclient import TestClient
 
 from app.web.access import gateway
 from app.web.server import ROUTERS, Settings, create_app
-from tests.app.conftest import ADDRESS, run_is, wait_until
+from tests.app.conftest import ADDRESS, command, run_is, wait_until
 from tests.app.folders import FRAMES
 from tests.synthetic import number_in
 from tracker.export import tracks_csv
@@ -184,7 +184,7 @@ def test_the_timeline_counts_what_the_engine_reports(client: TestClient, crossin
 
 
 def test_the_csv_is_the_engines(client: TestClient, crossing: Path, tmp_path: Path) -> None:
-    client.patch("/api/parameters", json={"changes": {P_D: 0.9}})
+    command(client, "set_parameters", changes={P_D: 0.9})
     wait_until(run_is(client, "done"))
     answer = client.get("/api/export/tracks.csv")
     assert answer.headers["content-type"].startswith("text/csv")
@@ -203,14 +203,14 @@ def test_the_csv_is_the_engines(client: TestClient, crossing: Path, tmp_path: Pa
 
 @pytest.mark.full
 def test_parameters_are_set_and_what_differs_is_told(client: TestClient) -> None:
-    state = client.patch("/api/parameters", json={"changes": {P_D: 0.9}}).json()
+    state = command(client, "set_parameters", changes={P_D: 0.9}).json()
     assert state["parameters"][P_D] == 0.9
     assert state["changed"] == [P_D]
-    state = client.post("/api/parameters/preset", json={"name": "published"}).json()
+    state = command(client, "apply_preset", preset="published").json()
     assert state["parameters"][P_D] == 0.98
-    state = client.post("/api/parameters/reset", json={"keys": ["fusion.motion"]}).json()
+    state = command(client, "reset_parameters", keys=["fusion.motion"]).json()
     assert "fusion.motion" not in state["changed"]
-    assert client.post("/api/parameters/reset").json()["changed"] == []
+    assert command(client, "reset_parameters").json()["changed"] == []
 
 
 @pytest.mark.full
@@ -227,9 +227,8 @@ def test_a_value_that_does_not_fit(
     client: TestClient, changes: dict[str, Any], words: tuple[str, ...]
 ) -> None:
     before = client.get("/api/state").json()
-    answer = client.patch(
-        "/api/parameters", json={"changes": {"fusion.birth_rate": 1.0, **changes}}
-    )
+    wish = {"fusion.birth_rate": 1.0, **changes}
+    answer = command(client, "set_parameters", changes=wish)
     assert_error(answer, 422, "bad_parameter", *words)
     assert answer.json()["field"] == next(iter(changes))
     assert client.get("/api/state").json()["parameters"] == before["parameters"]
@@ -239,9 +238,9 @@ def test_a_value_that_does_not_fit(
 @pytest.mark.parametrize(
     ("method", "path", "json", "status"),
     [
-        ("PATCH", "/api/parameters", {"changs": {}}, 422),
-        ("PATCH", "/api/parameters", [1], 422),
-        ("POST", "/api/parameters/preset", {}, 422),
+        ("POST", "/api/commands", {"name": "set_parameters", "changs": {}}, 422),
+        ("POST", "/api/commands", [1], 422),
+        ("POST", "/api/commands", {"name": "apply_preset"}, 422),
         ("POST", "/api/sequence", {"name": ""}, 422),
         ("POST", "/api/select", {"id": "first"}, 422),
         ("PATCH", "/api/layers", {"changes": {"clouds": True}}, 422),
@@ -397,7 +396,7 @@ def test_the_page_of_the_routes_loads_nothing_from_another_host(client: TestClie
 
 
 def test_a_body_that_is_no_json_is_said_to_be_none(empty: TestClient) -> None:
-    answer = empty.patch(
-        "/api/parameters", content="{changes", headers={"content-type": "application/json"}
+    answer = empty.post(
+        "/api/commands", content="{changes", headers={"content-type": "application/json"}
     )
     assert_error(answer, 422, "bad_request", "not JSON", "at byte 1")

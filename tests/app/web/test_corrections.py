@@ -15,7 +15,7 @@ from starlette.testclient import TestClient
 
 from app.state.doubting import Doubting
 from app.web.server import Settings, create_app
-from tests.app.conftest import ADDRESS, Runs, connect, run_is, wait_until
+from tests.app.conftest import ADDRESS, Runs, command, connect, run_is, wait_until
 from tracker.corrections import Correction
 from tracker.corrections.log import own_place, read_log, write_log
 from tracker.review.queue import Alternative, Queue, ReviewItem
@@ -84,8 +84,8 @@ def test_a_cut_is_obeyed_kept_taken_back_and_said_again(desk: TestClient, own: P
     one = max(before, key=lambda life: life["last"] - life["first"])
     step = (one["first"] + one["last"]) // 2
     wish = {"kind": "different", "step": step, "tracks": [one["id"]]}
-    answer = desk.post(PLACE, json={"corrections": [wish], "note": "two people"})
-    assert answer.status_code == 200, answer.text
+    answer = command(desk, "correct", corrections=[wish], note="two people")
+    assert answer.status_code == 204, answer.text
     found = settled(desk)
     assert [c["met"] for c in found["corrections"]] == [True]
     assert found["corrections"][0]["note"] == "two people"
@@ -93,16 +93,16 @@ def test_a_cut_is_obeyed_kept_taken_back_and_said_again(desk: TestClient, own: P
     assert said["undo"] == found["corrections"][0]["words"]
     assert len(tracks(desk)) == len(before) + 1
     assert [c.kind for c in read_log(own / "corrections.toml")] == ["different"]
-    desk.post("/api/undo")
+    command(desk, "undo")
     assert settled(desk)["corrections"] == []
     assert len(tracks(desk)) == len(before)
     assert read_log(own / "corrections.toml") == ()
-    desk.post("/api/redo")
+    command(desk, "redo")
     again = desk.get(PLACE).json()
     assert again["corrections"][0]["id"] == found["corrections"][0]["id"]
     settled(desk)
     assert len(tracks(desk)) == len(before) + 1
-    assert desk.post("/api/redo").status_code == 409
+    assert command(desk, "redo").status_code == 409
     key = desk.get("/api/state").json()["corrections"]
     assert (key["count"], key["unmet"]) == (1, 0)
 
@@ -112,19 +112,19 @@ def test_what_can_be_taken_back_survives_a_start(own: Path) -> None:
     with started(own) as client:
         lives = tracks(client)
         wish = {"kind": "name", "tracks": [lives[0]["id"]], "name": "Anna", "step": 30}
-        client.post(PLACE, json={"corrections": [wish]})
-        client.post(PLACE, json={"corrections": [{"kind": "checked", "first": 0, "last": 9}]})
-        client.post("/api/undo")
+        command(client, "correct", corrections=[wish])
+        command(client, "correct", corrections=[{"kind": "checked", "first": 0, "last": 9}])
+        command(client, "undo")
     with started(own) as client:
         found = settled(client)
         assert found["names"] == {str(lives[0]["id"]): "Anna"}
-        told = client.post("/api/redo").json()
+        told = command(client, "redo").json()
         assert told["edits"] == {"undo": "steps 0 – 9 checked", "redo": None}
         assert client.get(PLACE).json()["checked"] == [[0, 9]]
-        client.post("/api/undo")
-        client.post("/api/undo")
+        command(client, "undo")
+        command(client, "undo")
         assert client.get(PLACE).json()["corrections"] == []
-        assert client.post("/api/undo").status_code == 409
+        assert command(client, "undo").status_code == 409
 
 
 @pytest.mark.full
@@ -140,14 +140,14 @@ def test_what_a_full_disk_kept_elsewhere_is_there_after_a_start_and_goes_back(
         write_log(path, corrections)
 
     with started(own) as client:
-        client.post(PLACE, json={"corrections": wishes[:1]})
+        command(client, "correct", corrections=wishes[:1])
         with monkeypatch.context() as patched:
             patched.setattr("app.state.correcting.write_log", full)
-            assert client.post(PLACE, json={"corrections": wishes[1:2]}).status_code == 200
+            assert command(client, "correct", corrections=wishes[1:2]).status_code == 204
         assert len(read_log(log)) == 1
     with started(own) as client:
         assert client.get(PLACE).json()["checked"] == [[2, 2], [20, 20]]
-        client.post(PLACE, json={"corrections": wishes[2:]})
+        command(client, "correct", corrections=wishes[2:])
         assert client.get(PLACE).json()["checked"] == [[2, 2], [20, 20], [40, 40]]
     assert len(read_log(log)) == 3
     assert not own_place(own).exists()
@@ -165,11 +165,11 @@ def test_what_cannot_be_is_refused_with_a_sentence(desk: TestClient, own: Path) 
         ({"kind": "checked", "first": 9, "last": 3}, "expected a step from 9 on"),
         ({"kind": "different", "step": 10**6, "tracks": two[:1]}, "expected 0 …"),
     ):
-        answer = desk.post(PLACE, json={"corrections": [wish]})
+        answer = command(desk, "correct", corrections=[wish])
         assert answer.status_code == 422, wish
         assert words in answer.json()["detail"], answer.text
     assert not (own / "corrections.toml").exists()
-    assert desk.delete(f"{PLACE}/nothing").status_code == 404
+    assert command(desk, "drop_correction", id="nothing").status_code == 404
 
 
 def test_a_malformed_log_is_told_and_the_recording_stays_usable(own: Path) -> None:
@@ -182,8 +182,8 @@ def test_a_malformed_log_is_told_and_the_recording_stays_usable(own: Path) -> No
         assert told["type"] == "notice"
         assert "line 4" in told["message"]
         assert tracks(client)
-        answer = client.post(
-            PLACE, json={"corrections": [{"kind": "checked", "first": 0, "last": 9}]}
+        answer = command(
+            client, "correct", corrections=[{"kind": "checked", "first": 0, "last": 9}]
         )
         assert answer.status_code == 422
         assert "line 4" in answer.json()["detail"]
@@ -194,16 +194,17 @@ def test_a_log_that_another_program_writes_is_read_again(own: Path) -> None:
     log = own / "corrections.toml"
     checked = {"kind": "checked", "first": 0, "last": 9}
     with started(own) as client:
-        client.post(PLACE, json={"corrections": [checked]})
+        command(client, "correct", corrections=[checked])
         theirs = log.read_text().replace("last = 9", "last = 7")
         log.write_text(theirs)
         # without a look at it before: nothing of it is lost
-        found = client.post(PLACE, json={"corrections": [{**checked, "first": 20, "last": 30}]})
-        assert [one["last"] for one in found.json()["corrections"]] == [7, 30]
+        command(client, "correct", corrections=[{**checked, "first": 20, "last": 30}])
+        found = client.get(PLACE).json()
+        assert [one["last"] for one in found["corrections"]] == [7, 30]
         assert [one.last for one in read_log(log)] == [7, 30]
         log.write_text("[[correction]]")
         assert "corrections.toml" in client.get(PLACE).json()["problem"]
-        answer = client.post(PLACE, json={"corrections": [checked]})
+        answer = command(client, "correct", corrections=[checked])
         assert answer.status_code == 422
         assert log.read_text() == "[[correction]]"
         log.write_text(theirs)
@@ -222,7 +223,7 @@ def test_the_queue_is_answered_previewed_and_skipped(
     # so that what is hardly doubtful is told, too: who passes metres apart
     monkeypatch.setattr("tracker.review.queue.ranking.LEAST", 0.0)
     monkeypatch.setattr("tracker.review.queue.meetings._CLOSE", 8.0)
-    desk.patch("/api/parameters", json={"changes": {"fusion.survival_probability": 0.97}})
+    command(desk, "set_parameters", changes={"fusion.survival_probability": 0.97})
     settled(desk)
     queue = desk.get(f"{PLACE}/queue").json()
     assert queue["complete"]
@@ -236,11 +237,12 @@ def test_the_queue_is_answered_previewed_and_skipped(
     assert desk.get(f"{PLACE}/queue/{first['id']}/0").json()["spans"] == []
     assert desk.get(f"{PLACE}/queue/{first['id']}/99").status_code == 404
     assert desk.get(f"{PLACE}/queue/nothing/0").status_code == 404
-    left = desk.post(f"{PLACE}/skips", json={"doubt": first["id"]}).json()["doubts"]
+    command(desk, "skip", doubt=first["id"])
+    left = desk.get(f"{PLACE}/queue").json()["doubts"]
     assert first["id"] not in [one["id"] for one in left]
     if len(left):
-        answer = desk.post(f"{PLACE}/answers", json={"doubt": left[0]["id"], "alternative": 0})
-        assert answer.status_code == 200, answer.text
+        answer = command(desk, "answer", doubt=left[0]["id"], alternative=0)
+        assert answer.status_code == 204, answer.text
         settled(desk)
         rest = desk.get(f"{PLACE}/queue").json()["doubts"]
         assert left[0]["id"] not in [one["id"] for one in rest]
@@ -285,15 +287,15 @@ def test_what_is_answered_of_the_run_before_counts_in_the_one_that_came_meanwhil
     queues = iter([Queue((made,), 0, "a test")])
     nothing = Queue((), 0, "a test")
     monkeypatch.setattr("app.state.doubting.queue", lambda run, corrections: next(queues, nothing))
-    desk.patch("/api/parameters", json={"changes": {"fusion.survival_probability": 0.97}})
+    command(desk, "set_parameters", changes={"fusion.survival_probability": 0.97})
     settled(desk)
     (shown,) = desk.get(f"{PLACE}/queue").json()["doubts"]
-    desk.patch("/api/parameters", json={"changes": {"fusion.survival_probability": 0.98}})
+    command(desk, "set_parameters", changes={"fusion.survival_probability": 0.98})
     settled(desk)
     assert desk.get(f"{PLACE}/queue").json()["doubts"] == []
     assert desk.get(f"{PLACE}/queue/{shown['id']}/1").status_code == 404, "of other tracks"
-    answer = desk.post(f"{PLACE}/answers", json={"doubt": shown["id"], "alternative": 1})
-    assert answer.status_code == 200, answer.text
+    answer = command(desk, "answer", doubt=shown["id"], alternative=1)
+    assert answer.status_code == 204, answer.text
     assert [one["kind"] for one in settled(desk)["corrections"]] == ["different"]
 
 
@@ -303,27 +305,28 @@ def test_what_is_checked_leaves_the_queue_though_the_run_stays_the_same(
 ) -> None:
     monkeypatch.setattr("tracker.review.queue.ranking.LEAST", 0.0)
     monkeypatch.setattr("tracker.review.queue.meetings._CLOSE", 8.0)
-    desk.patch("/api/parameters", json={"changes": {"fusion.survival_probability": 0.97}})
+    command(desk, "set_parameters", changes={"fusion.survival_probability": 0.97})
     settled(desk)
     first, last = 0, desk.app.state.workbench.snapshot().sequence.frames - 1  # type: ignore[attr-defined]
     assert desk.get(f"{PLACE}/queue").json()["doubts"] != []
     wish = {"kind": "checked", "first": first, "last": last}
-    (told,) = desk.post(PLACE, json={"corrections": [wish]}).json()["corrections"]
+    command(desk, "correct", corrections=[wish])
+    (told,) = desk.get(PLACE).json()["corrections"]
     assert told["met"] is True
     assert desk.get(f"{PLACE}/queue").json()["doubts"] == []
-    desk.post("/api/undo")
+    command(desk, "undo")
     assert desk.get(f"{PLACE}/queue").json()["doubts"] != []
 
 
 @pytest.mark.full
 def test_a_name_that_is_dropped_is_gone_before_the_run_is_another(desk: TestClient) -> None:
     wish = {"kind": "name", "tracks": [tracks(desk)[0]["id"]], "name": "Anna", "step": 30}
-    desk.post(PLACE, json={"corrections": [wish]})
+    command(desk, "correct", corrections=[wish])
     (one,) = settled(desk)["corrections"]
     assert tracks(desk)[0]["name"] == "Anna"
-    answer = desk.delete(f"{PLACE}/{one['id']}")
-    assert answer.status_code == 200, answer.text
-    assert answer.json()["names"] == {}
+    answer = command(desk, "drop_correction", id=one["id"])
+    assert answer.status_code == 204, answer.text
+    assert desk.get(PLACE).json()["names"] == {}
 
 
 @pytest.mark.full
@@ -348,7 +351,8 @@ def test_the_feet_of_a_track_that_goes_over_the_floor_stay_where_they_are(own: P
             "tracks": [life["id"]],
             "clicks": [{"camera": camera.name, "x": float(x), "y": float(y)}],
         }
-        (told,) = desk.post(PLACE, json={"corrections": [wish]}).json()["corrections"]
+        command(desk, "correct", corrections=[wish])
+        (told,) = desk.get(PLACE).json()["corrections"]
     assert told["places"][0] == pytest.approx([step, *track["position"]], abs=0.02)
 
 
@@ -359,7 +363,8 @@ def test_only_what_was_checked_counts_as_truth(desk: TestClient, own: Path, run:
         {"kind": "checked", "first": 10, "last": 19},
         {"kind": "checked", "first": 20, "last": 29},
     ]
-    found = desk.post(PLACE, json={"corrections": wish}).json()
+    command(desk, "correct", corrections=wish)
+    found = desk.get(PLACE).json()
     assert found["checked"] == [[10, 29]]
     text = desk.get(f"{PLACE}/truth.csv").text
     assert text.startswith("# steps = 10-29\nframe,id,x,y,z\n")
@@ -401,5 +406,5 @@ def test_who_may_be_missing_is_shown_where_each_camera_would_have_him(
     first = next(one for one in told["sights"] if (one["step"], one["camera"]) == (60, 0))
     assert first["box"] == pytest.approx(boxes[0])
     assert desk.get(f"{PLACE}/queue/{told['id']}/1").status_code == 200
-    answer = desk.post(f"{PLACE}/answers", json={"doubt": told["id"], "alternative": 1})
-    assert [one["kind"] for one in answer.json()["corrections"]] == ["here", "here"]
+    command(desk, "answer", doubt=told["id"], alternative=1)
+    assert [one["kind"] for one in desk.get(PLACE).json()["corrections"]] == ["here", "here"]

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
-from tests.app.conftest import Runs
+from tests.app.conftest import Runs, command
 from tests.app.web.test_api import assert_error
 from tracker.evaluation import evaluate_sequence
 from tracker.evaluation.report.page import report_html
@@ -62,8 +62,8 @@ def test_the_page_is_told_which_methods_cannot_work_here_and_why(client: TestCli
     }  # fmt: skip
     assert set(unfit["single_view"]).isdisjoint({"detection_phd", "none"})
     assert unfit["single_view"]["jpda"].startswith("jpda needs pictures of every camera, and ")
-    boxes = {"changes": {"jpda.measurements": "detections"}}
-    after = client.patch("/api/parameters", json=boxes).json()
+    boxes = {"jpda.measurements": "detections"}
+    after = command(client, "set_parameters", changes=boxes).json()
     assert "jpda" not in after["unfit"]["single_view"], "it depends on the values, too"
 
 
@@ -82,7 +82,7 @@ def test_the_page_is_told_which_methods_cannot_work_here_and_why(client: TestCli
 def test_teach_says_where_a_method_looks_at_no_templates(
     client: TestClient, changes: dict[str, Any], asks: bool
 ) -> None:
-    client.patch("/api/parameters", json={"changes": changes})
+    command(client, "set_parameters", changes=changes)
     looking = client.get("/api/teach").json()["looking"]
     assert looking == ("colour_phd" if asks else None)
 
@@ -95,11 +95,11 @@ def test_what_was_asked_for_wrongly_is_told_where_to_find_what_there_is(
         words: str = answer.json()["hint"]
         return words
 
-    wrong = client.patch("/api/parameters", json={"changes": {"fusion.clutter_rate": -1.0}})
+    wrong = command(client, "set_parameters", changes={"fusion.clutter_rate": -1.0})
     assert hint(wrong) == "The manual lists every parameter with its range."
-    preset = client.post("/api/parameters/preset", json={"name": "nobody's"})
+    preset = command(client, "apply_preset", preset="nobody's")
     assert hint(preset).startswith("The tab Parameters lists the built-in presets ")
-    assert hint(client.post("/api/run/again/999")) == "The tab Runs lists them."
+    assert hint(command(client, "use_again", run=999)) == "The tab Runs lists them."
     assert "the cameras" in hint(client.post("/api/view", json={"camera": 9}))
     assert "the layers" in hint(client.patch("/api/layers", json={"changes": {"walls": True}}))
-    assert "your presets" in hint(client.delete("/api/presets/none-such"))
+    assert "your presets" in hint(command(client, "remove_preset", preset="none-such"))

@@ -12,7 +12,7 @@ from starlette.testclient import TestClient
 
 from app.state.workbench import Workbench
 from app.state.workers import identity_check
-from tests.app.conftest import wait_until
+from tests.app.conftest import command, wait_until
 from tracker.review.self_consistency import Estimate
 from tracker.runs import pipeline
 from tracker.runs.pipeline import Run
@@ -58,7 +58,7 @@ def test_another_run_ends_a_check(own_client: TestClient, monkeypatch: pytest.Mo
 
     monkeypatch.setattr(identity_check, "estimate", endless)
     key = own_client.post("/api/identity").json()["run"]
-    own_client.patch("/api/parameters", json={"changes": {"fusion.detection_probability": 0.7}})
+    command(own_client, "set_parameters", changes={"fusion.detection_probability": 0.7})
     wait_until(lambda: own_client.get("/api/identity").json()["state"] == "cancelled")
     wait_until(lambda: stopped == [key])
 

@@ -12,7 +12,7 @@ from starlette.testclient import TestClient
 
 from app.state.workers import keeper
 from app.web.server import Settings, create_app, running
-from tests.app.conftest import ADDRESS, is_evaluated, run_is, wait_until
+from tests.app.conftest import ADDRESS, command, is_evaluated, run_is, wait_until
 from tests.library.runs import made_by_the_version_before
 from tracker.library.errors import LibraryError
 from tracker.library.store import Library
@@ -35,7 +35,7 @@ def kept(data: Path, path: Path) -> Iterator[TestClient]:
     """The application with two kept runs of ``crossing``: the default, and p_D 0.8, shown."""
     with application(data, path) as client:
         wait_until(lambda: len(runs_of(client)) == 1)
-        client.patch("/api/parameters", json={"changes": {P_D: 0.8}})
+        command(client, "set_parameters", changes={P_D: 0.8})
         wait_until(lambda: len(runs_of(client)) == 2)
         yield client
 
@@ -62,7 +62,7 @@ def test_finished_runs_are_kept_with_their_figures(kept: TestClient) -> None:
     # what was never opened can be opened from there all the same
     (never,) = [r for r in listed["recordings"] if r["name"] == "numbers"]
     assert (never["id"], never["runs"]) == (None, 0)
-    kept.patch("/api/parameters", json={"changes": {"smoothing_method": "none"}})
+    command(kept, "set_parameters", changes={"smoothing_method": "none"})
     wait_until(lambda: len(runs_of(kept)) == 3)
     method = runs_of(kept)[0]["changes"][0]
     assert (method["default"], method["value"]) == ("identities", "none")
@@ -72,7 +72,7 @@ def test_finished_runs_are_kept_with_their_figures(kept: TestClient) -> None:
 def test_a_kept_run_names_its_people(kept: TestClient, data: Path) -> None:
     track = kept.get("/api/timeline").json()["tracks"][0]
     wish = {"kind": "name", "tracks": [track["id"]], "name": "Anna", "step": track["first"] + 9}
-    kept.post("/api/corrections", json={"corrections": [wish]})
+    command(kept, "correct", corrections=[wish])
     wait_until(lambda: len(runs_of(kept)) == 3)
     named, *_, default = runs_of(kept)
     for run, name in ((default, None), (named, "Anna")):
@@ -133,9 +133,9 @@ def test_a_recording_that_was_moved_is_found_again(data: Path, path: Path, tmp_p
 @pytest.mark.full
 def test_a_run_that_was_deleted_and_is_made_again_is_kept_again(kept: TestClient) -> None:
     _, default = runs_of(kept)
-    kept.post("/api/library/delete", json={"runs": [default["id"]]})
+    command(kept, "delete_runs", runs=[default["id"]])
     assert len(runs_of(kept)) == 1
-    kept.post("/api/parameters/reset", json={"keys": [P_D]})
+    command(kept, "reset_parameters", keys=[P_D])
     wait_until(lambda: [run["id"] for run in runs_of(kept)][:1] == [default["id"]])
 
 
@@ -228,7 +228,7 @@ def test_what_the_cameras_found_comes_back_by_computing_again(kept: TestClient) 
 @pytest.mark.full
 def test_a_moved_slider_computes_on_from_a_kept_run(kept: TestClient) -> None:
     kept.post(f"/api/library/runs/{runs_of(kept)[1]['id']}/open")
-    state = kept.patch("/api/parameters", json={"changes": {P_D: 0.7}}).json()
+    state = command(kept, "set_parameters", changes={P_D: 0.7}).json()
     assert state["run"]["kept"] is None
     wait_until(run_is(kept, "done"))
     wait_until(lambda: len(runs_of(kept)) == 3)
@@ -274,20 +274,21 @@ def test_a_kept_run_is_pinned_beside_the_shown_one(kept: TestClient) -> None:
 @pytest.mark.full
 def test_names_stars_notes_and_deletion(kept: TestClient) -> None:
     number = runs_of(kept)[0]["id"]
-    wish = {"name": "baseline", "star": True, "note": "as it comes", "tags": ["paper"]}
-    told = kept.patch(f"/api/library/runs/{number}", json=wish).json()
-    assert {key: told[key] for key in wish} == wish
-    gone = kept.post("/api/library/delete", json={"runs": [number]}).json()
+    marks = {"star": True, "note": "as it comes", "tags": ["paper"]}
+    assert command(kept, "mark_run", run=number, title="baseline", **marks).status_code == 204
+    wish = {"name": "baseline", **marks}
+    assert {key: runs_of(kept)[0][key] for key in wish} == wish
+    gone = command(kept, "delete_runs", runs=[number]).json()
     assert gone["bytes"] > 0
     assert len(runs_of(kept)) == 1
-    told = kept.post("/api/undo").json()
+    told = command(kept, "undo").json()
     assert runs_of(kept)[0]["name"] == "baseline"
     assert told["edits"]["redo"] == f"run {number} deleted"
-    assert kept.post("/api/undo").json()["marks"] > told["marks"]
+    assert command(kept, "undo").json()["marks"] > told["marks"]
     assert {key: runs_of(kept)[0][key] for key in wish} == {
         "name": "", "star": False, "note": "", "tags": []
     }  # fmt: skip
-    answer = kept.post("/api/library/delete", json={"runs": [999]})
+    answer = command(kept, "delete_runs", runs=[999])
     assert answer.status_code == 404
     assert "no run 999" in answer.json()["detail"]
 

@@ -11,7 +11,7 @@ import pytest
 from starlette.testclient import TestClient
 
 from app.state.workbench import Workbench
-from tests.app.conftest import connect, run_is, wait_until
+from tests.app.conftest import command, connect, run_is, wait_until
 from tracker import smoothing
 
 P_D = "fusion.detection_probability"
@@ -116,7 +116,7 @@ def test_a_changed_parameter_ends_in_the_step_of_its_own_run(client: TestClient)
         client.post("/api/seek", json={"step": 100})
         read_until(socket, is_type("step"))
         for number in range(10):
-            client.patch("/api/parameters", json={"changes": {P_D: 0.7 + 0.01 * number}})
+            command(client, "set_parameters", changes={P_D: 0.7 + 0.01 * number})
         wanted = client.get("/api/state").json()["run"]["key"]
         messages = read_until(
             socket,
@@ -148,7 +148,7 @@ def test_a_step_is_told_again_when_hindsight_has_replaced_its_people(
     with connect(client) as socket:
         read_until(socket, is_type("timeline"))
         client.post("/api/seek", json={"step": 100})
-        client.patch("/api/parameters", json={"changes": {P_D: 0.7}})
+        command(client, "set_parameters", changes={P_D: 0.7})
         wanted = client.get("/api/state").json()["run"]["key"]
 
         def is_step(message: Message) -> bool:

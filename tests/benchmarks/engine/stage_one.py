@@ -16,6 +16,7 @@ from websockets.sync.client import connect
 
 from app.state.workbench import Workbench
 from app.state.workers.jobs import Jobs
+from tests.app.conftest import command
 from tests.benchmarks.engine.pipeline import DATA
 from tests.benchmarks.measure import Measurement
 from tests.browser.serving import Server
@@ -55,7 +56,7 @@ def _first_steps(server: Server, movements: int) -> Iterator[Measurement]:
         for movement in range(movements):
             begin = time.perf_counter()
             changes = {P_D: round(0.6 + 0.01 * movement, 4)}
-            answer = client.patch("api/parameters", json={"changes": changes}).json()
+            answer = command(client, "set_parameters", changes=changes).json()
             key = answer["run"]["key"]
             while True:
                 message: dict[str, Any] = json.loads(socket.recv(timeout=60.0))

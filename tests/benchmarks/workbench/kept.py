@@ -33,7 +33,7 @@ def run(short: bool) -> Iterator[Measurement]:
         try:
             server.wait_for_run(600.0)
             kept(server, 1)
-            ask(server, "PATCH", "parameters", {"changes": {"fusion.detection_probability": 0.8}})
+            server.command("set_parameters", changes={"fusion.detection_probability": 0.8})
             kept(server, 2)
             page = browser.new_page(viewport={"width": 1440, "height": 900})
             page.route("**/viser/**", lambda route: route.abort())

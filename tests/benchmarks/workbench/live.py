@@ -14,6 +14,7 @@ from typing import Any
 import httpx2
 from websockets.sync.client import ClientConnection, connect
 
+from tests.app.conftest import command
 from tests.app.folders import write_crossing
 from tests.benchmarks.measure import Measurement
 from tests.browser.serving import Server
@@ -45,7 +46,7 @@ def run(short: bool) -> Iterator[Measurement]:
 def _change(client: httpx2.Client, **values: float) -> str:
     """Change values of the fusion; the key of the run that they ask for."""
     changes = {f"fusion.{name}": value for name, value in values.items()}
-    answer = client.patch("api/parameters", json={"changes": changes}).json()
+    answer = command(client, "set_parameters", changes=changes).json()
     return str(answer["run"]["key"])
 
 

@@ -41,8 +41,8 @@ def run(short: bool) -> Iterator[Measurement]:
             yield from _scrub(server, "idle", 40 if short else 150)
             yield from _play(server, 2.0 if short else 8.0)
             if not short:
-                change = {"changes": {"colour_phd.detection_probability": 0.79}}
-                httpx2.patch(server.address + "api/parameters", json=change)
+                changes = {"colour_phd.detection_probability": 0.79}
+                server.command("set_parameters", changes=changes)
                 yield from _scrub(server, "during a run", 100)
             yield from _kill(server, 2 if short else 10)
         finally:
@@ -54,8 +54,8 @@ def _kill(server: Server, kills: int) -> Iterator[Measurement]:
     rng = random.Random(2)
     answers, people, processor = [], [], []
     for kill in range(kills):
-        change = {"changes": {"fusion.survival_probability": round(0.9 + 0.005 * kill, 3)}}
-        httpx2.patch(server.address + "api/parameters", json=change)
+        changes = {"fusion.survival_probability": round(0.9 + 0.005 * kill, 3)}
+        server.command("set_parameters", changes=changes)
         time.sleep(rng.uniform(0.0, 1.0))
         server.kill()
         begin = time.perf_counter()

@@ -53,7 +53,7 @@ def test_nothing_serious_in_any_state(themed: tuple[Page, str], server: Server) 
     assert page.locator("html").get_attribute("data-theme") == theme
     states: dict[str, list[str]] = {"tracks": found(page)}
     ask(server, "POST", "run/pin")
-    ask(server, "PATCH", "parameters", {"changes": {"fusion.detection_probability": 0.6}})
+    server.command("set_parameters", changes={"fusion.detection_probability": 0.6})
     server.wait_for_run()
     for tab in ("Step", "Events", "Parameters", "Compare", "Runs"):
         page.get_by_role("tab", name=tab).click()

@@ -34,8 +34,8 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
 def as_it_was(server: Server) -> None:
     """No correction, and the defaults."""
     for one in corrections(server)["corrections"]:
-        ask(server, "DELETE", f"corrections/{one['id']}")
-    ask(server, "POST", "parameters/reset", {})
+        server.command("drop_correction", id=one["id"])
+    server.command("reset_parameters")
     server.wait_for_run()
 
 
@@ -147,7 +147,7 @@ def test_it_holds_after_a_slider_a_reload_and_is_undone(check: Page, server: Ser
     listed = check.get_by_role("listbox", name="Corrections").get_by_role("option")
     expect(listed).to_have_count(1)
     assert not exchanged(server)
-    ask(server, "PATCH", "parameters", {"changes": {P_D: 0.9}})
+    server.command("set_parameters", changes={P_D: 0.9})
     assert not exchanged(server)
     assert corrections(server)["corrections"][0]["met"] is True
     check.reload()

@@ -141,7 +141,7 @@ def test_a_and_b_change_places_and_a_link_brings_both(
     as_at_first(server)
     key = "fusion.detection_probability"
     ask(server, "POST", "run/pin")
-    ask(server, "PATCH", "parameters", {"changes": {key: 0.6}})
+    server.command("set_parameters", changes={key: 0.6})
     server.wait_for_run()
     page.get_by_role("tab", name="Compare").click()
     page.get_by_role("button", name="Exchange A and B").click()

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-import httpx2
 from playwright.sync_api import Browser, Page, expect
 
 from tests.browser.looking import as_at_first, ask, by_palette, readout, until
@@ -19,7 +18,7 @@ def test_reset_all_resets_all(flat_page: Page, server: Server) -> None:
     page = flat_page
     as_at_first(server)
     for way in ("button", "palette"):
-        ask(server, "PATCH", "parameters", {"changes": {P_D: 0.6}})
+        server.command("set_parameters", changes={P_D: 0.6})
         page.get_by_role("tab", name=re.compile("Parameters")).click()
         button = page.get_by_role("button", name="Reset all", exact=True)
         expect(button).to_be_enabled()
@@ -39,7 +38,7 @@ def test_lists_of_choices_stay_as_they_are_while_they_have_the_same(
     lists = "select[data-ref=sequence], select[data-ref=single_view]"
     mark = "all => all.forEach(list => [...list.options].forEach(one => (one.same = true)))"
     page.locator(lists).evaluate_all(mark)
-    ask(server, "PATCH", "parameters", {"changes": {P_D: 0.6}})
+    server.command("set_parameters", changes={P_D: 0.6})
     expect(page.get_by_role("tab", name=re.compile("Parameters"))).to_contain_text("1")
     kept = "all => all.map(list => [...list.options].every(one => one.same))"
     assert page.locator(lists).evaluate_all(kept) == [True, True]
@@ -52,13 +51,13 @@ def test_undo_is_offered_only_where_there_is_something_to_undo(
     page = flat_page
     as_at_first(server)
     while server.get("/api/state").json()["edits"]["undo"]:
-        httpx2.post(server.address + "api/undo")  # what other tests did with this server
+        server.command("undo")  # what other tests did with this server
     # not reloaded: the address may name what was undone only just now, and would bring it back
     page.goto(server.address)
     page.get_by_role("tab", name=re.compile("Parameters")).click()
     undo = page.get_by_role("button", name="Undo", exact=True)
     expect(undo).to_be_disabled()
-    ask(server, "PATCH", "parameters", {"changes": {P_D: 0.6}})
+    server.command("set_parameters", changes={P_D: 0.6})
     expect(undo).to_be_enabled()
     undo.click()
     server.wait(lambda state: state["changed"] == [])
@@ -69,7 +68,7 @@ def test_undo_is_offered_only_where_there_is_something_to_undo(
 def test_what_was_edited_is_undone_inside_a_dialog_too(flat_page: Page, server: Server) -> None:
     page = flat_page
     as_at_first(server)
-    ask(server, "PATCH", "parameters", {"changes": {P_D: 0.6}})
+    server.command("set_parameters", changes={P_D: 0.6})
     expect(page.locator("#tab-parameters .count")).to_have_text("1")
     page.keyboard.press("?")
     expect(page.locator("dialog.help")).to_be_visible()
@@ -100,7 +99,7 @@ def test_a_note_under_the_pointer_stays_while_a_run_goes_on(
     page.goto(server.address + "?nowhere=1")
     close = page.locator(".note", has_text="unknown parts").get_by_role("button", name="Dismiss")
     close.evaluate("button => (button.isTheOne = true)")
-    ask(server, "PATCH", "parameters", {"changes": {P_D: 0.6}})
+    server.command("set_parameters", changes={P_D: 0.6})
     expect(page.locator("#tab-parameters .count")).to_have_text("1")
     server.wait_for_run()
     expect(page.locator(".status")).to_contain_text("computed")

@@ -21,7 +21,7 @@ P_D = "fusion.detection_probability"
 def two_runs(server: Server) -> None:
     """The default, and another p_D, which is shown."""
     kept(server, 1)
-    ask(server, "PATCH", "parameters", {"changes": {P_D: 0.8}})
+    server.command("set_parameters", changes={P_D: 0.8})
     kept(server, 2)
 
 

@@ -83,7 +83,7 @@ def test_main_job(browser: Browser, tmp_path: Path) -> None:
             the_csv_is_what_is_shown(page, server, tmp_path / "tracks.csv")
             # what a slider does to the filter is seen long before a run's end, and smoothing's
             run = server.get("/api/state").json()["run"]["key"]
-            ask(server, "PATCH", "parameters", {"changes": {"smoothing_method": "none"}})
+            server.command("set_parameters", changes={"smoothing_method": "none"})
             run, found = results(server, after=run)
             for key, to in MOVED.items():
                 move_slider(server, page, key, to)

@@ -106,7 +106,7 @@ def test_the_focus_goes_on_to_what_is_left(flat_page: Page, server: Server) -> N
     page = flat_page
     as_at_first(server)
     changes = {"fusion.detection_probability": 0.6, "fusion.clutter_rate": 2.0}
-    ask(server, "PATCH", "parameters", {"changes": changes})
+    server.command("set_parameters", changes=changes)
     page.get_by_role("tab", name="Tracks").focus()
     page.keyboard.press("End")
     expect(page.get_by_role("tab", name="Runs")).to_be_focused()
@@ -133,7 +133,7 @@ def test_what_is_typed_and_where_the_focus_is_outlive_a_change_elsewhere(
     """Another window renames a template while somebody types the room's edge."""
     page = flat_page
     box = {"camera": "cam1", "step": 5, "left": 40, "top": 30, "width": 24, "height": 48}
-    ask(server, "POST", "teach/templates", {**box, "name": "Anna"})
+    server.command("add_template", **box, person="Anna")
     panel = shown(page, "Teach")
     name = panel.get_by_role("textbox", name="Name of template 1")
     expect(name).to_have_value("Anna")
@@ -142,13 +142,13 @@ def test_what_is_typed_and_where_the_focus_is_outlive_a_change_elsewhere(
     before = edge.input_value()
     page.keyboard.press("Control+a")
     page.keyboard.type("3.1")
-    ask(server, "PATCH", "teach/templates/0", {"value": "<b>Bob</b>"})
+    server.command("rename_template", index=0, person="<b>Bob</b>")
     expect(name).to_have_value("<b>Bob</b>")  # text, never an element
     expect(edge).to_be_focused()
     expect(edge).to_have_value("3.1")
     page.keyboard.press("Escape")
     expect(edge).to_have_value(before)
-    ask(server, "DELETE", "teach/templates/0")
+    server.command("remove_template", index=0)
     expect(name).to_have_count(0)
     until(page, lambda: ask(server, "GET", "state")["teaching"]["unsaved"] == 0, "as it was")
     as_at_first(server)

@@ -60,7 +60,7 @@ def test_back_and_forward_go_over_what_was_chosen(flat_page: Page, server: Serve
     until(page, lambda: "step=0" in page.url, "the address says where the page is")
     page.keyboard.press("2")
     until(page, lambda: "cam=2" in page.url, "the large camera is in the address")
-    ask(server, "PATCH", "parameters", {"changes": {P_D: 0.6}})
+    server.command("set_parameters", changes={P_D: 0.6})
     until(page, lambda: f"p.{P_D}=0.6" in page.url, "so is the changed value")
     page.keyboard.press("PageDown")
     until(page, lambda: "step=10" in page.url, "so is the step")

@@ -46,7 +46,7 @@ def test_a_box_dragged_on_a_camera_becomes_a_template_and_changes_the_run(
     for _ in range(2):
         page.keyboard.press("PageDown")
     until(page, lambda: readout(page) == "20", "twenty steps on")
-    httpx2.patch(server.address + "api/parameters", json={"changes": {"single_view": "colour_phd"}})
+    server.command("set_parameters", changes={"single_view": "colour_phd"})
     server.wait(lambda state: state["run"]["state"] == "failed")  # there is no template yet
     # which the page says above the pictures: they have moved when it is there
     expect(page.get_by_text("The run stopped at step")).to_be_visible(timeout=20_000)
@@ -87,7 +87,7 @@ def test_a_box_dragged_on_a_camera_becomes_a_template_and_changes_the_run(
     path = tmp_path / "tracks.csv"
     download.value.save_as(path)
     shown = read_tracks_csv(path)
-    httpx2.post(server.address + "api/teach/save", json={})
+    server.command("save_taught")
     (template,) = read_sequence(Path(server.folder)).templates
     assert (template.name, template.camera, template.frame) == ("Anna", "cam1", 20)
     assert template.box == pytest.approx(box, abs=0.6)  # whole pixels of the screen
@@ -121,7 +121,7 @@ def test_a_box_dragged_on_a_camera_becomes_a_template_and_changes_the_run(
         assert (state["methods"] == taught["methods"]) == (templates == 1)
         assert (state["teaching"]["key"] == taught["teaching"]["key"]) == (templates == 1)
         page.wait_for_timeout(300)  # the page hears of it
-    httpx2.post(server.address + "api/parameters/reset", json={})
+    server.command("reset_parameters")
     server.wait_for_run()
 
 
@@ -174,8 +174,8 @@ def test_the_field_of_a_new_name_is_no_trap(flat_page: Page, server: Server) -> 
     assert "Bob" not in kept
     page.keyboard.press("Escape")
     for index in (2, 1, 0):
-        httpx2.delete(server.address + f"api/teach/templates/{before + index}")
-    httpx2.post(server.address + "api/teach/save", json={})
+        server.command("remove_template", index=before + index)
+    server.command("save_taught")
     as_at_first(server)
 
 
@@ -229,8 +229,8 @@ def test_a_template_is_drawn_moved_and_named_by_keys_alone(flat_page: Page, serv
     server.wait(lambda state: state["teaching"]["unsaved"] == 0)
     template = read_sequence(Path(server.folder)).templates[before]
     assert (template.name, template.camera) == ("Eve", "cam2")
-    ask(server, "DELETE", f"teach/templates/{before}")
-    ask(server, "POST", "teach/save", {})
+    server.command("remove_template", index=before)
+    server.command("save_taught")
     as_at_first(server)
 
 
@@ -268,7 +268,7 @@ def test_a_template_by_numbers_is_added_once_and_named(flat_page: Page, server: 
     page.wait_for_timeout(300)  # the table is written anew
     expect(save).to_be_focused()
     assert server.get("/api/state").json()["sequence"]["templates"] == before + 1
-    ask(server, "POST", "teach/discard", {})
+    server.command("discard_taught")
     server.wait(lambda state: state["teaching"]["unsaved"] == 0)
 
 
@@ -279,7 +279,7 @@ def test_a_template_that_the_tracks_offer_is_taken_by_keys_and_undone(
     as_at_first(server)
     before = server.get("/api/state").json()["sequence"]["templates"]
     # by the boxes, whatever was taught before: colours of few templates may find nobody
-    ask(server, "PATCH", "parameters", {"changes": {"single_view": "none"}})
+    server.command("set_parameters", changes={"single_view": "none"})
     server.wait(
         lambda state: state["methods"]["single_view"] == "none" and state["run"]["state"] == "done"
     )

@@ -6,7 +6,7 @@ from urllib.parse import urlsplit
 
 from playwright.sync_api import Page, expect
 
-from tests.browser.looking import as_at_first, ask, by_palette, still, until, viser
+from tests.browser.looking import as_at_first, by_palette, still, until, viser
 from tests.browser.serving import Server
 from tests.browser.work.test_main_job import essential
 from tests.browser.work.test_panels import number
@@ -27,7 +27,7 @@ def test_a_pinned_run_is_compared_with_the_engines_figures(flat_page: Page, serv
     expect(pin).to_be_enabled(timeout=20_000)
     pin.click()
     server.wait(lambda state: state["pinned"] is not None)
-    ask(server, "PATCH", "parameters", {"changes": {P_D: 0.15}})
+    server.command("set_parameters", changes={P_D: 0.15})
     server.wait_for_run()
     differing = page.get_by_role("table", name="Parameters that differ")
     expect(differing.locator("tbody tr")).to_have_count(1)
@@ -98,10 +98,10 @@ def test_after_a_move_of_a_slider_the_page_asks_for_nothing_twice(
     asked: list[str] = []
     page.on("request", lambda request: asked.append(urlsplit(request.url).path))
     page.evaluate(
-        """(changes) => fetch("/api/parameters", {
-            method: "PATCH",
+        """(changes) => fetch("/api/commands", {
+            method: "POST",
             headers: { "Content-Type": "application/json" },
-            body: JSON.stringify({ changes }),
+            body: JSON.stringify({ name: "set_parameters", changes }),
         })""",
         {P_D: 0.6},
     )
@@ -116,7 +116,7 @@ def test_after_a_move_of_a_slider_the_page_asks_for_nothing_twice(
 def test_presets_of_ones_own_by_keyboard(flat_page: Page, server: Server) -> None:
     page = flat_page
     as_at_first(server)
-    ask(server, "PATCH", "parameters", {"changes": {P_D: 0.6}})
+    server.command("set_parameters", changes={P_D: 0.6})
     page.get_by_role("tab", name="Parameters").click()
     preset = page.get_by_role("combobox", name="Preset")
     expect(preset).to_have_value("")  # own values
@@ -192,14 +192,14 @@ def test_who_holds_a_slider_or_types_is_not_written_over(flat_page: Page, server
     page.mouse.down()
     held = server.wait(lambda state: state["parameters"][P_D] < 0.9)["parameters"][P_D]
     where = slider.input_value()
-    ask(server, "PATCH", "parameters", {"changes": {P_D: 0.2, "fusion.memory": 9.0}})
+    server.command("set_parameters", changes={P_D: 0.2, "fusion.memory": 9.0})
     memory = page.locator('#panel-parameters tr[data-key="fusion.memory"] .num')
     expect(memory).to_have_value("9")  # the page knows of both
     assert (slider.input_value(), field.input_value()) == (where, f"{held:g}")
     page.mouse.up()
     expect(field).to_have_value("0.2")
     field.fill("0.7")
-    ask(server, "PATCH", "parameters", {"changes": {P_D: 0.3, "fusion.memory": 8.0}})
+    server.command("set_parameters", changes={P_D: 0.3, "fusion.memory": 8.0})
     expect(memory).to_have_value("8")
     expect(field).to_have_value("0.7")
     page.keyboard.press("Escape")

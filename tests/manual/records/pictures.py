@@ -97,7 +97,7 @@ def compared(page: Page, server: Server) -> None:
     page.get_by_role("button", name="Pin as A").click()
     page.mouse.move(0, 0)
     server.wait(lambda state: state["pinned"] is not None)
-    ask(server, "PATCH", "parameters", {"changes": CHANGED})
+    server.command("set_parameters", changes=CHANGED)
     show(server, STEP, PERSON)
     keep(page, "compare")
 

@@ -62,7 +62,7 @@ def test_a_foreign_page_may_not_write(shared: TestClient, origin: str) -> None:
     before = shared.get("/api/state").json()["version"]
     for method, path, body in [
         ("POST", "/api/select", {"id": 1}),
-        ("PATCH", "/api/parameters", {"changes": {}}),
+        ("POST", "/api/commands", {"name": "set_parameters", "changes": {}}),
         ("POST", "/api/sequence", {"name": "numbers"}),
         ("POST", "/api/run/cancel", None),
         ("PUT", "/anything", None),
@@ -96,8 +96,8 @@ def test_who_is_no_browser_may_write(shared: TestClient) -> None:
 
 
 def test_bodies_are_small(shared: TestClient) -> None:
-    body = b'{"changes":{},"origin":"' + b"x" * LARGEST_BODY + b'"}'
-    answer = shared.patch("/api/parameters", content=body)
+    body = b'{"name":"set_parameters","changes":{},"origin":"' + b"x" * LARGEST_BODY + b'"}'
+    answer = shared.post("/api/commands", content=body)
     assert answer.status_code == 413
     assert answer.json()["code"] == "too_large"
 
@@ -105,7 +105,7 @@ def test_bodies_are_small(shared: TestClient) -> None:
         for start in range(0, len(body), 65536):
             yield body[start : start + 65536]
 
-    answer = shared.patch("/api/parameters", content=piecewise())  # type: ignore[arg-type]
+    answer = shared.post("/api/commands", content=piecewise())  # type: ignore[arg-type]
     assert answer.status_code == 413
     assert answer.json()["code"] == "too_large"
 

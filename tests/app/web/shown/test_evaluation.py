@@ -22,7 +22,7 @@ from app.state.workers import evaluator as worker
 from app.state.workers.evaluator import Evaluator
 from app.web.evaluation.messages import axis_end, comparison_of
 from app.web.server import Settings, create_app
-from tests.app.conftest import ADDRESS, connect, is_evaluated, run_is, wait_until
+from tests.app.conftest import ADDRESS, command, connect, is_evaluated, run_is, wait_until
 from tests.app.folders import FRAMES
 from tracker.evaluation import DEFINITIONS, compare, evaluate_sequence
 from tracker.parameters.values import with_values
@@ -42,7 +42,7 @@ def engine(folder: Path, **changes: Any) -> Run:
 
 
 def change(client: TestClient, **changes: Any) -> None:
-    client.patch("/api/parameters", json={"changes": changes})
+    command(client, "set_parameters", changes=changes)
     wait_until(run_is(client, "done"))
     wait_until(is_evaluated(client))
 
@@ -229,7 +229,7 @@ def test_pages_are_told(client: TestClient) -> None:
         first = told[-1]
         assert first["run"] == get(client, "/api/state")["run"]["key"]
         assert (first["steps"], first["partial"]) == (FRAMES, False)
-        client.patch("/api/parameters", json={"changes": {P_D: 0.5}})
+        command(client, "set_parameters", changes={P_D: 0.5})
         while told[-1]["type"] != "evaluation" or told[-1]["run"] == first["run"]:
             told.append(socket.receive_json())
 

@@ -8,7 +8,7 @@ import pytest
 from starlette.testclient import TestClient
 
 from app.web.server import Settings, create_app
-from tests.app.conftest import ADDRESS, is_evaluated, run_is, wait_until
+from tests.app.conftest import ADDRESS, command, is_evaluated, run_is, wait_until
 from tracker.parameters.catalogue import PARAMETERS
 
 P_D = "fusion.detection_probability"
@@ -23,8 +23,8 @@ def get(client: TestClient, path: str) -> Any:
 @pytest.mark.full
 def test_changes_are_told_with_their_defaults(client: TestClient) -> None:
     assert get(client, "changes")["changed"] == []
-    client.patch("/api/parameters", json={"changes": {P_D: 0.6}})
-    client.patch("/api/parameters", json={"changes": {"fusion_method": "sequential_phd"}})
+    command(client, "set_parameters", changes={P_D: 0.6})
+    command(client, "set_parameters", changes={"fusion_method": "sequential_phd"})
     changed = {
         one["key"]: (one["default"], one["now"]) for one in get(client, "changes")["changed"]
     }
@@ -48,7 +48,7 @@ def test_what_a_parameter_would_change_is_told(client: TestClient) -> None:
 @pytest.mark.full
 def test_an_evaluation_tells_how_much_was_changed_for_it(client: TestClient) -> None:
     assert get(client, "evaluation")["changes"] == 0
-    client.patch("/api/parameters", json={"changes": {P_D: 0.3}})
+    command(client, "set_parameters", changes={P_D: 0.3})
     wait_until(is_evaluated(client))
     assert get(client, "evaluation")["changes"] == 1
 
@@ -56,8 +56,8 @@ def test_an_evaluation_tells_how_much_was_changed_for_it(client: TestClient) -> 
 @pytest.mark.full
 def test_runs_are_listed_and_can_be_taken_up_again(own_client: TestClient) -> None:
     before = get(own_client, "state")
-    own_client.patch("/api/parameters", json={"changes": {P_D: 0.6}})
-    own_client.patch("/api/parameters", json={"changes": {"fusion_method": "sequential_phd"}})
+    command(own_client, "set_parameters", changes={P_D: 0.6})
+    command(own_client, "set_parameters", changes={"fusion_method": "sequential_phd"})
     wait_until(run_is(own_client, "done"))
     runs = get(own_client, "runs")["runs"]
     numbers = [run["number"] for run in runs]
@@ -68,10 +68,10 @@ def test_runs_are_listed_and_can_be_taken_up_again(own_client: TestClient) -> No
     assert (newest["changes"], first["changes"]) == (2, 0)
     for run in (newest, first):
         assert (run["state"], run["done"], run["same_recording"]) == ("done", run["total"], True)
-    after = own_client.post("/api/run/again/1").json()
+    after = command(own_client, "use_again", run=1).json()
     assert after["parameters"] == before["parameters"]
     assert after["methods"] == before["methods"]
-    assert own_client.post("/api/run/again/99").status_code == 422
+    assert command(own_client, "use_again", run=99).status_code == 422
     wait_until(run_is(own_client, "done"))
 
 
