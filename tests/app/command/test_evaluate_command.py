@@ -101,7 +101,7 @@ def test_a_truth_that_goes_on_is_scored_as_far_as_the_recording_goes(
 ) -> None:
     own = (crossing / "truth.csv").read_text(encoding="utf-8")
     columns = own.splitlines()[0].split(",")
-    given = dict(zip(("frame", "id", "x", "y", "z", "valid"), ("7", "1", "0", "0", "1", "1")))
+    given = {"id": "1", "x": "0", "y": "0", "z": "1", "valid": "1"}
 
     def row(step: int) -> str:
         return ",".join(str(step) if name == "frame" else given[name] for name in columns) + "\n"
