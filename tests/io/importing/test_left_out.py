@@ -46,8 +46,36 @@ def test_boxes_of_other_classes_are_summed_up_camera_by_camera(tmp_path: Path) -
         assert "(120 car, 60 dog)" in words
 
 
+@pytest.mark.parametrize("named", [True, False])
+def test_rows_of_other_classes_are_named_as_the_labels_beside_name_them(
+    tmp_path: Path, named: bool
+) -> None:
+    save_calibration(tmp_path / "cameras.toml", cameras(), "pose2sim")
+    car, person = (1, 2) if named else (3, 1)
+    for camera in cameras():
+        folder = tmp_path / camera.name / "gt"
+        folder.mkdir(parents=True)
+        frames, rows = boxes(camera, walks())
+        own = [(frame, person, 1, box) for frame, box in zip(frames, rows, strict=True)]
+        own += [(frame, car, 1, [5, 5, 9, 9]) for frame in range(60)]
+        own += [(frame, person, 0, [5, 5, 9, 9]) for frame in range(10)]
+        (folder / "gt.txt").write_text(
+            "".join(
+                f"{frame + 1},{n},{','.join(f'{side:.2f}' for side in box)},{counts},{kind},1\n"
+                for n, (frame, kind, counts, box) in enumerate(own, 1)
+            )
+        )
+        if named:
+            (folder / "labels.txt").write_text("car\nperson\n")
+    plan = settle(gather([tmp_path]), ImportOptions(fps=25.0))
+    car_words = "60 car" if named else "60 of class 3"
+    for view in plan.views:
+        (words,) = (text for text in plan.told if text.startswith(f"{view.camera.name}/gt/gt.txt"))
+        assert words.endswith(f"({car_words}, 10 with 0 in column 7, not to count)"), words
+
+
 def test_a_recording_of_no_people_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(FormatError, match=r"no box of a person.*180 of 180 rows \(100%\).*120 car"):
+    with pytest.raises(FormatError, match=r"no box of a person.*180 of 180 rows \(100 %\).*120 car"):
         _coco(tmp_path, people=False)
 
 
