@@ -75,7 +75,9 @@ def test_rows_of_other_classes_are_named_as_the_labels_beside_name_them(
 
 
 def test_a_recording_of_no_people_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(FormatError, match=r"no box of a person.*180 of 180 rows \(100 %\).*120 car"):
+    with pytest.raises(
+        FormatError, match=r"no box of a person.*180 of 180 rows \(100 %\).*120 car"
+    ):
         _coco(tmp_path, people=False)
 
 

@@ -24,6 +24,7 @@ from tracker.io.conventions.readings import LEAST_SHARE, Judge, Judged, Open, Se
 from tracker.io.conventions.search import Verdict, as_meant, find_reading
 from tracker.io.conventions.sizes import likely_unit
 from tracker.io.read.pieces import METRES, RawCamera
+from tracker.sequences.fields import listed
 from tracker.sequences.finding import Check, Remedy, absent, good, percent, warning
 from tracker.sequences.sequence import Sequence, View
 
@@ -294,7 +295,12 @@ def _size(sequence: Sequence, told: BoxesTell) -> Check:
 
 
 def _inside(sequence: Sequence, told: BoxesTell) -> Check:
+    """Cameras whose boxes agree with no other's show nobody whose place is known."""
     agreed, room = told.given.consensus, sequence.room
+    names = [camera.name for camera in sequence.cameras]
+    without = describe_unconfirmed(told.verdict, names, sequence.fps).without
+    known = [name for name in names if name not in without]
+    people = f"the people whom the boxes{f' of {listed(known)}' if without else ''} show"
     middles = agreed.feet + agreed.rises / 2.0
     inside = float(room.contains(middles, 0.5).mean())
     own = told.suggestion
@@ -305,7 +311,7 @@ def _inside(sequence: Sequence, told: BoxesTell) -> Check:
         )
         return warning(
             "people are in the room",
-            f"only {percent(inside)} of the people whom the boxes show are in [room]",
+            f"only {percent(inside)} of {people} are in [room]",
             Remedy("room.min", low),
             Remedy("room.max", high),
             inside=inside,
@@ -321,7 +327,7 @@ def _inside(sequence: Sequence, told: BoxesTell) -> Check:
             )
     return good(
         "people are in the room",
-        f"{percent(inside)} of the people whom the boxes show are in [room]",
+        f"{percent(inside)} of {people} are in [room]",
         inside=inside,
     )
 
@@ -331,12 +337,10 @@ def _stray_cameras(sequence: Sequence, told: BoxesTell) -> Iterator[Check]:
     own pose or clock is off."""
     name_of_check = "every camera agrees with another"
     names = [camera.name for camera in sequence.cameras]
-    doubtful = describe_unconfirmed(told.verdict, names)
-    if doubtful.alone:
-        yield warning(name_of_check, doubtful.alone)
-    if doubtful.others:
-        yield absent(name_of_check, doubtful.others)
-    if len(sequence.views) < 3 or doubtful.alone:
+    alone = describe_unconfirmed(told.verdict, names, sequence.fps).alone
+    if alone:
+        yield warning(name_of_check, alone)
+    if len(sequence.views) < 3 or alone:
         return
     shares: dict[str, float] = {}
     for index, view in enumerate(sequence.views):
@@ -351,7 +355,7 @@ def _stray_cameras(sequence: Sequence, told: BoxesTell) -> Iterator[Check]:
                 "it sees: its calibration, its file of boxes or its clock is another one's",
                 share=share,
             )
-    if shares and min(shares.values()) >= _OWN_SHARE and not doubtful.others:
+    if shares and min(shares.values()) >= _OWN_SHARE:
         yield good(name_of_check, "each one's boxes meet others'")
 
 

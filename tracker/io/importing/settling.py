@@ -166,8 +166,7 @@ def settle(taken: Sequence[ParsedFiles], options: ImportOptions | None = None) -
     )
     names = [raw.name for raw in raws]
     _exchange_found([*cameras, *unused], verdict)
-    clocks = {} if verdict is None else verdict.clocks
-    late = _late(clocks, names, options)
+    late = {} if verdict is None else _late(verdict.clocks, names, options)
     if late:
         shifted = _shifted(options, late, times.fps)
         times = settle_times(cameras, matched.truths, shifted, [])
@@ -187,12 +186,15 @@ def settle(taken: Sequence[ParsedFiles], options: ImportOptions | None = None) -
         fps, why = rate_of(settled, at_steps)
         found.append(("fps", f"{fps:g}, {why}, since no file says it; --fps"))
         if verdict is not None:
-            clocks = verdict.clocks_at(fps)
-            late = _late(clocks, names, options)
+            verdict = verdict.at_rate(fps)
+            late = _late(verdict.clocks, names, options)
         shifted = _shifted(options, late, fps).model_copy(update={"fps": fps})
         times = settle_times(cameras, matched.truths, shifted, [])
         at_steps = _at_steps(detections, times)
-    told += describe_clocks(clocks, names)
+    if verdict is not None:
+        unconfirmed = describe_unconfirmed(verdict, names, times.fps)
+        told += filter(None, (unconfirmed.alone, unconfirmed.others))
+        told += describe_clocks(verdict.clocks, names, times.fps)
     for name, steps in late.items():
         how = f"{steps / times.fps:.2f} s late ({steps} steps, within 1)"
         found.append((f"{name} clock", f"{how}, since boxes meet so"))
@@ -273,7 +275,7 @@ def _late(
     return {
         names[camera]: clock.late
         for camera, clock in clocks.items()
-        if clock.late and clock.steady and names[camera] not in options.offsets
+        if clock.late and names[camera] not in options.offsets
     }
 
 
@@ -566,7 +568,6 @@ def _read(
         found += told_
         if len(verdict.confirmed) == 2 and verdict.kind == "decided":
             told.append(OF_TWO)
-        told += filter(None, describe_unconfirmed(verdict, [raw.name for raw in raws]))
         told += describe_moved(verdict.moved, [raw.name for raw in raws])
     if any(raw.turns for raw in raws):
         found.append(("angles", f"{turns_in_words(reading.turns)}, {why}; --euler"))

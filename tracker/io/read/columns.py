@@ -444,8 +444,8 @@ def _with_frames(
         key: [cells[k] for k in np.flatnonzero(whole).tolist()] for key, cells in columns.items()
     }
     return kept, (
-        f"{file.where}, {name}: {out} of {rows} rows ({100 * out / rows:.2f} %) are left out, the first in "
-        f"{words} {shown(columns[name][row])}"
+        f"{file.where}, {name}: {out} of {rows} rows ({100 * out / rows:.2f} %) are left out, the "
+        f"first in {words} {shown(columns[name][row])}"
     )
 
 
