@@ -209,7 +209,7 @@ def test_an_import_asks_and_refuses_with_a_status_of_its_own(
     [
         (0, 1, "are of frame 0, so frames are counted from 0, not from 1: --first-index 0"),
         (1, 0, "the one after the last of 60, so frames are counted from 1: --first-index 1"),
-        (5, 0, "outside the 60 of the pictures; --first-index says where counting begins"),
+        (5, 0, "boxes are left out: of frames after frame 59, the last of the recording"),
     ],
 )
 def test_where_counting_begins_was_told_wrongly(
