@@ -20,7 +20,14 @@ from tracker.io.conventions.questions import (
     describe_unconfirmed,
 )
 from tracker.io.conventions.reading import Reading, exchanged, exchanges
-from tracker.io.conventions.readings import LEAST_SHARE, Judge, Judged, Open, Seen
+from tracker.io.conventions.readings import (
+    LEAST_SHARE,
+    Judge,
+    Judged,
+    Open,
+    Seen,
+    compared,
+)
 from tracker.io.conventions.search import Verdict, as_meant, find_reading
 from tracker.io.conventions.sizes import likely_unit
 from tracker.io.read.pieces import METRES, RawCamera
@@ -30,9 +37,6 @@ from tracker.sequences.sequence import Sequence, View
 
 AS_GIVEN = Reading()
 """How a sequence's file is read."""
-
-SCORE_THRESHOLD = 0.3
-"""Boxes below it are left out."""
 
 _SMALLER, _TALLER = 0.6, 1.6  # than the target: how tall boxes may be
 _SMALLEST = 0.08  # metres: not even a head
@@ -88,7 +92,7 @@ def seen_boxes(sequence: Sequence) -> list[Seen | None]:
         if own is None:
             seen.append(None)
             continue
-        kept = own.scores >= SCORE_THRESHOLD
+        kept = compared(own.scores)
         seen.append(Seen(own.frames[kept], own.boxes[kept]))
     return seen
 

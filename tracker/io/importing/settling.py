@@ -37,7 +37,7 @@ from tracker.io.conventions.questions import (
     rearranged,
 )
 from tracker.io.conventions.reading import Reading, read_boxes, to_camera
-from tracker.io.conventions.readings import Open, Seen
+from tracker.io.conventions.readings import Open, Seen, compared
 from tracker.io.conventions.search import ClockFit, Verdict, as_meant, find_reading
 from tracker.io.importing.arriving import short_videos
 from tracker.io.importing.finding.angles import check_turns, chosen_turns, turns_in_words
@@ -648,7 +648,8 @@ def _pixels(raws: Sequence[RawCamera], seen: Sequence[Seen | None]) -> tuple[flo
 
 def _seen(own: Detections, time: CameraTime) -> Seen:
     steps = time.steps_of(own.frames)
-    return Seen(steps[steps >= 0], own.boxes[steps >= 0])
+    kept = (steps >= 0) & compared(own.scores)
+    return Seen(steps[kept], own.boxes[kept])
 
 
 def _detections(own: _Boxes | None) -> Detections | None:
