@@ -46,6 +46,7 @@ from tracker.io.importing.finding.geometry import check_lenses, check_places, re
 from tracker.io.importing.finding.matching import (
     Matched,
     MatchedCamera,
+    first_of,
     match_all,
     matched_by,
     nothing_of,
@@ -231,10 +232,19 @@ def settle(taken: Sequence[ParsedFiles], options: ImportOptions | None = None) -
         matched.format,
         reading,
         tuple(found),
-        tuple(told),
+        tuple(_summed_up(told)),
         _sources(matched),
         open_[0] if open_ else None,
     )
+
+
+def _summed_up(told: Sequence[str]) -> list[str]:
+    """Sentences, those that say the same of several files or cameras as one."""
+    names: dict[str, list[str]] = {}
+    for sentence in told:
+        name, colon, words = sentence.partition(": ")
+        names.setdefault(words if colon else sentence, []).extend([name] if colon else [])
+    return [f"{first_of(own)}: {words}" if own else words for words, own in names.items()]
 
 
 def _sources(matched: Matched) -> frozenset[Path]:
