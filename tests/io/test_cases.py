@@ -38,7 +38,10 @@ HOLD: dict[str, Callable[[ImportPlan], bool]] = {
         any("taken for the number of the frame" in told for told in plan.told)
         and all(view.looked_at is not None and view.looked_at[1] == 5 for view in plan.views)
     ),
-    "dropped-frames": lambda plan: any("cam2: about step 1" in told for told in plan.told),
+    "dropped-frames": lambda plan: any(
+        "cam2: it lost about 25 frames (1.00 s) before its frame 150 (6.0 s)" in told
+        for told in plan.told
+    ),
     "every-second-frame": lambda plan: all(
         view.looked_at is not None and (view.looked_at % 2 == 0).all() for view in plan.views
     ),

@@ -117,7 +117,7 @@ def test_clocks_are_compared_anew_once_the_rate_is_known() -> None:
     verdict = find_reading(cameras, seen, fps=25.0, tried=Open(orders=False))
     assert verdict is not None
     assert 1 not in verdict.clocks
-    clock = verdict.clocks_at(4.0)[1]
+    clock = verdict.at_rate(4.0).clocks[1]
     assert not clock.steady
     assert clock.ends - clock.begins == pytest.approx(-3, abs=1)
 

@@ -49,14 +49,18 @@ def evaluate(command: Evaluate) -> None:
                 f"--html {command.html}: there is no folder {command.html.parent}; make it first"
             )
     sequence = library.open_sequence(command.sequence)
+    beyond: list[str] = []
     if command.truth is not None:
-        truth = truth_of(command.truth, str(command.truth), sequence.frames)
+        truth = truth_of(command.truth, str(command.truth), sequence.frames, beyond)
         sequence = replace(sequence, ground_truth=truth)
     tracks = read_tracks(command.tracks)
     check_fit(sequence, tracks, str(command.tracks))
     for sentence in (*sequence.warnings, *tracks.remarks):
         say(sentence)
     evaluation = evaluate_sequence(sequence, tracks, settings, steps=tracks.done)
+    evaluation = replace(evaluation, notes=(*evaluation.notes, *beyond))
+    for note in evaluation.notes:  # they say what the figures are worth
+        say(note)
     if command.html is not None:
         from tracker.evaluation.report.page import write_report  # brings plotly
 
@@ -75,8 +79,7 @@ def evaluate(command: Evaluate) -> None:
     else:
         print_evaluation(evaluation)
     done = "" if tracks.done is None else f" of {sequence.frames} (the file is partial)"
-    for line in (f"{evaluation.steps} steps{done}", *evaluation.notes):
-        say(line)
+    say(f"{evaluation.steps} steps{done}")
     if command.html is not None:
         say(f"the report is in {command.html}")
 

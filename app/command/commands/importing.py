@@ -46,6 +46,7 @@ def _import(command: Import) -> int:
     options = _options(command)
     from tracker.io.conventions.questions import Undecided, Unexplained
     from tracker.io.importing.arriving import gather_whole
+    from tracker.io.importing.remedies import for_import, unsaid
     from tracker.io.importing.settling import settle
     from tracker.io.importing.usage import file_uses
     from tracker.io.importing.writing import FILE, write
@@ -74,7 +75,7 @@ def _import(command: Import) -> int:
         say(f"{refusal}; nothing was written")
         return REFUSED
     print()
-    print_table(("found out", "as"), [*settled.found, *(("note", t) for t in settled.told)])
+    print_table(("found out", "as"), settled.found)
     uses = file_uses(taken, settled.sources)
     facts = (
         f"{len(settled.views)} cameras, {settled.frames} steps at {settled.fps:g} a second, "
@@ -82,14 +83,26 @@ def _import(command: Import) -> int:
         f"{sum(one.used for one in uses):,} of {sum(one.files.count for one in uses):,} files used"
     )
     if command.dry_run or command.output is None:
+        _print_notes(settled.told)
         say(f"{facts}; nothing was written")
         return 0
     name = command.name or command.output.resolve().name
     for sentence in write(settled, command.output, name, copy=command.copy):
         say(sentence)
+    sequence = library.open_sequence(str(command.output))
+    checks = [for_import(one, settled.reading) for one in _checks(sequence)]
+    _print_notes(unsaid(settled.told, checks))
     say(f"{facts}, written to {command.output}")
-    _print_checks(library.open_sequence(str(command.output)), settled.reading)
+    print()
+    _print_checks(sequence, checks)
     return 0
+
+
+def _print_notes(notes: Sequence[str]) -> None:
+    """What is not used, or odd, in a table of its own."""
+    if notes:
+        print()
+        print_table(("note",), [(note,) for note in notes])
 
 
 def _ask(question: Question) -> None:
@@ -180,18 +193,18 @@ def _check(command: Check) -> int:
     from tracker.sequences import library
 
     sequence = library.open_sequence(command.sequence)
-    return _print_checks(sequence)
+    return _print_checks(sequence, _checks(sequence))
 
 
-def _print_checks(sequence: Any, reading: Any = None) -> int:
-    """Every check in a row; status 1 where one of them warns."""
+def _checks(sequence: Any) -> list[Any]:
     from tracker.io.checks import check
-    from tracker.io.importing.remedies import for_import
     from tracker.single_view.working.shaking import check_shake
 
-    checks = [*check(sequence), *check_shake(sequence)]
-    if reading is not None:
-        checks = [for_import(one, reading) for one in checks]
+    return [*check(sequence), *check_shake(sequence)]
+
+
+def _print_checks(sequence: Any, checks: Sequence[Any]) -> int:
+    """Every check in a row; status 1 where one of them warns."""
     rows = [(SIGNS[one.status], one.name, str(one)) for one in checks]
     rows += [("!", "opening", warning) for warning in sequence.warnings]
     print_table(("", "check", "found"), rows)

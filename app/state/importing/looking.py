@@ -109,8 +109,8 @@ def look_into(settled: ImportPlan, name: str, cancelled: Callable[[], bool]) -> 
         if len(sequence.views) > 1:
             offsets = synchronise(sequence, reader=reader, most_steps=MOST_STEPS)
         _stop_if(cancelled)
-        clocks = None if told is None else told.verdict.clocks
-        timing = list(check_time(sequence, found=offsets, clocks=clocks))
+        verdict = None if told is None else told.verdict
+        timing = list(check_time(sequence, found=offsets, verdict=verdict))
         found = _for_import((*checks, *timing, *counting), settled)
         looked = replace(looked, checks=found, offsets=offsets, under_way="first tracks")
         if agreed is not None and sequence.has_detections:

@@ -34,7 +34,8 @@ if TYPE_CHECKING:
     from app.state.importing.looking import Looked
     from tracker.geometry.consistency.entrances import Door
     from tracker.io.conventions.questions import Question
-    from tracker.io.importing.settling import ImportPlan, PlannedView
+    from tracker.io.importing.remedies import unsaid
+from tracker.io.importing.settling import ImportPlan, PlannedView
 
 MOST_OFFSETS = 241
 """Values of a curve of agreement."""
@@ -123,9 +124,8 @@ def _told(settled: ImportPlan | None, looked: Looked | None) -> list[str]:
     """What is said besides the checks: what one of these says as well stands there alone."""
     if settled is None:
         return []
-    checked = [] if looked is None else [one.sentence for one in looked.checks]
-    alone = [own for own in settled.told if not any(own in sentence for sentence in checked)]
-    return [on_page(own) for own in alone]
+    checks = () if looked is None else looked.checks
+    return [on_page(own) for own in unsaid(settled.told, checks)]
 
 
 def _turns(settled: ImportPlan) -> str:

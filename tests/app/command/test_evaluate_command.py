@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import sys
+from contextlib import redirect_stderr
 from pathlib import Path
 
 import pytest
@@ -92,6 +94,46 @@ def test_report(run: Runs, crossing: Path, tracks: Path, tmp_path: Path) -> None
     assert "<h1>crossing</h1>" in report.read_text(encoding="utf-8")
     assert "seed 0" in report.read_text(encoding="utf-8")
     assert list(tmp_path.iterdir()) == [report]
+
+
+def test_a_truth_that_goes_on_is_scored_as_far_as_the_recording_goes(
+    run: Runs, crossing: Path, tracks: Path, tmp_path: Path
+) -> None:
+    own = (crossing / "truth.csv").read_text(encoding="utf-8")
+    columns = own.splitlines()[0].split(",")
+    given = {"id": "1", "x": "0", "y": "0", "z": "1", "valid": "1"}
+
+    def row(step: int) -> str:
+        return ",".join(str(step) if name == "frame" else given[name] for name in columns) + "\n"
+
+    longer, later = tmp_path / "longer.csv", tmp_path / "later.csv"
+    longer.write_text(own + row(FRAMES) + row(FRAMES + 5), encoding="utf-8")
+    later.write_text(",".join(columns) + "\n" + row(FRAMES + 5), encoding="utf-8")
+    status, expected, _ = run("evaluate", crossing, tracks, "--json")
+    assert status == 0
+    status, stdout, stderr = run("evaluate", crossing, tracks, "--truth", longer, "--json")
+    note = f"2 of {own.count(chr(10)) + 1} rows are left out: of steps after {FRAMES - 1}"
+    assert (status, note in stderr) == (0, True), stderr
+    found = json.loads(stdout)
+    assert found["figures"] == json.loads(expected)["figures"]
+    assert note in " ".join(found["notes"])
+    status, _, stderr = run("evaluate", crossing, tracks, "--truth", later)
+    assert status == 1
+    assert f"expected steps 0 … {FRAMES - 1} as the sequence has them, found none" in stderr
+
+
+def test_what_figures_are_worth_is_said_before_them(
+    run: Runs, crossing: Path, tracks: Path, tmp_path: Path
+) -> None:
+    head, *rows = (crossing / "truth.csv").read_text(encoding="utf-8").splitlines()
+    column = head.split(",").index("x")
+    cells = [row.split(",") for row in rows]
+    elsewhere = tmp_path / "elsewhere.csv"
+    moved = [",".join([*c[:column], str(float(c[column]) + 50), *c[column + 1 :]]) for c in cells]
+    elsewhere.write_text("\n".join([head, *moved]) + "\n", encoding="utf-8")
+    with redirect_stderr(sys.stdout):
+        _, printed, _ = run("evaluate", crossing, tracks, "--truth", elsewhere)
+    assert 0 <= printed.find("figures against it mean nothing") < printed.find("MOTA")
 
 
 def test_a_partial_file_is_scored_as_far_as_it_goes(

@@ -51,6 +51,19 @@ def test_it_is_told_and_taken(tmp_path: Path) -> None:
     assert "from step to step" in dict(settled.found)["fps"]
 
 
+def test_a_rate_that_the_times_of_boxes_state_is_told(tmp_path: Path) -> None:
+    toml(tmp_path)
+    detections(tmp_path, places=walkers(2.0, WALKING))
+    for path in tmp_path.glob("cam*.csv"):
+        head, *rows = path.read_text().splitlines()
+        cells = [row.partition(",") for row in rows]
+        timed = [f"{int(frame) / 2.0},{rest}" for frame, _, rest in cells]
+        path.write_text("\n".join([f"time,{head.partition(',')[2]}", *timed]) + "\n")
+    settled = settled_of(tmp_path)
+    assert settled.fps == 2.0
+    assert dict(settled.found)["fps"] == "2, by the files of boxes or truth; --fps"
+
+
 def test_who_goes_little_may_be_slow(tmp_path: Path) -> None:
     toml(tmp_path)
     detections(tmp_path, places=walkers(USUAL_RATE, 0.5))

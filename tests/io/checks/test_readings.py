@@ -215,6 +215,19 @@ def test_boxes_a_step_before_the_truth_are_counted_from_0() -> None:
     assert check_counting(sequence).status == "good"
 
 
+def test_cameras_that_differ_in_their_delay_do_not_count_otherwise() -> None:
+    """By 1 step in the median, but no number of a first frame is different in each camera."""
+    sequence = random_room(2, steps=200, cameras=3)
+    views = []
+    for view, late in zip(sequence.views, (1, 1, 2), strict=True):
+        own = view.detections
+        assert own is not None
+        shifted = replace(own, frames=own.frames + late)
+        views.append(replace(view, detections=shifted))
+    found = check_counting(replace(sequence, views=tuple(views)))
+    assert (found.status, found.remedies) == ("good", ())
+
+
 def test_a_room_of_seated_people_reaches_a_whole_size_above_and_below_them() -> None:
     rng = np.random.default_rng(3)
     feet = np.column_stack([rng.uniform(-3.0, 3.0, (200, 2)), np.full(200, 0.4)])

@@ -56,25 +56,67 @@ def test_a_late_camera_is_told_with_its_remedy_and_nothing_is_applied() -> None:
     assert sequence.views[2].clock is None
 
 
-@pytest.mark.parametrize("camera", [0, 2])
-def test_lost_frames_are_a_warning_with_their_number_and_step(camera: int) -> None:
-    sequence = random_room(5, cameras=4, fps=10.0, steps=300, people=3)
+def with_frames(sequence: Sequence, camera: int, frames: np.ndarray, kept: np.ndarray) -> Sequence:
+    """The sequence with other numbers of the frames of one camera, without some of its boxes."""
     view = sequence.views[camera]
     own = view.detections
     assert own is not None
-    frames = own.frames - 12 * (own.frames >= 162)
-    kept = (own.frames < 150) | (own.frames >= 162)
-    lost = Detections(frames[kept], own.boxes[kept], own.scores[kept])
-    views = tuple(replace(one, detections=lost) if one is view else one for one in sequence.views)
-    told = [each for each in check(replace(sequence, views=views)) if each.status == "warning"]
-    (words,) = (each.sentence for each in told if "jumps" in each.sentence)
-    assert words.startswith(view.camera.name)
-    jump = re.search(r"jumps by (-?\d+) steps", words)
-    assert jump is not None
-    assert int(jump[1]) == pytest.approx(-12, abs=2)
-    step = re.search(r"about step (\d+)", words)
-    assert step is not None
-    assert int(step[1]) == pytest.approx(150, abs=2)
+    changed = Detections(frames[kept], own.boxes[kept], own.scores[kept])
+    views = list(sequence.views)
+    views[camera] = replace(view, detections=changed)
+    return replace(sequence, views=tuple(views))
+
+
+def frames_of(sequence: Sequence, camera: int) -> np.ndarray:
+    own = sequence.views[camera].detections
+    assert own is not None
+    return own.frames
+
+
+def sentences(sequence: Sequence) -> list[str]:
+    """The warnings about cameras that do not show the same moments."""
+    return [
+        each.sentence
+        for each in check(sequence, pictures=False)
+        if each.name == "cameras show the same moments" and each.status == "warning"
+    ]
+
+
+@pytest.mark.parametrize(("cameras", "camera"), [(4, 0), (4, 2), (2, 0), (2, 1)])
+def test_lost_frames_are_a_warning_with_their_number_and_frame(cameras: int, camera: int) -> None:
+    """Of two cameras the one that lost frames is named, not the other, which has more."""
+    sequence = random_room(5, cameras=cameras, fps=10.0, steps=300, people=3)
+    frames = frames_of(sequence, camera)
+    kept = (frames < 150) | (frames >= 162)
+    (words,) = sentences(with_frames(sequence, camera, frames - 12 * (frames >= 162), kept))
+    found = re.fullmatch(
+        r"cam(\d): it lost about (\d+) frames \((\d\.\d\d) s\) before its frame (\d+) .*", words
+    )
+    assert found is not None, words
+    assert int(found[1]) == camera + 1
+    assert int(found[2]) == pytest.approx(12, abs=2)
+    assert float(found[3]) == pytest.approx(int(found[2]) / 10.0)
+    assert int(found[4]) == pytest.approx(150, abs=2)
+    assert "drifts" not in words
+
+
+@pytest.mark.parametrize(("cameras", "rate"), [(4, 1.05), (4, 0.95), (2, 1.05)])
+def test_a_clock_that_drifts_is_one_of_another_rate(cameras: int, rate: float) -> None:
+    """Of two cameras either may be meant."""
+    sequence = random_room(6, cameras=cameras, fps=10.0, steps=300, people=3)
+    frames = frames_of(sequence, 1)
+    drifting = np.round(frames * rate).astype(int)
+    (words,) = sentences(with_frames(sequence, 1, drifting, drifting < 300))
+    found = re.search(
+        r"(cam\d): its clock drifts: .*, as if it had ([\d.]+) frames a second", words
+    )
+    assert found is not None, words
+    if cameras == 2 and found[1] == "cam1":
+        rate = 1.0 / rate
+    else:
+        assert found[1] == "cam2"
+    assert float(found[2]) == pytest.approx(10.0 * rate, rel=0.01)
+    assert "lost" not in words
 
 
 def test_the_curve_has_its_peak_at_the_offset() -> None:

@@ -41,13 +41,59 @@ def test_boxes_of_other_classes_are_summed_up_camera_by_camera(tmp_path: Path) -
     for view in plan.views:
         assert view.detections is not None
         count = len(view.detections.frames)
-        (words,) = (text for text in plan.told if text.startswith(f"{view.camera.name}.json"))
-        assert f"180 of {count + 180} rows" in words
+        (words,) = (text for text in plan.told if f"180 of {count + 180} rows" in text)
         assert "(120 car, 60 dog)" in words
 
 
+@pytest.mark.parametrize("named", [True, False])
+def test_rows_of_other_classes_are_named_as_the_labels_beside_name_them(
+    tmp_path: Path, named: bool
+) -> None:
+    save_calibration(tmp_path / "cameras.toml", cameras(), "pose2sim")
+    car, person = (1, 2) if named else (3, 1)
+    for camera in cameras():
+        folder = tmp_path / camera.name / "gt"
+        folder.mkdir(parents=True)
+        frames, rows = boxes(camera, walks())
+        own = [(frame, person, 1, box) for frame, box in zip(frames, rows, strict=True)]
+        own += [(frame, car, 1, [5, 5, 9, 9]) for frame in range(60)]
+        own += [(frame, person, 0, [5, 5, 9, 9]) for frame in range(10)]
+        (folder / "gt.txt").write_text(
+            "".join(
+                f"{frame + 1},{n},{','.join(f'{side:.2f}' for side in box)},{counts},{kind},1\n"
+                for n, (frame, kind, counts, box) in enumerate(own, 1)
+            )
+        )
+        if named:
+            (folder / "labels.txt").write_text("car\nperson\n")
+    plan = settle(gather([tmp_path]), ImportOptions(fps=25.0))
+    car_words = "60 car" if named else "60 of class 3"
+    told = [text for text in plan.told if "/gt/gt.txt: 70 of" in text]
+    assert told
+    for words in told:
+        assert words.endswith(f"({car_words}, 10 with 0 in column 7, not to count)")
+
+
+def test_what_is_the_same_of_several_files_is_said_once(tmp_path: Path) -> None:
+    save_calibration(tmp_path / "cameras.toml", cameras(), "pose2sim")
+    frames, rows = boxes(cameras()[0], walks())
+    for camera in cameras():
+        lines = [
+            f"{n},{','.join(map(str, box))},person" for n, box in zip(frames, rows, strict=True)
+        ]
+        lines += [f"{n},5,5,9,9,car" for n in range(60)]
+        text = "\n".join(["frame,left,top,width,height,class", *lines]) + "\n"
+        (tmp_path / f"{camera.name}.csv").write_text(text)
+    plan = settle(gather([tmp_path]), ImportOptions(fps=25.0, accept_best=True))
+    (words,) = (one for one in plan.told if "left out" in one)
+    assert words.startswith("cam1.csv, cam2.csv, cam3.csv")
+    assert words.endswith("(60 car)")
+
+
 def test_a_recording_of_no_people_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(FormatError, match=r"no box of a person.*180 of 180 rows \(100%\).*120 car"):
+    with pytest.raises(
+        FormatError, match=r"no box of a person.*180 of 180 rows \(100 %\).*120 car"
+    ):
         _coco(tmp_path, people=False)
 
 

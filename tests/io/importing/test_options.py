@@ -209,7 +209,7 @@ def test_an_import_asks_and_refuses_with_a_status_of_its_own(
     [
         (0, 1, "are of frame 0, so frames are counted from 0, not from 1: --first-index 0"),
         (1, 0, "the one after the last of 60, so frames are counted from 1: --first-index 1"),
-        (5, 0, "outside the 60 of the pictures; --first-index says where counting begins"),
+        (5, 0, "boxes are left out: of frames after frame 59, the last of the recording"),
     ],
 )
 def test_where_counting_begins_was_told_wrongly(
@@ -219,7 +219,10 @@ def test_where_counting_begins_was_told_wrongly(
     videos(tmp_path)
     detections(tmp_path, first=counted)
     settled = settled_of(tmp_path, ImportOptions(first_index=stated))
-    assert sum(words in sentence for sentence in settled.told) == 4
+    named = [sentence.partition(": ")[0] for sentence in settled.told if words in sentence]
+    assert {name for names in named for name in names.split(", ")} == {
+        f"cam{number + 1}.csv" for number in range(4)
+    }
 
 
 @pytest.mark.full

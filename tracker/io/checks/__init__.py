@@ -52,8 +52,8 @@ def check(
     if told is not None and told.verdict.moved:
         found.append(absent("cameras show the same moments", "a camera that was moved comes first"))
     elif not quick and (sequence.has_detections or pictures):
-        clocks = None if told is None else told.verdict.clocks
-        found += check_time(sequence, reader, clocks=clocks)
+        verdict = None if told is None else told.verdict
+        found += check_time(sequence, reader, verdict=verdict)
     if told is not None:
         found.append(check_counting(sequence))
     found.append(truth)

@@ -20,18 +20,23 @@ from tracker.io.conventions.questions import (
     describe_unconfirmed,
 )
 from tracker.io.conventions.reading import Reading, exchanged, exchanges
-from tracker.io.conventions.readings import LEAST_SHARE, Judge, Judged, Open, Seen
+from tracker.io.conventions.readings import (
+    LEAST_SHARE,
+    Judge,
+    Judged,
+    Open,
+    Seen,
+    compared,
+)
 from tracker.io.conventions.search import Verdict, as_meant, find_reading
 from tracker.io.conventions.sizes import likely_unit
 from tracker.io.read.pieces import METRES, RawCamera
+from tracker.sequences.fields import listed
 from tracker.sequences.finding import Check, Remedy, absent, good, percent, warning
 from tracker.sequences.sequence import Sequence, View
 
 AS_GIVEN = Reading()
 """How a sequence's file is read."""
-
-SCORE_THRESHOLD = 0.3
-"""Boxes below it are left out."""
 
 _SMALLER, _TALLER = 0.6, 1.6  # than the target: how tall boxes may be
 _SMALLEST = 0.08  # metres: not even a head
@@ -87,7 +92,7 @@ def seen_boxes(sequence: Sequence) -> list[Seen | None]:
         if own is None:
             seen.append(None)
             continue
-        kept = own.scores >= SCORE_THRESHOLD
+        kept = compared(own.scores)
         seen.append(Seen(own.frames[kept], own.boxes[kept]))
     return seen
 
@@ -294,7 +299,12 @@ def _size(sequence: Sequence, told: BoxesTell) -> Check:
 
 
 def _inside(sequence: Sequence, told: BoxesTell) -> Check:
+    """Cameras whose boxes agree with no other's show nobody whose place is known."""
     agreed, room = told.given.consensus, sequence.room
+    names = [camera.name for camera in sequence.cameras]
+    without = describe_unconfirmed(told.verdict, names, sequence.fps).without
+    known = [name for name in names if name not in without]
+    people = f"the people whom the boxes{f' of {listed(known)}' if without else ''} show"
     middles = agreed.feet + agreed.rises / 2.0
     inside = float(room.contains(middles, 0.5).mean())
     own = told.suggestion
@@ -305,7 +315,7 @@ def _inside(sequence: Sequence, told: BoxesTell) -> Check:
         )
         return warning(
             "people are in the room",
-            f"only {percent(inside)} of the people whom the boxes show are in [room]",
+            f"only {percent(inside)} of {people} are in [room]",
             Remedy("room.min", low),
             Remedy("room.max", high),
             inside=inside,
@@ -321,7 +331,7 @@ def _inside(sequence: Sequence, told: BoxesTell) -> Check:
             )
     return good(
         "people are in the room",
-        f"{percent(inside)} of the people whom the boxes show are in [room]",
+        f"{percent(inside)} of {people} are in [room]",
         inside=inside,
     )
 
@@ -331,12 +341,10 @@ def _stray_cameras(sequence: Sequence, told: BoxesTell) -> Iterator[Check]:
     own pose or clock is off."""
     name_of_check = "every camera agrees with another"
     names = [camera.name for camera in sequence.cameras]
-    doubtful = describe_unconfirmed(told.verdict, names)
-    if doubtful.alone:
-        yield warning(name_of_check, doubtful.alone)
-    if doubtful.others:
-        yield absent(name_of_check, doubtful.others)
-    if len(sequence.views) < 3 or doubtful.alone:
+    alone = describe_unconfirmed(told.verdict, names, sequence.fps).alone
+    if alone:
+        yield warning(name_of_check, alone)
+    if len(sequence.views) < 3 or alone:
         return
     shares: dict[str, float] = {}
     for index, view in enumerate(sequence.views):
@@ -351,7 +359,7 @@ def _stray_cameras(sequence: Sequence, told: BoxesTell) -> Iterator[Check]:
                 "it sees: its calibration, its file of boxes or its clock is another one's",
                 share=share,
             )
-    if shares and min(shares.values()) >= _OWN_SHARE and not doubtful.others:
+    if shares and min(shares.values()) >= _OWN_SHARE:
         yield good(name_of_check, "each one's boxes meet others'")
 
 

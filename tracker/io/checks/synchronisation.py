@@ -15,8 +15,9 @@ from tracker.geometry.consistency.sliding import LinkedBoxes, agreement_by_offse
 from tracker.geometry.consistency.suggestion import LEAST_AGREEING, consensus_of_cameras
 from tracker.io.checks.motion import MOST_STEPS, motion_pairings
 from tracker.io.checks.offsets import Curve, Offset, Pairing, solve
+from tracker.io.conventions.readings import compared
 from tracker.sequences.pictures.frames import FrameReader
-from tracker.sequences.sequence import Sequence
+from tracker.sequences.sequence import Detections, Sequence
 
 WIDEST = 10.0
 """Seconds: the largest offset that is searched."""
@@ -29,9 +30,6 @@ LEAST_GAIN = 4.0
 
 LEAST_SHARPNESS = 3.5
 """Deviations by which the peak must stand above the curve."""
-
-LEAST_SCORE = 0.3
-"""The score of a box below which it is left out."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -128,7 +126,7 @@ class BoxPairing:
 
 
 def box_pairings(sequence: Sequence) -> dict[tuple[int, int], BoxPairing]:
-    """The pairs of cameras that both have boxes of :data:`LEAST_SCORE`, as high as the boxes tell.
+    """The pairs of cameras that both have boxes, as high as the boxes tell.
 
     Args:
         sequence: With calibrated cameras.
@@ -136,7 +134,9 @@ def box_pairings(sequence: Sequence) -> dict[tuple[int, int], BoxPairing]:
     rays: list[Rays] = []
     linked: list[LinkedBoxes | None] = []
     for view in sequence.views:
-        own = view.boxes_above(LEAST_SCORE)
+        own = view.boxes_above(0.0)
+        kept = compared(own.scores)
+        own = Detections(own.frames[kept], own.boxes[kept], own.scores[kept])
         rays.append(upright_rays(own.frames, own.boxes, view.camera))
         linked.append(
             link_boxes(view.camera, rays[-1], own.boxes, sequence.frames)

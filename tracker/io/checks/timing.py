@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from functools import lru_cache
 
 import numpy as np
 
 from tracker.io.checks.boxes import AS_GIVEN, raw_cameras, seen_boxes
 from tracker.io.checks.synchronisation import LEAST_STEPS, CameraOffset, synchronise
-from tracker.io.conventions.questions import describe_clocks
-from tracker.io.conventions.search import ClockFit, clocks_by
+from tracker.io.conventions.questions import (
+    Unconfirmed,
+    describe_clocks,
+    describe_unconfirmed,
+)
+from tracker.io.conventions.search import Verdict, clocks_by
+from tracker.sequences.fields import listed
 from tracker.sequences.finding import Check, Remedy, absent, good, warning
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
@@ -18,13 +23,14 @@ from tracker.sequences.sequence import Sequence
 _SHIFTS = (-3, -2, -1, 0, 1, 2, 3)
 _NEAR = 0.4  # heights of a box
 _LEAST_NEAR = 100
+_LEAST_SHARP = 3.0  # deviations by which all peaks stand out where offsets are told
 
 
 def check_time(
     sequence: Sequence,
     reader: FrameReader | None = None,
     found: tuple[CameraOffset, ...] | None = None,
-    clocks: Mapping[int, ClockFit] | None = None,
+    verdict: Verdict | None = None,
 ) -> Iterator[Check]:
     """Is any camera late; from the boxes, or from the motion in the pictures where there are none.
 
@@ -32,7 +38,7 @@ def check_time(
         sequence: Read rightly: with a wrong calibration nothing can be said.
         reader: Of the pictures.
         found: What :func:`synchronise` found, where it is known.
-        clocks: The clocks of the cameras whose boxes were compared by parts of the recording.
+        verdict: What the boxes tell, of the moments that they show, too.
     """
     name = "cameras show the same moments"
     if len(sequence.views) < 2:
@@ -42,10 +48,13 @@ def check_time(
     if not found:
         yield absent(name, "neither boxes nor pictures of two cameras can be compared")
         return
-    uneven = describe_clocks(clocks or {}, [camera.name for camera in sequence.cameras])
+    names = [camera.name for camera in sequence.cameras]
+    uneven = [] if verdict is None else describe_clocks(verdict.clocks, names, sequence.fps)
     for sentence in uneven:
         yield warning(name, sentence)
-    late = [offset for offset in found if offset.sure]
+    unconfirmed = None if verdict is None else describe_unconfirmed(verdict, names, sequence.fps)
+    # beside a clock that jumps or drifts a constant delay says nothing
+    late = [offset for offset in found if offset.sure and not uneven]
     for offset in late:
         yield warning(
             name,
@@ -56,7 +65,9 @@ def check_time(
             sharpness=offset.sharpness,
         )
     if not late and not uneven:
-        yield _agreeing(name, found)
+        yield _agreeing(name, found, unconfirmed)
+    elif unconfirmed is not None and unconfirmed.others:
+        yield absent(name, unconfirmed.others)
 
 
 @lru_cache(maxsize=1)
@@ -70,19 +81,35 @@ def uneven_clocks(sequence: Sequence) -> tuple[str, ...]:
         sequence: Read rightly. Its boxes tell; without boxes there is nothing to say.
     """
     clocks = clocks_by(raw_cameras(sequence), seen_boxes(sequence), AS_GIVEN, sequence.fps)
-    return tuple(describe_clocks(clocks, [camera.name for camera in sequence.cameras]))
+    names = [camera.name for camera in sequence.cameras]
+    return tuple(describe_clocks(clocks, names, sequence.fps))
 
 
-def _agreeing(name: str, found: tuple[CameraOffset, ...]) -> Check:
-    steps = max(abs(offset.steps) for offset in found)
-    if min(offset.sharpness for offset in found) < 3.0:
-        told = "no camera is seen to be late; too little moves to be sure of all of them"
-        return good(name, told)
-    if steps >= LEAST_STEPS:
-        return absent(
-            name, f"they agree best {steps:.1f} frames apart, but not by enough to be sure"
-        )
-    return good(name, f"to within {max(steps, 0.1):.1f} frames")
+def _agreeing(name: str, found: tuple[CameraOffset, ...], unconfirmed: Unconfirmed | None) -> Check:
+    """Of which cameras it is known that they show the same moments, and of which it is not.
+
+    Args:
+        name: Of the check.
+        found: How late each camera is, as far as that can be told.
+        unconfirmed: What the boxes do not confirm; None without boxes.
+    """
+    apart = () if unconfirmed is None else (*unconfirmed.without, *unconfirmed.doubtful)
+    rest = [offset for offset in found if offset.camera not in apart]
+    if unconfirmed is not None and len(rest) < 2:
+        return absent(name, unconfirmed.others or "too few cameras agree to compare their moments")
+    steps = max(abs(offset.steps) for offset in rest)
+    sharp = min(offset.sharpness for offset in rest) >= _LEAST_SHARP
+    if sharp and steps < LEAST_STEPS:
+        words = f"to within {max(steps, 0.1):.1f} frames"
+    elif unconfirmed is not None:
+        words = "no camera is seen to be late"
+    else:
+        return absent(name, "too little moves to tell")
+    if apart:
+        words = f"{listed([offset.camera for offset in rest])}: {words}"
+    if unconfirmed is not None and unconfirmed.others:
+        return absent(name, f"{words}; {unconfirmed.others}")
+    return good(name, words)
 
 
 def check_counting(sequence: Sequence, *, places: bool = True) -> Check:
@@ -108,10 +135,10 @@ def check_counting(sequence: Sequence, *, places: bool = True) -> Check:
         )
     behind = steps_behind_truth(sequence) if places else ()
     late = float(np.median(behind)) if behind else 0.0
-    # one camera may be late for other reasons: counting is the same in all
+    # one camera may be late for other reasons: counting is the same in all, and by one step
     for side, when, right in ((1.0, "before", "1"), (-1.0, "later", "0")):
-        apart = [side * steps for steps in behind]
-        if len(behind) > 1 and min(apart) > 0.4 and abs(late - side) < 0.4:
+        near = all(abs(steps - side) < 0.6 for steps in behind)
+        if len(behind) > 1 and near and abs(late - side) < 0.4:
             return warning(
                 name,
                 f"boxes show people as they are {abs(late):.1f} steps {when}, by the ground truth: "

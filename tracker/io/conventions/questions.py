@@ -226,30 +226,76 @@ def rearranged(
     return [replace(raw, name=name) for raw, name in zip(changed, names, strict=True)], found
 
 
-def describe_clocks(clocks: Mapping[int, ClockFit], names: Sequence[str]) -> list[str]:
-    """Return a sentence for each camera whose clock jumps or drifts."""
+_TIMES = "give the time of each frame: timestamps in sequence.toml"
+
+
+def describe_clocks(clocks: Mapping[int, ClockFit], names: Sequence[str], fps: float) -> list[str]:
+    """Return a sentence for each camera that lost frames, or whose clock drifts.
+
+    Args:
+        clocks: Those that are not as the others', by camera.
+        names: Of the cameras.
+        fps: Steps a second.
+    """
     return [
-        f"{names[camera]}: about step {fit.jump} its clock jumps by {fit.ends - fit.begins} steps, "
-        f"or it drifts: it is late by {fit.begins} in the first third of the recording and by "
-        f"{fit.ends} in the last; frames were lost, or its rate is another one: give the time of "
-        "each frame, timestamps in sequence.toml"
-        for camera, fit in clocks.items()
-        if not fit.steady
+        f"{names[camera]}: {_uneven(clock, fps)}; {_TIMES}"
+        for camera, clock in clocks.items()
+        if not clock.steady
     ]
 
 
+def _uneven(clock: ClockFit, fps: float) -> str:
+    """What a clock that jumps or drifts does, in words."""
+    if clock.drifts is not None:
+        first, last = clock.drifts
+        rate = fps * (1.0 + (clock.ends - clock.begins) / max(last - first, 1))
+        return (
+            f"its clock drifts: it is {_late(clock.begins, fps)} at step {first} and "
+            f"{_late(clock.ends, fps)} at step {last}, as if it had {rate:.4g} frames a second in "
+            f"place of {fps:.4g}"
+        )
+    assert clock.jump is not None
+    own = clock.jump + clock.begins
+    lost = clock.begins - clock.ends
+    before = f"; before, it is {_late(clock.begins, fps)}" if abs(clock.begins) > 1 else ""
+    if lost > 0:
+        return (
+            f"it lost about {lost} frames ({lost / fps:.2f} s) before its frame {own} "
+            f"({own / fps:.1f} s), and is ahead of the others from there on{before}"
+        )
+    return (
+        f"from its frame {own} ({own / fps:.1f} s) on it is {-lost} frames ({-lost / fps:.2f} s) "
+        f"behind: it has frames twice, or paused{before}"
+    )
+
+
+def _late(steps: int, fps: float) -> str:
+    words = "late" if steps >= 0 else "early"
+    return f"{abs(steps)} steps ({abs(steps) / fps:.2f} s) {words}"
+
+
 class Unconfirmed(NamedTuple):
-    """Sentences on cameras whose boxes nothing confirms to show the others' moments."""
+    """Cameras whose boxes nothing confirms to show the others' moments, and sentences on them."""
 
     alone: str
-    """Those whose boxes agree with those of no other camera; empty where there are none."""
+    """On those whose boxes agree with those of no other camera; empty where there are none."""
     others: str
-    """Those whose boxes agree, but as well with those of other moments; empty likewise."""
+    """On those whose boxes agree, but as well with those of other moments; empty likewise."""
+    without: tuple[str, ...]
+    """The names of the former."""
+    doubtful: tuple[str, ...]
+    """The names of the latter."""
 
 
-def describe_unconfirmed(verdict: Verdict, names: Sequence[str]) -> Unconfirmed:
+def describe_unconfirmed(verdict: Verdict, names: Sequence[str], fps: float) -> Unconfirmed:
     """Describe the cameras that nothing confirms: an import and the check of what it wrote say it
-    in these words."""
+    in these words.
+
+    Args:
+        verdict: What the boxes tell.
+        names: Of the cameras.
+        fps: Steps a second.
+    """
     confirmed = verdict.confirmed
     failing = [
         camera
@@ -261,13 +307,18 @@ def describe_unconfirmed(verdict: Verdict, names: Sequence[str]) -> Unconfirmed:
     alone = [c for c in failing if log_odds(evidence.of_camera(c), nothing) < DECISIVE]
     if 2 * len(failing) >= len(confirmed):
         alone = []  # it is not known which of them are the ones that do not belong
-    rest = [names[c] for c in failing if c not in alone]
+    without = tuple(names[c] for c in alone)
+    rest = tuple(names[c] for c in failing if c not in alone)
+    shows = "it shows" if len(rest) == 1 else "they show"
+    moments = "the same moments" if len(rest) == len(confirmed) else "the moments of the others"
     return Unconfirmed(
-        f"{', '.join(names[c] for c in alone)}: boxes agree with those of no other camera: "
-        "another recording, a camera that was moved, or late by more than 10 s"
-        if alone
+        f"{', '.join(without)}: boxes agree with those of no other camera: another recording, a "
+        f"camera that was moved, or late by more than {verdict.reach / fps:.2g} s"
+        if without
         else "",
-        f"{', '.join(rest)}: nothing confirms that these show the same moments" if rest else "",
+        f"{', '.join(rest)}: nothing confirms that {shows} {moments}" if rest else "",
+        without,
+        rest,
     )
 
 

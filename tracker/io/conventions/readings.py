@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 from typing import get_args
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
 from tracker.geometry.camera import Camera
@@ -57,6 +57,9 @@ _SAME_SIZE = 0.05
 """By how much the sides of a picture may differ from thousand pixels that lead to one scene with
 boxes in thousandths."""
 
+LEAST_SCORE = 0.3
+"""The score of a box below which it is not compared."""
+
 EVERY_ORDER = 4
 """Up to so many cameras every exchange is tried, above that one pair at a time."""
 
@@ -73,6 +76,19 @@ class Seen:
         """Some of the boxes, by their index once they are sorted by step."""
         rows = np.argsort(self.frames, kind="stable")[chosen]
         return Seen(self.frames[rows], self.four[rows])
+
+
+def compared(scores: Float[ndarray, " D"]) -> Bool[ndarray, " D"]:
+    """Which boxes of a camera are compared: an import and the check of what it wrote take the same.
+
+    Args:
+        scores: Of its boxes, 0 … 1.
+
+    Returns:
+        Those of at least :data:`LEAST_SCORE`; all where none has as much.
+    """
+    sure = scores >= LEAST_SCORE
+    return np.asarray(sure if sure.any() else ~sure)
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,10 +11,9 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from collections.abc import Sequence as Many
 from dataclasses import dataclass, field, replace
-from functools import partial
 from typing import Literal
 
 import cv2
@@ -107,7 +106,7 @@ class Verdict:
     kind: Literal["decided", "open", "none", "unproven"]
     """Unproven: there are too few boxes to tell anything."""
     best: Interpretation
-    judge: Judge
+    likelihood: Likelihood
     rival: Interpretation | None = None
     """The likeliest one that leads to another scene."""
     odds: float = math.inf
@@ -120,8 +119,20 @@ class Verdict:
     """Angles, radians, by which cameras have to be turned for their boxes to meet the others'."""
     compared: tuple[Interpretation, ...] = ()
     """Those that were compared by all moments; all others were far behind."""
-    clocks_at: Callable[[float], Mapping[int, ClockFit]] = lambda fps: {}
-    """The clocks by the number of steps a second, where that becomes known later."""
+    reach: int = 0
+    """The largest lag, steps, that was sought of a camera whose moments are not confirmed."""
+
+    @property
+    def judge(self) -> Judge:
+        """What judges readings by the boxes that meet."""
+        return self.likelihood.judge
+
+    def at_rate(self, fps: float) -> Verdict:
+        """The same with the clocks that are found at a number of steps a second."""
+        confirmed = confirm_moments(self.likelihood, self.best)
+        clocks = fit_clocks(self.likelihood, self.best, confirmed, fps)
+        reach = _reach(self.likelihood.moments, fps, _WIDEST)
+        return replace(self, confirmed=confirmed, clocks=clocks, reach=reach)
 
     def excludes(self, reading: Reading) -> bool:
         """Whether the best one is decided over a reading."""
@@ -136,18 +147,45 @@ class Verdict:
 class ClockFit:
     """How late a camera is, steps: it shows later what the others show at a step."""
 
-    late: int
     begins: int
-    """In the first third of the recording."""
+    """At the first moment."""
     ends: int
-    """In the last third."""
-    jump: int
-    """The step at which it changes from one to the other, if it does so at once."""
+    """At the last moment."""
+    jump: int | None = None
+    """The step of the others from which it is late by ``ends``, where its clock jumps."""
+    drifts: tuple[int, int] | None = None
+    """The first and the last moment, where its clock drifts from one to the other."""
 
     @property
     def steady(self) -> bool:
         """Whether the clock goes as those of the others."""
         return self.begins == self.ends
+
+    @property
+    def late(self) -> int:
+        """The steps by which a steady clock is late; 0 for another one."""
+        return self.begins if self.steady else 0
+
+    def frames(self, steps: Int[ndarray, " M"]) -> Int[ndarray, " M"]:
+        """Return the camera's frame at each step of the others; −1 where it lost that frame."""
+        if self.drifts is not None:
+            lags = self.begins + (self.ends - self.begins) * (steps - self.drifts[0]) / max(
+                self.drifts[1] - self.drifts[0], 1
+            )
+            return np.asarray(steps + np.round(lags).astype(np.int64))
+        if self.jump is None:
+            return np.asarray(steps + self.begins)
+        resumes = self.jump + max(0, self.begins - self.ends)
+        after = np.where(steps < resumes, -1, steps + self.ends)
+        return np.where(steps < self.jump, steps + self.begins, after)
+
+    def of_the_other(self) -> ClockFit:
+        """Return the clock of the other one of two cameras, if this one is right."""
+        return ClockFit(
+            -self.begins, -self.ends, None if self.jump is None else self.jump + self.begins,
+            None if self.drifts is None
+            else (self.drifts[0] + self.begins, self.drifts[1] + self.ends),
+        )  # fmt: skip
 
 
 class Likelihood:
@@ -273,7 +311,7 @@ class Likelihood:
         best: Interpretation,
         camera: int,
         steps: Iterable[Int[ndarray, " M"]],
-        late: Mapping[int, int] | None = None,
+        clocks: Mapping[int, ClockFit] | None = None,
     ) -> Float[ndarray, "L M"]:
         """Evidence of the pairs with one camera by the steps at which its boxes are taken.
 
@@ -281,13 +319,12 @@ class Likelihood:
             best: The reading.
             camera: Which camera.
             steps: What of its boxes is compared with the others' at the moments.
-            late: Steps by which other cameras are late.
+            clocks: Those of other cameras that are not as the others'.
         """
         poses = self.judge.poses(best.reading)
-        late = late or {}
         at: list[Int[ndarray, " M"] | None] = [None] * len(poses)
-        for other, lag in late.items():
-            at[other] = self.moments + lag
+        for other, clock in (clocks or {}).items():
+            at[other] = clock.frames(self.moments)
         among = np.zeros((len(poses), len(poses)), dtype=bool)
         among[camera], among[:, camera] = True, True
         boxes = self.boxes_at(best.reading, poses, best.scene, at)
@@ -390,7 +427,7 @@ def find_reading(
     kind: Literal["decided", "open", "none", "unproven"]
     if not found:
         kind = "unproven" if likelihood.boxes < _MANY_BOXES else "none"
-        return Verdict(kind, likelihood.unmet(next(_readings(open_, cameras))), judge)
+        return Verdict(kind, likelihood.unmet(next(_readings(open_, cameras))), likelihood)
     best = found[0]
     others = [one for one in found[1:] if not same_scene(judge, best, one)]
     odds = [
@@ -400,26 +437,24 @@ def find_reading(
     nearest = int(np.argmin(odds)) if odds else -1
     rival = others[nearest] if others else None
     least = odds[nearest] if odds else math.inf
-    confirmed = confirm_moments(likelihood, best)
-    clocks_at = partial(_clocks_at, likelihood, best, dict(confirmed))
-    clocks = fit_clocks(likelihood, best, confirmed, fps)
     nothing = log_odds(best.evidence.by_moment, np.zeros(len(likelihood.moments)))
     kind = "decided" if least >= DECISIVE else "open"
     if likelihood.boxes < _MANY_BOXES and nothing < DECISIVE:
         kind = "unproven"
     elif best.evidence.share < _LEAST_SHARE or nothing < DECISIVE:
         kind = "none"
+    verdict = Verdict(kind, best, likelihood, rival, least, compared=(*found,)).at_rate(fps)
     moved: dict[int, float] = {}
     if kind == "decided":
         moved, turned = find_moved(likelihood, best)
-        late = {camera: fit.late for camera, fit in clocks.items() if fit.late and fit.steady}
+        late = {camera: fit.late for camera, fit in verdict.clocks.items() if fit.late}
         if moved and late:
             # boxes of other moments meet badly, as those of a turned camera do
             shifted = Likelihood(cameras, _shifted(seen, late), fps)
             timed = replace(best, evidence=shifted.of_poses(best, judge.poses(best.reading)))
             if timed.evidence.by_moment.mean() > turned.by_moment.mean():
                 moved, _ = find_moved(shifted, timed)
-    return Verdict(kind, best, judge, rival, least, confirmed, clocks, moved, (*found,), clocks_at)
+    return replace(verdict, moved=moved)
 
 
 def _shifted(seen: Many[Seen | None], late: Mapping[int, int]) -> list[Seen | None]:
@@ -668,18 +703,28 @@ def as_meant(
     return best, verdict.judge.meant(best, up, unit)
 
 
-def confirm_moments(likelihood: Likelihood, best: Interpretation) -> dict[int, float]:
+def confirm_moments(
+    likelihood: Likelihood, best: Interpretation, clocks: Mapping[int, ClockFit] | None = None
+) -> dict[int, float]:
     """Log odds by camera that its boxes show the same moments as those of the other cameras.
 
     The evidence of its pairs is compared with their mean evidence when its clock is turned by a
     quarter to three quarters of the recording: people who stand about one room agree by chance.
+
+    Args:
+        likelihood: Of the boxes.
+        best: The reading.
+        clocks: Those of cameras that are not as the others'.
     """
+    clocks = clocks or {}
     count = len(likelihood.moments)
     turns = sorted({round(share * count) for share in (0.25, 0.4, 0.5, 0.6, 0.75)} - {0, count})
     found = {}
     for camera in sorted({camera for pair in best.evidence.terms for camera in pair}):
-        rolled = [np.roll(likelihood.moments, -turn) for turn in (0, *turns)]
-        nats = likelihood.of_camera(best, camera, rolled)
+        own = clocks.get(camera, ClockFit(0, 0)).frames(likelihood.moments)
+        rolled = [np.roll(own, -turn) for turn in (0, *turns)]
+        others = {other: clock for other, clock in clocks.items() if other != camera}
+        nats = likelihood.of_camera(best, camera, rolled, others)
         found[camera] = log_odds(nats[0], nats[1:].mean(axis=0)) if turns else 0.0
     return found
 
@@ -757,12 +802,6 @@ def turn_pose(own: Pose, turn: Float[ndarray, " 3"]) -> Pose:
     return replace(own, rotation=cv2.Rodrigues(turn)[0] @ own.rotation)
 
 
-def _clocks_at(
-    likelihood: Likelihood, best: Interpretation, confirmed: Mapping[int, float], fps: float
-) -> dict[int, ClockFit]:
-    return fit_clocks(likelihood, best, dict(confirmed), fps)
-
-
 def clocks_by(
     cameras: Many[RawCamera], seen: Many[Seen | None], reading: Reading, fps: float
 ) -> dict[int, ClockFit]:
@@ -783,19 +822,24 @@ def clocks_by(
     return fit_clocks(likelihood, best, confirm_moments(likelihood, best), fps)
 
 
+def _reach(moments: Int[ndarray, " M"], fps: float, seconds: float) -> int:
+    """The largest lag, steps, that is sought: of a longer one than a third of the recording a third
+    has nothing to compare."""
+    return min(round(seconds * fps), int(np.ptp(moments)) // 3)
+
+
 def fit_clocks(
     likelihood: Likelihood, best: Interpretation, confirmed: dict[int, float], fps: float
 ) -> dict[int, ClockFit]:
     """Find the cameras that are late, or whose clocks jump or drift, by the same evidence.
 
-    A camera whose moments are confirmed is searched 3 s around, the others 10 s, none by more than
-    a third of the recording: of a longer lag a third has nothing to compare. Every camera that is
-    shifted pays the logarithm of the number of lags, and at most half of them are shifted.
+    A camera whose moments are confirmed is searched 3 s around, the others 10 s. Every camera that
+    is shifted pays the logarithm of the number of lags, and at most half of them are shifted.
 
     Args:
         likelihood: Of the boxes.
         best: The reading.
-        confirmed: Log odds by camera; those of a camera that is shifted are set to its own.
+        confirmed: Log odds by camera; where a clock is another one, they are set to those with it.
         fps: Steps a second.
     """
     found: dict[int, ClockFit] = {}
@@ -806,45 +850,128 @@ def fit_clocks(
     for camera in by_doubt:
         if not third or len(found) > (len(confirmed) - 1) // 2:
             break
-        late = {other: fit.late for other, fit in found.items()}
-        reach = round((_NEAR if confirmed[camera] >= DECISIVE else _WIDEST) * fps)
-        reach = min(reach, int(np.ptp(likelihood.moments)) // 3)
+        widest = _NEAR if confirmed[camera] >= DECISIVE else _WIDEST
+        reach = _reach(likelihood.moments, fps, widest)
         lags = coarse * np.arange(-(reach // coarse), reach // coarse + 1)
-        nats = likelihood.of_camera(best, camera, likelihood.moments + lags[:, None], late)
+        nats = likelihood.of_camera(best, camera, likelihood.moments + lags[:, None], found)
         usual = np.mean(nats, axis=0)
         parts = (slice(None), slice(None, third), slice(-third, None))
         peaks = [int(np.argmax(nats[:, part].sum(axis=1))) for part in parts]
         here = len(lags) // 2
-        first, last = nats[peaks[1]], nats[peaks[2]]
         penalty = math.log(len(lags))
-        jumps = abs(peaks[1] - peaks[2]) > 1 and all(
-            log_odds(own[part], other[part]) >= DECISIVE + penalty
-            for own, other, part in ((first, last, parts[1]), (last, first, parts[2]))
+        line = _line(likelihood.moments, nats)
+        along = nats[line, np.arange(len(line))]
+        uneven = abs(peaks[1] - peaks[2]) > 1 and any(
+            _differ(first, last, nats[peaks[1]], nats[peaks[2]], third, penalty)
+            for first, last in ((nats[peaks[1]], nats[peaks[2]]), (along, along))
         )
         moved = nats[peaks[0]]
         clear = min(log_odds(moved, usual), log_odds(moved, nats[here])) >= DECISIVE + penalty
-        if jumps:
+        if uneven:
             begins, ends = (
-                _fine(likelihood, best, camera, int(lags[peak]), coarse, late, part)
+                _fine(likelihood, best, camera, int(lags[peak]), coarse, found, part)
                 for peak, part in zip(peaks[1:], parts[1:], strict=True)
             )
-            jump = _jump(likelihood, best, camera, begins, ends, late)
-            at = int(np.searchsorted(likelihood.moments, jump))
-            begins = _fine(likelihood, best, camera, begins, coarse, late, slice(None, at))
-            ends = _fine(likelihood, best, camera, ends, coarse, late, slice(at, None))
-            jump = _jump(likelihood, best, camera, begins, ends, late)
-            found[camera] = ClockFit(0, begins, ends, jump)
+            slope = int(lags[line[0]]), int(lags[line[-1]])
+            tried = [
+                _jumping(likelihood, best, camera, begins, ends, coarse, found),
+                _drifting(likelihood, best, camera, slope, coarse, found),
+            ]
+            found[camera] = max(tried, key=lambda own: _nats(likelihood, best, camera, own, found))
         elif peaks[0] != here and clear:
             lag = int(lags[peaks[0]])
-            steps = _fine(likelihood, best, camera, lag, coarse, late, slice(None))
-            found[camera] = ClockFit(steps, steps, steps, 0)
-            confirmed[camera] = log_odds(moved, usual)
+            steps = _fine(likelihood, best, camera, lag, coarse, found, slice(None))
+            found[camera] = ClockFit(steps, steps)
+    if len(confirmed) == 2 and found:
+        # frames are lost more often than any are there twice
+        ((camera, clock),) = found.items()
+        if clock.jump is not None and clock.ends > clock.begins:
+            (other,) = set(confirmed) - {camera}
+            found = {other: clock.of_the_other()}
+    if found:
+        confirmed.update(confirm_moments(likelihood, best, found))
     return found
+
+
+def _differ(
+    first: Float[ndarray, " M"], last: Float[ndarray, " M"],
+    by_first: Float[ndarray, " M"], by_last: Float[ndarray, " M"], third: int, penalty: float,
+) -> bool:  # fmt: skip
+    """Whether a clock is another one in the first third than in the last: in each of them the other
+    one's lag is wrong.
+
+    Args:
+        first: Evidence by moment of the clock that is supposed in the first third.
+        last: That of the last third.
+        by_first: That of the best constant lag of the first third.
+        by_last: That of the last third.
+        third: The number of moments in each.
+        penalty: What each of the two lags pays, nats.
+    """
+    better = first[:third] - by_last[:third], last[-third:] - by_first[-third:]
+    nothing = np.zeros(third)
+    each = min(log_odds(own, nothing) for own in better)
+    both = log_odds(np.concatenate(better), np.zeros(2 * third))
+    return each >= DECISIVE and both >= DECISIVE + 2.0 * penalty
+
+
+def _nats(
+    likelihood: Likelihood, best: Interpretation, camera: int, clock: ClockFit,
+    clocks: Mapping[int, ClockFit],
+) -> float:  # fmt: skip
+    """Evidence of the pairs with a camera by its clock."""
+    steps = clock.frames(likelihood.moments)
+    return float(likelihood.of_camera(best, camera, [steps], clocks).sum())
+
+
+def _jumping(
+    likelihood: Likelihood, best: Interpretation, camera: int, begins: int, ends: int, reach: int,
+    clocks: Mapping[int, ClockFit],
+) -> ClockFit:  # fmt: skip
+    """The clock that jumps from about one lag to about another."""
+    jump = _jump(likelihood, best, camera, begins, ends, clocks)
+    at = int(np.searchsorted(likelihood.moments, jump))
+    begins = _fine(likelihood, best, camera, begins, reach, clocks, slice(None, at))
+    ends = _fine(likelihood, best, camera, ends, reach, clocks, slice(at, None))
+    return ClockFit(begins, ends, _jump(likelihood, best, camera, begins, ends, clocks))
+
+
+def _line(moments: Int[ndarray, " M"], nats: Float[ndarray, "L M"]) -> Int[ndarray, " M"]:
+    """The index of the lag at each moment, on the line through the lags that has most evidence."""
+    count = len(nats)
+    along = (moments - moments[0]) / max(int(np.ptp(moments)), 1)
+    columns = np.arange(len(moments))
+    best, most = np.zeros(len(moments), dtype=np.int64), -math.inf
+    for begins in range(count):
+        slopes = np.arange(count)[:, None] - begins
+        rows = np.round(begins + slopes * along).astype(np.int64)
+        totals = nats[rows, columns].sum(axis=1)
+        ends = int(np.argmax(totals))
+        if totals[ends] > most:
+            best, most = rows[ends], float(totals[ends])
+    return best
+
+
+def _drifting(
+    likelihood: Likelihood, best: Interpretation, camera: int, about: tuple[int, int], reach: int,
+    clocks: Mapping[int, ClockFit],
+) -> ClockFit:  # fmt: skip
+    """The clock that drifts from about one lag at the first moment to about another at the last."""
+    moments = likelihood.moments
+    own = ClockFit(*about, drifts=(int(moments[0]), int(moments[-1])))
+    for _ in range(2):
+        for part in ("begins", "ends"):
+            near = range(getattr(own, part) - reach, getattr(own, part) + reach + 1)
+            tried = [replace(own, **{part: lag}) for lag in near]
+            rows = [each.frames(moments) for each in tried]
+            nats = likelihood.of_camera(best, camera, rows, clocks).sum(axis=1)
+            own = tried[int(np.argmax(nats))]
+    return own
 
 
 def _jump(
     likelihood: Likelihood, best: Interpretation, camera: int, begins: int, ends: int,
-    late: Mapping[int, int],
+    clocks: Mapping[int, ClockFit],
 ) -> int:  # fmt: skip
     """The step from which a camera's boxes are explained no more by its first lag: sought among the
     moments, then among all steps of the moments around. Of the steps whose frames the camera lost
@@ -854,7 +981,7 @@ def _jump(
     for dense in (False, True):
         some = likelihood if not dense else likelihood.of_moments(moments)
         steps = moments + np.array([[begins], [ends]])
-        first, last = some.of_camera(best, camera, steps, late)
+        first, last = some.of_camera(best, camera, steps, clocks)
         before, after = np.append(0.0, np.cumsum(first)), np.append(np.cumsum(last[::-1])[::-1], 0)
         resumed = np.searchsorted(moments, moments + max(0, begins - ends))
         jump = int(moments[int(np.argmax(before[:-1] + after[resumed]))])
@@ -865,9 +992,9 @@ def _jump(
 
 def _fine(
     likelihood: Likelihood, best: Interpretation, camera: int, lag: int, reach: int,
-    late: Mapping[int, int], part: slice,
+    clocks: Mapping[int, ClockFit], part: slice,
 ) -> int:  # fmt: skip
     """The best lag around one, step by step, in a part of the recording."""
     lags = np.arange(lag - reach, lag + reach + 1)
-    nats = likelihood.of_camera(best, camera, likelihood.moments + lags[:, None], late)
+    nats = likelihood.of_camera(best, camera, likelihood.moments + lags[:, None], clocks)
     return int(lags[int(np.argmax(nats[:, part].sum(axis=1)))])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -24,6 +25,11 @@ _OTHER = {
     "opencv": "opengl",
     "opengl": "opencv",
 }
+
+
+def unsaid(notes: Sequence[str], checks: Sequence[Check]) -> list[str]:
+    """The notes of an import that no check of what it wrote says as well."""
+    return [note for note in notes if not any(note in one.sentence for one in checks)]
 
 
 def for_import(check: Check, reading: Reading) -> Check:

@@ -37,7 +37,7 @@ from tracker.io.conventions.questions import (
     rearranged,
 )
 from tracker.io.conventions.reading import Reading, read_boxes, to_camera
-from tracker.io.conventions.readings import Open, Seen
+from tracker.io.conventions.readings import Open, Seen, compared
 from tracker.io.conventions.search import ClockFit, Verdict, as_meant, find_reading
 from tracker.io.importing.arriving import short_videos
 from tracker.io.importing.finding.angles import check_turns, chosen_turns, turns_in_words
@@ -46,6 +46,7 @@ from tracker.io.importing.finding.geometry import check_lenses, check_places, re
 from tracker.io.importing.finding.matching import (
     Matched,
     MatchedCamera,
+    first_of,
     match_all,
     matched_by,
     nothing_of,
@@ -166,8 +167,7 @@ def settle(taken: Sequence[ParsedFiles], options: ImportOptions | None = None) -
     )
     names = [raw.name for raw in raws]
     _exchange_found([*cameras, *unused], verdict)
-    clocks = {} if verdict is None else verdict.clocks
-    late = _late(clocks, names, options)
+    late = {} if verdict is None else _late(verdict.clocks, names, options)
     if late:
         shifted = _shifted(options, late, times.fps)
         times = settle_times(cameras, matched.truths, shifted, [])
@@ -187,12 +187,15 @@ def settle(taken: Sequence[ParsedFiles], options: ImportOptions | None = None) -
         fps, why = rate_of(settled, at_steps)
         found.append(("fps", f"{fps:g}, {why}, since no file says it; --fps"))
         if verdict is not None:
-            clocks = verdict.clocks_at(fps)
-            late = _late(clocks, names, options)
+            verdict = verdict.at_rate(fps)
+            late = _late(verdict.clocks, names, options)
         shifted = _shifted(options, late, fps).model_copy(update={"fps": fps})
         times = settle_times(cameras, matched.truths, shifted, [])
         at_steps = _at_steps(detections, times)
-    told += describe_clocks(clocks, names)
+    if verdict is not None:
+        unconfirmed = describe_unconfirmed(verdict, names, times.fps)
+        told += filter(None, (unconfirmed.alone, unconfirmed.others))
+        told += describe_clocks(verdict.clocks, names, times.fps)
     for name, steps in late.items():
         how = f"{steps / times.fps:.2f} s late ({steps} steps, within 1)"
         found.append((f"{name} clock", f"{how}, since boxes meet so"))
@@ -229,10 +232,19 @@ def settle(taken: Sequence[ParsedFiles], options: ImportOptions | None = None) -
         matched.format,
         reading,
         tuple(found),
-        tuple(told),
+        tuple(_summed_up(told)),
         _sources(matched),
         open_[0] if open_ else None,
     )
+
+
+def _summed_up(told: Sequence[str]) -> list[str]:
+    """Sentences, those that say the same of several files or cameras as one."""
+    names: dict[str, list[str]] = {}
+    for sentence in told:
+        name, colon, words = sentence.partition(": ")
+        names.setdefault(words if colon else sentence, []).extend([name] if colon else [])
+    return [f"{first_of(own)}: {words}" if own else words for words, own in names.items()]
 
 
 def _sources(matched: Matched) -> frozenset[Path]:
@@ -273,7 +285,7 @@ def _late(
     return {
         names[camera]: clock.late
         for camera, clock in clocks.items()
-        if clock.late and clock.steady and names[camera] not in options.offsets
+        if clock.late and names[camera] not in options.offsets
     }
 
 
@@ -566,7 +578,6 @@ def _read(
         found += told_
         if len(verdict.confirmed) == 2 and verdict.kind == "decided":
             told.append(OF_TWO)
-        told += filter(None, describe_unconfirmed(verdict, [raw.name for raw in raws]))
         told += describe_moved(verdict.moved, [raw.name for raw in raws])
     if any(raw.turns for raw in raws):
         found.append(("angles", f"{turns_in_words(reading.turns)}, {why}; --euler"))
@@ -647,7 +658,8 @@ def _pixels(raws: Sequence[RawCamera], seen: Sequence[Seen | None]) -> tuple[flo
 
 def _seen(own: Detections, time: CameraTime) -> Seen:
     steps = time.steps_of(own.frames)
-    return Seen(steps[steps >= 0], own.boxes[steps >= 0])
+    kept = (steps >= 0) & compared(own.scores)
+    return Seen(steps[kept], own.boxes[kept])
 
 
 def _detections(own: _Boxes | None) -> Detections | None:

@@ -335,21 +335,34 @@ def only_people(
     keep = (people(classes) if wanted is None else wanted) & is_box
     if keep.all():
         return piece
-    others = Counter(
+    others = [
         one if there else "without a box"
         for one, kept, there in zip(classes, keep, is_box, strict=True)
         if not kept
-    )
-    listed = ", ".join(f"{count} {name}".strip() for name, count in others.most_common(_LISTED))
-    out = int((~keep).sum())
+    ]
     return replace(
         piece,
         frames=piece.frames[keep],
         boxes=piece.boxes[keep],
         scores=piece.scores[keep],
         keypoints=None if piece.keypoints is None else piece.keypoints[keep],
-        left_out=f"{file.where}: {out} of {len(keep)} rows ({out / len(keep):.0%}) are left out, "
-        f"which are no boxes of people ({listed}{' …' if len(others) > _LISTED else ''})",
+        left_out=no_people(file, others, len(keep)),
+    )
+
+
+def no_people(file: SourceFile, others: Sequence[str], rows: int) -> str:
+    """Describe the rows of a file that are left out, since they are no boxes of people.
+
+    Args:
+        file: The file.
+        others: What each of these rows is of.
+        rows: The number of all rows.
+    """
+    counts = Counter(others)
+    listed = ", ".join(f"{count} {name}".strip() for name, count in counts.most_common(_LISTED))
+    return (
+        f"{file.where}: {len(others)} of {rows} rows ({100 * len(others) / rows:.0f} %) are left "
+        f"out, which are no boxes of people ({listed}{' …' if len(counts) > _LISTED else ''})"
     )
 
 
@@ -431,8 +444,8 @@ def _with_frames(
         key: [cells[k] for k in np.flatnonzero(whole).tolist()] for key, cells in columns.items()
     }
     return kept, (
-        f"{file.where}, {name}: {out} of {rows} rows ({out / rows:.2%}) are left out, the first in "
-        f"{words} {shown(columns[name][row])}"
+        f"{file.where}, {name}: {out} of {rows} rows ({100 * out / rows:.2f} %) are left out, the "
+        f"first in {words} {shown(columns[name][row])}"
     )
 
 

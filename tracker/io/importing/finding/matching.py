@@ -124,7 +124,7 @@ def match_all(
         left = [c.raw.name for c in cameras if c not in used]
         told.append(
             f"{len(left)} cameras of {chosen.label} have neither video nor boxes and are left out: "
-            f"{_first(left)}"
+            f"{first_of(left)}"
         )
     spare = [c for c in cameras if used and c not in used]
     return Matched(used or cameras, chosen.format, truths, told, chosen.sources, spare)
@@ -278,14 +278,15 @@ def _of_no_camera(labels: Sequence[str], cameras: Sequence[MatchedCamera]) -> li
     """One sentence on all files that belong to no camera; none where there are none."""
     if not labels:
         return []
-    known = _first([camera.raw.name for camera in cameras])
+    known = first_of([camera.raw.name for camera in cameras])
     belong = "belongs" if len(labels) == 1 else "belong"
     return [
-        f"{_first(labels)}: {belong} to no camera of the calibration ({known}); --camera NAME=FILE"
+        f"{first_of(labels)}: {belong} to no camera of the calibration ({known}); "
+        "--camera NAME=FILE"
     ]
 
 
-def _first(names: Sequence[str]) -> str:
+def first_of(names: Sequence[str]) -> str:
     """The first names of a list, and whether there are more."""
     return f"{', '.join(names[:_NAMED])}{' …' if len(names) > _NAMED else ''}"
 

@@ -273,6 +273,9 @@ def _rate(
         pieces = [c.detections for c in cameras if c.detections is not None]
         rates = [own.fps for own in pieces if own.fps is not None]
         rates += [truth.fps for _, truth in truths if truth.fps is not None]
+        if rates:
+            rate = sorted(rates)[len(rates) // 2]
+            found.append(("fps", f"{rate:g}, by the files of boxes or truth; --fps"))
     if not rates:
         return None
     fps = sorted(rates)[len(rates) // 2]
@@ -347,9 +350,11 @@ def told_beyond(piece: DetectionPiece, first: int, frames: int) -> str:
             f"{piece.source.name}: {behind} of {len(steps)} boxes are of frame {frames}, the one "
             f"after the last of {frames}, so frames are counted from 1: --first-index 1"
         )
+    where = [f"before frame {first}, the first"] if before else []
+    where += [f"after frame {first + frames - 1}, the last"] if behind else []
     return (
-        f"{piece.source.name}: {before + behind} of {len(steps)} boxes are of frames outside the "
-        f"{frames} of the pictures; --first-index says where counting begins"
+        f"{piece.source.name}: {before + behind} of {len(steps)} boxes are left out: of frames "
+        f"{' and '.join(where)} of the recording"
     )
 
 

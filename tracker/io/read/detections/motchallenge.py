@@ -11,13 +11,13 @@ Source: Milan et al., "MOT16: A benchmark for multi-object tracking", arXiv 1603
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from tracker.io.read.columns import decimal_points, to_unit
+from tracker.io.read.columns import decimal_points, no_people, to_unit
 from tracker.io.read.pieces import DetectionPiece, Piece, TruthPiece
 from tracker.io.read.protocol import Certainty, Kind
 from tracker.io.read.source import SourceFile
@@ -84,8 +84,19 @@ def read(file: SourceFile) -> Iterator[Piece]:
         return
     keep = np.ones(len(table), dtype=bool)
     scores = np.ones(len(table))
+    left_out = ""
     if is_truth:
-        keep = (table[:, 6] == 1.0) & np.isin(table[:, 7], _people(file))
+        labels = _labels(file)
+        named = [n for n, name in labels.items() if name.lower() in _PEOPLE_WORDS]
+        of_people = np.isin(table[:, 7], named or PEOPLE)
+        keep = (table[:, 6] == 1.0) & of_people
+        others = [
+            "with 0 in column 7, not to count"
+            if person
+            else labels.get(int(number)) or f"of class {number:.0f}"
+            for number, person in zip(table[~keep, 7], of_people[~keep], strict=True)
+        ]
+        left_out = no_people(file, others, len(table)) if others else ""
     elif columns >= 7:
         scores = to_unit(table[:, 6])
         if not scores.any():  # a tracker that writes none
@@ -108,7 +119,7 @@ def read(file: SourceFile) -> Iterator[Piece]:
         scores=scores[keep],
         layout="ltwh",
         first_index=1 if first else 0,
-        left_out=_left_out(file, table, keep),
+        left_out=left_out,
     )
     if placed.any():
         yield TruthPiece(
@@ -122,27 +133,14 @@ def read(file: SourceFile) -> Iterator[Piece]:
         )
 
 
-def _people(file: SourceFile) -> tuple[int, ...]:
-    """The classes of people: those that the labels beside the file call so, else the usual ones."""
+def _labels(file: SourceFile) -> Mapping[int, str]:
+    """The names of the classes by their numbers, of the labels beside the file."""
     labels = file.path.parent / LABELS
     if labels.is_symlink() or not labels.is_file() or labels.stat().st_size > _MOST_LABELS:
-        return PEOPLE
+        return {}
     file.companions.append(labels)
     names = labels.read_text("utf-8", "replace").splitlines()
-    found = [n for n, name in enumerate(names, 1) if name.strip().lower() in _PEOPLE_WORDS]
-    return tuple(found) or PEOPLE
-
-
-def _left_out(file: SourceFile, table: Float[ndarray, "N C"], keep: ndarray) -> str:
-    """A sentence about rows that are no boxes of people; empty where all are."""
-    out = int((~keep).sum())
-    if not out:
-        return ""
-    classes = sorted({int(number) for number in table[~keep, 7]})
-    return (
-        f"{file.where}: {out} of {len(table)} rows are left out: of classes that are no people "
-        f"({', '.join(map(str, classes[:8]))}), or with 0 in column 7, which is not to count"
-    )
+    return {number: name.strip() for number, name in enumerate(names, 1)}
 
 
 def _table(file: SourceFile) -> Float[ndarray, "N C"]:
