@@ -16,7 +16,7 @@ export function camerasTable(info) {
 		HEADS,
 		info.cameras.map((camera, k) => row(info, camera, k)),
 	);
-	rows.className = "cams-in";
+	rows.className = isPictured(info) ? "cams-in" : "cams-in plain";
 	const left = info.wish.left_out;
 	const words = [
 		...info.files
@@ -44,6 +44,9 @@ export function camerasTable(info) {
 export const isReady = (info, camera) =>
 	!(camera.offset?.sure || missesBoxes(info, camera) || withoutSize(camera));
 
+/** Whether any camera has pictures. @param {Info} info */
+export const isPictured = ({ cameras }) => cameras.some(({ video }) => video);
+
 /** @param {Info} info @param {Camera} camera */
 const missesBoxes = ({ cameras }, { detections }) =>
 	!detections && cameras.some((other) => other.detections);
@@ -56,17 +59,18 @@ const two = (first, second, whole = first) => [cut(first, "", whole), cut(second
 
 /** @param {Info} info @param {Camera} camera @param {number} k @returns {(Child | Child[])[]} */
 function row(info, camera, k) {
-	const { key, name, video, detections, frames } = camera;
+	const { key, name, video, detections, frames, calibration_of: of } = camera;
 	// The file is named for the browser, which shows an address that it has shown before as it was.
 	const query = new URLSearchParams({ camera: key, of: video });
 	return [
 		div(
 			{ class: "pic" },
-			span(
-				{ class: "shot" },
-				span({ class: "blank" }, icon("i-folder")),
-				video && h("img", { src: `/api/import/${info.key}/picture?${query}`, alt: "" }),
-			),
+			isPictured(info) &&
+				span(
+					{ class: "shot" },
+					span({ class: "blank" }, icon("i-boxes")),
+					video && h("img", { src: `/api/import/${info.key}/picture?${query}`, alt: "" }),
+				),
 			field(`in-name-${k}`, `Name of ${key}`, name, { names: { [key]: "$" } }, { maxlength: 60 }),
 		),
 		two(
@@ -74,15 +78,19 @@ function row(info, camera, k) {
 			`${frames ? `${frames} frames · ${show(camera.fps)} fps · ` : ""}${camera.width} × ${camera.height}`,
 		),
 		two(
-			camera.calibration,
-			camera.calibration_of === key
-				? `${key} · ${info.unit} → m`
-				: `that of ${camera.calibration_of} · ${info.unit} → m`,
+			short(info, "calibration", camera),
+			[
+				of !== key ? `that of ${of}` : key !== name && key,
+				info.unit === "m" ? "in metres" : `${info.unit} → m`,
+			]
+				.filter(Boolean)
+				.join(" · "),
+			`${camera.calibration}: ${camera.calibration_format}`,
 		),
 		sync(info, camera, k),
 		detections
 			? two(
-					short(info, detections),
+					short(info, "detections", camera),
 					`${show(camera.boxes_per_step)} boxes a step · ${camera.boxes_format}`,
 					detections,
 				)
@@ -94,9 +102,9 @@ function row(info, camera, k) {
 	];
 }
 
-/** A file without its folders, as far as cameras stay told apart. @param {Info} info @param {string} label */
-function short({ cameras }, label) {
-	const others = cameras.map(({ detections }) => detections).filter((other) => other !== label);
+/** A camera's file without its folders, as far as cameras stay told apart. @param {Info} info @param {"calibration" | "detections"} what @param {Camera} camera */
+function short({ cameras }, what, { [what]: label }) {
+	const others = cameras.map((camera) => camera[what]).filter((other) => other !== label);
 	return ownEnd(label, others) ?? label;
 }
 

@@ -161,6 +161,65 @@ def test_four_cameras_fit_a_small_screen(page: Page, files: Path) -> None:
     expect(page.locator("dialog.opener")).to_contain_text("Open a recording")
 
 
+@pytest.fixture
+def boxes(files: Path) -> Path:
+    """What another program left that had no videos: boxes and a calibration in metres."""
+    for file in [*files.glob("*.avi"), files / "notes.txt"]:
+        file.unlink()
+    toml(files, size=(640, 360))
+    return files
+
+
+def test_boxes_alone_are_told_of_as_boxes(flat_page: Page, boxes: Path, folder: Path) -> None:
+    """No word of videos, no conversion of metres to metres, no name of a section of a file."""
+    page, there = flat_page, folder / "data/boxes-alone"
+    shutil.copytree(boxes, there)
+    page.keyboard.press("Control+o")
+    page.locator("#open-path").fill(str(there))
+    page.keyboard.press("Enter")
+    settled(page)
+    sheet = page.locator("dialog.opener")
+    expect(sheet).to_be_focused()  # not the button Cancel, which Enter would press
+    row = sheet.locator("tbody tr").first
+    expect(row).to_contain_text("calibration.toml")
+    expect(row).to_contain_text("in metres")
+    expect(row.locator(".shot")).to_have_count(0)
+    expect(sheet).not_to_contain_text("Link")
+    expect(sheet).to_contain_text("the target is")
+    assert not re.search(r"\[\w+\]", sheet.inner_text())
+    for field, value in (("Poses", "world-to-camera"), ("Boxes", "ltwh"), ("First frame", "0")):
+        expect(sheet.get_by_label(field, exact=True).locator(":checked")).to_have_text(value)
+    page.get_by_role("button", name="Cancel").click()
+
+
+def test_the_plan_fills_its_frame_and_nothing_is_drawn_over_a_name(
+    flat_page: Page, boxes: Path
+) -> None:
+    page = flat_page
+    drop(page, boxes)
+    settled(page)
+    for size in ((1280, 720), (1440, 900), (1920, 1080)):
+        page.set_viewport_size({"width": size[0], "height": size[1]})
+        frame = page.locator(".plan").bounding_box()
+        ground = page.locator(".plan .ground").bounding_box()
+        assert frame is not None
+        assert ground is not None
+        assert ground["width"] > 0.97 * frame["width"] or ground["width"] < ground["height"]
+        assert ground["height"] > 0.97 * frame["height"], size
+        over = page.evaluate(
+            """() => {
+                const places = [...document.querySelectorAll(".plan text:not(.length)")]
+                    .map((text) => [text.textContent, text.getBoundingClientRect()]);
+                return places.flatMap(([name, one], k) => places.slice(k + 1)
+                    .filter(([_, other]) => one.left < other.right && other.left < one.right
+                        && one.top < other.bottom && other.top < one.bottom)
+                    .map(([other]) => `${name} ${other}`));
+            }"""
+        )
+        assert over == [], size
+    page.get_by_role("button", name="Cancel").click()
+
+
 @pytest.mark.data
 def test_a_folder_of_others_is_tracked(flat_page: Page, server: Server, foreign: Path) -> None:
     """From the drop to the last track, with what its makers give and nothing told."""
@@ -290,7 +349,7 @@ def test_a_foreign_recording_is_dropped_and_tracked(
     settled(page)
     sheet = page.locator("dialog.opener")
     expect(sheet.locator("tbody tr")).to_have_count(4)
-    expect(sheet.locator("tbody tr").first).to_contain_text("Qualisys")
+    expect(sheet.locator("tbody tr").first.get_by_title("Qualisys")).to_have_text("Calib.qca.txt")
     expect(sheet.locator("tbody tr").first).to_contain_text("mm → m")
     sheet.get_by_role("button", name="Import and track").click()
     server.wait(lambda now: now["sequence"]["name"].startswith("pose2sim-multi"))
