@@ -119,7 +119,7 @@ def _recording(settled: ImportPlan | None) -> dict[str, Any]:
 
 
 def _boxes(known: Known) -> dict[str, str]:
-    """How files of boxes are read: what all of them have in common, as the page's choices name it."""
+    """How files of boxes are read, as the page's choices name it, where all are read alike."""
     settled = known.settled
     pieces = [] if settled is None else [view.matched.detections for view in settled.views]
     own = [piece for piece in pieces if piece is not None and len(piece.frames)]
@@ -206,7 +206,7 @@ def _camera(view: PlannedView, known: Known) -> ImportedCamera:
 
 
 def _calibration(known: Known, settled: ImportPlan, camera: str) -> str:
-    """The file that a camera's calibration is in; its format where it is put together of several."""
+    """The file that a camera's calibration is in; its format where several make it up."""
     files = [
         (one.label, {raw.name for raw in piece.cameras})
         for one in known.taken

@@ -41,8 +41,30 @@ export function camerasTable(info) {
 }
 
 /** Whether nothing is to be decided about a camera. @param {Info} info @param {Camera} camera */
-export const isReady = (info, camera) =>
+const isReady = (info, camera) =>
 	!(camera.offset?.sure || missesBoxes(info, camera) || withoutSize(camera));
+
+/**
+ * What there is a button or a field for, to be decided; what is odd and only to be known; what is fine.
+ * @param {Info} info
+ */
+export function standing(info) {
+	const { cameras, checks, undecided } = info;
+	const of = (/** @type {Server.ImportedCheck["status"]} */ kind) =>
+		checks.filter(({ status }) => status === kind);
+	const odd = of("warning");
+	const open = odd.filter(({ mend }) => mend);
+	const ready = cameras.filter((camera) => isReady(info, camera));
+	return {
+		ready: ready.length,
+		open: Math.max(open.length + Number(Boolean(undecided)), cameras.length - ready.length),
+		known: odd.length - open.length + Number(cameras.some(isMoved)),
+		fine: of("good").length,
+	};
+}
+
+/** Whether it has another one's calibration by what the boxes tell. @param {Camera} camera */
+export const isMoved = ({ key, calibration_of: of }) => of !== key;
 
 /** Whether any camera has pictures. @param {Info} info */
 export const isPictured = ({ cameras }) => cameras.some(({ video }) => video);

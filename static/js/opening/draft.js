@@ -1,7 +1,7 @@
 /** The sheet once files are there: cameras, room, checks, target, and what happens next. */
 import { h, icon } from "../elements/dom.js";
 import { many, size } from "../library/words.js";
-import { camerasTable, isReady } from "./cameras.js";
+import { camerasTable, standing } from "./cameras.js";
 import {
 	CALIBRATIONS,
 	button,
@@ -97,8 +97,8 @@ const adding = () =>
 const copying = ({ copied, bytes, megabytes_per_second: speed }) =>
 	copied ? `, ${size(copied)} of ${size(bytes)} copied, ${speed.toFixed(0)} MB/s` : "";
 
-/** What there is to say now. @param {Server.ImportInfo} info @param {number} done  cameras that are ready @param {number} odd  things to decide @param {number} known  warnings with nothing to decide */
-function stateOf(info, done, odd, known) {
+/** What there is to say now. @param {Server.ImportInfo} info @param {ReturnType<typeof standing>} now */
+function stateOf(info, { ready, open, known }) {
 	if (info.error) return info.error;
 	switch (info.phase) {
 		case "uploading":
@@ -115,33 +115,26 @@ function stateOf(info, done, odd, known) {
 		? info.under_way
 			? `looking at the ${info.under_way}`
 			: "looking again"
-		: odd
-			? `${many(odd, "thing")} to decide`
+		: open
+			? `${many(open, "thing")} to decide${known ? `, ${known} more to look at` : ""}`
 			: known
-				? `nothing to decide, ${many(known, "warning")}`
+				? `nothing to decide, ${many(known, "thing")} to look at`
 				: "nothing to decide";
-	return `${done} of ${info.cameras.length} cameras ready, ${things}. Nothing is written before you import.`;
+	return `${ready} of ${info.cameras.length} cameras ready, ${things}. Nothing is written before you import.`;
 }
 
 /** @param {Server.ImportInfo} info */
 function foot(info) {
-	const { phase, busy, cameras, checks, copied, bytes, received } = info;
-	const done = cameras.filter((camera) => isReady(info, camera)).length;
-	const warnings = checks.filter(({ status }) => status === "warning");
-	// What there is a button or a field for is to be decided; the rest is to be known.
-	const odd = Math.max(
-		warnings.filter(({ mend }) => mend).length + Number(Boolean(info.undecided)),
-		cameras.length - done,
-	);
-	const known = warnings.filter(({ mend }) => !mend).length;
+	const { phase, busy, cameras, copied, bytes, received } = info;
+	const now = standing(info);
 	const kind = info.error
 		? "bad"
 		: busy || phase !== "settled"
 			? "busy"
-			: odd || known
+			: now.open || now.known
 				? "warn"
 				: "good";
-	const words = stateOf(info, done, odd, known);
+	const words = stateOf(info, now);
 	const uploads = phase === "uploading";
 	const moving = uploads || (["writing", "copying"].includes(phase) && copied > 0);
 	const part = Math.min(1, bytes ? (uploads ? received : copied) / bytes : 1);

@@ -13,7 +13,7 @@ import {
 	span,
 	wishing,
 } from "./controls.js";
-import { isPictured } from "./cameras.js";
+import { isMoved, isPictured, standing } from "./cameras.js";
 import { planPicture } from "./plan.js";
 
 /** @typedef {Server.ImportInfo} Info */
@@ -179,7 +179,7 @@ export function checksPart(info) {
 	const { checks, under_way: now } = info;
 	const of = (/** @type {Server.ImportedCheck["status"]} */ kind) =>
 		checks.filter(({ status }) => status === kind);
-	const [odd, fine] = [of("warning"), of("good")];
+	const { open, known, fine } = standing(info);
 	return h(
 		"section",
 		{ class: "in-scroll", tabindex: 0, "aria-label": "Checks" },
@@ -187,13 +187,13 @@ export function checksPart(info) {
 			"Checks",
 			small(now ? `looking at the ${now}…` : ""),
 			grow(),
-			small(`${fine.length} fine · ${odd.length + Number(hasMoved(info))} to look at`),
+			small(`${fine} fine · ${open + known} to look at`),
 		),
 		div(
 			{ class: "checks" },
 			undecided(info),
 			exchanged(info),
-			[...odd, ...fine, ...of("absent")].map(check),
+			[...of("warning"), ...of("good"), ...of("absent")].map(check),
 		),
 		pairs(info),
 	);
@@ -220,12 +220,6 @@ function undecided({ undecided: words, question, wish }) {
 		),
 	);
 }
-
-/** @param {Server.ImportedCamera} camera */
-const isMoved = ({ key, calibration_of: of }) => of !== key;
-
-/** @param {Info} info */
-const hasMoved = ({ cameras }) => cameras.some(isMoved);
 
 /** Calibrations that are other cameras' than their names say, and the other choice. @param {Info} info */
 function exchanged(info) {

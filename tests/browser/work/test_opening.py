@@ -192,6 +192,22 @@ def test_boxes_alone_are_told_of_as_boxes(flat_page: Page, boxes: Path, folder: 
     page.get_by_role("button", name="Cancel").click()
 
 
+def test_exchanged_cameras_are_to_look_at_everywhere(flat_page: Page, boxes: Path) -> None:
+    """The head of the checks and the foot count alike, what is exchanged too."""
+    page = flat_page
+    (boxes / "cam1.csv").rename(boxes / "kept")
+    (boxes / "cam2.csv").rename(boxes / "cam1.csv")
+    (boxes / "kept").rename(boxes / "cam2.csv")
+    drop(page, boxes)
+    settled(page)
+    sheet = page.locator("dialog.opener")
+    expect(sheet.locator("tbody tr").first).to_contain_text("that of cam2")
+    expect(sheet.get_by_role("region", name="Checks")).to_contain_text("1 to look at")
+    expect(sheet.locator(".say")).to_contain_text("nothing to decide, 1 thing to look at")
+    expect(sheet.locator(".dot")).to_have_class("dot warn")
+    page.get_by_role("button", name="Cancel").click()
+
+
 def test_the_plan_fills_its_frame_and_nothing_is_drawn_over_a_name(
     flat_page: Page, boxes: Path
 ) -> None:
