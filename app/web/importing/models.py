@@ -106,6 +106,8 @@ class ImportedCheck(Model):
     """The field of the sheet and what it should be; empty where there is none."""
     mend: ImportWish | None
     """The wish that mends it; null where nothing here does."""
+    cameras: list[str]
+    """The keys of the cameras that do not fit the others, where it is about them."""
 
 
 class ImportedPair(Model):

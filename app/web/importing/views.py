@@ -80,7 +80,7 @@ def info_of(draft: Draft) -> ImportInfo:
         place=folder_name(known.wish.name),
         open_turns=_open_turns(known),
         cameras=[] if settled is None else [_camera(view, known) for view in settled.views],
-        checks=[] if looked is None else [_check(one, known.wish) for one in looked.checks],
+        checks=[] if looked is None else [_check(one, known) for one in looked.checks],
         pairs=[] if looked is None else _pairs(looked),
         plan=None if looked is None else _plan(looked, known.wish),
         entrances=[] if looked is None else [_door(one) for one in looked.doors],
@@ -253,14 +253,17 @@ def _question(question: Question, wish: ImportWish) -> ImportQuestion:
     )
 
 
-def _check(one: Check, wish: ImportWish) -> ImportedCheck:
+def _check(one: Check, known: Known) -> ImportedCheck:
+    wish, settled = known.wish, known.settled
     changes = mended(wish, one.remedies)
+    views = () if settled is None else settled.views
     return ImportedCheck(
         name=one.name,
         status=one.status,
         sentence=on_page(one.sentence),
         remedy=on_page(" ".join(str(remedy) for remedy in one.remedies)),
         mend=_changed(wish, changes) if changes else None,
+        cameras=[view.matched.raw.name for view in views if view.camera.name in one.cameras],
     )
 
 

@@ -42,7 +42,23 @@ export function camerasTable(info) {
 
 /** Whether nothing is to be decided about a camera. @param {Info} info @param {Camera} camera */
 const isReady = (info, camera) =>
-	!(camera.offset?.sure || missesBoxes(info, camera) || withoutSize(camera));
+	!(
+		camera.offset?.sure ||
+		missesBoxes(info, camera) ||
+		withoutSize(camera) ||
+		isStray(info, camera)
+	);
+
+/** Whether a check says that it does not fit the others. @param {Info} info @param {Camera} camera */
+const isStray = ({ checks }, { key }) => checks.some(({ cameras }) => cameras.includes(key));
+
+/** A button that leaves cameras out. @param {Info} info @param {string[]} keys @param {string} [kind] */
+export function leaving({ wish, cameras }, keys, kind) {
+	const names = cameras.filter(({ key }) => keys.includes(key)).map(({ name }) => name);
+	return wishing("Leave out", { left_out: [...wish.left_out, ...keys] }, kind, {
+		"aria-label": `Leave out ${names.join(", ")}`,
+	});
+}
 
 /**
  * What there is a button or a field for, to be decided; what is odd and only to be known; what is fine.
@@ -53,7 +69,7 @@ export function standing(info) {
 	const of = (/** @type {Server.ImportedCheck["status"]} */ kind) =>
 		checks.filter(({ status }) => status === kind);
 	const odd = of("warning");
-	const open = odd.filter(({ mend }) => mend);
+	const open = odd.filter((one) => one.mend || one.cameras.length);
 	const ready = cameras.filter((camera) => isReady(info, camera));
 	return {
 		ready: ready.length,
@@ -210,8 +226,9 @@ function stateOf(info, camera, k) {
 					"",
 					{ files: [...wish.files, [key, "$"]] },
 				),
-			wishing("Leave out", { left_out: [...wish.left_out, key] }, ""),
+			leaving(info, [key], ""),
 		);
+	if (isStray(info, camera)) return fault("does not fit the others", leaving(info, [key], ""));
 	return span({ class: "okay" }, icon("i-tick"), "ready");
 }
 

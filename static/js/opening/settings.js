@@ -13,7 +13,7 @@ import {
 	span,
 	wishing,
 } from "./controls.js";
-import { isMoved, isPictured, standing } from "./cameras.js";
+import { isMoved, isPictured, leaving, standing } from "./cameras.js";
 import { planPicture } from "./plan.js";
 
 /** @typedef {Server.ImportInfo} Info */
@@ -193,7 +193,7 @@ export function checksPart(info) {
 			{ class: "checks" },
 			undecided(info),
 			exchanged(info),
-			[...of("warning"), ...of("good"), ...of("absent")].map(check),
+			[...of("warning"), ...of("good"), ...of("absent")].map((one) => check(info, one)),
 		),
 		pairs(info),
 	);
@@ -247,8 +247,8 @@ const SAY_ALL = [
 	"cameras see the room",
 ];
 
-/** @param {Server.ImportedCheck} one */
-const check = ({ status, name, sentence, remedy, mend }) =>
+/** @param {Info} info @param {Server.ImportedCheck} one */
+const check = (info, { status, name, sentence, remedy, mend, cameras }) =>
 	line(
 		status,
 		name,
@@ -259,6 +259,7 @@ const check = ({ status, name, sentence, remedy, mend }) =>
 				: sentence,
 		mend &&
 			wishing("Apply", { ...mend }, "main", { title: remedy, "aria-label": `Apply ${remedy}` }),
+		cameras.length > 0 && leaving(info, cameras),
 	);
 
 /** @param {Server.ImportedCheck["status"]} status @param {string} name @param {string} words @param {...Child} more */

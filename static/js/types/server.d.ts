@@ -691,6 +691,8 @@ declare namespace Server {
 		remedy: string;
 		/** The wish that mends it; null where nothing here does. */
 		mend: ImportWish | null;
+		/** The keys of the cameras that do not fit the others, where it is about them. */
+		cameras: string[];
 	}
 
 	/** A file, or a series of numbered ones, and what it was taken for. */

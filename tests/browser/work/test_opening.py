@@ -208,6 +208,33 @@ def test_exchanged_cameras_are_to_look_at_everywhere(flat_page: Page, boxes: Pat
     page.get_by_role("button", name="Cancel").click()
 
 
+def test_a_camera_of_another_recording_is_left_out_beside_its_warning(
+    flat_page: Page, boxes: Path
+) -> None:
+    """Its row, the check and the foot say the same of it until it is left out."""
+    page = flat_page
+    table = (boxes / "cam3.csv").read_text().splitlines()
+    last = int(table[-1].split(",")[0])
+    other = []
+    for row in table[1:]:  # people who walk backwards in a picture of the other hand
+        frame, left, top, width, height = (float(value) for value in row.split(","))
+        other.append(f"{last - frame:.0f},{640 - left - width},{top},{width},{height}")
+    (boxes / "cam3.csv").write_text("\n".join([table[0], *other]))
+    drop(page, boxes)
+    settled(page)
+    sheet = page.locator("dialog.opener")
+    checks = sheet.get_by_role("region", name="Checks")
+    expect(sheet.locator("tbody tr").nth(2)).to_contain_text("does not fit the others")
+    expect(sheet.locator(".say")).to_contain_text("3 of 4 cameras ready, 1 thing to decide")
+    expect(checks).to_contain_text("1 to look at")
+    checks.get_by_role("button", name="Leave out cam3").click()
+    expect(sheet.locator("tbody tr")).to_have_count(3)
+    settled(page)
+    expect(sheet).to_contain_text("Left out: cam3")
+    expect(sheet.locator(".say")).to_contain_text("3 of 3 cameras ready, nothing to decide")
+    page.get_by_role("button", name="Cancel").click()
+
+
 def test_the_plan_fills_its_frame_and_nothing_is_drawn_over_a_name(
     flat_page: Page, boxes: Path
 ) -> None:

@@ -333,7 +333,7 @@ def _stray_cameras(sequence: Sequence, told: BoxesTell) -> Iterator[Check]:
     names = [camera.name for camera in sequence.cameras]
     doubtful = describe_unconfirmed(told.verdict, names)
     if doubtful.alone:
-        yield warning(name_of_check, doubtful.alone)
+        yield warning(name_of_check, doubtful.alone, cameras=doubtful.without)
     if doubtful.others:
         yield absent(name_of_check, doubtful.others)
     if len(sequence.views) < 3 or doubtful.alone:
@@ -349,6 +349,7 @@ def _stray_cameras(sequence: Sequence, told: BoxesTell) -> Iterator[Check]:
                 name_of_check,
                 f"{name} has a box at {percent(share)} of the places where others' boxes meet and "
                 "it sees: its calibration, its file of boxes or its clock is another one's",
+                cameras=[name],
                 share=share,
             )
     if shares and min(shares.values()) >= _OWN_SHARE and not doubtful.others:
@@ -363,6 +364,7 @@ def _moved_cameras(sequence: Sequence, told: BoxesTell) -> Iterator[Check]:
         yield warning(
             "cameras are where they were calibrated",
             "; ".join(sentences),
+            cameras=[sequence.cameras[c].name for c in moved],
             degrees=float(np.degrees(max(moved.values()))),
         )
 

@@ -245,6 +245,8 @@ class Unconfirmed(NamedTuple):
     """Those whose boxes agree with those of no other camera; empty where there are none."""
     others: str
     """Those whose boxes agree, but as well with those of other moments; empty likewise."""
+    without: tuple[str, ...]
+    """The names of the former."""
 
 
 def describe_unconfirmed(verdict: Verdict, names: Sequence[str]) -> Unconfirmed:
@@ -268,6 +270,7 @@ def describe_unconfirmed(verdict: Verdict, names: Sequence[str]) -> Unconfirmed:
         if alone
         else "",
         f"{', '.join(rest)}: nothing confirms that these show the same moments" if rest else "",
+        tuple(names[c] for c in alone),
     )
 
 

@@ -566,7 +566,7 @@ def _read(
         found += told_
         if len(verdict.confirmed) == 2 and verdict.kind == "decided":
             told.append(OF_TWO)
-        told += filter(None, describe_unconfirmed(verdict, [raw.name for raw in raws]))
+        told += filter(None, describe_unconfirmed(verdict, [raw.name for raw in raws])[:2])
         told += describe_moved(verdict.moved, [raw.name for raw in raws])
     if any(raw.turns for raw in raws):
         found.append(("angles", f"{turns_in_words(reading.turns)}, {why}; --euler"))
