@@ -1,7 +1,7 @@
 /** The sheet once files are there: cameras, room, checks, target, and what happens next. */
 import { h, icon } from "../elements/dom.js";
 import { many, size } from "../library/words.js";
-import { camerasTable, standing } from "./cameras.js";
+import { camerasTable, isPictured, standing } from "./cameras.js";
 import {
 	CALIBRATIONS,
 	button,
@@ -43,11 +43,20 @@ export function draftSheet(info, methods, moved) {
 	];
 }
 
+/** What says how many steps a second has. @param {Server.ImportInfo} info */
+function rateOrigin(info) {
+	if (info.wish.fps !== null) return "as you say";
+	const found = info.found.find(([name]) => name === "fps")?.[1];
+	const why = found?.split(";")[0].split(", ").slice(1).join(", ");
+	return why || (isPictured(info) ? "by the videos" : "by the files");
+}
+
 /** @param {Server.ImportInfo} info */
-function head({ files_there, files_used, frames, cameras, fps, wish, phase }) {
+function head(info) {
+	const { files_there, files_used, frames, cameras, fps, wish, phase } = info;
 	const used = `${files_used} of ${many(files_there, "file")} used`;
 	const facts = frames
-		? `Hz · ${cameras.length} cameras · ${frames} steps · ${(frames / fps).toFixed(1)} s · ${used}`
+		? `Hz, ${rateOrigin(info)} · ${cameras.length} cameras · ${frames} steps · ${(frames / fps).toFixed(1)} s · ${used}`
 		: files_there
 			? many(files_there, "file")
 			: "";

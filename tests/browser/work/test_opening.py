@@ -84,6 +84,7 @@ def test_dropped_files_become_tracks(
     expect(sheet.locator("tbody tr")).to_have_count(4)
     expect(sheet.locator("tbody tr").first).to_contain_text("cam1.avi")
     expect(sheet.locator("tbody tr").first).to_contain_text("60 frames · 20 fps · 640 × 360")
+    expect(sheet.locator(".s-head")).to_contain_text("Hz, by the videos")
     expect(sheet.locator(".told")).to_contain_text("session/notes.txt: no format that is read")
     expect(sheet.locator(".told")).to_be_in_viewport()
     expect(sheet.get_by_role("group", name="Unit").locator("[aria-pressed=true]")).to_have_text(
@@ -184,6 +185,11 @@ def test_boxes_alone_are_told_of_as_boxes(flat_page: Page, boxes: Path) -> None:
     expect(row).to_contain_text("in metres")
     expect(row.locator(".shot")).to_have_count(0)
     expect(sheet).not_to_contain_text("Link")
+    expect(sheet.locator(".s-head")).to_contain_text(", since no file says it")
+    sheet.get_by_label("Rate, steps a second").fill("20")
+    page.keyboard.press("Enter")
+    expect(sheet.locator(".s-head")).to_contain_text("Hz, as you say")
+    settled(page)
     expect(sheet).to_contain_text("the target is")
     assert not re.search(r"\[\w+\]", sheet.inner_text())
     for field, value in (("Poses", "world-to-camera"), ("Boxes", "ltwh"), ("First frame", "0")):
