@@ -16,7 +16,7 @@ import {
 import { lensOf } from "../../static/js/draw/overlay.js";
 import { magnified } from "../../static/js/cameras/cameras.js";
 import { compareCells } from "../../static/js/elements/table.js";
-import { freeCorner } from "../../static/js/opening/plan.js";
+import { freePlace } from "../../static/js/opening/plan.js";
 import { kindsOf } from "../../static/js/inspector/side.js";
 import { strands } from "../../static/js/timeline/reading.js";
 import { matching, offersOf, valueOf } from "../../static/js/sheets/sheets.js";
@@ -505,10 +505,12 @@ test("cells are sorted as numbers or as words, and what is none stands last", ()
   assert.deepEqual(sorted(["cam10", "Cam2", "birth"], false), ["birth", "Cam2", "cam10"]);
 });
 
-test("the bar of one metre stands in a corner without a camera's name", () => {
+test("the bar that shows the scale stands where neither a camera nor its name is", () => {
   const label = (x, y) => ({ x, y, half: 0.4 });
-  const corner = (...labels) => freeCorner(labels, 6, 5, 0.02).map((v) => Number(v.toFixed(2)));
-  assert.deepEqual(corner(), [5.34, 4.8]);
-  assert.deepEqual(corner(label(5.6, 4.9)), [0.66, 4.8]);
-  assert.deepEqual(corner(label(5.6, 4.9), label(0.4, 4.9)), [5.34, 0.44]);
+  const place = (...labels) => freePlace(labels, 6, 5, 0.02, 1).map((v) => Number(v.toFixed(2)));
+  const corners = [label(5.6, 4.9), label(0.4, 4.9), label(5.6, 0.4), label(0.4, 0.4)];
+  assert.deepEqual(place(), [5.34, 4.8]);
+  assert.deepEqual(place(corners[0]), [0.66, 4.8]);
+  assert.deepEqual(place(...corners), [4.17, 4.8]);
+  assert.deepEqual(place(...corners, label(4.5, 4.6)), [1.83, 4.8]);
 });

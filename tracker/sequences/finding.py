@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Literal
@@ -43,6 +43,8 @@ class Check:
     """The changes that correct the problem together."""
     numbers: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
     """The numbers in the sentence, by name."""
+    cameras: tuple[str, ...] = ()
+    """The cameras that do not fit the others, where it is about them: without them it is good."""
 
     def __str__(self) -> str:
         mended = " ".join(str(remedy) for remedy in self.remedies)
@@ -54,9 +56,11 @@ def good(name: str, sentence: str, **numbers: float) -> Check:
     return Check(name, "good", sentence, numbers=MappingProxyType(numbers))
 
 
-def warning(name: str, sentence: str, *remedies: Remedy, **numbers: float) -> Check:
+def warning(
+    name: str, sentence: str, *remedies: Remedy, cameras: Iterable[str] = (), **numbers: float
+) -> Check:
     """Return the result of a check that found a problem."""
-    return Check(name, "warning", sentence, remedies, MappingProxyType(numbers))
+    return Check(name, "warning", sentence, remedies, MappingProxyType(numbers), tuple(cameras))
 
 
 def absent(name: str, sentence: str) -> Check:

@@ -27,22 +27,18 @@ FORGOTTEN_SECONDS = 86400.0
 class Desk:
     """Thread-safe owner of all drafts."""
 
-    def __init__(
-        self, workbench: Workbench, data: Path | None = None, roots: Sequence[Path] = ()
-    ) -> None:
+    def __init__(self, workbench: Workbench, data: Path | None = None) -> None:
         """Nothing is written yet.
 
         Args:
             workbench: Shows how far imports are.
             data: Where recordings are; the person's own place where none is given or it can only
                 be read.
-            roots: Further folders that may be imported by their path.
         """
         self._workbench = workbench
         own = settings_folder() / "recordings"
         self.home = data.absolute() if data is not None and os.access(data, os.W_OK) else own
         self._data = data.absolute() if data is not None else self.home
-        self._roots = [self._data, self.home, *(root.absolute() for root in roots)]
         self._lock = threading.Lock()
         self._drafts: dict[str, Draft] = {}
 
@@ -66,10 +62,11 @@ class Desk:
         """An import of files on this machine; where they are a recording already, its folder.
 
         Args:
-            path: A folder or file below the data folder, or its path from there.
+            path: A folder or file, in full or from the data folder on. Whoever may use the
+                workbench may name any: the manual's page on security says why.
 
         Raises:
-            UploadError: If it is not there, or not below a folder that may be opened.
+            UploadError: If it is not there.
         """
         try:
             given = given_folder(path)
@@ -83,11 +80,6 @@ class Desk:
         if not place.exists():
             where = "" if given.is_absolute() else f" in {self._data}"
             raise UploadError(f"{path}: there is no such file or folder{where}")
-        if not any(place.is_relative_to(root.resolve()) for root in self._roots):
-            raise UploadError(
-                f"{path}: expected files below the data folder {self._data}; move them there, or "
-                "start the workbench with --data"
-            )
         return self._new(place.stem if place.is_file() else place.name, place)
 
     def folders(self) -> list[str]:

@@ -123,8 +123,8 @@ class Upload:
             paths.append(path)
         if len(known) > MOST_FILES:
             raise UploadError(
-                f"expected at most {MOST_FILES:,} files, found {len(known):,}: put the folder "
-                "below the data folder and open it by its path"
+                f"expected at most {MOST_FILES:,} files, found {len(known):,}: open the folder "
+                "by its path"
             )
         self._check_room(sum(file.bytes for file in files))
         made: list[Path] = []
@@ -146,7 +146,7 @@ class Upload:
         if self.size + more > MOST_BYTES:
             raise UploadError(
                 f"expected at most {MOST_BYTES >> 30} GB, found {(self.size + more) / 2**30:.1f}: "
-                "put the folder below the data folder and open it by its path"
+                "open the folder by its path"
             )
         left = self.size - self.received
         free = shutil.disk_usage(self.folder.parent).free - SPARED_BYTES

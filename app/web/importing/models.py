@@ -83,7 +83,8 @@ class ImportedCamera(Model):
     width: int
     height: int
     calibration: str
-    """What the calibration's file was recognised as."""
+    """The file of its calibration; what it was recognised as, where it is made of several."""
+    calibration_format: str
     calibration_of: str
     """The camera whose calibration it has by its file: its own, unless they are exchanged."""
     detections: str
@@ -105,6 +106,8 @@ class ImportedCheck(Model):
     """The field of the sheet and what it should be; empty where there is none."""
     mend: ImportWish | None
     """The wish that mends it; null where nothing here does."""
+    cameras: list[str]
+    """The keys of the cameras that do not fit the others, where it is about them."""
 
 
 class ImportedPair(Model):
@@ -188,6 +191,10 @@ class ImportInfo(Model):
     up: str
     pose: str
     axes: str
+    boxes: str
+    """How the four numbers of a box are meant; empty where files differ or have none."""
+    first_index: str
+    """The number of the first frame in files of boxes; empty where there are none."""
     turns: str
     """How rotations given by three angles were taken; empty where there are none."""
     open_turns: list[tuple[str, str]]

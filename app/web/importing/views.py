@@ -27,6 +27,8 @@ from app.web.importing.words import on_page
 from tracker.io.checks import Check
 from tracker.io.checks.synchronisation import CameraOffset
 from tracker.io.importing.finding.angles import open_turns, product_in_words, turns_in_words
+from tracker.io.importing.finding.times import first_index
+from tracker.io.importing.options import ImportOptions
 from tracker.io.importing.usage import FileUse, file_uses
 from tracker.io.read.pieces import CalibrationPiece, DetectionPiece
 
@@ -74,11 +76,12 @@ def info_of(draft: Draft) -> ImportInfo:
         home=str(draft.home),
         free=shutil.disk_usage(draft.home).free,
         **_recording(settled),
+        **_boxes(known),
         told=_told(settled, looked),
         place=folder_name(known.wish.name),
         open_turns=_open_turns(known),
         cameras=[] if settled is None else [_camera(view, known) for view in settled.views],
-        checks=[] if looked is None else [_check(one, known.wish) for one in looked.checks],
+        checks=[] if looked is None else [_check(one, known) for one in looked.checks],
         pairs=[] if looked is None else _pairs(looked),
         plan=None if looked is None else _plan(looked, known.wish),
         entrances=[] if looked is None else [_door(one) for one in looked.doors],
@@ -114,6 +117,20 @@ def _recording(settled: ImportPlan | None) -> dict[str, Any]:
         "has_boxes": all(view.detections is not None for view in settled.views),
         "found": [(what, on_page(how)) for what, how in settled.found],
     }
+
+
+def _boxes(known: Known) -> dict[str, str]:
+    """How files of boxes are read, as the page's choices name it, where all are read alike."""
+    settled = known.settled
+    pieces = [] if settled is None else [view.matched.detections for view in settled.views]
+    own = [piece for piece in pieces if piece is not None and len(piece.frames)]
+    if settled is None or not own:
+        return {"boxes": "", "first_index": ""}
+    layouts = {piece.layout or settled.reading.layout for piece in own}
+    wished = ImportOptions(first_index=known.wish.first_index)
+    # the program that wrote them counts alike: one that begins at 0 speaks for all
+    first = min(first_index(piece, wished, settled.frames) for piece in own)
+    return {"boxes": layouts.pop() if len(layouts) == 1 else "", "first_index": str(first)}
 
 
 def _unfit(methods: Mapping[str, str]) -> dict[str, str]:
@@ -177,7 +194,8 @@ def _camera(view: PlannedView, known: Known) -> ImportedCamera:
         fps=round(view.time.timing.fps or settled.fps, 3),
         width=camera.image_size[0],
         height=camera.image_size[1],
-        calibration=settled.calibration,
+        calibration=_calibration(known, settled, matched.calibration_of),
+        calibration_format=settled.calibration,
         calibration_of=matched.calibration_of,
         detections="" if own is None else _label(known, own),
         boxes_format="" if own is None else own.format,
@@ -185,6 +203,18 @@ def _camera(view: PlannedView, known: Known) -> ImportedCamera:
         seconds_late=0.0 - view.time.timing.time_offset,
         offset=next((_offset(one) for one in offsets if one.camera == camera.name), None),
     )
+
+
+def _calibration(known: Known, settled: ImportPlan, camera: str) -> str:
+    """The file that a camera's calibration is in; its format where several make it up."""
+    files = [
+        (one.label, {raw.name for raw in piece.cameras})
+        for one in known.taken
+        for piece in one.pieces
+        if isinstance(piece, CalibrationPiece) and piece.source in settled.sources
+    ]
+    labels = {label for label, names in files if camera in names} or {label for label, _ in files}
+    return labels.pop() if len(labels) == 1 else settled.calibration
 
 
 def _label(known: Known, piece: DetectionPiece) -> str:
@@ -223,14 +253,17 @@ def _question(question: Question, wish: ImportWish) -> ImportQuestion:
     )
 
 
-def _check(one: Check, wish: ImportWish) -> ImportedCheck:
+def _check(one: Check, known: Known) -> ImportedCheck:
+    wish, settled = known.wish, known.settled
     changes = mended(wish, one.remedies)
+    views = () if settled is None else settled.views
     return ImportedCheck(
         name=one.name,
         status=one.status,
         sentence=on_page(one.sentence),
         remedy=on_page(" ".join(str(remedy) for remedy in one.remedies)),
         mend=_changed(wish, changes) if changes else None,
+        cameras=[view.matched.raw.name for view in views if view.camera.name in one.cameras],
     )
 
 

@@ -6,7 +6,6 @@ import asyncio
 import logging
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
-from pathlib import Path
 
 from fastapi import FastAPI
 
@@ -96,9 +95,7 @@ async def lifespan(app: FastAPI) -> AsyncIterator[None]:
     correcting = app.state.correcting = Correcting(workbench, edits)
     edits.follow()
     doubting = app.state.doubting = Doubting()
-    given = Path(settings.sequence or "").expanduser()
-    roots = [given] if settings.sequence and given.is_dir() else []
-    desk = app.state.desk = Desk(workbench, settings.data, roots)
+    desk = app.state.desk = Desk(workbench, settings.data)
     recents = app.state.recents = Recents(
         workbench, settings_folder() / "recent.json" if kept else None
     )

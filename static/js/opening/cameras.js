@@ -17,7 +17,7 @@ export function camerasTable(info) {
 		HEADS,
 		info.cameras.map((camera, k) => row(info, camera, k)),
 	);
-	rows.className = "cams-in";
+	rows.className = isPictured(info) ? "cams-in" : "cams-in plain";
 	const left = info.wish.left_out;
 	const words = [
 		...info.files
@@ -42,8 +42,49 @@ export function camerasTable(info) {
 }
 
 /** Whether nothing is to be decided about a camera. @param {Info} info @param {Camera} camera */
-export const isReady = (info, camera) =>
-	!(camera.offset?.sure || missesBoxes(info, camera) || withoutSize(camera));
+const isReady = (info, camera) =>
+	!(
+		camera.offset?.sure ||
+		missesBoxes(info, camera) ||
+		withoutSize(camera) ||
+		isStray(info, camera)
+	);
+
+/** Whether a check says that it does not fit the others. @param {Info} info @param {Camera} camera */
+const isStray = ({ checks }, { key }) => checks.some(({ cameras }) => cameras.includes(key));
+
+/** A button that leaves cameras out. @param {Info} info @param {string[]} keys @param {string} [kind] */
+export function leaving({ wish, cameras }, keys, kind) {
+	const names = cameras.filter(({ key }) => keys.includes(key)).map(({ name }) => name);
+	return wishing("Leave out", { left_out: [...wish.left_out, ...keys] }, kind, {
+		"aria-label": `Leave out ${names.join(", ")}`,
+	});
+}
+
+/**
+ * What there is a button or a field for, to be decided; what is odd and only to be known; what is fine.
+ * @param {Info} info
+ */
+export function standing(info) {
+	const { cameras, checks, undecided } = info;
+	const of = (/** @type {Server.ImportedCheck["status"]} */ kind) =>
+		checks.filter(({ status }) => status === kind);
+	const odd = of("warning");
+	const open = odd.filter((one) => one.mend || one.cameras.length);
+	const ready = cameras.filter((camera) => isReady(info, camera));
+	return {
+		ready: ready.length,
+		open: Math.max(open.length + Number(Boolean(undecided)), cameras.length - ready.length),
+		known: odd.length - open.length + Number(cameras.some(isMoved)),
+		fine: of("good").length,
+	};
+}
+
+/** Whether it has another one's calibration by what the boxes tell. @param {Camera} camera */
+export const isMoved = ({ key, calibration_of: of }) => of !== key;
+
+/** Whether any camera has pictures. @param {Info} info */
+export const isPictured = ({ cameras }) => cameras.some(({ video }) => video);
 
 /** @param {Info} info @param {Camera} camera */
 const missesBoxes = ({ cameras }, { detections }) =>
@@ -57,17 +98,18 @@ const two = (first, second, whole = first) => [cut(first, "", whole), cut(second
 
 /** @param {Info} info @param {Camera} camera @param {number} k @returns {(Child | Child[])[]} */
 function row(info, camera, k) {
-	const { key, name, video, detections, frames } = camera;
+	const { key, name, video, detections, frames, calibration_of: of } = camera;
 	// The file is named for the browser, which shows an address that it has shown before as it was.
 	const query = new URLSearchParams({ camera: key, of: video });
 	return [
 		div(
 			{ class: "pic" },
-			span(
-				{ class: "shot" },
-				span({ class: "blank" }, icon("i-folder")),
-				video && h("img", { src: `/api/import/${info.key}/picture?${query}`, alt: "" }),
-			),
+			isPictured(info) &&
+				span(
+					{ class: "shot" },
+					span({ class: "blank" }, icon("i-boxes")),
+					video && h("img", { src: `/api/import/${info.key}/picture?${query}`, alt: "" }),
+				),
 			field(`in-name-${k}`, `Name of ${key}`, name, { names: { [key]: "$" } }, { maxlength: 60 }),
 		),
 		two(
@@ -75,15 +117,19 @@ function row(info, camera, k) {
 			`${frames ? `${frames} frames · ${show(camera.fps)} fps · ` : ""}${camera.width} × ${camera.height}`,
 		),
 		two(
-			camera.calibration,
-			camera.calibration_of === key
-				? `${key} · ${info.unit} → m`
-				: `that of ${camera.calibration_of} · ${info.unit} → m`,
+			short(info, "calibration", camera),
+			[
+				of !== key ? `that of ${of}` : key !== name && key,
+				info.unit === "m" ? "in metres" : `${info.unit} → m`,
+			]
+				.filter(Boolean)
+				.join(" · "),
+			`${camera.calibration}: ${camera.calibration_format}`,
 		),
 		sync(info, camera, k),
 		detections
 			? two(
-					short(info, detections),
+					short(info, "detections", camera),
 					`${show(camera.boxes_per_step)} boxes a step · ${camera.boxes_format}`,
 					detections,
 				)
@@ -95,9 +141,9 @@ function row(info, camera, k) {
 	];
 }
 
-/** A file without its folders, as far as cameras stay told apart. @param {Info} info @param {string} label */
-function short({ cameras }, label) {
-	const others = cameras.map(({ detections }) => detections).filter((other) => other !== label);
+/** A camera's file without its folders, as far as cameras stay told apart. @param {Info} info @param {"calibration" | "detections"} what @param {Camera} camera */
+function short({ cameras }, what, { [what]: label }) {
+	const others = cameras.map((camera) => camera[what]).filter((other) => other !== label);
 	return ownEnd(label, others) ?? label;
 }
 
@@ -181,8 +227,9 @@ function stateOf(info, camera, k) {
 					"",
 					{ files: [...wish.files, [key, "$"]] },
 				),
-			wishing("Leave out", { left_out: [...wish.left_out, key] }, ""),
+			leaving(info, [key], ""),
 		);
+	if (isStray(info, camera)) return fault("does not fit the others", leaving(info, [key], ""));
 	return span({ class: "okay" }, icon("i-tick"), "ready");
 }
 

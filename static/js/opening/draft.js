@@ -1,7 +1,7 @@
 /** The sheet once files are there: cameras, room, checks, target, and what happens next. */
 import { h, icon } from "../elements/dom.js";
 import { many, size } from "../library/words.js";
-import { camerasTable, isReady } from "./cameras.js";
+import { camerasTable, isPictured, standing } from "./cameras.js";
 import {
 	CALIBRATIONS,
 	button,
@@ -43,11 +43,20 @@ export function draftSheet(info, methods, moved) {
 	];
 }
 
+/** What says how many steps a second has. @param {Server.ImportInfo} info */
+function rateOrigin(info) {
+	if (info.wish.fps !== null) return "as you say";
+	const found = info.found.find(([name]) => name === "fps")?.[1];
+	const why = found?.split(";")[0].split(", ").slice(1).join(", ");
+	return why || (isPictured(info) ? "by the videos" : "by the files");
+}
+
 /** @param {Server.ImportInfo} info */
-function head({ files_there, files_used, frames, cameras, fps, wish, phase }) {
+function head(info) {
+	const { files_there, files_used, frames, cameras, fps, wish, phase } = info;
 	const used = `${files_used} of ${many(files_there, "file")} used`;
 	const facts = frames
-		? `Hz · ${cameras.length} cameras · ${frames} steps · ${(frames / fps).toFixed(1)} s · ${used}`
+		? `Hz, ${rateOrigin(info)} · ${cameras.length} cameras · ${frames} steps · ${(frames / fps).toFixed(1)} s · ${used}`
 		: files_there
 			? many(files_there, "file")
 			: "";
@@ -97,8 +106,8 @@ const adding = () =>
 const copying = ({ copied, bytes, megabytes_per_second: speed }) =>
 	copied ? `, ${size(copied)} of ${size(bytes)} copied, ${speed.toFixed(0)} MB/s` : "";
 
-/** What there is to say now. @param {Server.ImportInfo} info @param {number} done  cameras that are ready @param {number} odd  things to decide @param {number} known  warnings with nothing to decide */
-function stateOf(info, done, odd, known) {
+/** What there is to say now. @param {Server.ImportInfo} info @param {ReturnType<typeof standing>} now */
+function stateOf(info, { ready, open, known }) {
 	if (info.error) return info.error;
 	switch (info.phase) {
 		case "uploading":
@@ -115,33 +124,26 @@ function stateOf(info, done, odd, known) {
 		? info.under_way
 			? `looking at the ${info.under_way}`
 			: "looking again"
-		: odd
-			? `${many(odd, "thing")} to decide`
+		: open
+			? `${many(open, "thing")} to decide${known ? `, ${known} more to look at` : ""}`
 			: known
-				? `nothing to decide, ${many(known, "warning")}`
+				? `nothing to decide, ${many(known, "thing")} to look at`
 				: "nothing to decide";
-	return `${done} of ${info.cameras.length} cameras ready, ${things}. Nothing is written before you import.`;
+	return `${ready} of ${info.cameras.length} cameras ready, ${things}. Nothing is written before you import.`;
 }
 
 /** @param {Server.ImportInfo} info */
 function foot(info) {
-	const { phase, busy, cameras, checks, copied, bytes, received } = info;
-	const done = cameras.filter((camera) => isReady(info, camera)).length;
-	const warnings = checks.filter(({ status }) => status === "warning");
-	// What there is a button or a field for is to be decided; the rest is to be known.
-	const odd = Math.max(
-		warnings.filter(({ mend }) => mend).length + Number(Boolean(info.undecided)),
-		cameras.length - done,
-	);
-	const known = warnings.filter(({ mend }) => !mend).length;
+	const { phase, busy, cameras, copied, bytes, received } = info;
+	const now = standing(info);
 	const kind = info.error
 		? "bad"
 		: busy || phase !== "settled"
 			? "busy"
-			: odd || known
+			: now.open || now.known
 				? "warn"
 				: "good";
-	const words = stateOf(info, done, odd, known);
+	const words = stateOf(info, now);
 	const uploads = phase === "uploading";
 	const moving = uploads || (["writing", "copying"].includes(phase) && copied > 0);
 	const part = Math.min(1, bytes ? (uploads ? received : copied) / bytes : 1);

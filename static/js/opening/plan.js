@@ -1,11 +1,15 @@
 /** The room of an import from above: the box around it, whose faces are dragged or moved by arrows. */
 import { all, one, svg, write } from "../elements/dom.js";
 
-/** About how many pixels the plan has; lengths of its signs are by these. */
-const SIZE = [330, 360];
+/** About how many pixels the plan has at most; lengths of its signs are by these. */
+const SIZE = [330, 320];
 
 /** How long a camera is in the plan: metres, and at least so many pixels. */
 const CAMERA = [0.7, 18];
+
+/** Lengths of the bar that shows the scale, metres, and at least so many pixels. */
+const BARS = [1, 2, 5, 10, 20, 50];
+const SHORTEST_BAR = 28;
 
 /** Of a length or a place in the plan: to the millimetre. @param {number} value */
 const mm = (value) => value.toFixed(3);
@@ -25,18 +29,27 @@ export function planPicture(info, words, moved) {
 		x - plan.x,
 		high - (y - plan.y),
 	];
-	const labels = plan.cameras.map(([x, y], k) => {
+	const length = Math.max(CAMERA[0], CAMERA[1] * pixel);
+	const labels = plan.cameras.map(([x, y, way], k) => {
 		const [u, v] = at(x, y);
 		const name = info.cameras[k]?.name ?? "";
 		const half = Math.min(3.5 * name.length * pixel, wide / 2);
+		// Beside the camera where it does not look; inside the plan.
+		const from = Math.sin(way) > 0 ? 14 * pixel : -5 * pixel;
 		return {
 			name,
 			half,
-			x: Math.min(Math.max(u, half), wide - half),
-			y: Math.min(Math.max(v - 4 * pixel, 12 * pixel), high - 4 * pixel),
+			x: Math.min(Math.max(u, half + 4 * pixel), wide - half - 4 * pixel),
+			y: Math.min(Math.max(v + from, 14 * pixel), high - 6 * pixel),
 		};
 	});
-	const [scaleX, scaleY] = freeCorner(labels, wide, high, pixel);
+	const signs = plan.cameras.map(([x, y, way]) => {
+		const [u, v] = at(x, y);
+		const half = length / 2;
+		return { half, x: u + half * Math.cos(way), y: v - half * Math.sin(way) };
+	});
+	const bar = BARS.find((metres) => metres >= SHORTEST_BAR * pixel) ?? BARS[5];
+	const [scaleX, scaleY] = freePlace([...labels, ...signs], wide, high, pixel, bar);
 	const drawing = svg(
 		"svg",
 		{
@@ -44,7 +57,9 @@ export function planPicture(info, words, moved) {
 			tabindex: 0,
 			viewBox: `0 0 ${mm(wide)} ${mm(high)}`,
 			"--pixel": `${pixel.toFixed(5)}px`,
+			"--shape": (wide / high).toFixed(3),
 		},
+		svg("rect", { class: "ground", width: mm(wide), height: mm(high) }),
 		tint(plan),
 		svg("path", {
 			class: "feet",
@@ -63,7 +78,6 @@ export function planPicture(info, words, moved) {
 		}),
 		plan.cameras.flatMap(([x, y, way, half], k) => {
 			const [u, v] = at(x, y);
-			const length = Math.max(CAMERA[0], CAMERA[1] * pixel);
 			const ends = [-half, half].map(
 				(turn) =>
 					`L${mm(u + length * Math.cos(way + turn))} ${mm(v - length * Math.sin(way + turn))}`,
@@ -93,35 +107,37 @@ export function planPicture(info, words, moved) {
 		svg("text", { class: "length" }),
 		svg("path", {
 			class: "scale",
-			d: `M${mm(scaleX - 0.5)} ${mm(scaleY)}h1`,
+			d: `M${mm(scaleX - bar / 2)} ${mm(scaleY)}h${bar}`,
 		}),
-		svg("text", { x: mm(scaleX), y: mm(scaleY - 4 * pixel) }, "1 m"),
+		svg("text", { x: mm(scaleX), y: mm(scaleY - 4 * pixel) }, `${bar} m`),
 	);
 	mountFaces(drawing, room, at, moved);
 	return drawing;
 }
 
 /**
- * The middle of a bar of one metre in a corner of the plan where no camera's name lies, metres from
- * its upper left; at the lower right where names lie in all of them.
- * @param {{x: number, y: number, half: number}[]} labels  where names stand, and half their widths
+ * The middle of the bar that shows the scale, along the lower or the upper edge of the plan where
+ * nothing else is drawn, metres from its upper left; at the lower right where there is no such place.
+ * @param {{x: number, y: number, half: number}[]} drawn  middles of names and cameras, and half their widths
  * @param {number} wide @param {number} high @param {number} pixel  of the plan, metres
+ * @param {number} bar  its length
  */
-export function freeCorner(labels, wide, high, pixel) {
-	const [left, right] = [0.5 + 8 * pixel, wide - 0.5 - 8 * pixel];
-	const [top, bottom] = [22 * pixel, high - 10 * pixel];
-	const corners = [
-		[right, bottom],
-		[left, bottom],
-		[right, top],
-		[left, top],
-	];
+export function freePlace(drawn, wide, high, pixel, bar) {
+	const [left, right] = [bar / 2 + 8 * pixel, wide - bar / 2 - 8 * pixel];
+	const places = [high - 10 * pixel, 22 * pixel].flatMap((y) =>
+		[1, 0, 0.75, 0.25, 0.5].map((part) => [left + part * (right - left), y]),
+	);
 	const isFree = (/** @type {number[]} */ [x, y]) =>
-		labels.every(
-			(label) => Math.abs(label.x - x) > label.half + 0.5 || Math.abs(label.y - y) > 20 * pixel,
+		drawn.every(
+			(one) =>
+				Math.abs(one.x - x) > one.half + bar / 2 ||
+				Math.abs(one.y - y) > 20 * pixel + Math.min(one.half, 12 * pixel),
 		);
-	return corners.find(isFree) ?? corners[0];
+	return places.find(isFree) ?? places[0];
 }
+
+/** So much of a cell's height, for rows that only touch leave a line between them. */
+const OVERLAP = 1.05;
 
 /** The floor by how many cameras see it: cells of a row that are alike in one piece. @param {Server.ImportedPlan} plan */
 function tint({ seen, width, height, cell }) {
@@ -133,7 +149,7 @@ function tint({ seen, width, height, cell }) {
 			while (end < width && count(end) === count(column)) end += 1;
 			const length = (end - column) * cell;
 			pieces[count(column)] +=
-				`M${mm(column * cell)} ${top}h${mm(length)}v${mm(cell)}h${mm(-length)}z`;
+				`M${mm(column * cell)} ${top}h${mm(length)}v${mm(cell * OVERLAP)}h${mm(-length)}z`;
 		}
 	}
 	return pieces.map((d, k) => k > 0 && d && svg("path", { class: `floor seen-${k}`, d }));

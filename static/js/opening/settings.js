@@ -13,6 +13,7 @@ import {
 	span,
 	wishing,
 } from "./controls.js";
+import { isMoved, isPictured, leaving, standing } from "./cameras.js";
 import { planPicture } from "./plan.js";
 
 /** @typedef {Server.ImportInfo} Info */
@@ -42,16 +43,15 @@ const SIGNS = {
 	absent: ["minus", "none"],
 };
 
-/** @param {string} words @param {string} note */
-const label = (words, note) => div({ class: "lab" }, span({}, words), cut(note));
+/** @param {string} words @param {string} note @param {string} [reason]  by the pointer */
+const label = (words, note, reason) =>
+	div({ class: "lab", title: reason }, span({}, words), span({}, note));
 
-/** Where a value is from. @param {Info} info @param {"up" | "unit"} what */
-function why({ wish, found }, what) {
-	if (wish[what] !== null) return "as you say";
+/** Where a value is from, in a word, and the reason. @param {Info} info @param {"up" | "unit"} what @returns {[string, string?]} */
+function origin({ wish, found }, what) {
+	if (wish[what] !== null) return ["as you say"];
 	const told = found.find(([name]) => name === what)?.[1];
-	if (told === undefined) return "as the file says";
-	const [first] = told.split(";");
-	return `found: ${first.split(", ").slice(1).join(", ") || told}`;
+	return told === undefined ? ["as the file says"] : ["found", told.split(";")[0]];
 }
 
 /* ---------- The room from above, its faces, and how the files are read. */
@@ -61,7 +61,9 @@ export function roomPart(info, moved) {
 	const { wish, room } = info;
 	if (!room) return null;
 	const words = AXES.map((axis, k) => `${axis} ${show(room[0][k])} to ${show(room[1][k])} m`);
+	const from = wish.room ? "as you say" : "suggested where people were seen or views overlap";
 	const keys = "Arrows move its near faces, with Shift the far ones";
+	const isRead = [wish.pose, wish.axes, wish.boxes, wish.first_index].some((own) => own !== null);
 	const face = (/** @type {number} */ end, /** @type {number} */ axis) =>
 		numberField(
 			`in-room-${end}-${axis}`,
@@ -84,37 +86,41 @@ export function roomPart(info, moved) {
 				AXES.flatMap((letter, axis) => [span({}, letter), face(0, axis), face(1, axis)]),
 			),
 		),
-		div({}, label("Up", why(info, "up")), segment("Up", UPS, info.up, "up")),
+		div({}, label("Up", ...origin(info, "up")), segment("Up", UPS, info.up, "up")),
 		div(
 			{},
-			label("File's unit", why(info, "unit")),
+			label("File's unit", ...origin(info, "unit")),
 			segment("Unit", ["mm", "cm", "m"], info.unit, "unit"),
 		),
+		label("How the files are read", isRead ? "as you say" : "found"),
 		choice("Poses", "pose", wish.pose, info.pose, ["world-to-camera", "camera-to-world"]),
 		choice("Axes", "axes", wish.axes, info.axes, ["opencv", "opengl"]),
-		choice("Boxes", "boxes", wish.boxes, "", LAYOUTS),
+		info.cameras.some(({ detections }) => detections) && [
+			choice("Boxes", "boxes", wish.boxes, info.boxes, LAYOUTS),
+			choice("First frame", "first_index", wish.first_index, info.first_index, ["0", "1"]),
+		],
 		anglesChoice(info),
-		choice("First frame", "first_index", wish.first_index, "", ["0", "1"]),
 		entrances(info),
-		div(
-			{},
-			label("Floor seen by", "cameras"),
-			div(
-				{ class: "keyline small" },
-				[1, 2, 3, 4].map((count) =>
-					span({}, h("i", { class: `seen-${count}` }), count < 4 ? count : "4 +"),
-				),
-			),
-		),
 		wish.room && wishing([icon("i-reset", "s"), "As suggested"], { room: null }),
 	);
 	return h(
 		"section",
 		{ "aria-label": "Room" },
-		heading("Room", small("suggested where people were seen or views overlap; drag its faces")),
+		heading("Room", small(`${from}; drag its faces`)),
 		div(
 			{ class: "roomy" },
-			planPicture(info, `Room from above, ${words.join(", ")}. ${keys}`, moved),
+			div(
+				{ class: "from-above" },
+				planPicture(info, `Room from above, ${words.join(", ")}. ${keys}`, moved),
+				div(
+					{ class: "keyline small" },
+					"Floor seen by",
+					[1, 2, 3, 4].map((count) =>
+						span({}, h("i", { class: `seen-${count}` }), count < 4 ? count : "4 +"),
+					),
+					"cameras",
+				),
+			),
 			side,
 		),
 	);
@@ -131,8 +137,8 @@ function entrances({ wish: { entrances: used }, entrances: found }) {
 	return (
 		found.length > 0 &&
 		div(
-			{ class: "lab" },
-			"Entrances, where tracks begin",
+			{ class: "lab", title: "Where tracks of a first run begin and end" },
+			"Entrances found",
 			wishing(found.length === 1 ? "Use it" : `Use all ${found.length}`, { entrances: found }),
 		)
 	);
@@ -143,28 +149,28 @@ export const anglesChoice = ({ open_turns: open, wish, turns }) =>
 	open.length > 1 && choice("Angles", "turns", wish.turns, turns, open);
 
 /**
- * A choice among values, each with words of its own or called as it is.
+ * A choice among values, each with words of its own or called as it is. What was found out stands
+ * first and holds until another is chosen.
  * @param {string} words @param {string} what @param {string | number | null} wished
- * @param {string} found @param {(string | [string, string])[]} values
+ * @param {string} found  of the values @param {(string | [string, string])[]} values
  */
-const choice = (words, what, wished, found, values) =>
-	h(
+function choice(words, what, wished, found, values) {
+	const named = values.map((one) =>
+		typeof one === "string" ? /** @type {[string, string]} */ ([one, one]) : one,
+	);
+	const own = named.find(([value]) => value === found);
+	const others = named.filter((one) => one !== own || wished !== null);
+	/** @type {[string, string]} */
+	const first = ["", wished === null && own ? own[1] : "as found"];
+	return h(
 		"label",
 		{ class: "lab" },
 		words,
-		select(
-			`in-${what}`,
-			words,
-			[
-				["", found && wished === null ? `${found} (found)` : "as found"],
-				...values.map((one) =>
-					typeof one === "string" ? /** @type {[string, string]} */ ([one, one]) : one,
-				),
-			],
-			String(wished ?? ""),
-			{ [what]: what === "first_index" ? "#" : "$" },
-		),
+		select(`in-${what}`, words, [first, ...others], String(wished ?? ""), {
+			[what]: what === "first_index" ? "#" : "$",
+		}),
 	);
+}
 
 /* ---------- All checks, what is odd first; the pairs of cameras; the truth. */
 
@@ -173,7 +179,7 @@ export function checksPart(info) {
 	const { checks, under_way: now } = info;
 	const of = (/** @type {Server.ImportedCheck["status"]} */ kind) =>
 		checks.filter(({ status }) => status === kind);
-	const [odd, fine] = [of("warning"), of("good")];
+	const { open, known, fine } = standing(info);
 	return h(
 		"section",
 		{ class: "in-scroll", tabindex: 0, "aria-label": "Checks" },
@@ -181,13 +187,13 @@ export function checksPart(info) {
 			"Checks",
 			small(now ? `looking at the ${now}…` : ""),
 			grow(),
-			small(`${fine.length} fine · ${odd.length + Number(hasMoved(info))} to look at`),
+			small(`${fine} fine · ${open + known} to look at`),
 		),
 		div(
 			{ class: "checks" },
 			undecided(info),
 			exchanged(info),
-			[...odd, ...fine, ...of("absent")].map(check),
+			[...of("warning"), ...of("good"), ...of("absent")].map((one) => check(info, one)),
 		),
 		pairs(info),
 	);
@@ -215,12 +221,6 @@ function undecided({ undecided: words, question, wish }) {
 	);
 }
 
-/** @param {Server.ImportedCamera} camera */
-const isMoved = ({ key, calibration_of: of }) => of !== key;
-
-/** @param {Info} info */
-const hasMoved = ({ cameras }) => cameras.some(isMoved);
-
 /** Calibrations that are other cameras' than their names say, and the other choice. @param {Info} info */
 function exchanged(info) {
 	const { cameras, wish } = info;
@@ -239,14 +239,27 @@ function exchanged(info) {
 	);
 }
 
-/** @param {Server.ImportedCheck} one */
-const check = ({ status, name, sentence, remedy, mend }) =>
+/** Checks whose name says all there is to say where nothing is odd. */
+const SAY_ALL = [
+	"people stand upright",
+	"every camera agrees with another",
+	"cameras above the floor",
+	"cameras see the room",
+];
+
+/** @param {Info} info @param {Server.ImportedCheck} one */
+const check = (info, { status, name, sentence, remedy, mend, cameras }) =>
 	line(
 		status,
 		name,
-		remedy && !mend ? `${sentence}: ${remedy}` : sentence,
+		status === "good" && SAY_ALL.includes(name)
+			? ""
+			: remedy && !mend
+				? `${sentence}: ${remedy}`
+				: sentence,
 		mend &&
 			wishing("Apply", { ...mend }, "main", { title: remedy, "aria-label": `Apply ${remedy}` }),
+		cameras.length > 0 && leaving(info, cameras),
 	);
 
 /** @param {Server.ImportedCheck["status"]} status @param {string} name @param {string} words @param {...Child} more */
@@ -442,11 +455,15 @@ const chosen = (words, value, pressed, wish, note) =>
 	);
 
 /** @param {Info} info */
-function kept({ uploaded, bytes, free, home, place: name, wish: { copy_files: copies } }) {
+function kept(info) {
+	const { uploaded, bytes, free, home, place: name } = info;
+	const { copy_files: copies } = info.wish;
 	const whole = `${home}/${name}`;
 	const place = name.length > LONGEST_PLACE ? `${name.slice(0, LONGEST_PLACE)}…` : name;
 	const there = `${size(free)} free there`;
 	if (uploaded) return h("p", { title: whole }, `${size(bytes)} uploaded to ${place}, ${there}.`);
+	// Boxes and truth are written anew: there is nothing to link.
+	if (!isPictured(info)) return h("p", { title: whole }, `In ${place}, ${there}.`);
 	return div(
 		{ class: "choices" },
 		chosen("Link", "", !copies, { copy_files: false }, "The videos stay where they are."),

@@ -84,6 +84,7 @@ async function send(key, numbers, files, signal, tell) {
 /** @param {Context} context */
 export function mountOpening({ store, actions }) {
 	const dialog = /** @type {any} */ (one("dialog.opener"));
+	dialog.tabIndex = -1;
 	/** @type {Server.ImportInfo | null} */
 	let info = null;
 	/** Wishes to go back to, newest last.  @type {Server.ImportWish[]} */
@@ -163,10 +164,12 @@ export function mountOpening({ store, actions }) {
 	function draw(sheet) {
 		const held = document.activeElement;
 		// Whoever types or drags is not disturbed: what he does is sent when he has done it.
+		const wide = dialog.classList.contains("wide");
 		const types = held instanceof HTMLInputElement && held.value !== held.defaultValue;
 		if ((dialog.contains(held) && types) || one("[data-held]", dialog)) return;
+		// Another sheet begins at itself: its buttons are no others' successors.
+		if (dialog.classList.toggle("wide", Boolean(info)) !== wide && dialog.open) dialog.focus();
 		redraw(dialog, sheet);
-		dialog.classList.toggle("wide", Boolean(info));
 	}
 
 	/** @param {Partial<Server.ImportWish>} changes @param {boolean} [undone] */

@@ -553,6 +553,10 @@ declare namespace Server {
 		up: string;
 		pose: string;
 		axes: string;
+		/** How the four numbers of a box are meant; empty where files differ or have none. */
+		boxes: string;
+		/** The number of the first frame in files of boxes; empty where there are none. */
+		first_index: string;
 		/** How rotations given by three angles were taken; empty where there are none. */
 		turns: string;
 		/** How they may be composed: what is wished, and words; what the names leave open. */
@@ -671,8 +675,9 @@ declare namespace Server {
 		fps: number;
 		width: number;
 		height: number;
-		/** What the calibration's file was recognised as. */
+		/** The file of its calibration; what it was recognised as, where it is made of several. */
 		calibration: string;
+		calibration_format: string;
 		/** The camera whose calibration it has by its file: its own, unless they are exchanged. */
 		calibration_of: string;
 		detections: string;
@@ -693,6 +698,8 @@ declare namespace Server {
 		remedy: string;
 		/** The wish that mends it; null where nothing here does. */
 		mend: ImportWish | null;
+		/** The keys of the cameras that do not fit the others, where it is about them. */
+		cameras: string[];
 	}
 
 	/** A file, or a series of numbered ones, and what it was taken for. */

@@ -84,6 +84,7 @@ def test_dropped_files_become_tracks(
     expect(sheet.locator("tbody tr")).to_have_count(4)
     expect(sheet.locator("tbody tr").first).to_contain_text("cam1.avi")
     expect(sheet.locator("tbody tr").first).to_contain_text("60 frames · 20 fps · 640 × 360")
+    expect(sheet.locator(".s-head")).to_contain_text("Hz, by the videos")
     expect(sheet.locator(".told")).to_contain_text("session/notes.txt: no format that is read")
     expect(sheet.locator(".told")).to_be_in_viewport()
     expect(sheet.get_by_role("group", name="Unit").locator("[aria-pressed=true]")).to_have_text(
@@ -159,6 +160,112 @@ def test_four_cameras_fit_a_small_screen(page: Page, files: Path) -> None:
     assert stray == ""
     page.get_by_role("button", name="Cancel").click()
     expect(page.locator("dialog.opener")).to_contain_text("Open a recording")
+
+
+@pytest.fixture
+def boxes(files: Path) -> Path:
+    """What another program left that had no videos: boxes and a calibration in metres."""
+    for file in [*files.glob("*.avi"), files / "notes.txt"]:
+        file.unlink()
+    toml(files, size=(640, 360))
+    return files
+
+
+def test_boxes_alone_are_told_of_as_boxes(flat_page: Page, boxes: Path) -> None:
+    """No word of videos, no conversion of metres to metres, no name of a section of a file."""
+    page = flat_page
+    page.keyboard.press("Control+o")
+    page.locator("#open-path").fill(str(boxes))  # it need not be below the data folder
+    page.keyboard.press("Enter")
+    settled(page)
+    sheet = page.locator("dialog.opener")
+    expect(sheet).to_be_focused()  # not the button Cancel, which Enter would press
+    row = sheet.locator("tbody tr").first
+    expect(row).to_contain_text("calibration.toml")
+    expect(row).to_contain_text("in metres")
+    expect(row.locator(".shot")).to_have_count(0)
+    expect(sheet).not_to_contain_text("Link")
+    expect(sheet.locator(".s-head")).to_contain_text(", since no file says it")
+    sheet.get_by_label("Rate, steps a second").fill("20")
+    page.keyboard.press("Enter")
+    expect(sheet.locator(".s-head")).to_contain_text("Hz, as you say")
+    settled(page)
+    expect(sheet).to_contain_text("the target is")
+    assert not re.search(r"\[\w+\]", sheet.inner_text())
+    for field, value in (("Poses", "world-to-camera"), ("Boxes", "ltwh"), ("First frame", "0")):
+        expect(sheet.get_by_label(field, exact=True).locator(":checked")).to_have_text(value)
+    page.get_by_role("button", name="Cancel").click()
+
+
+def test_exchanged_cameras_are_to_look_at_everywhere(flat_page: Page, boxes: Path) -> None:
+    """The head of the checks and the foot count alike, what is exchanged too."""
+    page = flat_page
+    (boxes / "cam1.csv").rename(boxes / "kept")
+    (boxes / "cam2.csv").rename(boxes / "cam1.csv")
+    (boxes / "kept").rename(boxes / "cam2.csv")
+    drop(page, boxes)
+    settled(page)
+    sheet = page.locator("dialog.opener")
+    expect(sheet.locator("tbody tr").first).to_contain_text("that of cam2")
+    expect(sheet.get_by_role("region", name="Checks")).to_contain_text("1 to look at")
+    expect(sheet.locator(".say")).to_contain_text("nothing to decide, 1 thing to look at")
+    expect(sheet.locator(".dot")).to_have_class("dot warn")
+    page.get_by_role("button", name="Cancel").click()
+
+
+def test_a_camera_of_another_recording_is_left_out_beside_its_warning(
+    flat_page: Page, boxes: Path
+) -> None:
+    """Its row, the check and the foot say the same of it until it is left out."""
+    page = flat_page
+    table = (boxes / "cam3.csv").read_text().splitlines()
+    last = int(table[-1].split(",")[0])
+    other = []
+    for row in table[1:]:  # people who walk backwards in a picture of the other hand
+        frame, left, top, width, height = (float(value) for value in row.split(","))
+        other.append(f"{last - frame:.0f},{640 - left - width},{top},{width},{height}")
+    (boxes / "cam3.csv").write_text("\n".join([table[0], *other]))
+    drop(page, boxes)
+    settled(page)
+    sheet = page.locator("dialog.opener")
+    checks = sheet.get_by_role("region", name="Checks")
+    expect(sheet.locator("tbody tr").nth(2)).to_contain_text("does not fit the others")
+    expect(sheet.locator(".say")).to_contain_text("3 of 4 cameras ready, 1 thing to decide")
+    expect(checks).to_contain_text("1 to look at")
+    checks.get_by_role("button", name="Leave out cam3").click()
+    expect(sheet.locator("tbody tr")).to_have_count(3)
+    settled(page)
+    expect(sheet).to_contain_text("Left out: cam3")
+    expect(sheet.locator(".say")).to_contain_text("3 of 3 cameras ready, nothing to decide")
+    page.get_by_role("button", name="Cancel").click()
+
+
+def test_the_plan_fills_its_frame_and_nothing_is_drawn_over_a_name(
+    flat_page: Page, boxes: Path
+) -> None:
+    page = flat_page
+    drop(page, boxes)
+    settled(page)
+    for size in ((1280, 720), (1440, 900), (1920, 1080)):
+        page.set_viewport_size({"width": size[0], "height": size[1]})
+        frame = page.locator(".plan").bounding_box()
+        ground = page.locator(".plan .ground").bounding_box()
+        assert frame is not None
+        assert ground is not None
+        assert ground["width"] > 0.97 * frame["width"] or ground["width"] < ground["height"]
+        assert ground["height"] > 0.97 * frame["height"], size
+        over = page.evaluate(
+            """() => {
+                const places = [...document.querySelectorAll(".plan text:not(.length)")]
+                    .map((text) => [text.textContent, text.getBoundingClientRect()]);
+                return places.flatMap(([name, one], k) => places.slice(k + 1)
+                    .filter(([_, other]) => one.left < other.right && other.left < one.right
+                        && one.top < other.bottom && other.top < one.bottom)
+                    .map(([other]) => `${name} ${other}`));
+            }"""
+        )
+        assert over == [], size
+    page.get_by_role("button", name="Cancel").click()
 
 
 @pytest.mark.data
@@ -243,9 +350,9 @@ def test_the_sheet_opens_what_is_there(flat_page: Page, server: Server, folder: 
     expect(sheet.locator(".rec", has_text="room44-3p")).to_be_visible()
     sheet.get_by_label("Find by name").fill("numb")
     expect(sheet.locator(".rec", has_text="room44-3p")).to_be_hidden()
-    sheet.get_by_label("Path").fill("/etc")
+    sheet.get_by_label("Path").fill(str(folder / "nowhere"))
     sheet.get_by_role("button", name="Open", exact=True).click()
-    expect(sheet.get_by_role("alert")).to_contain_text("expected files below the data folder")
+    expect(sheet.get_by_role("alert")).to_contain_text("there is no such file or folder")
     shutil.copytree(folder / "data/walkers", folder / "data/others", dirs_exist_ok=True)
     sheet.get_by_label("Path").fill("others/sequence.toml")
     sheet.get_by_label("Path").press("Enter")
@@ -290,7 +397,7 @@ def test_a_foreign_recording_is_dropped_and_tracked(
     settled(page)
     sheet = page.locator("dialog.opener")
     expect(sheet.locator("tbody tr")).to_have_count(4)
-    expect(sheet.locator("tbody tr").first).to_contain_text("Qualisys")
+    expect(sheet.locator("tbody tr").first.get_by_title("Qualisys")).to_have_text("Calib.qca.txt")
     expect(sheet.locator("tbody tr").first).to_contain_text("mm → m")
     sheet.get_by_role("button", name="Import and track").click()
     server.wait(lambda now: now["sequence"]["name"].startswith("pose2sim-multi"))

@@ -341,10 +341,10 @@ def _stray_cameras(sequence: Sequence, told: BoxesTell) -> Iterator[Check]:
     own pose or clock is off."""
     name_of_check = "every camera agrees with another"
     names = [camera.name for camera in sequence.cameras]
-    alone = describe_unconfirmed(told.verdict, names, sequence.fps).alone
-    if alone:
-        yield warning(name_of_check, alone)
-    if len(sequence.views) < 3 or alone:
+    doubtful = describe_unconfirmed(told.verdict, names, sequence.fps)
+    if doubtful.alone:
+        yield warning(name_of_check, doubtful.alone, cameras=doubtful.without)
+    if len(sequence.views) < 3 or doubtful.alone:
         return
     shares: dict[str, float] = {}
     for index, view in enumerate(sequence.views):
@@ -357,6 +357,7 @@ def _stray_cameras(sequence: Sequence, told: BoxesTell) -> Iterator[Check]:
                 name_of_check,
                 f"{name} has a box at {percent(share)} of the places where others' boxes meet and "
                 "it sees: its calibration, its file of boxes or its clock is another one's",
+                cameras=[name],
                 share=share,
             )
     if shares and min(shares.values()) >= _OWN_SHARE:
@@ -371,6 +372,7 @@ def _moved_cameras(sequence: Sequence, told: BoxesTell) -> Iterator[Check]:
         yield warning(
             "cameras are where they were calibrated",
             "; ".join(sentences),
+            cameras=[sequence.cameras[c].name for c in moved],
             degrees=float(np.degrees(max(moved.values()))),
         )
 
