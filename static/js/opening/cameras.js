@@ -214,7 +214,8 @@ function agreement({ steps, offsets, agreement, sure }, late) {
 	});
 	const values = points.map(({ y }) => y);
 	const [low, high] = values.length ? [Math.min(...values), Math.max(...values)] : [0, 1];
-	const labelled = [-reach, 0, reach, ...(sure ? [steps] : [])];
+	const close = sure && Math.abs(steps) < reach / 4; // their numbers would lie over each other
+	const labelled = [-reach, reach, ...(close ? [] : [0]), ...(sure ? [steps] : [])];
 	/** @type {import("../elements/chart.js").Mark[]} */
 	const marks = [
 		{ kind: "line", colour: "ink-3", points: [-reach, reach].map((x) => ({ x, y: low })) },
