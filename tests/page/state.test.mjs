@@ -15,7 +15,7 @@ import {
 } from "../../static/js/state/events.js";
 import { lensOf } from "../../static/js/draw/overlay.js";
 import { magnified } from "../../static/js/cameras/cameras.js";
-import { compareCells } from "../../static/js/elements/drawn.js";
+import { compareCells } from "../../static/js/elements/table.js";
 import { freeCorner } from "../../static/js/opening/plan.js";
 import { kindsOf } from "../../static/js/inspector/side.js";
 import { strands } from "../../static/js/timeline/reading.js";

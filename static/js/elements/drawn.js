@@ -1,5 +1,6 @@
 /** Panels that are drawn anew while somebody works in them, and what they are written with. */
 import { all, h, symbolParts } from "./dom.js";
+import { table } from "./table.js";
 
 /** Elements that are replaced as a whole where they differ: what they do is made with what they say. */
 const CONTROLS = "button, a, input, select";
@@ -77,44 +78,6 @@ export function fixed(value, digits, signed = false) {
 	return `${!Number(text) ? "" : value < 0 ? "−" : signed ? "+" : ""}${text}`;
 }
 
-/** By which column each table is sorted, by its label: kept while it is drawn anew. @type {Map<string, {word: string, down: boolean}>} */
-const sorted = new Map();
-
-/**
- * The order of two cells: numbers by their value, those that are none last, other text by letters.
- * @param {string} a @param {string} b @param {boolean} number @param {boolean} down
- */
-export function compareCells(a, b, number, down) {
-	const turn = down ? -1 : 1;
-	if (!number) return turn * a.localeCompare(b, "en", { numeric: true });
-	const [x, y] = [a, b].map((text) => Number.parseFloat(text.replace("−", "-")));
-	if (Number.isNaN(x) || Number.isNaN(y)) return Number(Number.isNaN(x)) - Number(Number.isNaN(y));
-	return turn * (x - y);
-}
-
-/** Bring the rows into the chosen order. @param {HTMLTableElement} element */
-function sortRows(element) {
-	const { word, down } = sorted.get(element.ariaLabel ?? "") ?? { word: "", down: false };
-	const heads = [...element.querySelectorAll("th")];
-	const at = heads.findIndex(({ textContent }) => textContent === word);
-	heads.forEach((head, k) => (head.ariaSort = k !== at ? null : down ? "descending" : "ascending"));
-	if (at < 0) return;
-	const text = (/** @type {HTMLTableRowElement} */ row) => row.cells[at].textContent ?? "";
-	const number = heads[at].className === "num";
-	const [body] = element.tBodies;
-	body.append(...[...body.rows].sort((a, b) => compareCells(text(a), text(b), number, down)));
-}
-
-/** By a head: from the least, then from the largest. @param {MouseEvent} event */
-function sortBy({ currentTarget }) {
-	const button = /** @type {HTMLElement} */ (currentTarget);
-	const element = /** @type {HTMLTableElement} */ (button.closest("table"));
-	const [label, word] = [element.ariaLabel ?? "", button.textContent ?? ""];
-	const before = sorted.get(label);
-	sorted.set(label, { word, down: before?.word === word && !before.down });
-	sortRows(element);
-}
-
 /** A click anywhere in a row is one on its first button. @param {MouseEvent} event */
 function pressFirst({ currentTarget, target }) {
 	const row = /** @type {HTMLElement} */ (currentTarget);
@@ -123,7 +86,7 @@ function pressFirst({ currentTarget, target }) {
 }
 
 /**
- * A table that is made once: one of several below each other.
+ * A table that a panel draws anew whenever something changes.
  * @param {string} label
  * @param {string[]} words  of the columns; a `#` in front means numbers, at the right
  * @param {(Child | Child[])[][]} rows  a cell a column; a dash stands for null
@@ -131,33 +94,17 @@ function pressFirst({ currentTarget, target }) {
  * @param {boolean} [how.sorts]  by its heads: its rows have no order of their own
  * @param {boolean} [how.goes]  a row does as a whole what its first button does
  */
-export function table(label, words, rows, { sorts = false, goes = false } = {}) {
-	const kinds = words.map((word) => ({ class: word.startsWith("#") ? "num" : "" }));
-	const heads = words.map((head, k) => {
-		const word = head.replace("#", "");
-		return h(
-			"th",
-			{ scope: "col", ...kinds[k] },
-			!word
-				? h("span", { class: "vh" }, "Actions")
-				: sorts
-					? h("button", { onclick: sortBy }, word)
-					: word,
-		);
+export function drawnTable(label, words, rows, { sorts = false, goes = false } = {}) {
+	const columns = words.map((head, k) => ({
+		word: head.replace("#", ""),
+		kind: head.startsWith("#") ? "num" : "",
+		by: sorts && head !== "#",
+		cell: (/** @type {number} */ row) => rows[row][k] ?? "–",
+	}));
+	const { element, show } = table(label, columns, {
+		key: Number,
+		attributes: () => (goes ? { class: "goes", onclick: pressFirst } : {}),
 	});
-	const lines = rows.map((row) =>
-		h(
-			"tr",
-			goes ? { class: "goes", onclick: pressFirst } : {},
-			row.map((cell, k) => h("td", kinds[k], cell ?? "–")),
-		),
-	);
-	const element = h(
-		"table",
-		{ "aria-label": label },
-		h("thead", {}, h("tr", {}, heads)),
-		h("tbody", {}, lines),
-	);
-	if (sorts) sortRows(element);
+	show([...rows.keys()]);
 	return element;
 }

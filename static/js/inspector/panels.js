@@ -1,6 +1,6 @@
 /** What the panels beside the pictures tell: the shown step, events, figures and runs. */
 import { h, idTag, show } from "../elements/dom.js";
-import { fixed, line, nothing, parameterName, quiet, table } from "../elements/drawn.js";
+import { drawnTable, fixed, line, nothing, parameterName, quiet } from "../elements/drawn.js";
 import { getJson } from "../state/api.js";
 import { eventsNow, resultOf, scoresOf, trueCount } from "../state/events.js";
 
@@ -81,7 +81,7 @@ export function stepTables(state, series) {
 		),
 	);
 	return [
-		table(
+		drawnTable(
 			`People in 3D at step ${result.step}`,
 			["In 3D", "#Weight", "#x, y, z  m", "#± m", "#Error  m"],
 			result.tracks.map(({ id, existence, position, sigma }) => [
@@ -93,7 +93,7 @@ export function stepTables(state, series) {
 			]),
 			{ sorts: true },
 		),
-		table(
+		drawnTable(
 			"Tracks in the pictures",
 			["Camera", "Track", "State", "#p_D", "Because", "Fed by", BOX],
 			result.cameras.flatMap(({ name, tracks }) =>
@@ -110,7 +110,7 @@ export function stepTables(state, series) {
 			{ sorts: true },
 		),
 		unowned.length > 0 &&
-			table(
+			drawnTable(
 				"Detections that are nobody's",
 				["Camera", "Nobody's", "#Score", "Nearest track", "#σ away", "#Gate, σ", BOX],
 				unowned,
@@ -124,7 +124,7 @@ export function stepTables(state, series) {
 function curves({ sequence }, result, series) {
 	const at = (/** @type {Server.EvaluationSeries | null} */ one, /** @type {"ospa"} */ name) =>
 		one?.[name][Math.floor((result.step - one.first) / one.stride)];
-	return table(
+	return drawnTable(
 		"Curves at this step",
 		["Measure", "#B", "#A"],
 		[
@@ -174,7 +174,7 @@ export function eventTable(state, _, actions) {
 				quiet(identity.warning),
 			),
 			identity.doubts.length
-				? table(
+				? drawnTable(
 						"Doubtful moments",
 						["#Step", "#Time  s", "Doubtful, the most doubtful first", "Tracks"],
 						identity.doubts
@@ -208,7 +208,7 @@ export function eventTable(state, _, actions) {
 	]);
 	const more = events.length - MOST_EVENTS;
 	return [
-		table(
+		drawnTable(
 			"Events",
 			["#Step", "#Time  s", "Event", "Track"],
 			events
@@ -260,7 +260,7 @@ function checked(state, actions) {
 			),
 		];
 	return [
-		table(
+		drawnTable(
 			"Identity without truth",
 			["Without truth", "#IDF1", "Which is"],
 			[
@@ -346,7 +346,7 @@ export function compareTables(state, comparison, actions) {
 				` ${sideOf(shown, evaluation.changes, evaluation.partial)}`,
 				" · no run to compare with: pin this one, or change a parameter",
 			),
-			table(
+			drawnTable(
 				"Figures",
 				["Measure", "#B"],
 				evaluation.figures
@@ -366,7 +366,7 @@ export function compareTables(state, comparison, actions) {
 			h("b", {}, "B"),
 			` ${sideOf(shown, count(b), b.partial)} · ${steps} steps`,
 		),
-		table(
+		drawnTable(
 			"Figures",
 			["Measure", "#A", "#B", "#Difference", "B is"],
 			rows
@@ -382,7 +382,7 @@ export function compareTables(state, comparison, actions) {
 				]),
 		),
 		parameters.length > 0 &&
-			table(
+			drawnTable(
 				"Parameters that differ",
 				["B differs in", "#A", "#B"],
 				parameters.map((one) => [nameOf(state, one.key), quiet(valueOf(one.a)), valueOf(one.b)]),
@@ -408,7 +408,7 @@ const PHASES = {
 export function runTable({ run: now }, { runs }, actions) {
 	if (!runs.length)
 		return nothing("No run yet", "What is computed is listed here, and can be taken up again.");
-	return table(
+	return drawnTable(
 		"Runs",
 		["Run", "Sequence", "Methods", "State", "#Steps/s", "#Changes", "#"],
 		runs.map((run) => {

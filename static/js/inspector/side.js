@@ -1,6 +1,6 @@
 /** The side panel: tabs with a panel each, and the first of them, the table of tracks. */
 import { all, one, parts, fill, h, idTag, write } from "../elements/dom.js";
-import { grid } from "../elements/grid.js";
+import { table } from "../elements/table.js";
 import {
 	isAlone,
 	eventsNow,
@@ -136,7 +136,7 @@ function mountTracks(root, { store, actions, playback }) {
 			by: ({ id }) => scored.get(id)?.switches ?? -1,
 		},
 	];
-	const table = grid("Tracks", columns, {
+	const rows = table("Tracks", columns, {
 		key: ({ id }) => id,
 		by: "Length",
 		down: true,
@@ -151,7 +151,8 @@ function mountTracks(root, { store, actions, playback }) {
 			onpointerleave: () => store.set({ hover: null }),
 		}),
 	});
-	root.prepend(table.element);
+	const scroller = h("div", { class: "scroll" }, rows.element);
+	root.prepend(scroller);
 	const buttons = KINDS.map(([name, , tip]) =>
 		h("button", { "data-tip": tip, onclick: () => store.set({ listed: name }) }),
 	);
@@ -160,7 +161,7 @@ function mountTracks(root, { store, actions, playback }) {
 	function list() {
 		const { timeline, sequence, run } = store.get();
 		scored = new Map(scoresOf(store.get())?.evaluation.per_track.map((track) => [track.id, track]));
-		table.element.classList.toggle("plain", !sequence?.has_truth);
+		scroller.classList.toggle("plain", !sequence?.has_truth);
 		const kinds = kindsOf(timeline?.tracks ?? [], scored, timeline?.events ?? []);
 		const { listed: kind } = store.get();
 		const truth = sequence?.has_truth;
@@ -173,7 +174,7 @@ function mountTracks(root, { store, actions, playback }) {
 		const tracks = kinds[kind].filter(
 			({ id }) => !isAlone(store.get()) || id === store.get().selection,
 		);
-		table.show(tracks.slice(0, MOST_ROWS));
+		rows.show(tracks.slice(0, MOST_ROWS));
 		blank.hidden = tracks.length > 0;
 		if (!tracks.length) {
 			const [title, text] = kinds.all.length
@@ -196,8 +197,8 @@ function mountTracks(root, { store, actions, playback }) {
 	/** What changes with the playhead: written only where it differs. */
 	function now() {
 		const { timeline, selection, sequence } = store.get();
-		table.live();
-		table.each((track, row) => {
+		rows.live();
+		rows.each((track, row) => {
 			row.classList.toggle("gone", !["seen", "coasting"].includes(state(track) ?? ""));
 			row.ariaSelected = String(track.id === selection);
 		});
@@ -225,7 +226,7 @@ function mountTracks(root, { store, actions, playback }) {
 	store.on(["shown", "result", "eventKind"], now);
 	store.on(["selection"], () => (isAlone(store.get()) ? list() : now()));
 	store.on(["selection"], ({ selection }) =>
-		table.each(({ id }, row) => id === selection && row.scrollIntoView({ block: "nearest" })),
+		rows.each(({ id }, row) => id === selection && row.scrollIntoView({ block: "nearest" })),
 	);
 }
 

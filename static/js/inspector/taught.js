@@ -1,6 +1,6 @@
 /** The panel of teaching: templates with their colours, the room, entrances, and saving. */
 import { h, idTag } from "../elements/dom.js";
-import { line, quiet, table } from "../elements/drawn.js";
+import { drawnTable, line, quiet } from "../elements/drawn.js";
 import { NUMBERS } from "./teach.js";
 
 /** @typedef {NonNullable<PageState["sequence"]>} Sequence */
@@ -100,7 +100,7 @@ function templates(sequence, { templates, method, looking }) {
 				: "No camera has pictures, so there are no colours to learn.",
 		);
 	return [
-		table(
+		drawnTable(
 			"Colour templates",
 			["Box", "Person", "Colours", "Seen at", "#"],
 			templates.map((one, k) => [
@@ -142,7 +142,7 @@ function offers(sequence, { offers }) {
 	const every = send("Add all", "POST teach/offers/taken", { label: "Add all offers" });
 	return [
 		line(ask, " ", every, " ", forget),
-		table(
+		drawnTable(
 			"Offered templates",
 			["Offered", "Person", "Colours", "Seen at", "Why", "#"],
 			offers.map(({ template, track, reason }, k) => [
@@ -249,7 +249,7 @@ function detector({ detector, fetching, method }, actions) {
 
 /** @param {Sequence} sequence */
 const room = ({ room }) =>
-	table(
+	drawnTable(
 		"Room, in metres",
 		["Room", ...AXES.map((axis) => `#${axis}  m`)],
 		/** @type {const} */ ([
@@ -274,7 +274,7 @@ function target({ target: { half_extents: half } }, { sizes }) {
 		own.some((side, k) => Math.abs(side - half[k]) > 1e-6),
 	);
 	return [
-		table(
+		drawnTable(
 			"Target, in metres",
 			["Target", "#width  m", "#depth  m", "#height  m"],
 			[
@@ -306,7 +306,7 @@ function entrances({ room: { entrances } }) {
 	]).flatMap(([part, sign]) => AXES.map((axis, k) => ({ part, k, word: `${sign}${axis}` })));
 	return [
 		entrances.length > 0 &&
-			table(
+			drawnTable(
 				"Entrances, in metres",
 				["Entrance", ...places.map(({ word }) => `#${word}  m`), "#"],
 				entrances.map((entrance, index) => [

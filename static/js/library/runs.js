@@ -1,6 +1,6 @@
 /** The table of a recording's runs. */
 import { fill, h, icon, symbolOf } from "../elements/dom.js";
-import { grid } from "../elements/grid.js";
+import { table } from "../elements/table.js";
 import { figure, isMethod, livesAMinute, madeWhen, many, methodWord } from "./words.js";
 
 /** Figures with a bar: what the bar is from and to, and which end is the better. */
@@ -148,7 +148,7 @@ export function runsTable(on) {
 		},
 		{
 			word: "Methods",
-			by: (run) => `${run.single_view} ${run.fusion_method}`,
+			by: true,
 			cell: (run) => [
 				methodWord(run.single_view),
 				h("span", { class: "q" }, " › "),
@@ -188,9 +188,9 @@ export function runsTable(on) {
 			by: (run) => run.steps_per_second,
 			cell: (run) => (run.steps_per_second ? Math.round(run.steps_per_second) : "–"),
 		},
-		{ word: "Note", kind: "q note-cell", by: (run) => run.note, cell: (run) => run.note },
+		{ word: "Note", kind: "q note-cell", by: true, cell: (run) => run.note },
 	];
-	const table = grid("Runs", columns, {
+	const rows = table("Runs", columns, {
 		key: (run) => run.id,
 		by: "When",
 		down: true,
@@ -202,7 +202,7 @@ export function runsTable(on) {
 	/** Words of the columns that somebody does not want. @type {Set<string>} */
 	const hidden = new Set(recall());
 	const hide = () => {
-		for (const row of table.element.querySelectorAll("tr"))
+		for (const row of rows.element.querySelectorAll("tr"))
 			[...row.cells].forEach((cell, k) => {
 				const word = columns[k]?.word;
 				// Figures need a truth; what they are replaced by needs none.
@@ -245,7 +245,7 @@ export function runsTable(on) {
 	});
 
 	return {
-		element: table.element,
+		element: h("div", { class: "scroll" }, rows.element),
 		/** What chooses the columns. */
 		chooser: [chooser, menu],
 		/**
@@ -262,8 +262,8 @@ export function runsTable(on) {
 				const values = runs.map((run) => final(run, key)).filter((value) => value !== null);
 				best[key] = values.length > 1 ? sign * Math.max(...values.map((v) => sign * v)) : null;
 			}
-			table.show(runs);
-			table.each((run, row) => {
+			rows.show(runs);
+			rows.each((run, row) => {
 				row.ariaSelected = String(run.id === focused);
 				row.classList.toggle("picked-row", chosen.has(run.id));
 				if (run.id === focused) row.tabIndex = 0;

@@ -1,7 +1,7 @@
 /** The cameras of an import: a row each, with all that belongs to one and what is odd about it. */
 import { plot } from "../elements/chart.js";
 import { h, icon, one, show } from "../elements/dom.js";
-import { table } from "../elements/drawn.js";
+import { drawnTable } from "../elements/drawn.js";
 import { ownEnd } from "../library/words.js";
 import { cut, div, field, numberField, select, small, span, wishing } from "./controls.js";
 
@@ -12,7 +12,7 @@ const HEADS = ["Camera", "Video", "Calibration", "Starts late by, frames", "Dete
 
 /** All rows, and what is not used, which stays in sight however many cameras there are. @param {Info} info */
 export function camerasTable(info) {
-	const rows = table(
+	const rows = drawnTable(
 		"Cameras",
 		HEADS,
 		info.cameras.map((camera, k) => row(info, camera, k)),

@@ -460,19 +460,35 @@ interface Store<T extends object> {
 /** Of a table. */
 interface Column<R> {
 	word: string;
+	/** What stands in its head, where that is not its word. */
+	head?: Child;
 	/** Classes. */
 	kind?: string;
 	help?: string;
 	cell: (row: R) => string | number | Child | Child[];
-	/** Makes it sortable. */
-	by?: (row: R) => number | string;
+	/** Makes it sortable: by a number, or by what the cells say. */
+	by?: ((row: R) => number) | boolean;
 	/** Changes with the shown step. */
 	live?: boolean;
 }
 
+interface TableHow<R> {
+	key: (row: R) => string | number;
+	/** Word of the column that sorts at first; without one rows stay in their order. */
+	by?: string;
+	/** From the largest. */
+	down?: boolean;
+	/** By click or Enter. */
+	choose?: (row: R, event: MouseEvent | KeyboardEvent) => void;
+	/** By double click. */
+	open?: (row: R) => void;
+	/** Of the row, and its listeners. */
+	attributes?: (row: R) => Record<string, any>;
+}
+
 /** A table. */
-interface Grid<R> {
-	element: HTMLElement;
+interface Table<R> {
+	element: HTMLTableElement;
 	show: (rows: R[]) => void;
 	/** Fill the columns that change with the step. */
 	live: () => void;
