@@ -1,5 +1,6 @@
 /** The trials of a study, and what is done with the chosen one: used, compared, kept, repeated. */
-import { fill, h, icon, symbolOf } from "../elements/dom.js";
+import { all, fill, h, icon, symbolOf } from "../elements/dom.js";
+import { table } from "../elements/table.js";
 import { getJson } from "../state/api.js";
 import { differenceOf, figureOf, titledOf, valueOf } from "./words.js";
 
@@ -8,6 +9,15 @@ import { differenceOf, figureOf, titledOf, valueOf } from "./words.js";
 /** Rows that are shown; the export has all. */
 const MOST_ROWS = 200;
 
+/** What a trial is called beside its number. @param {Server.Study} study @param {Server.TrialInfo} trial */
+function signOf({ best, front, objectives }, { number, vetoed, state }) {
+	if (number === 0) return "";
+	if (number === best) return "best";
+	if (vetoed) return "vetoed";
+	if (state !== "complete") return state;
+	return objectives.length > 1 && front.includes(number) ? "front" : "";
+}
+
 /**
  * @param {object} on
  * @param {(number: number) => void} on.choose
@@ -15,128 +25,74 @@ const MOST_ROWS = 200;
  */
 function trialsTable({ choose, use }) {
 	const element = h("div", { class: "scroll", tabindex: 0, "aria-label": "Trials, best first" });
-	/** @type {number[]} in the order of the table */
-	let order = [];
+	/** @type {Server.Study} */
+	let study;
+	/** @type {Server.TrialInfo | undefined} */
+	let standard;
+	/** @type {Table<Server.TrialInfo> | null} */
+	let rows = null;
+	/** The study and the columns that it is made of. */
+	let made = "";
 
 	/**
-	 * @param {Server.Study} study
-	 * @param {Server.TrialInfo[]} trials
-	 * @param {number | null} chosen
+	 * A figure of the trials, and its difference to the default.
+	 * @param {Server.ObjectiveInfo} of
+	 * @param {(trial: Server.TrialInfo) => number | undefined} at
+	 * @returns {Column<Server.TrialInfo>}
 	 */
-	function show(study, trials, chosen) {
-		const [lead] = study.objectives;
-		const standard = trials.find(({ number }) => number === 0);
-		const worth = (/** @type {Server.TrialInfo} */ trial) =>
-			trial.number === study.best
-				? Infinity
-				: trial.objectives === null || trial.vetoed || trial.state !== "complete"
-					? -Infinity
-					: (lead.higher ? 1 : -1) * trial.objectives[0];
-		const rows = trials
-			.filter(({ number }) => number !== 0)
-			.sort((a, b) => worth(b) - worth(a) || a.number - b.number)
-			.slice(0, MOST_ROWS);
-		if (standard) rows.push(standard);
-		order = rows.map(({ number }) => number);
-		const head = h(
-			"tr",
-			{},
-			h("th", {}, "Trial"),
-			study.objectives.map((of, k) =>
-				h(
-					"th",
-					{
-						class: "num",
-						title: of.help,
-						"aria-sort": k ? null : lead.higher ? "descending" : "ascending",
-					},
-					titledOf(of),
-				),
-			),
-			study.beside.map((of) => h("th", { class: "num", title: of.help }, titledOf(of))),
-			study.varied.map((range) =>
-				h("th", { class: "num", title: `${range.label}: ${range.help}` }, symbolOf(range.symbol)),
-			),
-			h("th", { class: "num" }, "Time s"),
-			h("th", {}, h("span", { class: "vh" }, "Use")),
-		);
-		fill(
-			element,
-			h(
-				"table",
-				{ class: "bt" },
-				h("caption", { class: "vh" }, "Trials, best first; the default last"),
-				h("thead", {}, head),
-				h(
-					"tbody",
-					{},
-					rows.map((trial) => row(study, trial, standard, chosen)),
-				),
-			),
-		);
-	}
+	const figure = (of, at) => ({
+		word: titledOf(of),
+		help: of.help,
+		kind: "num",
+		by: (trial) => at(trial) ?? Number.NaN,
+		cell: (trial) => [
+			figureOf(at(trial), of),
+			trial.number !== 0 && differenceOf(at(trial), standard && at(standard), of),
+		],
+	});
 
-	/**
-	 * @param {Server.Study} study
-	 * @param {Server.TrialInfo} trial
-	 * @param {Server.TrialInfo | undefined} standard
-	 * @param {number | null} chosen
-	 */
-	function row(study, trial, standard, chosen) {
-		const { number } = trial;
-		const sign =
-			number === 0
-				? ""
-				: number === study.best
-					? "best"
-					: trial.vetoed
-						? "vetoed"
-						: trial.state !== "complete"
-							? trial.state
-							: study.objectives.length > 1 && study.front.includes(number)
-								? "front"
-								: "";
-		return h(
-			"tr",
-			{
-				"aria-selected": String(number === chosen),
-				"data-trial": number,
-				title: trial.words || null,
-				onclick: () => choose(number),
+	/** @returns {Column<Server.TrialInfo>[]} */
+	const columns = () => [
+		{
+			word: "Trial",
+			by: ({ number }) => number,
+			cell: (trial) => {
+				const { number } = trial;
+				const sign = signOf(study, trial);
+				return [
+					h(
+						"button",
+						{ class: "as-text", onclick: () => choose(number) },
+						number ? number : "default",
+					),
+					sign && h("span", { class: "q" }, ` ${sign}`),
+				];
 			},
-			h(
-				"td",
-				{},
-				h(
-					"button",
-					{ class: "as-text", onclick: () => choose(number) },
-					number ? number : "default",
-				),
-				sign && h("span", { class: "q" }, ` ${sign}`),
-			),
-			study.objectives.map((of, k) =>
-				h(
-					"td",
-					{ class: "num" },
-					figureOf(trial.objectives?.[k], of),
-					number !== 0 && differenceOf(trial.objectives?.[k], standard?.objectives?.[k], of),
-				),
-			),
-			study.beside.map((of) =>
-				h(
-					"td",
-					{ class: "num" },
-					figureOf(trial.figures[of.key], of),
-					number !== 0 && differenceOf(trial.figures[of.key], standard?.figures[of.key], of),
-				),
-			),
-			study.varied.map(({ key }) =>
-				h("td", { class: "num pv2" }, key in trial.values ? valueOf(trial.values[key]) : "·"),
-			),
-			h("td", { class: "num" }, trial.seconds.toFixed(1)),
-			h(
-				"td",
-				{ class: "act" },
+		},
+		...study.objectives.map((of, k) => figure(of, ({ objectives }) => objectives?.[k])),
+		...study.beside.map((of) => figure(of, ({ figures }) => figures[of.key])),
+		...study.varied.map(({ key, label, symbol, help }) => {
+			/** @type {Column<Server.TrialInfo>} */
+			const column = {
+				word: key,
+				head: symbolOf(symbol),
+				help: `${label}: ${help}`,
+				kind: "num pv2",
+				by: true,
+				cell: ({ values }) => (key in values ? valueOf(values[key]) : "·"),
+			};
+			return column;
+		}),
+		{
+			word: "Time s",
+			kind: "num",
+			by: ({ seconds }) => seconds,
+			cell: ({ seconds }) => seconds.toFixed(1),
+		},
+		{
+			word: "",
+			kind: "act",
+			cell: ({ number }) =>
 				number === 0
 					? h("span", { class: "q" }, "trial 0")
 					: h(
@@ -148,20 +104,60 @@ function trialsTable({ choose, use }) {
 							},
 							"Use",
 						),
-			),
-		);
+		},
+	];
+
+	/**
+	 * @param {Server.Study} now
+	 * @param {Server.TrialInfo[]} trials
+	 * @param {number | null} chosen
+	 */
+	function show(now, trials, chosen) {
+		study = now;
+		const { info, objectives, beside, varied } = now;
+		const needed = [info.name, ...[objectives, beside, varied].flat().map(({ key }) => key)].join();
+		if (needed !== made || !rows) {
+			made = needed;
+			rows = table(`Trials of ${info.name}, best first`, columns(), {
+				key: ({ number }) => number,
+				attributes: ({ number, words }) => ({
+					"data-trial": number,
+					title: words || null,
+					onclick: () => choose(number),
+				}),
+			});
+			rows.element.className = "bt";
+			fill(element, rows.element);
+		}
+		const [lead] = objectives;
+		standard = trials.find(({ number }) => number === 0);
+		const worth = (/** @type {Server.TrialInfo} */ trial) =>
+			trial.number === study.best
+				? Infinity
+				: trial.objectives === null || trial.vetoed || trial.state !== "complete"
+					? -Infinity
+					: (lead.higher ? 1 : -1) * trial.objectives[0];
+		const listed = trials
+			.filter(({ number }) => number !== 0)
+			.sort((a, b) => worth(b) - worth(a) || a.number - b.number)
+			.slice(0, MOST_ROWS);
+		rows.show(standard ? [...listed, standard] : listed);
+		rows.each(({ number }, row) => (row.ariaSelected = String(number === chosen)));
 	}
+
+	const lines = () => all("tr[data-trial]", element);
+	const lineOf = (/** @type {number | null} */ number) =>
+		lines().findIndex(({ dataset }) => Number(dataset.trial) === number);
 
 	/** The trial before or after one in the table. @param {number | null} from @param {number} by */
 	function beside(from, by) {
-		const at = order.indexOf(from ?? Number.NaN);
-		return order[Math.min(order.length - 1, Math.max(0, at < 0 ? 0 : at + by))] ?? null;
+		const [at, last] = [lineOf(from), lines().length - 1];
+		const next = lines()[Math.min(last, Math.max(0, at < 0 ? 0 : at + by))];
+		return next ? Number(next.dataset.trial) : null;
 	}
 
 	/** @param {number | null} number */
-	function reveal(number) {
-		element.querySelector(`tr[data-trial="${number}"]`)?.scrollIntoView({ block: "nearest" });
-	}
+	const reveal = (number) => lines()[lineOf(number)]?.scrollIntoView({ block: "nearest" });
 
 	return { element, show, beside, reveal };
 }
