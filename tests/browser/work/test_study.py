@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -167,6 +168,21 @@ def test_keys_walk_through_the_trials_and_use_one(study: Page, server: Server) -
     assert {key: now[key] for key in values} == pytest.approx(values)
     study.keyboard.press("Escape")
     expect(study.locator("main")).to_be_visible()
+
+
+def test_trials_are_sorted_by_a_column(study: Page) -> None:
+    head = study.get_by_role("columnheader", name="Position error m")
+    column = head.evaluate("head => head.cellIndex")
+    expect(head).not_to_have_attribute("aria-sort", re.compile("."))
+    for order, turn in (("ascending", 1), ("descending", -1)):
+        head.get_by_role("button").click()
+        expect(head).to_have_attribute("aria-sort", order)
+        errors = [
+            float(row.locator("td").nth(column).inner_text().split()[0])
+            for row in study.locator("tr[data-trial]").all()
+        ]
+        assert errors == sorted(errors, reverse=turn < 0), errors
+        assert len(set(errors)) > 1
 
 
 def test_a_copy_is_changed_and_what_is_wrong_is_said(study: Page) -> None:
