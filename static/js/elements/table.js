@@ -22,7 +22,8 @@ function sort(element, rows) {
 	const heads = [...element.querySelectorAll("th")];
 	const at = word ? heads.findIndex(({ dataset }) => dataset.by === word) : -1;
 	heads.forEach((head, k) => (head.ariaSort = k !== at ? null : down ? "descending" : "ascending"));
-	const value = ({ cells: { [at]: cell } } = rows[0]) => cell.dataset.by ?? cell.textContent ?? "";
+	const value = (/** @type {HTMLTableRowElement} */ { cells }) =>
+		cells[at].dataset.by ?? cells[at].textContent ?? "";
 	const number = heads[at]?.matches(".num") || Boolean(rows[0]?.cells[at]?.dataset.by);
 	if (at >= 0) rows.sort((a, b) => compareCells(value(a), value(b), number, down));
 	const [body] = element.tBodies;
