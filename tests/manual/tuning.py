@@ -20,8 +20,27 @@ STAGES = {
 INTRODUCTION = """# Tuning: what each parameter does
 
 This page is made from the definitions in `tracker/parameters`, like the sliders, the flags of
-`track` and the table of `multiview-phd parameters`. A click on a slider's label in the workbench
-leads here.
+`track` and the table of `multiview-phd parameters`.
+
+## Where they are set
+
+Beside the 3D view are the essential ones of the methods in use, as plain sliders, with presets and
+methods below them; a hint says unit, range, default and what is published. The tab *Parameters*
+has all that have an effect with these methods, by topics, the essential ones first: slider, number
+and unit of each. The slider of a range over decades is logarithmic; a tick on it is the published
+value. What is set in one place shows in the other, and whoever holds a slider or types keeps it.
+
+- A click on a name tells what it is, its range, default and published value, and leads here.
+- The field in the table's head finds words of name, symbol, key, unit or help; *changed only*
+  leaves out what stands at its default. The palette (Ctrl+K) sets a parameter by its name too, or
+  shows it in the table.
+- The arrow of a changed row resets it, *Reset all* every value and method; *Save as* keeps all
+  under a name.
+- *Effect* in the head runs the recording with a few other values of each of the first twelve
+  parameters that are listed, in the background, until somebody works again. A row then has the
+  curve of MOTA (without truth: of the number of tracks) over the values, and the share of its
+  variance that the parameter explains alone, among those that were run. That is the importance
+  which [studies](studies.md) report, with one parameter moved at a time.
 
 ## In which order
 
