@@ -123,7 +123,7 @@ class _Step:
             self.assign(label, row, columns[chosen.get(index, int(benefit[index].argmax()))])
         self.unknown += [column for column in columns if not self.labels[column]]
         for row in rows:
-            if decision_matrices.row_case(self.decision, row) == "splits":
+            if self.decision[row].sum() > 1:
                 self.splits.append(np.flatnonzero(self.decision[row]).tolist())
 
     def benefit(self, label: int, row: int, columns: list[int]) -> Float[ndarray, " J"]:

@@ -26,12 +26,10 @@ from tracker.single_view.colour.trust import shapes_of_templates, taught_well, t
 from tracker.single_view.dropped import Dropped
 from tracker.single_view.noise import box_sigmas
 from tracker.single_view.pictures import mean_shift
+from tracker.single_view.pictures.foreground.shares import LEAST_SHARE
 from tracker.single_view.protocol import TRUST
 from tracker.single_view.shape.evidence import log_ratios, shape_sigmas
 from tracker.single_view.shape.finder import SAME_PERSON, ShapeFinder, Shapes
-
-LEAST_LIKELY = 0.02
-"""Constant added to the probability of a person by shape, as to the share of foreground."""
 
 BELIEVED = 0.9
 """Trust in the foreground at a person below which shapes are used as well."""
@@ -40,10 +38,8 @@ FITTING = 0.25
 """Least mean intersection over union of templates and people by shape for shapes to be used: boxes
 drawn by hand around heads and trunks have 0.4 to 0.5, around bodies 0.6."""
 
-SHAPE_OVERLAP = 0.3
-"""Intersection over union above which windows of the shapes are of one person."""
-
 _SHAPES = ShapesParams()
+"""The default parameters of people by shape: the method ``shapes`` alone reads those of a run."""
 
 PEAK_EVEN = 0.45
 """Distance to a template at which a peak at a shape is equally likely of a person and of something
@@ -115,7 +111,6 @@ class PeakFinder:
         parameters: ColourPeakParams,
         foreground: ForegroundParams,
         reader: Pictures,
-        shapes: ShapesParams = _SHAPES,
     ) -> None:
         """Read the templates and learn the background of one camera.
 
@@ -152,7 +147,6 @@ class PeakFinder:
         self._shapes = ShapeFinder.of(sequence, camera_index, reader) if wanted else None
         self._instead = np.zeros(len(self._appearance.model.names))
         """Weight with which the shape replaces the foreground at each person, 0 … 1."""
-        self._shape_numbers = shapes
         self._by_shape = np.zeros(len(self._appearance.model.names))
         """Trust in the shapes at each person, 0 … 1."""
         if self._shapes is not None:
@@ -189,12 +183,12 @@ class PeakFinder:
             The state for the next image, and the peaks.
         """
         background, shape_state = state
-        p, s = self._parameters, self._shape_numbers
+        p = self._parameters
         background, scene = self._appearance.look(background, picture)
         shapes: Shapes | None = None
         if self._shapes is not None:
-            least = min(s.passed_odds, p.shape_odds) if self._fits else p.shape_odds
-            shape_state, shapes = self._shapes.find(shape_state, picture, least, SHAPE_OVERLAP)
+            least = min(_SHAPES.passed_odds, p.shape_odds) if self._fits else p.shape_odds
+            shape_state, shapes = self._shapes.find(shape_state, picture, least, _SHAPES.overlap)
         samples = self._sample(intensity, scene, rng)
         scores, _, _ = self._score(scene, shapes, samples)
         candidates = self._climb(samples, scores)
@@ -241,7 +235,7 @@ class PeakFinder:
         without a shape ln (t Λ + 1 - t) is the ratio of not being detected by shape, with the
         trust t in the shapes at the person whose colours it has.
         """
-        s = self._shape_numbers
+        s = _SHAPES
         near = self._near(found, peaks)
         surest = np.where(near, found.log_odds[:, None], -np.inf)
         vouched = near & (surest == surest.max(axis=0, initial=-np.inf))
@@ -334,7 +328,7 @@ class PeakFinder:
         """Log likelihood and distance D of each box for each person, and share of foreground.
 
         At a person whom the foreground does not show, the shape replaces it:
-        a ln(P + 0.02), with the probability P of a person by shape.
+        a ln(P + ε), with the probability P of a person by shape, in place of the share inside.
         """
         p = self._parameters
         distances = self._appearance.distances(scene, boxes)
@@ -351,7 +345,7 @@ class PeakFinder:
         )
         scores = scores + trust * factors[:, None]
         if shapes is not None and instead.any():
-            likely = np.log(expit(shapes.support(boxes)) + LEAST_LIKELY)
+            likely = np.log(expit(shapes.support(boxes)) + LEAST_SHARE)
             scores += p.foreground_weight * instead * likely[:, None]
         return scores, distances, inside
 

@@ -19,6 +19,7 @@ from scipy.special import expit
 
 from tracker.geometry.boxes import Boxes, box_overlaps
 from tracker.parameters.groups.foreground import ForegroundParams
+from tracker.parameters.groups.shapes import ShapesParams
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence, Template
 from tracker.single_view.box_sizes import geometry
@@ -32,8 +33,8 @@ PICTURES_BEFORE = 8
 TEMPLATES_BY_SHAPE = 2
 """Number of templates of each person that are used: each takes a moment before the first step."""
 
-PASSED, OVERLAP = -1.5, 0.3
-"""Log odds from which a person is detected by shape, and the largest overlap of two people."""
+_SHAPES = ShapesParams()
+"""The default parameters of people by shape: the method ``shapes`` alone reads those of a run."""
 
 NOTHING, ENOUGH = 0.1, 0.3
 """Shares of foreground in a template's box: below the first the foreground does not show the
@@ -144,7 +145,7 @@ def _by_shape(sequence: Sequence, template: Template, reader: Pictures) -> tuple
         picture = template_picture(reader, camera, template.frame)
         if picture is None:
             return 0.0, 0.0
-        _, found = finder.find(state, picture, PASSED, OVERLAP)
+        _, found = finder.find(state, picture, _SHAPES.passed_odds, _SHAPES.overlap)
         there = Boxes(found.boxes).left_top
         shared = box_overlaps(there, template.box[None]).max(initial=0.0)
         support = found.support(Boxes.from_left_top(template.box[None]).centred)
