@@ -14,7 +14,7 @@ import pytest
 from tests.single_view.networks import answering
 from tracker.geometry.camera import Camera
 from tracker.parameters.catalogue import (
-    FOLLOWING,
+    DEFAULT_CANDIDATES,
     METHODS,
     ORIGINS,
     PARAMETERS,
@@ -295,7 +295,7 @@ def test_a_method_fails_just_where_it_is_said_to(recording: Sequence, what: str,
 def test_the_default_follows_the_recording_and_nothing_else_does(recording: Sequence) -> None:
     assert default_parameters(recording).single_view == "onnx_detector"
     recording = replace(recording, detector=None)
-    first, second, third = FOLLOWING
+    first, second, third = DEFAULT_CANDIDATES
     assert RunParameters().single_view == first
     for what, expected in (("detections", first), ("templates", second), ("pictures", second)):
         found = default_parameters(without(recording, what))

@@ -13,7 +13,7 @@ from tests import world
 from tests.single_view.pieces import PUBLISHED, draw, person, play
 from tracker.parameters.groups.jpda import JpdaParams
 from tracker.single_view.association_matrix import decision_matrices
-from tracker.single_view.association_matrix.handing_over import decide
+from tracker.single_view.association_matrix.track_transfer import decide
 from tracker.single_view.dropped import GATES, Dropped
 from tracker.single_view.jpda.cases import determine_cases, exclude_outside_boxes, search_components
 from tracker.single_view.jpda.measurements import Measured

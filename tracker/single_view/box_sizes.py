@@ -45,7 +45,7 @@ BELOW_FLOOR = 0.1
 """Extent of a target below the room's volume that is allowed, for a floor drawn by eye, metres."""
 
 
-def geometry(sequence: Sequence, camera_index: int) -> Hashable:
+def geometry_key(sequence: Sequence, camera_index: int) -> Hashable:
     """A key of cached data that depends on the camera, the room and the target.
 
     Data that depend on the images alone do not need it: they remain when a user moves the room's

@@ -74,7 +74,9 @@ class DetectorBoxes:
         p, all_boxes = parameters, view.detections
         above = all_boxes.scores >= p.score_threshold
         self._frames = all_boxes.frames[above]
-        found = judged(sequence, view.camera, all_boxes.boxes[above], all_boxes.scores[above], p)
+        found = judge_boxes(
+            sequence, view.camera, all_boxes.boxes[above], all_boxes.scores[above], p
+        )
         embeddings = all_boxes.embeddings
         if embeddings.shape[1]:
             embeddings = embeddings[above]
@@ -88,7 +90,7 @@ class DetectorBoxes:
         return self._found.take(slice(int(first), int(last)))
 
 
-def judged(
+def judge_boxes(
     sequence: Sequence,
     camera: Camera,
     boxes: Float[ndarray, "N 4"],
@@ -105,21 +107,21 @@ def judged(
         parameters: The parameters of the noise and of the consistency.
     """
     p, centred = parameters, Boxes.from_left_top(boxes).centred
-    sigmas = trust(centred, p)
+    sigmas = detector_sigmas(centred, p)
     plausible = np.zeros(len(centred), dtype=bool)
     for first in range(0, len(centred), _AT_ONCE):
         some = slice(first, first + _AT_ONCE)
-        nearest, farthest = standing_between(
+        nearest, farthest = standing_range(
             camera,
             centred[some],
             float(sequence.target_half_extents[2]),
             p.depth_sigmas * sigmas[some, 3] / centred[some, 3],
         )
-        plausible[some] = meets(sequence.room, nearest, farthest, p.room_tolerance)
-    return Detected(_within(centred, camera), scores, sigmas, plausible)
+        plausible[some] = meets_room(sequence.room, nearest, farthest, p.room_tolerance)
+    return Detected(_clip_to_image(centred, camera), scores, sigmas, plausible)
 
 
-def _within(boxes: Float[ndarray, "N 4"], camera: Camera) -> Float[ndarray, "N 4"]:
+def _clip_to_image(boxes: Float[ndarray, "N 4"], camera: Camera) -> Float[ndarray, "N 4"]:
     """Clip top and bottom of the boxes to the image, as the measurement model expects them.
 
     Some detectors and annotations have boxes of whole persons also at the edge of the image; a
@@ -135,7 +137,9 @@ def _within(boxes: Float[ndarray, "N 4"], camera: Camera) -> Float[ndarray, "N 4
     return within
 
 
-def trust(boxes: Float[ndarray, "N 4"], parameters: DetectionBoxParams) -> Float[ndarray, "N 4"]:
+def detector_sigmas(
+    boxes: Float[ndarray, "N 4"], parameters: DetectionBoxParams
+) -> Float[ndarray, "N 4"]:
     """Compute the measurement noise of boxes: a share of their size and a constant, in quadrature.
 
     Args:
@@ -156,7 +160,7 @@ def trust(boxes: Float[ndarray, "N 4"], parameters: DetectionBoxParams) -> Float
     return np.hypot(np.stack(shares, axis=1), p.pixel_sigma)
 
 
-def standing_between(
+def standing_range(
     camera: Camera,
     boxes: Float[ndarray, "N 4"],
     half_height: float,
@@ -195,7 +199,7 @@ def standing_between(
     return nearest, farthest
 
 
-def meets(
+def meets_room(
     room: Room, starts: Float[ndarray, "N 3"], ends: Float[ndarray, "N 3"], margin: float
 ) -> Bool[ndarray, " N"]:
     """Whether each segment comes within ``margin`` metres of the room's volume, axis by axis.

@@ -15,7 +15,7 @@ from numpy import ndarray
 from tracker.parameters.groups.foreground import ForegroundParams
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
-from tracker.single_view.box_sizes import BoxSizes, geometry
+from tracker.single_view.box_sizes import BoxSizes, geometry_key
 from tracker.single_view.colour.carrying import with_carried
 from tracker.single_view.colour.templates import read_templates
 from tracker.single_view.colour.trust import template_trust
@@ -85,7 +85,7 @@ class Appearance:
         camera, room, half_extents = view.camera, sequence.room, sequence.target_half_extents
         # no parameter has an effect on it, so that a change of one does not repeat it
         self.sizes = reader.once(
-            ("sizes", geometry(sequence, camera_index)),
+            ("sizes", geometry_key(sequence, camera_index)),
             lambda: BoxSizes.of(camera, room, half_extents),
         )
         self._size_jitter = size_jitter

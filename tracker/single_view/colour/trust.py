@@ -22,7 +22,7 @@ from tracker.parameters.groups.foreground import ForegroundParams
 from tracker.parameters.groups.shapes import ShapesParams
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence, Template
-from tracker.single_view.box_sizes import geometry
+from tracker.single_view.box_sizes import geometry_key
 from tracker.single_view.colour.templates import template_picture
 from tracker.single_view.pictures.foreground import box_shares, integral, learn
 from tracker.single_view.shape.finder import ShapeFinder
@@ -79,7 +79,7 @@ def template_trust(
     return trust
 
 
-def taught_well(sequence: Sequence) -> bool:
+def templates_suffice(sequence: Sequence) -> bool:
     """Whether every person has a template in every camera, and several in one.
 
     A person's colours in another camera, with other light, are predicted from those in
@@ -130,7 +130,7 @@ def _by_shape(sequence: Sequence, template: Template, reader: Pictures) -> tuple
     if template.camera not in names:
         return 0.0, 0.0
     camera = names.index(template.camera)
-    what = (template.camera, template.frame, template.box.tobytes(), geometry(sequence, camera))
+    what = (template.camera, template.frame, template.box.tobytes(), geometry_key(sequence, camera))
 
     def look() -> tuple[float, float]:
         finder = ShapeFinder.of(sequence, camera, reader)

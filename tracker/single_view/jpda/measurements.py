@@ -21,7 +21,7 @@ from tracker.parameters.groups.jpda import JpdaParams
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.colour.peaks import PeakFinder
-from tracker.single_view.detector_boxes import DetectorBoxes, trust
+from tracker.single_view.detector_boxes import DetectorBoxes, detector_sigmas
 from tracker.single_view.dropped import Dropped
 from tracker.single_view.jpda.crowns import TargetSizes, crowns
 from tracker.single_view.noise import box_sigmas
@@ -273,4 +273,4 @@ class _Detector:
         )
 
     def sigmas(self, boxes: Float[ndarray, "N 4"]) -> Float[ndarray, "N 4"]:
-        return trust(boxes, self._parameters)
+        return detector_sigmas(boxes, self._parameters)
