@@ -187,7 +187,7 @@ def _print_checks(sequence: Any, reading: Any = None) -> int:
     """Every check in a row; status 1 where one of them warns."""
     from tracker.io.checks import check
     from tracker.io.importing.remedies import for_import
-    from tracker.single_view.working.shaking import check_shake
+    from tracker.single_view.rectification.shake_check import check_shake
 
     checks = [*check(sequence), *check_shake(sequence)]
     if reading is not None:
