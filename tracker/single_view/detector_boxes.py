@@ -1,4 +1,8 @@
-"""Boxes of an external detector: their measurement noise, and their consistency with the room."""
+"""Boxes of an external detector: their measurement noise, and their consistency with the room.
+
+A detector gives the ends of an upright target, which determine its place in the room; the sizes of
+:mod:`~tracker.single_view.box_sizes` are for boxes that are sought in the image.
+"""
 
 from __future__ import annotations
 
@@ -16,6 +20,10 @@ from tracker.single_view.dropped import Dropped
 
 _AT_ONCE = 4096
 """Number of boxes whose places in the room are in memory at a time."""
+
+_LEAST_SHARE = 0.05
+"""Least ratio of the expected height to that of a box: however much too tall a box may be, its
+target is at most 20 times as far away as it says, so that the place is finite."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -182,6 +190,9 @@ def standing_range(
         half_height: h, metres.
         relative_error: Largest relative error of a box's height; from 1 on a box that is
             far too tall may belong to a target at any distance.
+
+    Returns:
+        The nearest and the farthest place of the target's centre, world metres.
     """
     # in the picture of a camera that hangs upside down, heads are at the bottoms of the boxes
     down = [0.0, 1.0 if camera.rotation[1, 2] <= 0.0 else -1.0]
@@ -195,7 +206,7 @@ def standing_range(
     t = rise * (together * heads[:, 2] - feet[:, 2]) / determinant
     middle = (s[:, None] * heads + t[:, None] * feet) / 2.0
     nearest = camera.centre + middle / (1.0 + relative_error)[:, None]
-    farthest = camera.centre + middle / np.maximum(1.0 - relative_error, 0.05)[:, None]
+    farthest = camera.centre + middle / np.maximum(1.0 - relative_error, _LEAST_SHARE)[:, None]
     return nearest, farthest
 
 

@@ -1,5 +1,9 @@
 """One step of the objects: the decision matrix, the transfer of tracks, and new tracks.
 
+An object of this method may have several tracks, which it passes on as objects merge and split
+([CMQ07]); in the other trackers of one camera a target is one track
+(:mod:`tracker.single_view.jpda.track_management`).
+
 [CMQ07] Chang, Ma, Qiao, "Human oriented multi-target tracking algorithm in video
 sequence", Control and Decision 22(4), 2007.
 """

@@ -50,11 +50,13 @@ class Measured:
     sigmas: Float[ndarray, "M 4"]
     """Standard deviations of the boxes' numbers, pixels."""
     pieces: Float[ndarray, "M 4"]
-    """Box of the foreground component of each; targets that it occludes are inside."""
+    """Box of the foreground component around each measurement, pixels: a target that the
+    measurement occludes lies inside. Without foreground it is a multiple of the measurement."""
     shown: Float[ndarray, "S 4"] | None = None
-    """Rejected boxes for display, pixels; None for none."""
+    """All boxes of the source for display, those that are no measurements among them, pixels; None
+    where these are the measurements."""
     shown_scores: Float[ndarray, " S"] | None = None
-    """Score of each rejected box, 0 … 1."""
+    """Score of each box for display, 0 … 1; None where these are the measurements."""
     samples: Float[ndarray, "S 4"] = field(default_factory=lambda: np.zeros((0, 4)))
     """Sampled boxes of the intensity, pixels, where the source has any."""
     sample_weights: Float[ndarray, " S"] = field(default_factory=lambda: np.zeros(0))

@@ -156,6 +156,8 @@ def strongest(
 ) -> tuple[Int[ndarray, " N"], Int[ndarray, " K"]]:
     """Select windows by greedy non-maximum suppression, the best first.
 
+    Unlike OpenCV's ``NMSBoxes`` it also says which window each of the suppressed ones belongs to.
+
     Args:
         edges: Left, top, right and bottom of N windows, pixels.
         scores: Score of each window.

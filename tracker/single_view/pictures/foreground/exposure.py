@@ -17,8 +17,7 @@ import numpy as np
 from jaxtyping import UInt8
 from numpy import ndarray
 
-from tracker.kernels.pictures import images
-from tracker.kernels.pictures.foreground import level_medians, upper_medians
+from tracker.kernels.pictures.foreground import foreground_mask, level_medians, upper_medians
 from tracker.parameters.groups.foreground import ForegroundParams
 from tracker.single_view.pictures.foreground.segmentation import Segmentation
 
@@ -104,7 +103,7 @@ class BackgroundModel:
                 16 √level (0 … 255), to which the variation of a pixel is added; and the bounds
                 of a shadow.
         """
-        mask = images.foreground_mask(
+        mask = foreground_mask(
             picture,
             self.picture,
             tone_curve(self.picture, picture),
