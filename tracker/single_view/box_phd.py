@@ -93,7 +93,12 @@ class BoxPhd:
         )
 
     def predict(self, state: BoxPhdState, births: GaussianMixture) -> BoxPhdState:
-        """Predict one step, and add births, which get the next labels."""
+        """Predict one step, and add births, which get the next labels.
+
+        Args:
+            state: The state after the step before.
+            births: Birth components, as of :meth:`births`.
+        """
         born = models.label_births(births, state.next_label)
         noise = self.walk_variances(state.mixture.means)[:, :, None] * np.eye(4)
         surviving = gaussian_mixture.predict(

@@ -234,7 +234,15 @@ class BoxSizes:
     def draw(
         self, centres: Float[ndarray, "N 2"], rng: np.random.Generator
     ) -> tuple[Float[ndarray, "N 2"], Bool[ndarray, " N"]]:
-        """Draw a possible size at each place, pixels, and say whether there is one (else NaN)."""
+        """Draw a possible size of a target at each place.
+
+        Args:
+            centres: N places in the image, pixels.
+            rng: The generator of the draws.
+
+        Returns:
+            Half width and half height, pixels, NaN where no target can be; and whether one can be.
+        """
         place = _cells(centres, self.cell, self.columns, self.rows)
         first, count = self.starts[place], self.starts[place + 1] - self.starts[place]
         chosen = first + (rng.random(len(centres)) * count).astype(np.int64)

@@ -41,7 +41,7 @@ _STAGE_ONE = "the rest of stage 1"
 _PARTS: tuple[tuple[type, str, str], ...] = (
     (VideoDecoder, "read", "decoding"),
     (RectifiedView, "picture", "reducing"),
-    (Appearance, "look", "colours and foreground"),
+    (Appearance, "prepare", "colours and foreground"),
     (ShapeFinder, "find", "shapes"),
     (PeakFinder, "_sample", "sampling"),
     (PeakFinder, "_score", "scoring"),

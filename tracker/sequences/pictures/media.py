@@ -45,6 +45,10 @@ def locate(folder: Path, fields: Fields, name: str) -> Path:
 def find_images(folder: Path, fields: Fields) -> tuple[tuple[Path, ...], Bool[ndarray, " N"]]:
     """Return the pictures that match the pattern ``images``, sorted by name.
 
+    Args:
+        folder: The folder of the sequence.
+        fields: The camera's table, with the field ``images``.
+
     Returns:
         The pictures, with those that are missing in their numbering, and whether each exists.
 
@@ -108,6 +112,11 @@ class PictureProperties:
 def probe(video: Path | None, images: tuple[Path, ...], fields: Fields) -> PictureProperties | None:
     """Determine the properties of a camera's video or images; None if there is neither.
 
+    Args:
+        video: The video, or None.
+        images: The image files in their order; there may be none.
+        fields: The camera's table, for messages.
+
     Raises:
         SequenceError: If the video or the first image cannot be read.
     """
@@ -134,6 +143,12 @@ def check_pictures(
     view: View, found: PictureProperties, fields: Fields, frames: int
 ) -> Iterable[str]:
     """Check the size and the number of a camera's pictures.
+
+    Args:
+        view: The camera, with the files of its pictures.
+        found: The properties of the pictures.
+        fields: The camera's table, for messages.
+        frames: The number of steps of the sequence.
 
     Returns:
         Warnings on missing pictures, and on images whose names do not sort by number.

@@ -31,7 +31,9 @@ DECODED_TO_VERIFY = 24
 codec reorders."""
 
 RUN_UP = 16
-"""The number of frames before the wanted one at which a jump aims, from which all are decoded."""
+"""The number of frames before the wanted one at which a jump aims, from which all are decoded.
+Right after a jump frames can be out of order by as many as a codec may reorder, in H.264 at most
+16."""
 
 
 LARGEST_IMAGE = 2**28

@@ -33,6 +33,14 @@ def decide(
 
     It is decided by distance for an equal number of objects, and by overlap where the number
     changes or where the distances give no one-to-one matrix.
+
+    Args:
+        situation: The I objects of the step before.
+        seen: This step's J objects.
+        parameters: The bounds of distance and overlap, and the kind of overlap.
+
+    Returns:
+        R, and the shared pixels, or square pixels of the boxes where these are compared.
     """
     objects, p = situation.objects, parameters
     before = np.array([one.box for one in objects]).reshape(-1, 4)

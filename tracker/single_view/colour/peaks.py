@@ -184,7 +184,7 @@ class PeakFinder:
         """
         background, shape_state = state
         p = self._parameters
-        background, scene = self._appearance.look(background, picture)
+        background, scene = self._appearance.prepare(background, picture)
         shapes: Shapes | None = None
         if self._shapes is not None:
             least = min(_SHAPES.passed_odds, p.shape_odds) if self._fits else p.shape_odds

@@ -132,7 +132,7 @@ def _by_shape(sequence: Sequence, template: Template, reader: Pictures) -> tuple
     camera = names.index(template.camera)
     what = (template.camera, template.frame, template.box.tobytes(), geometry_key(sequence, camera))
 
-    def look() -> tuple[float, float]:
+    def measure() -> tuple[float, float]:
         finder = ShapeFinder.of(sequence, camera, reader)
         state = finder.start()
         # the images before are needed for motion
@@ -151,7 +151,7 @@ def _by_shape(sequence: Sequence, template: Template, reader: Pictures) -> tuple
         support = found.support(Boxes.from_left_top(template.box[None]).centred)
         return float(expit(support[0])), float(shared)
 
-    return reader.once(("template by shape", what), look)
+    return reader.once(("template by shape", what), measure)
 
 
 def _share(
@@ -164,7 +164,7 @@ def _share(
     camera = names.index(template.camera)
     what = (template.camera, template.frame, template.box.tobytes())
 
-    def look() -> float | None:
+    def measure() -> float | None:
         picture = template_picture(reader, camera, template.frame)
         model = learn(sequence, camera, reader, parameters)
         if picture is None or model is None:
@@ -173,4 +173,4 @@ def _share(
         edges: Float[ndarray, "1 4"] = Boxes.from_left_top(template.box[None]).corners
         return float(box_shares(integral(found.mask), edges)[0])
 
-    return reader.once(("template on foreground", parameters, what), look)
+    return reader.once(("template on foreground", parameters, what), measure)

@@ -113,6 +113,12 @@ def source_of(
 
     Without any template the colours are replaced by the foreground.
 
+    Args:
+        sequence: The sequence.
+        camera_index: Index of the camera.
+        parameters: The choice, and the parameters of the source.
+        reader: Reader of the images.
+
     Raises:
         ValueError: If the camera lacks data that the source needs.
     """

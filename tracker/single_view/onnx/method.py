@@ -71,7 +71,7 @@ class OnnxDetector:
         """Detect the people in the image."""
         if picture is None:
             return None, ViewResult.of_no_frame()
-        seen = self._network.look(picture)
+        seen = self._network.detect(picture)
         found = judge_boxes(self._sequence, self._camera, seen.boxes, seen.scores, self._parameters)
         good = found.plausible
         result = ViewResult.of_boxes(found.boxes[good], found.scores[good], found.sigmas[good])

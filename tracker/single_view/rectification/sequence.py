@@ -128,14 +128,14 @@ class _RectifiedReader:
         self._key = tuple(None if view is None else view.key for view in views)
 
     def picture(self, camera: int, step: int) -> Picture | None:
-        return self._look(camera, self._reader.picture(camera, step))
+        return self._rectify(camera, self._reader.picture(camera, step))
 
     def iterate(self, camera: int, first: int = 0) -> Iterator[Picture | None]:
         for picture in self._reader.iterate(camera, first):
-            yield self._look(camera, picture)
+            yield self._rectify(camera, picture)
 
     def empty(self, camera: int) -> Picture | None:
-        return self._look(camera, self._reader.empty(camera))
+        return self._rectify(camera, self._reader.empty(camera))
 
     def once(self, name: Hashable, make: Callable[[], _Made]) -> _Made:
         return self._reader.once(("rectified", self._key, name), make)
@@ -143,6 +143,6 @@ class _RectifiedReader:
     def check(self) -> None:
         self._reader.check()
 
-    def _look(self, camera: int, picture: Picture | None) -> Picture | None:
+    def _rectify(self, camera: int, picture: Picture | None) -> Picture | None:
         view = self._views[camera]
         return picture if view is None or picture is None else view.picture(picture)

@@ -85,13 +85,27 @@ class Channels:
         return ChannelState((), None)
 
     def watch(self, state: ChannelState, picture: UInt8[ndarray, "h w 3"]) -> ChannelState:
-        """Update the state by an image without computing its channels."""
+        """Update the state by an image without computing its channels.
+
+        Args:
+            state: The state after the image before.
+            picture: The image, BGR, of the background's size.
+        """
         return self._watch(state, self._reduced(square_roots(picture)))[0]
 
     def step(
         self, state: ChannelState, picture: UInt8[ndarray, "h w 3"]
     ) -> tuple[ChannelState, Int32[ndarray, "h1 w1 C"]]:
-        """Compute the integral images of an image's channels, and the next state."""
+        """Compute the integral images of an image's channels.
+
+        Args:
+            state: The state after the image before.
+            picture: The image, BGR, of the background's size.
+
+        Returns:
+            The next state, and the sums of :func:`tracker.kernels.pictures.channels.channel_sums`
+            over the reduced image.
+        """
         empty = self._background.picture
         shown = cv2.LUT(empty, square_roots(tone_curve(empty, picture)))
         roots = self._reduced(square_roots(picture))
