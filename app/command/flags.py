@@ -29,7 +29,7 @@ from app.command.typed import WrongValue, registry
 from tracker import __version__
 from tracker.library import KEEP
 from tracker.parameters.catalogue import (
-    FOLLOWS,
+    DEFAULT_RULE,
     GROUPS,
     METHODS,
     PARAMETERS,
@@ -124,7 +124,7 @@ class Track:
     """Its form; `runs export` lists them."""
     single_view: Annotated[
         str | None,
-        arg(metavar="|".join(METHODS["single_view"]), help_behavior_hint=f"({FOLLOWS})"),
+        arg(metavar="|".join(METHODS["single_view"]), help_behavior_hint=f"({DEFAULT_RULE})"),
     ] = None
     """Method of stage 1."""
     fusion_method: Annotated[

@@ -247,7 +247,7 @@ def test_a_shadow_leaves_enough_light_of_nearly_one_colour(
     picture[1, 2], learnt[1, 2] = pixel, [level // 2 if level > 9 else level for level in levels]
     curve = np.repeat(np.arange(256)[:, None], 3, axis=1)
     curve[10:] = np.minimum(2 * curve[10:], 255)
-    mask = images.foreground_mask(
+    mask = foreground.foreground_mask(
         picture, learnt, curve[None].astype(np.uint8), np.full((2, 3), 6.0), 10.0, 0.6, 0.25
     )
     assert mask[1, 2] == expected

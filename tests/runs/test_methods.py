@@ -14,7 +14,7 @@ import pytest
 from tests.single_view.networks import answering
 from tracker.geometry.camera import Camera
 from tracker.parameters.catalogue import (
-    FOLLOWING,
+    DEFAULT_CANDIDATES,
     METHODS,
     ORIGINS,
     PARAMETERS,
@@ -160,6 +160,47 @@ def test_what_is_not_shown_changes_no_result(choice: dict[str, Any], recording: 
         np.testing.assert_array_equal(a, b)
 
 
+@pytest.mark.parametrize("model", ["learnt", "adaptive"])
+@pytest.mark.parametrize("name", ["colour_phd", "pseudo_particle", "jpda", "association_matrix"])
+def test_the_memory_of_motion_is_for_methods_without_colours(name: str, model: str) -> None:
+    """It is no part of the cache key of a method that does not read it, and is not shown for it."""
+    parameters = with_values(RunParameters(), {"single_view": name, "foreground.model": model})
+    motion = {
+        f"foreground.{each}"
+        for each in ("restless_from", "restless_to", "motion_memory", "motion_threshold")
+    }
+    by_colours = name in ("colour_phd", "pseudo_particle")
+    assert motion & set(stage_values(parameters, "single_view")) == (
+        set() if by_colours else motion
+    )
+    assert motion & set(shown_keys(parameters)) == (
+        motion if not by_colours and model == "learnt" else set()
+    )
+    assert "foreground.darkest_shadow" in shown_keys(parameters)
+
+
+@pytest.mark.parametrize("measurement", ["centre", "box", "box_and_width"])
+def test_noise_of_widths_counts_where_widths_are_measured(
+    recording: Sequence, measurement: str
+) -> None:
+    """Stage 1 states it in any case; those of the other posture are shown only where they count."""
+    some = replace(recording, frames=warm_up.EMPTY + 6)
+    own = {"single_view": "none", "fusion.measurement": measurement}
+    reference = pipeline.compute(some, with_values(RunParameters(), own))
+    shown = shown_keys(reference.parameters)
+    assert len(reference.tracks.positions)
+    for key in (
+        "detection_boxes.width_sigma",
+        "fusion.posture_width",
+        "fusion.posture_width_sigma",
+    ):
+        changes = {**own, key: moved(PARAMETERS[key])}
+        other = pipeline.compute(some, with_values(RunParameters(), changes))
+        same = np.array_equal(reference.tracks.positions, other.tracks.positions)
+        assert same == (measurement != "box_and_width")
+        assert (key in shown) == (key.startswith("detection_boxes") or not same)
+
+
 @pytest.mark.parametrize("key", METHODS)
 def test_every_method_is_registered_once_and_made(key: Any, recording: Sequence) -> None:
     assert not ORIGINS, "a method of another package is installed: these tests are of our own"
@@ -254,7 +295,7 @@ def test_a_method_fails_just_where_it_is_said_to(recording: Sequence, what: str,
 def test_the_default_follows_the_recording_and_nothing_else_does(recording: Sequence) -> None:
     assert default_parameters(recording).single_view == "onnx_detector"
     recording = replace(recording, detector=None)
-    first, second, third = FOLLOWING
+    first, second, third = DEFAULT_CANDIDATES
     assert RunParameters().single_view == first
     for what, expected in (("detections", first), ("templates", second), ("pictures", second)):
         found = default_parameters(without(recording, what))

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from tests.synthetic import CODECS, write_video
-from tracker.sequences.pictures.containers import VideoError, check_container, is_video, opened
+from tracker.sequences.pictures.containers import VideoError, check_container, is_video, open_video
 from tracker.sequences.pictures.video import index_video, read_image
 
 LISTS = {
@@ -35,8 +35,8 @@ def test_ffmpeg_itself_opens_no_list(
     write_video(inside, range(8), CODECS["mp4"])
     playlist = tmp_path / "list.m3u8"
     playlist.write_text(LISTS[kind])
-    assert not opened(playlist).isOpened()
-    assert opened(inside).isOpened()
+    assert not open_video(playlist).isOpened()
+    assert open_video(inside).isOpened()
 
 
 def test_numbered_pictures_are_no_video(tmp_path: Path) -> None:

@@ -21,7 +21,7 @@ from tracker.sequences.reader import read_sequence
 from tracker.sequences.sequence import Sequence
 from tracker.sequences.writing.by_step import write_by_step
 from tracker.single_view.pictures.foreground import BackgroundModel, learn, learn_background
-from tracker.single_view.working.sequence import Working
+from tracker.single_view.rectification.sequence import RectifiedSequence
 
 _Made = TypeVar("_Made")
 
@@ -107,9 +107,9 @@ def test_the_picture_is_reduced_as_the_others_are(tmp_path: Path) -> None:
     sequence = read_sequence(folder)
     parameters = RunParameters(single_view="colour_phd")
     with FrameReader(sequence) as reader:
-        working = Working.of(sequence, parameters, reader)
-        empty, picture = working.reader.empty(0), working.reader.picture(0, 1)
-        assert working.reader.empty(1) is None
+        rectified = RectifiedSequence.of(sequence, parameters, reader)
+        empty, picture = rectified.reader.empty(0), rectified.reader.picture(0, 1)
+        assert rectified.reader.empty(1) is None
     assert empty is not None
     assert empty.shape[0] < 720
     np.testing.assert_array_equal(empty, picture)

@@ -18,7 +18,7 @@ from tracker.sequences.csv_columns import Columns
 from tracker.sequences.errors import SequenceError
 from tracker.sequences.fields import Fields
 from tracker.sequences.filling import check_missing, find_room, find_time
-from tracker.sequences.pictures.media import Pictures, check_pictures
+from tracker.sequences.pictures.media import PictureProperties, check_pictures
 from tracker.sequences.pictures.video import VideoIndex, index_video
 from tracker.sequences.sequence import View
 from tracker.sequences.tables import BoxTable, Reading
@@ -42,7 +42,7 @@ def source(
         table = BoxTable(
             Columns("a", ("frame",), values, np.arange(boxes)), 0, False, 0, np.zeros((0, 0))
         )
-    pictures = None if frames is None else Pictures((64, 48), frames, rate)
+    pictures = None if frames is None else PictureProperties((64, 48), frames, rate)
     nothing = np.zeros(0, dtype=bool)
     return Source("a", fields(), None, (), nothing, pictures, Timing(**timing), table)
 
@@ -154,7 +154,7 @@ def images(*names: str, **more: Any) -> View:
 
 
 def warnings(view: View, count: int, steps: int) -> list[str]:
-    found = check_pictures(view, Pictures(CAMERA.image_size, count, None), fields(), steps)
+    found = check_pictures(view, PictureProperties(CAMERA.image_size, count, None), fields(), steps)
     return [one.removeprefix('camera "cam1": ') for one in found]
 
 
@@ -179,7 +179,7 @@ def test_pictures_that_are_too_few_are_counted() -> None:
         "from step 2 on it has no picture"
     ]
     with pytest.raises(SequenceError, match="frame size 48×64 does not match calibration 64×48"):
-        list(check_pictures(video, Pictures((48, 64), 9, None), fields(), 3))
+        list(check_pictures(video, PictureProperties((48, 64), 9, None), fields(), 3))
 
 
 @pytest.mark.parametrize(
@@ -204,7 +204,9 @@ def test_names_that_sort_otherwise_than_their_numbers_are_reported() -> None:
     assert 'so "a10.png" comes before "a2.png"' in reported
 
 
-def view_of(table: dict[str, Any], pictures: Pictures | None = None, steps: int = 5) -> View:
+def view_of(
+    table: dict[str, Any], pictures: PictureProperties | None = None, steps: int = 5
+) -> View:
     known = [*table, "background", "image_size", "distortion", "lens", "projection"]
     own = Fields("file", table, known)
     film = Path("a.mp4") if pictures else None
@@ -218,7 +220,7 @@ POSE = {"K": [[60.0, 0, 31.5], [0, 60.0, 23.6], [0, 0, 1]], "R": np.eye(3).tolis
 
 
 def test_a_pictures_size_is_stated_or_the_pictures_or_twice_the_principal_point() -> None:
-    film = Pictures((64, 48), 9, None)
+    film = PictureProperties((64, 48), 9, None)
     assert view_of(POSE | {"image_size": [64, 48]}, film).camera.image_size == (64, 48)
     assert view_of(POSE, film).camera.image_size == (64, 48)
     assert view_of(POSE).camera.image_size == (64, 48)
@@ -234,7 +236,7 @@ def test_a_pictures_size_is_stated_or_the_pictures_or_twice_the_principal_point(
 
 
 def test_a_background_is_a_range_of_steps_with_both_ends() -> None:
-    film = Pictures((64, 48), 9, None)
+    film = PictureProperties((64, 48), 9, None)
     for first, last in ((0, 4), (2, 2), (0, 0)):
         found = view_of(POSE | {"background": [first, last]}, film).background
         assert found == range(first, last + 1)
@@ -245,10 +247,10 @@ def test_a_background_is_a_range_of_steps_with_both_ends() -> None:
 
 def test_a_video_of_another_rate_has_a_clock_where_none_is_stated() -> None:
     assert view_of(POSE).clock is None
-    clock = view_of(POSE, Pictures((64, 48), 9, 10.0)).clock
+    clock = view_of(POSE, PictureProperties((64, 48), 9, 10.0)).clock
     assert clock is not None
     assert_array_equal(clock.frame_of_step, [0, 2, 4, 6, 8])
-    assert view_of(POSE, Pictures((64, 48), 9, None)).clock is None
+    assert view_of(POSE, PictureProperties((64, 48), 9, None)).clock is None
 
 
 def written(path: Path, codec: str, fps: float, frames: int) -> VideoIndex:

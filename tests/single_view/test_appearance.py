@@ -58,7 +58,7 @@ def test_boxes_on_foreground_are_centred_on_its_pixels(
     one, rng = appearance(heads, reader, 0.0, FOREGROUND), np.random.default_rng(0)
     picture = reader.picture(0, 3)
     assert picture is not None
-    _, scene = one.look(one.start(), picture)
+    _, scene = one.prepare(one.start(), picture)
     assert scene.mask is not None
     boxes = one.draw_on_foreground(500, scene, rng)
     columns, rows = np.floor(boxes[:, :2] + 0.5).astype(int).T
@@ -67,7 +67,7 @@ def test_boxes_on_foreground_are_centred_on_its_pixels(
     assert scene.foreground_share == pytest.approx(scene.mask.mean())
     assert len(one.draw_on_foreground(0, scene, rng)) == 0
     blind = appearance(heads, reader, 0.0)
-    _, bare = blind.look(blind.start(), picture)
+    _, bare = blind.prepare(blind.start(), picture)
     assert bare.mask is None
     assert bare.foreground_share == 0.0
     assert len(blind.draw_on_foreground(9, bare, rng)) == 0

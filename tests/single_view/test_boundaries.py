@@ -13,7 +13,7 @@ from tests import world
 from tests.single_view.pieces import PUBLISHED, draw, person, play
 from tracker.parameters.groups.jpda import JpdaParams
 from tracker.single_view.association_matrix import decision_matrices
-from tracker.single_view.association_matrix.handing_over import decide
+from tracker.single_view.association_matrix.track_transfer import decide
 from tracker.single_view.dropped import GATES, Dropped
 from tracker.single_view.jpda.cases import determine_cases, exclude_outside_boxes, search_components
 from tracker.single_view.jpda.measurements import Measured
@@ -22,9 +22,9 @@ from tracker.single_view.jpda.track_management import Managed
 from tracker.single_view.jpda.track_management import manage as manage_jpda
 from tracker.single_view.pseudo_particle import hypotheses, track_management
 from tracker.single_view.pseudo_particle.track_management import Departed, Tracks
+from tracker.single_view.rectification.stabilisation import LARGEST, LEAST_CORNERS, consensus_shift
 from tracker.single_view.shape.finder import strongest
 from tracker.single_view.shape.windows import Windows
-from tracker.single_view.working.stabilisation import LARGEST, LEAST_CORNERS, agreed
 
 JPDA = JpdaParams(vanish_steps=3, return_steps=5, confirmation_steps=5)
 
@@ -340,7 +340,7 @@ def test_corners_agree_from_the_least_number_on_and_up_to_the_largest_shift() ->
         (LEAST_CORNERS, far - 1e-6, True),
         (LEAST_CORNERS, far + 1e-6, False),
     ):
-        found = agreed(places[:count], np.full((count, 2), [shift, -shift]), 100.0)
+        found = consensus_shift(places[:count], np.full((count, 2), [shift, -shift]), 100.0)
         assert (found is not None) == known, (count, shift)
         if found is not None:
             np.testing.assert_allclose(found, [shift, -shift, 0.0], atol=1e-9)

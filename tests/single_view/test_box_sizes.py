@@ -28,7 +28,7 @@ from tracker.single_view.box_sizes import (
     upright_boxes,
     usual_heights,
 )
-from tracker.single_view.detector_boxes import judged, meets, standing_between
+from tracker.single_view.detector_boxes import judge_boxes, meets_room, standing_range
 from tracker.single_view.jpda.crowns import TargetSizes
 
 LENS = world.look_at("lens", (-2.9, -2.7, 2.4), focal=300.0, image_size=(320, 240),
@@ -255,19 +255,19 @@ def test_a_box_tells_where_its_target_stands(
     assert (foot[1] < head[1]) == upside_down
     box = np.array([[(head[0] + foot[0]) / 2.0, (head[1] + foot[1]) / 2.0, 9.0,
                      abs(foot[1] - head[1]) / 2.0]])  # fmt: skip
-    near, far = standing_between(camera, box, 0.85, np.zeros(1))
+    near, far = standing_range(camera, box, 0.85, np.zeros(1))
     assert_allclose(near, place, atol=1e-6)
     assert_allclose(near, far)
-    near, far = standing_between(camera, box, 0.85, np.full(1, error))
+    near, far = standing_range(camera, box, 0.85, np.full(1, error))
     along = place - camera.centre
     assert_allclose(near, camera.centre + along / (1.0 + error), atol=1e-6)
     assert_allclose(far, camera.centre + along / (1.0 - error), atol=1e-6)
-    _, far = standing_between(camera, box, 0.85, np.full(1, 3.0))
+    _, far = standing_range(camera, box, 0.85, np.full(1, 3.0))
     assert_allclose(far, camera.centre + along / 0.05, atol=1e-5)
 
 
 WAYS = [
-    # start, end, margin, whether it meets the cube from -1 to 1
+    # start, end, margin, whether it meets_room the cube from -1 to 1
     ([-3, 0, 0], [3, 0, 0], 0.0, True),  # through it
     ([-3, 0, 0], [-1, 0, 0], 0.0, True),  # ends on its wall
     ([-3, 0, 0], [-1.001, 0, 0], 0.0, False),
@@ -292,8 +292,8 @@ def test_a_way_meets_the_room_where_some_point_of_it_does(
     room = Room(-np.ones(3), np.ones(3))
     for turn in range(3):  # in every axis, and backwards
         a, b = np.roll([start], turn, axis=1).astype(float), np.roll([end], turn, axis=1)
-        assert meets(room, a, b.astype(float), margin).tolist() == [met]
-        assert meets(room, b.astype(float), a, margin).tolist() == [met]
+        assert meets_room(room, a, b.astype(float), margin).tolist() == [met]
+        assert meets_room(room, b.astype(float), a, margin).tolist() == [met]
 
 
 def test_boxes_end_where_the_picture_ends_and_contradict_a_room_they_are_not_in() -> None:
@@ -304,16 +304,14 @@ def test_boxes_end_where_the_picture_ends_and_contradict_a_room_they_are_not_in(
     boxes = np.array([good, giant, dwarf, cut, above])
     whole = detected([boxes])
     p = DetectionBoxParams(room_tolerance=0.3, depth_sigmas=2.0)
-    found = judged(whole, CAMERA, Boxes(boxes).left_top, np.linspace(0.1, 0.5, 5), p)
+    found = judge_boxes(whole, CAMERA, Boxes(boxes).left_top, np.linspace(0.1, 0.5, 5), p)
     assert found.plausible[:3].tolist() == [True, False, False]
     expected = boxes.copy()
     expected[3] = [640.0, (660.0 + 799.0) / 2.0, 60.0, (799.0 - 660.0) / 2.0]
     assert_allclose(found.boxes, expected)  # what lies wholly outside is left as it is
     # an error of two deviations of its height is forgiven
-    nearest, farthest = standing_between(
-        CAMERA, boxes, 0.85, 2.0 * found.sigmas[:, 3] / boxes[:, 3]
-    )
-    assert_array_equal(found.plausible, meets(whole.room, nearest, farthest, 0.3))
+    nearest, farthest = standing_range(CAMERA, boxes, 0.85, 2.0 * found.sigmas[:, 3] / boxes[:, 3])
+    assert_array_equal(found.plausible, meets_room(whole.room, nearest, farthest, 0.3))
 
 
 def test_boxes_of_a_detector_pass_from_their_least_score_on_with_what_is_told_of_them() -> None:

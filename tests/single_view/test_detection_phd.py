@@ -20,7 +20,7 @@ from tracker.single_view.box_phd import BoxPhdState
 from tracker.single_view.box_sizes import entrance_boxes
 from tracker.single_view.colour_phd import ColourPhd, ColourPhdState
 from tracker.single_view.detection_phd import DetectionPhd
-from tracker.single_view.detector_boxes import trust
+from tracker.single_view.detector_boxes import detector_sigmas
 
 NUMBERS: dict[str, object] = {
     "clutter_rate": 3.0, "score_clutter": 2.0, "detection_probability": 0.8,
@@ -68,7 +68,7 @@ def test_a_step_is_bayes_rule_with_a_clutter_that_falls_with_the_score() -> None
     width, height = CAMERA.image_size
     clutter = 3.0 * np.exp(2.0 * 2.0 * (0.5 - np.array(SCORES))) / (width * height) ** 2 * 4.0
     spread = np.diag([9.0, 16.0, 4.0, 9.0]) + walked(KNOWN)[:, :, None] * np.eye(4)
-    noise = trust(SEEN, p.detection_phd)[:, :, None] ** 2 * np.eye(4)
+    noise = detector_sigmas(SEEN, p.detection_phd)[:, :, None] ** 2 * np.eye(4)
     pairs = np.zeros((2, 3))
     for j, z in np.ndindex(2, 3):
         offset, covariance = SEEN[z] - KNOWN[j], spread[j] + noise[z]
@@ -109,7 +109,7 @@ def test_a_newcomer_begins_where_a_box_was_left_unexplained_as_unsure_as_box_and
         assert after.unexplained.shape == (0, 4)
         order = np.argsort(after.mixture.labels)
         assert_allclose(after.mixture.means[order], SEEN)
-        born = trust(SEEN, p.detection_phd) ** 2 + walked(SEEN)
+        born = detector_sigmas(SEEN, p.detection_phd) ** 2 + walked(SEEN)
         assert_allclose(after.mixture.covariances[order], born[:, :, None] * np.eye(4))
         later, _ = method.step(after, 1, None, np.random.default_rng(0))
         assert_allclose(later.mixture.weights, 0.95 * 0.2**2 * weight)

@@ -19,7 +19,7 @@ from tracker.parameters.values import with_values
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.colour.peaks import PeakFinder
-from tracker.single_view.detector_boxes import trust
+from tracker.single_view.detector_boxes import detector_sigmas
 from tracker.single_view.jpda.measurements import source_of
 from tracker.single_view.pseudo_particle.particles import ColourParticles
 from tracker.single_view.shape.evidence import log_ratios, shape_sigmas
@@ -41,8 +41,8 @@ def test_a_detectors_noise_is_a_share_of_the_size_and_pixels_in_quadrature() -> 
     p = DetectionBoxParams(centre_sigma=0.1, size_sigma=0.2, width_sigma=0.5, pixel_sigma=1.5)
     # along and across a box's centre is off by a share of its height
     expected = np.array([[1.0, 1.0, 2.0, 2.0], [24.0, 24.0, 50.0, 48.0], [0.01, 0.01, 0.0, 0.02]])
-    assert_allclose(trust(BOXES, p), np.sqrt(expected**2 + 1.5**2))
-    assert_allclose(trust(BOXES, p.model_copy(update={"pixel_sigma": 0.0})), expected)
+    assert_allclose(detector_sigmas(BOXES, p), np.sqrt(expected**2 + 1.5**2))
+    assert_allclose(detector_sigmas(BOXES, p.model_copy(update={"pixel_sigma": 0.0})), expected)
 
 
 def test_a_peaks_noise_is_a_share_of_its_width_and_height_and_no_more_of_a_large_one(
@@ -121,7 +121,7 @@ def test_the_stated_noise_is_that_of_the_boxes_it_is_stated_of() -> None:
             for step, person, box in zip(one.frames, one.people, one.boxes, strict=True)
         }
         true = np.array([truth[key] for key in zip(other.frames, other.people, strict=True)])
-        errors.append((other.boxes - true) / trust(true, p))
+        errors.append((other.boxes - true) / detector_sigmas(true, p))
     # a width is a share of itself, which the noise of the boxes here is not
     standard = np.concatenate(errors)[:, [0, 1, 3]]
     assert len(standard) > 1000

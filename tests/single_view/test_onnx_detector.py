@@ -208,7 +208,7 @@ def test_the_person_is_found_in_every_layout(name: str) -> None:
 def test_every_layout_passes_through_opencv(name: str, tmp_path: Path) -> None:
     network = Network(answering(tmp_path / "model.onnx", LAYOUTS[name]), Settings())
     assert network.size_for(640, 480) == SIZE
-    found = network.look(np.zeros((64, 64, 3), np.uint8))
+    found = network.detect(np.zeros((64, 64, 3), np.uint8))
     assert len(found.boxes) == 1
     np.testing.assert_allclose(found.boxes[0], [21.5, 9.5, 20.0, 40.0], atol=0.02)
 
@@ -276,7 +276,7 @@ def test_boxes_come_back_from_the_letterbox(picture: tuple[int, int], tmp_path: 
     """A box of the network's picture lies at the same place of the scaled one in its middle."""
     network = Network(answering(tmp_path / "model.onnx", {"output0": end_to_end()}), Settings())
     height, width = picture
-    found = network.look(np.zeros((height, width, 3), np.uint8))
+    found = network.detect(np.zeros((height, width, 3), np.uint8))
     scale = min(64 / width, 64 / height)
     inner = round(width * scale), round(height * scale)
     shift = np.array([(64 - inner[0]) // 2, (64 - inner[1]) // 2] * 2)
@@ -291,13 +291,13 @@ def test_it_sees_what_is_in_the_picture(tmp_path: Path) -> None:
     network = Network(pooling(tmp_path / "model.onnx"), Settings())
     picture = np.zeros((64, 32, 3), np.uint8)
     picture[16:24, 8:16, 2] = 255  # red, at half the size rows 8 to 11, columns 4 to 7
-    found = network.look(picture)
+    found = network.detect(picture)
     assert found.scores[0] == pytest.approx(1.0, abs=0.02)
     (left, top, width, height) = found.boxes[0]
     assert (left + width / 2.0, top + height / 2.0) == pytest.approx((11.5, 19.5), abs=0.1)
     assert (width, height) == pytest.approx((24.0, 40.0), abs=0.1)
     picture[..., 0], picture[..., 2] = picture[..., 2].copy(), 0
-    assert len(network.look(picture).boxes) == 0
+    assert len(network.detect(picture).boxes) == 0
 
 
 def test_sizes_that_are_left_open_and_channels_last(tmp_path: Path) -> None:
@@ -307,7 +307,7 @@ def test_sizes_that_are_left_open_and_channels_last(tmp_path: Path) -> None:
     answering(path, {"output0": yolo_8()}, channels_last=True)
     network = Network(path, Settings())
     assert network.size_for(640, 480) == SIZE
-    assert len(network.look(np.zeros((64, 64, 3), np.uint8)).boxes) == 1
+    assert len(network.detect(np.zeros((64, 64, 3), np.uint8)).boxes) == 1
 
 
 @pytest.mark.parametrize(
@@ -327,7 +327,7 @@ def test_open_sizes_are_in_the_pictures_proportions(
     network = Network(path, Settings(side=side))
     assert network.size_for(*picture) == expected
     # a box of the network's picture, in the picture that is scaled into its middle
-    found = network.look(np.zeros((picture[1], picture[0], 3), np.uint8))
+    found = network.detect(np.zeros((picture[1], picture[0], 3), np.uint8))
     scale = min(expected[0] / picture[0], expected[1] / picture[1])
     inner = np.maximum(1, np.round(np.array(picture) * scale))
     shift = (np.array(expected) - inner) // 2
@@ -339,7 +339,7 @@ def test_open_sizes_are_in_the_pictures_proportions(
 
 @pytest.mark.parametrize("kind", [TensorProto.INT64, TensorProto.FLOAT])
 def test_a_network_that_asks_for_the_size_is_told_it(kind: int, tmp_path: Path) -> None:
-    found = Network(sized(tmp_path / "m.onnx", kind), Settings()).look(
+    found = Network(sized(tmp_path / "m.onnx", kind), Settings()).detect(
         np.zeros((32, 32, 3), np.uint8)
     )
     np.testing.assert_allclose(found.boxes, [[7.5, 7.5, 16.0, 16.0]], atol=1e-4)
@@ -381,9 +381,11 @@ def test_blue_comes_first_where_the_network_wants_it(tmp_path: Path) -> None:
 def test_score_and_overlap(tmp_path: Path) -> None:
     path = answering(tmp_path / "model.onnx", {"output0": yolo_8()})
     dark = np.zeros((64, 64, 3), np.uint8)
-    assert len(Network(path, Settings(score=0.95)).look(dark).boxes) == 0
-    assert len(Network(path, Settings()).with_settings(Settings(score=0.95)).look(dark).boxes) == 0
-    both = Network(path, Settings(overlap=0.98)).look(dark)
+    assert len(Network(path, Settings(score=0.95)).detect(dark).boxes) == 0
+    assert (
+        len(Network(path, Settings()).with_settings(Settings(score=0.95)).detect(dark).boxes) == 0
+    )
+    both = Network(path, Settings(overlap=0.98)).detect(dark)
     np.testing.assert_allclose(both.scores, [0.9, 0.7], atol=1e-5)
 
 
@@ -393,7 +395,7 @@ def test_score_and_overlap(tmp_path: Path) -> None:
 def test_a_network_without_a_known_answer_is_told_when_it_is_run(tmp_path: Path) -> None:
     path = answering(tmp_path / "classes.onnx", {"probabilities": np.zeros((1, 1000))})
     with pytest.raises(ValueError, match=r"classes\.onnx cannot be used: its outputs probab"):
-        Network(path, Settings()).look(np.zeros((64, 64, 3), np.uint8))
+        Network(path, Settings()).detect(np.zeros((64, 64, 3), np.uint8))
 
 
 def test_inputs_and_outputs_are_read_from_the_file(tmp_path: Path) -> None:

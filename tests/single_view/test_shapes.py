@@ -16,7 +16,7 @@ from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import upright_boxes
 from tracker.single_view.colour.peaks import colour_ratios
-from tracker.single_view.colour.trust import taught_well
+from tracker.single_view.colour.trust import templates_suffice
 from tracker.single_view.pictures.foreground import BackgroundModel, tone_curve
 from tracker.single_view.pictures.foreground.exposure import square_roots
 from tracker.single_view.shape.channels import Channels
@@ -107,11 +107,11 @@ def test_colours_are_guessed_where_somebody_is_not_taught_in_every_camera_and_tw
     second = replace(heads.views[0], camera=replace(heads.cameras[0], name="cam2"))
     both = replace(heads, views=(heads.views[0], second))
     each = tuple(replace(first, camera=camera.name) for camera in both.cameras)
-    assert taught_well(replace(both, templates=(*each, first)))
-    assert not taught_well(replace(both, templates=each))
-    assert not taught_well(replace(both, templates=each[1:] + each[1:]))
+    assert templates_suffice(replace(both, templates=(*each, first)))
+    assert not templates_suffice(replace(both, templates=each))
+    assert not templates_suffice(replace(both, templates=each[1:] + each[1:]))
     another = replace(first, name="another")
-    assert not taught_well(replace(both, templates=(*each, first, another)))
+    assert not templates_suffice(replace(both, templates=(*each, first, another)))
 
 
 def test_the_best_of_windows_that_overlap_takes_the_others() -> None:
@@ -190,12 +190,14 @@ def test_channels_of_a_reduced_picture_are_as_small(factor: float, size: tuple[i
 
 
 def test_colours_speak_for_a_shape_by_a_peak_and_against_it_by_its_own_box() -> None:
-    vouched = np.array([[True, False], [False, True], [False, False], [False, False]])
+    supported = np.array([[True, False], [False, True], [False, False], [False, False]])
     of_peaks, of_shapes = np.array([0.3, 0.6]), np.array([0.9, 0.9, 0.3, 0.9])
-    ratios = colour_ratios(vouched, of_peaks, of_shapes, sigma=0.1)
+    ratios = colour_ratios(supported, of_peaks, of_shapes, sigma=0.1)
     np.testing.assert_allclose(ratios, [1.5, -1.5, 0.0, -1.0])
     # a wider likelihood tells less
-    np.testing.assert_allclose(colour_ratios(vouched, of_peaks, of_shapes, 0.2)[:2], [0.75, -0.75])
+    np.testing.assert_allclose(
+        colour_ratios(supported, of_peaks, of_shapes, 0.2)[:2], [0.75, -0.75]
+    )
     assert colour_ratios(np.zeros((0, 2), bool), of_peaks, np.zeros(0), 0.1).shape == (0,)
     np.testing.assert_allclose(
         colour_ratios(np.zeros((2, 0), bool), np.zeros(0), of_shapes[2:], 0.1), [0.0, -1.0]

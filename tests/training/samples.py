@@ -18,11 +18,11 @@ from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.reader import read_sequence
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.pictures.foreground import learn_background
+from tracker.single_view.rectification.sequence import RectifiedSequence
 from tracker.single_view.shape.channels import Channels
 from tracker.single_view.shape.finder import PIXELS_PER_METRE
 from tracker.single_view.shape.trees import Trees
 from tracker.single_view.shape.windows import Windows
-from tracker.single_view.working.sequence import Working
 
 CAMERAS, STEPS = 3, 9
 """Looked at in each room, at most."""
@@ -109,12 +109,12 @@ def of_room(folder: Path, trees: Trees | None) -> tuple[ndarray, ndarray]:
     """
     sequence, rng = read_sequence(folder), np.random.default_rng(int(folder.name))
     chosen = with_values(RunParameters(), {"single_view": "shapes"})
-    working = Working.of(sequence, chosen, FrameReader(sequence))
+    rectified = RectifiedSequence.of(sequence, chosen, FrameReader(sequence))
     people, visible = people_of(folder), visible_of(folder)
     means, labels = [], []
-    for number, camera in enumerate(working.sequence.cameras[:CAMERAS]):
+    for number, camera in enumerate(rectified.sequence.cameras[:CAMERAS]):
         windows = Windows.of(camera, sequence.room, sequence.target_half_extents)
-        background = learn_background(working.sequence, number, working.reader)
+        background = learn_background(rectified.sequence, number, rectified.reader)
         if background is None or not len(windows.edges):
             continue
         size = float(np.median(windows.sizes))
@@ -123,7 +123,7 @@ def of_room(folder: Path, trees: Trees | None) -> tuple[ndarray, ndarray]:
         edges = (windows.edges + 0.5) * np.tile(channels.factors, 2) - 0.5
         state = channels.initial()
         for step, sampled in _steps(sequence):
-            picture = working.reader.picture(number, step)
+            picture = rectified.reader.picture(number, step)
             if picture is None:
                 continue
             state, sums = channels.step(state, picture)

@@ -89,11 +89,11 @@ REMOVED: Mapping[str, str] = {
 """The keys of parameters of earlier versions that no longer exist, and what holds instead: files,
 addresses and commands that name them are read without them, and a note says so."""
 
-FOLLOWING = ("colour_phd", "none", "shapes")
+DEFAULT_CANDIDATES = ("colour_phd", "none", "shapes")
 """Candidates for the default of ``single_view``: the first whose requirements the recording
 meets is chosen, or a fetched detection network instead of shapes."""
 
-FOLLOWS = (
+DEFAULT_RULE = (
     "follows the recording: onnx_detector where a detector is named, else colour_phd with "
     "pictures and templates, else none with detections, else onnx_detector where one was fetched "
     "and standing people are 100 pixels high in every camera, else shapes"

@@ -157,6 +157,13 @@ def stage_values(parameters: RunParameters, stage: Stage) -> dict[str, Any]:
 
     A parameter that has no effect only because of another's value (``when``) is included all the
     same: a cached result must never be mistaken for that of other parameters.
+
+    Args:
+        parameters: The parameters of a run.
+        stage: The stage.
+
+    Returns:
+        The values by key, the choice of the method first.
     """
     values: dict[str, Any] = {}
     for method in METHODS:

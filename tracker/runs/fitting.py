@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tracker.parameters import MethodKey
-from tracker.parameters.catalogue import FOLLOWING, METHODS, RunParameters, method_of
+from tracker.parameters.catalogue import DEFAULT_CANDIDATES, METHODS, RunParameters, method_of
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import BoxSizes
 
@@ -23,9 +23,9 @@ def default_parameters(sequence: Sequence) -> RunParameters:
     """Return the default parameters, with a single-view method that can work on the recording.
 
     That is the detection network, if one is named and there are pictures; else the first of
-    :data:`tracker.parameters.catalogue.FOLLOWING` for which the recording has the pictures,
-    templates and detections that it needs, where the fetched network takes the place of shapes
-    if one is at hand and people are large enough for it.
+    :data:`tracker.parameters.catalogue.DEFAULT_CANDIDATES` for which the recording has the
+    pictures, templates and detections that it needs, where the fetched network takes the place of
+    shapes if one is at hand and people are large enough for it.
 
     Raises:
         ValueError: If the sequence has neither pictures nor detections.
@@ -33,7 +33,7 @@ def default_parameters(sequence: Sequence) -> RunParameters:
     defaults = RunParameters()
     if sequence.detector is not None and sequence.detector.named and sequence.has_pictures:
         return defaults.model_copy(update={"single_view": "onnx_detector"})
-    for name in FOLLOWING:
+    for name in DEFAULT_CANDIDATES:
         if _lacks(sequence, defaults, "single_view", name, bool(sequence.templates)) is None:
             if name == "shapes" and sequence.detector is not None and suits_detector(sequence):
                 name = "onnx_detector"

@@ -15,7 +15,7 @@ from tracker.runs.run import Cancelled, Run
 from tracker.sequences.pictures.frames import Picture, Pictures
 from tracker.single_view.colour.likeness import Likeness, appearance_of
 from tracker.single_view.protocol import SHAKE, SingleViewMethod, ViewResult
-from tracker.single_view.working.sequence import Working
+from tracker.single_view.rectification.sequence import RectifiedSequence
 
 BLOCK = 5
 """The number of steps that a camera computes at a time: few, so that results arrive early; more
@@ -52,7 +52,7 @@ class SingleViews:
         self._cancelled = cancelled
         self._stopped = False
         stopping = _StoppingReader(reader, self._is_stopped)
-        self._working = Working.of(run.sequence, run.parameters, stopping)
+        self._rectified = RectifiedSequence.of(run.sequence, run.parameters, stopping)
         self._pools = [
             ThreadPoolExecutor(1, f"single-view-{view.camera.name}", thread_begins)
             for view in run.sequence.views
@@ -95,14 +95,14 @@ class SingleViews:
         run = self._run
         method = single_view.create(
             run.parameters.single_view,
-            self._working.sequence,
+            self._rectified.sequence,
             camera,
             run.parameters,
-            self._working.reader,
+            self._rectified.reader,
         )
         run.costly = run.costly or _uses_pictures(run)
         state = run.view_states[camera] if run.view_states is not None else method.start()
-        return _CameraWorker(method, state, camera, run, self._working, self._is_stopped)
+        return _CameraWorker(method, state, camera, run, self._rectified, self._is_stopped)
 
 
 class _CameraWorker:
@@ -114,10 +114,10 @@ class _CameraWorker:
         state: Any,
         camera: int,
         run: Run,
-        working: Working,
+        rectified: RectifiedSequence,
         stopped: Cancel,
     ) -> None:
-        self._working = working
+        self._rectified = rectified
         self._method = method
         self._state = state
         self._camera = camera
@@ -128,9 +128,9 @@ class _CameraWorker:
         self._stopped = stopped
         self._every = run.parameters.method("single_view").used(run.parameters).every
         pictures = _uses_pictures(run)
-        self._shake = working.shake(camera) if pictures else 0.0
-        self._pictures = working.reader.iterate(camera, self._frame) if pictures else None
-        self._likeness = Likeness.of(working.sequence, working.reader) if pictures else None
+        self._shake = rectified.shake(camera) if pictures else 0.0
+        self._pictures = rectified.reader.iterate(camera, self._frame) if pictures else None
+        self._likeness = Likeness.of(rectified.sequence, rectified.reader) if pictures else None
 
     def block(self, steps: int) -> list[tuple[ViewResult, Any]]:
         """Compute the next few steps, and return the result and state of each; none at the end."""
@@ -153,7 +153,7 @@ class _CameraWorker:
                 result = replace(result, embeddings=appearance_of(picture, result.boxes))
             if self._shake > 0.0:
                 result = replace(result, information={**result.information, SHAKE: self._shake})
-            done.append((self._working.back(self._camera, result), self._state))
+            done.append((self._rectified.back(self._camera, result), self._state))
             self._frame += 1
         return done
 

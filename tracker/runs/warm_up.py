@@ -32,7 +32,7 @@ from tracker.geometry.camera import Camera
 from tracker.kernels import compilation
 from tracker.parameters import Method, MethodKey
 from tracker.parameters.catalogue import (
-    FOLLOWING,
+    DEFAULT_CANDIDATES,
     METHODS,
     ORIGINS,
     PRESETS,
@@ -109,10 +109,10 @@ def compile_kernels(
     ):
         recording = _recording(Path(folder))
         if half == HALVES[0]:
-            for single_view in FOLLOWING:
+            for single_view in DEFAULT_CANDIDATES:
                 with compilation.only_of_pixels():
                     pipeline.compute(recording, RunParameters(single_view=single_view))
-                if single_view == FOLLOWING[0]:
+                if single_view == DEFAULT_CANDIDATES[0]:
                     ready()
         for parameters in _ways(half):
             pipeline.compute(recording, parameters)
@@ -162,7 +162,7 @@ def _ways(half: str) -> Iterable[RunParameters]:
     )
     of_smoothings = (
         RunParameters(single_view=single_view, smoothing_method=smoothing_method)
-        for single_view in FOLLOWING
+        for single_view in DEFAULT_CANDIDATES
         for smoothing_method in _own("smoothing_method")
     )
     # the orders are opposite, so that neither process waits for what the other compiles

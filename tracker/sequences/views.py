@@ -17,7 +17,7 @@ from tracker.sequences.clock import FIELDS, Timing, read_timing
 from tracker.sequences.fields import Fields
 from tracker.sequences.pictures.containers import MOST_PIXELS
 from tracker.sequences.pictures.media import (
-    Pictures,
+    PictureProperties,
     check_pictures,
     check_size,
     find_images,
@@ -50,7 +50,7 @@ class Source:
     pictures_exist: Bool[ndarray, " N"]
     """Whether each frame of the video or image list exists: images may be missing in their
     numbering."""
-    pictures: Pictures | None
+    pictures: PictureProperties | None
     timing: Timing
     table: BoxTable | None
 
@@ -204,7 +204,7 @@ def _background(view: View, fields: Fields, steps: int, reading: Reading) -> Pat
     return range(int(first), int(last) + 1)
 
 
-def _image_size(fields: Fields, pictures: Pictures | None) -> tuple[int, int]:
+def _image_size(fields: Fields, pictures: PictureProperties | None) -> tuple[int, int]:
     """Return the picture's size as stated, or that of the pictures, or about twice the principal
     point."""
     if "image_size" in fields:

@@ -70,7 +70,7 @@ class BoxPhd:
         """The state without targets, before the first step."""
         return BoxPhdState(GaussianMixture.empty(4), np.zeros((0, 4)), next_label=1)
 
-    def walk(self, boxes: Float[ndarray, "N 4"]) -> Float[ndarray, "N 4"]:
+    def walk_variances(self, boxes: Float[ndarray, "N 4"]) -> Float[ndarray, "N 4"]:
         """Variances of one step of the random walk of each box, squared pixels."""
         p, sizes = self._parameters, np.maximum(boxes[:, 2:], 0.5)
         shifts = p.motion_sigma * sizes[:, self._scale]
@@ -93,9 +93,14 @@ class BoxPhd:
         )
 
     def predict(self, state: BoxPhdState, births: GaussianMixture) -> BoxPhdState:
-        """Predict one step, and add births, which get the next labels."""
+        """Predict one step, and add births, which get the next labels.
+
+        Args:
+            state: The state after the step before.
+            births: Birth components, as of :meth:`births`.
+        """
         born = models.label_births(births, state.next_label)
-        noise = self.walk(state.mixture.means)[:, :, None] * np.eye(4)
+        noise = self.walk_variances(state.mixture.means)[:, :, None] * np.eye(4)
         surviving = gaussian_mixture.predict(
             state.mixture, np.eye(4), noise, self._parameters.survival_probability
         )

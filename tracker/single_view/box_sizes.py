@@ -1,7 +1,14 @@
 """Possible sizes of a target's box at each place of an image, from the calibrated camera.
 
+The way is from the room to the image: positions in the volume are projected. Three others differ:
+the windows of :mod:`~tracker.single_view.shape.windows` hang from crowns above the floor, around
+head and trunk, as those of the training set; :mod:`~tracker.single_view.colour.carrying` goes from
+one drawn box to the room, along the ray of its centre, since a target may be a head without feet;
+and :mod:`~tracker.single_view.detector_boxes` by both ends of a box.
+
 [DC66] Drillis, Contini, "Body segment parameters", Office of Vocational Rehabilitation, 1966.
 [NCD16] NCD Risk Factor Collaboration, "A century of trends in adult human height", eLife 5, 2016.
+[Rob18] Roberts, "The unreasonable effectiveness of quasirandom sequences", 2018.
 """
 
 from __future__ import annotations
@@ -41,11 +48,18 @@ OUTLINE = ((0.13, 0.10), (0.47, 0.195), (1.0, 0.11))
 from all sides, in statures. Lengths and widths from the front are those of [DC66]; the mean width
 of a convex outline is its circumference over pi (Cauchy), here that of an ellipse half as deep."""
 
+_DRAWN, _LEAST_SEEN = 500, 10
+"""Number of targets that are drawn from an entrance, for the moments of their boxes, and the number
+of visible ones below which the entrance is outside the image."""
+
+_PEOPLE_DIFFER = 0.1
+"""Standard deviation of people's sizes, as a share, as of the samples (``size_jitter``)."""
+
 BELOW_FLOOR = 0.1
 """Extent of a target below the room's volume that is allowed, for a floor drawn by eye, metres."""
 
 
-def geometry(sequence: Sequence, camera_index: int) -> Hashable:
+def geometry_key(sequence: Sequence, camera_index: int) -> Hashable:
     """A key of cached data that depends on the camera, the room and the target.
 
     Data that depend on the images alone do not need it: they remain when a user moves the room's
@@ -220,7 +234,15 @@ class BoxSizes:
     def draw(
         self, centres: Float[ndarray, "N 2"], rng: np.random.Generator
     ) -> tuple[Float[ndarray, "N 2"], Bool[ndarray, " N"]]:
-        """Draw a possible size at each place, pixels, and say whether there is one (else NaN)."""
+        """Draw a possible size of a target at each place.
+
+        Args:
+            centres: N places in the image, pixels.
+            rng: The generator of the draws.
+
+        Returns:
+            Half width and half height, pixels, NaN where no target can be; and whether one can be.
+        """
         place = _cells(centres, self.cell, self.columns, self.rows)
         first, count = self.starts[place], self.starts[place + 1] - self.starts[place]
         chosen = first + (rng.random(len(centres)) * count).astype(np.int64)
@@ -267,8 +289,8 @@ def _bring_to_usual_heights(
 
 
 def _even_points(count: int) -> Float[ndarray, "N 3"]:
-    """Points that fill the unit cube evenly: the additive recurrence of the plastic number."""
-    growth = 1.2207440846057596  # the real root of x⁴ = x + 1
+    """Points that fill the unit cube evenly: the additive recurrence R₃ of [Rob18]."""
+    growth = 1.2207440846057596  # the positive root of x⁴ = x + 1
     steps = np.arange(1, count + 1)[:, None] * growth ** -np.arange(1.0, 4.0)
     return steps % 1.0
 
@@ -302,19 +324,23 @@ def entrance_boxes(
         camera: The calibrated camera.
         room: The room, whose entrances have mean and standard deviation in metres.
         half_extents: Half width, depth and height of a target, metres.
-        weight: Weight of each component, expected targets per step.
+        weight: Weight of each component, expected number of targets.
+
+    Returns:
+        At most as many components as entrances, centre and half sizes in pixels; none where no
+        entrance is visible.
     """
     births = models.entrance_births(room, weight)
-    normals = _normals(_even_points(500))
+    normals = _normals(_even_points(_DRAWN))
     means, covariances = [], []
     for mean, covariance in zip(births.means, births.covariances, strict=True):
         positions = mean + normals * np.sqrt(np.diag(covariance))
         boxes, visible = upright_boxes(camera, positions, half_extents)
-        if visible.sum() < 10:
+        if visible.sum() < _LEAST_SEEN:
             continue
         means.append(boxes[visible].mean(axis=0))
         spread = np.cov(boxes[visible].T)
-        covariances.append(spread + np.diag((0.1 * means[-1][[2, 3, 2, 3]]) ** 2))
+        covariances.append(spread + np.diag((_PEOPLE_DIFFER * means[-1][[2, 3, 2, 3]]) ** 2))
     return GaussianMixture(
         weights=np.full(len(means), weight),
         means=np.array(means).reshape(-1, 4),

@@ -12,7 +12,7 @@ from tracker.filters.phd import PhdUpdate
 from tracker.parameters.groups.detections import DetectionPhdParams
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_phd import EXPLAINED, BoxPhd, BoxPhdState
-from tracker.single_view.detector_boxes import Detected, DetectorBoxes, trust
+from tracker.single_view.detector_boxes import Detected, DetectorBoxes, detector_sigmas
 from tracker.single_view.protocol import ViewResult
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ class DetectionPhd:
         p, found = self._parameters, self._boxes.at(frame)
         good = np.flatnonzero(found.plausible)
         births = state.unexplained
-        variances = trust(births, p) ** 2 + self._filter.walk(births)
+        variances = detector_sigmas(births, p) ** 2 + self._filter.walk_variances(births)
         after, updated = self._filter.update(
             self._filter.predict(state, self._filter.births(births, variances)),
             found.boxes[good],

@@ -1,4 +1,8 @@
-"""Boxes of an external detector: their measurement noise, and their consistency with the room."""
+"""Boxes of an external detector: their measurement noise, and their consistency with the room.
+
+A detector gives the ends of an upright target, which determine its place in the room; the sizes of
+:mod:`~tracker.single_view.box_sizes` are for boxes that are sought in the image.
+"""
 
 from __future__ import annotations
 
@@ -16,6 +20,10 @@ from tracker.single_view.dropped import Dropped
 
 _AT_ONCE = 4096
 """Number of boxes whose places in the room are in memory at a time."""
+
+_LEAST_SHARE = 0.05
+"""Least ratio of the expected height to that of a box: however much too tall a box may be, its
+target is at most 20 times as far away as it says, so that the place is finite."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,7 +82,9 @@ class DetectorBoxes:
         p, all_boxes = parameters, view.detections
         above = all_boxes.scores >= p.score_threshold
         self._frames = all_boxes.frames[above]
-        found = judged(sequence, view.camera, all_boxes.boxes[above], all_boxes.scores[above], p)
+        found = judge_boxes(
+            sequence, view.camera, all_boxes.boxes[above], all_boxes.scores[above], p
+        )
         embeddings = all_boxes.embeddings
         if embeddings.shape[1]:
             embeddings = embeddings[above]
@@ -88,7 +98,7 @@ class DetectorBoxes:
         return self._found.take(slice(int(first), int(last)))
 
 
-def judged(
+def judge_boxes(
     sequence: Sequence,
     camera: Camera,
     boxes: Float[ndarray, "N 4"],
@@ -105,21 +115,21 @@ def judged(
         parameters: The parameters of the noise and of the consistency.
     """
     p, centred = parameters, Boxes.from_left_top(boxes).centred
-    sigmas = trust(centred, p)
+    sigmas = detector_sigmas(centred, p)
     plausible = np.zeros(len(centred), dtype=bool)
     for first in range(0, len(centred), _AT_ONCE):
         some = slice(first, first + _AT_ONCE)
-        nearest, farthest = standing_between(
+        nearest, farthest = standing_range(
             camera,
             centred[some],
             float(sequence.target_half_extents[2]),
             p.depth_sigmas * sigmas[some, 3] / centred[some, 3],
         )
-        plausible[some] = meets(sequence.room, nearest, farthest, p.room_tolerance)
-    return Detected(_within(centred, camera), scores, sigmas, plausible)
+        plausible[some] = meets_room(sequence.room, nearest, farthest, p.room_tolerance)
+    return Detected(_clip_to_image(centred, camera), scores, sigmas, plausible)
 
 
-def _within(boxes: Float[ndarray, "N 4"], camera: Camera) -> Float[ndarray, "N 4"]:
+def _clip_to_image(boxes: Float[ndarray, "N 4"], camera: Camera) -> Float[ndarray, "N 4"]:
     """Clip top and bottom of the boxes to the image, as the measurement model expects them.
 
     Some detectors and annotations have boxes of whole persons also at the edge of the image; a
@@ -135,7 +145,9 @@ def _within(boxes: Float[ndarray, "N 4"], camera: Camera) -> Float[ndarray, "N 4
     return within
 
 
-def trust(boxes: Float[ndarray, "N 4"], parameters: DetectionBoxParams) -> Float[ndarray, "N 4"]:
+def detector_sigmas(
+    boxes: Float[ndarray, "N 4"], parameters: DetectionBoxParams
+) -> Float[ndarray, "N 4"]:
     """Compute the measurement noise of boxes: a share of their size and a constant, in quadrature.
 
     Args:
@@ -156,7 +168,7 @@ def trust(boxes: Float[ndarray, "N 4"], parameters: DetectionBoxParams) -> Float
     return np.hypot(np.stack(shares, axis=1), p.pixel_sigma)
 
 
-def standing_between(
+def standing_range(
     camera: Camera,
     boxes: Float[ndarray, "N 4"],
     half_height: float,
@@ -178,6 +190,9 @@ def standing_between(
         half_height: h, metres.
         relative_error: Largest relative error of a box's height; from 1 on a box that is
             far too tall may belong to a target at any distance.
+
+    Returns:
+        The nearest and the farthest place of the target's centre, world metres.
     """
     # in the picture of a camera that hangs upside down, heads are at the bottoms of the boxes
     down = [0.0, 1.0 if camera.rotation[1, 2] <= 0.0 else -1.0]
@@ -191,11 +206,11 @@ def standing_between(
     t = rise * (together * heads[:, 2] - feet[:, 2]) / determinant
     middle = (s[:, None] * heads + t[:, None] * feet) / 2.0
     nearest = camera.centre + middle / (1.0 + relative_error)[:, None]
-    farthest = camera.centre + middle / np.maximum(1.0 - relative_error, 0.05)[:, None]
+    farthest = camera.centre + middle / np.maximum(1.0 - relative_error, _LEAST_SHARE)[:, None]
     return nearest, farthest
 
 
-def meets(
+def meets_room(
     room: Room, starts: Float[ndarray, "N 3"], ends: Float[ndarray, "N 3"], margin: float
 ) -> Bool[ndarray, " N"]:
     """Whether each segment comes within ``margin`` metres of the room's volume, axis by axis.

@@ -35,18 +35,18 @@ class Dropped:
         return Dropped(np.zeros((0, 4), np.float32), np.zeros(0, np.int8))
 
     @staticmethod
-    def of(candidates: Float[ndarray, "M 4"], fell: Mapping[str, Bool[ndarray, " M"]]) -> Dropped:
+    def of(candidates: Float[ndarray, "M 4"], gates: Mapping[str, Bool[ndarray, " M"]]) -> Dropped:
         """Select the rejected ones of M candidates.
 
         Args:
             candidates: Boxes of the candidates, pixels.
-            fell: Which of them each gate rejected; at most one gate for each.
+            gates: Which of them each gate rejected; at most one gate for each.
         """
-        gates = np.full(len(candidates), -1, np.int8)
-        for gate, rejected in fell.items():
-            gates[rejected] = GATES.index(gate)
-        gone = gates >= 0
-        return Dropped(candidates[gone].astype(np.float32), gates[gone])
+        numbers = np.full(len(candidates), -1, np.int8)
+        for gate, rejected in gates.items():
+            numbers[rejected] = GATES.index(gate)
+        gone = numbers >= 0
+        return Dropped(candidates[gone].astype(np.float32), numbers[gone])
 
     def information(self, passed: int) -> dict[str, float]:
         """The number of candidates and of those that each gate rejected, by name.

@@ -11,7 +11,7 @@ from pathlib import Path
 from app.command.arguments.listing import Benchmark, Parameters, Sequences
 from app.command.flags import describe_range, show
 from app.command.terminal import CommandError, check_data, print_json, print_table
-from tracker.parameters.catalogue import FOLLOWS, METHODS, PARAMETERS, RunParameters
+from tracker.parameters.catalogue import DEFAULT_RULE, METHODS, PARAMETERS, RunParameters
 
 _INDENT = "    "
 
@@ -57,7 +57,7 @@ def parameters(command: Parameters) -> None:
     }
     defaults = RunParameters()
     chosen = {
-        "single_view": FOLLOWS,
+        "single_view": DEFAULT_RULE,
         "fusion_method": defaults.fusion_method,
         "smoothing_method": defaults.smoothing_method,
     }

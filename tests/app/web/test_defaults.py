@@ -14,7 +14,7 @@ from tests.app.web.test_api import assert_error
 from tracker.evaluation import evaluate_sequence
 from tracker.evaluation.report.page import report_html
 from tracker.export import tracks_csv
-from tracker.parameters.catalogue import FOLLOWS, METHODS, PARAMETERS, RunParameters
+from tracker.parameters.catalogue import DEFAULT_RULE, METHODS, PARAMETERS, RunParameters
 from tracker.parameters.values import value_of, with_values
 from tracker.runs import pipeline
 from tracker.sequences.reader import read_sequence
@@ -39,7 +39,7 @@ def test_one_default_in_definition_list_help_page_report_and_plain_run(
     listed = {row["key"]: row for row in json.loads(run("parameters", "--json")[1])}
     assert DEFINED.fusion_method in listed["fusion_method"]["range"].split("|")
     assert listed["fusion_method"]["default"] == DEFINED.fusion_method
-    assert listed["single_view"]["default"] == FOLLOWS
+    assert listed["single_view"]["default"] == DEFAULT_RULE
 
     out = tmp_path / "tracks.csv"
     assert run("track", crossing, "-o", out)[0] == 0

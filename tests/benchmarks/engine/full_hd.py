@@ -26,8 +26,8 @@ from tracker.sequences.reader import read_sequence
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.colour.appearance import Appearance
 from tracker.single_view.colour.peaks import PeakFinder
+from tracker.single_view.rectification.view import RectifiedView
 from tracker.single_view.shape.finder import ShapeFinder
-from tracker.single_view.working.view import WorkingView
 
 ROOM = 33
 """Four cameras, three people with a template each, who sit and stand, and changing light: colours,
@@ -40,8 +40,8 @@ Seconds = defaultdict[str, float]
 _STAGE_ONE = "the rest of stage 1"
 _PARTS: tuple[tuple[type, str, str], ...] = (
     (VideoDecoder, "read", "decoding"),
-    (WorkingView, "picture", "reducing"),
-    (Appearance, "look", "colours and foreground"),
+    (RectifiedView, "picture", "reducing"),
+    (Appearance, "prepare", "colours and foreground"),
     (ShapeFinder, "find", "shapes"),
     (PeakFinder, "_sample", "sampling"),
     (PeakFinder, "_score", "scoring"),

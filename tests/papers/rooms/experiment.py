@@ -14,7 +14,7 @@ from tests.papers.rooms.causes import causes_of, worst_of
 from tests.papers.rooms.kept import read_rows
 from tracker.evaluation import EvaluationSettings
 from tracker.evaluation.figures import number
-from tracker.parameters.catalogue import FOLLOWING, METHODS
+from tracker.parameters.catalogue import DEFAULT_CANDIDATES, METHODS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -158,7 +158,7 @@ def _findings(found: dict[Case, list[dict[str, Any]]]) -> tuple[Finding, ...]:
         ]
         if not judged:
             continue
-        usual = [case for name in FOLLOWING for case in judged if case.method == name]
+        usual = [case for name in DEFAULT_CANDIDATES for case in judged if case.method == name]
         best = max(judged, key=lambda case: _spread_of(found[case], "found_share", 0.1)[0])
         default = usual[0] if usual else best
         least, least_tenth, most, most_tenth = ASKED[templates]

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy import ndarray
 from numpy.testing import assert_array_equal
 
-from tracker.single_view.pictures.blobs import blobs, foreground_boxes
+from tracker.single_view.pictures.blobs import blobs
 
 
 def flood(mask: ndarray) -> list[set[tuple[int, int]]]:
@@ -51,7 +51,6 @@ def test_pieces_agree_with_a_flood_fill(seed: int, share: float, least: int) -> 
         assert (x - half_width, x + half_width) == (columns.min() - 0.5, columns.max() + 0.5)
         assert (y - half_height, y + half_height) == (rows.min() - 0.5, rows.max() + 0.5)
     assert seen == {pixel for piece in pieces for pixel in piece}
-    assert_array_equal(foreground_boxes(mask, least), found.boxes)
 
 
 @pytest.mark.parametrize("shape", [(0, 0), (0, 5), (4, 4)])
@@ -65,8 +64,8 @@ def test_nothing_gives_no_boxes(shape: tuple[int, int]) -> None:
 def test_one_pixel_is_a_box_of_one_pixel() -> None:
     mask = np.zeros((5, 7), dtype=bool)
     mask[3, 6] = True
-    assert_array_equal(foreground_boxes(mask, 1), [[6.0, 3.0, 0.5, 0.5]])
-    assert len(foreground_boxes(mask, 2)) == 0
+    assert_array_equal(blobs(mask, 1).boxes, [[6.0, 3.0, 0.5, 0.5]])
+    assert len(blobs(mask, 2).boxes) == 0
 
 
 def test_a_picture_in_colour_is_no_mask() -> None:

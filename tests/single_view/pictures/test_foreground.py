@@ -18,7 +18,7 @@ from tests.single_view.pictures.furnished import (
     photograph,
     with_person,
 )
-from tracker.kernels.pictures import images
+from tracker.kernels.pictures.foreground import foreground_mask
 from tracker.parameters.groups.foreground import ForegroundParams
 from tracker.single_view.pictures import foreground
 from tracker.single_view.pictures.foreground import BackgroundModel, LearntForeground, tone_curve
@@ -102,7 +102,7 @@ def test_the_mask_agrees_with_numpy() -> None:
     shade = np.where(rng.random((20, 30, 1)) < 0.3, 0.75, 1.0)
     picture = np.clip(background * shade + change, 0, 255).astype(np.uint8)
     spread = rng.integers(0, 20, (20, 30), dtype=np.uint8)
-    mask = images.foreground_mask(picture, learnt, curve, spread, 15.0, 0.65, 0.08)
+    mask = foreground_mask(picture, learnt, curve, spread, 15.0, 0.65, 0.08)
     differs = np.abs(16 * np.sqrt(picture) - 16 * np.sqrt(background)).max(axis=2) > 15.0 + spread
     shares = (picture + 4.0) / (background + 4.0)
     low, high = shares.min(axis=2), shares.max(axis=2)

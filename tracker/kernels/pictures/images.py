@@ -1,4 +1,4 @@
-"""Kernels over pixels and boxes, compiled.
+"""Colour histograms, means and mean shift of boxes in an image, compiled.
 
 Boxes are rows of ``centre_x, centre_y, half_width, half_height`` in pixels. Every
 kernel must agree with a NumPy counterpart in the tests.
@@ -253,8 +253,10 @@ def mean_shift(
 ) -> Modes:
     """Climb from each start to a mode of a weighted sample of boxes.
 
-    m ← Σ_i w_i k_i x_i / Σ_i w_i k_i with the Gaussian kernel
-    k_i = exp(-½ |x_i - m|²), distances in units of bandwidth × half size of m.
+        m ← Σ_i w_i k_i x_i / Σ_i w_i k_i,  k_i = exp(-½ |x_i - m|²)
+
+    with distances in units of bandwidth × half size of m. Samples further away than √12 of them,
+    with k_i below 0.0025, are left out.
 
     Args:
         samples: (S, 4), centre x, centre y, half width, half height.
@@ -302,60 +304,6 @@ def mean_shift(
             if u * u + v * v + s * s + t * t < tolerance * tolerance:
                 break
     return Modes(modes, densities)
-
-
-@pixel_kernel
-def foreground_mask(
-    picture: ndarray,
-    background: ndarray,
-    curve: ndarray,
-    spread: ndarray,
-    threshold: float,
-    darkest_shadow: float,
-    shadow_tint: float,
-) -> ndarray:
-    """Mark the pixels that are neither the background nor a shadow on it.
-
-    A pixel differs where its square-rooted grey levels (whose noise is the same in
-    dark and light) are further apart than threshold + spread. It is a shadow where
-    all channels decreased by nearly the same share.
-
-    Args:
-        picture: (h, w, 3) uint8.
-        background: (h, w, 3) uint8.
-        curve: (1, 256, 3) uint8, each level of the background at the image's exposure.
-        spread: (h, w), variation of each pixel, in the units of the threshold.
-        threshold: Threshold on the scale 16 √level, which runs from 0 to 255.
-        darkest_shadow: Least share of the light that a shadow leaves; 1 for no shadows.
-        shadow_tint: Largest difference of the channels' shares in a shadow.
-
-    Returns:
-        (h, w) uint8, 1 where a pixel is foreground.
-    """
-    height, width, _ = picture.shape
-    roots = np.empty(256)
-    for level in range(256):
-        roots[level] = 16.0 * math.sqrt(level)
-    expected = np.empty((256, 3))
-    for level in range(256):
-        for c in range(3):
-            expected[level, c] = roots[curve[0, level, c]]
-    mask = np.zeros((height, width), dtype=np.uint8)
-    for y in range(height):
-        for x in range(width):
-            largest = 0.0
-            for c in range(3):
-                difference = abs(roots[picture[y, x, c]] - expected[background[y, x, c], c])
-                largest = max(largest, difference)
-            if largest <= threshold + spread[y, x]:
-                continue
-            low, high = 1e9, 0.0
-            for c in range(3):
-                share = (picture[y, x, c] + 4.0) / (curve[0, background[y, x, c], c] + 4.0)
-                low, high = min(low, share), max(high, share)
-            if low < darkest_shadow or high > 1.0 or high - low > shadow_tint:
-                mask[y, x] = 1
-    return mask
 
 
 @pixel_kernel

@@ -127,6 +127,9 @@ def choose(
 ) -> Chosen:
     """Select the best boxes of each component, averaged with their neighbours, that keep apart.
 
+    A box's neighbours are the candidates of its component within three standard deviations of the
+    average's weights, in place and in height.
+
     Args:
         candidates: The candidate boxes, component by component.
         scores: (N,), their scores.

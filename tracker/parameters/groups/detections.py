@@ -37,7 +37,8 @@ class DetectionBoxParams(Params):
     width_sigma: Annotated[
         float, Field(ge=0.005, le=3.0), ui("σ_b", unit="half widths", step=0.01, log=True)
     ] = 0.3
-    """Standard deviation of a box's half width, as a share of it; arms and turning change it."""
+    """Standard deviation of a box's half width, as a share of it; arms and turning change it. The
+    fusion uses widths for the measurement box_and_width alone."""
 
     pixel_sigma: Annotated[float, Field(ge=0.0, le=50.0), ui("σ_px", unit="px", step=0.1)] = 1.5
     """Part of the noise of a box's centre and half sizes that does not depend on the box's size."""

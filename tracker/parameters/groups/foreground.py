@@ -15,6 +15,9 @@ from tracker.parameters.method import Reads
 
 _LEARNT, _ADAPTIVE = {"model": ("learnt",)}, {"model": ("adaptive",)}
 
+_MOTION = frozenset({"restless_from", "restless_to", "motion_memory", "motion_threshold"})
+"""The parameters of the memory of motion."""
+
 
 class ForegroundParams(Params):
     """Foreground of a picture, for every method that looks at it ([CMQ07])."""
@@ -97,7 +100,11 @@ class ForegroundParams(Params):
 
     @property
     def read_by_colours(self) -> tuple[Reads, ...]:
-        """What a method on colour reads of this group. Such methods use the mask alone, not its
-        connected pieces; with a learnt background the least area of a piece has no effect on it."""
-        without = frozenset({"minimum_area"}) if self.model == "learnt" else frozenset()
+        """What a method on colour reads of this group.
+
+        Such a method knows people by their colours, so it needs no memory of motion for those who
+        stay. It uses the mask alone, not its connected components, of which the learnt background
+        drops none.
+        """
+        without = _MOTION | {"minimum_area"} if self.model == "learnt" else _MOTION
         return (Reads("foreground", without=without),)

@@ -13,7 +13,7 @@ from pydantic import Field
 from tracker.parameters.definition import Params, ui
 from tracker.parameters.method import Method, Reads, Uses, Values
 
-_BOXES = {"measurement": ("box", "box_and_width")}
+_BOXES, _WIDTHS = {"measurement": ("box", "box_and_width")}, {"measurement": ("box_and_width",)}
 _RECOGNITION = {"recognition": (True,)}
 _WALK, _VELOCITY = {"motion": ("random_walk",)}, {"motion": ("constant_velocity",)}
 
@@ -207,7 +207,7 @@ class FusionParams(Params):
     posture_width: Annotated[
         float,
         Field(ge=0.1, le=2.0),
-        ui("w_p", unit="half heights", step=0.05, advanced=True, when=_BOXES),
+        ui("w_p", unit="half heights", step=0.05, advanced=True, when=_WIDTHS),
     ] = 0.6
     """Other posture: half width of the target, relative to the upright one's half height."""
 
@@ -221,7 +221,7 @@ class FusionParams(Params):
     posture_width_sigma: Annotated[
         float,
         Field(ge=0.01, le=2.0),
-        ui("σ_pw", unit="half heights", step=0.01, advanced=True, when=_BOXES),
+        ui("σ_pw", unit="half heights", step=0.01, advanced=True, when=_WIDTHS),
     ] = 0.5
     """Other posture: standard deviation of the box's half width."""
 

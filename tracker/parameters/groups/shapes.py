@@ -10,7 +10,6 @@ from typing import Annotated
 from pydantic import Field
 
 from tracker.parameters.definition import Params, ui
-from tracker.parameters.groups.jpda import JpdaParams
 from tracker.parameters.method import Method, Reads, Uses
 
 
@@ -65,26 +64,22 @@ class ShapesParams(Params):
     """An occluded person lies within so many half sizes of the box that hides the person."""
 
 
-_TRACKING = frozenset(
-    name
-    for name in JpdaParams.model_fields
-    if name
-    not in {
-        "association", "events", "five_cases", "gate_probability", "detection_probability",
-        "clutter", "clutter_rate", "gate_volume", "acceleration_sigma", "velocity_sigma",
-        "size_rate", "least_probability", "occlusion", "vanish_steps", "return_steps",
-        "confirmation_steps", "output", "longest_hidden", "same_size", "leap", "one_side",
+_MEASURING = frozenset(
+    {
+        "measurements", "foreground_box", "centre_sigma", "size_sigma", "pixel_sigma", "cover",
+        "height_sigmas", "crack", "top_reach", "least_inside", "most_above", "most_beside",
+        "shoulder_across", "shoulder_down",
     }
 )  # fmt: skip
-"""The parameters of the association that this method does not read: they are about how
-measurements are made."""
+"""The parameters of ``jpda`` about how measurements are made, which this method does not read:
+its measurements are people by shape."""
 
 METHOD = Method(
     name="shapes",
     help="People by the shape of head and trunk, tracked in the picture by data association.",
     uses=Uses(
         pictures=True,
-        reads=(Reads("shapes"), Reads("jpda", without=_TRACKING), Reads("pictures")),
+        reads=(Reads("shapes"), Reads("jpda", without=_MEASURING), Reads("pictures")),
     ),
     parameters=ShapesParams,
 )

@@ -101,7 +101,7 @@ def check_container(path: Path) -> None:
         raise VideoError("its first bytes are those of no video" if head else "it is empty")
 
 
-def opened(path: Path, *, packets: bool = False) -> cv2.VideoCapture:
+def open_video(path: Path, *, packets: bool = False) -> cv2.VideoCapture:
     """Open a video by FFmpeg, after a check of its container.
 
     Args:

@@ -45,6 +45,10 @@ def locate(folder: Path, fields: Fields, name: str) -> Path:
 def find_images(folder: Path, fields: Fields) -> tuple[tuple[Path, ...], Bool[ndarray, " N"]]:
     """Return the pictures that match the pattern ``images``, sorted by name.
 
+    Args:
+        folder: The folder of the sequence.
+        fields: The camera's table, with the field ``images``.
+
     Returns:
         The pictures, with those that are missing in their numbering, and whether each exists.
 
@@ -94,7 +98,7 @@ def _inside(folder: Path, given: str, fields: Fields, name: str) -> Path:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Pictures:
+class PictureProperties:
     """The properties of one camera's pictures, found by opening them once."""
 
     size: tuple[int, int]
@@ -105,8 +109,13 @@ class Pictures:
     """The frame rate, 1/s; None for images, and for a video that does not state it."""
 
 
-def probe(video: Path | None, images: tuple[Path, ...], fields: Fields) -> Pictures | None:
+def probe(video: Path | None, images: tuple[Path, ...], fields: Fields) -> PictureProperties | None:
     """Determine the properties of a camera's video or images; None if there is neither.
+
+    Args:
+        video: The video, or None.
+        images: The image files in their order; there may be none.
+        fields: The camera's table, for messages.
 
     Raises:
         SequenceError: If the video or the first image cannot be read.
@@ -121,17 +130,25 @@ def probe(video: Path | None, images: tuple[Path, ...], fields: Fields) -> Pictu
                 f'"{video.name}" ({size:,} bytes) cannot be read as a video ({error}); '
                 "expected MP4, AVI or another format that FFmpeg decodes",
             ) from None
-        return Pictures(index.size, index.frames, index.fps)
+        return PictureProperties(index.size, index.frames, index.fps)
     if images:
         picture = read_image(images[0])
         if picture is None:
             raise fields.error("images", f'"{images[0].name}" {why_no_picture(images[0])}')
-        return Pictures((picture.shape[1], picture.shape[0]), len(images), None)
+        return PictureProperties((picture.shape[1], picture.shape[0]), len(images), None)
     return None
 
 
-def check_pictures(view: View, found: Pictures, fields: Fields, frames: int) -> Iterable[str]:
+def check_pictures(
+    view: View, found: PictureProperties, fields: Fields, frames: int
+) -> Iterable[str]:
     """Check the size and the number of a camera's pictures.
+
+    Args:
+        view: The camera, with the files of its pictures.
+        found: The properties of the pictures.
+        fields: The camera's table, for messages.
+        frames: The number of steps of the sequence.
 
     Returns:
         Warnings on missing pictures, and on images whose names do not sort by number.

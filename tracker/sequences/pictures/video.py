@@ -22,7 +22,7 @@ from jaxtyping import Int, UInt8
 from numpy import ndarray
 
 from tracker.files.atomic import size_of
-from tracker.sequences.pictures.containers import MOST_PIXELS, VideoError, opened
+from tracker.sequences.pictures.containers import MOST_PIXELS, VideoError, open_video
 
 __all__ = ["VideoDecoder", "VideoError", "VideoIndex", "index_video", "read_image"]
 
@@ -31,7 +31,9 @@ DECODED_TO_VERIFY = 24
 codec reorders."""
 
 RUN_UP = 16
-"""The number of frames before the wanted one at which a jump aims, from which all are decoded."""
+"""The number of frames before the wanted one at which a jump aims, from which all are decoded.
+Right after a jump frames can be out of order by as many as a codec may reorder, in H.264 at most
+16."""
 
 
 LARGEST_IMAGE = 2**28
@@ -72,7 +74,7 @@ def index_video(path: Path) -> VideoIndex:
 def _index_video(path: Path, bytes_: int, changed: int) -> VideoIndex:
     """Return the index of a video from its packets and its first pictures."""
     stamps, is_key = _scan(path)
-    capture = opened(path)
+    capture = open_video(path)
     try:
         decoded = list(_first_times(capture, DECODED_TO_VERIFY))
         if not decoded:
@@ -129,7 +131,7 @@ _SIDES = (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT)
 
 def _scan(path: Path) -> tuple[Int[ndarray, " F"], ndarray]:
     """Read time stamp, microseconds, and key flag of every packet, in the file's order."""
-    capture = opened(path, packets=True)
+    capture = open_video(path, packets=True)
     stamps: list[int] = []
     keys: list[bool] = []
     try:
@@ -257,7 +259,7 @@ class VideoDecoder:
     def _open(self) -> None:
         """Open the file, or open it again, at its start."""
         self.close()
-        self._capture = opened(self._index.path)
+        self._capture = open_video(self._index.path)
         self._at, self._broken = -1, False
 
     def _advance_to(self, frame: int) -> None:

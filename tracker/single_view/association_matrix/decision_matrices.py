@@ -8,15 +8,10 @@ sequence", Control and Decision 22(4), 2007.
 
 from __future__ import annotations
 
-from typing import Literal
-
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 from scipy.sparse.csgraph import connected_components
-
-RowCase = Literal["interrupted", "continues", "splits"]
-ColumnCase = Literal["new", "continues", "merges"]
 
 
 def distances(before: Float[ndarray, "I 2"], now: Float[ndarray, "J 2"]) -> Float[ndarray, "I J"]:
@@ -78,18 +73,6 @@ def pixel_overlaps(
 def is_one_to_one(decision: Bool[ndarray, "I J"]) -> bool:
     """Whether every object of either step has exactly one of the other."""
     return bool((decision.sum(axis=0) == 1).all() and (decision.sum(axis=1) == 1).all())
-
-
-def row_case(decision: Bool[ndarray, "I J"], row: int) -> RowCase:
-    """The case of an object of the step before, by its row sum: 0, 1 or more."""
-    total = int(decision[row].sum())
-    return "interrupted" if total == 0 else "continues" if total == 1 else "splits"
-
-
-def column_case(decision: Bool[ndarray, "I J"], column: int) -> ColumnCase:
-    """The case of an object of this step, by its column sum: 0, 1 or more."""
-    total = int(decision[:, column].sum())
-    return "new" if total == 0 else "continues" if total == 1 else "merges"
 
 
 def families(decision: Bool[ndarray, "I J"]) -> list[tuple[list[int], list[int]]]:

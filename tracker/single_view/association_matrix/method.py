@@ -19,9 +19,9 @@ from tracker.parameters.groups.association_matrix import AssociationMatrixParams
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.association_matrix.following import follow, object_histograms
-from tracker.single_view.association_matrix.handing_over import advance
 from tracker.single_view.association_matrix.moving_objects import MovingObject, Situation
 from tracker.single_view.association_matrix.silhouettes import Fits, Silhouettes
+from tracker.single_view.association_matrix.track_transfer import advance
 from tracker.single_view.dropped import Dropped
 from tracker.single_view.noise import box_sigmas
 from tracker.single_view.pictures import colour
@@ -153,12 +153,12 @@ class AssociationMatrix:
             boxes, weights = fits.boxes, np.exp(np.minimum(fits.scores, 0.0))
             labels = _labels_of_fits(fits, situation)
             fitted = np.isin(np.arange(seen.size), fits.owners)
-            fell = {"foreground": ~fits.filled, "outline": fits.filled & ~fitted}
+            rejected = {"foreground": ~fits.filled, "outline": fits.filled & ~fitted}
         else:
             boxes, labels = _apart(situation)
             weights = np.ones(len(boxes))
-            fell = {}
-        dropped = Dropped.of(seen.boxes, fell)
+            rejected = {}
+        dropped = Dropped.of(seen.boxes, rejected)
         estimates, estimate_labels = _estimates(situation, p.confirmation_steps)
         return ViewResult(
             boxes=boxes,

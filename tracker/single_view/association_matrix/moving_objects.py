@@ -12,6 +12,10 @@ import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
+_LONGEST_PREDICTION = 3
+"""Number of steps for which an interrupted object is predicted to move on; then it is sought where
+it would be, in a circle that grows (``straying``)."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Track:
@@ -40,7 +44,8 @@ class MovingObject:
     area: int
     """Number of pixels of the component."""
     velocity: Float[ndarray, " 2"]
-    """Smoothed displacement of the centre, pixels per step."""
+    """Displacement of the centre, pixels per step: the mean of the last one and of this number a
+    step before."""
     missing: int = 0
     """Number of steps since the object was interrupted."""
     followed: bool = False
@@ -54,7 +59,8 @@ class MovingObject:
     @property
     def expected(self) -> Float[ndarray, " 2"]:
         """The predicted centre one step later, pixels."""
-        return np.asarray(self.box[:2] + self.velocity * (1 + min(self.missing, 3)))
+        steps = 1 + min(self.missing, _LONGEST_PREDICTION)
+        return np.asarray(self.box[:2] + self.velocity * steps)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

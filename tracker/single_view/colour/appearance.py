@@ -15,7 +15,7 @@ from numpy import ndarray
 from tracker.parameters.groups.foreground import ForegroundParams
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
-from tracker.single_view.box_sizes import BoxSizes, geometry
+from tracker.single_view.box_sizes import BoxSizes, geometry_key
 from tracker.single_view.colour.carrying import with_carried
 from tracker.single_view.colour.templates import read_templates
 from tracker.single_view.colour.trust import template_trust
@@ -85,7 +85,7 @@ class Appearance:
         camera, room, half_extents = view.camera, sequence.room, sequence.target_half_extents
         # no parameter has an effect on it, so that a change of one does not repeat it
         self.sizes = reader.once(
-            ("sizes", geometry(sequence, camera_index)),
+            ("sizes", geometry_key(sequence, camera_index)),
             lambda: BoxSizes.of(camera, room, half_extents),
         )
         self._size_jitter = size_jitter
@@ -103,12 +103,15 @@ class Appearance:
         """The state of the foreground model before the first image."""
         return None if self._foreground is None else self._foreground.start()
 
-    def look(self, state: Any, picture: UInt8[ndarray, "h w 3"]) -> tuple[Any, Scene]:
+    def prepare(self, state: Any, picture: UInt8[ndarray, "h w 3"]) -> tuple[Any, Scene]:
         """Prepare an image.
 
         Args:
             state: The state of :meth:`start`, or after the image before.
             picture: The image, BGR.
+
+        Returns:
+            The state of the foreground model after this image, and the prepared image.
         """
         bins = colour.bin_map(picture, self.model.space)
         if self._foreground is None:
@@ -117,7 +120,15 @@ class Appearance:
         return state, Scene(bins, found.mask, integral(found.mask))
 
     def distances(self, scene: Scene, boxes: Float[ndarray, "N 4"]) -> Float[ndarray, "N G"]:
-        """Compute the Bhattacharyya distance D of each box to each person's nearest template."""
+        """Compute the Bhattacharyya distance D of each box to each person's nearest template.
+
+        Args:
+            scene: The image.
+            boxes: Centre and half sizes of N boxes, pixels.
+
+        Returns:
+            D, 0 … 1, of each box and each of the G people of :attr:`model`.
+        """
         return self.model.distances(scene.bins, boxes)
 
     def shape_scores(
@@ -150,7 +161,13 @@ class Appearance:
     ) -> Float[ndarray, "N 4"]:
         """Draw boxes centred on foreground pixels, with possible sizes of a target there.
 
-        Fewer than ``count`` result where no target can be; none without foreground.
+        Args:
+            count: Number of boxes; fewer result where no target can be, none without foreground.
+            scene: The image, with its foreground mask.
+            rng: The generator of places and sizes.
+
+        Returns:
+            Centre and half sizes, pixels.
         """
         if scene.mask is None or count == 0:
             return np.zeros((0, 4))
@@ -163,7 +180,12 @@ class Appearance:
     def draw_anywhere(self, count: int, rng: np.random.Generator) -> Float[ndarray, "N 4"]:
         """Draw boxes centred anywhere in the image, with possible sizes of a target there.
 
-        Fewer than ``count`` result where no target can be.
+        Args:
+            count: Number of boxes; fewer result where no target can be.
+            rng: The generator of places and sizes.
+
+        Returns:
+            Centre and half sizes, pixels.
         """
         width, height = self._image_size
         return self._with_sizes(rng.integers(0, [width, height], (count, 2)), rng)

@@ -43,6 +43,10 @@ class Likeness:
         """Read the templates; None with fewer than two people.
 
         A template that cannot be read is reported in the log, for a method may need none.
+
+        Args:
+            sequence: The sequence with its templates.
+            reader: Reader of the images.
         """
         if len({template.name for template in sequence.templates}) < 2:
             return None
@@ -82,6 +86,10 @@ def appearance_of(
     """Compute the root of each box's colour histogram: a unit vector, 0 outside the image.
 
     The product of two is the Bhattacharyya coefficient of their histograms.
+
+    Args:
+        picture: The image, BGR.
+        boxes: Centre and half sizes of N boxes, pixels.
     """
     space, kernel = _NUMBERS.colour_space, _NUMBERS.histogram_kernel
     roots = np.zeros((len(boxes), colour.BINS[space]), dtype=np.float16)

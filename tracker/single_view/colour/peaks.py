@@ -22,28 +22,24 @@ from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import BoxSizes
 from tracker.single_view.colour.appearance import Appearance, Scene
-from tracker.single_view.colour.trust import shapes_of_templates, taught_well, template_trust
+from tracker.single_view.colour.trust import shapes_of_templates, template_trust, templates_suffice
 from tracker.single_view.dropped import Dropped
 from tracker.single_view.noise import box_sigmas
 from tracker.single_view.pictures import mean_shift
+from tracker.single_view.pictures.foreground.shares import LEAST_SHARE
 from tracker.single_view.protocol import TRUST
 from tracker.single_view.shape.evidence import log_ratios, shape_sigmas
 from tracker.single_view.shape.finder import SAME_PERSON, ShapeFinder, Shapes
 
-LEAST_LIKELY = 0.02
-"""Constant added to the probability of a person by shape, as to the share of foreground."""
-
-BELIEVED = 0.9
+SUFFICIENT_TRUST = 0.9
 """Trust in the foreground at a person below which shapes are used as well."""
 
 FITTING = 0.25
 """Least mean intersection over union of templates and people by shape for shapes to be used: boxes
 drawn by hand around heads and trunks have 0.4 to 0.5, around bodies 0.6."""
 
-SHAPE_OVERLAP = 0.3
-"""Intersection over union above which windows of the shapes are of one person."""
-
 _SHAPES = ShapesParams()
+"""The default parameters of people by shape: the method ``shapes`` alone reads those of a run."""
 
 PEAK_EVEN = 0.45
 """Distance to a template at which a peak at a shape is equally likely of a person and of something
@@ -115,7 +111,6 @@ class PeakFinder:
         parameters: ColourPeakParams,
         foreground: ForegroundParams,
         reader: Pictures,
-        shapes: ShapesParams = _SHAPES,
     ) -> None:
         """Read the templates and learn the background of one camera.
 
@@ -140,11 +135,11 @@ class PeakFinder:
         if p.shapes in ("unsure", "fitting") and p.asks_foreground:
             # a person not seen by one camera's foreground is detected by shape in all cameras
             wanted = any(
-                trust < BELIEVED
+                trust < SUFFICIENT_TRUST
                 for camera in range(len(sequence.views))
                 for trust in template_trust(sequence, camera, reader, foreground).values()
             )
-        guessed = p.shapes == "unsure" and not taught_well(sequence)
+        guessed = p.shapes == "unsure" and not templates_suffice(sequence)
         if p.shapes == "fitting" or wanted or guessed:
             by_shape = shapes_of_templates(sequence, reader)
             self._fits = by_shape.fit >= FITTING
@@ -152,7 +147,6 @@ class PeakFinder:
         self._shapes = ShapeFinder.of(sequence, camera_index, reader) if wanted else None
         self._instead = np.zeros(len(self._appearance.model.names))
         """Weight with which the shape replaces the foreground at each person, 0 … 1."""
-        self._shape_numbers = shapes
         self._by_shape = np.zeros(len(self._appearance.model.names))
         """Trust in the shapes at each person, 0 … 1."""
         if self._shapes is not None:
@@ -189,12 +183,12 @@ class PeakFinder:
             The state for the next image, and the peaks.
         """
         background, shape_state = state
-        p, s = self._parameters, self._shape_numbers
-        background, scene = self._appearance.look(background, picture)
+        p = self._parameters
+        background, scene = self._appearance.prepare(background, picture)
         shapes: Shapes | None = None
         if self._shapes is not None:
-            least = min(s.passed_odds, p.shape_odds) if self._fits else p.shape_odds
-            shape_state, shapes = self._shapes.find(shape_state, picture, least, SHAPE_OVERLAP)
+            least = min(_SHAPES.passed_odds, p.shape_odds) if self._fits else p.shape_odds
+            shape_state, shapes = self._shapes.find(shape_state, picture, least, _SHAPES.overlap)
         samples = self._sample(intensity, scene, rng)
         scores, _, _ = self._score(scene, shapes, samples)
         candidates = self._climb(samples, scores)
@@ -241,16 +235,16 @@ class PeakFinder:
         without a shape ln (t Λ + 1 - t) is the ratio of not being detected by shape, with the
         trust t in the shapes at the person whose colours it has.
         """
-        s = self._shape_numbers
+        s = _SHAPES
         near = self._near(found, peaks)
         surest = np.where(near, found.log_odds[:, None], -np.inf)
-        vouched = near & (surest == surest.max(axis=0, initial=-np.inf))
-        behind = self._behind(found, peaks, person, vouched)
+        supported = near & (surest == surest.max(axis=0, initial=-np.inf))
+        behind = self._behind(found, peaks, person, supported)
         alone = np.flatnonzero(~near.any(axis=0) | behind)
-        vouched &= ~behind
+        supported &= ~behind
         own = self._nearest(scene, found.boxes)
         ratios = log_ratios(found.log_odds, s.even_odds, s.odds_weight, s.largest_ratio)
-        ratios += colour_ratios(vouched, distances, own, self._parameters.likelihood_sigma)
+        ratios += colour_ratios(supported, distances, own, self._parameters.likelihood_sigma)
         least = log_ratios(np.array(s.passed_odds), s.even_odds, s.odds_weight, s.largest_ratio)
         trust = self._by_shape[person[alone]]
         of_alone = np.log(trust * np.exp(least) + 1.0 - trust)
@@ -265,7 +259,7 @@ class PeakFinder:
                     self.sigmas(peaks[alone]),
                 ]
             ),
-            np.concatenate([ratios, _at_least(of_alone, seen)]),
+            np.concatenate([ratios, _discount(of_alone, seen)]),
         )
 
     @staticmethod
@@ -273,13 +267,13 @@ class PeakFinder:
         found: Shapes,
         peaks: Float[ndarray, "N 4"],
         person: Int[ndarray, " N"],
-        vouched: Bool[ndarray, "K N"],
+        supported: Bool[ndarray, "K N"],
     ) -> Bool[ndarray, " N"]:
         """Whether each peak is of another person than the one nearest in colours to the shape:
         two people in front of each other have one shape in the image."""
         behind = np.zeros(len(peaks), dtype=bool)
-        for k in np.flatnonzero(vouched.sum(axis=1) > 1):
-            own = np.flatnonzero(vouched[k])
+        for k in np.flatnonzero(supported.sum(axis=1) > 1):
+            own = np.flatnonzero(supported[k])
             apart = np.abs(peaks[own, :2] - found.boxes[k, :2]) / found.sizes[k]
             nearest = own[(apart**2).sum(axis=1).argmin()]
             behind[own] |= person[own] != person[nearest]
@@ -334,7 +328,7 @@ class PeakFinder:
         """Log likelihood and distance D of each box for each person, and share of foreground.
 
         At a person whom the foreground does not show, the shape replaces it:
-        a ln(P + 0.02), with the probability P of a person by shape.
+        a ln(P + ε), with the probability P of a person by shape, in place of the share inside.
         """
         p = self._parameters
         distances = self._appearance.distances(scene, boxes)
@@ -351,7 +345,7 @@ class PeakFinder:
         )
         scores = scores + trust * factors[:, None]
         if shapes is not None and instead.any():
-            likely = np.log(expit(shapes.support(boxes)) + LEAST_LIKELY)
+            likely = np.log(expit(shapes.support(boxes)) + LEAST_SHARE)
             scores += p.foreground_weight * instead * likely[:, None]
         return scores, distances, inside
 
@@ -406,19 +400,19 @@ class PeakFinder:
             least = np.where(person[kept] == person[i], p.same_person_distance, p.merge_distance)
             if good[i] and np.all((apart**2).sum(axis=1) >= least**2):
                 kept.append(int(i))
-        fell = ~good & coloured & covered
+        rejected = ~good & coloured & covered
         by_shape = self._instead[person] > self._trusted(person)
         gates = {
             "colour": ~good & ~coloured,
             "foreground": ~good & coloured & ~covered,
-            "surroundings": fell & ~by_shape,
-            "shape": fell & by_shape,
+            "surroundings": rejected & ~by_shape,
+            "shape": rejected & by_shape,
             "another at its place": good & ~np.isin(np.arange(len(good)), kept),
         }
         return candidates[kept], nearest[kept], person[kept], Dropped.of(candidates, gates)
 
 
-def _at_least(
+def _discount(
     log_ratios: Float[ndarray, " N"], share: Float[ndarray, " N"]
 ) -> Float[ndarray, " N"]:
     """Compute ln (t + (1 - t) Λ) of likelihood ratios Λ below 1, which are uninformative with
@@ -428,7 +422,7 @@ def _at_least(
 
 
 def colour_ratios(
-    vouched: Bool[ndarray, "K N"],
+    supported: Bool[ndarray, "K N"],
     of_peaks: Float[ndarray, " N"],
     of_shapes: Float[ndarray, " K"],
     sigma: float,
@@ -446,12 +440,12 @@ def colour_ratios(
     own colours are no evidence for it: only a peak is.
 
     Args:
-        vouched: Whether each of N peaks is at the place of each of K shapes.
+        supported: Whether each of N peaks is at the place of each of K shapes.
         of_peaks: D of each peak.
         of_shapes: D of each shape's box.
         sigma: σ, in units of D.
     """
-    nearest = np.where(vouched, of_peaks, np.inf).min(axis=1, initial=np.inf)
+    nearest = np.where(supported, of_peaks, np.inf).min(axis=1, initial=np.inf)
     by_peak = np.clip((PEAK_EVEN - nearest) / sigma, -LARGEST, LARGEST)
     by_box = np.clip((SHAPE_EVEN - of_shapes) / sigma, -UNLIKE, 0.0)
-    return np.asarray(np.where(vouched.any(axis=1), by_peak, by_box))
+    return np.asarray(np.where(supported.any(axis=1), by_peak, by_box))

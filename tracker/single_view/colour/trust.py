@@ -19,9 +19,10 @@ from scipy.special import expit
 
 from tracker.geometry.boxes import Boxes, box_overlaps
 from tracker.parameters.groups.foreground import ForegroundParams
+from tracker.parameters.groups.shapes import ShapesParams
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence, Template
-from tracker.single_view.box_sizes import geometry
+from tracker.single_view.box_sizes import geometry_key
 from tracker.single_view.colour.templates import template_picture
 from tracker.single_view.pictures.foreground import box_shares, integral, learn
 from tracker.single_view.shape.finder import ShapeFinder
@@ -32,8 +33,8 @@ PICTURES_BEFORE = 8
 TEMPLATES_BY_SHAPE = 2
 """Number of templates of each person that are used: each takes a moment before the first step."""
 
-PASSED, OVERLAP = -1.5, 0.3
-"""Log odds from which a person is detected by shape, and the largest overlap of two people."""
+_SHAPES = ShapesParams()
+"""The default parameters of people by shape: the method ``shapes`` alone reads those of a run."""
 
 NOTHING, ENOUGH = 0.1, 0.3
 """Shares of foreground in a template's box: below the first the foreground does not show the
@@ -78,7 +79,7 @@ def template_trust(
     return trust
 
 
-def taught_well(sequence: Sequence) -> bool:
+def templates_suffice(sequence: Sequence) -> bool:
     """Whether every person has a template in every camera, and several in one.
 
     A person's colours in another camera, with other light, are predicted from those in
@@ -129,9 +130,9 @@ def _by_shape(sequence: Sequence, template: Template, reader: Pictures) -> tuple
     if template.camera not in names:
         return 0.0, 0.0
     camera = names.index(template.camera)
-    what = (template.camera, template.frame, template.box.tobytes(), geometry(sequence, camera))
+    what = (template.camera, template.frame, template.box.tobytes(), geometry_key(sequence, camera))
 
-    def look() -> tuple[float, float]:
+    def measure() -> tuple[float, float]:
         finder = ShapeFinder.of(sequence, camera, reader)
         state = finder.start()
         # the images before are needed for motion
@@ -144,13 +145,13 @@ def _by_shape(sequence: Sequence, template: Template, reader: Pictures) -> tuple
         picture = template_picture(reader, camera, template.frame)
         if picture is None:
             return 0.0, 0.0
-        _, found = finder.find(state, picture, PASSED, OVERLAP)
+        _, found = finder.find(state, picture, _SHAPES.passed_odds, _SHAPES.overlap)
         there = Boxes(found.boxes).left_top
         shared = box_overlaps(there, template.box[None]).max(initial=0.0)
         support = found.support(Boxes.from_left_top(template.box[None]).centred)
         return float(expit(support[0])), float(shared)
 
-    return reader.once(("template by shape", what), look)
+    return reader.once(("template by shape", what), measure)
 
 
 def _share(
@@ -163,7 +164,7 @@ def _share(
     camera = names.index(template.camera)
     what = (template.camera, template.frame, template.box.tobytes())
 
-    def look() -> float | None:
+    def measure() -> float | None:
         picture = template_picture(reader, camera, template.frame)
         model = learn(sequence, camera, reader, parameters)
         if picture is None or model is None:
@@ -172,4 +173,4 @@ def _share(
         edges: Float[ndarray, "1 4"] = Boxes.from_left_top(template.box[None]).corners
         return float(box_shares(integral(found.mask), edges)[0])
 
-    return reader.once(("template on foreground", parameters, what), look)
+    return reader.once(("template on foreground", parameters, what), measure)

@@ -6,9 +6,17 @@ the size of a target whose height above the floor is roughly known.
 
 Where the number of people in each component is known from tracks,
 :mod:`~tracker.single_view.association_matrix.silhouettes` fits that number: it accepts
-poorer boxes for expected targets, and only very good ones beyond.
+poorer boxes for expected targets, and only very good ones beyond. Neither is of a paper: [WW10] and
+[CMQ07] associate whole components, as the preset ``published`` does. They are two since this one
+needs no tracks, which are of its measurements, and decides by three shares of foreground; that one
+orders all candidates by one score.
 
 Boxes are ``centre_x, centre_y, half_width, half_height`` in pixels.
+
+[WW10] Wang, Wan, "Fast tracking of multiple targets in video by joint probabilistic
+data association", patent CN101783020A, 2010.
+[CMQ07] Chang, Ma, Qiao, "Human oriented multi-target tracking algorithm in video
+sequence", Control and Decision 22(4), 2007.
 """
 
 from __future__ import annotations
@@ -47,10 +55,13 @@ class Crowns:
 class TargetSizes:
     """The median size of a target at each place of an image.
 
-    It is that of targets with centres at the heights of the entrances, or of lower
-    ones, for people who sit or bend, where none of those can be. Anything higher, such as an
-    open door, is no target. In a room without entrances it is that of people on the floor, and
-    of targets at any height where none of those can be.
+    A place that is the centre of targets at the heights of the entrances has their median size.
+    Any other place has that of targets below these heights, for people who sit or bend; anything
+    higher, such as an open door, is no target. In a room without entrances the heights are those
+    of people on the floor, and the other places have the size of targets at any height.
+
+    These are medians of :class:`~tracker.single_view.box_sizes.BoxSizes`: a top of a component is
+    one candidate, while the methods that draw or try several sizes use its samples.
     """
 
     def __init__(
@@ -70,7 +81,7 @@ class TargetSizes:
         """
         upright, lower = (
             BoxSizes.of(camera, part, half_extents)
-            for part in _walked(room, float(half_extents[2]), height_sigmas)
+            for part in _height_ranges(room, float(half_extents[2]), height_sigmas)
         )
         self._grid, places = lower, lower.places()
         self.outline = outline_share(half_extents)
@@ -94,15 +105,15 @@ class TargetSizes:
         return sizes
 
 
-def _walked(room: Room, half_height: float, sigmas_wide: float) -> tuple[Room, Room]:
+def _height_ranges(room: Room, half_height: float, height_sigmas: float) -> tuple[Room, Room]:
     """The parts of the room's volume with the centres of upright targets, and of all targets."""
     means, sigmas = usual_heights(room, half_height)
     if not len(means):
         return room, room
     low, high = room.minimum.copy(), room.maximum.copy()
     # the volume of box sizes begins at the centre of a target on its floor
-    low[2] = (means - sigmas_wide * sigmas).min() - half_height + BELOW_FLOOR
-    high[2] = (means + sigmas_wide * sigmas).max()
+    low[2] = (means - height_sigmas * sigmas).min() - half_height + BELOW_FLOOR
+    high[2] = (means + height_sigmas * sigmas).max()
     highest = high if room.entrances else room.maximum
     return Room(low, high), Room(room.minimum, highest)
 

@@ -21,7 +21,7 @@ from tracker.parameters.groups.jpda import JpdaParams
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.colour.peaks import PeakFinder
-from tracker.single_view.detector_boxes import DetectorBoxes, trust
+from tracker.single_view.detector_boxes import DetectorBoxes, detector_sigmas
 from tracker.single_view.dropped import Dropped
 from tracker.single_view.jpda.crowns import TargetSizes, crowns
 from tracker.single_view.noise import box_sigmas
@@ -50,11 +50,13 @@ class Measured:
     sigmas: Float[ndarray, "M 4"]
     """Standard deviations of the boxes' numbers, pixels."""
     pieces: Float[ndarray, "M 4"]
-    """Box of the foreground component of each; targets that it occludes are inside."""
+    """Box of the foreground component around each measurement, pixels: a target that the
+    measurement occludes lies inside. Without foreground it is a multiple of the measurement."""
     shown: Float[ndarray, "S 4"] | None = None
-    """Rejected boxes for display, pixels; None for none."""
+    """All boxes of the source for display, those that are no measurements among them, pixels; None
+    where these are the measurements."""
     shown_scores: Float[ndarray, " S"] | None = None
-    """Score of each rejected box, 0 … 1."""
+    """Score of each box for display, 0 … 1; None where these are the measurements."""
     samples: Float[ndarray, "S 4"] = field(default_factory=lambda: np.zeros((0, 4)))
     """Sampled boxes of the intensity, pixels, where the source has any."""
     sample_weights: Float[ndarray, " S"] = field(default_factory=lambda: np.zeros(0))
@@ -110,6 +112,12 @@ def source_of(
     """Create the chosen source for one camera.
 
     Without any template the colours are replaced by the foreground.
+
+    Args:
+        sequence: The sequence.
+        camera_index: Index of the camera.
+        parameters: The choice, and the parameters of the source.
+        reader: Reader of the images.
 
     Raises:
         ValueError: If the camera lacks data that the source needs.
@@ -273,4 +281,4 @@ class _Detector:
         )
 
     def sigmas(self, boxes: Float[ndarray, "N 4"]) -> Float[ndarray, "N 4"]:
-        return trust(boxes, self._parameters)
+        return detector_sigmas(boxes, self._parameters)

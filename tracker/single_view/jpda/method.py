@@ -19,6 +19,7 @@ from tracker.parameters.groups.jpda import JpdaParams
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.jpda.association import associate
+from tracker.single_view.jpda.case_updates import CaseUpdates, update_by_case
 from tracker.single_view.jpda.cases import (
     Cases,
     determine_cases,
@@ -26,7 +27,6 @@ from tracker.single_view.jpda.cases import (
     search_components,
 )
 from tracker.single_view.jpda.measurements import Measured, Source, source_of
-from tracker.single_view.jpda.moves import Moved, move
 from tracker.single_view.jpda.targets import Targets, innovations
 from tracker.single_view.jpda.track_management import Managed, manage
 from tracker.single_view.pictures.foreground import pack
@@ -122,9 +122,9 @@ class Jpda:
         possible = validation_matrix(found.squared, self._gate)[:, 1:].T
         matrix, own = associate(found, possible, self._area, p)
         cases, matrix = self._cases(expected, matrix, own, seen)
-        moved = move(expected, found, matrix, cases, seen, p)
+        updated = update_by_case(expected, found, matrix, cases, seen, p)
         managed = manage(
-            moved.targets,
+            updated.targets,
             vanished,
             state.next_label,
             cases.new,
@@ -133,7 +133,7 @@ class Jpda:
             gate=self._gate,
             longest_hidden=self._longest_hidden,
         )
-        result = self._result(expected, seen, cases, moved, managed)
+        result = self._result(expected, seen, cases, updated, managed)
         return JpdaState(managed.targets, managed.vanished, managed.next_label, source), result
 
     def _cases(
@@ -153,18 +153,23 @@ class Jpda:
         return cases, matrix
 
     def _result(
-        self, expected: Targets, seen: Measured, cases: Cases, moved: Moved, managed: Managed
+        self,
+        expected: Targets,
+        seen: Measured,
+        cases: Cases,
+        updated: CaseUpdates,
+        managed: Managed,
     ) -> ViewResult:
         """Return the result of a step."""
         p, targets = self._parameters, managed.targets
         # returned and new targets are at their measurements
         arrived = np.ones(len(managed.sources))
-        weights = np.concatenate([_weights(moved, cases)[managed.stayed], arrived])
+        weights = np.concatenate([_weights(updated, cases)[managed.stayed], arrived])
         counting = targets.labels > 0
         shown = np.flatnonzero(counting)
         estimates = targets.boxes[shown]
         if p.output == "measurements":
-            boxes, sigmas, box_weights, labels = self._believed(seen, moved, managed)
+            boxes, sigmas, box_weights, labels = self._believed(seen, updated, managed)
         else:
             seen_now = counting & (targets.misses == 0)
             if p.occlusion == "inside":
@@ -185,18 +190,18 @@ class Jpda:
             samples=pack_samples(seen.samples, seen.sample_weights),
             information={**seen.information, "newcomers": float((~counting).sum())},
             dropped=seen.dropped,
-            events=_events(expected, cases, moved, managed),
+            events=_events(expected, cases, updated, managed),
             gates=self._gates(expected),
             foreground=None if seen.mask is None else pack(seen.mask),
         )
 
     def _believed(
-        self, seen: Measured, moved: Moved, managed: Managed
+        self, seen: Measured, updated: CaseUpdates, managed: Managed
     ) -> tuple[ndarray, ndarray, ndarray, ndarray]:
         """The measurements that belong to targets: boxes, sigmas, probabilities and labels."""
         after = len(managed.targets.labels)
         matrix = np.zeros((after, len(seen.boxes)))
-        matrix[: len(managed.stayed)] = moved.matrix[managed.stayed]
+        matrix[: len(managed.stayed)] = updated.matrix[managed.stayed]
         matrix[np.arange(len(managed.stayed), after), managed.sources] = 1.0
         matrix = matrix[managed.targets.labels > 0]
         labels = managed.targets.labels[managed.targets.labels > 0]
@@ -221,21 +226,21 @@ class Jpda:
         return np.concatenate([counting.positions, border], axis=1)
 
 
-def _weights(moved: Moved, cases: Cases) -> ndarray:
+def _weights(updated: CaseUpdates, cases: Cases) -> ndarray:
     """The probability that each target was measured; that of occluded targets is unknown."""
-    weights = np.minimum(moved.matrix.sum(axis=1), 1.0)
-    return np.where(moved.hidden, 0.5, weights)
+    weights = np.minimum(updated.matrix.sum(axis=1), 1.0)
+    return np.where(updated.hidden, 0.5, weights)
 
 
 def _events(
-    expected: Targets, cases: Cases, moved: Moved, managed: Managed
+    expected: Targets, cases: Cases, updated: CaseUpdates, managed: Managed
 ) -> tuple[ViewEvent, ...]:
     """The events of the step; new targets that are not confirmed yet have none."""
     labels = expected.labels
     events = []
     for j in np.unique(cases.shared[cases.shared >= 0]):
         group = np.flatnonzero((cases.shared == j) & (labels > 0))
-        if len(group) > 1 and moved.hidden[group].any():
+        if len(group) > 1 and updated.hidden[group].any():
             events.append(ViewEvent("occluded", tuple(sorted(labels[group].tolist()))))
     for label in labels[cases.split & (labels > 0)].tolist():
         events.append(ViewEvent("split", (label,)))

@@ -1,4 +1,14 @@
-"""Track management of one camera: targets that begin, end, or return."""
+"""Track management of one camera by place: targets that begin, end, or return ([WW10]).
+
+A measurement without a target continues a vanished target in whose predicted gate it lies. The two
+other trackers of published methods decide by other evidence, so each has a track management of its
+own: :mod:`~tracker.single_view.pseudo_particle.track_management` by the person whose colours a
+target has, and :mod:`~tracker.single_view.association_matrix.track_transfer` by the objects that
+several tracks may share.
+
+[WW10] Wang, Wan, "Fast tracking of multiple targets in video by joint probabilistic
+data association", patent CN101783020A, 2010.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +24,7 @@ from tracker.single_view.jpda.measurements import Measured
 from tracker.single_view.jpda.targets import Targets, concatenate, innovations
 
 FAR = 1e9
-"""Distance of an inadmissible pair."""
+"""Squared distance of an inadmissible pair: more than the sum of all distances inside gates."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,7 +83,7 @@ def manage(
     places = np.flatnonzero(new)
     back, where = np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
     if p.five_cases:
-        back, where = _same(vanished, seen, places, gate)
+        back, where = _pair_returned(vanished, seen, places, gate)
     fresh = np.setdiff1d(places, where)
     returned = Targets.at_rest(
         np.concatenate([seen.boxes[where, :2], vanished.half_sizes[back]], axis=1),
@@ -106,10 +116,17 @@ def manage(
     )
 
 
-def _same(
+def _pair_returned(
     vanished: Targets, seen: Measured, places: Int[ndarray, " m"], gate: float
 ) -> tuple[Int[ndarray, " r"], Int[ndarray, " r"]]:
-    """Pair vanished targets with measurements, nearest first, one to one."""
+    """Pair vanished targets with measurements, one to one.
+
+    As many pairs as possible are made inside the gates, with the least sum of squared Mahalanobis
+    distances.
+
+    Returns:
+        Indices of the vanished targets, and the measurement of each.
+    """
     found = innovations(vanished, seen.boxes[places, :2], seen.sigmas[places, :2])
     distances: Float[ndarray, "v m"] = np.where(found.squared <= gate, found.squared, FAR)
     rows, columns = linear_sum_assignment(distances)

@@ -10,7 +10,7 @@ from numpy import ndarray
 
 from tracker.parameters.groups.onnx_detector import OnnxDetectorParams
 from tracker.sequences.sequence import Sequence
-from tracker.single_view.detector_boxes import judged
+from tracker.single_view.detector_boxes import judge_boxes
 from tracker.single_view.onnx.network import Network, Settings
 from tracker.single_view.protocol import ViewResult
 
@@ -71,8 +71,8 @@ class OnnxDetector:
         """Detect the people in the image."""
         if picture is None:
             return None, ViewResult.of_no_frame()
-        seen = self._network.look(picture)
-        found = judged(self._sequence, self._camera, seen.boxes, seen.scores, self._parameters)
+        seen = self._network.detect(picture)
+        found = judge_boxes(self._sequence, self._camera, seen.boxes, seen.scores, self._parameters)
         good = found.plausible
         result = ViewResult.of_boxes(found.boxes[good], found.scores[good], found.sigmas[good])
         dropped = found.dropped

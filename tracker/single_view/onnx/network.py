@@ -113,10 +113,10 @@ class Network:
         """A model that was run on an empty image, so that its outputs can be read.
 
         Raises:
-            ValueError: In the cases of the constructor and of :meth:`look`.
+            ValueError: In the cases of the constructor and of :meth:`detect`.
         """
         network = cls(path, Settings())
-        network.look(np.full((_SIDE, _SIDE, 3), _GREY, np.uint8))
+        network.detect(np.full((_SIDE, _SIDE, 3), _GREY, np.uint8))
         return network
 
     def with_settings(self, settings: Settings) -> Network:
@@ -165,7 +165,7 @@ class Network:
             )
         )
 
-    def look(self, picture: UInt8[ndarray, "h w 3"]) -> Found:
+    def detect(self, picture: UInt8[ndarray, "h w 3"]) -> Found:
         """Detect the people in an image (blue, green, red).
 
         The image is scaled to fit into the network's input with its aspect ratio, in the middle

@@ -57,8 +57,3 @@ def blobs(mask: UInt8[ndarray, "h w"], minimum_area: int) -> Blobs:
         [left + (width - 1) / 2.0, top + (height - 1) / 2.0, width / 2.0, height / 2.0]
     )
     return Blobs(np.ascontiguousarray(boxes.T), areas, new_name[labels])
-
-
-def foreground_boxes(mask: UInt8[ndarray, "h w"], minimum_area: int) -> Float[ndarray, "N 4"]:
-    """The boxes of :func:`blobs` alone, pixels."""
-    return blobs(mask, minimum_area).boxes

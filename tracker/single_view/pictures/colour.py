@@ -9,7 +9,6 @@ density filtering", 2021, §2.1.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args
@@ -97,32 +96,6 @@ def _hsi_bins() -> UInt16[ndarray, " 32768"]:
 _HSI_BINS = _hsi_bins()
 
 
-def distance(
-    first: Float[ndarray, "*N bins"], second: Float[ndarray, "*N bins"]
-) -> Float[ndarray, "*N"]:
-    """The Bhattacharyya distance sqrt(1 - Σ_u sqrt(p(u) q(u))) of histograms, as in [CRM03].
-
-    Args:
-        first: Histograms p, each with sum 1; any number of leading axes.
-        second: Histograms q, each with sum 1.
-
-    Returns:
-        0 for equal histograms, 1 for disjoint ones or where one is empty.
-    """
-    coefficient = np.sqrt(first * second).sum(axis=-1)
-    return np.asarray(np.sqrt(np.clip(1.0 - coefficient, 0.0, 1.0)))
-
-
-def likelihood(distances: Float[ndarray, " N"], sigma: float) -> Float[ndarray, " N"]:
-    """Compute l_z = N(D; 0, σ²), the colour likelihood of [ZW21] §2.1.
-
-    Args:
-        distances: Bhattacharyya distances D, 0 … 1.
-        sigma: σ > 0, in units of D.
-    """
-    return np.exp(-0.5 * (distances / sigma) ** 2) / (sigma * math.sqrt(2.0 * math.pi))
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class ColourModel:
     """Templates in one histogram space, for comparison with boxes."""
@@ -170,9 +143,13 @@ class ColourModel:
     def distances(
         self, bins: UInt16[ndarray, "h w"], boxes: Float[ndarray, "N 4"]
     ) -> Float[ndarray, "N G"]:
-        """Compute D = min_i sqrt(1 - Σ_u sqrt(p(u) q_i(u))) over the templates of each of G people.
+        """Compute the Bhattacharyya distance of each box to each person's nearest template.
 
-        The distance of [ZW21], over all templates, is the smallest value of a row.
+            D = min_i sqrt(1 - Σ_u sqrt(p(u) q_i(u)))
+
+        over the templates of each of G people, with the histogram p of the box and q_i of a
+        template ([CRM03]): 0 for equal histograms, 1 for disjoint ones. The distance of [ZW21],
+        over all templates, is the smallest value of a row.
 
         Args:
             bins: :func:`bin_map` of the image.

@@ -99,7 +99,7 @@ class PseudoParticle:
         moved = self._model.move(state.particles, rng)
         if picture is None:
             return replace(state, particles=moved), self._unseen(state)
-        foreground, scene = self._model.look(state.foreground, picture)
+        foreground, scene = self._model.prepare(state.foreground, picture)
         if self._parameters.filter == "classical":
             particles, result = self._classical(moved, scene, rng)
             after = PseudoParticleState(particles, state.tracks, foreground)
@@ -118,7 +118,7 @@ class PseudoParticle:
     ) -> tuple[Float[ndarray, "S 4"], Tracks, ViewResult]:
         """Clusters, hypothesis matrix, and new particles: particles, targets and result."""
         p = self._parameters
-        samples = np.concatenate([moved, self._model.newcomers(p.samples - len(moved), scene, rng)])
+        samples = np.concatenate([moved, self._model.draw_new(p.samples - len(moved), scene, rng)])
         expected = tracks.targets.moved(p.velocity_share)
         scores, persons = self._model.scores(scene, samples)
         weights = (
@@ -200,7 +200,7 @@ class PseudoParticle:
     ) -> tuple[Float[ndarray, "S 4"], ViewResult]:
         """Sampling, importance weights and resampling: one posterior, and its mean."""
         p = self._parameters
-        samples = moved if len(moved) else self._model.newcomers(p.samples, scene, rng)
+        samples = moved if len(moved) else self._model.draw_new(p.samples, scene, rng)
         weights = particle_set.normalised(self._model.scores(scene, samples)[0])
         counts = particle_set.resample(weights, p.samples if len(samples) else 0, rng)
         mean = (weights @ samples)[None] if len(samples) else np.zeros((0, 4))

@@ -55,14 +55,26 @@ class ColourParticles:
         """The state of the foreground model before the first image."""
         return self._appearance.start()
 
-    def look(self, state: Any, picture: UInt8[ndarray, "h w 3"]) -> tuple[Any, Scene]:
-        """Prepare an image."""
-        return self._appearance.look(state, picture)
+    def prepare(self, state: Any, picture: UInt8[ndarray, "h w 3"]) -> tuple[Any, Scene]:
+        """Prepare an image: :meth:`tracker.single_view.colour.appearance.Appearance.prepare`."""
+        return self._appearance.prepare(state, picture)
 
     def move(
         self, particles: Float[ndarray, "S 4"], rng: np.random.Generator
     ) -> Float[ndarray, "S 4"]:
-        """Predict by a random walk in half sizes; width and height change together."""
+        """Predict by a random walk in half sizes; width and height change together.
+
+            x ← x + σ_w √T H n,  H ← H exp(σ_H √T n₃)
+
+        with the time T of a step and standard normal n.
+
+        Args:
+            particles: Centre and half sizes of S particles, pixels.
+            rng: The generator of n.
+
+        Returns:
+            At most S particles: those whose centres are still in the image.
+        """
         p, root = self._parameters, self._root_time
         noise = rng.standard_normal((len(particles), 3))
         moved = particles.copy()
@@ -70,10 +82,14 @@ class ColourParticles:
         moved[:, 2:] *= np.exp(p.growth_sigma * root * noise[:, 2:])
         return self._appearance.within(moved)
 
-    def newcomers(
-        self, count: int, scene: Scene, rng: np.random.Generator
-    ) -> Float[ndarray, "N 4"]:
-        """Draw particles where new targets may be."""
+    def draw_new(self, count: int, scene: Scene, rng: np.random.Generator) -> Float[ndarray, "N 4"]:
+        """Draw particles where new targets may be: on the foreground, or anywhere.
+
+        Args:
+            count: Number of particles; fewer result where no target can be.
+            scene: The image.
+            rng: The generator of places and sizes.
+        """
         if self._parameters.birth == "foreground":
             drawn = self._appearance.draw_on_foreground(count, scene, rng)
         else:
@@ -83,7 +99,15 @@ class ColourParticles:
     def evidence(
         self, scene: Scene, boxes: Float[ndarray, "N 4"]
     ) -> tuple[Float[ndarray, " N"], Float[ndarray, " N"]]:
-        """The foreground's log factor of the likelihood of each box, and its share inside."""
+        """Compute the foreground's log factors of the likelihood of boxes, and shares inside.
+
+        Args:
+            scene: The image.
+            boxes: Centre and half sizes of N boxes, pixels.
+
+        Returns:
+            As :func:`tracker.single_view.pictures.foreground.shape_scores`.
+        """
         p = self._parameters
         return self._appearance.shape_scores(
             scene, boxes, inside_weight=p.foreground_weight, around_weight=p.surroundings_weight
@@ -92,14 +116,22 @@ class ColourParticles:
     def scores(
         self, scene: Scene, boxes: Float[ndarray, "N 4"]
     ) -> tuple[Float[ndarray, " N"], Int[ndarray, " N"]]:
-        """The log weight of each box, and the person whose colours it fits best."""
+        """Compute the log weight -λ d of each box, plus that of its foreground.
+
+        Args:
+            scene: The image.
+            boxes: Centre and half sizes of N boxes, pixels.
+
+        Returns:
+            The log weights, and the index of the person whose colours each box fits best.
+        """
         distances = self._appearance.distances(scene, boxes)
         colours = particle_set.log_likelihoods(distances, self._parameters.sharpness)
         evidence, _ = self.evidence(scene, boxes)
         return np.asarray(colours + evidence), np.asarray(distances.argmin(axis=1))
 
     def distances(self, scene: Scene, boxes: Float[ndarray, "N 4"]) -> Float[ndarray, "N G"]:
-        """Compute d of each box to each person's colours."""
+        """Compute the Bhattacharyya distance d of each of N boxes to each of G people's colours."""
         return self._appearance.distances(scene, boxes)
 
     def sigmas(self, boxes: Float[ndarray, "N 4"]) -> Float[ndarray, "N 4"]:

@@ -1,4 +1,12 @@
-"""Track management of one camera: targets that begin, end, or return."""
+"""Track management of one camera by colours: targets that begin, end, or return.
+
+The hypothesis matrix ([SG08]) has assigned the modes to targets, to new targets or to the
+background. A target returns as the last vanished one with the colours of the same person, wherever
+it is; by place, as in :mod:`~tracker.single_view.jpda.track_management`, one that comes in
+elsewhere would be new.
+
+[SG08] Sun, Guo, "Multiple object tracking with a pseudo particle filter", 2008.
+"""
 
 from __future__ import annotations
 

@@ -14,16 +14,16 @@ from numpy import ndarray
 
 from tracker.kernels.pictures.channels import channel_sums, gradients
 from tracker.single_view.pictures.foreground import BackgroundModel, tone_curve
-from tracker.single_view.pictures.foreground.exposure import square_roots
+from tracker.single_view.pictures.foreground.exposure import largest_channel, square_roots
+from tracker.single_view.pictures.foreground.motion import BLUR
 
 LAG = 0.12
-"""Time between two images that are compared, seconds: a moving hand leaves its place."""
+"""Time between two images that are compared, seconds: a moving hand leaves its place. The trees
+are trained on it, so that it is not the one of
+:class:`~tracker.single_view.pictures.foreground.MovingForeground`."""
 
 MEMORY = 2.0
 """Time constant of the fading mean of motion, seconds."""
-
-BLUR = 1.0
-"""Standard deviation of the blur against noise and compression, before comparison, pixels."""
 
 _AROUND = 0.35
 """Distance to either side over which edges are averaged for normalisation, metres."""
@@ -85,17 +85,31 @@ class Channels:
         return ChannelState((), None)
 
     def watch(self, state: ChannelState, picture: UInt8[ndarray, "h w 3"]) -> ChannelState:
-        """Update the state by an image without computing its channels."""
+        """Update the state by an image without computing its channels.
+
+        Args:
+            state: The state after the image before.
+            picture: The image, BGR, of the background's size.
+        """
         return self._watch(state, self._reduced(square_roots(picture)))[0]
 
     def step(
         self, state: ChannelState, picture: UInt8[ndarray, "h w 3"]
     ) -> tuple[ChannelState, Int32[ndarray, "h1 w1 C"]]:
-        """Compute the integral images of an image's channels, and the next state."""
+        """Compute the integral images of an image's channels.
+
+        Args:
+            state: The state after the image before.
+            picture: The image, BGR, of the background's size.
+
+        Returns:
+            The next state, and the sums of :func:`tracker.kernels.pictures.channels.channel_sums`
+            over the reduced image.
+        """
         empty = self._background.picture
         shown = cv2.LUT(empty, square_roots(tone_curve(empty, picture)))
         roots = self._reduced(square_roots(picture))
-        difference = _largest(cv2.absdiff(roots, self._reduced(shown)))
+        difference = largest_channel(cv2.absdiff(roots, self._reduced(shown)))
         after, motion, activity = self._watch(state, roots)
         found = gradients(roots)
         mean = cv2.blur(found.magnitudes, (self._around, self._around))
@@ -135,11 +149,6 @@ def _moved(old: UInt8[ndarray, "h w 3"], new: UInt8[ndarray, "h w 3"]) -> UInt8[
     if any(shift):
         levels = np.arange(256)[:, None] + shift
         old = cv2.LUT(old, np.clip(levels, 0, 255).astype(np.uint8)[None])
-    difference = _largest(cv2.absdiff(old, new))
+    difference = largest_channel(cv2.absdiff(old, new))
     noise = np.uint8(min(255, 2 * int(np.median(difference[::2, ::2]))))
     return np.asarray(cv2.subtract(difference, np.full_like(difference, noise)))
-
-
-def _largest(picture: UInt8[ndarray, "h w 3"]) -> UInt8[ndarray, "h w"]:
-    blue, green, red = cv2.split(picture)
-    return np.asarray(cv2.max(cv2.max(blue, green), red))

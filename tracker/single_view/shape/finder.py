@@ -10,7 +10,7 @@ from numpy import ndarray
 
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
-from tracker.single_view.box_sizes import geometry
+from tracker.single_view.box_sizes import geometry_key
 from tracker.single_view.pictures.foreground import learn_background
 from tracker.single_view.shape.channels import Channels, ChannelState
 from tracker.single_view.shape.trees import Trees
@@ -89,7 +89,12 @@ class ShapeFinder:
             reader: Reader of the images.
         """
         return reader.once(
-            ("shape finder", camera_index, sequence.step_time, geometry(sequence, camera_index)),
+            (
+                "shape finder",
+                camera_index,
+                sequence.step_time,
+                geometry_key(sequence, camera_index),
+            ),
             lambda: ShapeFinder(sequence, camera_index, reader),
         )
 
@@ -150,6 +155,8 @@ def strongest(
     edges: Float[ndarray, "N 4"], scores: Float[ndarray, " N"], overlap: float
 ) -> tuple[Int[ndarray, " N"], Int[ndarray, " K"]]:
     """Select windows by greedy non-maximum suppression, the best first.
+
+    Unlike OpenCV's ``NMSBoxes`` it also says which window each of the suppressed ones belongs to.
 
     Args:
         edges: Left, top, right and bottom of N windows, pixels.

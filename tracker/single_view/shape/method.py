@@ -122,8 +122,8 @@ class ShapeSource:
         p = self._parameters
         least = min(p.passed_odds, p.least_odds)
         state, found = self._finder.find(state, picture, least, p.overlap)
-        fell = np.ones(len(found.unlikely), dtype=bool)
-        dropped = Dropped.of(found.unlikely, {"shape": fell})
+        rejected = np.ones(len(found.unlikely), dtype=bool)
+        dropped = Dropped.of(found.unlikely, {"shape": rejected})
         probabilities = expit(found.log_odds)
         likely = np.flatnonzero(found.log_odds >= p.least_odds)
         return state, Measured(

@@ -85,7 +85,16 @@ class Windows:
 
     @staticmethod
     def of(camera: Camera, room: Room, half_extents: Float[ndarray, " 3"]) -> Windows:
-        """The windows of people of every height anywhere on the floor, without similar ones."""
+        """The windows of people of every height anywhere on the floor, without similar ones.
+
+        Args:
+            camera: The calibrated camera, upright.
+            room: The room, whose lowest height is that of the floor.
+            half_extents: Half width, depth and height of the target below the crown, metres.
+
+        Returns:
+            None in number where the camera sees no place of the floor.
+        """
         across = _places(room.minimum[:2], room.maximum[:2])
         floor = room.minimum[2]
         grid = np.meshgrid(*across, floor + np.array(CROWNS), indexing="ij")

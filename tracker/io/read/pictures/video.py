@@ -10,7 +10,7 @@ import numpy as np
 from tracker.io.read.pieces import Piece, VideoPiece
 from tracker.io.read.protocol import Certainty, Kind
 from tracker.io.read.source import SourceFile
-from tracker.sequences.pictures.containers import is_video, opened
+from tracker.sequences.pictures.containers import is_video, open_video
 from tracker.sequences.pictures.video import VideoError, VideoIndex, index_video
 
 NAME = "video"
@@ -34,7 +34,7 @@ def read(file: SourceFile) -> Iterator[Piece]:
             f"({file.size:,} bytes) cannot be read as a video ({error}); expected MP4, AVI or "
             "another format that FFmpeg decodes; it may be cut short"
         ) from None
-    capture = opened(file.path)
+    capture = open_video(file.path)
     try:
         rate = float(capture.get(cv2.CAP_PROP_FPS))
         turned = round(capture.get(cv2.CAP_PROP_ORIENTATION_META)) % 360 != 0

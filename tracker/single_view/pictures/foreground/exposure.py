@@ -17,8 +17,7 @@ import numpy as np
 from jaxtyping import UInt8
 from numpy import ndarray
 
-from tracker.kernels.pictures import images
-from tracker.kernels.pictures.foreground import level_medians, upper_medians
+from tracker.kernels.pictures.foreground import foreground_mask, level_medians, upper_medians
 from tracker.parameters.groups.foreground import ForegroundParams
 from tracker.single_view.pictures.foreground.segmentation import Segmentation
 
@@ -88,7 +87,9 @@ class BackgroundModel:
             aligned.append(cv2.LUT(picture, _inverse(tone_curve(reference, picture))))
         reference = median(aligned, check)
         roots = cv2.LUT(reference, _ROOTS)
-        deviations = [_largest(cv2.absdiff(cv2.LUT(picture, _ROOTS), roots)) for picture in aligned]
+        deviations = [
+            largest_channel(cv2.absdiff(cv2.LUT(picture, _ROOTS), roots)) for picture in aligned
+        ]
         return BackgroundModel(reference, median(deviations, check), _changing_share(deviations))
 
     def foreground(
@@ -102,7 +103,7 @@ class BackgroundModel:
                 16 √level (0 … 255), to which the variation of a pixel is added; and the bounds
                 of a shadow.
         """
-        mask = images.foreground_mask(
+        mask = foreground_mask(
             picture,
             self.picture,
             tone_curve(self.picture, picture),
@@ -158,6 +159,12 @@ def square_roots(picture: UInt8[ndarray, "h w 3"]) -> UInt8[ndarray, "h w 3"]:
     return np.asarray(cv2.LUT(picture, _ROOTS), dtype=np.uint8)
 
 
+def largest_channel(picture: UInt8[ndarray, "h w 3"]) -> UInt8[ndarray, "h w"]:
+    """Compute the largest value of each pixel's channels."""
+    blue, green, red = cv2.split(picture)
+    return np.asarray(cv2.max(cv2.max(blue, green), red), dtype=np.uint8)
+
+
 def _changing_share(deviations: list[UInt8[ndarray, "h w"]]) -> float:
     """Compute :attr:`BackgroundModel.changing_share`.
 
@@ -202,13 +209,6 @@ def median(
         medians: ndarray = upper_medians(stack.reshape(len(stack), -1))
         result[top : top + rows] = medians.reshape(stack.shape[1:])
     return result
-
-
-def _largest(picture: UInt8[ndarray, "h w 3"]) -> UInt8[ndarray, "h w"]:
-    """The largest value of each pixel's channels."""
-    blue, green, red = cv2.split(picture)
-    largest: ndarray = cv2.max(cv2.max(blue, green), red)
-    return largest
 
 
 class LearntForeground:

@@ -16,7 +16,11 @@ from jaxtyping import UInt8
 from numpy import ndarray
 
 from tracker.parameters.groups.foreground import ForegroundParams
-from tracker.single_view.pictures.foreground.exposure import BackgroundModel, square_roots
+from tracker.single_view.pictures.foreground.exposure import (
+    BackgroundModel,
+    largest_channel,
+    square_roots,
+)
 from tracker.single_view.pictures.foreground.segmentation import Segmentation
 
 LAG = 0.1
@@ -91,7 +95,7 @@ class MovingForeground:
     def _changed(
         self, old: UInt8[ndarray, "h w 3"], new: UInt8[ndarray, "h w 3"]
     ) -> UInt8[ndarray, "h w"]:
-        difference = cv2.absdiff(old, new).max(axis=2)
+        difference = largest_channel(cv2.absdiff(old, new))
         changed = (difference > self._parameters.motion_threshold).astype(np.uint8)
         if cv2.countNonZero(changed) > BLIND * changed.size:
             return np.zeros_like(changed)

@@ -29,7 +29,12 @@ class ForegroundModel(Protocol):
         ...
 
     def step(self, state: Any, picture: UInt8[ndarray, "h w 3"]) -> tuple[Any, Segmentation]:
-        """Segment the next image, BGR."""
+        """Segment the next image.
+
+        Args:
+            state: The state after the image before.
+            picture: The image, BGR, of the background's size.
+        """
         ...
 
 

@@ -9,6 +9,10 @@ from numpy import ndarray
 
 from tracker.kernels.pictures import images
 
+LEAST_SHARE = 0.02
+"""ε, a share that is added before the logarithm: an empty box costs a ln ε = -3.9 a and not
+infinity."""
+
 # in half sizes from a box's centre, left, top, right, bottom: inside, above, left and right
 _PARTS = np.array(
     [
@@ -65,8 +69,8 @@ def shape_scores(
     """Compute log factors of the likelihood of boxes from the foreground, and shares inside.
 
     A box on a person is full of foreground, with background above and beside it:
-    a ln(inside + 0.02) - b (above + beside), of :func:`shape_shares`, where a box that is as
-    full as the outline of a person counts as full.
+    a ln(inside + ε) - b (above + beside), of :func:`shape_shares`, with ε = 0.02. A box that
+    is as full as the outline of a person counts as full.
 
     Args:
         sums: Integral image of the mask, of :func:`integral`.
@@ -77,4 +81,4 @@ def shape_scores(
     """
     inside, above, beside = shape_shares(sums, boxes)
     inside = np.minimum(inside / outline, 1.0)
-    return inside_weight * np.log(inside + 0.02) - around_weight * (above + beside), inside
+    return inside_weight * np.log(inside + LEAST_SHARE) - around_weight * (above + beside), inside

@@ -13,8 +13,8 @@ from tracker.sequences.pictures.frames import Picture, Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.pictures.foreground import pack, unpack
 from tracker.single_view.protocol import ViewResult, pack_samples, unpack_samples
-from tracker.single_view.working.stabilisation import SteadyReader
-from tracker.single_view.working.view import WorkingView, working_view
+from tracker.single_view.rectification.stabilisation import StabilisedReader
+from tracker.single_view.rectification.view import RectifiedView, rectified_view
 
 if TYPE_CHECKING:
     from tracker.parameters.catalogue import RunParameters
@@ -23,18 +23,18 @@ _Made = TypeVar("_Made")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Working:
+class RectifiedSequence:
     """A recording whose images are reduced and rotated for stage 1."""
 
     sequence: Sequence
-    """The sequence with the calibrations and templates of the working images."""
+    """The sequence with the calibrations and templates of the rectified images."""
     reader: Pictures
-    """Reader of the working images."""
-    views: tuple[WorkingView | None, ...]
+    """Reader of the rectified images."""
+    views: tuple[RectifiedView | None, ...]
     """The conversion of each camera; None where its own images are used."""
 
     @staticmethod
-    def of(sequence: Sequence, parameters: RunParameters, reader: Pictures) -> Working:
+    def of(sequence: Sequence, parameters: RunParameters, reader: Pictures) -> RectifiedSequence:
         """Prepare the images for the chosen method of stage 1.
 
         Args:
@@ -42,14 +42,14 @@ class Working:
             parameters: The method, and the resolution of the images.
             reader: Reader of the recording's images.
         """
-        views: tuple[WorkingView | None, ...] = (None,) * len(sequence.views)
+        views: tuple[RectifiedView | None, ...] = (None,) * len(sequence.views)
         used = parameters.method("single_view").used(parameters)
         if not used.pictures:
-            return Working(sequence, reader, views)
+            return RectifiedSequence(sequence, reader, views)
         if used.reads_parameter("pictures", "level_from"):
             reduced = used.reads_parameter("pictures", "lines")
             views = tuple(
-                working_view(
+                rectified_view(
                     camera,
                     sequence.room,
                     sequence.target_half_extents,
@@ -59,20 +59,25 @@ class Working:
                 for camera in sequence.cameras
             )
         if any(view is not None for view in views):
-            sequence, reader = _reduced(sequence, views), _WorkingReader(reader, views)
+            sequence, reader = _reduced(sequence, views), _RectifiedReader(reader, views)
         if used.reads_parameter("pictures", "steady_from"):
-            reader = SteadyReader(sequence, reader, views, parameters.pictures.steady_from)
-        return Working(sequence, reader, views)
+            reader = StabilisedReader(sequence, reader, views, parameters.pictures.steady_from)
+        return RectifiedSequence(sequence, reader, views)
 
     def shake(self, camera: int) -> float:
         """Standard deviation of a shake that is compensated, in the camera's own pixels, else 0."""
-        if not isinstance(self.reader, SteadyReader):
+        if not isinstance(self.reader, StabilisedReader):
             return 0.0
         view = self.views[camera]
         return self.reader.shake(camera) / (1.0 if view is None else view.scale)
 
     def back(self, camera: int, result: ViewResult) -> ViewResult:
-        """Convert a result from working pixels to the camera's own."""
+        """Convert a result from rectified pixels to the camera's own.
+
+        Args:
+            camera: Index of the camera.
+            result: The result of stage 1 in the rectified image.
+        """
         view = self.views[camera]
         if view is None:
             return result
@@ -93,8 +98,8 @@ class Working:
         )
 
 
-def _reduced(sequence: Sequence, views: tuple[WorkingView | None, ...]) -> Sequence:
-    """The recording with the calibrations and templates of the working images."""
+def _reduced(sequence: Sequence, views: tuple[RectifiedView | None, ...]) -> Sequence:
+    """The recording with the calibrations and templates of the rectified images."""
     cameras = {view.full.name: view for view in views if view is not None}
     templates = []
     for template in sequence.templates:
@@ -114,30 +119,30 @@ def _reduced(sequence: Sequence, views: tuple[WorkingView | None, ...]) -> Seque
     )
 
 
-class _WorkingReader:
-    """A reader of the working images, from another reader's images."""
+class _RectifiedReader:
+    """A reader of the rectified images, from another reader's images."""
 
-    def __init__(self, reader: Pictures, views: tuple[WorkingView | None, ...]) -> None:
+    def __init__(self, reader: Pictures, views: tuple[RectifiedView | None, ...]) -> None:
         self._reader = reader
         self._views = views
         self._key = tuple(None if view is None else view.key for view in views)
 
     def picture(self, camera: int, step: int) -> Picture | None:
-        return self._look(camera, self._reader.picture(camera, step))
+        return self._rectify(camera, self._reader.picture(camera, step))
 
     def iterate(self, camera: int, first: int = 0) -> Iterator[Picture | None]:
         for picture in self._reader.iterate(camera, first):
-            yield self._look(camera, picture)
+            yield self._rectify(camera, picture)
 
     def empty(self, camera: int) -> Picture | None:
-        return self._look(camera, self._reader.empty(camera))
+        return self._rectify(camera, self._reader.empty(camera))
 
     def once(self, name: Hashable, make: Callable[[], _Made]) -> _Made:
-        return self._reader.once(("working", self._key, name), make)
+        return self._reader.once(("rectified", self._key, name), make)
 
     def check(self) -> None:
         self._reader.check()
 
-    def _look(self, camera: int, picture: Picture | None) -> Picture | None:
+    def _rectify(self, camera: int, picture: Picture | None) -> Picture | None:
         view = self._views[camera]
         return picture if view is None or picture is None else view.picture(picture)

@@ -20,7 +20,7 @@ _SMALLER = 0.95
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class WorkingView:
+class RectifiedView:
     """The mapping between a camera's pixels and those of stage 1.
 
     An image is reduced by the factors s along its axes and then rotated by the camera's
@@ -35,28 +35,28 @@ class WorkingView:
     """
 
     camera: Camera
-    """The calibration of the working image."""
+    """The calibration of the rectified image."""
     full: Camera
     """The calibration of the camera's own image."""
     factors: Float[ndarray, " 2"]
     """s, horizontal and vertical."""
     turn: Float[ndarray, "2 3"] | None
-    """Affine map from the reduced image's pixels to the working image's; None for no rotation."""
+    """Affine map from the reduced image's pixels to the rectified image's; None for no rotation."""
     roll: float
     """θ, clockwise rotation of the image, radians."""
 
     @property
     def scale(self) -> float:
-        """Working pixels per full pixel."""
+        """Rectified pixels per full pixel."""
         return float(np.sqrt(self.factors.prod()))
 
     @property
     def key(self) -> tuple[float, ...]:
-        """A key of data that are made from the working images."""
+        """A key of data that are made from the rectified images."""
         return (*self.camera.image_size, *self.factors.tolist(), self.roll)
 
     def picture(self, full: UInt8[ndarray, "h w 3"]) -> UInt8[ndarray, "h2 w2 3"]:
-        """Compute the working image: areas are averaged; it is black outside the camera's image."""
+        """Compute the rectified image by averages of areas; outside the camera's it is black."""
         reduced = _reduced(full, self._reduced_size)
         if self.turn is not None:
             reduced = cv2.warpAffine(reduced, self.turn, self.camera.image_size)
@@ -64,7 +64,7 @@ class WorkingView:
 
     @property
     def shown(self) -> UInt8[ndarray, "h2 w2"] | None:
-        """1 where the working image shows the camera's image; None for everywhere."""
+        """1 where the rectified image shows the camera's image; None for everywhere."""
         if self.turn is None:
             return None
         width, height = self._reduced_size
@@ -72,25 +72,25 @@ class WorkingView:
         flags = cv2.INTER_NEAREST
         return np.asarray(cv2.warpAffine(whole, self.turn, self.camera.image_size, flags=flags))
 
-    def mask(self, working: UInt8[ndarray, "h2 w2"]) -> UInt8[ndarray, "h1 w1"]:
-        """Convert a mask of the working image to one of the camera's own, reduced."""
+    def mask(self, rectified: UInt8[ndarray, "h2 w2"]) -> UInt8[ndarray, "h1 w1"]:
+        """Convert a mask of the rectified image to one of the camera's own, reduced."""
         if self.turn is None:
-            return working
+            return rectified
         flags = cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP
-        return np.asarray(cv2.warpAffine(working, self.turn, self._reduced_size, flags=flags))
+        return np.asarray(cv2.warpAffine(rectified, self.turn, self._reduced_size, flags=flags))
 
     def points(self, full: Float[ndarray, "N 2"]) -> Float[ndarray, "N 2"]:
-        """Convert full pixels to working pixels."""
+        """Convert full pixels to rectified pixels."""
         reduced = (full + 0.5) * self.factors - 0.5
         if self.turn is not None:
             reduced = reduced @ self.turn[:, :2].T + self.turn[:, 2]
         return np.asarray(reduced)
 
-    def points_back(self, working: Float[ndarray, "N 2"]) -> Float[ndarray, "N 2"]:
-        """Convert working pixels to full pixels."""
-        reduced = working
+    def points_back(self, rectified: Float[ndarray, "N 2"]) -> Float[ndarray, "N 2"]:
+        """Convert rectified pixels to full pixels."""
+        reduced = rectified
         if self.turn is not None:
-            reduced = (working - self.turn[:, 2]) @ self.turn[:, :2]
+            reduced = (rectified - self.turn[:, 2]) @ self.turn[:, :2]
         return np.asarray((reduced + 0.5) / self.factors - 0.5)
 
     def drawn_box(
@@ -120,30 +120,30 @@ class WorkingView:
         ]
         return np.concatenate([self.points(box[None, :2])[0], sizes])
 
-    def boxes_back(self, working: Float[ndarray, "N 4"]) -> Float[ndarray, "N 4"]:
+    def boxes_back(self, rectified: Float[ndarray, "N 4"]) -> Float[ndarray, "N 4"]:
         """Convert boxes of upright targets to the camera's own image.
 
         The half sizes are the extent of the longer one of the target's two axes, rotated:
         the fusion expects the ends of the upright axis of a rolled camera's box.
         """
-        centres = self.points_back(working[:, :2])
-        return np.concatenate([centres, self._reach(working[:, 2:])], axis=1)
+        centres = self.points_back(rectified[:, :2])
+        return np.concatenate([centres, self._reach(rectified[:, 2:])], axis=1)
 
-    def sigmas_back(self, working: Float[ndarray, "N 4"]) -> Float[ndarray, "N 4"]:
+    def sigmas_back(self, rectified: Float[ndarray, "N 4"]) -> Float[ndarray, "N 4"]:
         """Convert standard deviations of boxes in the same way."""
         across, along = abs(math.cos(self.roll)), abs(math.sin(self.roll))
         turned = np.array([[across, along], [along, across]])
-        centres = np.sqrt(working[:, :2] ** 2 @ (turned**2).T) / self.factors
-        return np.concatenate([centres, self._reach(working[:, 2:])], axis=1)
+        centres = np.sqrt(rectified[:, :2] ** 2 @ (turned**2).T) / self.factors
+        return np.concatenate([centres, self._reach(rectified[:, 2:])], axis=1)
 
-    def gates_back(self, working: Float[ndarray, "G 5"]) -> Float[ndarray, "G 5"]:
+    def gates_back(self, rectified: Float[ndarray, "G 5"]) -> Float[ndarray, "G 5"]:
         """Convert ellipses, centre and xx, xy, yy of their matrix, in the same way."""
-        matrix = working[:, [2, 3, 3, 4]].reshape(-1, 2, 2)
+        matrix = rectified[:, [2, 3, 3, 4]].reshape(-1, 2, 2)
         turn = np.eye(2) if self.turn is None else self.turn[:, :2]
         back = turn.T / self.factors[:, None]
         full = back @ matrix @ back.T
         ellipse = full.reshape(-1, 4)[:, [0, 1, 3]]
-        return np.concatenate([self.points_back(working[:, :2]), ellipse], axis=1)
+        return np.concatenate([self.points_back(rectified[:, :2]), ellipse], axis=1)
 
     def _reach(self, sizes: Float[ndarray, "N 2"]) -> Float[ndarray, "N 2"]:
         across, along = abs(math.cos(self.roll)), abs(math.sin(self.roll))
@@ -156,14 +156,14 @@ class WorkingView:
         return round(width * self.factors[0]), round(height * self.factors[1])
 
 
-def working_view(
+def rectified_view(
     camera: Camera,
     room: Room,
     half_extents: Float[ndarray, " 3"],
     parameters: PictureParams,
     *,
     reduced: bool = True,
-) -> WorkingView | None:
+) -> RectifiedView | None:
     """The conversion of a camera for stage 1; None where its own images are suitable.
 
     Args:
@@ -188,7 +188,7 @@ def working_view(
     intrinsics[:2, 2] = (intrinsics[:2, 2] + 0.5) * factors - 0.5
     smaller = replace(camera, intrinsics=intrinsics, image_size=(int(size[0]), int(size[1])))
     if not turned:
-        return WorkingView(smaller, camera, factors, None, 0.0)
+        return RectifiedView(smaller, camera, factors, None, 0.0)
     return _turned(smaller, camera, factors, roll)
 
 
@@ -206,7 +206,7 @@ def _reduced(full: UInt8[ndarray, "h w 3"], size: tuple[int, int]) -> UInt8[ndar
 
 def _turned(
     reduced: Camera, full: Camera, factors: Float[ndarray, " 2"], roll: float
-) -> WorkingView:
+) -> RectifiedView:
     cos, sin = math.cos(roll), math.sin(roll)
     rotation = np.array([[cos, sin], [-sin, cos]])
     width, height = reduced.image_size
@@ -233,7 +233,7 @@ def _turned(
         translation=turn @ full.translation,
         distortion=distortion,
     )
-    return WorkingView(camera, full, factors, np.column_stack([rotation, shift]), roll)
+    return RectifiedView(camera, full, factors, np.column_stack([rotation, shift]), roll)
 
 
 def _scale(

@@ -16,7 +16,7 @@ from tracker.single_view.jpda.targets import Innovations, Targets, X, Y, innovat
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Moved:
+class CaseUpdates:
     """The n targets after the update of one step, in the same order as before."""
 
     targets: Targets
@@ -27,14 +27,14 @@ class Moved:
     """Whether a target is occluded by another one."""
 
 
-def move(
+def update_by_case(
     targets: Targets,
     found: Innovations,
     matrix: Float[ndarray, "n M"],
     cases: Cases,
     seen: Measured,
     parameters: JpdaParams,
-) -> Moved:
+) -> CaseUpdates:
     """Update every target by its case.
 
     Args:
@@ -53,8 +53,8 @@ def move(
         matrix = _one_each(targets, cases, matrix, p.least_probability)
     # occluded and missed targets are not updated by all associations
     matrix = np.where((hidden | cases.missed)[:, None], 0.0, matrix)
-    moved = kalman.update(targets, found, matrix)
-    moved = replace(moved, half_sizes=_sizes(targets, cases, hidden, matrix, seen, p))
+    updated = kalman.update(targets, found, matrix)
+    updated = replace(updated, half_sizes=_sizes(targets, cases, hidden, matrix, seen, p))
     for t in np.flatnonzero(hidden):
         j = int(cases.shared[t])
         if p.occlusion == "measurement":
@@ -62,12 +62,12 @@ def move(
         else:
             alone = (hidden & (cases.shared >= 0) & _in_piece(cases.shared, j, seen)).sum() == 1
             one = _behind(targets, int(t), j, seen, p.one_side, alone=bool(alone))
-        moved = _put(moved, int(t), one)
+        updated = _put(updated, int(t), one)
     # a target with a measurement of its own is not occluded, even if another has it as well
     lost = hidden & ((cases.own != cases.shared) | (p.occlusion == "inside"))
-    return Moved(
+    return CaseUpdates(
         replace(
-            moved,
+            updated,
             hits=np.where(cases.missed, 0, targets.hits + 1),
             misses=np.where(cases.missed, targets.misses + 1, 0),
             hidden=np.where(lost, targets.hidden + 1, 0),
@@ -173,10 +173,10 @@ def _behind(
         known = edges != 0
         place = np.where(known, np.where(edges < 0, low, high), place)
         unsure = np.where(known, seen.sigmas[j, :2], unsure)
-    moved = kalman.update(one, innovations(one, place[None], unsure[None]), np.ones((1, 1)))
-    means = moved.means.copy()
-    means[0, [X, Y]] = np.clip(moved.positions[0], low, high)
-    return replace(moved, means=means)
+    updated = kalman.update(one, innovations(one, place[None], unsure[None]), np.ones((1, 1)))
+    means = updated.means.copy()
+    means[0, [X, Y]] = np.clip(updated.positions[0], low, high)
+    return replace(updated, means=means)
 
 
 def _left_over(

@@ -16,9 +16,9 @@ from tracker.runs import pipeline
 from tracker.runs.gates import notices
 from tracker.sequences.library import open_sequence
 from tracker.sequences.pictures.frames import FrameReader, Picture
-from tracker.single_view.working.sequence import Working
-from tracker.single_view.working.shaking import check_shake
-from tracker.single_view.working.stabilisation import StaticScene, _evened, agreed
+from tracker.single_view.rectification.sequence import RectifiedSequence
+from tracker.single_view.rectification.shake_check import check_shake
+from tracker.single_view.rectification.stabilisation import StaticScene, _normalise, consensus_shift
 
 
 def test_a_shake_is_the_deviation_of_what_moved_and_is_undone() -> None:
@@ -34,7 +34,7 @@ def test_a_shake_is_the_deviation_of_what_moved_and_is_undone() -> None:
     square = np.median((moved[:, :2] ** 2).sum(axis=1))
     assert found.shake == pytest.approx(np.sqrt(square / np.log(4.0)), rel=0.25)
     # what is left of it, measured in the same way on the pictures that are held still
-    left = StaticScene.learn([found.still(picture) for picture in pictures], None, 0.0)
+    left = StaticScene.learn([found.align(picture) for picture in pictures], None, 0.0)
     assert left is not None
     assert left.shake < 0.15 * found.shake
     # a picture of three times the size shakes by three times as many pixels
@@ -56,7 +56,7 @@ def test_a_camera_that_turns_about_the_middle_of_its_picture_is_not_shifted() ->
     found = StaticScene.learn([turned(0.0)] * 3, None, 0.2)
     assert found is not None
     angle = 0.06
-    forth, back = (found._moved(_evened(turned(one), 1.0)) for one in (angle, -angle))
+    forth, back = (found._shift_of(_normalise(turned(one), 1.0)) for one in (angle, -angle))
     assert forth is not None
     assert back is not None
     assert forth[2] == pytest.approx(angle, rel=0.02)
@@ -67,9 +67,9 @@ def test_a_camera_that_turns_about_the_middle_of_its_picture_is_not_shifted() ->
 def test_a_picture_on_its_side_is_evened_alike() -> None:
     picture = scene(np.random.default_rng(5))
     sideways = np.ascontiguousarray(picture.transpose(1, 0, 2))
-    evened = _evened(picture, 1.0)
+    evened = _normalise(picture, 1.0)
     assert evened.std() > 20.0  # there is something to be evened
-    assert np.abs(_evened(sideways, 1.0).T.astype(int) - evened).max() <= 1
+    assert np.abs(_normalise(sideways, 1.0).T.astype(int) - evened).max() <= 1
 
 
 def test_people_light_and_noise_are_no_shake() -> None:
@@ -85,7 +85,7 @@ def test_who_moves_does_not_move_the_scene() -> None:
     shifts = truth[:2] + truth[2] * np.stack([-places[:, 1], places[:, 0]], axis=1)
     shifts += rng.normal(0.0, 0.05, shifts.shape)
     shifts[:20] += [6.0, 2.0]  # somebody who walks
-    found = agreed(places, shifts, 240.0)
+    found = consensus_shift(places, shifts, 240.0)
     assert found is not None
     assert (np.abs(found - truth) < [0.05, 0.05, 0.001]).all()
 
@@ -93,11 +93,11 @@ def test_who_moves_does_not_move_the_scene() -> None:
 def test_what_nobody_agrees_on_or_lies_too_far_is_no_shake() -> None:
     rng = np.random.default_rng(6)
     places = rng.uniform(-100.0, 100.0, (60, 2))
-    assert agreed(places, rng.uniform(-20.0, 20.0, (60, 2)), 240.0) is None
-    assert agreed(places, np.full((60, 2), 13.0), 240.0) is None
-    assert agreed(places, np.full((60, 2), 11.0), 240.0) is not None
-    assert agreed(places[:11], np.zeros((11, 2)), 240.0) is None
-    assert agreed(places[:0], np.zeros((0, 2)), 240.0) is None
+    assert consensus_shift(places, rng.uniform(-20.0, 20.0, (60, 2)), 240.0) is None
+    assert consensus_shift(places, np.full((60, 2), 13.0), 240.0) is None
+    assert consensus_shift(places, np.full((60, 2), 11.0), 240.0) is not None
+    assert consensus_shift(places[:11], np.zeros((11, 2)), 240.0) is None
+    assert consensus_shift(places[:0], np.zeros((0, 2)), 240.0) is None
 
 
 def test_a_plain_wall_tells_nothing() -> None:
@@ -105,7 +105,7 @@ def test_a_plain_wall_tells_nothing() -> None:
     found = StaticScene.learn(walls, None, 0.2)
     assert found is not None
     assert found.shake == 0.0
-    assert found.still(walls[0]) is walls[0]
+    assert found.align(walls[0]) is walls[0]
     assert StaticScene.learn([], None, 0.2) is None
 
 
@@ -136,17 +136,17 @@ def test_a_run_holds_the_shaking_camera_still_and_says_so() -> None:
     sequence = cut(open_sequence("room24-2p"), 270, 32)
     parameters = with_values(RunParameters(), {"single_view": "association_matrix"})
     with FrameReader(sequence) as calm, _Shaking(sequence) as reader:
-        working = Working.of(sequence, parameters, reader)
+        rectified = RectifiedSequence.of(sequence, parameters, reader)
         undone = pipeline.compute(sequence, parameters, reader=reader, steps=3)
         off = with_values(parameters, {"pictures.steady_from": 100.0})
         left = pipeline.compute(sequence, off, reader=reader, steps=3)
-        plain = Working.of(sequence, parameters, calm)
-        assert working.shake(0) == pytest.approx(1.5, rel=0.4)
+        plain = RectifiedSequence.of(sequence, parameters, calm)
+        assert rectified.shake(0) == pytest.approx(1.5, rel=0.4)
         for camera in range(1, len(sequence.views)):
-            assert working.shake(camera) == 0.0
-            picture = working.reader.picture(camera, 5)
+            assert rectified.shake(camera) == 0.0
+            picture = rectified.reader.picture(camera, 5)
             assert (picture == calm.picture(camera, 5)).all()
-        first, second = working.reader.picture(0, 7), next(iter(working.reader.iterate(0, 7)))
+        first, second = rectified.reader.picture(0, 7), next(iter(rectified.reader.iterate(0, 7)))
         assert (first == second).all()
         assert (first != reader.picture(0, 7)).any()
         assert plain.shake(0) == 0.0

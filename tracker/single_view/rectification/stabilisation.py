@@ -24,7 +24,7 @@ from tracker.sequences.pictures.frames import Picture, Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.pictures.foreground import spread_steps
 from tracker.single_view.pictures.foreground.exposure import median
-from tracker.single_view.working.view import WorkingView
+from tracker.single_view.rectification.view import RectifiedView
 
 _Made = TypeVar("_Made")
 
@@ -86,34 +86,34 @@ class StaticScene:
         if not whole:
             return None
         reduction = min(1.0, LINES / min(whole[0].shape[:2]))
-        some = [_evened(picture, reduction) for picture in whole[::_STILL]]
+        some = [_normalise(picture, reduction) for picture in whole[::_STILL]]
         first = _scene_and_shake(some, shown, reduction, check=check)
         if first.shake < least:
             return first
         # the median of aligned images is sharp
-        every = [_evened(picture, reduction) for picture in whole]
+        every = [_normalise(picture, reduction) for picture in whole]
         calm = []
         for picture in every:
             check()
-            calm.append(first._undone(picture))
+            calm.append(first._align_reduced(picture))
         return _scene_and_shake(calm, shown, reduction, every, check)
 
-    def still(self, picture: UInt8[ndarray, "h w 3"]) -> UInt8[ndarray, "h w 3"]:
+    def align(self, picture: UInt8[ndarray, "h w 3"]) -> UInt8[ndarray, "h w 3"]:
         """Align an image with the scene; an image whose shift is unknown is not changed."""
-        moved = self._moved(_evened(picture, self.reduction))
+        moved = self._shift_of(_normalise(picture, self.reduction))
         return picture if moved is None else _back(picture, moved, self.reduction)
 
-    def _undone(self, evened: UInt8[ndarray, "h w"]) -> UInt8[ndarray, "h w"]:
-        moved = self._moved(evened)
-        return evened if moved is None else _back(evened, moved, 1.0)
+    def _align_reduced(self, normalised: UInt8[ndarray, "h w"]) -> UInt8[ndarray, "h w"]:
+        moved = self._shift_of(normalised)
+        return normalised if moved is None else _back(normalised, moved, 1.0)
 
-    def _moved(self, evened: UInt8[ndarray, "h w"]) -> Float[ndarray, " 3"] | None:
+    def _shift_of(self, normalised: UInt8[ndarray, "h w"]) -> Float[ndarray, " 3"] | None:
         """Shift to the right and down, reduced pixels, and rotation about the middle, radians."""
         if len(self.corners) < LEAST_CORNERS:
             return None
         found, there, _ = cv2.calcOpticalFlowPyrLK(
             self.scene,
-            evened,
+            normalised,
             self.corners,
             self.corners.copy(),
             winSize=(_WINDOW, _WINDOW),
@@ -122,7 +122,9 @@ class StaticScene:
         followed = there.ravel() > 0
         height, width = self.scene.shape
         places = self.corners[followed, 0].astype(float) - [(width - 1) / 2, (height - 1) / 2]
-        return agreed(places, (found - self.corners)[followed, 0].astype(float), min(height, width))
+        return consensus_shift(
+            places, (found - self.corners)[followed, 0].astype(float), min(height, width)
+        )
 
 
 def _scene_and_shake(
@@ -154,7 +156,7 @@ def _scene_and_shake(
     shifts = []
     for picture in pictures if measured is None else measured:
         check()
-        moved = found._moved(picture)
+        moved = found._shift_of(picture)
         if moved is not None:
             shifts.append(moved[:2])
     if 2 * len(shifts) < len(pictures):  # a scene that less than half of them show is not static
@@ -164,7 +166,7 @@ def _scene_and_shake(
     return StaticScene(scene, found.corners, reduction, shake)
 
 
-def agreed(
+def consensus_shift(
     places: Float[ndarray, "N 2"], shifts: Float[ndarray, "N 2"], side: float
 ) -> Float[ndarray, " 3"] | None:
     """Find the shift and rotation on which most corners agree: d and θ of s = d + θ J p.
@@ -197,7 +199,7 @@ def agreed(
     return moved if np.abs(moved[:2]).max() <= LARGEST * side else None
 
 
-def _evened(picture: UInt8[ndarray, "h w 3"], reduction: float) -> UInt8[ndarray, "h2 w2"]:
+def _normalise(picture: UInt8[ndarray, "h w 3"], reduction: float) -> UInt8[ndarray, "h2 w2"]:
     """Normalise mean and contrast of the grey levels locally, against changes of light."""
     grey = cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY)
     if reduction < 1.0:
@@ -206,8 +208,8 @@ def _evened(picture: UInt8[ndarray, "h w 3"], reduction: float) -> UInt8[ndarray
     size = (2 * _SMOOTH + 1, 2 * _SMOOTH + 1)
     mean = cv2.blur(level, size)
     spread = np.sqrt(np.maximum(cv2.blur(level * level, size) - mean * mean, 0.0))
-    evened = 128.0 + 42.0 * (level - mean) / (spread + _CONTRAST)
-    return np.asarray(np.clip(evened, 0.0, 255.0), dtype=np.uint8)
+    normalised = 128.0 + 42.0 * (level - mean) / (spread + _CONTRAST)
+    return np.asarray(np.clip(normalised, 0.0, 255.0), dtype=np.uint8)
 
 
 def _back(
@@ -228,14 +230,14 @@ def _back(
     )
 
 
-class SteadyReader:
+class StabilisedReader:
     """A reader that stabilises the images of cameras that shake."""
 
     def __init__(
         self,
         sequence: Sequence,
         reader: Pictures,
-        views: tuple[WorkingView | None, ...],
+        views: tuple[RectifiedView | None, ...],
         least: float,
     ) -> None:
         """Wrap a reader; cameras are examined when their images are needed.
@@ -275,7 +277,7 @@ class SteadyReader:
         return _aligned(self._scene_of(camera), self._reader.empty(camera))
 
     def once(self, name: Hashable, make: Callable[[], _Made]) -> _Made:
-        return self._reader.once(("steady", self._least, name), make)
+        return self._reader.once(("stabilised", self._least, name), make)
 
     def check(self) -> None:
         self._reader.check()
@@ -288,7 +290,7 @@ class SteadyReader:
             shown = None if view is None else view.shown
             return StaticScene.learn(self._spread(camera), shown, self._least, self.check)
 
-        found = self._reader.once(("steadying", camera, self._least), made)
+        found = self._reader.once(("static scene", camera, self._least), made)
         return None if found is None or found.shake < self._least else found
 
     def _spread(self, camera: int) -> Iterator[Picture]:
@@ -299,4 +301,4 @@ class SteadyReader:
 
 
 def _aligned(scene: StaticScene | None, picture: Picture | None) -> Picture | None:
-    return picture if scene is None or picture is None else scene.still(picture)
+    return picture if scene is None or picture is None else scene.align(picture)

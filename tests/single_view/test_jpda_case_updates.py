@@ -8,9 +8,9 @@ from numpy import ndarray
 from numpy.testing import assert_allclose, assert_array_equal
 
 from tracker.parameters.groups.jpda import JpdaParams
+from tracker.single_view.jpda.case_updates import CaseUpdates, _left_over, update_by_case
 from tracker.single_view.jpda.cases import Cases
 from tracker.single_view.jpda.measurements import Measured
-from tracker.single_view.jpda.moves import Moved, _left_over, move
 from tracker.single_view.jpda.targets import Targets, innovations
 
 HALF = (4.0, 9.0)
@@ -38,12 +38,12 @@ def moved(
     own: list[int],
     shared: list[int],
     p: JpdaParams | None = None,
-) -> Moved:
+) -> CaseUpdates:
     """One step of targets whose cases are told."""
     none = np.zeros(some.size, dtype=bool)
     cases = Cases(np.array(own), np.array(shared), none, none, np.zeros(len(seen.boxes), bool))
     found = innovations(some, seen.boxes[:, :2], seen.sigmas[:, :2])
-    return move(some, found, np.array(matrix), cases, seen, p or JpdaParams())
+    return update_by_case(some, found, np.array(matrix), cases, seen, p or JpdaParams())
 
 
 def test_an_edge_that_who_is_in_front_leaves_over_is_of_who_is_behind() -> None:

@@ -7,7 +7,7 @@ from tracker.parameters.values import with_values
 from tracker.sequences.finding import Check, absent, good, warning
 from tracker.sequences.pictures.frames import FrameReader, Pictures
 from tracker.sequences.sequence import Sequence
-from tracker.single_view.working.sequence import Working
+from tracker.single_view.rectification.sequence import RectifiedSequence
 
 _NAME = "cameras hold still"
 
@@ -31,10 +31,10 @@ def check_shake(sequence: Sequence, reader: Pictures | None = None) -> list[Chec
         with FrameReader(sequence) as opened:
             return check_shake(sequence, opened)
     parameters = with_values(RunParameters(), {"single_view": "shapes"})  # it needs no templates
-    working = Working.of(sequence, parameters, reader)
+    rectified = RectifiedSequence.of(sequence, parameters, reader)
     found = []
     for number, camera in enumerate(sequence.cameras):
-        shake = working.shake(number)
+        shake = rectified.shake(number)
         if shake > 0.0:
             found.append(
                 warning(

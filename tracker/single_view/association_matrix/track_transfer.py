@@ -1,5 +1,9 @@
 """One step of the objects: the decision matrix, the transfer of tracks, and new tracks.
 
+An object of this method may have several tracks, which it passes on as objects merge and split
+([CMQ07]); in the other trackers of one camera a target is one track
+(:mod:`tracker.single_view.jpda.track_management`).
+
 [CMQ07] Chang, Ma, Qiao, "Human oriented multi-target tracking algorithm in video
 sequence", Control and Decision 22(4), 2007.
 """
@@ -29,6 +33,14 @@ def decide(
 
     It is decided by distance for an equal number of objects, and by overlap where the number
     changes or where the distances give no one-to-one matrix.
+
+    Args:
+        situation: The I objects of the step before.
+        seen: This step's J objects.
+        parameters: The bounds of distance and overlap, and the kind of overlap.
+
+    Returns:
+        R, and the shared pixels, or square pixels of the boxes where these are compared.
     """
     objects, p = situation.objects, parameters
     before = np.array([one.box for one in objects]).reshape(-1, 4)
@@ -123,7 +135,7 @@ class _Step:
             self.assign(label, row, columns[chosen.get(index, int(benefit[index].argmax()))])
         self.unknown += [column for column in columns if not self.labels[column]]
         for row in rows:
-            if decision_matrices.row_case(self.decision, row) == "splits":
+            if self.decision[row].sum() > 1:
                 self.splits.append(np.flatnonzero(self.decision[row]).tolist())
 
     def benefit(self, label: int, row: int, columns: list[int]) -> Float[ndarray, " J"]:

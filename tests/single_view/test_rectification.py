@@ -26,8 +26,8 @@ from tracker.single_view.box_sizes import upright_boxes
 from tracker.single_view.dropped import Dropped
 from tracker.single_view.pictures.foreground import pack, unpack
 from tracker.single_view.protocol import ViewResult
-from tracker.single_view.working.sequence import Working
-from tracker.single_view.working.view import WorkingView, working_view
+from tracker.single_view.rectification.sequence import RectifiedSequence
+from tracker.single_view.rectification.view import RectifiedView, rectified_view
 
 CAMERAS = tuple(
     world.surveillance(f"cam{k}", (4.6 * x, 4.6 * y, 2.6), (0.0, 0.0, 0.8), focal=620.0,
@@ -46,8 +46,8 @@ def rolled(camera: Camera, angle: float, **changes: object) -> Camera:
     return replace(turned, **changes)  # type: ignore[arg-type]
 
 
-def seen(camera: Camera, **numbers: float) -> WorkingView:
-    view = working_view(camera, ROOM, HALF_EXTENTS, PictureParams(**numbers))
+def seen(camera: Camera, **numbers: float) -> RectifiedView:
+    view = rectified_view(camera, ROOM, HALF_EXTENTS, PictureParams(**numbers))
     assert view is not None
     return view
 
@@ -58,7 +58,7 @@ def places(count: int = 40) -> ndarray:
 
 def test_a_small_level_camera_is_left_alone() -> None:
     assert all(
-        working_view(c, SMALL_ROOM, world.HEAD, PictureParams()) is None for c in SMALL_CAMERAS
+        rectified_view(c, SMALL_ROOM, world.HEAD, PictureParams()) is None for c in SMALL_CAMERAS
     )
 
 
@@ -77,11 +77,11 @@ def test_the_working_calibration_sees_what_the_working_picture_shows(
     camera = rolled(camera, angle, intrinsics=intrinsics, distortion=lens, fisheye=fisheye)
     view = seen(camera)
     full, valid = camera.project(places())
-    working, also = view.camera.project(places())
+    rectified, also = view.camera.project(places())
     assert valid.all()
     assert also.all()
-    # the working picture's sides are whole pixels: a part of one is left
-    np.testing.assert_allclose(working, view.points(full), atol=0.6)
+    # the rectified picture's sides are whole pixels: a part of one is left
+    np.testing.assert_allclose(rectified, view.points(full), atol=0.6)
     np.testing.assert_allclose(view.points_back(view.points(full)), full, atol=1e-9)
 
 
@@ -117,7 +117,7 @@ def test_what_is_in_the_picture_is_where_the_working_calibration_says() -> None:
 def test_a_picture_is_reduced_to_so_many_lines(lines: int, shorter: int) -> None:
     camera = replace(CAMERAS[0])
     numbers = {"lines": lines, "target_height": 2000}
-    view = working_view(camera, ROOM, HALF_EXTENTS, PictureParams(**numbers))
+    view = rectified_view(camera, ROOM, HALF_EXTENTS, PictureParams(**numbers))
     assert (camera if view is None else view.camera).image_size[1] == shorter
 
 
@@ -184,9 +184,9 @@ def test_deviations_come_back_turned(angle: float) -> None:
 def test_a_picture_is_left_alone_from_a_twentieth_less_on() -> None:
     numbers = {"target_height": 2000, "least_height": 8}
     for lines, alone in ((800, True), (761, True), (760, False), (759, False)):
-        view = working_view(CAMERAS[0], ROOM, HALF_EXTENTS, PictureParams(lines=lines, **numbers))
+        view = rectified_view(CAMERAS[0], ROOM, HALF_EXTENTS, PictureParams(lines=lines, **numbers))
         assert (view is None) == alone
-    view = working_view(
+    view = rectified_view(
         rolled(CAMERAS[0], 0.6), ROOM, HALF_EXTENTS, PictureParams(lines=761, **numbers)
     )
     assert view is not None  # turned, and as large as it was
@@ -210,7 +210,7 @@ def test_targets_are_made_so_high_and_pictures_at_most_half_as_large_for_it() ->
 
 def test_what_is_seen_from_above_or_skewed_is_not_turned() -> None:
     def turned(camera: Camera, **numbers: float) -> bool:
-        view = working_view(camera, ROOM, HALF_EXTENTS, PictureParams(**numbers))
+        view = rectified_view(camera, ROOM, HALF_EXTENTS, PictureParams(**numbers))
         return view is not None and view.turn is not None
 
     for slope, expected in ((0.19, False), (0.21, True)):  # of the sine of its tilt
@@ -245,17 +245,17 @@ def recording(folder: Path, camera: Camera) -> Sequence:
 def test_methods_get_the_reduced_recording_and_their_results_come_back(tmp_path: Path) -> None:
     sequence = recording(tmp_path, rolled(CAMERAS[0], 0.4))
     with FrameReader(sequence) as reader:
-        working = Working.of(sequence, RunParameters(), reader)
-        picture = working.reader.picture(0, 0)
+        rectified = RectifiedSequence.of(sequence, RunParameters(), reader)
+        picture = rectified.reader.picture(0, 0)
         assert picture is not None
-        assert picture.shape[1::-1] == working.sequence.cameras[0].image_size
-        assert working.sequence.views[0].has_pictures
+        assert picture.shape[1::-1] == rectified.sequence.cameras[0].image_size
+        assert rectified.sequence.views[0].has_pictures
         mask = np.ones(picture.shape[:2], dtype=np.uint8)
         boxes = np.array([[100.0, 120.0, 10.0, 30.0]])
         result = ViewResult.of_boxes(boxes, np.ones(1), np.ones((1, 4)))
         fell = Dropped.of(boxes, {"colour": np.array([True])})
-        back = working.back(0, replace(result, foreground=pack(mask), dropped=fell))
-        view = working.views[0]
+        back = rectified.back(0, replace(result, foreground=pack(mask), dropped=fell))
+        view = rectified.views[0]
         assert view is not None
         np.testing.assert_allclose(view.points(back.boxes[:, :2]), boxes[:, :2])
         np.testing.assert_allclose(back.dropped.boxes, back.boxes, rtol=1e-6)
@@ -268,9 +268,9 @@ def test_methods_that_look_at_no_pictures_get_the_recording_as_it_is(tmp_path: P
     sequence = recording(tmp_path, rolled(CAMERAS[0], 0.4))
     with FrameReader(sequence) as reader:
         parameters = with_values(RunParameters(), {"single_view": "none"})
-        working = Working.of(sequence, parameters, reader)
-        assert working.sequence is sequence
-        assert working.reader is reader
+        rectified = RectifiedSequence.of(sequence, parameters, reader)
+        assert rectified.sequence is sequence
+        assert rectified.reader is reader
 
 
 @pytest.mark.full
