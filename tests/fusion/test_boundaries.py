@@ -32,8 +32,8 @@ from tracker.fusion.model import FusionModel, all_boxes
 from tracker.fusion.multi_bernoulli import MultiBernoulli, MultiBernoulliState
 from tracker.fusion.place_constraints import constraints_by_step
 from tracker.fusion.protocol import FusionResult
-from tracker.fusion.record import Ledger, Record, summed
-from tracker.fusion.reidentification import Identities
+from tracker.fusion.record import Ledger, Record, sum_associations
+from tracker.fusion.reidentification import IdentityBeliefs
 from tracker.fusion.sequential_phd import SequentialPhd, SequentialPhdState
 from tracker.fusion.target_model import TargetModel
 from tracker.fusion.trajectories import Bounds, by_boxes, extract
@@ -335,7 +335,7 @@ def test_pairs_are_recorded_from_one_per_cent_on_and_summed_by_label() -> None:
     assert len(Ledger().associations(np.array([1])).cameras) == 0
     assert len(ledger.associations(np.zeros(0, dtype=np.int64)).cameras) == 0
     nothing = np.zeros(0, dtype=np.int64)
-    assert len(summed(np.array([1]), nothing, nothing, nothing, np.zeros(0)).cameras) == 0
+    assert len(sum_associations(np.array([1]), nothing, nothing, nothing, np.zeros(0)).cameras) == 0
     blank = Record.blank(2, 1).extended(2)
     assert blank.sources.tolist() == [[-1] * 3] * 2
     assert blank.hidden_by.tolist() == [[-1] * 3] * 2
@@ -462,7 +462,7 @@ def test_two_sure_components_of_one_label_are_two_people(other: float, parted: b
 def test_a_target_is_above_the_threshold(weight: float, there: bool) -> None:
     fusion, nobody = MultiBernoulli(empty_room(), RunParameters()), GaussianMixture.empty(6)
     state = MultiBernoulliState(
-        people((4, 0.9, 0.0)), nobody, 50, Memory.start(6), Identities.none()
+        people((4, 0.9, 0.0)), nobody, 50, Memory.start(6), IdentityBeliefs.none()
     )
     _, result = fusion.step(state, (NO_FRAME,) * 4)
     exactly = replace(result, posterior=replace(result.posterior, weights=np.array([weight])))

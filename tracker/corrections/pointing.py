@@ -77,7 +77,7 @@ def foot_on_floor(
     return place
 
 
-def triangulated(points: Many[tuple[Camera, tuple[float, float]]]) -> Float[ndarray, " 3"]:
+def triangulate(points: Many[tuple[Camera, tuple[float, float]]]) -> Float[ndarray, " 3"]:
     """Triangulate the point nearest to the rays of pixels in two or more images, world metres.
 
     It is the least-squares solution of Σ_c |(I − r_c r_cᵀ)(x − o_c)|², of rays r_c from o_c.

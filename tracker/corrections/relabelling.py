@@ -122,7 +122,7 @@ class _Segments:
         return found
 
 
-def relabelled(
+def relabel(
     frames: Int[ndarray, " N"],
     ids: Int[ndarray, " N"],
     positions: ndarray,

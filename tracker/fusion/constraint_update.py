@@ -69,7 +69,7 @@ def apply_constraints(
             mixture = gaussian_mixture.concatenate([mixture, born])
             record = record.extended(born.size)
         else:
-            mixture = _updated(mixture, best, place, noise)
+            mixture = _update_component(mixture, best, place, noise)
     return mixture, record, next_label
 
 
@@ -97,7 +97,7 @@ def _component_at(
     return best if np.isfinite(score[best]) else None
 
 
-def _updated(
+def _update_component(
     mixture: GaussianMixture, component: int, place: ndarray, noise: ndarray
 ) -> GaussianMixture:
     """Update one component by a place, in Joseph's form, and raise its label's existence."""

@@ -25,7 +25,7 @@ move away from the bound although nothing new is known of it."""
 
 
 @dataclass(frozen=True, slots=True)
-class Heights:
+class HeightBounds:
     """Bounds of a target's centre: at the lower one it lies or crouches on the floor.
 
     One camera measures a target's distance by the size of its box alone, and boxes that are all
@@ -41,7 +41,7 @@ class Heights:
     """Density beyond the bounds relative to that between them, 0 … 1."""
 
     @staticmethod
-    def of(room: Room, half_height: float, outside: float) -> Heights:
+    def of(room: Room, half_height: float, outside: float) -> HeightBounds:
         """The bounds in a room.
 
         Args:
@@ -50,7 +50,7 @@ class Heights:
             outside: Density beyond the bounds relative to that between them, 0 … 1.
         """
         low = float(room.minimum[_HEIGHT]) + half_height
-        return Heights(low, max(low, float(room.maximum[_HEIGHT]) - half_height), outside)
+        return HeightBounds(low, max(low, float(room.maximum[_HEIGHT]) - half_height), outside)
 
     def truncate(self, tracks: GaussianMixture) -> GaussianMixture:
         """Truncate the tracks whose height is near or beyond a bound ([SS10]_).

@@ -74,9 +74,9 @@ def recall(
     if model.parameters.memory == 0.0:
         return labels, memory
     bearers = _first_of_each(labels, (mixture.weights > CONFIRMED).nonzero()[0])
-    missing = _missing(memory, labels[bearers], model, first_label)
+    missing = _predict_lost(memory, labels[bearers], model, first_label)
     if missing.lost.size and len(bearers):
-        labels, back = _returned(missing, mixture.take(bearers), labels, model.memory_reach)
+        labels, back = _return_labels(missing, mixture.take(bearers), labels, model.memory_reach)
         missing = missing.take(~back)
     known = GaussianMixture(
         mixture.weights.take(bearers),
@@ -100,7 +100,7 @@ def _first_of_each(labels: Int[ndarray, " J"], among: Int[ndarray, " K"]) -> Int
     return np.array([first[label] for label in sorted(first)], dtype=np.int64)
 
 
-def _missing(
+def _predict_lost(
     memory: Memory, present: Int[ndarray, " L"], model: FusionModel, first_label: int
 ) -> Memory:
     """Predict the lost tracks to this step, with the known tracks that are lost at this step.
@@ -138,7 +138,7 @@ def _missing(
     return missing if waiting.all() else missing.take(waiting)
 
 
-def _returned(
+def _return_labels(
     memory: Memory, people: GaussianMixture, labels: Int[ndarray, " J"], reach: float
 ) -> tuple[Int[ndarray, " J"], Bool[ndarray, " L"]]:
     """Assign new tracks to lost ones by squared Mahalanobis distance, and swap their labels.

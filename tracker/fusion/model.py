@@ -11,7 +11,7 @@ from numpy import ndarray
 from tracker.filters import association, gaussian_mixture, models
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion import missing_frames, visibility
-from tracker.fusion.heights import Heights
+from tracker.fusion.heights import HeightBounds
 from tracker.fusion.measurement_births import BirthModel, Evidence, MeasurementBirths, Newborns
 from tracker.fusion.missing_frames import Recent, StepEvidence
 from tracker.fusion.target_model import ExpectedBoxes, TargetModel
@@ -63,7 +63,7 @@ class FusionModel:
         other and no duplicates."""
         share = self.target.posture_share
         self.heights = (
-            Heights.of(sequence.room, p.posture_height * self.target.half_height, share)
+            HeightBounds.of(sequence.room, p.posture_height * self.target.half_height, share)
             if share
             else None
         )

@@ -93,14 +93,14 @@ class Ledger:
         self._probabilities.append(probabilities.take(reported))
 
     def associations(self, labels: Int[ndarray, " J"]) -> Associations:
-        """Sum the pairs by label and box, as :func:`summed` does.
+        """Sum the pairs by label and box, as :func:`sum_associations` does.
 
         Args:
             labels: Labels of the posterior's components, the heaviest first.
         """
         if not self._cameras:
             return Associations.none()
-        return summed(
+        return sum_associations(
             labels,
             np.concatenate(self._cameras),
             np.concatenate(self._labels),
@@ -109,7 +109,7 @@ class Ledger:
         )
 
 
-def summed(
+def sum_associations(
     labels: Int[ndarray, " J"],
     cameras: Int[ndarray, " A"],
     of_pairs: Int[ndarray, " A"],

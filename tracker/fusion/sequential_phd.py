@@ -146,9 +146,9 @@ class SequentialPhd:
             mixture, record = mixture.take(single), record.take(single)
         associations = work.ledger.associations(mixture.labels)
         labels, next_label = _one_person_a_label(mixture, previous, work.next_label)
-        mixture = _relabelled(mixture, labels)
+        mixture = _with_labels(mixture, labels)
         labels, lost = memory.recall(state.memory, mixture, self._model, state.next_label)
-        mixture = _relabelled(mixture, labels)
+        mixture = _with_labels(mixture, labels)
         after = SequentialPhdState(mixture, next_label, lost, recent)
         return after, record.result(mixture, associations)
 
@@ -245,7 +245,7 @@ class SequentialPhd:
         return np.flatnonzero(~duplicate[label])
 
 
-def _relabelled(mixture: GaussianMixture, labels: Int[ndarray, " J"]) -> GaussianMixture:
+def _with_labels(mixture: GaussianMixture, labels: Int[ndarray, " J"]) -> GaussianMixture:
     """Return the components with other labels."""
     return GaussianMixture(mixture.weights, mixture.means, mixture.covariances, labels)
 

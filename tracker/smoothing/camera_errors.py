@@ -234,7 +234,7 @@ def _delays(
     return np.asarray(step_time * inverse @ free @ slope), np.asarray(sigmas)
 
 
-def significance(cameras: int) -> float:
+def significant_deviations(cameras: int) -> float:
     """The number of standard deviations from which a delay of any of C cameras counts."""
     from scipy.special import ndtri  # a server starts without
 

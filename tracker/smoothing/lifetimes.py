@@ -36,7 +36,7 @@ _HARDLY_EVER = 0.1
 """Share of a track's boxes below which those away from other tracks are taken as stray."""
 
 
-def independence(step_time: float, memory: float) -> float:
+def independent_share(step_time: float, memory: float) -> float:
     """Compute the share of a step's evidence that is independent of the steps before, 0 … 1.
 
     Args:
@@ -46,14 +46,14 @@ def independence(step_time: float, memory: float) -> float:
     return min(step_time / memory, 1.0)
 
 
-def misses(shared: BoxAssociations) -> Float[ndarray, " N"]:
+def log_miss_likelihoods(shared: BoxAssociations) -> Float[ndarray, " N"]:
     """Compute the log likelihood of the misses at each row, Σ_c P(c misses) log(1 − p_D), at most
     0."""
     blind = np.log1p(-np.minimum(shared.chances, 1.0 - 1e-6))
     return np.asarray((shared.missed * blind).sum(axis=0))
 
 
-def lifetimes(
+def estimate_lifetimes(
     smoother: Smoother, paths: Paths, shared: BoxAssociations, parameters: SmoothingParams
 ) -> tuple[Float[ndarray, " N"], Float[ndarray, " n"]]:
     """Estimate the existence probability at each row, and the log odds of each path as a whole.
@@ -67,7 +67,8 @@ def lifetimes(
     rarely do: each box beyond the second offsets up to log 1/(1 − p_D) of a negative log Λ.
 
     Where stage 1 may give several boxes of a person, the detections count only for boxes apart
-    from tracks of greater odds (:func:`shown_apart`), for other boxes may be of these tracks.
+    from tracks of greater odds (:func:`select_separate_links`), for other boxes may be of these
+    tracks.
 
     Args:
         smoother: The models and the boxes.
@@ -87,7 +88,7 @@ def lifetimes(
         log_ratios[own] = -np.log(camera.clutter_factors[links.boxes[own]])
     rows = len(paths.states)
     shown = np.bincount(links.rows, links.shares, rows)
-    weight = independence(smoother.model.step_time, parameters.memory)
+    weight = independent_share(smoother.model.step_time, parameters.memory)
     survival = min(p.survival_probability, 1.0 - 1e-9)
     # probabilities within the time of independent evidence, symmetric under reversal of time
     steps = 1.0 / weight
@@ -96,7 +97,7 @@ def lifetimes(
     transitions = ExistenceTransitions(
         float(np.log(survival)), (come + leave) / 4.0, -parameters.change
     )
-    with_place, against = smoother.rows_with_places(paths)[0], misses(shared)
+    with_place, against = smoother.rows_with_places(paths)[0], log_miss_likelihoods(shared)
 
     def by(votes: Float[ndarray, " N"]) -> tuple[Float[ndarray, " N"], Float[ndarray, " n"]]:
         votes[with_place] += _CONSTRAINT_VOTES
@@ -107,19 +108,19 @@ def lifetimes(
 
     def voted(shown: Float[ndarray, " N"]) -> Float[ndarray, " N"]:
         """The log odds of the detections, given the number of cameras with one at each row."""
-        return _votes(hit, shown, appearance) if log_ratios.any() else hit * shown
+        return _detection_odds(hit, shown, appearance) if log_ratios.any() else hit * shown
 
     appearance = np.bincount(links.rows, links.shares * log_ratios, rows)
     there, odds = by(voted(shown))
     if not smoother.several_boxes:
         return there, odds
-    apart = shown_apart(smoother, paths, shared, there, odds)
+    apart = select_separate_links(smoother, paths, shared, there, odds)
     if apart.all():
         return there, odds
     return by(voted(np.bincount(links.rows, links.shares * apart, rows)))
 
 
-def _votes(
+def _detection_odds(
     hit: float, shown: Float[ndarray, " N"], appearance: Float[ndarray, " N"]
 ) -> Float[ndarray, " N"]:
     """Compute the log odds for existence by the detections of each row.
@@ -134,7 +135,9 @@ def _votes(
     return np.asarray(meeting + np.where(appearance < 0.0, outweighed, appearance))
 
 
-def extended(smoother: Smoother, paths: Paths, steps: int) -> tuple[Paths, Float[ndarray, " N"]]:
+def extend_paths(
+    smoother: Smoother, paths: Paths, steps: int
+) -> tuple[Paths, Float[ndarray, " N"]]:
     """Extend the paths at both ends by prediction with the motion model.
 
     Args:
@@ -152,10 +155,10 @@ def extended(smoother: Smoother, paths: Paths, steps: int) -> tuple[Paths, Float
     for i, (begin, end) in enumerate(zip(paths.starts, paths.starts[1:], strict=False)):
         before = min(steps, int(paths.firsts[i]))
         after = min(steps, smoother.frames - 1 - int(paths.lasts[i]))
-        head = _carried(
+        head = _predict_steps(
             paths.states[begin], paths.covariances[begin], backward, motion.noise, before
         )
-        tail = _carried(
+        tail = _predict_steps(
             paths.states[end - 1], paths.covariances[end - 1], motion.transition, motion.noise,
             after,
         )  # fmt: skip
@@ -169,7 +172,7 @@ def extended(smoother: Smoother, paths: Paths, steps: int) -> tuple[Paths, Float
     return longer, np.concatenate([np.zeros(0), *existences])
 
 
-def _carried(
+def _predict_steps(
     state: ndarray, covariance: ndarray, transition: ndarray, noise: ndarray, steps: int
 ) -> tuple[ndarray, ndarray]:
     """Predict a state over some steps; returns (steps, d) states and (steps, d, d) covariances."""
@@ -182,7 +185,7 @@ def _carried(
     return states, covariances
 
 
-def shown_apart(
+def select_separate_links(
     smoother: Smoother,
     paths: Paths,
     shared: BoxAssociations,
@@ -205,7 +208,7 @@ def shown_apart(
     """
     links = shared.links
     rows, sure = links.rows, np.where(there > _THERE, odds[paths.owners], -np.inf)
-    beside = _beside_surer(paths, sure, 2.0 * smoother.model.target.half_width)
+    beside = _beside_likelier(paths, sure, 2.0 * smoother.model.target.half_width)
     away = np.bincount(paths.owners[rows], links.shares * ~beside[rows], len(paths.labels))
     whole = np.bincount(paths.owners[rows], links.shares, len(paths.labels))
     apart = (away > _HARDLY_EVER * whole)[paths.owners[rows]]
@@ -213,25 +216,27 @@ def shown_apart(
         own = np.flatnonzero(links.cameras == number)
         own = own[np.argsort(paths.steps[rows[own]], kind="stable")]
         boxes = Boxes(camera.boxes[links.boxes[own]]).left_top
-        for one, other in _together(paths.steps[rows[own]]):
+        for one, other in _pairs_at_one_step(paths.steps[rows[own]]):
             over = paired_overlaps(boxes[one], boxes[other]) > ONE_PERSON
-            lesser = _lesser(sure[rows[own]], one, other, over)
+            lesser = _lower_of_pairs(sure[rows[own]], one, other, over)
             apart[own[lesser]] = False
     return np.asarray(apart)
 
 
-def _beside_surer(paths: Paths, sure: Float[ndarray, " N"], width: float) -> Bool[ndarray, " N"]:
+def _beside_likelier(paths: Paths, sure: Float[ndarray, " N"], width: float) -> Bool[ndarray, " N"]:
     """The rows within ``width``, metres on the floor, of a track of greater odds at that step."""
     order = np.argsort(paths.steps, kind="stable")
     places = paths.states[order, :2]
     beside = np.zeros(len(order), dtype=bool)
-    for one, other in _together(paths.steps[order]):
+    for one, other in _pairs_at_one_step(paths.steps[order]):
         near = ((places[one] - places[other]) ** 2).sum(axis=1) < width**2
-        beside[order[_lesser(sure[order], one, other, near)]] = True
+        beside[order[_lower_of_pairs(sure[order], one, other, near)]] = True
     return beside
 
 
-def _together(steps: Int[ndarray, " N"]) -> Iterator[tuple[Int[ndarray, " P"], Int[ndarray, " P"]]]:
+def _pairs_at_one_step(
+    steps: Int[ndarray, " N"],
+) -> Iterator[tuple[Int[ndarray, " P"], Int[ndarray, " P"]]]:
     """All pairs of entries with equal steps, given in ascending order, as batches of indices."""
     for distance in range(1, len(steps)):
         one = np.flatnonzero(steps[distance:] == steps[:-distance])
@@ -240,7 +245,7 @@ def _together(steps: Int[ndarray, " N"]) -> Iterator[tuple[Int[ndarray, " P"], I
         yield one, one + distance
 
 
-def _lesser(
+def _lower_of_pairs(
     sure: Float[ndarray, " N"],
     one: Int[ndarray, " P"],
     other: Int[ndarray, " P"],

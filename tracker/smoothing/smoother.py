@@ -281,7 +281,7 @@ class Smoother:
                 scales = found.noise_scales
                 paths = paths.with_states(found.rows.means, found.rows.covariances)
                 del found
-        return _fitted(paths, found)
+        return _enforce_places(paths, found)
 
     def _linearised(self, paths: Paths, by_camera: list[Links], learnt: Calibration) -> _Linearised:
         """What the boxes and constraints say of paths, linearised at their states.
@@ -308,7 +308,7 @@ class Smoother:
         """
         motion, places = self.model.motion, linear.places
         rule = passes.PathMotion(motion.transition, motion.noise, self.prior)
-        smooth = partial(_smoothed, starts, linear.begins, linear.information, rule)
+        smooth = partial(_smooth_with_places, starts, linear.begins, linear.information, rule)
         found = smooth(places, scales)
         inflated = places.inflate(found.means, found.covariances)
         if inflated.contradicted:
@@ -598,7 +598,7 @@ class Smoother:
             if len(rest) >= FEWEST:
                 square = (half[:, None] * left) ** 2
                 ratio = np.median(square / own_noise) / _MEDIAN + np.median(spread / own_noise)
-                alike = _alike(chosen, owners, left)
+                alike = _step_correlation(chosen, owners, left)
                 noises[c] = np.clip(
                     np.sqrt(ratio * (1.0 + alike) / (1.0 - alike)), NARROWEST, WIDEST
                 )
@@ -699,7 +699,7 @@ class Smoother:
         for camera, lens in enumerate(self.model.cameras):
             own = sure.take(sure.cameras == camera)
             found = self._residuals(camera, paths, own, learnt)
-            alike = max(alike, _alike(found.rows, owners, found.left))
+            alike = max(alike, _step_correlation(found.rows, owners, found.left))
             place = np.minimum(np.searchsorted(rows, found.rows), len(rows) - 1)
             used = np.flatnonzero(rows[place] == found.rows)
             states, tall = paths.states[found.rows[used]], found.half_heights[used, None]
@@ -824,7 +824,7 @@ class Smoother:
         return replace(learnt, shifts=learnt.shifts + found)
 
 
-def _fitted(paths: Paths, last: _Iterated) -> Fitted:
+def _enforce_places(paths: Paths, last: _Iterated) -> Fitted:
     """The result of the last iteration, with the constraints of places enforced."""
     found = last.rows
     places, states, covariances = last.places.enforce(found.means, found.covariances)
@@ -844,7 +844,7 @@ def _fitted(paths: Paths, last: _Iterated) -> Fitted:
     )
 
 
-def _smoothed(
+def _smooth_with_places(
     starts: Int[ndarray, " n1"],
     begins: Float[ndarray, "n d"],
     information: evidence.BoxInformation,
@@ -860,7 +860,7 @@ def _smoothed(
     return found
 
 
-def _alike(
+def _step_correlation(
     rows: Int[ndarray, " L"], owners: Int[ndarray, " N"], residuals: Float[ndarray, "L m"]
 ) -> float:
     """Estimate the correlation ρ of the errors of a path's boxes in consecutive steps, 0 … 0.95.

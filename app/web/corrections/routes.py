@@ -28,7 +28,7 @@ from app.web.dependencies import ERRORS, Bench, Work, file_name, nothing_open
 from tracker.corrections import CorrectionError
 from tracker.corrections.truth import write_truth
 from tracker.review.queue import ReviewItem
-from tracker.review.queue.item import confirmed
+from tracker.review.queue.item import confirm
 
 NOTHING_CHANGED = "Nothing was changed."
 SETTLES_SECONDS = 10.0
@@ -127,7 +127,7 @@ def answer(wish: AnswerRequest, bench: Bench, correct: Correct, doubts: Doubts) 
         correct.skipped.add(found.id)
         return views.corrections_of(snapshot, correct)
     with _complaining():
-        correct.add(confirmed(chosen.corrections, found.title if wish.alternative else ""))
+        correct.add(confirm(chosen.corrections, found.title if wish.alternative else ""))
     return views.corrections_of(bench.snapshot(), correct)
 
 

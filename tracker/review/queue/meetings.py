@@ -68,7 +68,7 @@ def meetings(run: Run, track_rows: TrackRows) -> Iterator[Move]:
             draw = max(drawn.get((one, other, int(steps[k])), 0.0) for k in part.tolist())
             wrong = max(_EXCHANGED * float(np.exp(-apart / width)), 0.1 * (draw > _EVEN))
             log_odds = float(np.log(wrong) - np.log1p(-wrong))
-            log_odds += _straight_on(track_rows, one, other, nearest, step_time)
+            log_odds += _velocity_log_odds(track_rows, one, other, nearest, step_time)
             title = f"Tracks {one} and {other} pass within {apart:.2f} m"
             why = f"nearest at step {nearest}"
             if draw > _EVEN:
@@ -102,7 +102,9 @@ def _near(
     return found
 
 
-def _straight_on(track_rows: TrackRows, one: int, other: int, step: int, step_time: float) -> float:
+def _velocity_log_odds(
+    track_rows: TrackRows, one: int, other: int, step: int, step_time: float
+) -> float:
     """Return the log odds of an exchange at a step by the velocities before and after it; 0 if a
     track has no place at one of the three steps."""
     stride = max(round(_STRIDE / step_time), 1)

@@ -11,7 +11,7 @@ from tracker.review.queue.item import TrackRows
 from tracker.review.queue.linking import Move, Tracklet
 from tracker.runs.run import Run
 from tracker.smoothing import names_of
-from tracker.smoothing.result import Joined
+from tracker.smoothing.result import LinkedTracklets
 
 _TEMPERED = 3.0
 """Divisor of the log odds of the association, whose model takes dependent boxes as independent and
@@ -41,7 +41,9 @@ _LEAST_LOG_ODDS = -7.0
 """Least log odds of a move that is considered; half of it for joins of lost people."""
 
 
-def tracklets_of(run: Run, track_rows: TrackRows) -> tuple[list[Tracklet | None], Joined | None]:
+def tracklets_of(
+    run: Run, track_rows: TrackRows
+) -> tuple[list[Tracklet | None], LinkedTracklets | None]:
     """Return the tracklets that the smoothing linked to tracks, and the gains of its links.
 
     If no smoothing linked the tracks that the run has now (they may be the filter's, or those of
@@ -74,7 +76,7 @@ def _whole(track_rows: TrackRows, track: int) -> Tracklet:
     return Tracklet(track, begin, end)
 
 
-def moves_of_links(tracklets: list[Tracklet | None], joined: Joined) -> Iterator[Move]:
+def moves_of_links(tracklets: list[Tracklet | None], joined: LinkedTracklets) -> Iterator[Move]:
     """Yield all changes of one or two links, by the gains of the tracklet association.
 
     The run has the assignment with the largest sum of gains. The assignments next to it exchange
@@ -138,7 +140,7 @@ def moves_of_links(tracklets: list[Tracklet | None], joined: Joined) -> Iterator
 
 
 def _links(
-    tracklets: list[Tracklet | None], joined: Joined
+    tracklets: list[Tracklet | None], joined: LinkedTracklets
 ) -> tuple[dict[int, int], dict[int, int]]:
     """Return the index of the next tracklet of each tracklet in its track, and of the previous
     one."""

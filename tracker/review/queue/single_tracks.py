@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from tracker.corrections.kinds import KINDS
-from tracker.review.queue.item import WITHIN, Alternative, ReviewItem, TrackRows, proposed
+from tracker.review.queue.item import WITHIN, Alternative, ReviewItem, TrackRows, propose
 from tracker.review.queue.linking import Move, Tracklet
 from tracker.runs.run import Run
 
@@ -70,8 +70,8 @@ def _clutter(run: Run, track_rows: TrackRows, track: int) -> Iterator[ReviewItem
         "short", f"Track {track} is nobody?", how, first, last, (track,), (places[0], places[-1]),
         wrong, len(rows),
         (
-            Alternative("as it is", 1.0 - wrong, proposed("same", (places[0], places[-1]))),
-            Alternative("nobody", wrong, proposed("nobody", places)),
+            Alternative("as it is", 1.0 - wrong, propose("same", (places[0], places[-1]))),
+            Alternative("nobody", wrong, propose("nobody", places)),
         ),
     )  # fmt: skip
 

@@ -10,9 +10,9 @@ from numpy import ndarray
 
 from tracker.corrections import Correction, Place
 from tracker.corrections.kinds import leeway
-from tracker.review.queue.item import Alternative, ReviewItem, TrackRows, proposed
+from tracker.review.queue.item import Alternative, ReviewItem, TrackRows, propose
 from tracker.review.queue.moves import leaving_probability
-from tracker.review.queue.unclaimed import Unclaimed, unclaimed
+from tracker.review.queue.unclaimed import Unclaimed, find_unclaimed
 from tracker.runs.run import Run
 
 _MISSED = 0.3
@@ -54,7 +54,7 @@ def track_ends(run: Run, track_rows: TrackRows, asked: Collection[Place]) -> Ite
         asked: The first and last places of tracks that items of other sources concern, for which
             no item is made here.
     """
-    free = unclaimed(run)
+    free = find_unclaimed(run)
     yield from (_missing(run, track_rows, one) for one in free)
     near = leeway(run.sequence.step_time)
     for track in track_rows.ids.tolist():
@@ -94,14 +94,14 @@ def _missing(run: Run, track_rows: TrackRows, one: Unclaimed) -> ReviewItem:
     names = [run.sequence.cameras[number].name for number in one.cameras]
     listed = f"{', '.join(names[:-1])} and {names[-1]}"
     here: tuple[Correction, ...] = tuple(
-        one for place in along for one in proposed("here", (place,), accuracy=_ACCURACY)
+        one for place in along for one in propose("here", (place,), accuracy=_ACCURACY)
     )
     return ReviewItem(
         "missing", "Somebody is missing?",
         f"boxes of {listed} meet for {seconds:.1f} s where nobody is tracked",
         first.step, last.step, (), tuple(along), wrong, last.step - first.step + 1,
         (
-            Alternative("nobody", 1.0 - wrong, proposed("nobody", along)),
+            Alternative("nobody", 1.0 - wrong, propose("nobody", along)),
             Alternative("somebody", wrong, here),
         ),
     )  # fmt: skip
@@ -129,8 +129,8 @@ def _edge(run: Run, track_rows: TrackRows, track: int, *, before: bool) -> Itera
     metres = _way_out(run, point)
     stake = round(metres / _WALK / sequence.step_time)
     other = Place(place.step + (-stride if before else stride), *beyond.tolist())
-    here = proposed("here", (other,), accuracy=_ACCURACY)
-    now = proposed("came" if before else "left", (place,))
+    here = propose("here", (other,), accuracy=_ACCURACY)
+    now = propose("came" if before else "left", (place,))
     word, was = ("begins", "there before") if before else ("ends", "there after")
     yield ReviewItem(
         "begins" if before else "ends", f"Track {track} {word} here?",

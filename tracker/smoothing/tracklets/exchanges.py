@@ -33,14 +33,16 @@ def exchange_breaks(
     one, other = _pairs(fitted, reach)
     if not len(one):
         return breaks
-    gains = gains_of(fitted, one, other)
-    for chosen in _best(paths.owners[one], paths.owners[other], paths.steps[one], gains, apart):
+    gains = exchange_log_odds(fitted, one, other)
+    for chosen in _best_of_encounters(
+        paths.owners[one], paths.owners[other], paths.steps[one], gains, apart
+    ):
         if gains[chosen] > least:
             breaks[[one[chosen], other[chosen]]] = True
     return breaks
 
 
-def gains_of(
+def exchange_log_odds(
     fitted: Fitted, one: Int[ndarray, " P"], other: Int[ndarray, " P"]
 ) -> Float[ndarray, " P"]:
     """Compute the log odds of a swap at pairs of rows of one step.
@@ -65,7 +67,7 @@ def gains_of(
     return np.asarray(gains - own[i] - own[j])
 
 
-def turn(fitted: Fitted, one: int, other: int, after: int, until: int) -> list[int]:
+def find_exchange(fitted: Fitted, one: int, other: int, after: int, until: int) -> list[int]:
     """Find the rows before which two paths are split so that the one continues as the other.
 
     They are those of the step at which the swap has the largest log odds.
@@ -88,7 +90,7 @@ def turn(fitted: Fitted, one: int, other: int, after: int, until: int) -> list[i
     steps = np.arange(first, last + 1)
     own = int(paths.starts[one]) + steps - int(paths.firsts[one])
     others = int(paths.starts[other]) + steps - int(paths.firsts[other])
-    best = int(np.argmax(gains_of(fitted, own, others)))
+    best = int(np.argmax(exchange_log_odds(fitted, own, others)))
     return [int(own[best]), int(others[best])]
 
 
@@ -110,7 +112,7 @@ def _pairs(fitted: Fitted, reach: float) -> tuple[Int[ndarray, " P"], Int[ndarra
     return one[near], other[near]
 
 
-def _best(
+def _best_of_encounters(
     one: Int[ndarray, " P"],
     other: Int[ndarray, " P"],
     steps: Int[ndarray, " P"],

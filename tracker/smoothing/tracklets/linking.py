@@ -31,18 +31,18 @@ from tracker.smoothing.paths import (
     select_rows,
 )
 from tracker.smoothing.protocol import EmptyStore, ResultStore
-from tracker.smoothing.result import Decision, Joined
+from tracker.smoothing.result import Decision, LinkedTracklets
 from tracker.smoothing.smoother import BoxAssociations
 from tracker.smoothing.tracklets import costs, splitting
 from tracker.smoothing.tracklets.constraints import (
     ConstraintResolver,
-    limits,
-    of_chains,
-    parted,
+    constraints_on_chains,
+    existence_spans,
+    split_by_gap,
 )
 from tracker.smoothing.tracklets.motion import Ends, Pairs
-from tracker.smoothing.tracklets.people import Seen, template_log_odds
-from tracker.smoothing.tracklets.people import of_chains as people_of_chains
+from tracker.smoothing.tracklets.people import Appearances, template_log_odds
+from tracker.smoothing.tracklets.people import sum_by_chain as people_of_chains
 from tracker.smoothing.tracklets.solver import TrackletGraph, link_tracklets
 from tracker.smoothing.tracklets.splitting import Tracked
 
@@ -82,7 +82,7 @@ class LinkedTracks:
     """The filter's label of each row, -1 where it had no track."""
     decisions: list[Decision]
     """Splits and links by which the tracks differ from the filter's."""
-    joined: Joined
+    joined: LinkedTracklets
     """The tracklets and the odds of linking them otherwise."""
     limits: dict[int, tuple[int, int]]
     """First and last step at which corrections let a track exist, by its label."""
@@ -93,7 +93,7 @@ class LinkedTracks:
 def resolve_identities(
     tracked: Tracked,
     parameters: SmoothingParams,
-    seen: Seen,
+    seen: Appearances,
     corrections: Many[Correction] = (),
     earlier: ResultStore | None = None,
 ) -> tuple[LinkedTracks, str]:
@@ -132,7 +132,7 @@ def resolve_identities(
             earlier.put("cuts", plain)
             if not corrections:
                 tracked.forget_predictions()
-            found = _linked(
+            found = _link(
                 tracked, parameters, seen, obeyed, leeway, plain, prior_links,
                 bool(corrections),
             )  # fmt: skip
@@ -175,10 +175,10 @@ def _unmet(
     return found
 
 
-def _linked(
+def _link(
     tracked: Tracked,
     parameters: SmoothingParams,
-    seen: Seen,
+    seen: Appearances,
     corrections: Many[Correction],
     leeway: int,
     plain: splitting.Splits,
@@ -226,7 +226,7 @@ def _linked(
     pairs = short_gap_odds.pairs(alone)
     people = template_log_odds(refitted.paths, links, smoother, seen, parameters.appearance)
     longest = max(round(parameters.longest / smoother.model.step_time), 1)
-    now, later = parted(constraints, tracklets, longest)
+    now, later = split_by_gap(constraints, tracklets, longest)
 
     def best_chains(pairs: Pairs, constraints: Constraints[int]) -> list[list[int]]:
         """Find the most likely chains of tracklets under some constraints."""
@@ -250,10 +250,13 @@ def _linked(
         if again == first:
             break
         first = again
-    on_chains = of_chains(later, first, tracklets)
+    on_chains = constraints_on_chains(later, first, tracklets)
     if on_chains is None:  # the chains cannot be linked so, since tracklets lie between
         first = best_chains(pairs, constraints)
-        on_chains = of_chains(replace(constraints, must_link=()), first, tracklets) or Constraints()
+        on_chains = (
+            constraints_on_chains(replace(constraints, must_link=()), first, tracklets)
+            or Constraints()
+        )
     # chains linked by motion have better embeddings than single tracklets
     back = costs.long_gap_odds(
         smoother, refitted.paths, links, first, parameters, seen.embeddings, rates
@@ -276,7 +279,7 @@ def _linked(
     paths, rows = join_chains(refitted.paths, chains, labels)
     lengths = np.diff(tracklets.starts)
     origins = [
-        _most(before.owners[source_rows[tracklets.starts[chain]]], lengths[chain])
+        _heaviest_value(before.owners[source_rows[tracklets.starts[chain]]], lengths[chain])
         for chain in chains
     ]
     links = renumber_rows(links, rows)
@@ -288,12 +291,12 @@ def _linked(
     for chain, label in zip(chains, labels, strict=True):
         of_tracklets[chain] = label
     places = refitted.paths.states[:, :3]
-    joined = Joined(
+    joined = LinkedTracklets(
         of_tracklets, tracklets.firsts, tracklets.lasts,
         places[tracklets.starts[:-1]], places[tracklets.starts[1:] - 1],
         worths, births, deaths, pairs.earlier, pairs.later, pairs.gains,
     )  # fmt: skip
-    spans = {labels[k]: span for k, span in limits(constraints, chains, tracklets).items()}
+    spans = {labels[k]: span for k, span in existence_spans(constraints, chains, tracklets).items()}
     origins_of = np.array(origins, dtype=np.int64)
     whose = np.full(rows_before, -1, dtype=np.int64)
     whose[source_rows] = of_tracklets[tracklets.owners]
@@ -302,7 +305,7 @@ def _linked(
     )
 
 
-def _most(names: ndarray, weights: ndarray) -> int:
+def _heaviest_value(names: ndarray, weights: ndarray) -> int:
     """Return the value with the largest total weight, the smallest of equal ones."""
     values, which = np.unique(names, return_inverse=True)
     return int(values[np.argmax(np.bincount(which, weights))])

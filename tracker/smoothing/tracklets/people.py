@@ -26,7 +26,7 @@ _OWN = 0.7
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Seen:
+class Appearances:
     """The appearance of the boxes of all steps, camera by camera; None where none is known."""
 
     embeddings: Many[Float[ndarray, "B A"]] | None = None
@@ -35,9 +35,9 @@ class Seen:
     """Probability of each of G people with templates for each box, 1/G each where it is unknown."""
 
     @staticmethod
-    def of(views: Steps[tuple[ViewResult, ...]]) -> Seen:
+    def of(views: Steps[tuple[ViewResult, ...]]) -> Appearances:
         """Collect the appearance of boxes from the results of stage 1 for each step."""
-        return Seen(_embeddings(views), _likenesses(views))
+        return Appearances(_embeddings(views), _likenesses(views))
 
 
 def _embeddings(views: Steps[tuple[ViewResult, ...]]) -> list[Float[ndarray, "B A"]] | None:
@@ -84,7 +84,7 @@ def _with_counts(
 
 
 def template_log_odds(
-    tracklets: Paths, links: Links, smoother: Smoother, seen: Seen, weight: float
+    tracklets: Paths, links: Links, smoother: Smoother, seen: Appearances, weight: float
 ) -> Float[ndarray, "n G"]:
     """Compute the log likelihood of each tracklet's colours under each of G people with templates.
 
@@ -131,7 +131,7 @@ def _clear(links: Links, cameras: Many[CameraBoxes]) -> Bool[ndarray, " L"]:
     return np.asarray(result)
 
 
-def of_chains(scores: Float[ndarray, "n G"], chains: Many[Many[int]]) -> Float[ndarray, "m G"]:
+def sum_by_chain(scores: Float[ndarray, "n G"], chains: Many[Many[int]]) -> Float[ndarray, "m G"]:
     """Sum the log likelihoods over the tracklets of each chain, less the largest of each chain.
 
     Args:

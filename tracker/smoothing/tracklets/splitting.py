@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
 from tracker.parameters.groups.smoothing import SmoothingParams
-from tracker.smoothing.lifetimes import independence, lifetimes
+from tracker.smoothing.lifetimes import estimate_lifetimes, independent_share
 from tracker.smoothing.paths import Paths, split_paths
 from tracker.smoothing.smoother import BoxAssociations, Fitted, Smoother
 from tracker.smoothing.tracklets.constraints import ConstraintResolver
@@ -86,16 +86,16 @@ def find_splits(tracked: Tracked, p: SmoothingParams) -> Splits:
     smoother, fitted, shared = tracked.smoother, tracked.fitted, tracked.shared
     step_time, paths = smoother.model.step_time, fitted.paths
     rows = len(paths.states)
-    there, odds = lifetimes(smoother, paths, shared, p)
+    there, odds = estimate_lifetimes(smoother, paths, shared, p)
     reasons = np.zeros(rows, dtype=np.int64)
     fed = np.bincount(shared.links.rows, shared.links.shares, rows) > _FED
     fed[smoother.rows_with_places(paths)[0]] = True
     too_long = round(GAP / step_time)
     away = _long_gaps(paths, fed, too_long) | (there < 0.5)
-    reasons[away | _not_bridged(paths, tracked.had, away, too_long)] = 3
+    reasons[away | _gaps_without_boxes(paths, tracked.had, away, too_long)] = 3
     around = round(_AROUND / step_time)
     # errors of boxes are correlated: the distance is reduced to that of independent evidence
-    jumps = np.flatnonzero(fitted.jumps * independence(step_time, p.memory) > p.jump)
+    jumps = np.flatnonzero(fitted.jumps * independent_share(step_time, p.memory) > p.jump)
     owners = paths.owners
     for offset in range(-around, around):
         near = np.clip(jumps + offset, 0, rows - 1)
@@ -108,7 +108,7 @@ def find_splits(tracked: Tracked, p: SmoothingParams) -> Splits:
         fitted, reach=1.0 + FASTEST * step_time, least=p.exchange, apart=too_long
     )
     clear = _between(paths, fed & (reasons == 0)) & (reasons == 0)
-    begins, between = _of_two(paths, tracked.names)
+    begins, between = _label_changes(paths, tracked.names)
     return Splits(reasons, clear & ~between, breaks | begins, Rates.of(smoother, paths, odds > 0.0))
 
 
@@ -138,10 +138,12 @@ def split_tracks(
     short[list(resolver.meant(tracklets, source_rows))] = False
     clear[source_rows[np.repeat(short, lengths)]] = False
     tracklets, source_rows = split_paths(paths, clear, breaks)
-    return replace(tracklets, labels=_named(tracklets, tracked.names[source_rows])), source_rows
+    return replace(
+        tracklets, labels=_filter_labels(tracklets, tracked.names[source_rows])
+    ), source_rows
 
 
-def _of_two(
+def _label_changes(
     paths: Paths, names: Int[ndarray, " N"]
 ) -> tuple[Bool[ndarray, " N"], Bool[ndarray, " N"]]:
     """Find the rows at which the filter's label of a path changes.
@@ -162,7 +164,7 @@ def _of_two(
     return begins, between
 
 
-def _named(tracklets: Paths, names: Int[ndarray, " M"]) -> Int[ndarray, " n"]:
+def _filter_labels(tracklets: Paths, names: Int[ndarray, " M"]) -> Int[ndarray, " n"]:
     """Return the filter's label of each tracklet; one without such a label retains its own."""
     labels = tracklets.labels.copy()
     known = np.flatnonzero(names >= 0)
@@ -184,7 +186,7 @@ def _long_gaps(paths: Paths, fed: Bool[ndarray, " N"], longest: int) -> Bool[nda
     return np.asarray(~fed & (np.bincount(run)[run] > longest)) if len(fed) else fed
 
 
-def _not_bridged(
+def _gaps_without_boxes(
     paths: Paths, had: Bool[ndarray, " N"], away: Bool[ndarray, " N"], longest: int
 ) -> Bool[ndarray, " N"]:
     """Find the rows of the filter's long gaps of which a part is ``away``, without boxes for long.
