@@ -386,7 +386,7 @@ def test_a_stated_place_updates_whom_it_means_or_begins_somebody() -> None:
     assert found.weights.tolist() == [pytest.approx(0.999), 0.9]
     assert_array_equal(found.means[1], mixture.means[1])
     spread = 0.01 + 0.04
-    edge = float(np.sqrt(MODEL.gate_of_places * spread))
+    edge = float(np.sqrt(MODEL.place_gate * spread))
     assert MODEL.near < edge
     for x, size in ((-edge + 1e-3, 2), (-edge - 1e-3, 3)):
         found, free = said(x)
@@ -412,7 +412,7 @@ def test_a_place_above_a_person_is_somebody_elses_from_their_height_on(
     told = constraints_by_step(
         [make(kind="here", places=[[0, 0.0, 0.0, 0.85 + up]], accuracy=0.2)]
     )[0]
-    assert up**2 / (0.01 + 0.04) > MODEL.gate_of_places
+    assert up**2 / (0.01 + 0.04) > MODEL.place_gate
     found, _, _ = apply_constraints(
         people((3, 0.6, 0.0)), Record.blank(4, 1), told, MODEL, first_new_label=9, next_label=9
     )

@@ -390,7 +390,9 @@ def test_people_are_followed_to_the_margin_around_the_room(axis: int, side: floa
     edge = (ROOM.maximum if side > 0 else ROOM.minimum)[axis] + side * margin
     places = np.tile([0.3, 0.2, 0.85], (2, 1))
     places[:, axis] = edge - side * 1e-9, edge + side * 1e-9
-    assert FusionModel(empty_room(), FusionParams()).stays(world.gaussians(places)).tolist() == [0]
+    assert FusionModel(empty_room(), FusionParams()).inside_tracked_volume(
+        world.gaussians(places)
+    ).tolist() == [0]
 
 
 # ── what every step reports

@@ -36,7 +36,7 @@ class HeightBounds:
     low: float
     """Height of a centre on the floor, world metres."""
     high: float
-    """As far below the ceiling, world metres."""
+    """Height of a centre as far below the ceiling as ``low`` is above the floor, world metres."""
     outside: float
     """Density beyond the bounds relative to that between them, 0 … 1."""
 
@@ -74,8 +74,8 @@ class HeightBounds:
         """
         heights = tracks.means[:, _HEIGHT]
         sigmas = np.sqrt(tracks.covariances[:, _HEIGHT, _HEIGHT])
-        room = np.minimum(heights - self.low, self.high - heights)
-        rows = np.flatnonzero((room < _NEAR * sigmas) & (sigmas > 0.0))
+        margins = np.minimum(heights - self.low, self.high - heights)
+        rows = np.flatnonzero((margins < _NEAR * sigmas) & (sigmas > 0.0))
         if not len(rows):
             return tracks
         z, sigma = heights[rows], sigmas[rows]

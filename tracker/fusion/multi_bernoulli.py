@@ -68,6 +68,12 @@ class MultiBernoulli:
     """
 
     def __init__(self, sequence: Sequence, parameters: RunParameters) -> None:
+        """Prepare the filter for one sequence.
+
+        Args:
+            sequence: The cameras and the room.
+            parameters: The parameters of the run, of which those of the fusion are used.
+        """
         p, model = parameters.fusion, FusionModel(sequence, parameters.fusion)
         self._parameters, self._model = p, model
         motion, target = model.motion, model.target
@@ -93,7 +99,7 @@ class MultiBernoulli:
         """Model and cameras of a step, by the cameras that have a frame."""
         self._target = target.target(motion.dimension)
         self._camera_rule = model.camera_rule(REPORTING_THRESHOLD)
-        low, high = model.followed
+        low, high = model.tracked_volume
         self._keeping_rule = KeepingRule(
             p.pruning_threshold, low, high, p.max_components, model.near, model.height, CONFIRMED
         )

@@ -71,6 +71,7 @@ class Ledger:
     change."""
 
     def __init__(self) -> None:
+        """Begin a step without any pair."""
         self._cameras: list[ndarray] = []
         self._labels: list[ndarray] = []
         self._boxes: list[ndarray] = []
@@ -83,7 +84,14 @@ class Ledger:
         boxes: Int[ndarray, " A"],
         probabilities: Float[ndarray, " A"],
     ) -> None:
-        """Add one camera's pairs of label and box of at least :data:`REPORTING_THRESHOLD`."""
+        """Add one camera's pairs of label and box of at least :data:`REPORTING_THRESHOLD`.
+
+        Args:
+            camera: Index of the camera.
+            labels: Label of each of A pairs.
+            boxes: Index of the box of each pair, in the camera.
+            probabilities: Association probability of each pair, 0 … 1.
+        """
         reported = (probabilities >= REPORTING_THRESHOLD).nonzero()[0]
         if not len(reported):
             return
@@ -112,7 +120,7 @@ class Ledger:
 def sum_associations(
     labels: Int[ndarray, " J"],
     cameras: Int[ndarray, " A"],
-    of_pairs: Int[ndarray, " A"],
+    pair_labels: Int[ndarray, " A"],
     boxes: Int[ndarray, " A"],
     probabilities: Float[ndarray, " A"],
 ) -> Associations:
@@ -121,11 +129,11 @@ def sum_associations(
     Args:
         labels: Labels of the posterior's J components, the heaviest first.
         cameras: Camera of each of A pairs.
-        of_pairs: Label of each pair.
+        pair_labels: Label of each pair.
         boxes: Index of the box of each pair, in its camera.
         probabilities: Association probability of each pair, 0 … 1.
     """
     if not len(labels) or not len(cameras):
         return Associations.none()
-    found = sum_pairs(labels, cameras, of_pairs, boxes, probabilities)
+    found = sum_pairs(labels, cameras, pair_labels, boxes, probabilities)
     return Associations(found.cameras, found.components, found.boxes, found.probabilities)
