@@ -329,7 +329,7 @@ def test_a_track_rests_on_a_join_from_where_it_holds(
     steps, ids, where = standing([(1, *span) for span in spans])
     said = make(kind="same", places=places)
     rests = supporting_corrections(
-        steps, ids, where, [said], outcomes(steps, ids, where, [said], leeway=2)
+        steps, ids, [said], outcomes(steps, ids, where, [said], leeway=2)
     )
     assert [bool(name) for name in rests] == (steps >= begins).tolist()
 
@@ -343,16 +343,14 @@ def test_what_rests_on_what_ends_where_the_next_begins() -> None:
     away = make(kind="same", places=[at(4), at(5, 5.0)])
     told = [late, early, here, other, away]
     rests = np.array(
-        supporting_corrections(steps, ids, where, told, outcomes(steps, ids, where, told, leeway=2))
+        supporting_corrections(steps, ids, told, outcomes(steps, ids, where, told, leeway=2))
     )
     names = {late.id: "L", early.id: "E", here.id: "H", other.id: "D", "": "."}
     assert "".join(names[one] for one in rests[ids == 1]) == "...EEEELLL"
     assert "".join(names[one] for one in rests[ids == 2]) == "...EEDDDDD"
     assert rests[(ids == 1) & (steps == 8)] == late.id, "a later join goes over a place"
     alone = np.array(
-        supporting_corrections(
-            steps, ids, where, [here], outcomes(steps, ids, where, [here], leeway=2)
-        )
+        supporting_corrections(steps, ids, [here], outcomes(steps, ids, where, [here], leeway=2))
     )
     assert steps[alone == here.id].tolist() == [8]
 

@@ -127,11 +127,11 @@ def test_two_who_exchange_are_tied_across_and_parted() -> None:
 def test_all_pieces_that_are_spoken_of_are_meant() -> None:
     cut, kept = pieces()
     told = [said("same", at(8), at(15)), said("here", at(4)), said("nobody", at(0), at(2))]
-    assert resolver(*told).meant(cut, kept) == {0, 1, 2, 4}
-    assert resolver(said("same", at(8), at(15, 2.0))).meant(cut, kept) == {2}
+    assert resolver(*told).referenced_tracklets(cut, kept) == {0, 1, 2, 4}
+    assert resolver(said("same", at(8), at(15, 2.0))).referenced_tracklets(cut, kept) == {2}
     nothing = np.zeros(0, dtype=np.int64)
     empty = Paths.of([], [], [], [], 6)
-    assert resolver(*told).meant(empty, nothing) == set()
+    assert resolver(*told).referenced_tracklets(empty, nothing) == set()
 
 
 def test_limits_and_ties_of_chains_are_those_of_their_pieces() -> None:

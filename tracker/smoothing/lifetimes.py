@@ -18,21 +18,21 @@ UNSURE = 0.3
 """Prior existence probability, for the association of boxes, of a row beyond a path's ends or in a
 gap."""
 
-_MEETING = 2
+_MEETING_BY_CHANCE = 2
 """Number of cameras whose false boxes always have rays that nearly intersect somewhere."""
 
-_CONSTRAINT_VOTES = 1e4
+_CONSTRAINT_LOG_ODDS = 1e4
 """Log odds for existence where a correction states a position, more than all cameras can
 contradict."""
 
-ONE_PERSON = 0.3
+_ONE_PERSON = 0.3
 """Intersection over union above which two boxes of one camera may be of one person, as in the
 non-maximum suppression of detectors."""
 
-_THERE = 0.5
-"""Existence probability above which a track is present."""
+_PRESENT = 0.5
+"""Existence probability above which a track is present: it is likelier than not."""
 
-_HARDLY_EVER = 0.1
+_STRAY_SHARE = 0.1
 """Share of a track's boxes below which those away from other tracks are taken as stray."""
 
 
@@ -99,25 +99,32 @@ def estimate_lifetimes(
     )
     with_place, against = smoother.rows_with_places(paths)[0], log_miss_likelihoods(shared)
 
-    def by(votes: Float[ndarray, " N"]) -> tuple[Float[ndarray, " N"], Float[ndarray, " n"]]:
-        votes[with_place] += _CONSTRAINT_VOTES
+    def existence(
+        log_odds: Float[ndarray, " N"],
+    ) -> tuple[Float[ndarray, " N"], Float[ndarray, " n"]]:
+        """The existence probabilities and log odds, given the log odds of the detections."""
+        log_odds[with_place] += _CONSTRAINT_LOG_ODDS
         found = presence(
-            paths.starts, paths.firsts, weight * (votes + against), transitions, smoother.frames - 1
+            paths.starts,
+            paths.firsts,
+            weight * (log_odds + against),
+            transitions,
+            smoother.frames - 1,
         )
         return found.probabilities, found.odds
 
-    def voted(shown: Float[ndarray, " N"]) -> Float[ndarray, " N"]:
+    def detections(shown: Float[ndarray, " N"]) -> Float[ndarray, " N"]:
         """The log odds of the detections, given the number of cameras with one at each row."""
         return _detection_odds(hit, shown, appearance) if log_ratios.any() else hit * shown
 
     appearance = np.bincount(links.rows, links.shares * log_ratios, rows)
-    there, odds = by(voted(shown))
+    there, odds = existence(detections(shown))
     if not smoother.several_boxes:
         return there, odds
     apart = select_separate_links(smoother, paths, shared, there, odds)
     if apart.all():
         return there, odds
-    return by(voted(np.bincount(links.rows, links.shares * apart, rows)))
+    return existence(detections(np.bincount(links.rows, links.shares * apart, rows)))
 
 
 def _detection_odds(
@@ -130,7 +137,7 @@ def _detection_odds(
         shown: Expected number of cameras with a detection at each of N rows.
         appearance: Sum of the log likelihood ratios of these boxes' appearance.
     """
-    outweighed = np.minimum(appearance + hit * np.maximum(shown - _MEETING, 0.0), 0.0)
+    outweighed = np.minimum(appearance + hit * np.maximum(shown - _MEETING_BY_CHANCE, 0.0), 0.0)
     meeting = hit * np.minimum(shown, 2.0 * np.maximum(shown - 1.0, 0.0))
     return np.asarray(meeting + np.where(appearance < 0.0, outweighed, appearance))
 
@@ -192,7 +199,7 @@ def select_separate_links(
     there: Float[ndarray, " N"],
     odds: Float[ndarray, " n"],
 ) -> Bool[ndarray, " L"]:
-    """Select the links to boxes that are apart from every track of greater odds.
+    """Select the L links to boxes that are apart from every track of greater odds.
 
     A detector gives further boxes around a person: of limbs, one too high, one with a load. The
     rays of such boxes of several cameras intersect beside the person, or where rays to two people
@@ -207,17 +214,17 @@ def select_separate_links(
         odds: Log odds of each of the n paths, which rank them where they are present.
     """
     links = shared.links
-    rows, sure = links.rows, np.where(there > _THERE, odds[paths.owners], -np.inf)
+    rows, sure = links.rows, np.where(there > _PRESENT, odds[paths.owners], -np.inf)
     beside = _beside_likelier(paths, sure, 2.0 * smoother.model.target.half_width)
     away = np.bincount(paths.owners[rows], links.shares * ~beside[rows], len(paths.labels))
     whole = np.bincount(paths.owners[rows], links.shares, len(paths.labels))
-    apart = (away > _HARDLY_EVER * whole)[paths.owners[rows]]
+    apart = (away > _STRAY_SHARE * whole)[paths.owners[rows]]
     for number, camera in enumerate(smoother.cameras):
         own = np.flatnonzero(links.cameras == number)
         own = own[np.argsort(paths.steps[rows[own]], kind="stable")]
         boxes = Boxes(camera.boxes[links.boxes[own]]).left_top
         for one, other in _pairs_at_one_step(paths.steps[rows[own]]):
-            over = paired_overlaps(boxes[one], boxes[other]) > ONE_PERSON
+            over = paired_overlaps(boxes[one], boxes[other]) > _ONE_PERSON
             lesser = _lower_of_pairs(sure[rows[own]], one, other, over)
             apart[own[lesser]] = False
     return np.asarray(apart)

@@ -134,7 +134,7 @@ class PositionSmoothing:
         begin = _read_filter(smoother, results, tracks)
         del tracks
         check()
-        learnt, decided = self._named(smoother, begin, seen, check, corrections, earlier)
+        learnt, decided = self._resolve(smoother, begin, seen, check, corrections, earlier)
         known: Smoothed | None = earlier.get(f"smoothed-{decided.key}") if decided.key else None
         if known is not None:
             return known
@@ -144,7 +144,7 @@ class PositionSmoothing:
             earlier.put(f"smoothed-{decided.key}", found)
         return found
 
-    def _named(
+    def _resolve(
         self,
         smoother: Smoother,
         begin: _InitialTracks,
@@ -164,7 +164,7 @@ class PositionSmoothing:
 class IdentitySmoothing(PositionSmoothing):
     """Tracks smoothed with their identities resolved: split where ambiguous, and linked at once."""
 
-    def _named(
+    def _resolve(
         self,
         smoother: Smoother,
         begin: _InitialTracks,
@@ -173,11 +173,12 @@ class IdentitySmoothing(PositionSmoothing):
         corrections: Many[Correction],
         earlier: ResultStore,
     ) -> tuple[Calibration | None, _Resolution]:
+        """Split the tracks in ``begin`` into tracklets, and replace them by linked ones."""
         p = self._parameters.smoothing
         seen = Appearances.of(views) if p.appearance > 0.0 else Appearances()
         start: _LastRoundInput | None = earlier.get("start")
         if start is None:
-            start = self._start(smoother, begin, seen, check)
+            start = self._before_last_round(smoother, begin, seen, check)
             earlier.put("start", start)
         tracked = Tracked(
             smoother, start.fitted, start.shared, start.contested, start.had, start.names
@@ -194,14 +195,21 @@ class IdentitySmoothing(PositionSmoothing):
         decided = _Resolution([*found.decisions, *removed], found.joined, found.limits, key)
         return learnt.of_people(found.origins), decided
 
-    def _start(
+    def _before_last_round(
         self,
         smoother: Smoother,
         begin: _InitialTracks,
         seen: Appearances,
         check: Callable[[], None],
     ) -> _LastRoundInput:
-        """Run all rounds but the last resolution, the only one with corrections of identity."""
+        """Run all rounds but the last resolution, the only one with corrections of identity.
+
+        Args:
+            smoother: The models and the boxes.
+            begin: The filter's tracks, which are taken.
+            seen: Appearance of the boxes.
+            check: A function that is called in every round and raises an exception to stop.
+        """
         p = self._parameters.smoothing
         contested = contested_shares(begin.paths, begin.links)
         had = begin.existences == 1.0
@@ -232,7 +240,7 @@ class _InitialTracks:
     """
 
     def __init__(self, paths: Paths, existences: Float[ndarray, " N"], links: Links) -> None:
-        """Begin with some tracks, as :meth:`replace` takes them."""
+        """Begin with some tracks, with the arguments of :meth:`replace`."""
         self.replace(paths, existences, links)
 
     def replace(self, paths: Paths, existences: Float[ndarray, " N"], links: Links) -> None:
@@ -252,7 +260,7 @@ class _InitialTracks:
 
     def take_links(self) -> Links:
         """The links, which are forgotten."""
-        found, self.links = self.links, Links.joined([])
+        found, self.links = self.links, Links.concatenate([])
         return found
 
 
@@ -377,8 +385,13 @@ def _finish(
 
 
 def _removal(paths: Paths, path: int, odds: float) -> Decision:
-    """Make the decision to remove a track, for its log odds or since none of its tracklets is
-    left."""
+    """Make the decision to remove a track, for its log odds or since none of its tracklets is left.
+
+    Args:
+        paths: The tracks.
+        path: Index of the track.
+        odds: Log odds of existing at any step.
+    """
     absence = float(1.0 / (1.0 + np.exp(np.clip(odds, -600.0, 600.0))))
     reason = (
         "over its whole life it is likelier nobody"
@@ -474,9 +487,15 @@ def _steps_before_report(
 
 
 def read_links(fused: Steps[FusionResult], paths: Paths, cameras: Many[CameraBoxes]) -> Links:
-    """Convert the association probabilities of the fusion to links of the rows of the paths."""
+    """Convert the association probabilities of the fusion to links of the rows of the paths.
+
+    Args:
+        fused: The result of stage 2 for each step.
+        paths: The fusion's tracks.
+        cameras: The boxes of each camera.
+    """
     parts = range(0, len(fused), _AT_ONCE)
-    return Links.joined([_links_of(fused, first, paths, cameras) for first in parts])
+    return Links.concatenate([_links_of(fused, first, paths, cameras) for first in parts])
 
 
 def _links_of(
@@ -490,7 +509,7 @@ def _links_of(
     )
     labels = fused.column("posterior.labels", first=begin, last=end)
     if not len(of_pair.values) or not len(paths.labels):
-        return Links.joined([])
+        return Links.concatenate([])
     within = of_pair.steps
     named = labels.values[labels.starts[within] + components.values]
     order = np.argsort(paths.labels, kind="stable")

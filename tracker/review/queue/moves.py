@@ -27,6 +27,10 @@ seconds."""
 _SPEED = 0.6
 """Standard deviation of the velocity of a lost person, metres per second."""
 
+_STRAIGHT = 4.0
+"""Time for which a lost person keeps direction and velocity, seconds; later the displacement grows
+as that of a random walk."""
+
 _NEAR = 0.4
 """Standard deviation of the place of a person that has just been lost, metres."""
 
@@ -162,10 +166,10 @@ def joins_of_lost_people(
     """Yield joins of tracks that end, each with a track that begins near by at a later step.
 
     Let p_i be the probability that the person of track i has left where it ends, A the area of the
-    room on the ground, and f_ij = N(x_j; x_i, σ_ij² I) exp(−t_ij / T) the density of the place of
-    a lost person after the gap of t_ij ≤ T seconds, with σ_ij² = s² + v² t_ij min(t_ij, 4 s), where
-    s, v and T are :data:`_NEAR`, :data:`_SPEED` and :data:`_LONGEST`. The odds that j is the
-    continuation of i are
+    room on the ground, and f_ij = N(x_j; x_i, σ_ij² I) exp(−t_ij / T) the density of the place of a
+    lost person after the gap of t_ij ≤ T seconds, with σ_ij² = s² + v² t_ij min(t_ij, t_0), where
+    s, v, t_0 and T are :data:`_NEAR`, :data:`_SPEED`, :data:`_STRAIGHT` and :data:`_LONGEST`. The
+    odds that j is the continuation of i are
 
         (1 − p_i) f_ij / [p_i / A + Σ_{k≠j} (1 − p_i) f_ik]
 
@@ -190,7 +194,7 @@ def joins_of_lost_people(
     seconds = (b[None, :, 0] - e[:, None, 0]) * sequence.step_time
     apart = np.hypot(b[None, :, 1] - e[:, None, 1], b[None, :, 2] - e[:, None, 2])
     spread = _NEAR**2 + (_SPEED**2) * np.maximum(seconds, 0.0) * np.minimum(
-        np.maximum(seconds, 0.0), 4.0
+        np.maximum(seconds, 0.0), _STRAIGHT
     )
     possible = (seconds > 0.0) & (seconds <= _LONGEST)
     density = np.exp(-0.5 * apart**2 / spread) / (2.0 * np.pi * spread)

@@ -333,6 +333,7 @@ def is_answered(item: ReviewItem, corrections: Many[Correction], steps: int) -> 
     """
 
     def near(one: Place, other: Place) -> bool:
+        """Whether two places count as the same."""
         return (
             abs(one.step - other.step) <= steps
             and float(np.hypot(one.x - other.x, one.y - other.y)) <= _NEAR

@@ -19,6 +19,10 @@ seconds."""
 _LONG = 5.0
 """Time constant of the part of this probability that is due to few boxes, seconds."""
 
+_FORGOTTEN = 5.0
+"""Time constant with which the probability that a track follows another person after a gap grows
+with the gap, seconds."""
+
 _UNSEEN = 1.0
 """Longest gap without a box of any camera for which no item is made, seconds."""
 
@@ -79,7 +83,8 @@ def _clutter(run: Run, track_rows: TrackRows, track: int) -> Iterator[ReviewItem
 def _unseen(run: Run, track_rows: TrackRows, track: int) -> Iterator[Move]:
     """Yield moves at long gaps of a track, after which it may follow another person.
 
-    After a gap of t seconds the probability of this is taken as 0.4 (1 − exp(−t / 5 s)).
+    After a gap of t seconds the probability of this is taken as 0.4 (1 − exp(−t / 5 s)), with
+    :data:`_FORGOTTEN`; both numbers are estimates.
     """
     rows, tracks = track_rows.rows[track], run.tracks
     seen = np.flatnonzero(tracks.seen[rows].any(axis=1))
@@ -90,7 +95,7 @@ def _unseen(run: Run, track_rows: TrackRows, track: int) -> Iterator[Move]:
             continue
         title = f"Track {track} is gone for {seconds:.1f} s"
         why = f"no camera has it from step {before.step + 1} to {after.step - 1}"
-        wrong = 0.4 * (1.0 - np.exp(-seconds / 5.0))
+        wrong = 0.4 * (1.0 - np.exp(-seconds / _FORGOTTEN))
         # stands for both tracklets: the earlier one ends before the cut, the later begins after it
         tracklet = Tracklet(track, begin=after, end=before)
         yield Move((tracklet,), (tracklet,), "gap", _log_odds(wrong), why, title)

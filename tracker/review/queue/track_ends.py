@@ -55,7 +55,7 @@ def track_ends(run: Run, track_rows: TrackRows, asked: Collection[Place]) -> Ite
             no item is made here.
     """
     free = find_unclaimed(run)
-    yield from (_missing(run, track_rows, one) for one in free)
+    yield from (_missing(run, one) for one in free)
     near = leeway(run.sequence.step_time)
     for track in track_rows.ids.tolist():
         rows = track_rows.rows[track]
@@ -82,8 +82,16 @@ def _shown(place: Place, free: list[Unclaimed], run: Run, *, before: bool) -> bo
     return False
 
 
-def _missing(run: Run, track_rows: TrackRows, one: Unclaimed) -> ReviewItem:
-    """Return the item of a person that unclaimed boxes show."""
+def _missing(run: Run, one: Unclaimed) -> ReviewItem:
+    """Return the item of a person that unclaimed boxes show.
+
+    Boxes of n cameras that agree on a share s of the steps of t seconds are of a person with the
+    probability 0.8 s (1 − exp(−t (n − 1) / 1 s)), of which the numbers are estimates.
+
+    Args:
+        run: The run.
+        one: The person.
+    """
     seconds = len(one.places) * run.sequence.step_time
     wrong = float(0.8 * one.share * -np.expm1(-seconds * (len(one.cameras) - 1)))
     pause = max(round(_APART / run.sequence.step_time), 1)

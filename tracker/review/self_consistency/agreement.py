@@ -6,7 +6,7 @@ multi-target, multi-camera tracking", ECCV workshops 2016: IDF1.
 
 from __future__ import annotations
 
-from collections.abc import Sequence as Items
+from collections.abc import Sequence as Many
 from dataclasses import dataclass
 
 import numpy as np
@@ -141,7 +141,7 @@ def _differences_of_track(
 
 
 def disagreements(
-    found: Items[tuple[str, Items[Difference]]], step_time: float
+    found: Many[tuple[str, Many[Difference]]], step_time: float
 ) -> tuple[Disagreement, ...]:
     """Group the differences of several runs into moments, the most important first.
 

@@ -182,8 +182,8 @@ class ConstraintResolver:
                 found.append(earlier + 1 + int(np.argmax(self._jumps[between])))
         return found
 
-    def meant(self, tracklets: Paths, source_rows: Int[ndarray, " M"]) -> set[int]:
-        """The tracklets that a correction refers to.
+    def referenced_tracklets(self, tracklets: Paths, source_rows: Int[ndarray, " M"]) -> set[int]:
+        """The tracklets that any correction refers to.
 
         Args:
             tracklets: The tracklets, with M rows.

@@ -7,10 +7,7 @@ from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
 from tracker.smoothing.smoother import Fitted
-from tracker.smoothing.tracklets.motion import log_integral
-
-_BEYOND = 1e-9
-"""Share of the prior information that is left, so that a row without boxes has about 0."""
+from tracker.smoothing.tracklets.motion import PRIOR_LEFT, log_integral
 
 
 def exchange_breaks(
@@ -58,9 +55,9 @@ def exchange_log_odds(
     i, j = place[: len(one)], place[len(one) :]
     a, spread = fitted.ahead[rows], fitted.ahead_covariances[rows]
     inverse, before = np.linalg.inv(paths.covariances[rows]), np.linalg.inv(spread)
-    information = inverse - (1.0 - _BEYOND) * before
+    information = inverse - (1.0 - PRIOR_LEFT) * before
     vectors = np.einsum("nij,nj->ni", inverse, paths.states[rows])
-    vectors -= (1.0 - _BEYOND) * np.einsum("nij,nj->ni", before, a)
+    vectors -= (1.0 - PRIOR_LEFT) * np.einsum("nij,nj->ni", before, a)
     own = log_integral(a, spread, information, vectors)
     gains = log_integral(a[i], spread[i], information[j], vectors[j])
     gains += log_integral(a[j], spread[j], information[i], vectors[i])

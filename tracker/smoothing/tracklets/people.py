@@ -22,7 +22,7 @@ _AS_THE_FILTER = FusionParams()
 """The filter's default parameters, by which colours are weighted whatever the filter is set to."""
 
 _OWN = 0.7
-"""Least association probability of a box whose colours count."""
+"""Association probability above which the colours of a box count."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,6 +41,7 @@ class Appearances:
 
 
 def _embeddings(views: Steps[tuple[ViewResult, ...]]) -> list[Float[ndarray, "B A"]] | None:
+    """The embeddings of each camera's boxes; None where there are none, or of several sizes."""
     cameras = range(views.width or 0)
     shapes = {shape for c in cameras for shape in views.shapes("embeddings", c)}
     sizes = {size for (size,) in shapes if size}
@@ -59,6 +60,7 @@ def _embeddings(views: Steps[tuple[ViewResult, ...]]) -> list[Float[ndarray, "B 
 
 
 def _likenesses(views: Steps[tuple[ViewResult, ...]]) -> list[Float[ndarray, "B G"]] | None:
+    """The likelihoods of each camera's boxes for G people; None for fewer than two people."""
     cameras = range(views.width or 0)
     shapes = {shape for c in cameras for shape in views.shapes("likenesses", c)}
     people = max((size for (size,) in shapes), default=0)
