@@ -1,4 +1,4 @@
-"""Two who went on as each other are found by both lives as a whole, and settled."""
+"""Exchanged tracks are found by both paths as a whole, and split where they were exchanged."""
 
 from __future__ import annotations
 

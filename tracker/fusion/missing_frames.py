@@ -81,7 +81,13 @@ Recent = tuple[StepEvidence, ...]
 
 
 def remember(recent: Recent, latest: StepEvidence, step_time: float) -> Recent:
-    """Prepend a step to the recent ones and drop those older than :data:`LONGEST` seconds."""
+    """Prepend a step to the recent ones and drop those older than :data:`LONGEST` seconds.
+
+    Args:
+        recent: The evidence of the steps before, the latest first.
+        latest: The evidence of this step.
+        step_time: Time between two steps, seconds.
+    """
     return (latest, *recent)[: int(LONGEST / step_time + 1e-9)]
 
 

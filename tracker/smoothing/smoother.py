@@ -644,10 +644,10 @@ class Smoother:
         return _Residuals(*(np.concatenate(each) for each in zip(*parts, strict=True)))
 
     def reported(self, fitted: Fitted, links: Links, learnt: Calibration) -> Reported | None:
-        """Estimate the noise of boxes, and the covariances of paths whose boxes err so.
+        """Estimate the noise of boxes, and the covariances of paths that follow from it.
 
-        The positions stay as they are. With the shape of bodies they would be elsewhere, by δ:
-        their covariance is that of the displaced ones and δ δᵀ, their mean square error.
+        The positions do not change. With the shape of bodies they would be displaced by δ: the
+        reported covariance is that of the displaced ones plus δ δᵀ.
 
         Args:
             fitted: The paths, with N rows.
@@ -721,7 +721,7 @@ class Smoother:
             expected = target.expected(lens, states)
             at = place[used], np.full(len(used), camera)
             seen.residuals[at] = found.plain[used] / tall
-            # where all are displaced by the cameras' offsets is not told from where they are
+            # a displacement of all people cannot be distinguished from the cameras' offsets
             seen.residuals[(*at, 0)] -= learnt.offsets[camera, 0]
             seen.jacobians[at] = expected.jacobians[:, :, :3] / tall[:, :, None]
             own_shifts = self._body_shifts(camera, states, target.half_width)
@@ -744,8 +744,8 @@ class Smoother:
     ) -> tuple[Float[ndarray, " n"], Float[ndarray, " n"]]:
         """Estimate the heights of people above the floor, and their standard deviations, metres.
 
-        An offset that the boxes of all cameras have is not told from people's heights: only the
-        differences between cameras are subtracted. See
+        An offset of the boxes of all cameras cannot be distinguished from people's heights: only
+        the differences between cameras are subtracted. See
         :func:`tracker.smoothing.heights.standing_heights`.
 
         Args:

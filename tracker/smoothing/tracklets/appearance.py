@@ -48,6 +48,7 @@ class Means:
     """The mean embeddings of n tracklets in D dimensions, and the number of boxes of each."""
 
     values: Float[ndarray, "n D"]
+    """Mean embedding of each tracklet, 0 without a box."""
     counts: Float[ndarray, " n"]
     """Weighted number of boxes; 0 without any."""
 

@@ -49,6 +49,11 @@ def exchange_log_odds(
 
         g = ℓ(a_i, A_i; η_j, Λ_j) + ℓ(a_j, A_j; η_i, Λ_i) − ℓ(a_i, A_i; η_i, Λ_i)
             − ℓ(a_j, A_j; η_j, Λ_j),    ℓ = log ∫ N(x; a, A) e^{ηᵀx − ½ xᵀΛx} dx
+
+    Args:
+        fitted: The paths, fitted to their boxes.
+        one: Index of the row of path i, of each of P pairs.
+        other: Index of the row of path j, at the same step.
     """
     paths = fitted.paths
     rows, place = np.unique(np.concatenate([one, other]), return_inverse=True)

@@ -241,7 +241,14 @@ def log_integral(
     information: Float[ndarray, "P d d"],
     vectors: Float[ndarray, "P d"],
 ) -> Float[ndarray, " P"]:
-    """Compute log ∫ N(x; m, P) e^{ηᵀx − ½ xᵀΛx} dx for P Gaussians and information pairs."""
+    """Compute log ∫ N(x; m, P) e^{ηᵀx − ½ xᵀΛx} dx for P Gaussians and information pairs.
+
+    Args:
+        means: m of each Gaussian, metres and metres per second.
+        covariances: P of each Gaussian.
+        information: Λ, an information matrix for each; it may be singular.
+        vectors: η, an information vector for each.
+    """
     if not len(means):
         return np.zeros(0)
     bracket = np.eye(means.shape[1]) + information @ covariances

@@ -1,4 +1,4 @@
-"""Whose boxes bear witness to a person more, beside somebody who is surer."""
+"""Which boxes are evidence for a track beside a track of greater odds."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Who is meant by a place."""
+"""Which track a place refers to."""
 
 from __future__ import annotations
 

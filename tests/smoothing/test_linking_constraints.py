@@ -1,4 +1,4 @@
-"""The joining of pieces under what a person said: exact against all ways that obey."""
+"""Tracklets linked under constraints: the optimum of all links that satisfy them."""
 
 from __future__ import annotations
 
