@@ -22,8 +22,8 @@ from tracker.corrections.kinds import content_of, digest, leeway, make
 from tracker.corrections.lookup import TrackIndex, mostly_inside
 from tracker.corrections.merging import difference, merge
 from tracker.corrections.outcomes import Outcome, names_by_track, outcomes, supporting_corrections
-from tracker.corrections.pointing import foot_on_floor, ground_under, stands, triangulated
-from tracker.corrections.relabelling import relabelled
+from tracker.corrections.pointing import foot_on_floor, ground_under, stands, triangulate
+from tracker.corrections.relabelling import relabel
 from tracker.corrections.truth import checked_ranges, write_truth
 
 ABOVE = 1e-6
@@ -329,7 +329,7 @@ def test_a_track_rests_on_a_join_from_where_it_holds(
     steps, ids, where = standing([(1, *span) for span in spans])
     said = make(kind="same", places=places)
     rests = supporting_corrections(
-        steps, ids, where, [said], outcomes(steps, ids, where, [said], leeway=2)
+        steps, ids, [said], outcomes(steps, ids, where, [said], leeway=2)
     )
     assert [bool(name) for name in rests] == (steps >= begins).tolist()
 
@@ -343,16 +343,14 @@ def test_what_rests_on_what_ends_where_the_next_begins() -> None:
     away = make(kind="same", places=[at(4), at(5, 5.0)])
     told = [late, early, here, other, away]
     rests = np.array(
-        supporting_corrections(steps, ids, where, told, outcomes(steps, ids, where, told, leeway=2))
+        supporting_corrections(steps, ids, told, outcomes(steps, ids, where, told, leeway=2))
     )
     names = {late.id: "L", early.id: "E", here.id: "H", other.id: "D", "": "."}
     assert "".join(names[one] for one in rests[ids == 1]) == "...EEEELLL"
     assert "".join(names[one] for one in rests[ids == 2]) == "...EEDDDDD"
     assert rests[(ids == 1) & (steps == 8)] == late.id, "a later join goes over a place"
     alone = np.array(
-        supporting_corrections(
-            steps, ids, where, [here], outcomes(steps, ids, where, [here], leeway=2)
-        )
+        supporting_corrections(steps, ids, [here], outcomes(steps, ids, where, [here], leeway=2))
     )
     assert steps[alone == here.id].tolist() == [8]
 
@@ -415,7 +413,7 @@ def test_each_kind_cuts_and_joins_where_it_says(
 ) -> None:
     steps, ids, places = standing(spans)
     kind, *of = said
-    new, kept = relabelled(steps, ids, places, [make(kind=kind, places=of)], leeway=1)
+    new, kept = relabel(steps, ids, places, [make(kind=kind, places=of)], leeway=1)
     assert len(kept) == len(steps)
     assert {name: new[ids == name].tolist() for name in names} == names
     assert len(set(zip(steps.tolist(), new.tolist(), strict=True))) == len(steps)
@@ -429,7 +427,7 @@ def test_two_turn_into_each_other_where_they_are_nearest_between_both_places() -
     places[10:, 1] = apart
     for first, last, turn in ((2, 7, 5), (1, 4, 4), (5, 7, 6), (7, 9, 8), (0, 9, 8), (0, 2, 2)):
         said = make(kind="same", places=[at(first), at(last, 0.0, apart[last])])
-        new, _ = relabelled(steps, ids, places, [said], leeway=1)
+        new, _ = relabel(steps, ids, places, [said], leeway=1)
         one = new[:10]
         assert one[first] == new[10 + last]
         assert (new[10 + turn :] == one[first]).all(), (first, last)
@@ -443,14 +441,14 @@ def test_one_path_is_parted_before_its_longest_way_in_between() -> None:
     steps, ids = np.arange(8), np.ones(8, dtype=np.int64)
     for first, last, cut in ((0, 7, 7), (0, 6, 2), (2, 6, 4), (1, 2, 2), (4, 6, 5), (1, 5, 2)):
         said = make(kind="different", places=[at(first, x[first]), at(last, x[last])])
-        new, _ = relabelled(steps, ids, places, [said], leeway=1)
+        new, _ = relabel(steps, ids, places, [said], leeway=1)
         assert np.flatnonzero(np.diff(new)).tolist() == [cut - 1], (first, last)
 
 
 def test_who_was_nobody_is_gone_from_the_first_row_along_it_to_the_last() -> None:
     steps, ids, places = standing([(1, 0, 9), (2, 0, 9)])
     places[(ids == 1) & (steps == 4), 0] = 3.0  # a step aside in between is nobody, too
-    new, kept = relabelled(steps, ids, places, [nobody(2, 6)], leeway=1)
+    new, kept = relabel(steps, ids, places, [nobody(2, 6)], leeway=1)
     gone = np.setdiff1d(np.arange(20), kept)
     assert steps[gone].tolist() == [2, 3, 4, 5, 6]
     assert set(ids[gone]) == {1}
@@ -508,9 +506,9 @@ def test_rays_that_miss_each_other_by_half_a_metre_show_two_points(
     ]
     if refused:
         with pytest.raises(CorrectionError, match=r"0\.5 m apart"):
-            triangulated(clicks)
+            triangulate(clicks)
     else:
-        assert triangulated(clicks) == pytest.approx([0.0, 0.0, 1.0], abs=1e-6)
+        assert triangulate(clicks) == pytest.approx([0.0, 0.0, 1.0], abs=1e-6)
 
 
 def test_the_place_of_clicks_is_nearest_to_all_rays() -> None:
@@ -525,7 +523,7 @@ def test_the_place_of_clicks_is_nearest_to_all_rays() -> None:
         )
         for camera in cameras
     ]
-    found = triangulated(clicks)
+    found = triangulate(clicks)
 
     def miss(place: ndarray) -> float:
         total = 0.0

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from tests import world
 from tracker.corrections import CorrectionError
-from tracker.corrections.pointing import foot_on_floor, ground_under, stands, triangulated
+from tracker.corrections.pointing import foot_on_floor, ground_under, stands, triangulate
 
 CAMERAS = world.ring(3, distortion=world.BARREL)
 _SPOTS = st.tuples(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0))
@@ -48,7 +48,7 @@ def test_a_click_goes_to_what_the_target_stands_on(
 def test_two_clicks_on_one_point_are_that_point(spot: tuple[float, float], height: float) -> None:
     point = np.array([[*spot, height]])
     clicks = [(camera, tuple(camera.project(point)[0][0].tolist())) for camera in CAMERAS[:2]]
-    assert triangulated(clicks) == pytest.approx(point[0], abs=1e-3)
+    assert triangulate(clicks) == pytest.approx(point[0], abs=1e-3)
 
 
 def test_what_says_nothing_of_a_place_is_refused() -> None:
@@ -58,9 +58,9 @@ def test_what_says_nothing_of_a_place_is_refused() -> None:
         foot_on_floor(camera, (float(high[0]), float(high[1])), floor=0.0, half_height=0.9)
     one = (camera, tuple(camera.project(np.array([[0.0, 0.0, 1.0]]))[0][0].tolist()))
     with pytest.raises(CorrectionError, match="in each of two"):
-        triangulated([one])
+        triangulate([one])
     with pytest.raises(CorrectionError, match="same side"):
-        triangulated([one, one])
+        triangulate([one, one])
 
 
 @pytest.mark.parametrize(("angle", "refused"), [(0.03, True), (0.05, False), (0.2, False)])
@@ -74,6 +74,6 @@ def test_two_pictures_from_nearly_the_same_side_are_refused(angle: float, refuse
     clicks = [(one, tuple(one.project(point[None])[0][0].tolist())) for one in cameras]
     if refused:
         with pytest.raises(CorrectionError, match="same side"):
-            triangulated(clicks)
+            triangulate(clicks)
     else:
-        assert triangulated(clicks) == pytest.approx(point, abs=1e-6)
+        assert triangulate(clicks) == pytest.approx(point, abs=1e-6)

@@ -12,7 +12,7 @@ from numpy import ndarray
 from tracker.corrections import Correction
 from tracker.corrections.kinds import make
 from tracker.corrections.outcomes import outcomes
-from tracker.corrections.relabelling import relabelled
+from tracker.corrections.relabelling import relabel
 
 STEPS, LEEWAY = 60, 5
 
@@ -58,11 +58,11 @@ def said(draw: st.DrawFn) -> Correction:
 @given(st.lists(said(), max_size=5))
 def test_only_who_is_who_changes(told: list[Correction]) -> None:
     steps, ids, places = walkers(4)
-    new, kept = relabelled(steps, ids, places, told, leeway=LEEWAY)
+    new, kept = relabel(steps, ids, places, told, leeway=LEEWAY)
     pairs = list(zip(steps[kept].tolist(), new[kept].tolist(), strict=True))
     assert len(set(pairs)) == len(pairs), "a track is at one place at a step"
     assert (np.diff(kept) > 0).all()
-    again, still = relabelled(steps, ids, places, told, leeway=LEEWAY)
+    again, still = relabel(steps, ids, places, told, leeway=LEEWAY)
     assert (again == new).all()
     assert (still == kept).all()
 
@@ -75,9 +75,9 @@ def partition(steps: ndarray, ids: ndarray, kept: ndarray) -> set[tuple[int, ...
 @given(said())
 def test_what_was_made_to_hold_is_not_made_to_hold_again(one: Correction) -> None:
     steps, ids, places = walkers(4)
-    new, kept = relabelled(steps, ids, places, [one], leeway=LEEWAY)
+    new, kept = relabel(steps, ids, places, [one], leeway=LEEWAY)
     own = steps[kept], new[kept], places[kept]
-    again, still = relabelled(*own, [one], leeway=LEEWAY)
+    again, still = relabel(*own, [one], leeway=LEEWAY)
     assert len(still) == len(kept)
     every = np.arange(len(kept))
     assert partition(own[0], again, every) == partition(own[0], own[1], every)
@@ -101,7 +101,7 @@ def test_the_order_of_those_that_speak_of_different_people_does_not_matter(
         mixed.append((left if not right or (left and order.random() < 0.5) else right).pop(0))
     found = []
     for told in ([*first, *other], [*other, *first], mixed):
-        new, kept = relabelled(steps, ids, places, told, leeway=LEEWAY)
+        new, kept = relabel(steps, ids, places, told, leeway=LEEWAY)
         became = outcomes(steps[kept], new[kept], places[kept], told, leeway=LEEWAY)
         met = {one.id: one.met for one in became}
         found.append((partition(steps, new, kept), kept.tolist(), met))
@@ -125,7 +125,7 @@ def test_each_kind_is_met_alone() -> None:
         make(kind="name", places=[at(3, 25)], name="Anna"),
         make(kind="checked", first=0, last=9),
     ):
-        new, kept = relabelled(steps, ids, places, [one], leeway=LEEWAY)
+        new, kept = relabel(steps, ids, places, [one], leeway=LEEWAY)
         found = outcomes(steps[kept], new[kept], places[kept], [one], leeway=LEEWAY)
         assert found[0].met, (one.words, found)
         before = outcomes(steps, ids, places, [one], leeway=LEEWAY)
@@ -137,7 +137,7 @@ def test_each_kind_is_met_alone() -> None:
 def test_an_exchange_and_its_way_back_touch_what_is_between() -> None:
     steps, ids, places = walkers(2)
     told = [exchanged(1, 2, 20), exchanged(1, 2, 40)]
-    new, _ = relabelled(steps, ids, places, told, leeway=LEEWAY)
+    new, _ = relabel(steps, ids, places, told, leeway=LEEWAY)
     between = (steps >= 20) & (steps < 40)
     assert (new[~between] == ids[~between]).all()
     assert (new[between] == 3 - ids[between]).all()
@@ -146,7 +146,7 @@ def test_an_exchange_and_its_way_back_touch_what_is_between() -> None:
 def test_who_is_not_found_is_told_and_changes_nothing() -> None:
     steps, ids, places = walkers(2)
     told = [make(kind="same", places=[[3, 90.0, 0.0, 0.9], at(1, 9)])]
-    new, kept = relabelled(steps, ids, places, told, leeway=LEEWAY)
+    new, kept = relabel(steps, ids, places, told, leeway=LEEWAY)
     assert (new == ids).all()
     assert len(kept) == len(ids)
     found = outcomes(steps, ids, places, told, leeway=LEEWAY)[0]
@@ -157,7 +157,7 @@ def test_who_is_not_found_is_told_and_changes_nothing() -> None:
 def test_nobody_at_all() -> None:
     nothing = np.zeros(0, dtype=np.int64)
     told = [exchanged(1, 2, 20), make(kind="nobody", places=[at(1, 0)])]
-    new, kept = relabelled(nothing, nothing, np.zeros((0, 3)), told, leeway=LEEWAY)
+    new, kept = relabel(nothing, nothing, np.zeros((0, 3)), told, leeway=LEEWAY)
     assert len(new) == len(kept) == 0
     found = outcomes(nothing, nothing, np.zeros((0, 3)), told, leeway=LEEWAY)
     assert [one.met for one in found] == [False, True]
@@ -166,6 +166,6 @@ def test_nobody_at_all() -> None:
 def test_an_exchange_of_whom_one_is_not_there_changes_nothing() -> None:
     steps, ids, places = walkers(3)
     told = make(kind="exchanged", places=[at(1, 9), at(7, 9), at(2, 10), at(1, 10)])
-    found, kept = relabelled(steps, ids, places, [told], leeway=LEEWAY)
+    found, kept = relabel(steps, ids, places, [told], leeway=LEEWAY)
     assert found.tolist() == ids.tolist()
     assert kept.tolist() == list(range(len(ids)))

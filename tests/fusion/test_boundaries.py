@@ -32,8 +32,8 @@ from tracker.fusion.model import FusionModel, all_boxes
 from tracker.fusion.multi_bernoulli import MultiBernoulli, MultiBernoulliState
 from tracker.fusion.place_constraints import constraints_by_step
 from tracker.fusion.protocol import FusionResult
-from tracker.fusion.record import Ledger, Record, summed
-from tracker.fusion.reidentification import Identities
+from tracker.fusion.record import Ledger, Record, sum_associations
+from tracker.fusion.reidentification import IdentityBeliefs
 from tracker.fusion.sequential_phd import SequentialPhd, SequentialPhdState
 from tracker.fusion.target_model import TargetModel
 from tracker.fusion.trajectories import Bounds, by_boxes, extract
@@ -335,7 +335,7 @@ def test_pairs_are_recorded_from_one_per_cent_on_and_summed_by_label() -> None:
     assert len(Ledger().associations(np.array([1])).cameras) == 0
     assert len(ledger.associations(np.zeros(0, dtype=np.int64)).cameras) == 0
     nothing = np.zeros(0, dtype=np.int64)
-    assert len(summed(np.array([1]), nothing, nothing, nothing, np.zeros(0)).cameras) == 0
+    assert len(sum_associations(np.array([1]), nothing, nothing, nothing, np.zeros(0)).cameras) == 0
     blank = Record.blank(2, 1).extended(2)
     assert blank.sources.tolist() == [[-1] * 3] * 2
     assert blank.hidden_by.tolist() == [[-1] * 3] * 2
@@ -386,7 +386,7 @@ def test_a_stated_place_updates_whom_it_means_or_begins_somebody() -> None:
     assert found.weights.tolist() == [pytest.approx(0.999), 0.9]
     assert_array_equal(found.means[1], mixture.means[1])
     spread = 0.01 + 0.04
-    edge = float(np.sqrt(MODEL.gate_of_places * spread))
+    edge = float(np.sqrt(MODEL.place_gate * spread))
     assert MODEL.near < edge
     for x, size in ((-edge + 1e-3, 2), (-edge - 1e-3, 3)):
         found, free = said(x)
@@ -412,7 +412,7 @@ def test_a_place_above_a_person_is_somebody_elses_from_their_height_on(
     told = constraints_by_step(
         [make(kind="here", places=[[0, 0.0, 0.0, 0.85 + up]], accuracy=0.2)]
     )[0]
-    assert up**2 / (0.01 + 0.04) > MODEL.gate_of_places
+    assert up**2 / (0.01 + 0.04) > MODEL.place_gate
     found, _, _ = apply_constraints(
         people((3, 0.6, 0.0)), Record.blank(4, 1), told, MODEL, first_new_label=9, next_label=9
     )
@@ -462,7 +462,7 @@ def test_two_sure_components_of_one_label_are_two_people(other: float, parted: b
 def test_a_target_is_above_the_threshold(weight: float, there: bool) -> None:
     fusion, nobody = MultiBernoulli(empty_room(), RunParameters()), GaussianMixture.empty(6)
     state = MultiBernoulliState(
-        people((4, 0.9, 0.0)), nobody, 50, Memory.start(6), Identities.none()
+        people((4, 0.9, 0.0)), nobody, 50, Memory.start(6), IdentityBeliefs.none()
     )
     _, result = fusion.step(state, (NO_FRAME,) * 4)
     exactly = replace(result, posterior=replace(result.posterior, weights=np.array([weight])))

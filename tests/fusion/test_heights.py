@@ -14,11 +14,11 @@ from tests import world
 from tests.fusion.rooms import filtered
 from tests.random_rooms import looking_camera
 from tracker.filters.gaussian_mixture import GaussianMixture
-from tracker.fusion.heights import Heights
+from tracker.fusion.heights import HeightBounds
 from tracker.fusion.multi_bernoulli import MultiBernoulli
 from tracker.single_view.protocol import ViewResult
 
-BOUNDS = Heights(0.4, 1.6, 0.1)
+BOUNDS = HeightBounds(0.4, 1.6, 0.1)
 
 
 def track(height: float, sigma: float, along: float = 0.0) -> GaussianMixture:
@@ -33,7 +33,7 @@ def track(height: float, sigma: float, along: float = 0.0) -> GaussianMixture:
     )  # fmt: skip
 
 
-def integrated(height: float, sigma: float, bounds: Heights) -> tuple[float, float]:
+def integrated(height: float, sigma: float, bounds: HeightBounds) -> tuple[float, float]:
     """Mean and variance of the density that is ``outside`` as large beyond the bounds."""
     z = np.linspace(height - 9.0 * sigma, height + 9.0 * sigma, 400_001)
     density = norm.pdf(z, height, sigma)
@@ -51,7 +51,7 @@ def integrated(height: float, sigma: float, bounds: Heights) -> tuple[float, flo
 def test_the_moments_are_those_of_the_truncated_density(
     height: float, sigma: float, outside: float
 ) -> None:
-    bounds = Heights(0.4, 1.6, outside)
+    bounds = HeightBounds(0.4, 1.6, outside)
     after = bounds.truncate(track(height, sigma))
     if min(height - 0.4, 1.6 - height) >= sigma:
         assert_array_equal(after.means, track(height, sigma).means)
@@ -85,14 +85,14 @@ def test_a_certain_height_stays_beyond_the_bounds_and_between_them(height: float
 
 def test_without_density_outside_a_height_far_beyond_the_bounds_stays_as_it_is() -> None:
     before = track(-5.0, 0.1)
-    after = Heights(0.4, 1.6, 0.0).truncate(before)
+    after = HeightBounds(0.4, 1.6, 0.0).truncate(before)
     assert_array_equal(after.means, before.means)
     assert_array_equal(after.covariances, before.covariances)
 
 
 def test_no_tracks_and_a_room_lower_than_its_targets() -> None:
     assert BOUNDS.truncate(GaussianMixture.empty(6)).size == 0
-    low = Heights.of(world.volume(), 5.0, 0.1)
+    low = HeightBounds.of(world.volume(), 5.0, 0.1)
     assert low.low == low.high == 5.0
     assert np.isfinite(low.truncate(track(0.2, 0.5)).means).all()
 

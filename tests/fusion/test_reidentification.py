@@ -13,15 +13,15 @@ from tests.fusion.rooms import NO_BOXES, exact, filtered
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion.multi_bernoulli import MultiBernoulli
 from tracker.fusion.protocol import Associations
-from tracker.fusion.reidentification import Identities, reidentify, resemblance
+from tracker.fusion.reidentification import IdentityBeliefs, appearance_ratios, reidentify
 from tracker.single_view.protocol import ViewResult
 
 NOBODY = np.zeros(0, dtype=np.int64)
 
 
 def step(
-    names: Identities, labels: list[int], looks: list[list[float]], seconds: float = 0.2
-) -> tuple[dict[int, int], Identities]:
+    names: IdentityBeliefs, labels: list[int], looks: list[list[float]], seconds: float = 0.2
+) -> tuple[dict[int, int], IdentityBeliefs]:
     """One camera sees one box of each sure track, with these likenesses."""
     count = len(labels)
     boxes = np.ones((count, 4))
@@ -38,8 +38,8 @@ def step(
 
 
 def watched(
-    names: Identities, labels: list[int], looks: list[list[float]], steps: int
-) -> Identities:
+    names: IdentityBeliefs, labels: list[int], looks: list[list[float]], steps: int
+) -> IdentityBeliefs:
     """Many steps in which no label changes."""
     for _ in range(steps):
         renamed, names = step(names, labels, looks)
@@ -51,7 +51,7 @@ FIRST, SECOND, EITHER = [0.95, 0.05], [0.05, 0.95], [0.5, 0.5]
 
 
 def test_who_returns_after_long_absence_gets_his_label_back_once_it_is_sure() -> None:
-    names = watched(Identities.none(), [1, 2], [FIRST, SECOND], 30)
+    names = watched(IdentityBeliefs.none(), [1, 2], [FIRST, SECOND], 30)
     assert names.owners.tolist() == [1, 2]
     names = watched(names, [2], [SECOND], 300)
     renamed, names = step(names, [2, 7], [SECOND, FIRST])
@@ -64,13 +64,13 @@ def test_who_returns_after_long_absence_gets_his_label_back_once_it_is_sure() ->
 
 
 def test_a_stranger_is_not_named_by_exclusion() -> None:
-    names = watched(Identities.none(), [1, 2], [FIRST, SECOND], 30)
+    names = watched(IdentityBeliefs.none(), [1, 2], [FIRST, SECOND], 30)
     names = watched(names, [2], [SECOND], 20)
     watched(names, [2, 7], [SECOND, EITHER], 100)
 
 
 def test_two_tracks_that_were_exchanged_are_exchanged_back() -> None:
-    names = watched(Identities.none(), [1, 2], [FIRST, SECOND], 20)
+    names = watched(IdentityBeliefs.none(), [1, 2], [FIRST, SECOND], 20)
     renamed: dict[int, int] = {}
     for _ in range(60):
         renamed, names = step(names, [1, 2], [SECOND, FIRST])
@@ -81,10 +81,10 @@ def test_two_tracks_that_were_exchanged_are_exchanged_back() -> None:
 
 
 def test_who_is_known_by_his_colours_is_likelier_to_make_a_box_that_has_them() -> None:
-    names = watched(Identities.none(), [1, 2], [FIRST, SECOND], 40)
+    names = watched(IdentityBeliefs.none(), [1, 2], [FIRST, SECOND], 40)
     view = ViewResult.of_boxes(np.ones((3, 4)), np.ones(3), np.ones((3, 4)))
     view = replace(view, likenesses=np.array([FIRST, SECOND, EITHER]))
-    alike = resemblance(names, np.array([2, 1, 9]), [view, view])
+    alike = appearance_ratios(names, np.array([2, 1, 9]), [view, view])
     assert alike.shape == (3, 6)
     own = np.exp(names.log_beliefs[1]) / np.exp(names.log_beliefs[1]).sum()
     assert alike[0, :3] == pytest.approx(
@@ -99,18 +99,18 @@ def test_who_is_known_by_his_colours_is_likelier_to_make_a_box_that_has_them() -
 
 def test_without_pictures_nobody_is_known_by_looks() -> None:
     view = ViewResult.of_boxes(np.ones((2, 4)), np.ones(2), np.ones((2, 4)))
-    assert resemblance(Identities.none(), np.array([1]), [view]).shape == (0, 2)
-    names = watched(Identities.none(), [1, 2], [FIRST, SECOND], 20)
-    assert resemblance(names, np.array([1, 2]), [view]) == pytest.approx(1.0)
+    assert appearance_ratios(IdentityBeliefs.none(), np.array([1]), [view]).shape == (0, 2)
+    names = watched(IdentityBeliefs.none(), [1, 2], [FIRST, SECOND], 20)
+    assert appearance_ratios(names, np.array([1, 2]), [view]) == pytest.approx(1.0)
 
 
 def test_people_who_look_alike_keep_their_labels() -> None:
-    names = watched(Identities.none(), [1, 2], [EITHER, EITHER], 200)
+    names = watched(IdentityBeliefs.none(), [1, 2], [EITHER, EITHER], 200)
     assert names.owners.tolist() == [-1, -1]
 
 
 def test_a_track_is_named_once_the_odds_are_twenty_to_one() -> None:
-    names, named = Identities.none(), []
+    names, named = IdentityBeliefs.none(), []
     for _ in range(12):
         _, names = step(names, [1], [FIRST])
         named.append(bool(names.owners[0] == 1))
@@ -120,7 +120,7 @@ def test_a_track_is_named_once_the_odds_are_twenty_to_one() -> None:
 
 
 def test_looks_that_nobody_renews_are_forgotten_at_the_rate_of_the_leak() -> None:
-    names = watched(Identities.none(), [1, 2], [FIRST, SECOND], 30)
+    names = watched(IdentityBeliefs.none(), [1, 2], [FIRST, SECOND], 30)
 
     def share() -> float:
         """π of the first person in the first track's looks."""
@@ -135,7 +135,7 @@ def test_looks_that_nobody_renews_are_forgotten_at_the_rate_of_the_leak() -> Non
 
 
 def test_no_evidence_lasts_for_ever() -> None:
-    soon = watched(Identities.none(), [1, 2], [FIRST, SECOND], 200)
+    soon = watched(IdentityBeliefs.none(), [1, 2], [FIRST, SECOND], 200)
     late = watched(soon, [1, 2], [FIRST, SECOND], 400)
     odds = [float(np.ptp(names.log_beliefs[0])) for names in (soon, late)]
     assert odds[1] == pytest.approx(odds[0], abs=0.01)
@@ -145,7 +145,7 @@ def test_no_evidence_lasts_for_ever() -> None:
 def test_pictures_of_one_moment_count_as_one_look() -> None:
     odds = []
     for seconds in (0.02, 0.1):
-        names = Identities.none()
+        names = IdentityBeliefs.none()
         for _ in range(round(1.0 / seconds)):
             _, names = step(names, [1, 2], [FIRST, SECOND], seconds)
         odds.append(float(np.ptp(names.log_beliefs[0])))
@@ -154,7 +154,7 @@ def test_pictures_of_one_moment_count_as_one_look() -> None:
 
 def test_without_two_people_to_tell_apart_nothing_is_done() -> None:
     for looks in ([[1.0], [1.0]], [[], []]):
-        renamed, names = step(Identities.none(), [1, 2], looks)
+        renamed, names = step(IdentityBeliefs.none(), [1, 2], looks)
         assert renamed == {}
         assert len(names.labels) == 0
 
@@ -162,7 +162,7 @@ def test_without_two_people_to_tell_apart_nothing_is_done() -> None:
 @given(st.integers(0, 10_000))
 def test_labels_stay_unique_and_what_is_kept_is_bounded(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    names, labels, free = Identities.none(), [1, 2, 3], 4
+    names, labels, free = IdentityBeliefs.none(), [1, 2, 3], 4
     for _ in range(25):
         looks = rng.dirichlet([0.3, 0.3, 0.3], len(labels)).tolist()
         renamed, names = step(names, labels, looks, seconds=0.5)

@@ -32,7 +32,7 @@ from tracker.fusion.memory import Memory
 from tracker.fusion.model import FusionModel
 from tracker.fusion.multi_bernoulli import MultiBernoulli, MultiBernoulliState
 from tracker.fusion.protocol import FusionResult
-from tracker.fusion.reidentification import Identities
+from tracker.fusion.reidentification import IdentityBeliefs
 from tracker.fusion.sequential_phd import SequentialPhd, SequentialPhdState
 from tracker.parameters.catalogue import PRESETS, RunParameters
 from tracker.parameters.groups.fusion import FusionParams
@@ -53,7 +53,7 @@ def known(
     if method is SequentialPhd:
         return SequentialPhdState(tracks, next_label, Memory.start(6))
     nobody = GaussianMixture.empty(6)
-    return MultiBernoulliState(tracks, nobody, next_label, Memory.start(6), Identities.none())
+    return MultiBernoulliState(tracks, nobody, next_label, Memory.start(6), IdentityBeliefs.none())
 
 
 def three_walkers(steps: int = 5, misses: float = 0.05, clutter: float = 0.5) -> list[Step]:
@@ -390,7 +390,9 @@ def test_people_are_followed_to_the_margin_around_the_room(axis: int, side: floa
     edge = (ROOM.maximum if side > 0 else ROOM.minimum)[axis] + side * margin
     places = np.tile([0.3, 0.2, 0.85], (2, 1))
     places[:, axis] = edge - side * 1e-9, edge + side * 1e-9
-    assert FusionModel(empty_room(), FusionParams()).stays(world.gaussians(places)).tolist() == [0]
+    assert FusionModel(empty_room(), FusionParams()).inside_tracked_volume(
+        world.gaussians(places)
+    ).tolist() == [0]
 
 
 # ── what every step reports

@@ -8,7 +8,7 @@ from tests.papers.laboratory.answering import Truthful
 from tracker.corrections import Place
 from tracker.fusion.trajectories import Trajectories
 from tracker.review.queue import Alternative, ReviewItem
-from tracker.review.queue.item import proposed
+from tracker.review.queue.item import propose
 from tracker.sequences.sequence import GroundTruth
 
 
@@ -49,15 +49,15 @@ def test_what_says_most_is_answered_and_somebody_is_not_nobody() -> None:
     a, b, c, d = at(0, 0.0), at(0, 5.0), at(9, 0.0), at(9, 5.0)
 
     def asked(*others: Alternative) -> ReviewItem:
-        now = Alternative("as it is", 0.5, proposed("same", (a, c)))
+        now = Alternative("as it is", 0.5, propose("same", (a, c)))
         return ReviewItem("exchange", "", "", 0, 9, (1, 2), (a, c), 0.5, 1, (now, *others))
 
-    apart = Alternative("two people", 0.3, proposed("different", (a, c)))
-    exchanged = Alternative("exchanged", 0.2, proposed("exchanged", (a, b, d, c)))
+    apart = Alternative("two people", 0.3, propose("different", (a, c)))
+    exchanged = Alternative("exchanged", 0.2, propose("exchanged", (a, b, d, c)))
     assert person.wrong(asked(apart))
     assert [one.kind for one in person.answer(asked(apart, exchanged))] == ["exchanged"]
-    assert person.holds(proposed("different", (a, at(9, 20.0)))[0])
-    assert not person.holds(proposed("same", (a, at(9, 20.0)))[0])
+    assert person.holds(propose("different", (a, at(9, 20.0)))[0])
+    assert not person.holds(propose("same", (a, at(9, 20.0)))[0])
 
 
 def test_whose_a_track_is_a_film_of_the_moment_tells() -> None:

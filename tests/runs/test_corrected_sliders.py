@@ -57,9 +57,7 @@ def test_rows_that_rest_on_a_correction_name_it() -> None:
     lost = make(kind="same", places=[[3, 90.0, 0.0, 1.0], [9, 90.0, 0.0, 1.0]])
     run = run_of(whole, (same, here, lost))
     tracks = run.tracks
-    found = supporting_corrections(
-        tracks.frames, tracks.ids, tracks.positions, run.corrections, run.outcomes
-    )
+    found = supporting_corrections(tracks.frames, tracks.ids, run.corrections, run.outcomes)
     assert set(found) == {"", same.id, here.id}
     own = [
         step for step, name in zip(tracks.frames.tolist(), found, strict=True) if name == same.id

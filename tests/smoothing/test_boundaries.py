@@ -11,10 +11,14 @@ from scipy.stats import multivariate_normal
 from tracker.corrections.constraints import Constraints
 from tracker.filters.models import Motion
 from tracker.parameters.groups.fusion import FusionParams
-from tracker.smoothing.lifetimes import independence
+from tracker.smoothing.lifetimes import independent_share
 from tracker.smoothing.paths import Paths, same_label
 from tracker.smoothing.smoother import Fitted
-from tracker.smoothing.tracklets.constraints import limits, parted, possible
+from tracker.smoothing.tracklets.constraints import (
+    combine_constraints,
+    existence_spans,
+    split_by_gap,
+)
 from tracker.smoothing.tracklets.motion import Ends, Pairs, log_integral, motion_gains, near_pairs
 
 PRIOR = np.diag([100.0] * 3 + [0.49] * 3)
@@ -72,7 +76,7 @@ def test_a_piece_goes_on_under_its_label_as_the_next_that_does_not_overlap() -> 
 @pytest.mark.parametrize(("gap", "near"), [(10, True), (11, False)])
 def test_a_constraint_over_the_longest_gap_is_one_over_a_short_gap(gap: int, near: bool) -> None:
     cut = standing((1, 0, 4, 0.0), (2, 4 + gap, 30, 0.0))
-    now, later = parted(Constraints(must_link=((0, 1),), cannot_link=((0, 1),)), cut, 10)
+    now, later = split_by_gap(Constraints(must_link=((0, 1),), cannot_link=((0, 1),)), cut, 10)
     assert now.must_link == (((0, 1),) if near else ())
     assert later.must_link == (() if near else ((0, 1),))
     assert now.cannot_link == later.cannot_link == ((0, 1),)
@@ -81,22 +85,25 @@ def test_a_constraint_over_the_longest_gap_is_one_over_a_short_gap(gap: int, nea
 def test_pieces_of_one_person_follow_one_another() -> None:
     firsts = np.array([0, 5, 6])
     for last, together in ((4, ((0, 1),)), (5, ())):
-        found = possible(firsts, np.array([last, 8, 9]), [Constraints(((0, 1),))])
+        found = combine_constraints(firsts, np.array([last, 8, 9]), [Constraints(((0, 1),))])
         assert found is not None
         assert found.must_link == together
-    assert possible(firsts, np.array([5, 8, 9]), [Constraints(((0, 1),))], strict=True) is None
+    assert (
+        combine_constraints(firsts, np.array([5, 8, 9]), [Constraints(((0, 1),))], strict=True)
+        is None
+    )
 
 
 def test_who_is_not_somebody_else_ends_before_that_one_begins() -> None:
     cut = standing((1, 0, 4, 0.0), (2, 8, 9, 0.0), (3, 2, 6, 0.0))
     apart = Constraints(cannot_link=((1, 0), (0, 2)))
-    assert limits(apart, [[0], [1], [2]], cut) == {
+    assert existence_spans(apart, [[0], [1], [2]], cut) == {
         0: (0, 7), 1: (5, int(np.iinfo(np.int64).max))
     }  # fmt: skip
     own = Constraints(firsts=frozenset({1}), lasts=frozenset({0}))
-    assert limits(own, [[0], [1]], cut)[0] == (0, 4)
-    assert limits(own, [[0], [1]], cut)[1][0] == 8
-    assert limits(own, [[0, 1]], cut) == {0: (0, int(np.iinfo(np.int64).max))}
+    assert existence_spans(own, [[0], [1]], cut)[0] == (0, 4)
+    assert existence_spans(own, [[0], [1]], cut)[1][0] == 8
+    assert existence_spans(own, [[0, 1]], cut) == {0: (0, int(np.iinfo(np.int64).max))}
 
 
 # ── what a link is worth
@@ -162,4 +169,4 @@ def test_the_first_pieces_own_prior_is_not_evidence() -> None:
 def test_the_share_of_new_evidence_is_a_steps_time_over_the_memory(
     step_time: float, memory: float, share: float
 ) -> None:
-    assert independence(step_time, memory) == pytest.approx(share)
+    assert independent_share(step_time, memory) == pytest.approx(share)

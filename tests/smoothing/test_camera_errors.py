@@ -20,7 +20,7 @@ from tracker.smoothing.camera_errors import (
     FACTOR,
     CameraErrors,
     estimate_camera_errors,
-    significance,
+    significant_deviations,
 )
 from tracker.smoothing.noise import NoiseModel, NoiseSample, SureBoxes
 from tracker.smoothing.paths import Paths
@@ -135,7 +135,7 @@ def test_of_two_cameras_none_is_out_of_line() -> None:
 
 @pytest.mark.parametrize(("cameras", "normal"), [(1, 2.5758), (4, 3.0233)])
 def test_the_bound_of_delays_counts_cameras_and_both_sides(cameras: int, normal: float) -> None:
-    assert significance(cameras) == pytest.approx(normal, abs=1e-3)
+    assert significant_deviations(cameras) == pytest.approx(normal, abs=1e-3)
 
 
 def test_notes_say_where_a_camera_lost_frames_as_the_check_says_it() -> None:

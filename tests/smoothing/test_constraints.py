@@ -15,8 +15,8 @@ from tracker.corrections.kinds import make
 from tracker.smoothing.paths import Paths
 from tracker.smoothing.tracklets.constraints import (
     ConstraintResolver,
-    of_chains,
-    possible,
+    combine_constraints,
+    constraints_on_chains,
 )
 
 PATHS = standing((1, 0, 9, 0.0), (2, 0, 9, 5.0), (3, 14, 19, 0.0))
@@ -127,11 +127,11 @@ def test_two_who_exchange_are_tied_across_and_parted() -> None:
 def test_all_pieces_that_are_spoken_of_are_meant() -> None:
     cut, kept = pieces()
     told = [said("same", at(8), at(15)), said("here", at(4)), said("nobody", at(0), at(2))]
-    assert resolver(*told).meant(cut, kept) == {0, 1, 2, 4}
-    assert resolver(said("same", at(8), at(15, 2.0))).meant(cut, kept) == {2}
+    assert resolver(*told).referenced_tracklets(cut, kept) == {0, 1, 2, 4}
+    assert resolver(said("same", at(8), at(15, 2.0))).referenced_tracklets(cut, kept) == {2}
     nothing = np.zeros(0, dtype=np.int64)
     empty = Paths.of([], [], [], [], 6)
-    assert resolver(*told).meant(empty, nothing) == set()
+    assert resolver(*told).referenced_tracklets(empty, nothing) == set()
 
 
 def test_limits_and_ties_of_chains_are_those_of_their_pieces() -> None:
@@ -139,17 +139,17 @@ def test_limits_and_ties_of_chains_are_those_of_their_pieces() -> None:
     constraints = Constraints(
         must_link=((2, 4),), cannot_link=((0, 3),), firsts=frozenset({0}), lasts=frozenset({4})
     )
-    found = of_chains(constraints, [[0, 1], [2], [3], [4]], cut)
+    found = constraints_on_chains(constraints, [[0, 1], [2], [3], [4]], cut)
     assert found is not None
     assert (found.must_link, found.cannot_link) == (((1, 3),), ((0, 2),))
     assert (found.firsts, found.lasts) == ({0}, {3})
     assert found.targets == {0, 1, 3}
     # who is in no chain says nothing; two of one person's that overlap cannot both be
     assert (
-        of_chains(Constraints(cannot_link=((0, 3),), firsts=frozenset({3})), [[0]], cut)
+        constraints_on_chains(Constraints(cannot_link=((0, 3),), firsts=frozenset({3})), [[0]], cut)
         == Constraints()
     )
-    assert of_chains(Constraints(must_link=((0, 3),)), [[0], [3]], cut) is None
+    assert constraints_on_chains(Constraints(must_link=((0, 3),)), [[0], [3]], cut) is None
 
 
 @pytest.mark.parametrize(
@@ -163,22 +163,22 @@ def test_one_constraint_of_any_kind_is_something_to_obey(kind: str) -> None:
 
 def test_one_person_is_in_one_place_whatever_the_order_of_pairs() -> None:
     firsts, lasts = np.array([0, 5, 10, 7]), np.array([4, 9, 14, 12])
-    found = possible(firsts, lasts, [Constraints(((1, 2),)), Constraints(((0, 2),))])
+    found = combine_constraints(firsts, lasts, [Constraints(((1, 2),)), Constraints(((0, 2),))])
     assert found is not None
     assert found.must_link == ((0, 1), (1, 2))
     # the fourth overlaps two of them
-    assert possible(firsts, lasts, [Constraints(((0, 1),)), Constraints(((0, 3),))]) == Constraints(
-        ((0, 1),), targets=frozenset({0, 1})
-    )
+    assert combine_constraints(
+        firsts, lasts, [Constraints(((0, 1),)), Constraints(((0, 3),))]
+    ) == Constraints(((0, 1),), targets=frozenset({0, 1}))
     # two of one person who are told apart later, and two who are told apart joined by a third
-    later = possible(
+    later = combine_constraints(
         firsts,
         lasts,
         [Constraints(((0, 1),)), Constraints(((1, 2),)), Constraints(cannot_link=((0, 2),))],
     )
     assert later is not None
     assert (later.cannot_link, later.must_link) == ((), ((0, 1), (1, 2)))
-    first = possible(
+    first = combine_constraints(
         firsts,
         lasts,
         [Constraints(cannot_link=((0, 2),)), Constraints(((0, 1),)), Constraints(((1, 2),))],

@@ -1,4 +1,4 @@
-"""Two who went on as each other are found by both lives as a whole, and settled."""
+"""Exchanged tracks are found by both paths as a whole, and split where they were exchanged."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from scipy.stats import multivariate_normal
 
 from tests.smoothing.measured import STEP, fitted_to, measured
 from tracker.smoothing.smoother import Fitted
-from tracker.smoothing.tracklets.exchanges import exchange_breaks, gains_of, turn
+from tracker.smoothing.tracklets.exchanges import exchange_breaks, exchange_log_odds, find_exchange
 
 SIGMA = 0.05
 
@@ -27,7 +27,10 @@ def two(steps: int, turn: int) -> list[ndarray]:
     away = (np.arange(steps) - turn + 0.5) * STEP * 1.2
     one = np.stack([away, np.zeros(steps), np.ones(steps)], axis=1)
     other = np.stack([np.full(steps, 0.2), away, np.ones(steps)], axis=1)
-    one[turn:], other[turn:] = other[turn:].copy(), one[turn:].copy()
+    one[turn:], other[turn:] = (
+        other[turn:].copy(),
+        one[turn:].copy(),
+    )
     return [own + rng.normal(0.0, SIGMA, own.shape) for own in (one, other)]
 
 
@@ -40,11 +43,11 @@ def test_both_are_cut_where_they_turned_into_each_other(turn: int) -> None:
 @pytest.mark.parametrize("crossed", [6, 10, 14])
 def test_who_is_said_to_be_the_other_later_turned_where_both_lives_fit(crossed: int) -> None:
     paths = fitted(two(20, crossed))
-    assert turn(paths, 0, 1, crossed - 5, crossed + 4) == [crossed, 20 + crossed]
-    assert turn(paths, 0, 1, 18, 30) == [19, 39]
-    assert turn(paths, 0, 1, 19, 30) == []
-    assert turn(paths, 0, 1, -5, 0) == [], "nobody turns before the own second step"
-    assert turn(paths, 0, 1, -5, 1) == [1, 21]
+    assert find_exchange(paths, 0, 1, crossed - 5, crossed + 4) == [crossed, 20 + crossed]
+    assert find_exchange(paths, 0, 1, 18, 30) == [19, 39]
+    assert find_exchange(paths, 0, 1, 19, 30) == []
+    assert find_exchange(paths, 0, 1, -5, 0) == [], "nobody turns before the own second step"
+    assert find_exchange(paths, 0, 1, -5, 1) == [1, 21]
 
 
 def test_who_goes_straight_on_is_not_cut() -> None:
@@ -70,8 +73,8 @@ def test_what_an_exchange_gains_is_by_the_integrals_and_the_same_from_either_sid
     both ways have alike."""
     paths = fitted(two(20, 10))
     one, other = np.array([6, 10, 13]), np.array([26, 30, 33])
-    found = gains_of(paths, one, other)
-    assert found == pytest.approx(gains_of(paths, other, one))
+    found = exchange_log_odds(paths, one, other)
+    assert found == pytest.approx(exchange_log_odds(paths, other, one))
     states, spread = paths.paths.states, paths.paths.covariances
 
     def fits(before: int, after: int) -> float:
@@ -104,6 +107,6 @@ def test_only_who_come_near_each_other_are_exchanged() -> None:
 @pytest.mark.parametrize(("least", "cut"), [(-1e-6, True), (1e-6, False)])
 def test_both_are_cut_from_the_least_odds_on(least: float, cut: bool) -> None:
     paths = fitted(two(20, 10))
-    most = gains_of(paths, np.array([10]), np.array([30]))[0]
+    most = exchange_log_odds(paths, np.array([10]), np.array([30]))[0]
     found = exchange_breaks(paths, reach=2.5, least=most + least, apart=40)
     assert found.any() == cut

@@ -11,7 +11,13 @@ from numpy.testing import assert_allclose
 from tests import world
 from tests.smoothing.known import PLAIN, backwards, known
 from tests.smoothing.test_boundaries import standing
-from tracker.smoothing.lifetimes import UNSURE, extended, independence, lifetimes, misses
+from tracker.smoothing.lifetimes import (
+    UNSURE,
+    estimate_lifetimes,
+    extend_paths,
+    independent_share,
+    log_miss_likelihoods,
+)
 from tracker.smoothing.paths import Links
 from tracker.smoothing.smoother import BoxAssociations, Smoother
 
@@ -35,7 +41,7 @@ def odds_of(cameras: int, log_ratio: float | None, *, after: int = 0) -> float:
     paths, links = scene.paths()
     nothing = np.zeros((cameras, STEPS))
     shared = BoxAssociations(links, nothing, nothing, nothing.astype(np.int64))
-    return float(lifetimes(smoother, paths, shared, PLAIN.smoothing)[1][0])
+    return float(estimate_lifetimes(smoother, paths, shared, PLAIN.smoothing)[1][0])
 
 
 @pytest.mark.parametrize(
@@ -55,7 +61,7 @@ def test_what_cameras_and_looks_say_of_a_whole_life(
     cameras: int, log_ratio: float | None, vote: float
 ) -> None:
     """All of a recording's steps, of which a share is new evidence; nobody comes or goes."""
-    new = independence(0.1, PLAIN.smoothing.memory)
+    new = independent_share(0.1, PLAIN.smoothing.memory)
     stays = (STEPS - 1) * np.log(PLAIN.fusion.survival_probability)
     expected = STEPS * new * vote + stays
     if vote < 0.0:  # who is likelier nobody was there for a single step
@@ -66,7 +72,7 @@ def test_what_cameras_and_looks_say_of_a_whole_life(
 
 def test_who_leaves_has_a_quarter_of_the_log_odds_of_coming_and_leaving() -> None:
     """Both ends have the same, so that a recording seen backwards in time gives the same."""
-    steps = 1.0 / independence(0.1, PLAIN.smoothing.memory)
+    steps = 1.0 / independent_share(0.1, PLAIN.smoothing.memory)
     come = np.log(PLAIN.fusion.birth_rate * steps * 0.1)
     leave = np.log(1.0 - PLAIN.fusion.survival_probability**steps)
     expected = odds_of(2, None) + (come + leave) / 4.0
@@ -77,7 +83,9 @@ def test_a_miss_says_as_much_against_somebody_as_the_camera_should_have_seen() -
     nothing = Links(*(np.zeros(0, dtype=np.int64) for _ in range(3)), np.zeros(0))
     chances = np.array([[0.5, 1.0], [0.9, 0.0]])
     missed = np.array([[1.0, 0.5], [0.2, 1.0]])
-    found = misses(BoxAssociations(nothing, chances, missed, np.zeros((2, 2), dtype=np.int64)))
+    found = log_miss_likelihoods(
+        BoxAssociations(nothing, chances, missed, np.zeros((2, 2), dtype=np.int64))
+    )
     assert found == pytest.approx([np.log(0.5) + 0.2 * np.log(0.1), 0.5 * np.log(1e-6)])
 
 
@@ -89,7 +97,7 @@ def test_paths_are_carried_on_to_both_sides_alike_and_within_the_recording() -> 
     states = paths.states.copy()
     states[:5, 0], states[:5, 3] = 0.1 * np.arange(5), 1.0
     walking = paths.with_states(states, paths.covariances)
-    longer, there = extended(smoother, walking, 3)
+    longer, there = extend_paths(smoother, walking, 3)
     assert longer.firsts.tolist() == [0, 0]
     assert longer.lasts.tolist() == [9, 9]
     assert there.tolist() == [UNSURE] * 2 + [1.0] * 5 + [UNSURE] * 3 + [1.0] * 10
@@ -105,10 +113,10 @@ def test_paths_are_carried_on_to_both_sides_alike_and_within_the_recording() -> 
     turned[:5], turned[5:] = states[:5][::-1], states[5:][::-1]
     turned[:, 3:] *= -1.0
     back = standing((1, 3, 7, 0.0), (2, 0, 9, 1.0)).with_states(turned, paths.covariances)
-    other, _ = extended(backwards(scene).smoother(), back, 3)
+    other, _ = extend_paths(backwards(scene).smoother(), back, 3)
     assert other.firsts.tolist() == [0, 0]
     assert_allclose(other.states[:10, :3], longer.states[:10, :3][::-1], atol=1e-12)
     variances = longer.covariances[:, range(3), range(3)]
     assert (np.diff(variances[:3], axis=0) < 0.0).all(), "the farther back the less is known"
-    none, _ = extended(smoother, walking, 0)
+    none, _ = extend_paths(smoother, walking, 0)
     assert_allclose(none.states, states)

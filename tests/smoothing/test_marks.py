@@ -1,4 +1,4 @@
-"""What marked boxes say of stage 1's: a shift that all cameras share is no height of a person."""
+"""The shifts of boxes that marked boxes show: a shift in all cameras is no height of a person."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy import ndarray
 from numpy.testing import assert_allclose
 
 from tests.smoothing.known import CAMERAS, PLAIN, Known, given
-from tests.smoothing.test_positions_laws import one_walker
+from tests.smoothing.test_smoother_properties import one_walker
 from tests.world import PERSON as HALF_EXTENTS
 from tracker.geometry.boxes import Boxes
 from tracker.geometry.camera import Camera

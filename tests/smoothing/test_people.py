@@ -15,7 +15,7 @@ from tracker.single_view.protocol import ViewResult
 from tracker.smoothing.paths import Links, Paths
 from tracker.smoothing.recording import CameraBoxes
 from tracker.smoothing.smoother import Smoother
-from tracker.smoothing.tracklets.people import Seen, of_chains, template_log_odds
+from tracker.smoothing.tracklets.people import Appearances, sum_by_chain, template_log_odds
 from tracker.steps import Steps
 
 STEP = 0.2
@@ -42,7 +42,7 @@ def told(likenesses: list[list[float]], places: list[list[float]], weight: float
     piece = Paths.of([1], [0], [np.zeros((steps, 6))], [np.zeros((steps, 6, 6))], 6)
     rows = np.arange(steps)
     links = Links(np.zeros(steps, dtype=np.int64), rows, starts[:-1].copy(), np.ones(steps))
-    return template_log_odds(piece, links, smoother, Seen(None, [every]), weight)[0]
+    return template_log_odds(piece, links, smoother, Appearances(None, [every]), weight)[0]
 
 
 def test_boxes_of_ones_colours_count_by_the_time_that_they_last() -> None:
@@ -69,13 +69,13 @@ def test_what_another_box_touches_says_nothing_of_colours() -> None:
 def test_a_camera_without_a_picture_is_not_asked_and_one_person_alone_tells_nothing() -> None:
     view = ViewResult.of_boxes(np.ones((1, 4)), np.ones(1), np.ones((1, 4)))
     of_two = replace(view, likenesses=np.array([FIRST]))
-    seen = Seen.of(Steps.of([(of_two, view), (view, of_two)], ViewResult, 2)).likenesses
+    seen = Appearances.of(Steps.of([(of_two, view), (view, of_two)], ViewResult, 2)).likenesses
     assert seen is not None
     assert [one.tolist() for one in seen] == [[FIRST, [0.5, 0.5]], [[0.5, 0.5], FIRST]]
     for one in (replace(view, likenesses=np.ones((1, 1))), view):
-        assert Seen.of(Steps.of([(one,)], ViewResult, 1)).likenesses is None
+        assert Appearances.of(Steps.of([(one,)], ViewResult, 1)).likenesses is None
 
 
 def test_chains_are_the_likeliest_of_all_their_pieces() -> None:
     pieces = np.array([[0.0, -6.0], [-4.0, 0.0], [0.0, 0.0]])
-    assert of_chains(pieces, [[0, 1], [2]]).tolist() == [[0.0, -2.0], [0.0, 0.0]]
+    assert sum_by_chain(pieces, [[0, 1], [2]]).tolist() == [[0.0, -2.0], [0.0, 0.0]]

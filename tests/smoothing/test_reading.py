@@ -161,3 +161,10 @@ def test_a_component_stands_for_the_person_next_to_it(
     smoothed = rows([(1, 1, 0.0, 0.9), (1, 2, 0.5, 0.9)])
     tracks = told(smoothed, results([], components), {})
     assert list(zip(tracks.components.tolist(), tracks.labels.tolist(), strict=True)) == found
+
+
+def test_a_component_within_reach_of_two_tracks_is_of_the_nearer_alone() -> None:
+    smoothed = rows([(1, 1, 0.0, 0.9), (1, 2, 0.5, 0.9)])
+    tracks = told(smoothed, results([], [(6, 0.2, 0.9)]), {}, near=1.0)
+    assert tracks.components.tolist() == [0, -1]
+    assert tracks.labels.tolist() == [6, -1]

@@ -91,6 +91,12 @@ class _Contradiction(Exception):
     """Corrections contradict each other."""
 
     def __init__(self, why: str, *others: Correction) -> None:
+        """Describe a contradiction.
+
+        Args:
+            why: The contradiction, in words.
+            others: The corrections that contradict each other.
+        """
         super().__init__(why)
         self.why, self.others = why, others
 
@@ -99,6 +105,7 @@ class _People:
     """Places grouped by person, in a union-find structure."""
 
     def __init__(self) -> None:
+        """Begin without places."""
         self.places: list[tuple[Place, Correction]] = []
         self._parents: list[int] = []
 

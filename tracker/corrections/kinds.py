@@ -23,7 +23,6 @@ Kind = Literal[
 REACH = 1.0
 """Distance on the ground within which a place refers to the nearest track, metres."""
 
-
 LEEWAY = 1.0
 """Time by which a track may miss the step of a place that refers to it, seconds."""
 
@@ -61,7 +60,7 @@ class Place(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class KindOf:
+class KindDefinition:
     """The meaning and the fields of a kind of correction."""
 
     word: str
@@ -74,29 +73,29 @@ class KindOf:
     """Default accuracy, metres; None for a kind without one."""
 
 
-KINDS: dict[Kind, KindOf] = {
-    "same": KindOf("same person", (2, 2), "the tracks at both places are of one person"),
-    "different": KindOf(
+KINDS: dict[Kind, KindDefinition] = {
+    "same": KindDefinition("same person", (2, 2), "the tracks at both places are of one person"),
+    "different": KindDefinition(
         "not the same", (2, 2), "the tracks at the two places are of different people"
     ),
-    "exchanged": KindOf(
+    "exchanged": KindDefinition(
         "exchanged from here",
         (4, 4),
         "the people at the first and the second place are at the third and the fourth one later",
     ),
-    "here": KindOf(
+    "here": KindDefinition(
         "is here",
         (1, 2),
         "a person is at the first place; if given, the second is where the run has that person",
         0.1,
     ),
-    "nobody": KindOf(
+    "nobody": KindDefinition(
         "was nobody", (1, None), "no person is near the path through these places", 0.5
     ),
-    "came": KindOf("came in here", (1, 1), "the person at this place came in at this step"),
-    "left": KindOf("left here", (1, 1), "the person at this place left at this step"),
-    "name": KindOf("name", (1, 1), "the person at this place has this name"),
-    "checked": KindOf(
+    "came": KindDefinition("came in here", (1, 1), "the person at this place came in at this step"),
+    "left": KindDefinition("left here", (1, 1), "the person at this place left at this step"),
+    "name": KindDefinition("name", (1, 1), "the person at this place has this name"),
+    "checked": KindDefinition(
         "checked", (0, 0), "the user has checked these steps, and the tracks are right"
     ),
 }
@@ -132,6 +131,7 @@ class Correction(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _with_defaults(cls, values: Any) -> Any:
+        """Fill in accuracy and id by default, and round the places."""
         if isinstance(values, dict) and values.get("kind") in list(KINDS):
             known = KINDS[values["kind"]]
             values = dict(values)
@@ -254,6 +254,7 @@ def _rounded(places: Any) -> Any:
 
 
 def _id_of(values: dict[str, Any]) -> str:
+    """A hash of the values of a correction, as its id."""
     content = {key: str(value) for key, value in values.items() if key != "id"}
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:12]
 
@@ -298,4 +299,5 @@ def content_of(correction: Correction) -> str:
 
 
 def _content(one: Correction) -> dict[str, Any]:
+    """The fields of a correction that have an effect on a run."""
     return one.model_dump(mode="json", exclude={"id", "time", "note"}, exclude_none=True)

@@ -62,6 +62,7 @@ def place_of(folder: Path) -> Path:
 
 
 def _is_read_only(folder: Path) -> bool:
+    """Whether the log beside a recording, or else its folder, cannot be written to."""
     beside = folder / FILE
     return not os.access(beside if beside.exists() else folder, os.W_OK)
 
@@ -81,17 +82,18 @@ def _leads_out(beside: Path) -> bool:
 
 def own_place(folder: Path) -> Path:
     """The path of the log of a read-only recording, in the user's settings."""
-    return _kept_as(key_of(folder))
+    return _settings_path(key_of(folder))
 
 
-def _kept_as(key: str) -> Path:
+def _settings_path(key: str) -> Path:
+    """The path in the user's settings of the log with a key."""
     return settings_folder() / "corrections" / f"{key}.toml"
 
 
 def _earlier_if_alone(folder: Path) -> Path:
     """The log of a built-in room: that of an earlier rendering until a correction is added."""
     own, key = own_place(folder), earlier_key(folder)
-    earlier = own if key is None else _kept_as(key)
+    earlier = own if key is None else _settings_path(key)
     return earlier if earlier.exists() and not own.exists() else own
 
 
@@ -99,7 +101,7 @@ def remark_on(folder: Path) -> str | None:
     """The remark that a recording's log is of an earlier rendering, or that there is another one in
     the settings, which was written before; None where neither is so."""
     earlier, place, own = earlier_key(folder), place_of(folder), own_place(folder)
-    if earlier is not None and place == _kept_as(earlier):
+    if earlier is not None and place == _settings_path(earlier):
         return f"The corrections were {EARLIER}."
     if earlier is None and place != own and own.exists():
         return (
@@ -267,10 +269,12 @@ def dump(corrections: Iterable[Correction]) -> str:
 
 
 def _in_utc(time: datetime) -> datetime:
+    """A time in UTC; one without a zone is taken as UTC."""
     return (time if time.tzinfo else time.replace(tzinfo=UTC)).astimezone(UTC)
 
 
 def _places(one: Correction) -> Any:
+    """The places of a correction as a TOML array, rounded to a tenth of a millimetre."""
     import tomlkit
 
     rows = tomlkit.array()

@@ -32,7 +32,7 @@ class TrackIndex:
         self._ground = positions[self._order, :2]
         self._before = self._after = np.zeros_like(self._ground)
         if owners is not None:
-            self._before, self._after = _ways(self._steps, self._ground, owners[self._order])
+            self._before, self._after = _velocities(self._steps, self._ground, owners[self._order])
 
     def at(self, step: int) -> slice:
         """Return the slice of one step among the rows sorted by step."""
@@ -86,12 +86,17 @@ class TrackIndex:
         return found
 
 
-def _ways(
+def _velocities(
     steps: Int[ndarray, " N"], ground: Float[ndarray, "N 2"], owners: Int[ndarray, " N"]
 ) -> tuple[Float[ndarray, "N 2"], Float[ndarray, "N 2"]]:
     """Compute the velocity of each row's track before and after the row, metres per step.
 
     It is 0 at an end of the track.
+
+    Args:
+        steps: Step of each of N rows.
+        ground: Position of each row on the ground, world metres.
+        owners: Track of each row.
     """
     before, after = np.zeros_like(ground), np.zeros_like(ground)
     order = np.lexsort((steps, owners))
@@ -127,6 +132,6 @@ def mostly_inside(
     count = int(owners.max()) + 1
     there = np.bincount(owners[during], minlength=count)
     along_it = np.bincount(owners[inside], minlength=count)
-    whole = np.bincount(owners, minlength=count)
-    touches = (along_it == 1) & (whole > 1) & (first < last)
+    lengths = np.bincount(owners, minlength=count)
+    touches = (along_it == 1) & (lengths > 1) & (first < last)
     return set(np.flatnonzero((along_it > 0) & (2 * along_it > there) & ~touches).tolist())

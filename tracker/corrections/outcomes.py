@@ -14,8 +14,7 @@ from tracker.corrections.lookup import TrackIndex, mostly_inside
 
 _GATE = 3.0
 """Distance within which a track is at the place of a correction, in standard deviations of the
-place."""
-
+place: 99 % of the places of two Gaussian coordinates are within it."""
 
 _IDENTITY_KINDS = ("same", "different", "exchanged")
 """The kinds about identity, which may contradict an unmet correction."""
@@ -44,6 +43,7 @@ class _Tracks:
     """The tracks of a run with an index of their rows, for corrections whose tracks must exist."""
 
     def __init__(self, frames: ndarray, ids: ndarray, positions: ndarray, leeway: int) -> None:
+        """Index the tracks, with the arguments of :func:`outcomes`."""
         self.frames, self.ids, self.leeway = frames, ids, leeway
         self.index = TrackIndex(frames, positions, ids)
         self.positions = positions
@@ -180,7 +180,6 @@ def names_by_track(outcomes: Many[Outcome], corrections: Many[Correction]) -> di
 def supporting_corrections(
     frames: Int[ndarray, " N"],
     ids: Int[ndarray, " N"],
-    positions: Float[ndarray, "N 3"],
     corrections: Many[Correction],
     outcomes: Many[Outcome],
 ) -> list[str]:
@@ -193,7 +192,6 @@ def supporting_corrections(
     Args:
         frames: Step of each of N rows.
         ids: Track of each row.
-        positions: Position of each row, world metres.
         corrections: The corrections in the order in which they were made.
         outcomes: The outcomes of the corrections in these tracks.
     """

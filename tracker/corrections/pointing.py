@@ -12,11 +12,11 @@ from tracker.corrections.kinds import CorrectionError
 from tracker.geometry.camera import Camera
 
 _FLAT = 0.02
-"""Sine of the angle between a ray and the floor below which the distance is undetermined."""
+"""Sine of the angle between a ray and the floor below which the distance is undetermined: 1.1°, at
+which a camera 3 m high sees the floor at 150 m."""
 
 _MISS = 0.5
 """Largest distance between the rays of two clicks on one person, metres."""
-
 
 _OFF_FLOOR = 0.3
 """Largest height above the floor of the lower end of a target that stands on the floor, metres."""
@@ -77,7 +77,7 @@ def foot_on_floor(
     return place
 
 
-def triangulated(points: Many[tuple[Camera, tuple[float, float]]]) -> Float[ndarray, " 3"]:
+def triangulate(points: Many[tuple[Camera, tuple[float, float]]]) -> Float[ndarray, " 3"]:
     """Triangulate the point nearest to the rays of pixels in two or more images, world metres.
 
     It is the least-squares solution of Σ_c |(I − r_c r_cᵀ)(x − o_c)|², of rays r_c from o_c.

@@ -21,6 +21,7 @@ class _Segments:
     """Tracks split into segments, each followed by at most one other."""
 
     def __init__(self, frames: ndarray, ids: ndarray, positions: ndarray, leeway: int) -> None:
+        """Make one segment of each track, with the arguments of :func:`relabel`."""
         self.frames, self.positions = frames, positions
         self.index = TrackIndex(frames, positions, ids)
         self.leeway = leeway
@@ -122,7 +123,7 @@ class _Segments:
         return found
 
 
-def relabelled(
+def relabel(
     frames: Int[ndarray, " N"],
     ids: Int[ndarray, " N"],
     positions: ndarray,

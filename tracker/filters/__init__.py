@@ -1,1 +1,1 @@
-"""Recursions over sets of targets: GM-PHD and Poisson multi-Bernoulli, and their models."""
+"""Recursions over sets of targets: GM-PHD, Poisson multi-Bernoulli, their models, association."""

@@ -153,11 +153,13 @@ def label_births(births: GaussianMixture, first_label: int) -> GaussianMixture:
 def visible_area(camera: Camera, room: Room) -> float:
     """The area of the image that the room's volume covers, in squared pixels.
 
-    False boxes are modelled as uniform over it ([ZW21] §2.4: clutter uniform over
-    the volume, projected into this camera). It is the convex hull of a grid of 12³ points of the
-    volume, and at least one per cent of the image, so that the clutter intensity stays finite for a
-    camera that does not view the room. The result is cached for each camera and room, since every
-    run needs it.
+    False boxes are modelled as uniform over it ([ZW21] §2.4: clutter uniform over the volume,
+    projected into this camera). It is the area of the convex hull of those of a grid of 12³ points
+    of the volume that lie in the image, and at least one per cent of the image, so that the clutter
+    intensity stays finite for a camera that does not view the room. With 48³ points the area is
+    larger: by 2 to 10 % in the rooms of ``cmc1``, ``cmc2`` and ``av163-seq45-3p-1111-points``, by
+    10 to 49 % in the square of ``wildtrack-points-300``. The result is cached for each camera and
+    room, since every run needs it.
     """
     axes = np.linspace(room.minimum, room.maximum, 12).T
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)

@@ -14,7 +14,8 @@ from tracker.fusion.place_constraints import PlaceConstraints
 from tracker.fusion.record import Record
 
 _EXISTENCE = 0.999
-"""Existence probability of a target that a place constraint states to be present."""
+"""Existence probability of a target that a place constraint states to be present; at 1 no miss
+would decrease it afterwards."""
 
 
 def apply_constraints(
@@ -69,7 +70,7 @@ def apply_constraints(
             mixture = gaussian_mixture.concatenate([mixture, born])
             record = record.extended(born.size)
         else:
-            mixture = _updated(mixture, best, place, noise)
+            mixture = _update_component(mixture, best, place, noise)
     return mixture, record, next_label
 
 
@@ -92,12 +93,12 @@ def _component_at(
     _, log_determinants = np.linalg.slogdet(spread)
     score = np.log(np.maximum(mixture.weights, 1e-300)) - 0.5 * (distances + log_determinants)
     too_near = (np.hypot(*offsets[:, :2].T) <= model.near) & (np.abs(offsets[:, 2]) <= model.height)
-    score[(distances > model.gate_of_places) & ~too_near] = -np.inf
+    score[(distances > model.place_gate) & ~too_near] = -np.inf
     best = int(np.argmax(score))
     return best if np.isfinite(score[best]) else None
 
 
-def _updated(
+def _update_component(
     mixture: GaussianMixture, component: int, place: ndarray, noise: ndarray
 ) -> GaussianMixture:
     """Update one component by a place, in Joseph's form, and raise its label's existence."""

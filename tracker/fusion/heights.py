@@ -25,7 +25,7 @@ move away from the bound although nothing new is known of it."""
 
 
 @dataclass(frozen=True, slots=True)
-class Heights:
+class HeightBounds:
     """Bounds of a target's centre: at the lower one it lies or crouches on the floor.
 
     One camera measures a target's distance by the size of its box alone, and boxes that are all
@@ -36,12 +36,12 @@ class Heights:
     low: float
     """Height of a centre on the floor, world metres."""
     high: float
-    """As far below the ceiling, world metres."""
+    """Height of a centre as far below the ceiling as ``low`` is above the floor, world metres."""
     outside: float
     """Density beyond the bounds relative to that between them, 0 … 1."""
 
     @staticmethod
-    def of(room: Room, half_height: float, outside: float) -> Heights:
+    def of(room: Room, half_height: float, outside: float) -> HeightBounds:
         """The bounds in a room.
 
         Args:
@@ -50,7 +50,7 @@ class Heights:
             outside: Density beyond the bounds relative to that between them, 0 … 1.
         """
         low = float(room.minimum[_HEIGHT]) + half_height
-        return Heights(low, max(low, float(room.maximum[_HEIGHT]) - half_height), outside)
+        return HeightBounds(low, max(low, float(room.maximum[_HEIGHT]) - half_height), outside)
 
     def truncate(self, tracks: GaussianMixture) -> GaussianMixture:
         """Truncate the tracks whose height is near or beyond a bound ([SS10]_).
@@ -74,8 +74,8 @@ class Heights:
         """
         heights = tracks.means[:, _HEIGHT]
         sigmas = np.sqrt(tracks.covariances[:, _HEIGHT, _HEIGHT])
-        room = np.minimum(heights - self.low, self.high - heights)
-        rows = np.flatnonzero((room < _NEAR * sigmas) & (sigmas > 0.0))
+        margins = np.minimum(heights - self.low, self.high - heights)
+        rows = np.flatnonzero((margins < _NEAR * sigmas) & (sigmas > 0.0))
         if not len(rows):
             return tracks
         z, sigma = heights[rows], sigmas[rows]

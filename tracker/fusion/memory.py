@@ -13,6 +13,9 @@ from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion.model import CONFIRMED, FusionModel
 from tracker.geometry.assignment import linear_sum_assignment
 
+_INADMISSIBLE = 1e6
+"""Cost of a pair of a lost and a new track that is not admissible, far above any gate."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Memory:
@@ -73,16 +76,18 @@ def recall(
     labels = mixture.labels
     if model.parameters.memory == 0.0:
         return labels, memory
-    bearers = _first_of_each(labels, (mixture.weights > CONFIRMED).nonzero()[0])
-    missing = _missing(memory, labels[bearers], model, first_label)
-    if missing.lost.size and len(bearers):
-        labels, back = _returned(missing, mixture.take(bearers), labels, model.memory_reach)
+    representatives = _first_of_each(labels, (mixture.weights > CONFIRMED).nonzero()[0])
+    missing = _predict_lost(memory, labels[representatives], model, first_label)
+    if missing.lost.size and len(representatives):
+        labels, back = _return_labels(
+            missing, mixture.take(representatives), labels, model.recovery_gate
+        )
         missing = missing.take(~back)
     known = GaussianMixture(
-        mixture.weights.take(bearers),
-        mixture.means.take(bearers, 0),
-        mixture.covariances.take(bearers, 0),
-        labels.take(bearers),
+        mixture.weights.take(representatives),
+        mixture.means.take(representatives, 0),
+        mixture.covariances.take(representatives, 0),
+        labels.take(representatives),
     )
     return labels, Memory(known, missing.lost, missing.ages, missing.newer)
 
@@ -100,7 +105,7 @@ def _first_of_each(labels: Int[ndarray, " J"], among: Int[ndarray, " K"]) -> Int
     return np.array([first[label] for label in sorted(first)], dtype=np.int64)
 
 
-def _missing(
+def _predict_lost(
     memory: Memory, present: Int[ndarray, " L"], model: FusionModel, first_label: int
 ) -> Memory:
     """Predict the lost tracks to this step, with the known tracks that are lost at this step.
@@ -132,13 +137,13 @@ def _missing(
     if len(absent) < missing.lost.size:
         missing = missing.take(np.array(absent, dtype=np.int64))
     lost = model.motion.predict(missing.lost, 1.0)
-    waiting = model.room.contains(lost.means[:, :3])
-    waiting &= missing.ages <= model.parameters.memory + 1e-9
+    recoverable = model.room.contains(lost.means[:, :3])
+    recoverable &= missing.ages <= model.parameters.memory + 1e-9
     missing = Memory(known, lost, missing.ages, missing.newer)
-    return missing if waiting.all() else missing.take(waiting)
+    return missing if recoverable.all() else missing.take(recoverable)
 
 
-def _returned(
+def _return_labels(
     memory: Memory, people: GaussianMixture, labels: Int[ndarray, " J"], reach: float
 ) -> tuple[Int[ndarray, " J"], Bool[ndarray, " L"]]:
     """Assign new tracks to lost ones by squared Mahalanobis distance, and swap their labels.
@@ -161,7 +166,9 @@ def _returned(
     if not may.any():
         return labels, back
     labels = labels.copy()
-    for old, newcomer in zip(*linear_sum_assignment(np.where(may, distances, 1e6)), strict=True):
+    for old, newcomer in zip(
+        *linear_sum_assignment(np.where(may, distances, _INADMISSIBLE)), strict=True
+    ):
         if may[old, newcomer]:
             # other components with the lost label get the label of the new track
             name, other = lost.labels[old], people.labels[newcomer]

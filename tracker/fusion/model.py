@@ -11,7 +11,7 @@ from numpy import ndarray
 from tracker.filters import association, gaussian_mixture, models
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion import missing_frames, visibility
-from tracker.fusion.heights import Heights
+from tracker.fusion.heights import HeightBounds
 from tracker.fusion.measurement_births import BirthModel, Evidence, MeasurementBirths, Newborns
 from tracker.fusion.missing_frames import Recent, StepEvidence
 from tracker.fusion.target_model import ExpectedBoxes, TargetModel
@@ -24,13 +24,20 @@ from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult
 
 CONFIRMED = 0.5
-"""Weight above which a component is a confirmed track, which may occlude others."""
+"""Weight above which a component is a confirmed track, which may occlude others: its target is
+likelier there than not."""
 
 
 class FusionModel:
     """The models of one sequence: its room, its cameras and its targets, with the parameters."""
 
     def __init__(self, sequence: Sequence, parameters: FusionParams) -> None:
+        """Make the models of one sequence.
+
+        Args:
+            sequence: The cameras, the room, the size of a target and the time of a step.
+            parameters: The parameters of the fusion.
+        """
         p = self.parameters = parameters
         self.room = sequence.room
         self.cameras = sequence.cameras
@@ -52,9 +59,9 @@ class FusionModel:
         """κ of each camera, per unit of the measurement space."""
         self.gate = gaussian_mixture.gate_distance(p.gate_probability, self.target.size)
         """Largest squared Mahalanobis distance of an innovation."""
-        self.memory_reach = gaussian_mixture.gate_distance(p.memory_gate_probability, 3)
+        self.recovery_gate = gaussian_mixture.gate_distance(p.memory_gate_probability, 3)
         """Squared Mahalanobis distance within which a new track may take over a lost label."""
-        self.gate_of_places = gaussian_mixture.gate_distance(p.gate_probability, 3)
+        self.place_gate = gaussian_mixture.gate_distance(p.gate_probability, 3)
         """Squared Mahalanobis distance within which a place constraint belongs to a target."""
         self.near = p.duplicate_distance * 2.0 * float(np.mean(sequence.target_half_extents[:2]))
         """Distance within which two tracks may be duplicates of one person, metres."""
@@ -63,14 +70,14 @@ class FusionModel:
         other and no duplicates."""
         share = self.target.posture_share
         self.heights = (
-            Heights.of(sequence.room, p.posture_height * self.target.half_height, share)
+            HeightBounds.of(sequence.room, p.posture_height * self.target.half_height, share)
             if share
             else None
         )
         """Where a target's centre can be between floor and ceiling; None where no posture but the
         upright one is assumed."""
         margin = p.followed_margin
-        self.followed = (self.room.minimum - margin, self.room.maximum + margin)
+        self.tracked_volume = (self.room.minimum - margin, self.room.maximum + margin)
         """Minimum and maximum of the volume in which targets are tracked, world metres."""
         self._newborns = MeasurementBirths(
             self.cameras,
@@ -93,7 +100,13 @@ class FusionModel:
     def detection_probabilities(
         self, index: int, expected: ExpectedBoxes, mixture: GaussianMixture
     ) -> Float[ndarray, " J"]:
-        """Compute p_D of each of J components in the camera ``index``, without occlusion."""
+        """Compute p_D of each of J components in one camera, without occlusion.
+
+        Args:
+            index: Index of the camera.
+            expected: The predicted boxes of the components in that camera.
+            mixture: J components.
+        """
         return self.parameters.detection_probability * visibility.inside_probability(
             self.cameras[index],
             expected,
@@ -188,13 +201,14 @@ class FusionModel:
         return (self._at_rest(found) if len(found.existences) else None), later
 
     def _at_rest(self, found: Newborns) -> tuple[GaussianMixture, Newborns]:
+        """Make components without labels of newborn targets, at rest, and return both."""
         unlabelled = np.zeros(len(found.existences), dtype=np.int64)
         born = GaussianMixture(found.existences, found.positions, found.covariances, unlabelled)
         return self.motion.at_rest(born), found
 
-    def stays(self, mixture: GaussianMixture) -> Int[ndarray, " K"]:
+    def inside_tracked_volume(self, mixture: GaussianMixture) -> Int[ndarray, " K"]:
         """Return the indices of the components whose means lie in the tracked volume."""
-        inside: ndarray = linear_algebra.inside_bounds(mixture.means, *self.followed)
+        inside: ndarray = linear_algebra.inside_bounds(mixture.means, *self.tracked_volume)
         return inside
 
     def duplicates(

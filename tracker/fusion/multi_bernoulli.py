@@ -25,8 +25,8 @@ from tracker.fusion.missing_frames import Recent
 from tracker.fusion.model import CONFIRMED, FusionModel, all_boxes
 from tracker.fusion.place_constraints import PlaceConstraints
 from tracker.fusion.protocol import FusionResult
-from tracker.fusion.record import REPORTING_THRESHOLD, Record, summed
-from tracker.fusion.reidentification import Identities
+from tracker.fusion.record import REPORTING_THRESHOLD, Record, sum_associations
+from tracker.fusion.reidentification import IdentityBeliefs
 from tracker.geometry.camera import stacked
 from tracker.kernels.gating import Measurements
 from tracker.kernels.labelled import step as step_kernels
@@ -52,7 +52,7 @@ class MultiBernoulliState:
     """The first label that is free."""
     memory: Memory
     """The confirmed tracks and those lost a short while ago."""
-    identities: Identities
+    identities: IdentityBeliefs
     """Beliefs of the tracks over the people with templates."""
     recent: Recent = ()
     """Unexplained boxes of the last frames, for cameras that have none at a step."""
@@ -68,6 +68,12 @@ class MultiBernoulli:
     """
 
     def __init__(self, sequence: Sequence, parameters: RunParameters) -> None:
+        """Prepare the filter for one sequence.
+
+        Args:
+            sequence: The cameras and the room.
+            parameters: The parameters of the run, of which those of the fusion are used.
+        """
         p, model = parameters.fusion, FusionModel(sequence, parameters.fusion)
         self._parameters, self._model = p, model
         motion, target = model.motion, model.target
@@ -93,7 +99,7 @@ class MultiBernoulli:
         """Model and cameras of a step, by the cameras that have a frame."""
         self._target = target.target(motion.dimension)
         self._camera_rule = model.camera_rule(REPORTING_THRESHOLD)
-        low, high = model.followed
+        low, high = model.tracked_volume
         self._keeping_rule = KeepingRule(
             p.pruning_threshold, low, high, p.max_components, model.near, model.height, CONFIRMED
         )
@@ -118,7 +124,7 @@ class MultiBernoulli:
         """The state without tracks, before the first step."""
         dimension = self._model.motion.dimension
         empty = GaussianMixture.empty(dimension)
-        return MultiBernoulliState(empty, empty, 1, Memory.start(dimension), Identities.none())
+        return MultiBernoulliState(empty, empty, 1, Memory.start(dimension), IdentityBeliefs.none())
 
     def step(
         self,
@@ -130,7 +136,7 @@ class MultiBernoulli:
         p, before = self._parameters, state.tracks
         seen = all_boxes(views)
         if p.recognition:
-            alike = reidentification.resemblance(state.identities, before.labels, views)
+            alike = reidentification.appearance_ratios(state.identities, before.labels, views)
             seen = seen._replace(resemblance=alike)
         cameras = missing_frames.cameras_with_frame(views)
         step_model, calibrations = self._with_frame(cameras)
@@ -180,7 +186,7 @@ class MultiBernoulli:
         tracks, record = tracks.take(kept), record.take(kept)
         labels, lost = memory.recall(state.memory, tracks, self._model, state.next_label)
         posterior = GaussianMixture(tracks.weights, tracks.means, tracks.covariances, labels)
-        associations = summed(
+        associations = sum_associations(
             tracks.labels,
             pair_cameras,
             found.pair_labels,

@@ -71,6 +71,7 @@ class Ledger:
     change."""
 
     def __init__(self) -> None:
+        """Begin a step without any pair."""
         self._cameras: list[ndarray] = []
         self._labels: list[ndarray] = []
         self._boxes: list[ndarray] = []
@@ -83,7 +84,14 @@ class Ledger:
         boxes: Int[ndarray, " A"],
         probabilities: Float[ndarray, " A"],
     ) -> None:
-        """Add one camera's pairs of label and box of at least :data:`REPORTING_THRESHOLD`."""
+        """Add one camera's pairs of label and box of at least :data:`REPORTING_THRESHOLD`.
+
+        Args:
+            camera: Index of the camera.
+            labels: Label of each of A pairs.
+            boxes: Index of the box of each pair, in the camera.
+            probabilities: Association probability of each pair, 0 … 1.
+        """
         reported = (probabilities >= REPORTING_THRESHOLD).nonzero()[0]
         if not len(reported):
             return
@@ -93,14 +101,14 @@ class Ledger:
         self._probabilities.append(probabilities.take(reported))
 
     def associations(self, labels: Int[ndarray, " J"]) -> Associations:
-        """Sum the pairs by label and box, as :func:`summed` does.
+        """Sum the pairs by label and box, as :func:`sum_associations` does.
 
         Args:
             labels: Labels of the posterior's components, the heaviest first.
         """
         if not self._cameras:
             return Associations.none()
-        return summed(
+        return sum_associations(
             labels,
             np.concatenate(self._cameras),
             np.concatenate(self._labels),
@@ -109,10 +117,10 @@ class Ledger:
         )
 
 
-def summed(
+def sum_associations(
     labels: Int[ndarray, " J"],
     cameras: Int[ndarray, " A"],
-    of_pairs: Int[ndarray, " A"],
+    pair_labels: Int[ndarray, " A"],
     boxes: Int[ndarray, " A"],
     probabilities: Float[ndarray, " A"],
 ) -> Associations:
@@ -121,11 +129,11 @@ def summed(
     Args:
         labels: Labels of the posterior's J components, the heaviest first.
         cameras: Camera of each of A pairs.
-        of_pairs: Label of each pair.
+        pair_labels: Label of each pair.
         boxes: Index of the box of each pair, in its camera.
         probabilities: Association probability of each pair, 0 … 1.
     """
     if not len(labels) or not len(cameras):
         return Associations.none()
-    found = sum_pairs(labels, cameras, of_pairs, boxes, probabilities)
+    found = sum_pairs(labels, cameras, pair_labels, boxes, probabilities)
     return Associations(found.cameras, found.components, found.boxes, found.probabilities)

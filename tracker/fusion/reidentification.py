@@ -21,14 +21,14 @@ _NEVER = -1e3
 """Log score of an inadmissible pair; its exponential is 0 beside any other."""
 
 _UNINFORMATIVE = 0.5
-"""ε of :func:`resemblance`: probability that the colours of a box are uninformative at its step. It
-is large, since the effect of light on colours lasts for many steps in a row."""
+"""ε of :func:`appearance_ratios`: probability that the colours of a box are uninformative at its
+step. It is large, since the effect of light on colours lasts for many steps in a row."""
 
 _DEFAULTS = FusionParams()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Identities:
+class IdentityBeliefs:
     """The belief of each track over the G people with templates, from the colours of its boxes.
 
     It is a categorical distribution π, which follows
@@ -49,21 +49,21 @@ class Identities:
     """The label of each person, -1 for none yet."""
 
     @staticmethod
-    def none() -> Identities:
+    def none() -> IdentityBeliefs:
         """The beliefs before the first step: no labels and no people."""
         nothing = np.zeros(0, dtype=np.int64)
-        return Identities(nothing, np.zeros((0, 0)), nothing)
+        return IdentityBeliefs(nothing, np.zeros((0, 0)), nothing)
 
 
 def reidentify(
-    identities: Identities,
+    identities: IdentityBeliefs,
     posterior: GaussianMixture,
     associations: Associations,
     views: Many[ViewResult],
     waiting: Int[ndarray, " L"],
     step_time: float,
     parameters: FusionParams = _DEFAULTS,
-) -> tuple[dict[int, int], Identities]:
+) -> tuple[dict[int, int], IdentityBeliefs]:
     """Update the beliefs by this step's boxes and decide which labels change.
 
     Args:
@@ -83,33 +83,33 @@ def reidentify(
     if people < 2:
         return {}, identities
     p, seen = parameters, (identities, posterior, associations, views, people, waiting, step_time)
-    labels, beliefs = _updated(*seen, p)
+    labels, beliefs = _update_beliefs(*seen, p)
     owners = identities.owners if len(identities.owners) else np.full(people, -1, dtype=np.int64)
     sure = posterior.labels.compress(posterior.weights > CONFIRMED)
     confirmed = beliefs.take(np.searchsorted(labels, sure), 0)
     own_odds = float(np.log(p.recognition_own_odds))
     if _agrees(confirmed, sure, owners, own_odds):
-        return {}, Identities(labels, beliefs, owners)
+        return {}, IdentityBeliefs(labels, beliefs, owners)
     wanted: dict[int, int] = {}
     owners = owners.copy()
-    for track, person in _recognised(confirmed, own_odds, float(np.log(p.recognition_odds))):
+    for track, person in _recognise(confirmed, own_odds, float(np.log(p.recognition_odds))):
         label = int(sure[track])
         if owners[person] < 0 and label not in owners:
             owners[person] = label
         elif owners[person] >= 0:
             wanted[label] = int(owners[person])
-    relabelled = _permuted(wanted, posterior.labels.tolist())
+    relabelled = _as_permutation(wanted, posterior.labels.tolist())
     own: dict[int, ndarray] = dict(zip(labels.tolist(), beliefs, strict=True))
     after = {relabelled.get(label, label): belief for label, belief in own.items()}
     # a track that takes over the label of a lost one keeps its own belief
     after |= {relabelled[label]: own[label] for label in relabelled}
     order = sorted(after)
     rows = np.array([after[label] for label in order]).reshape(-1, people)
-    return relabelled, Identities(np.array(order, dtype=np.int64), rows, owners)
+    return relabelled, IdentityBeliefs(np.array(order, dtype=np.int64), rows, owners)
 
 
-def resemblance(
-    identities: Identities, labels: Int[ndarray, " n"], views: Many[ViewResult]
+def appearance_ratios(
+    identities: IdentityBeliefs, labels: Int[ndarray, " n"], views: Many[ViewResult]
 ) -> Float[ndarray, "k B"]:
     """Compute the likelihood ratio of each box's appearance, of a track's person against any
     person.
@@ -140,7 +140,7 @@ def resemblance(
 
 
 def _known(
-    identities: Identities, labels: Int[ndarray, " n"], people: int
+    identities: IdentityBeliefs, labels: Int[ndarray, " n"], people: int
 ) -> Float[ndarray, "n G"]:
     """Look up log π of n labels, up to a constant each; 0 for a label without a belief."""
     found = np.zeros((len(labels), people))
@@ -151,8 +151,8 @@ def _known(
     return found
 
 
-def _updated(
-    identities: Identities,
+def _update_beliefs(
+    identities: IdentityBeliefs,
     posterior: GaussianMixture,
     associations: Associations,
     views: Many[ViewResult],
@@ -207,7 +207,7 @@ def _agrees(
     return bool((owners.take(beliefs.argmax(axis=1)) == labels).compress(clear).all())
 
 
-def _recognised(beliefs: Float[ndarray, "n G"], own: float, odds: float) -> list[tuple[int, int]]:
+def _recognise(beliefs: Float[ndarray, "n G"], own: float, odds: float) -> list[tuple[int, int]]:
     """Find the pairs of track and person, one to one, with clear odds against any alternative.
 
     Args:
@@ -237,7 +237,7 @@ def _recognised(beliefs: Float[ndarray, "n G"], own: float, odds: float) -> list
     return pairs
 
 
-def _permuted(wanted: dict[int, int], present: list[int]) -> dict[int, int]:
+def _as_permutation(wanted: dict[int, int], present: list[int]) -> dict[int, int]:
     """Extend wanted renamings to a permutation: a track that loses its label gets a free one."""
     relabelled = {old: new for old, new in wanted.items() if old != new}
     left = sorted(old for old in relabelled if old not in relabelled.values())

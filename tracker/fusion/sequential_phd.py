@@ -37,7 +37,9 @@ from tracker.single_view.protocol import ViewResult
 if TYPE_CHECKING:
     from tracker.parameters.catalogue import RunParameters
 
-_LARGEST_LOG_ODDS = 600.0  # bound at which log odds are clipped, so that exp does not overflow
+_LARGEST_LOG_ODDS = 600.0
+"""Bound at which log odds are clipped, so that their exponential does not overflow, which it does
+from 709.8 on."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -92,6 +94,12 @@ class SequentialPhd:
     """
 
     def __init__(self, sequence: Sequence, parameters: RunParameters) -> None:
+        """Prepare the filter for one sequence.
+
+        Args:
+            sequence: The cameras and the room.
+            parameters: The parameters of the run, of which those of the fusion are used.
+        """
         self._parameters = parameters.fusion
         self._model = FusionModel(sequence, parameters.fusion)
 
@@ -139,16 +147,16 @@ class SequentialPhd:
             )  # fmt: skip
             heaviest_first = np.argsort(-mixture.weights, kind="stable")
             work.mixture, work.record = mixture.take(heaviest_first), record.take(heaviest_first)
-        inside = self._model.stays(work.mixture)
+        inside = self._model.inside_tracked_volume(work.mixture)
         mixture, record = work.mixture.take(inside), work.record.take(inside)
         if p.misses == "per_person":
             single = self._without_duplicates(mixture, record)
             mixture, record = mixture.take(single), record.take(single)
         associations = work.ledger.associations(mixture.labels)
         labels, next_label = _one_person_a_label(mixture, previous, work.next_label)
-        mixture = _relabelled(mixture, labels)
+        mixture = _with_labels(mixture, labels)
         labels, lost = memory.recall(state.memory, mixture, self._model, state.next_label)
-        mixture = _relabelled(mixture, labels)
+        mixture = _with_labels(mixture, labels)
         after = SequentialPhdState(mixture, next_label, lost, recent)
         return after, record.result(mixture, associations)
 
@@ -236,16 +244,16 @@ class SequentialPhd:
         """Return the indices of the components whose labels are no duplicates of another label."""
         grouped = linear_algebra.group_labels(mixture.labels)
         labels, label = grouped.labels, grouped.places
-        held = np.bincount(label, mixture.weights, len(labels))
+        existences = np.bincount(label, mixture.weights, len(labels))
         # the position of a label is that of its heaviest component
         heaviest = mixture_kernels.heaviest_of_groups(mixture.weights, label, len(labels))
         duplicate = self._model.duplicates(
-            mixture.means[heaviest], held, labels, record.sources[:, heaviest]
+            mixture.means[heaviest], existences, labels, record.sources[:, heaviest]
         )
         return np.flatnonzero(~duplicate[label])
 
 
-def _relabelled(mixture: GaussianMixture, labels: Int[ndarray, " J"]) -> GaussianMixture:
+def _with_labels(mixture: GaussianMixture, labels: Int[ndarray, " J"]) -> GaussianMixture:
     """Return the components with other labels."""
     return GaussianMixture(mixture.weights, mixture.means, mixture.covariances, labels)
 

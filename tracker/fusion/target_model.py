@@ -209,7 +209,13 @@ class TargetModel:
     def measured_boxes(
         self, boxes: Float[ndarray, "M 4"], sigmas: Float[ndarray, "M 4"], factor: float
     ) -> Measurements:
-        """Convert M boxes with standard deviations, pixels, as :meth:`measured` does."""
+        """Convert M boxes to measurements z with noise R in squared pixels.
+
+        Args:
+            boxes: Centre and half sizes of each box, pixels.
+            sigmas: Standard deviations of the same, pixels.
+            factor: Factor on the standard deviations.
+        """
         return measurement.measured_boxes(
             np.ascontiguousarray(boxes, dtype=float),
             np.ascontiguousarray((factor * sigmas) ** 2, dtype=float),

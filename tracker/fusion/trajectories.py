@@ -14,7 +14,7 @@ from numpy import ndarray
 
 from tracker.corrections import Correction
 from tracker.corrections.kinds import leeway
-from tracker.corrections.relabelling import relabelled
+from tracker.corrections.relabelling import relabel
 from tracker.filters import gaussian_mixture
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion.protocol import FusionResult
@@ -26,7 +26,7 @@ Rule = Literal["components", "boxes"]
 """Unit of extraction: a component, or all components that one box updated."""
 
 _AT_ONCE = 1024
-"""Number of steps whose results are concatenated at a time."""
+"""Number of steps whose results are concatenated at a time, which bounds the memory."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -133,13 +133,13 @@ def extract(
     remaining, parts = iter(results), []
     while some := list(islice(remaining, _AT_ONCE)):
         parts.append(
-            _extracted(some, cameras, extraction_threshold, rule, bounds, first_frame, ids)
+            _extract_part(some, cameras, extraction_threshold, rule, bounds, first_frame, ids)
         )
         first_frame += len(some)
     return parts[0] if len(parts) == 1 else concatenate(parts, cameras)
 
 
-def _extracted(
+def _extract_part(
     results: list[FusionResult],
     cameras: int,
     extraction_threshold: float,
@@ -190,12 +190,12 @@ def _extracted(
     )
 
 
-def corrected(
+def apply_corrections(
     tracks: Trajectories, corrections: Many[Correction], step_time: float
 ) -> Trajectories:
     """Apply the corrections of identity to finished tracks, without any image or box.
 
-    See :func:`tracker.corrections.relabelling.relabelled`.
+    See :func:`tracker.corrections.relabelling.relabel`.
 
     Args:
         tracks: The tracks of a run.
@@ -204,7 +204,7 @@ def corrected(
     """
     if not len(tracks) or not corrections:
         return tracks
-    ids, remaining = relabelled(
+    ids, remaining = relabel(
         tracks.frames, tracks.ids, tracks.positions, corrections, leeway=leeway(step_time)
     )
     changed = replace(tracks, ids=ids).take(remaining)
@@ -226,9 +226,9 @@ def by_boxes(result: FusionResult) -> tuple[GaussianMixture, Int[ndarray, " K"]]
     posterior, group = result.posterior, np.full(result.posterior.size, -1, dtype=np.int64)
     count = 0
     for boxes in result.sources[::-1]:
-        open_ones = np.flatnonzero((group < 0) & (boxes >= 0))
-        names, which = np.unique(boxes[open_ones], return_inverse=True)
-        group[open_ones] = count + which
+        ungrouped = np.flatnonzero((group < 0) & (boxes >= 0))
+        names, which = np.unique(boxes[ungrouped], return_inverse=True)
+        group[ungrouped] = count + which
         count += len(names)
     rest = np.flatnonzero(group < 0)
     group[rest] = count + np.arange(len(rest))
@@ -240,7 +240,7 @@ def by_boxes(result: FusionResult) -> tuple[GaussianMixture, Int[ndarray, " K"]]
     return GaussianMixture.of(merged, posterior.labels.take(leaders)), leaders
 
 
-class Growing:
+class GrowingTrajectories:
     """Tracks to which rows are appended without copying the earlier ones each time.
 
     What was returned before never changes: it consists of the first rows of the same arrays.
@@ -248,25 +248,28 @@ class Growing:
 
     def __init__(self, tracks: Trajectories) -> None:
         """Begin with some tracks."""
-        self._tracks = self._room = tracks
+        self._tracks = self._storage = tracks
 
     def append(self, more: Trajectories) -> Trajectories:
         """Append the tracks of later steps, and return all."""
         count, total = len(self._tracks), len(self._tracks) + len(more)
-        if total > len(self._room):
-            self._room = Trajectories(
-                *(_longer(getattr(self._tracks, name), total) for name in Trajectories.__slots__)
+        if total > len(self._storage):
+            self._storage = Trajectories(
+                *(
+                    _with_capacity(getattr(self._tracks, name), total)
+                    for name in Trajectories.__slots__
+                )
             )
         for name in Trajectories.__slots__:
-            getattr(self._room, name)[count:total] = getattr(more, name)
+            getattr(self._storage, name)[count:total] = getattr(more, name)
         self._tracks = Trajectories(
-            *(getattr(self._room, name)[:total] for name in Trajectories.__slots__)
+            *(getattr(self._storage, name)[:total] for name in Trajectories.__slots__)
         )
         return self._tracks
 
 
-def _longer(rows: ndarray, least: int) -> ndarray:
-    """The rows, and room for more of them."""
+def _with_capacity(rows: ndarray, least: int) -> ndarray:
+    """The rows at the beginning of an array with capacity for at least ``least`` rows."""
     found = np.empty((max(1024, least + least // 2), *rows.shape[1:]), rows.dtype)
     found[: len(rows)] = rows
     return found

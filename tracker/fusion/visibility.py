@@ -39,8 +39,8 @@ def inside_probability(
     """Compute the probability that the centre of each target lies inside the image.
 
     The predicted position is taken as Gaussian in the image, so the value falls
-    smoothly towards the edge, over the width of its own uncertainty; it is 0 where
-    head or foot is behind the lens.
+    smoothly towards the edge, over the width of its own uncertainty and one pixel more;
+    it is 0 where head or foot is behind the lens.
 
     Args:
         camera: The camera, whose image size is used.

@@ -87,16 +87,23 @@ def solve(lower: ndarray, right: ndarray, solution: ndarray) -> None:
 
 
 @kernel
+def whiten(lower: ndarray, right: ndarray, whitened: ndarray) -> float:
+    """Compute L⁻¹ b for a Cholesky factor L in place; returns its squared length."""
+    length = 0.0
+    for p in range(len(right)):
+        value = right[p]
+        for r in range(p):
+            value -= lower[p, r] * whitened[r]
+        value /= lower[p, p]
+        whitened[p] = value
+        length += value * value
+    return length
+
+
+@kernel
 def squared_length(residual: ndarray, lower: ndarray) -> float:
     """The squared Mahalanobis length of a vector, by the Cholesky factor of its covariance."""
-    total, solved = 0.0, np.empty(len(residual))
-    for p in range(len(residual)):
-        value = residual[p]
-        for r in range(p):
-            value -= lower[p, r] * solved[r]
-        solved[p] = value / lower[p, p]
-        total += solved[p] * solved[p]
-    return total
+    return whiten(lower, residual, np.empty(len(residual)))
 
 
 @kernel

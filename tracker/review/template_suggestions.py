@@ -136,7 +136,7 @@ def drawn_boxes(
     return boxes
 
 
-def moments(run: Run) -> Moments:
+def best_moments(run: Run) -> Moments:
     """Return the best moments of every track in every camera, the best of each first.
 
     The moments are those at which the track is long enough and has a high existence probability,
@@ -274,7 +274,7 @@ def suggest_templates(run: Run, pictures: Pictures) -> tuple[Suggestion, ...]:
     Returns:
         The suggestions by person and by camera, the best first.
     """
-    found = moments(run)
+    found = best_moments(run)
     found, appearances = _appearances(found, pictures)
     templates = run.sequence.templates
     known = _known(run.sequence, pictures)

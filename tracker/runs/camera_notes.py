@@ -6,7 +6,7 @@ import numpy as np
 
 from tracker.io.checks.timing import uneven_clocks
 from tracker.runs.run import Run
-from tracker.smoothing.camera_errors import CameraErrors, Quantity, significance
+from tracker.smoothing.camera_errors import CameraErrors, Quantity, significant_deviations
 
 _WALKING = 1.4
 """Preferred speed of walking, m/s (Bohannon, Age and Ageing 26(1), 1997)."""
@@ -60,7 +60,7 @@ def out_of_line_notes(run: Run) -> list[str]:
 
 def _delays(errors: CameraErrors, names: list[str], least: float, fps: float) -> list[str]:
     """Describe the delays of more than ``least`` seconds that are significant."""
-    bound = np.maximum(least, significance(len(names)) * errors.delay_sigmas)
+    bound = np.maximum(least, significant_deviations(len(names)) * errors.delay_sigmas)
     return [
         f'camera "{names[camera]}" is {abs(errors.delays[camera]):.2f} s '
         f"({abs(errors.delays[camera]) * fps:.1f} steps) "

@@ -16,7 +16,7 @@ from tracker.corrections.kinds import leeway
 from tracker.corrections.outcomes import outcomes
 from tracker.fusion import trajectories as tracks_stage
 from tracker.fusion.place_constraints import constraints_by_step
-from tracker.fusion.trajectories import Bounds, Growing, Trajectories, corrected
+from tracker.fusion.trajectories import Bounds, GrowingTrajectories, Trajectories, apply_corrections
 from tracker.parameters import Stage
 from tracker.parameters.catalogue import RunParameters
 from tracker.runs.fitting import default_parameters
@@ -133,7 +133,7 @@ class _Reporter:
         self._first = len(run.fused)
         self._begin = self._last_report = time.perf_counter()
         self._preparing = 0.0
-        self._growing: Growing | None = None
+        self._growing: GrowingTrajectories | None = None
         self.ids: dict[int, int] = {}
         self._stage: Stage = "single_view"
         if len(run.views) >= total:
@@ -157,7 +157,7 @@ class _Reporter:
         """Extract the tracks of all fused steps, and report them."""
         run = self._run
         if run.done < len(run.fused):
-            self._growing = self._growing or Growing(run.filtered)
+            self._growing = self._growing or GrowingTrajectories(run.filtered)
             run.tracks = run.filtered = self._growing.append(self._extract())
             run.done = len(run.fused)
         if self._meanwhile is not None and run.tracks is run.filtered:
@@ -282,7 +282,7 @@ def _correct(run: Run, reporter: _Reporter) -> None:
         return
     step_time = run.sequence.step_time
     if not run.corrected and not run.parameters.method("smoothing_method").resolves_identities:
-        run.tracks = corrected(run.tracks, run.corrections, step_time)
+        run.tracks = apply_corrections(run.tracks, run.corrections, step_time)
     run.corrected = True
     tracks = run.tracks
     run.outcomes = outcomes(

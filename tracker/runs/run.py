@@ -174,9 +174,7 @@ def row_corrections(run: Run) -> list[str]:
     if not run.corrections:
         return []
     tracks = run.tracks
-    return supporting_corrections(
-        tracks.frames, tracks.ids, tracks.positions, run.corrections, run.outcomes
-    )
+    return supporting_corrections(tracks.frames, tracks.ids, run.corrections, run.outcomes)
 
 
 def given_names(run: Run) -> dict[int, str]:

@@ -30,13 +30,13 @@ def maker(method: Method) -> Callable[[Sequence, RunParameters], SmoothingMethod
         case "none":
             return NoSmoothing
         case "positions":
-            from tracker.smoothing.stage import Positions
+            from tracker.smoothing.stage import PositionSmoothing
 
-            return Positions
+            return PositionSmoothing
         case "identities":
-            from tracker.smoothing.stage import Identities
+            from tracker.smoothing.stage import IdentitySmoothing
 
-            return Identities
+            return IdentitySmoothing
     return method.load()
 
 

@@ -8,12 +8,13 @@ more the steeper the camera looks. For a cylinder of radius ρ an edge is furthe
 
 to first order: the support function of a circle under the linearised projection. The part of it
 that is the same at all places is taken for an offset of the camera or for the person's size; the
-rest displaces everybody who is not in the middle between the cameras, alike at each visit.
+rest displaces the estimate of everybody who is not in the middle between the cameras, always by the
+same amount at the same place.
 
 Where the axis is inclined in the image, the horizontal centre depends on the level ω at which the
 body is widest, half heights above its middle: it is off by ω (x_head − x_foot) / 2. Cameras agree
-about that but for a small part, since another position explains it nearly as well: so ω is no
-correction, and its mean square is what positions are uncertain by.
+about that but for a small part, since another position explains it nearly as well. So positions are
+not corrected by ω; its mean square is part of their uncertainty.
 """
 
 from __future__ import annotations
@@ -63,7 +64,13 @@ class RowBoxes:
 
     @staticmethod
     def none(owners: Int[ndarray, " K"], cameras: int, size: int) -> RowBoxes:
-        """Rows without boxes, for measurements of some size, 3 or 4."""
+        """Rows without boxes.
+
+        Args:
+            owners: Path of each of K rows.
+            cameras: C, the number of cameras.
+            size: m, the size of a measurement, 3 or 4.
+        """
         shape = len(owners), cameras
         return RowBoxes(
             np.zeros((*shape, size)),
@@ -87,7 +94,7 @@ class BodyPriors(NamedTuple):
 
 
 class BodyShape(NamedTuple):
-    """The shape of bodies, and what of offsets and sizes it takes the place of."""
+    """The shape of bodies, and the changes of offsets and sizes that it replaces in part."""
 
     radius: float
     """ρ, metres, at least 0."""

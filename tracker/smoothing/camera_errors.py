@@ -68,8 +68,8 @@ class CameraErrors:
     """Lower confidence bound of the factors, such that with :data:`FALSE_ALARM` any of them is
     above the true factor."""
     delays: Float[ndarray, " C"]
-    """By how much each camera is late against their mean, seconds: what the others show, it shows
-    so much later. NaN where it is not estimated."""
+    """Delay of each camera relative to the mean of all, seconds, positive where it shows an event
+    later than the others; NaN where it is not estimated."""
     delay_sigmas: Float[ndarray, " C"]
     """Standard deviation of the delays, seconds."""
 
@@ -81,8 +81,8 @@ class CameraErrors:
     def out_of_line(self) -> tuple[int, Quantity] | None:
         """Index of the camera that is most out of line, and in which quantity; None for none.
 
-        One that is turned draws people's positions along, and with them the boxes of others out of
-        line: so it is one camera, the worst.
+        A camera with a wrong pose displaces the estimated positions, and by them the residuals of
+        the other cameras: so only the worst one is returned.
         """
         beyond = np.where(self.least > FACTOR, self.factors, -np.inf)
         if not len(beyond) or not np.isfinite(beyond).any():
@@ -97,12 +97,13 @@ class CameraErrors:
 def estimate_camera_errors(
     sample: NoiseSample, noise: NoiseModel, offsets: Float[ndarray, "C m"]
 ) -> CameraErrors:
-    """Estimate each camera's errors, and by how much it is late.
+    """Estimate each camera's errors, and its delay.
 
     Args:
         sample: The boxes by which the noise was estimated.
         noise: The noise of all cameras together.
-        offsets: b: offset of each camera's boxes that is left out of the residuals, half heights.
+        offsets: b, the offset of each camera's boxes that was subtracted from the residuals, half
+            heights.
     """
     seen = sample.seen
     whole = replace(
@@ -163,7 +164,7 @@ def _equations(
     information = across @ slopes + np.eye(3) * _NOTHING
     rest = there[:, :, None] * np.eye(unknowns) - slopes @ np.linalg.solve(information, across)
     left = (rest @ errors[:, :, None])[:, :, 0]
-    # an error that never ends, as that of a calibration, leaves blocks of which to take a spread
+    # bounded, so that an error that never ends, as that of a calibration, leaves enough blocks
     length = max(2, min(round(2.0 * noise.time / step_time), len(rows) // MANY_BLOCKS))
     owners = paths.owners_of(rows)
     number = np.column_stack([owners, (rows - paths.starts[owners]) // length])
@@ -207,7 +208,7 @@ def _log_factors(
 def _delays(
     sample: NoiseSample, noise: NoiseModel, cameras: int
 ) -> tuple[Float[ndarray, " C"], Float[ndarray, " C"]]:
-    """Estimate by how much each camera is late, by the innovation likelihood.
+    """Estimate the delay of each camera, and its standard deviation, by the innovation likelihood.
 
     A camera that is late by o shows a person who moves with velocity v where the person was, and
     its boxes have the residual −H v o. The innovations are linear in all o, so that least squares
@@ -234,7 +235,7 @@ def _delays(
     return np.asarray(step_time * inverse @ free @ slope), np.asarray(sigmas)
 
 
-def significance(cameras: int) -> float:
+def significant_deviations(cameras: int) -> float:
     """The number of standard deviations from which a delay of any of C cameras counts."""
     from scipy.special import ndtri  # a server starts without
 

@@ -18,25 +18,25 @@ UNSURE = 0.3
 """Prior existence probability, for the association of boxes, of a row beyond a path's ends or in a
 gap."""
 
-_MEETING = 2
+_MEETING_BY_CHANCE = 2
 """Number of cameras whose false boxes always have rays that nearly intersect somewhere."""
 
-_CONSTRAINT_VOTES = 1e4
+_CONSTRAINT_LOG_ODDS = 1e4
 """Log odds for existence where a correction states a position, more than all cameras can
 contradict."""
 
-ONE_PERSON = 0.3
+_ONE_PERSON = 0.3
 """Intersection over union above which two boxes of one camera may be of one person, as in the
 non-maximum suppression of detectors."""
 
-_THERE = 0.5
-"""Existence probability above which a track is present."""
+_PRESENT = 0.5
+"""Existence probability above which a track is present: it is likelier than not."""
 
-_HARDLY_EVER = 0.1
+_STRAY_SHARE = 0.1
 """Share of a track's boxes below which those away from other tracks are taken as stray."""
 
 
-def independence(step_time: float, memory: float) -> float:
+def independent_share(step_time: float, memory: float) -> float:
     """Compute the share of a step's evidence that is independent of the steps before, 0 … 1.
 
     Args:
@@ -46,14 +46,14 @@ def independence(step_time: float, memory: float) -> float:
     return min(step_time / memory, 1.0)
 
 
-def misses(shared: BoxAssociations) -> Float[ndarray, " N"]:
+def log_miss_likelihoods(shared: BoxAssociations) -> Float[ndarray, " N"]:
     """Compute the log likelihood of the misses at each row, Σ_c P(c misses) log(1 − p_D), at most
     0."""
     blind = np.log1p(-np.minimum(shared.chances, 1.0 - 1e-6))
     return np.asarray((shared.missed * blind).sum(axis=0))
 
 
-def lifetimes(
+def estimate_lifetimes(
     smoother: Smoother, paths: Paths, shared: BoxAssociations, parameters: SmoothingParams
 ) -> tuple[Float[ndarray, " N"], Float[ndarray, " n"]]:
     """Estimate the existence probability at each row, and the log odds of each path as a whole.
@@ -67,7 +67,8 @@ def lifetimes(
     rarely do: each box beyond the second offsets up to log 1/(1 − p_D) of a negative log Λ.
 
     Where stage 1 may give several boxes of a person, the detections count only for boxes apart
-    from tracks of greater odds (:func:`shown_apart`), for other boxes may be of these tracks.
+    from tracks of greater odds (:func:`select_separate_links`), for other boxes may be of these
+    tracks.
 
     Args:
         smoother: The models and the boxes.
@@ -87,7 +88,7 @@ def lifetimes(
         log_ratios[own] = -np.log(camera.clutter_factors[links.boxes[own]])
     rows = len(paths.states)
     shown = np.bincount(links.rows, links.shares, rows)
-    weight = independence(smoother.model.step_time, parameters.memory)
+    weight = independent_share(smoother.model.step_time, parameters.memory)
     survival = min(p.survival_probability, 1.0 - 1e-9)
     # probabilities within the time of independent evidence, symmetric under reversal of time
     steps = 1.0 / weight
@@ -96,30 +97,37 @@ def lifetimes(
     transitions = ExistenceTransitions(
         float(np.log(survival)), (come + leave) / 4.0, -parameters.change
     )
-    with_place, against = smoother.rows_with_places(paths)[0], misses(shared)
+    with_place, against = smoother.rows_with_places(paths)[0], log_miss_likelihoods(shared)
 
-    def by(votes: Float[ndarray, " N"]) -> tuple[Float[ndarray, " N"], Float[ndarray, " n"]]:
-        votes[with_place] += _CONSTRAINT_VOTES
+    def existence(
+        log_odds: Float[ndarray, " N"],
+    ) -> tuple[Float[ndarray, " N"], Float[ndarray, " n"]]:
+        """The existence probabilities and log odds, given the log odds of the detections."""
+        log_odds[with_place] += _CONSTRAINT_LOG_ODDS
         found = presence(
-            paths.starts, paths.firsts, weight * (votes + against), transitions, smoother.frames - 1
+            paths.starts,
+            paths.firsts,
+            weight * (log_odds + against),
+            transitions,
+            smoother.frames - 1,
         )
         return found.probabilities, found.odds
 
-    def voted(shown: Float[ndarray, " N"]) -> Float[ndarray, " N"]:
+    def detections(shown: Float[ndarray, " N"]) -> Float[ndarray, " N"]:
         """The log odds of the detections, given the number of cameras with one at each row."""
-        return _votes(hit, shown, appearance) if log_ratios.any() else hit * shown
+        return _detection_odds(hit, shown, appearance) if log_ratios.any() else hit * shown
 
     appearance = np.bincount(links.rows, links.shares * log_ratios, rows)
-    there, odds = by(voted(shown))
+    there, odds = existence(detections(shown))
     if not smoother.several_boxes:
         return there, odds
-    apart = shown_apart(smoother, paths, shared, there, odds)
+    apart = select_separate_links(smoother, paths, shared, there, odds)
     if apart.all():
         return there, odds
-    return by(voted(np.bincount(links.rows, links.shares * apart, rows)))
+    return existence(detections(np.bincount(links.rows, links.shares * apart, rows)))
 
 
-def _votes(
+def _detection_odds(
     hit: float, shown: Float[ndarray, " N"], appearance: Float[ndarray, " N"]
 ) -> Float[ndarray, " N"]:
     """Compute the log odds for existence by the detections of each row.
@@ -129,12 +137,14 @@ def _votes(
         shown: Expected number of cameras with a detection at each of N rows.
         appearance: Sum of the log likelihood ratios of these boxes' appearance.
     """
-    outweighed = np.minimum(appearance + hit * np.maximum(shown - _MEETING, 0.0), 0.0)
+    outweighed = np.minimum(appearance + hit * np.maximum(shown - _MEETING_BY_CHANCE, 0.0), 0.0)
     meeting = hit * np.minimum(shown, 2.0 * np.maximum(shown - 1.0, 0.0))
     return np.asarray(meeting + np.where(appearance < 0.0, outweighed, appearance))
 
 
-def extended(smoother: Smoother, paths: Paths, steps: int) -> tuple[Paths, Float[ndarray, " N"]]:
+def extend_paths(
+    smoother: Smoother, paths: Paths, steps: int
+) -> tuple[Paths, Float[ndarray, " N"]]:
     """Extend the paths at both ends by prediction with the motion model.
 
     Args:
@@ -152,10 +162,10 @@ def extended(smoother: Smoother, paths: Paths, steps: int) -> tuple[Paths, Float
     for i, (begin, end) in enumerate(zip(paths.starts, paths.starts[1:], strict=False)):
         before = min(steps, int(paths.firsts[i]))
         after = min(steps, smoother.frames - 1 - int(paths.lasts[i]))
-        head = _carried(
+        head = _predict_steps(
             paths.states[begin], paths.covariances[begin], backward, motion.noise, before
         )
-        tail = _carried(
+        tail = _predict_steps(
             paths.states[end - 1], paths.covariances[end - 1], motion.transition, motion.noise,
             after,
         )  # fmt: skip
@@ -169,7 +179,7 @@ def extended(smoother: Smoother, paths: Paths, steps: int) -> tuple[Paths, Float
     return longer, np.concatenate([np.zeros(0), *existences])
 
 
-def _carried(
+def _predict_steps(
     state: ndarray, covariance: ndarray, transition: ndarray, noise: ndarray, steps: int
 ) -> tuple[ndarray, ndarray]:
     """Predict a state over some steps; returns (steps, d) states and (steps, d, d) covariances."""
@@ -182,14 +192,14 @@ def _carried(
     return states, covariances
 
 
-def shown_apart(
+def select_separate_links(
     smoother: Smoother,
     paths: Paths,
     shared: BoxAssociations,
     there: Float[ndarray, " N"],
     odds: Float[ndarray, " n"],
 ) -> Bool[ndarray, " L"]:
-    """Select the links to boxes that are apart from every track of greater odds.
+    """Select the L links to boxes that are apart from every track of greater odds.
 
     A detector gives further boxes around a person: of limbs, one too high, one with a load. The
     rays of such boxes of several cameras intersect beside the person, or where rays to two people
@@ -204,34 +214,36 @@ def shown_apart(
         odds: Log odds of each of the n paths, which rank them where they are present.
     """
     links = shared.links
-    rows, sure = links.rows, np.where(there > _THERE, odds[paths.owners], -np.inf)
-    beside = _beside_surer(paths, sure, 2.0 * smoother.model.target.half_width)
+    rows, sure = links.rows, np.where(there > _PRESENT, odds[paths.owners], -np.inf)
+    beside = _beside_likelier(paths, sure, 2.0 * smoother.model.target.half_width)
     away = np.bincount(paths.owners[rows], links.shares * ~beside[rows], len(paths.labels))
     whole = np.bincount(paths.owners[rows], links.shares, len(paths.labels))
-    apart = (away > _HARDLY_EVER * whole)[paths.owners[rows]]
+    apart = (away > _STRAY_SHARE * whole)[paths.owners[rows]]
     for number, camera in enumerate(smoother.cameras):
         own = np.flatnonzero(links.cameras == number)
         own = own[np.argsort(paths.steps[rows[own]], kind="stable")]
         boxes = Boxes(camera.boxes[links.boxes[own]]).left_top
-        for one, other in _together(paths.steps[rows[own]]):
-            over = paired_overlaps(boxes[one], boxes[other]) > ONE_PERSON
-            lesser = _lesser(sure[rows[own]], one, other, over)
+        for one, other in _pairs_at_one_step(paths.steps[rows[own]]):
+            over = paired_overlaps(boxes[one], boxes[other]) > _ONE_PERSON
+            lesser = _lower_of_pairs(sure[rows[own]], one, other, over)
             apart[own[lesser]] = False
     return np.asarray(apart)
 
 
-def _beside_surer(paths: Paths, sure: Float[ndarray, " N"], width: float) -> Bool[ndarray, " N"]:
+def _beside_likelier(paths: Paths, sure: Float[ndarray, " N"], width: float) -> Bool[ndarray, " N"]:
     """The rows within ``width``, metres on the floor, of a track of greater odds at that step."""
     order = np.argsort(paths.steps, kind="stable")
     places = paths.states[order, :2]
     beside = np.zeros(len(order), dtype=bool)
-    for one, other in _together(paths.steps[order]):
+    for one, other in _pairs_at_one_step(paths.steps[order]):
         near = ((places[one] - places[other]) ** 2).sum(axis=1) < width**2
-        beside[order[_lesser(sure[order], one, other, near)]] = True
+        beside[order[_lower_of_pairs(sure[order], one, other, near)]] = True
     return beside
 
 
-def _together(steps: Int[ndarray, " N"]) -> Iterator[tuple[Int[ndarray, " P"], Int[ndarray, " P"]]]:
+def _pairs_at_one_step(
+    steps: Int[ndarray, " N"],
+) -> Iterator[tuple[Int[ndarray, " P"], Int[ndarray, " P"]]]:
     """All pairs of entries with equal steps, given in ascending order, as batches of indices."""
     for distance in range(1, len(steps)):
         one = np.flatnonzero(steps[distance:] == steps[:-distance])
@@ -240,7 +252,7 @@ def _together(steps: Int[ndarray, " N"]) -> Iterator[tuple[Int[ndarray, " P"], I
         yield one, one + distance
 
 
-def _lesser(
+def _lower_of_pairs(
     sure: Float[ndarray, " N"],
     one: Int[ndarray, " P"],
     other: Int[ndarray, " P"],

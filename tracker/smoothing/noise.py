@@ -6,8 +6,8 @@ averages what does not average. The model of a box of person i in camera c at st
     z = h_c(x_k) + η (β_ick + r v) + ς v',   β_(k+1) = exp(-Δt/τ) β_k + w,   Var β = q²
 
 with half height η, white noise v and v', and errors β that persist for a time τ. One model holds
-for all cameras: a camera whose noise is estimated by its own residuals leaves small ones where it
-is trusted, and is trusted the more.
+for all cameras: if each camera's noise were estimated from its own residuals, a camera with small
+noise would draw positions towards its boxes, leave small residuals, and get a still smaller noise.
 """
 
 from __future__ import annotations
@@ -65,8 +65,12 @@ LONGEST = 60.0
 PROCESS = 0.05, 20.0
 """Bounds of the factor on the process noise."""
 
-_START_TIME, _START_PIXELS = 1.0, 1.0  # seconds, pixels
+_START_TIME, _START_PIXELS = 1.0, 1.0
+"""Values of τ, seconds, and ς, pixels, at which the search of the maximum begins."""
+
 _ITERATIONS, _TOLERANCE = 40, 1e-6
+"""Largest number of iterations of L-BFGS, and relative change of the likelihood at which it
+stops."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -111,6 +115,7 @@ class NoiseSample:
     """Rows of smoothed paths, with N rows in all, and the boxes by which the noise is estimated."""
 
     paths: Paths
+    """The paths."""
     rows: Int[ndarray, " K"]
     """The rows, ascending, as :func:`choose_rows` returns them."""
     seen: SureBoxes
@@ -261,9 +266,9 @@ class PersistentErrors:
 
         G Q_β Gᵀ + κ (q_x² + b_x²) h² I,   G = (Σ Hᵀ R⁻¹ H)⁻¹ Hᵀ R⁻¹
 
-    with the mean square b_x² of the cameras' offsets. Neither does what is not known of the shape
-    of bodies, by which horizontal centres are off by δ in all cameras at once: it adds
-    (G δ)(G δ)ᵀ, a third of it where the error is evenly distributed between none and δ.
+    with the mean square b_x² of the cameras' offsets. The unknown shape of bodies, by which
+    horizontal centres are off by δ in all cameras at once, does not average either: it adds
+    (G δ)(G δ)ᵀ, or a third of it where the error is evenly distributed between 0 and δ.
     """
 
     def __init__(self, noise: NoiseModel, rows: int, half_height: float) -> None:
@@ -291,13 +296,13 @@ class PersistentErrors:
     def add_bodies(
         self, seen: SureBoxes, rims: Float[ndarray, " L"], levels: Float[ndarray, " L"]
     ) -> None:
-        """Add what is not known of the bodies in the boxes of one camera.
+        """Add the uncertainty due to the shape of bodies, of the boxes of one camera.
 
         Args:
             seen: The boxes.
-            rims: By how much the horizontal centre of a cylinder is beside its axis, pixels: a body
-                that is narrower at head and feet is between both.
-            levels: Standard deviation of the horizontal centre since it is not known at which level
+            rims: Distance between the horizontal centre of a cylinder and that of its axis, pixels;
+                the centre of a body that is narrower at head and feet lies between both.
+            levels: Standard deviation of the horizontal centre due to the unknown level at which
                 bodies are widest, pixels.
         """
         lateral = seen.jacobians[:, 0] / self._noise.variances(seen.half_heights)[:, :1]
@@ -324,7 +329,16 @@ class PersistentErrors:
 
 
 def common_variance(noise: NoiseModel, offsets: Float[ndarray, "C m"], half_height: float) -> float:
-    """The variance along x and y of errors that all cameras have in common, square metres."""
+    """Compute the variance along x and y of errors that all cameras have in common, square metres.
+
+    It is κ (q_x² + b_x²) h², with the mean square b_x² of the cameras' offsets and κ of
+    :data:`COMMON`.
+
+    Args:
+        noise: The noise of the boxes.
+        offsets: b, the offset of each camera's boxes, half heights.
+        half_height: h, of the target, metres.
+    """
     between = noise.persistent[0] ** 2 + np.mean(offsets[:, 0] ** 2)
     return float(COMMON * between * half_height**2)
 

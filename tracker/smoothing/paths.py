@@ -118,7 +118,7 @@ class Links:
     """Association probability, 0 … 1."""
 
     @staticmethod
-    def joined(parts: Many[Links]) -> Links:
+    def concatenate(parts: Many[Links]) -> Links:
         """Concatenate the pairs of several cameras."""
         nothing = np.zeros(0, dtype=np.int64)
         every = [Links(nothing, nothing, nothing, np.zeros(0)), *parts]

@@ -37,7 +37,7 @@ class Decision:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Joined:
+class LinkedTracklets:
     """The n tracklets that tracks consist of, and the log odds of P possible links."""
 
     labels: Int[ndarray, " n"]
@@ -84,7 +84,7 @@ class Smoothed:
     """Differences from the filter's tracks, by step."""
     learnt: Calibration = field(default_factory=lambda: Calibration.none(0, 0, 3))
     """The self-calibration of the boxes; its sizes are those of the final tracks."""
-    joined: Joined | None = None
+    joined: LinkedTracklets | None = None
     """The tracklets of the tracks, where identities were resolved."""
     noise: NoiseModel | None = None
     """The noise of the boxes, of which the covariances follow; None where it is not estimated."""

@@ -75,18 +75,28 @@ _AT_ONCE = 1024
 all their derivatives these take more than the paths."""
 
 _MOST_THREADS = 4
-_LEAST = 0.01  # association probability below which a pair is left out
-_SURE = 0.9  # least association probability of a box that is used for the self-calibration
-_MAINLY = 0.5  # least association probability of a box by which the noise is estimated
-_MEDIAN = 0.4549  # median of χ² with one degree of freedom
+"""Largest number of threads, each of one camera or one block of rows."""
 
-_HABIT = 8.0
+_LEAST_SHARE = 0.01
+"""Association probability below which a pair is left out, as in the result of the fusion."""
+
+_CALIBRATION_SHARE = 0.9
+"""Least association probability of a box that is used for the self-calibration."""
+
+_NOISE_SHARE = 0.5
+"""Least association probability of a box by which the noise is estimated: it is likelier the
+track's than not."""
+
+_MEDIAN = 0.4549
+"""Median of χ² with one degree of freedom, 0.6745²."""
+
+_SCALE_TIME = 8.0
 """Time constant with which the process-noise scale of a path changes, seconds."""
 
-_PRIOR = 0.5
+_SCALE_PRIOR = 0.5
 """Weight of the prior s = 1 of the process-noise scale, seconds of a path."""
 
-_WILD = 2.0
+_LARGEST_RATIO = 2.0
 """Bound of the contribution of one step, as a factor on the previous scale, so that a single turn
 or a wrong association does not raise the scale."""
 
@@ -240,7 +250,7 @@ class Smoother:
             for c in range(len(model.cameras))
         ]
         motion = model.motion
-        self._rule = model.camera_rule(_LEAST)
+        self._rule = model.camera_rule(_LEAST_SHARE)
         self.prior = np.zeros((motion.dimension, motion.dimension))
         self.prior[:3, :3] = START_SIGMA**2 * np.eye(3)
         self.prior[3:, 3:] = max(motion.start_velocity, 1e-6) ** 2 * np.eye(motion.dimension - 3)
@@ -281,7 +291,7 @@ class Smoother:
                 scales = found.noise_scales
                 paths = paths.with_states(found.rows.means, found.rows.covariances)
                 del found
-        return _fitted(paths, found)
+        return _enforce_places(paths, found)
 
     def _linearised(self, paths: Paths, by_camera: list[Links], learnt: Calibration) -> _Linearised:
         """What the boxes and constraints say of paths, linearised at their states.
@@ -308,7 +318,7 @@ class Smoother:
         """
         motion, places = self.model.motion, linear.places
         rule = passes.PathMotion(motion.transition, motion.noise, self.prior)
-        smooth = partial(_smoothed, starts, linear.begins, linear.information, rule)
+        smooth = partial(_smooth_with_places, starts, linear.begins, linear.information, rule)
         found = smooth(places, scales)
         inflated = places.inflate(found.means, found.covariances)
         if inflated.contradicted:
@@ -446,7 +456,10 @@ class Smoother:
         learnt = learnt or self.uncalibrated(paths)
         shape = len(self.cameras), len(order)
         found = BoxAssociations(
-            Links.joined([]), np.zeros(shape), np.ones(shape), np.full(shape, -1, dtype=np.int64)
+            Links.concatenate([]),
+            np.zeros(shape),
+            np.ones(shape),
+            np.full(shape, -1, dtype=np.int64),
         )
 
         def of_camera(c: int) -> Links:
@@ -463,9 +476,9 @@ class Smoother:
                 boxes = own.links.boxes + self.cameras[c].starts[first]
                 of_links = np.full(len(boxes), c, dtype=np.int64)
                 parts.append(Links(of_links, rows[own.links.rows], boxes, own.links.shares))
-            return Links.joined(parts)
+            return Links.concatenate(parts)
 
-        return replace(found, links=Links.joined(self._each_camera(of_camera)))
+        return replace(found, links=Links.concatenate(self._each_camera(of_camera)))
 
     def _share_steps(
         self,
@@ -582,7 +595,9 @@ class Smoother:
         size_sums, count = np.zeros(people), np.zeros(people)
         offsets, noises = np.zeros_like(learnt.offsets), learnt.noises.copy()
         for c in range(len(self.cameras)):
-            own = links.take((links.cameras == c) & (links.shares > _SURE) & witness[links.rows])
+            own = links.take(
+                (links.cameras == c) & (links.shares > _CALIBRATION_SHARE) & witness[links.rows]
+            )
             chosen, plain, half, left, spread, own_noise = self._residuals(c, paths, own, learnt)
             if not len(chosen):
                 continue
@@ -598,7 +613,7 @@ class Smoother:
             if len(rest) >= FEWEST:
                 square = (half[:, None] * left) ** 2
                 ratio = np.median(square / own_noise) / _MEDIAN + np.median(spread / own_noise)
-                alike = _alike(chosen, owners, left)
+                alike = _step_correlation(chosen, owners, left)
                 noises[c] = np.clip(
                     np.sqrt(ratio * (1.0 + alike) / (1.0 - alike)), NARROWEST, WIDEST
                 )
@@ -629,10 +644,10 @@ class Smoother:
         return _Residuals(*(np.concatenate(each) for each in zip(*parts, strict=True)))
 
     def reported(self, fitted: Fitted, links: Links, learnt: Calibration) -> Reported | None:
-        """Estimate the noise of boxes, and the covariances of paths whose boxes err so.
+        """Estimate the noise of boxes, and the covariances of paths that follow from it.
 
-        The positions stay as they are. With the shape of bodies they would be elsewhere, by δ:
-        their covariance is that of the displaced ones and δ δᵀ, their mean square error.
+        The positions do not change. With the shape of bodies they would be displaced by δ: the
+        reported covariance is that of the displaced ones plus δ δᵀ.
 
         Args:
             fitted: The paths, with N rows.
@@ -643,7 +658,7 @@ class Smoother:
             None where two cameras see too few rows, or boxes have no height.
         """
         given = fitted.paths
-        sure = links.shares > _MAINLY
+        sure = links.shares > _NOISE_SHARE
         rows = choose_rows(given, np.bincount(links.rows[sure], minlength=len(given.states)))
         if rows is None or self.model.target.size < 3:
             return None
@@ -686,7 +701,7 @@ class Smoother:
             learnt: The calibration.
         """
         target, owners = self.model.target, paths.owners
-        usable = links.shares > _SURE
+        usable = links.shares > _CALIBRATION_SHARE
         usable &= ~np.isin(links.rows, self.rows_with_places(paths)[0])
         sure = links.take(usable)
         several = np.flatnonzero(np.bincount(sure.rows, minlength=len(paths.states)) >= 2)
@@ -699,14 +714,14 @@ class Smoother:
         for camera, lens in enumerate(self.model.cameras):
             own = sure.take(sure.cameras == camera)
             found = self._residuals(camera, paths, own, learnt)
-            alike = max(alike, _alike(found.rows, owners, found.left))
+            alike = max(alike, _step_correlation(found.rows, owners, found.left))
             place = np.minimum(np.searchsorted(rows, found.rows), len(rows) - 1)
             used = np.flatnonzero(rows[place] == found.rows)
             states, tall = paths.states[found.rows[used]], found.half_heights[used, None]
             expected = target.expected(lens, states)
             at = place[used], np.full(len(used), camera)
             seen.residuals[at] = found.plain[used] / tall
-            # where all are displaced by the cameras' offsets is not told from where they are
+            # a displacement of all people cannot be distinguished from the cameras' offsets
             seen.residuals[(*at, 0)] -= learnt.offsets[camera, 0]
             seen.jacobians[at] = expected.jacobians[:, :, :3] / tall[:, :, None]
             own_shifts = self._body_shifts(camera, states, target.half_width)
@@ -729,8 +744,8 @@ class Smoother:
     ) -> tuple[Float[ndarray, " n"], Float[ndarray, " n"]]:
         """Estimate the heights of people above the floor, and their standard deviations, metres.
 
-        An offset that the boxes of all cameras have is not told from people's heights: only the
-        differences between cameras are subtracted. See
+        An offset of the boxes of all cameras cannot be distinguished from people's heights: only
+        the differences between cameras are subtracted. See
         :func:`tracker.smoothing.heights.standing_heights`.
 
         Args:
@@ -742,7 +757,7 @@ class Smoother:
         owners = paths.owners
         half_height = float(self._sequence.target_half_extents[2])
         offsets = learnt.offsets[:, 1] - learnt.offsets[:, 1].mean()
-        sure, parts = links.take(links.shares > _MAINLY), []
+        sure, parts = links.take(links.shares > _NOISE_SHARE), []
         for camera in range(len(self.cameras)):
             own = sure.take(sure.cameras == camera)
             for rows, expected, _, half, plain, _ in self._compared(camera, paths, own, learnt):
@@ -824,7 +839,7 @@ class Smoother:
         return replace(learnt, shifts=learnt.shifts + found)
 
 
-def _fitted(paths: Paths, last: _Iterated) -> Fitted:
+def _enforce_places(paths: Paths, last: _Iterated) -> Fitted:
     """The result of the last iteration, with the constraints of places enforced."""
     found = last.rows
     places, states, covariances = last.places.enforce(found.means, found.covariances)
@@ -844,7 +859,7 @@ def _fitted(paths: Paths, last: _Iterated) -> Fitted:
     )
 
 
-def _smoothed(
+def _smooth_with_places(
     starts: Int[ndarray, " n1"],
     begins: Float[ndarray, "n d"],
     information: evidence.BoxInformation,
@@ -860,7 +875,7 @@ def _smoothed(
     return found
 
 
-def _alike(
+def _step_correlation(
     rows: Int[ndarray, " L"], owners: Int[ndarray, " N"], residuals: Float[ndarray, "L m"]
 ) -> float:
     """Estimate the correlation ρ of the errors of a path's boxes in consecutive steps, 0 … 0.95.
@@ -916,11 +931,11 @@ def process_noise_scales(
     on_ground = noise[np.ix_(ground, ground)]
     size = float(len(ground))
     squares = before * size + before**2 * drives(found, on_ground, ground)
-    squares = np.minimum(squares, _WILD * size * before)
+    squares = np.minimum(squares, _LARGEST_RATIO * size * before)
     counts = np.full(len(squares), size)
     begins = starts[:-1]
     squares[begins], counts[begins] = 0.0, 0.0  # no step leads to a first row
-    kept = float(np.exp(-step_time / _HABIT))
-    prior = _PRIOR * size / step_time
+    kept = float(np.exp(-step_time / _SCALE_TIME))
+    prior = _SCALE_PRIOR * size / step_time
     total, count = sums_around(starts, squares, kept), sums_around(starts, counts, kept)
     return np.asarray((prior + total) / (prior + count))

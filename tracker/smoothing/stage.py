@@ -25,10 +25,10 @@ from tracker.smoothing.calibration import Calibration
 from tracker.smoothing.paths import Links, Paths, contested_shares
 from tracker.smoothing.protocol import EmptyStore, ResultStore
 from tracker.smoothing.recording import CameraBoxes
-from tracker.smoothing.result import Decision, Joined, Smoothed
+from tracker.smoothing.result import Decision, LinkedTracklets, Smoothed
 from tracker.smoothing.smoother import BoxAssociations, Fitted, Smoother
 from tracker.smoothing.tracklets import linking
-from tracker.smoothing.tracklets.people import Seen
+from tracker.smoothing.tracklets.people import Appearances
 from tracker.smoothing.tracklets.splitting import Tracked
 from tracker.steps import Steps
 
@@ -47,12 +47,12 @@ _AT_ONCE = 1024
 """Number of steps whose associations are converted at a time."""
 
 
-class _Decided(NamedTuple):
+class _Resolution(NamedTuple):
     """The resolution of identities."""
 
     decisions: list[Decision]
     """Differences from the filter's tracks."""
-    joined: Joined | None = None
+    joined: LinkedTracklets | None = None
     """The tracklets of the tracks."""
     limits: Mapping[int, tuple[int, int]] = MappingProxyType({})
     """First and last step at which corrections let a track exist, by its label."""
@@ -60,7 +60,7 @@ class _Decided(NamedTuple):
     """Hash of the corrections that were enforced; empty where identities are not resolved."""
 
 
-class _First(NamedTuple):
+class _FilterTracks(NamedTuple):
     """The filter's n tracks as they were in the first round, without their states."""
 
     paths: Paths
@@ -68,7 +68,7 @@ class _First(NamedTuple):
     """Log odds of each, of existing at any step."""
 
 
-class _Start(NamedTuple):
+class _LastRoundInput(NamedTuple):
     """The input of the last resolution of identities, which does not depend on corrections of
     identity."""
 
@@ -84,11 +84,11 @@ class _Start(NamedTuple):
     """Whether the filter, or the round before, had a track at each row; other rows fill gaps."""
     names: Int[ndarray, " N"]
     """The filter's label of each row, -1 where it had no track."""
-    first: _First
+    first: _FilterTracks
     """The filter's own tracks."""
 
 
-class Positions:
+class PositionSmoothing:
     """Each track of the filter, smoothed over its whole duration.
 
     A track is fitted to its boxes, and the boxes are associated again with the fitted tracks;
@@ -131,53 +131,54 @@ class Positions:
         tracks = trajectories.extract(results, cameras=cameras, extraction_threshold=CONFIRMED)
         if not len(tracks):
             return Smoothed.empty(dimension, cameras)
-        begin = _read(smoother, results, tracks)
+        begin = _read_filter(smoother, results, tracks)
         del tracks
         check()
-        learnt, decided = self._named(smoother, begin, seen, check, corrections, earlier)
+        learnt, decided = self._resolve(smoother, begin, seen, check, corrections, earlier)
         known: Smoothed | None = earlier.get(f"smoothed-{decided.key}") if decided.key else None
         if known is not None:
             return known
         turns = p.iterations if learnt is None else 1  # resolved tracks are near their boxes
-        found = _finished(smoother, begin, p, learnt, check, turns, decided)
+        found = _finish(smoother, begin, p, learnt, check, turns, decided)
         if decided.key:
             earlier.put(f"smoothed-{decided.key}", found)
         return found
 
-    def _named(
+    def _resolve(
         self,
         smoother: Smoother,
-        begin: _Begin,
+        begin: _InitialTracks,
         views: Steps[tuple[ViewResult, ...]],
         check: Callable[[], None],
         corrections: Many[Correction],
         earlier: ResultStore,
-    ) -> tuple[Calibration | None, _Decided]:
+    ) -> tuple[Calibration | None, _Resolution]:
         """Resolve the identities in ``begin``; here the filter's own tracks remain.
 
         Returns:
             The self-calibration, if there is one yet, and the decisions.
         """
-        return None, _Decided([])
+        return None, _Resolution([])
 
 
-class Identities(Positions):
+class IdentitySmoothing(PositionSmoothing):
     """Tracks smoothed with their identities resolved: split where ambiguous, and linked at once."""
 
-    def _named(
+    def _resolve(
         self,
         smoother: Smoother,
-        begin: _Begin,
+        begin: _InitialTracks,
         views: Steps[tuple[ViewResult, ...]],
         check: Callable[[], None],
         corrections: Many[Correction],
         earlier: ResultStore,
-    ) -> tuple[Calibration | None, _Decided]:
+    ) -> tuple[Calibration | None, _Resolution]:
+        """Split the tracks in ``begin`` into tracklets, and replace them by linked ones."""
         p = self._parameters.smoothing
-        seen = Seen.of(views) if p.appearance > 0.0 else Seen()
-        start: _Start | None = earlier.get("start")
+        seen = Appearances.of(views) if p.appearance > 0.0 else Appearances()
+        start: _LastRoundInput | None = earlier.get("start")
         if start is None:
-            start = self._start(smoother, begin, seen, check)
+            start = self._before_last_round(smoother, begin, seen, check)
             earlier.put("start", start)
         tracked = Tracked(
             smoother, start.fitted, start.shared, start.contested, start.had, start.names
@@ -190,25 +191,32 @@ class Identities(Positions):
         gone = np.flatnonzero(~np.isin(first.paths.labels, found.names)).tolist()
         removed = []
         if gone:
-            removed = [_removed(first.paths, path, first.odds[path]) for path in gone]
-        decided = _Decided([*found.decisions, *removed], found.joined, found.limits, key)
+            removed = [_removal(first.paths, path, first.odds[path]) for path in gone]
+        decided = _Resolution([*found.decisions, *removed], found.joined, found.limits, key)
         return learnt.of_people(found.origins), decided
 
-    def _start(
+    def _before_last_round(
         self,
         smoother: Smoother,
-        begin: _Begin,
-        seen: Seen,
+        begin: _InitialTracks,
+        seen: Appearances,
         check: Callable[[], None],
-    ) -> _Start:
-        """Run all rounds but the last resolution, the only one with corrections of identity."""
+    ) -> _LastRoundInput:
+        """Run all rounds but the last resolution, the only one with corrections of identity.
+
+        Args:
+            smoother: The models and the boxes.
+            begin: The filter's tracks, which are taken.
+            seen: Appearance of the boxes.
+            check: A function that is called in every round and raises an exception to stop.
+        """
         p = self._parameters.smoothing
         contested = contested_shares(begin.paths, begin.links)
         had = begin.existences == 1.0
         names = np.where(had, begin.paths.labels[begin.paths.owners], -1)
         fitted, shared, learnt = _fit_and_share(smoother, begin, p, None, check, p.iterations)
-        _, odds = lifetimes.lifetimes(smoother, fitted.paths, shared, p)
-        first = _First(fitted.paths.without_states(), odds)
+        _, odds = lifetimes.estimate_lifetimes(smoother, fitted.paths, shared, p)
+        first = _FilterTracks(fitted.paths.without_states(), odds)
         for _ in range(p.rounds - 1):
             tracked = Tracked(smoother, fitted, shared, contested, had, names)
             del fitted, shared
@@ -222,17 +230,17 @@ class Identities(Positions):
             # resolved identities improve the association of boxes, and the association identities
             fitted, shared, learnt = _fit_and_share(smoother, begin, p, learnt, check, 1)
             contested = contested_shares(fitted.paths, shared.links)
-        return _Start(fitted, shared, learnt, contested, had, names, first)
+        return _LastRoundInput(fitted, shared, learnt, contested, had, names, first)
 
 
-class _Begin:
+class _InitialTracks:
     """Tracks to be fitted to their boxes, with N rows.
 
     They are given away once, so that nothing holds the states while the fit replaces them.
     """
 
     def __init__(self, paths: Paths, existences: Float[ndarray, " N"], links: Links) -> None:
-        """Begin with some tracks, as :meth:`replace` takes them."""
+        """Begin with some tracks, with the arguments of :meth:`replace`."""
         self.replace(paths, existences, links)
 
     def replace(self, paths: Paths, existences: Float[ndarray, " N"], links: Links) -> None:
@@ -252,20 +260,22 @@ class _Begin:
 
     def take_links(self) -> Links:
         """The links, which are forgotten."""
-        found, self.links = self.links, Links.joined([])
+        found, self.links = self.links, Links.concatenate([])
         return found
 
 
-def _read(smoother: Smoother, results: Steps[FusionResult], tracks: Trajectories) -> _Begin:
+def _read_filter(
+    smoother: Smoother, results: Steps[FusionResult], tracks: Trajectories
+) -> _InitialTracks:
     """The filter's tracks, as they are reported."""
     paths, had = read_paths(results, tracks, smoother.model.motion.dimension)
     links = read_links(results, paths, smoother.cameras)
-    return _Begin(paths, np.where(had, 1.0, lifetimes.UNSURE), links)
+    return _InitialTracks(paths, np.where(had, 1.0, lifetimes.UNSURE), links)
 
 
 def _fit_and_share(
     smoother: Smoother,
-    begin: _Begin,
+    begin: _InitialTracks,
     p: SmoothingParams,
     learnt: Calibration | None,
     check: Callable[[], None],
@@ -289,7 +299,7 @@ def _fit_and_share(
         check()
         paths = fitted.paths
         del fitted
-        existences, _ = lifetimes.lifetimes(smoother, paths, shared, p)
+        existences, _ = lifetimes.estimate_lifetimes(smoother, paths, shared, p)
         if p.learning:
             learnt = smoother.learn(paths, shared.links, learnt)
         begin.replace(paths, existences, shared.links)
@@ -299,14 +309,14 @@ def _fit_and_share(
     return fitted, shared, learnt
 
 
-def _finished(
+def _finish(
     smoother: Smoother,
-    begin: _Begin,
+    begin: _InitialTracks,
     p: SmoothingParams,
     learnt: Calibration | None,
     check: Callable[[], None],
     turns: int,
-    decided: _Decided,
+    decided: _Resolution,
 ) -> Smoothed:
     """Fit tracks with settled identities, estimate their ends, and remove false tracks.
 
@@ -321,11 +331,11 @@ def _finished(
     """
     fitted, shared, learnt = _fit_and_share(smoother, begin, p, learnt, check, turns)
     del shared
-    longer, existences = lifetimes.extended(
+    longer, existences = lifetimes.extend_paths(
         smoother, fitted.paths, round(REACH / smoother.model.step_time)
     )
     del fitted
-    away = _outside(longer, decided.limits)
+    away = _outside_spans(longer, decided.limits)
     existences = np.where(away, 0.0, existences)
     shared = smoother.associate(longer, existences, learnt)
     begin.replace(longer, existences, shared.links)
@@ -338,7 +348,7 @@ def _finished(
     del shared
     shared = smoother.associate(fitted.paths, existences, learnt)
     reported = smoother.reported(fitted, shared.links, learnt) if p.learning else None
-    there, odds = lifetimes.lifetimes(smoother, fitted.paths, shared, p)
+    there, odds = lifetimes.estimate_lifetimes(smoother, fitted.paths, shared, p)
     there[away] = 0.0
     paths = fitted.places.lead(fitted.paths, smoother.model.step_time)
     noise = None if reported is None else reported.noise
@@ -349,7 +359,7 @@ def _finished(
         certain = paths.with_states(paths.states, covariances)
         heights[:] = smoother.heights(certain, shared.links, reported.learnt, reported.noise)
     present = odds > 0.0
-    removed = [_removed(paths, path, odds[path]) for path in np.flatnonzero(~present).tolist()]
+    removed = [_removal(paths, path, odds[path]) for path in np.flatnonzero(~present).tolist()]
     links = shared.links
     seen = np.zeros((len(there), len(smoother.cameras)), dtype=bool)
     sure = links.shares > _SEEN
@@ -374,9 +384,14 @@ def _finished(
     )
 
 
-def _removed(paths: Paths, path: int, odds: float) -> Decision:
-    """Make the decision to remove a track, for its log odds or since none of its tracklets is
-    left."""
+def _removal(paths: Paths, path: int, odds: float) -> Decision:
+    """Make the decision to remove a track, for its log odds or since none of its tracklets is left.
+
+    Args:
+        paths: The tracks.
+        path: Index of the track.
+        odds: Log odds of existing at any step.
+    """
     absence = float(1.0 / (1.0 + np.exp(np.clip(odds, -600.0, 600.0))))
     reason = (
         "over its whole life it is likelier nobody"
@@ -389,7 +404,7 @@ def _removed(paths: Paths, path: int, odds: float) -> Decision:
     )
 
 
-def _outside(paths: Paths, limits: Mapping[int, tuple[int, int]]) -> Bool[ndarray, " N"]:
+def _outside_spans(paths: Paths, limits: Mapping[int, tuple[int, int]]) -> Bool[ndarray, " N"]:
     """Find the rows at which corrections state that a track does not exist."""
     away = np.zeros(len(paths.states), dtype=bool)
     for path, label in enumerate(paths.labels.tolist()):
@@ -420,7 +435,7 @@ def read_paths(
     of_label, frames = tracks.labels[order], tracks.frames[order]
     labels, begins = np.unique(of_label, return_index=True)
     ends = np.append(begins[1:], len(order))
-    earlier = _before_their_report(fused, labels, frames[begins])
+    earlier = _steps_before_report(fused, labels, frames[begins])
     known = []
     for label, begin, end in zip(labels.tolist(), begins, ends, strict=True):
         before = np.array(earlier.get(label, ()), dtype=np.int64).reshape(-1, 2)
@@ -443,7 +458,7 @@ def read_paths(
     return paths, had
 
 
-def _before_their_report(
+def _steps_before_report(
     fused: Steps[FusionResult], labels: Int[ndarray, " n"], reported: Int[ndarray, " n"]
 ) -> dict[int, list[tuple[int, int]]]:
     """List the steps before each label's first report at which a box updated it, with its
@@ -472,9 +487,15 @@ def _before_their_report(
 
 
 def read_links(fused: Steps[FusionResult], paths: Paths, cameras: Many[CameraBoxes]) -> Links:
-    """Convert the association probabilities of the fusion to links of the rows of the paths."""
+    """Convert the association probabilities of the fusion to links of the rows of the paths.
+
+    Args:
+        fused: The result of stage 2 for each step.
+        paths: The fusion's tracks.
+        cameras: The boxes of each camera.
+    """
     parts = range(0, len(fused), _AT_ONCE)
-    return Links.joined([_links_of(fused, first, paths, cameras) for first in parts])
+    return Links.concatenate([_links_of(fused, first, paths, cameras) for first in parts])
 
 
 def _links_of(
@@ -488,7 +509,7 @@ def _links_of(
     )
     labels = fused.column("posterior.labels", first=begin, last=end)
     if not len(of_pair.values) or not len(paths.labels):
-        return Links.joined([])
+        return Links.concatenate([])
     within = of_pair.steps
     named = labels.values[labels.starts[within] + components.values]
     order = np.argsort(paths.labels, kind="stable")

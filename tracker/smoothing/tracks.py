@@ -13,6 +13,9 @@ from tracker.fusion.trajectories import Bounds, Trajectories
 from tracker.smoothing.result import Smoothed
 from tracker.steps import Steps
 
+_FAINT = 0.05
+"""Weight below which a component belongs to no track."""
+
 
 def tracks_of(
     smoothed: Smoothed,
@@ -106,7 +109,3 @@ def _components(
         components[own] = np.where(good & closest, sure[best], -1)
         labels[own] = np.where(good & closest, own_labels[step][sure[best]], -1)
     return components, labels
-
-
-_FAINT = 0.05
-"""Weight below which a component belongs to no track."""

@@ -24,7 +24,7 @@ from app.state.workers.compiling import Compiling
 from app.state.workers.opening import Opener
 from app.state.workers.threads import CLOSING_SECONDS, be_nice
 from app.state.workers.watchdog import Watchdog
-from tracker.fusion.trajectories import Trajectories, corrected
+from tracker.fusion.trajectories import Trajectories, apply_corrections
 from tracker.library.keeping import run_for_display
 from tracker.library.records import Result
 from tracker.parameters.catalogue import RunParameters
@@ -401,4 +401,4 @@ def _meanwhile(snapshot: Snapshot, seed: int) -> Trajectories | None:
     if not known <= set(snapshot.corrections):
         return None  # something was taken back: that run is kept, and there at once
     new = [one for one in snapshot.corrections if one not in known]
-    return corrected(shown.tracks, new, sequence.step_time)
+    return apply_corrections(shown.tracks, new, sequence.step_time)

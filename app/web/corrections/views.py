@@ -24,7 +24,7 @@ from app.state.correcting import Correcting
 from app.state.snapshot import Ghosts, Snapshot
 from tracker.corrections.outcomes import Outcome, names_by_track
 from tracker.corrections.truth import checked_ranges
-from tracker.fusion.trajectories import Trajectories, corrected
+from tracker.fusion.trajectories import Trajectories, apply_corrections
 from tracker.review.queue import Queue, ReviewItem
 from tracker.review.queue.item import TrackRows
 from tracker.runs.camera_notes import out_of_line_notes
@@ -148,7 +148,7 @@ def _after(run: Run, doubt: ReviewItem, alternative: int) -> Trajectories:
     if not alternative:
         return run.tracks
     said = doubt.alternatives[alternative].corrections
-    return corrected(run.tracks, said, run.sequence.step_time)
+    return apply_corrections(run.tracks, said, run.sequence.step_time)
 
 
 def _around(run: Run, doubt: ReviewItem) -> tuple[int, int]:

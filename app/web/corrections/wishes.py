@@ -6,7 +6,7 @@ from app.models.correcting import CorrectionWish
 from app.state.snapshot import Snapshot
 from tracker.corrections import Correction, CorrectionError, Place
 from tracker.corrections.kinds import KINDS, make
-from tracker.corrections.pointing import foot_on_floor, ground_under, stands, triangulated
+from tracker.corrections.pointing import foot_on_floor, ground_under, stands, triangulate
 from tracker.review.queue.item import WITHIN, TrackRows
 from tracker.sequences.sequence import Sequence
 
@@ -141,7 +141,7 @@ def _place(wish: CorrectionWish, snapshot: Snapshot, sequence: Sequence, step: i
     if len(points) == 1:
         found = foot_on_floor(*points[0], floor=ground, half_height=half_height)
     else:
-        found = triangulated(points)
+        found = triangulate(points)
         # any point of somebody who stands says where: the middle is half a person over the floor
         if stands(float(found[2]), ground=ground, half_height=half_height):
             found[2] = ground + half_height

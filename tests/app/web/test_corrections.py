@@ -19,7 +19,7 @@ from tests.app.conftest import ADDRESS, Runs, command, connect, run_is, wait_unt
 from tracker.corrections import Correction
 from tracker.corrections.log import own_place, read_log, write_log
 from tracker.review.queue import Alternative, Queue, ReviewItem
-from tracker.review.queue.item import TrackRows, proposed
+from tracker.review.queue.item import TrackRows, propose
 from tracker.sequences.reader import read_sequence
 
 PLACE = "/api/corrections"
@@ -254,7 +254,7 @@ def test_how_it_would_be_is_shown_until_it_is_no_more(
     lanes = TrackRows(desk.app.state.workbench.snapshot().run.tracks)  # type: ignore[attr-defined]
     track = tracks(desk)[0]["id"]
     places = (lanes.place(track, 59), lanes.place(track, 60, after=True))
-    two = Alternative("two people", 0.5, proposed("different", places))
+    two = Alternative("two people", 0.5, propose("different", places))
     made = ReviewItem(
         "cut", "two people?", "told", 59, 60, (track,), places, 0.5, 60,
         (Alternative("as it is", 0.5, ()), two),
@@ -279,8 +279,8 @@ def test_what_is_answered_of_the_run_before_counts_in_the_one_that_came_meanwhil
     lanes = TrackRows(desk.app.state.workbench.snapshot().run.tracks)  # type: ignore[attr-defined]
     track = tracks(desk)[0]["id"]
     places = (lanes.place(track, 59), lanes.place(track, 60, after=True))
-    now = Alternative("as it is", 0.5, proposed("same", places))
-    two = Alternative("two people", 0.5, proposed("different", places))
+    now = Alternative("as it is", 0.5, propose("same", places))
+    two = Alternative("two people", 0.5, propose("different", places))
     made = ReviewItem(
         "cut", "two people?", "told", 59, 60, (track,), places, 0.5, 60, (now, two)
     )  # fmt: skip
@@ -388,10 +388,10 @@ def test_who_may_be_missing_is_shown_where_each_camera_would_have_him(
     run = desk.app.state.workbench.snapshot().run  # type: ignore[attr-defined]
     place = TrackRows(run.tracks).place(tracks(desk)[0]["id"], 60)
     other = place._replace(step=70)
-    here = (*proposed("here", (place,)), *proposed("here", (other,)))
+    here = (*propose("here", (place,)), *propose("here", (other,)))
     made = ReviewItem(
         "missing", "Somebody is missing?", "told", 60, 70, (), (place, other), 0.7, 11,
-        (Alternative("nobody", 0.3, proposed("nobody", (place, other))),
+        (Alternative("nobody", 0.3, propose("nobody", (place, other))),
          Alternative("somebody", 0.7, here)),
     )  # fmt: skip
     monkeypatch.setattr(Doubting, "of", lambda self, snapshot: Queue((made,), 0, "a test"))

@@ -14,7 +14,7 @@ from tracker.evaluation import EvaluationSettings, evaluate_sequence
 from tracker.fusion.trajectories import Trajectories
 from tracker.parameters.catalogue import RunParameters
 from tracker.review.queue import ReviewItem, queue
-from tracker.review.queue.item import TrackRows, confirmed
+from tracker.review.queue.item import TrackRows, confirm
 from tracker.review.self_consistency.estimate import Common, Variant, track_variant
 from tracker.runs import pipeline
 from tracker.runs.pipeline import Run
@@ -109,7 +109,7 @@ class Truthful:
         if not true:
             return ()
         as_it_is = doubt.alternatives[0].corrections
-        return confirmed(
+        return confirm(
             as_it_is
             if as_it_is in true
             else max(true, key=lambda told: sum(len(one.constraints.must_link) for one in told))

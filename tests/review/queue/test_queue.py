@@ -10,10 +10,10 @@ from tests.engine.synthetic import crossing, sequence, walk
 from tests.runs.test_corrected_runs import run_of, with_a_gap
 from tracker.corrections import Place
 from tracker.corrections.kinds import Kind
-from tracker.fusion.trajectories import Trajectories, corrected
+from tracker.fusion.trajectories import Trajectories, apply_corrections
 from tracker.review.queue import queue
 from tracker.review.queue.clear_places import ClearPlaces
-from tracker.review.queue.item import Alternative, TrackRows, confirmed, proposed
+from tracker.review.queue.item import Alternative, TrackRows, confirm, propose
 from tracker.review.queue.linking import Move, Tracklet
 from tracker.review.queue.other_run import OtherRun
 from tracker.review.queue.ranking import IdentityReach, _with_none_of_them
@@ -34,13 +34,13 @@ def test_who_was_away_is_asked_for_first_and_not_again(smoothing: str) -> None:
     assert first.kind == "join"
     assert 25 <= first.first < first.last <= 55
     assert sum(one.probability for one in first.alternatives) == pytest.approx(1.0, abs=0.05)
-    answer = confirmed(first.alternatives[1].corrections, "the same")
+    answer = confirm(first.alternatives[1].corrections, "the same")
     after = run_of(whole, answer, smoothing=smoothing)
     assert [one.met for one in after.outcomes] == [True]
     assert len(set(after.tracks.ids.tolist())) == 2
     rest = queue(after)
     assert first.id not in [one.id for one in rest.items]
-    kept = run_of(whole, confirmed(first.alternatives[0].corrections), smoothing=smoothing)
+    kept = run_of(whole, confirm(first.alternatives[0].corrections), smoothing=smoothing)
     assert first.id not in [one.id for one in queue(kept).items]
 
 
@@ -62,7 +62,7 @@ def test_the_other_run_weighs_a_move_by_who_is_who_there() -> None:
     one, other = (int(track) for track in lanes.ids)
     places = [lanes.place(one, 29), lanes.place(other, 29), lanes.place(other, 30),
               lanes.place(one, 30)]  # fmt: skip
-    swapped: Trajectories = corrected(tracks, proposed("exchanged", places), 1.0 / 25.0)
+    swapped: Trajectories = apply_corrections(tracks, propose("exchanged", places), 1.0 / 25.0)
     tracklets = [
         Tracklet(track, lanes.place(track, 30), lanes.place(track, 29)) for track in (one, other)
     ]
@@ -142,7 +142,7 @@ def test_who_says_that_it_is_as_it_is_changes_nothing() -> None:
         ]
         assert told or len(set(plain.tracks.ids.tolist())) == 2
         for corrections in told:
-            run = run_of(whole, confirmed(corrections))
+            run = run_of(whole, confirm(corrections))
             assert all(one.met for one in run.outcomes)
             np.testing.assert_array_equal(run.tracks.ids, plain.tracks.ids)
             np.testing.assert_array_equal(run.tracks.positions, plain.tracks.positions)
@@ -161,9 +161,9 @@ def test_none_of_those_who_are_told_parts_from_all_of_them() -> None:
     one, other = (Tracklet(k, places[end], places[end]) for k, end in ((1, "a"), (2, "b")))
     after, begins = (Tracklet(k, places[at], places[at]) for k, at in ((1, "c"), (3, "d")))
     move = Move((one,), (after, begins), "exchange", 0.0)
-    now = Alternative("as it is", 0.5, proposed("same", (one.end, after.begin)))
-    goes_on = Alternative("1 goes on as 3", 0.3, proposed("same", (one.end, begins.begin)))
-    came = Alternative("2 goes on", 0.2, proposed("same", (other.end, after.begin)))
+    now = Alternative("as it is", 0.5, propose("same", (one.end, after.begin)))
+    goes_on = Alternative("1 goes on as 3", 0.3, propose("same", (one.end, begins.begin)))
+    came = Alternative("2 goes on", 0.2, propose("same", (other.end, after.begin)))
     none = _with_none_of_them(move, now, [goes_on, came])[-1]
     assert none.words == "none of these"
     apart = {(a.step, b.step) for told in none.corrections for a, b in told.constraints.cannot_link}
@@ -176,9 +176,9 @@ def test_two_who_were_parted_anywhere_are_not_asked_for_again() -> None:
     lanes = TrackRows(run.tracks)
     first, second = join.tracks
     # far from the places that the queue would ask for
-    far = proposed("different", (lanes.of_row(int(lanes.rows[first][2])),
+    far = propose("different", (lanes.of_row(int(lanes.rows[first][2])),
                                lanes.of_row(int(lanes.rows[second][-3]))))  # fmt: skip
-    after = run_of(with_a_gap(), confirmed(far))
+    after = run_of(with_a_gap(), confirm(far))
     assert [one.met for one in after.outcomes] == [True]
     assert all(one.kind != "join" for one in queue(after).items)
 
@@ -190,7 +190,7 @@ def test_who_left_or_came_in_is_not_asked_for_as_going_on(kind: Kind) -> None:
     lanes = TrackRows(run.tracks)
     first, second = join.tracks
     row = lanes.rows[first][-1] if kind == "left" else lanes.rows[second][0]
-    after = run_of(with_a_gap(), confirmed(proposed(kind, (lanes.of_row(int(row)),))))
+    after = run_of(with_a_gap(), confirm(propose(kind, (lanes.of_row(int(row)),))))
     assert [one.met for one in after.outcomes] == [True]
     assert all(one.kind != "join" for one in queue(after).items)
 
@@ -210,7 +210,7 @@ def test_who_was_named_is_not_asked_whether_he_is_anybody() -> None:
     """A short life is asked about, until something is said that is said of people alone."""
     whole = sequence([(20, walk((-0.4, 0.0, 1.0), (0.2, 0.0, 1.0), 14))], 60)
     (asked,) = (one for one in queue(run_of(whole)).items if one.kind == "short")
-    (named,) = proposed("name", asked.places[:1], name="Anna")
-    after = queue(run_of(whole, confirmed((named,))))
+    (named,) = propose("name", asked.places[:1], name="Anna")
+    after = queue(run_of(whole, confirm((named,))))
     assert "short" not in [one.kind for one in after.items]
     assert after.answered > 0

@@ -13,10 +13,10 @@ from tests.runs.test_corrected_runs import run_of
 from tracker.corrections import Place
 from tracker.fusion.trajectories import Trajectories
 from tracker.review.queue import queue
-from tracker.review.queue.item import Alternative, ReviewItem, TrackRows, confirmed, proposed
+from tracker.review.queue.item import Alternative, ReviewItem, TrackRows, confirm, propose
 from tracker.review.queue.meetings import ambiguous_shares, meetings
 from tracker.review.queue.ranking import is_answered, once_each
-from tracker.review.queue.unclaimed import unclaimed
+from tracker.review.queue.unclaimed import find_unclaimed
 from tracker.runs.run import Run
 from tracker.steps.steps import Ragged, Steps
 
@@ -95,12 +95,12 @@ def test_a_run_that_grows_while_it_is_read_is_read_as_far_as_it_was() -> None:
 
 def test_who_is_missing_is_asked_for_with_where_he_is() -> None:
     run = two()
-    assert unclaimed(run) == []
+    assert find_unclaimed(run) == []
     assert not [one for one in queue(run).items if one.kind == "missing"]
     gone = int(run.tracks.ids[0])
     own = run.tracks.ids == gone
     path = dict(zip(run.tracks.frames[own].tolist(), run.tracks.positions[own], strict=True))
-    found = unclaimed(without(run, gone))
+    found = find_unclaimed(without(run, gone))
     assert len(found) == 1
     away = [
         np.hypot(*(place.point - path[place.step])[:2])
@@ -134,7 +134,7 @@ def test_a_track_that_begins_or_ends_inside_is_asked_for(first: int, last: int, 
     now, other = told[0].alternatives
     assert now.corrections[0].kind == {"begins": "came", "ends": "left"}[kind]
     assert other.corrections[0].kind == "here"
-    assert is_answered(told[0], confirmed(now.corrections), 25)
+    assert is_answered(told[0], confirm(now.corrections), 25)
     assert not [one for one in queue(two()).items if one.kind in ("begins", "ends")]
 
 
@@ -145,7 +145,7 @@ def test_a_place_is_told_once_and_only_where_something_is_at_stake() -> None:
         other = replace_place(place, x)
         return ReviewItem(
             "exchange", "", "", first, first + 4, tracks, (place, other), 0.5, stake,
-            (Alternative("as it is", 0.5, ()), Alternative("other", 0.5, proposed("name", [other],
+            (Alternative("as it is", 0.5, ()), Alternative("other", 0.5, propose("name", [other],
                                                                                name="A"))),
         )  # fmt: skip
 

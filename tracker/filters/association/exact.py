@@ -18,7 +18,8 @@ from tracker.filters.association.belief_propagation import Marginals
 from tracker.kernels.association.subsets import subset_marginals
 
 MOST_ITEMS = 18
-"""Largest value of min(n, M): the memory grows as 2^min(n, M)."""
+"""Largest value of min(n, M): the memory grows as n · 2ⁿ, 44 MB for n = M = 18 and 193 MB for
+20."""
 
 
 def exact_marginals(

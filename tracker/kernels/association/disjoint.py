@@ -37,7 +37,7 @@ class _Matching(NamedTuple):
     """(N,) the row of each column, -1 for none."""
 
 
-class _Room(NamedTuple):
+class _Workspace(NamedTuple):
     """Working memory of a search."""
 
     shortest: ndarray
@@ -76,7 +76,7 @@ def disjoint_matchings(weights: ndarray, count: int) -> ndarray:
     reduced = np.empty((size, kept))
     row_duals = np.empty(size)
     matching = _Matching(row_duals, column_duals, column_of, row_of)
-    room = _Room(
+    workspace = _Workspace(
         np.full(size, np.inf),
         np.empty(size, dtype=np.int64),
         np.zeros(size, dtype=np.bool_),
@@ -100,7 +100,7 @@ def disjoint_matchings(weights: ndarray, count: int) -> ndarray:
                     break
         for i in range(size):
             if column_of[i] < 0:
-                _augment(cost, i, matching, core, reduced[:, kept - 1], room)
+                _augment(cost, i, matching, core, reduced[:, kept - 1], workspace)
         pairs = 0
         for i in range(size):
             found[k, i] = -1
@@ -139,7 +139,7 @@ def _augment(
     matching: _Matching,
     core: ndarray,
     bounds: ndarray,
-    room: _Room,
+    workspace: _Workspace,
 ) -> None:
     """Assign a column to one more row by the shortest augmenting path, in place.
 
@@ -152,12 +152,12 @@ def _augment(
         matching: Matching of the other rows.
         core: (N, C) the nearest columns of each row.
         bounds: (N,) the least reduced cost of each row's other columns.
-        room: Working memory.
+        workspace: Working memory.
     """
     row_duals, column_duals = matching.row_duals, matching.column_duals
     column_of, row_of = matching.column_of, matching.row_of
-    shortest, before, finished = room.shortest, room.before, room.finished
-    touched, keys, nodes = room.touched, room.keys, room.nodes
+    shortest, before, finished = workspace.shortest, workspace.before, workspace.finished
+    touched, keys, nodes = workspace.touched, workspace.keys, workspace.nodes
     size = len(cost)
     partial = core.shape[1] < size
     heap, reached = 0, 0

@@ -102,12 +102,15 @@ class CameraUpdate(NamedTuple):
     covariances: ndarray
     """(n, d, d), covariances."""
     record: CameraRecord
+    """The evidence of the camera for the n tracks."""
     undetected: ndarray
     """(U,), weights of the undetected components."""
     newcomers: Newcomers
+    """The components that boxes make of undetected targets."""
     unexplained: ndarray
     """(M,), the probability that no track made each box."""
     pairs: TrackPairs
+    """The pairs that are reported."""
 
 
 @kernel

@@ -234,7 +234,7 @@ def predict_and_update(
         covariances = np.concatenate((covariances, found.newcomers.covariances[born]))
         labels = np.concatenate((labels, next_label + np.arange(len(born))))
         next_label += len(born)
-    everybody = len(existences)
+    total = len(existences)
     return StepResult(
         existences,
         means,
@@ -244,10 +244,10 @@ def predict_and_update(
         left,
         undetected_means,
         undetected_covariances,
-        detection_probabilities[:, :everybody].copy(),
-        hidden_by[:, :everybody].copy(),
-        sources[:, :everybody].copy(),
-        shares[:, :everybody].copy(),
+        detection_probabilities[:, :total].copy(),
+        hidden_by[:, :total].copy(),
+        sources[:, :total].copy(),
+        shares[:, :total].copy(),
         pair_rows[:pairs, 0].copy(),
         pair_rows[:pairs, 1].copy(),
         pair_rows[:pairs, 2].copy(),

@@ -14,14 +14,14 @@ from tracker.kernels.compilation import kernel
 from tracker.kernels.gating import Measurements
 from tracker.kernels.kalman import Expected
 from tracker.kernels.labelled.camera_update import CameraRule
-from tracker.kernels.linear_algebra import factorise
+from tracker.kernels.linear_algebra import factorise, whiten
 from tracker.kernels.measurement import ExpectedBoxes
 
 _NO_SHARE = 1e-6
 """Probability below which a box has no effect on a path."""
 
 
-class _Room(NamedTuple):
+class _Workspace(NamedTuple):
     """Working memory for one pair."""
 
     spread: ndarray
@@ -35,8 +35,11 @@ class _Room(NamedTuple):
 
 
 @kernel
-def _room(size: int) -> _Room:
-    return _Room(np.empty((size, size)), np.zeros((size, size)), np.empty(size), np.empty(size))
+def _workspace(size: int) -> _Workspace:
+    """Allocate the working memory for measurements of a size."""
+    return _Workspace(
+        np.empty((size, size)), np.zeros((size, size)), np.empty(size), np.empty(size)
+    )
 
 
 @kernel
@@ -53,25 +56,11 @@ def _add_spread(jacobian: ndarray, covariance: ndarray, spread: ndarray) -> None
 
 
 @kernel
-def _whiten(lower: ndarray, right: ndarray, whitened: ndarray) -> float:
-    """Compute L⁻¹ b for a Cholesky factor L; returns its squared length."""
-    length = 0.0
-    for p in range(len(right)):
-        value = right[p]
-        for r in range(p):
-            value -= lower[p, r] * whitened[r]
-        value /= lower[p, p]
-        whitened[p] = value
-        length += value * value
-    return length
-
-
-@kernel
-def _log_density(room: _Room) -> float:
+def _log_density(workspace: _Workspace) -> float:
     """log N(column; 0, spread); the whitened column is stored as well."""
-    size = len(room.column)
-    log_determinant = factorise(room.spread, room.lower)
-    length = _whiten(room.lower, room.column, room.whitened)
+    size = len(workspace.column)
+    log_determinant = factorise(workspace.spread, workspace.lower)
+    length = whiten(workspace.lower, workspace.column, workspace.whitened)
     return -0.5 * (size * math.log(2.0 * math.pi) + log_determinant + length)
 
 
@@ -167,7 +156,7 @@ def add_information(
     other_expected, other_jacobians = expected.posture_values, expected.posture_jacobians
     other_drift, other_share = expected.posture_drift, expected.posture_share
     values, noises = measurements.values, measurements.noises
-    size, room = values.shape[1], _room(values.shape[1])
+    size, workspace = values.shape[1], _workspace(values.shape[1])
     kinds = 2 if len(other_expected) > 0 else 1
     noise, chances = np.empty((2, size, size)), np.ones(2)
     halves = np.empty((3, size))
@@ -183,18 +172,18 @@ def add_information(
             noise[1] = noises[z]
             noise[1] += expected.posture_spreads[link]
             _add_spread(h, other_drift, noise[1])
-            room.spread[:] = noise[0]
-            _add_spread(jacobians[link], covariances[k], room.spread)
+            workspace.spread[:] = noise[0]
+            _add_spread(jacobians[link], covariances[k], workspace.spread)
             for p in range(size):
-                room.column[p] = values[z, p] - expected.values[link, p]
-            upright = math.log(1.0 - other_share) + _log_density(room)
+                workspace.column[p] = values[z, p] - expected.values[link, p]
+            upright = math.log(1.0 - other_share) + _log_density(workspace)
             low = -math.inf
             if other_expected[link, 0] < math.inf:
-                room.spread[:] = noise[1]
-                _add_spread(h, covariances[k], room.spread)
+                workspace.spread[:] = noise[1]
+                _add_spread(h, covariances[k], workspace.spread)
                 for p in range(size):
-                    room.column[p] = values[z, p] - other_expected[link, p]
-                low = math.log(other_share) + _log_density(room)
+                    workspace.column[p] = values[z, p] - other_expected[link, p]
+                low = math.log(other_share) + _log_density(workspace)
             largest = max(upright, low)
             total = math.exp(upright - largest) + math.exp(low - largest)
             chances[0] = math.exp(upright - largest) / total
@@ -206,18 +195,18 @@ def add_information(
             h = jacobians[link] if kind == 0 else other_jacobians[link]
             value = expected.values[link] if kind == 0 else other_expected[link]
             for p in range(size):
-                room.column[p] = values[z, p] - value[p]
+                workspace.column[p] = values[z, p] - value[p]
                 for a in range(3):
-                    room.column[p] += h[p, a] * states[k, a]
-            room.spread[:] = noise[kind]
-            information.constants[k] += a_share * _log_density(room)
+                    workspace.column[p] += h[p, a] * states[k, a]
+            workspace.spread[:] = noise[kind]
+            information.constants[k] += a_share * _log_density(workspace)
             for a in range(3):
                 for p in range(size):
-                    room.column[p] = h[p, a]
-                _whiten(room.lower, room.column, halves[a])
+                    workspace.column[p] = h[p, a]
+                whiten(workspace.lower, workspace.column, halves[a])
                 total = 0.0
                 for p in range(size):
-                    total += halves[a, p] * room.whitened[p]
+                    total += halves[a, p] * workspace.whitened[p]
                 information.vectors[k, a] += a_share * total
                 for b in range(a + 1):
                     total = 0.0
@@ -259,7 +248,7 @@ def share_camera(
     found_rows, found_boxes, found_shares = [0], [0], [0.0]
     found_rows.pop(), found_boxes.pop(), found_shares.pop()
     kinds = 2 if len(other_expected) > 0 else 1
-    base, room = np.empty((size, size)), _room(size)
+    base, workspace = np.empty((size, size)), _workspace(size)
     for step in range(len(step_starts) - 1):
         own = order[step_starts[step] : step_starts[step + 1]]
         if len(own) == 0 or camera.blind[step]:
@@ -308,16 +297,16 @@ def share_camera(
                     for p in range(size):
                         gap = values[z, p] - value[p]
                         within = within and gap * gap <= gate * (base[p, p] + noises[z, p, p])
-                        room.column[p] = gap
+                        workspace.column[p] = gap
                     if not within:
                         continue
                     for p in range(size):
                         for q in range(size):
-                            room.spread[p, q] = base[p, q] + noises[z, p, q]
-                    log_density = _log_density(room)
+                            workspace.spread[p, q] = base[p, q] + noises[z, p, q]
+                    log_density = _log_density(workspace)
                     length = 0.0
                     for p in range(size):
-                        length += room.whitened[p] * room.whitened[p]
+                        length += workspace.whitened[p] * workspace.whitened[p]
                     if length > gate:
                         continue
                     detected[i, j] += weights[i] * chances_here[i] * share * math.exp(log_density)

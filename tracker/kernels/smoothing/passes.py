@@ -44,7 +44,7 @@ class SmoothedRows(NamedTuple):
     """P⁻ (N, d, d), covariances of these predictions."""
 
 
-class _Room(NamedTuple):
+class _Workspace(NamedTuple):
     """Working memory for one row."""
 
     inverse: ndarray
@@ -107,7 +107,9 @@ def _inverse(matrix: ndarray, inverse: ndarray) -> float:
 
 
 @kernel
-def _update(y: ndarray, v: ndarray, mean: ndarray, covariance: ndarray, room: _Room) -> float:
+def _update(
+    y: ndarray, v: ndarray, mean: ndarray, covariance: ndarray, workspace: _Workspace
+) -> float:
     """Update mean and covariance by the information of a row's boxes, in place.
 
     With P_pp = L Lᵀ, W = P_p L⁻ᵀ and S = I + Lᵀ Y L it is P⁺ = P − W (I − S⁻¹) Wᵀ: S is symmetric
@@ -116,7 +118,7 @@ def _update(y: ndarray, v: ndarray, mean: ndarray, covariance: ndarray, room: _R
     Returns:
         log ∫ N(x; m, P) exp(vᵀx − ½ xᵀYx) dx, by the matrix determinant lemma.
     """
-    inverse, system, side, half, lower = room
+    inverse, system, side, half, lower = workspace
     d = len(mean)
     factorise(covariance[:3, :3], lower[:3, :3])
     for a in range(d):
@@ -175,13 +177,13 @@ def _look_back(
     ahead: ndarray,
     ahead_covariance: ndarray,
     transition: ndarray,
-    room: _Room,
+    workspace: _Workspace,
 ) -> None:
     """Smooth mean and covariance of a row by those of the row after it ([RTS65]), in place.
 
     G = P Fᵀ (P⁻)⁻¹,   m += G (m_after − m⁻),   P += G (P_after − P⁻) Gᵀ
     """
-    half, lower, d = room.half, room.lower, len(mean)
+    half, lower, d = workspace.half, workspace.lower, len(mean)
     factorise(ahead_covariance, lower)
     gain = np.empty((d, d))
     crossing = np.empty(d)
@@ -237,7 +239,7 @@ def smooth_paths(
     means, covariances = np.empty((rows, d)), np.empty((rows, d, d))
     ahead, ahead_covariances = np.empty((rows, d)), np.empty((rows, d, d))
     fits, traces = np.zeros(rows), np.empty(rows)
-    room = _Room(
+    workspace = _Workspace(
         np.empty((3, 3)), np.empty((3, 3)), np.empty((d, 3)), np.empty((d, d)), np.zeros((d, d))
     )
     for path in range(len(starts) - 1):
@@ -247,18 +249,18 @@ def smooth_paths(
                 ahead[k], ahead_covariances[k] = begins[path], motion.prior
             else:
                 _carry(
-                    means[k - 1], covariances[k - 1], motion, noise_scales[k], room.half,
+                    means[k - 1], covariances[k - 1], motion, noise_scales[k], workspace.half,
                     ahead[k], ahead_covariances[k],
                 )  # fmt: skip
             means[k], covariances[k] = ahead[k], ahead_covariances[k]
             y = information[k]
             if y[0, 0] + y[1, 1] + y[2, 2] > 0.0:
-                fits[k] = _update(y, vectors[k], means[k], covariances[k], room)
+                fits[k] = _update(y, vectors[k], means[k], covariances[k], workspace)
             traces[k] = covariances[k, 0, 0] + covariances[k, 1, 1] + covariances[k, 2, 2]
         for k in range(last - 2, first - 1, -1):
             _look_back(
                 means[k], covariances[k], means[k + 1], covariances[k + 1],
-                ahead[k + 1], ahead_covariances[k + 1], motion.transition, room,
+                ahead[k + 1], ahead_covariances[k + 1], motion.transition, workspace,
             )  # fmt: skip
     return SmoothedRows(means, covariances, fits, traces, ahead, ahead_covariances)
 

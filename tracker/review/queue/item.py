@@ -78,7 +78,7 @@ class ReviewItem:
         return self.probability * self.stake
 
 
-def proposed(kind: str, places: Iterable[Place], **values: Any) -> tuple[Correction, ...]:
+def propose(kind: str, places: Iterable[Place], **values: Any) -> tuple[Correction, ...]:
     """Return the correction with these values as a tuple of one; empty if they are invalid."""
     try:
         return (make(kind=kind, places=[tuple(p) for p in places], time=_UNMADE, **values),)
@@ -86,7 +86,7 @@ def proposed(kind: str, places: Iterable[Place], **values: Any) -> tuple[Correct
         return ()
 
 
-def confirmed(corrections: Iterable[Correction], note: str = "") -> tuple[Correction, ...]:
+def confirm(corrections: Iterable[Correction], note: str = "") -> tuple[Correction, ...]:
     """Return proposed corrections with the present time as the time they were made.
 
     Args:

@@ -6,7 +6,7 @@ from collections.abc import Sequence as Many
 from dataclasses import dataclass
 
 from tracker.corrections import Place
-from tracker.review.queue.item import Alternative, ItemKind, proposed
+from tracker.review.queue.item import Alternative, ItemKind, propose
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,23 +82,23 @@ class Move:
         if len(self.earlier) == 1 and len(self.later) == 1:
             i, j = self.earlier[0], self.later[0]
             if self.joins:
-                return Alternative(_joined(i, j), 0.0, proposed("same", (i.end, j.begin)))
-            return Alternative("two people", 0.0, proposed("different", (i.end, j.begin)))
+                return Alternative(_words_of_link(i, j), 0.0, propose("same", (i.end, j.begin)))
+            return Alternative("two people", 0.0, propose("different", (i.end, j.begin)))
         if len(self.earlier) == 2 and len(self.later) == 2:
             (i, other), (j, after) = self.earlier, self.later
-            exchange = proposed("exchanged", (i.end, other.end, after.begin, j.begin))
+            exchange = propose("exchanged", (i.end, other.end, after.begin, j.begin))
             if not exchange:
                 exchange = (
-                    *proposed("same", (i.end, after.begin)),
-                    *proposed("same", (other.end, j.begin)),
+                    *propose("same", (i.end, after.begin)),
+                    *propose("same", (other.end, j.begin)),
                 )
             words = f"exchanged with {other.track if other.track != i.track else after.track}"
             return Alternative(words, 0.0, exchange)
         if len(self.earlier) == 2:  # instead of i → j, i' → j; i ends
             (_, other), (j,) = self.earlier, self.later
-            return Alternative(_joined(other, j), 0.0, proposed("same", (other.end, j.begin)))
+            return Alternative(_words_of_link(other, j), 0.0, propose("same", (other.end, j.begin)))
         (i,), (_, after) = self.earlier, self.later
-        return Alternative(_joined(i, after), 0.0, proposed("same", (i.end, after.begin)))
+        return Alternative(_words_of_link(i, after), 0.0, propose("same", (i.end, after.begin)))
 
     @property
     def halves(self) -> tuple[Alternative, ...]:
@@ -107,11 +107,11 @@ class Move:
             return ()
         (i, other), (j, after) = self.earlier, self.later
         return tuple(
-            Alternative(_joined(a, b), 0.0, proposed("same", (a.end, b.begin)))
+            Alternative(_words_of_link(a, b), 0.0, propose("same", (a.end, b.begin)))
             for a, b in ((i, after), (other, j))
         )
 
 
-def _joined(i: Tracklet, j: Tracklet) -> str:
+def _words_of_link(i: Tracklet, j: Tracklet) -> str:
     """Describe the link of two tracklets."""
     return f"{i.track} goes on as {j.track}" if i.track != j.track else f"{i.track} goes on"

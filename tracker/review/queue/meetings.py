@@ -33,7 +33,10 @@ _STRIDE = 0.5
 _MOST = 3.0
 """Largest log odds that the velocities contribute, since their model is approximate."""
 
-_EVEN = 0.3
+_EXCHANGED_IF_AMBIGUOUS = 0.1
+"""Least of this prior probability where their boxes are ambiguous."""
+
+_AMBIGUOUS = 0.3
 """Ambiguous share of two people's boxes (see :func:`ambiguous_shares`) from which
 their tracks may have been exchanged though they are not close."""
 
@@ -52,9 +55,9 @@ def meetings(run: Run, track_rows: TrackRows) -> Iterator[Move]:
     """
     step_time = run.sequence.step_time
     width = 2.0 * float(run.sequence.target_half_extents[:2].mean())
-    drawn = ambiguous_shares(run)
+    ambiguous = ambiguous_shares(run)
     pause = max(round(1.0 / step_time), 2)
-    for (one, other), met in _near(run, _CLOSE * width, drawn).items():
+    for (one, other), met in _near(run, _CLOSE * width, ambiguous).items():
         steps = np.array([step for step, _ in met])
         for part in np.split(np.arange(len(met)), np.flatnonzero(np.diff(steps) > pause) + 1):
             nearest, apart = min((met[k] for k in part.tolist()), key=lambda at: at[1])
@@ -65,21 +68,26 @@ def meetings(run: Run, track_rows: TrackRows) -> Iterator[Move]:
                 )
                 for track in (one, other)
             )
-            draw = max(drawn.get((one, other, int(steps[k])), 0.0) for k in part.tolist())
-            wrong = max(_EXCHANGED * float(np.exp(-apart / width)), 0.1 * (draw > _EVEN))
+            ambiguous_share = max(
+                ambiguous.get((one, other, int(steps[k])), 0.0) for k in part.tolist()
+            )
+            wrong = max(
+                _EXCHANGED * float(np.exp(-apart / width)),
+                _EXCHANGED_IF_AMBIGUOUS * (ambiguous_share > _AMBIGUOUS),
+            )
             log_odds = float(np.log(wrong) - np.log1p(-wrong))
-            log_odds += _straight_on(track_rows, one, other, nearest, step_time)
+            log_odds += _velocity_log_odds(track_rows, one, other, nearest, step_time)
             title = f"Tracks {one} and {other} pass within {apart:.2f} m"
             why = f"nearest at step {nearest}"
-            if draw > _EVEN:
-                why += f", and {100 * draw:.0f} % of their boxes fit either"
+            if ambiguous_share > _AMBIGUOUS:
+                why += f", and {100 * ambiguous_share:.0f} % of their boxes fit either"
             for i, j in ((mine, its), (its, mine)):
                 yield Move((i, j), (i, j), "crossing", log_odds, why, title)
                 yield Move((i,), (i, j), "crossing", log_odds - _ALONE, why, title)
 
 
 def _near(
-    run: Run, reach: float, drawn: dict[tuple[int, int, int], float]
+    run: Run, reach: float, ambiguous: dict[tuple[int, int, int], float]
 ) -> dict[tuple[int, int], list[tuple[int, float]]]:
     """Return the steps at which two tracks are near, or their boxes ambiguous, for each pair of
     ids, each step with their distance in metres on the ground.
@@ -87,7 +95,7 @@ def _near(
     Args:
         run: The run.
         reach: Distance within which two tracks are near, metres.
-        drawn: The ambiguous shares, as returned by :func:`ambiguous_shares`.
+        ambiguous: The ambiguous shares, as returned by :func:`ambiguous_shares`.
     """
     tracks = run.tracks
     found: dict[tuple[int, int], list[tuple[int, float]]] = {}
@@ -97,14 +105,27 @@ def _near(
         apart = np.hypot(*(ground[:, None] - ground[None]).transpose(2, 0, 1))
         for a, b in np.argwhere(np.triu(apart < 2.0 * reach, 1)).tolist():
             pair = (ids[a], ids[b])
-            if apart[a, b] < reach or drawn.get((*pair, step), 0.0) > _EVEN:
+            if apart[a, b] < reach or ambiguous.get((*pair, step), 0.0) > _AMBIGUOUS:
                 found.setdefault(pair, []).append((step, float(apart[a, b])))
     return found
 
 
-def _straight_on(track_rows: TrackRows, one: int, other: int, step: int, step_time: float) -> float:
-    """Return the log odds of an exchange at a step by the velocities before and after it; 0 if a
-    track has no place at one of the three steps."""
+def _velocity_log_odds(
+    track_rows: TrackRows, one: int, other: int, step: int, step_time: float
+) -> float:
+    """Return the log odds of an exchange by the velocities before and after it, as in
+    :func:`meetings`.
+
+    Args:
+        track_rows: The run's tracks.
+        one: The id of the first track.
+        other: The id of the second track.
+        step: The step at which they meet.
+        step_time: Duration of a step, seconds.
+
+    Returns:
+        The log odds, clipped to ±3; 0 if a track has no place at one of the three steps.
+    """
     stride = max(round(_STRIDE / step_time), 1)
     relative: Float[ndarray, "3 2"] = np.zeros((3, 2))
     for k, at in enumerate((step - stride, step, step + stride)):

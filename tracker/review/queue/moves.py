@@ -11,7 +11,7 @@ from tracker.review.queue.item import TrackRows
 from tracker.review.queue.linking import Move, Tracklet
 from tracker.runs.run import Run
 from tracker.smoothing import names_of
-from tracker.smoothing.result import Joined
+from tracker.smoothing.result import LinkedTracklets
 
 _TEMPERED = 3.0
 """Divisor of the log odds of the association, whose model takes dependent boxes as independent and
@@ -27,6 +27,10 @@ seconds."""
 _SPEED = 0.6
 """Standard deviation of the velocity of a lost person, metres per second."""
 
+_STRAIGHT = 4.0
+"""Time for which a lost person keeps direction and velocity, seconds; later the displacement grows
+as that of a random walk."""
+
 _NEAR = 0.4
 """Standard deviation of the place of a person that has just been lost, metres."""
 
@@ -41,7 +45,9 @@ _LEAST_LOG_ODDS = -7.0
 """Least log odds of a move that is considered; half of it for joins of lost people."""
 
 
-def tracklets_of(run: Run, track_rows: TrackRows) -> tuple[list[Tracklet | None], Joined | None]:
+def tracklets_of(
+    run: Run, track_rows: TrackRows
+) -> tuple[list[Tracklet | None], LinkedTracklets | None]:
     """Return the tracklets that the smoothing linked to tracks, and the gains of its links.
 
     If no smoothing linked the tracks that the run has now (they may be the filter's, or those of
@@ -74,7 +80,7 @@ def _whole(track_rows: TrackRows, track: int) -> Tracklet:
     return Tracklet(track, begin, end)
 
 
-def moves_of_links(tracklets: list[Tracklet | None], joined: Joined) -> Iterator[Move]:
+def moves_of_links(tracklets: list[Tracklet | None], joined: LinkedTracklets) -> Iterator[Move]:
     """Yield all changes of one or two links, by the gains of the tracklet association.
 
     The run has the assignment with the largest sum of gains. The assignments next to it exchange
@@ -138,7 +144,7 @@ def moves_of_links(tracklets: list[Tracklet | None], joined: Joined) -> Iterator
 
 
 def _links(
-    tracklets: list[Tracklet | None], joined: Joined
+    tracklets: list[Tracklet | None], joined: LinkedTracklets
 ) -> tuple[dict[int, int], dict[int, int]]:
     """Return the index of the next tracklet of each tracklet in its track, and of the previous
     one."""
@@ -160,10 +166,10 @@ def joins_of_lost_people(
     """Yield joins of tracks that end, each with a track that begins near by at a later step.
 
     Let p_i be the probability that the person of track i has left where it ends, A the area of the
-    room on the ground, and f_ij = N(x_j; x_i, σ_ij² I) exp(−t_ij / T) the density of the place of
-    a lost person after the gap of t_ij ≤ T seconds, with σ_ij² = s² + v² t_ij min(t_ij, 4 s), where
-    s, v and T are :data:`_NEAR`, :data:`_SPEED` and :data:`_LONGEST`. The odds that j is the
-    continuation of i are
+    room on the ground, and f_ij = N(x_j; x_i, σ_ij² I) exp(−t_ij / T) the density of the place of a
+    lost person after the gap of t_ij ≤ T seconds, with σ_ij² = s² + v² t_ij min(t_ij, t_0), where
+    s, v, t_0 and T are :data:`_NEAR`, :data:`_SPEED`, :data:`_STRAIGHT` and :data:`_LONGEST`. The
+    odds that j is the continuation of i are
 
         (1 − p_i) f_ij / [p_i / A + Σ_{k≠j} (1 − p_i) f_ik]
 
@@ -188,7 +194,7 @@ def joins_of_lost_people(
     seconds = (b[None, :, 0] - e[:, None, 0]) * sequence.step_time
     apart = np.hypot(b[None, :, 1] - e[:, None, 1], b[None, :, 2] - e[:, None, 2])
     spread = _NEAR**2 + (_SPEED**2) * np.maximum(seconds, 0.0) * np.minimum(
-        np.maximum(seconds, 0.0), 4.0
+        np.maximum(seconds, 0.0), _STRAIGHT
     )
     possible = (seconds > 0.0) & (seconds <= _LONGEST)
     density = np.exp(-0.5 * apart**2 / spread) / (2.0 * np.pi * spread)

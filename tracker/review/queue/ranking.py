@@ -15,7 +15,7 @@ from tracker.corrections.kinds import Kind, leeway
 from tracker.fusion.trajectories import Trajectories
 from tracker.review.queue import moves, single_tracks
 from tracker.review.queue.clear_places import ClearPlaces
-from tracker.review.queue.item import Alternative, ReviewItem, TrackRows, proposed
+from tracker.review.queue.item import Alternative, ReviewItem, TrackRows, propose
 from tracker.review.queue.linking import Move
 from tracker.review.queue.meetings import meetings
 from tracker.review.queue.other_run import OtherRun
@@ -78,7 +78,7 @@ def queue(
     track_rows = TrackRows(run.tracks)
     if not len(run.tracks):
         return Queue((), 0, "nobody is tracked")
-    linked = list(_linked(run, track_rows, backwards))
+    linked = list(_identity_items(run, track_rows, backwards))
     asked = {place for one in linked for place in one.places}
     found = [*linked, *single_tracks.items(run, track_rows), *track_ends(run, track_rows, asked)]
     ordered = sorted(found, key=lambda one: (-one.weight, one.first, one.id))
@@ -104,7 +104,7 @@ def _parted_by(run: Run) -> Callable[[int, int], bool]:
     """Return a function that gets the ids of two tracks and returns whether corrections rule out
     their join: they state that these are different people, that the first left, or that the second
     came in."""
-    applied = _applied(run)
+    applied = _satisfied(run)
     parted = {frozenset(tracks) for kind, tracks in applied if kind == "different"}
     left = {track for kind, tracks in applied if kind == "left" for track in tracks}
     came = {track for kind, tracks in applied if kind == "came" for track in tracks}
@@ -114,10 +114,10 @@ def _parted_by(run: Run) -> Callable[[int, int], bool]:
 def _people(run: Run) -> set[int]:
     """Return the ids of the tracks that corrections declare to be people."""
     kinds = ("here", "name", "came", "left", "same")
-    return {track for kind, tracks in _applied(run) if kind in kinds for track in tracks}
+    return {track for kind, tracks in _satisfied(run) if kind in kinds for track in tracks}
 
 
-def _applied(run: Run) -> list[tuple[Kind | None, tuple[int, ...]]]:
+def _satisfied(run: Run) -> list[tuple[Kind | None, tuple[int, ...]]]:
     """Return the kind and the ids of the tracks of each correction that the run satisfies."""
     kinds = {one.id: one.kind for one in run.corrections}
     return [(kinds.get(one.id), one.tracks) for one in run.outcomes if one.met]
@@ -154,7 +154,7 @@ def _joins(run: Run) -> bool:
     return run.smoothed is not None and run.smoothed.joined is not None
 
 
-def _linked(
+def _identity_items(
     run: Run, track_rows: TrackRows, backwards: Trajectories | None
 ) -> Iterable[ReviewItem]:
     """Yield the items on identities: all moves, grouped by the track and place that they change."""
@@ -290,9 +290,9 @@ def _with_none_of_them(
         for one in (now, *others)
         for made in one.corrections
         for a, b in made.constraints.must_link
-        if _is(a, first) or _is(b, last)
+        if _is_rounded(a, first) or _is_rounded(b, last)
     )
-    apart = [one for pair in pairs for one in proposed("different", pair)]
+    apart = [one for pair in pairs for one in propose("different", pair)]
     plain = [one for one in others if one.corrections and one.corrections[0].kind == "different"]
     chance = plain[0].probability if plain else 0.0
     rest = [one for one in others if one not in plain]
@@ -303,7 +303,7 @@ def _with_none_of_them(
     return sorted([*rest, none], key=lambda one: -one.probability)
 
 
-def _is(rounded: Place, place: Place) -> bool:
+def _is_rounded(rounded: Place, place: Place) -> bool:
     """Whether the place of a correction, which is rounded, is the given place."""
     return rounded.step == place.step and bool(
         np.allclose(rounded.point, place.point, atol=_ROUNDED)
@@ -313,13 +313,13 @@ def _is(rounded: Place, place: Place) -> bool:
 def _as_it_is(move: Move) -> tuple[Correction, ...]:
     """Return the corrections that confirm the run's own links."""
     if move.joins:
-        return proposed("different", (move.earlier[0].end, move.later[0].begin))
+        return propose("different", (move.earlier[0].end, move.later[0].begin))
     if len(move.earlier) == 2 and len(move.later) == 1:
-        return proposed("same", (move.earlier[0].end, move.later[0].begin))
+        return propose("same", (move.earlier[0].end, move.later[0].begin))
     return tuple(
         one
         for i, j in zip(move.earlier, move.later, strict=False)
-        for one in proposed("same", (i.end, j.begin))
+        for one in propose("same", (i.end, j.begin))
     )
 
 
@@ -333,6 +333,7 @@ def is_answered(item: ReviewItem, corrections: Many[Correction], steps: int) -> 
     """
 
     def near(one: Place, other: Place) -> bool:
+        """Whether two places count as the same."""
         return (
             abs(one.step - other.step) <= steps
             and float(np.hypot(one.x - other.x, one.y - other.y)) <= _NEAR

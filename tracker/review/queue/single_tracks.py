@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from tracker.corrections.kinds import KINDS
-from tracker.review.queue.item import WITHIN, Alternative, ReviewItem, TrackRows, proposed
+from tracker.review.queue.item import WITHIN, Alternative, ReviewItem, TrackRows, propose
 from tracker.review.queue.linking import Move, Tracklet
 from tracker.runs.run import Run
 
@@ -18,6 +18,10 @@ seconds."""
 
 _LONG = 5.0
 """Time constant of the part of this probability that is due to few boxes, seconds."""
+
+_FORGOTTEN = 5.0
+"""Time constant with which the probability that a track follows another person after a gap grows
+with the gap, seconds."""
 
 _UNSEEN = 1.0
 """Longest gap without a box of any camera for which no item is made, seconds."""
@@ -70,8 +74,8 @@ def _clutter(run: Run, track_rows: TrackRows, track: int) -> Iterator[ReviewItem
         "short", f"Track {track} is nobody?", how, first, last, (track,), (places[0], places[-1]),
         wrong, len(rows),
         (
-            Alternative("as it is", 1.0 - wrong, proposed("same", (places[0], places[-1]))),
-            Alternative("nobody", wrong, proposed("nobody", places)),
+            Alternative("as it is", 1.0 - wrong, propose("same", (places[0], places[-1]))),
+            Alternative("nobody", wrong, propose("nobody", places)),
         ),
     )  # fmt: skip
 
@@ -79,7 +83,8 @@ def _clutter(run: Run, track_rows: TrackRows, track: int) -> Iterator[ReviewItem
 def _unseen(run: Run, track_rows: TrackRows, track: int) -> Iterator[Move]:
     """Yield moves at long gaps of a track, after which it may follow another person.
 
-    After a gap of t seconds the probability of this is taken as 0.4 (1 − exp(−t / 5 s)).
+    After a gap of t seconds the probability of this is taken as 0.4 (1 − exp(−t / 5 s)), with
+    :data:`_FORGOTTEN`; both numbers are estimates.
     """
     rows, tracks = track_rows.rows[track], run.tracks
     seen = np.flatnonzero(tracks.seen[rows].any(axis=1))
@@ -90,7 +95,7 @@ def _unseen(run: Run, track_rows: TrackRows, track: int) -> Iterator[Move]:
             continue
         title = f"Track {track} is gone for {seconds:.1f} s"
         why = f"no camera has it from step {before.step + 1} to {after.step - 1}"
-        wrong = 0.4 * (1.0 - np.exp(-seconds / 5.0))
+        wrong = 0.4 * (1.0 - np.exp(-seconds / _FORGOTTEN))
         # stands for both tracklets: the earlier one ends before the cut, the later begins after it
         tracklet = Tracklet(track, begin=after, end=before)
         yield Move((tracklet,), (tracklet,), "gap", _log_odds(wrong), why, title)

@@ -10,9 +10,9 @@ from numpy import ndarray
 
 from tracker.corrections import Correction, Place
 from tracker.corrections.kinds import leeway
-from tracker.review.queue.item import Alternative, ReviewItem, TrackRows, proposed
+from tracker.review.queue.item import Alternative, ReviewItem, TrackRows, propose
 from tracker.review.queue.moves import leaving_probability
-from tracker.review.queue.unclaimed import Unclaimed, unclaimed
+from tracker.review.queue.unclaimed import Unclaimed, find_unclaimed
 from tracker.runs.run import Run
 
 _MISSED = 0.3
@@ -54,8 +54,8 @@ def track_ends(run: Run, track_rows: TrackRows, asked: Collection[Place]) -> Ite
         asked: The first and last places of tracks that items of other sources concern, for which
             no item is made here.
     """
-    free = unclaimed(run)
-    yield from (_missing(run, track_rows, one) for one in free)
+    free = find_unclaimed(run)
+    yield from (_missing(run, one) for one in free)
     near = leeway(run.sequence.step_time)
     for track in track_rows.ids.tolist():
         rows = track_rows.rows[track]
@@ -82,8 +82,16 @@ def _shown(place: Place, free: list[Unclaimed], run: Run, *, before: bool) -> bo
     return False
 
 
-def _missing(run: Run, track_rows: TrackRows, one: Unclaimed) -> ReviewItem:
-    """Return the item of a person that unclaimed boxes show."""
+def _missing(run: Run, one: Unclaimed) -> ReviewItem:
+    """Return the item of a person that unclaimed boxes show.
+
+    Boxes of n cameras that agree on a share s of the steps of t seconds are of a person with the
+    probability 0.8 s (1 − exp(−t (n − 1) / 1 s)), of which the numbers are estimates.
+
+    Args:
+        run: The run.
+        one: The person.
+    """
     seconds = len(one.places) * run.sequence.step_time
     wrong = float(0.8 * one.share * -np.expm1(-seconds * (len(one.cameras) - 1)))
     pause = max(round(_APART / run.sequence.step_time), 1)
@@ -94,14 +102,14 @@ def _missing(run: Run, track_rows: TrackRows, one: Unclaimed) -> ReviewItem:
     names = [run.sequence.cameras[number].name for number in one.cameras]
     listed = f"{', '.join(names[:-1])} and {names[-1]}"
     here: tuple[Correction, ...] = tuple(
-        one for place in along for one in proposed("here", (place,), accuracy=_ACCURACY)
+        one for place in along for one in propose("here", (place,), accuracy=_ACCURACY)
     )
     return ReviewItem(
         "missing", "Somebody is missing?",
         f"boxes of {listed} meet for {seconds:.1f} s where nobody is tracked",
         first.step, last.step, (), tuple(along), wrong, last.step - first.step + 1,
         (
-            Alternative("nobody", 1.0 - wrong, proposed("nobody", along)),
+            Alternative("nobody", 1.0 - wrong, propose("nobody", along)),
             Alternative("somebody", wrong, here),
         ),
     )  # fmt: skip
@@ -129,8 +137,8 @@ def _edge(run: Run, track_rows: TrackRows, track: int, *, before: bool) -> Itera
     metres = _way_out(run, point)
     stake = round(metres / _WALK / sequence.step_time)
     other = Place(place.step + (-stride if before else stride), *beyond.tolist())
-    here = proposed("here", (other,), accuracy=_ACCURACY)
-    now = proposed("came" if before else "left", (place,))
+    here = propose("here", (other,), accuracy=_ACCURACY)
+    now = propose("came" if before else "left", (place,))
     word, was = ("begins", "there before") if before else ("ends", "there after")
     yield ReviewItem(
         "begins" if before else "ends", f"Track {track} {word} here?",

@@ -50,7 +50,7 @@ class Unclaimed:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Free:
+class _UnexplainedBoxes:
     """The B boxes of one camera that no track explains."""
 
     steps: Int[ndarray, " B"]
@@ -61,7 +61,7 @@ class _Free:
     """The height of each box, pixels."""
 
 
-def unclaimed(run: Run) -> list[Unclaimed]:
+def find_unclaimed(run: Run) -> list[Unclaimed]:
     """Return all people that boxes of at least two cameras show for a while without a track.
 
     A box is explained by a track if its centre lies in the track's reprojected box. Unexplained
@@ -69,9 +69,9 @@ def unclaimed(run: Run) -> list[Unclaimed]:
     a place in the room, if no track is within the reach of a correction (:data:`REACH`) from this
     place, and if both boxes are about as high as a target's box there.
     """
-    free = [_free(run, number) for number in range(len(run.sequence.cameras))]
+    free = [_unexplained_boxes(run, number) for number in range(len(run.sequence.cameras))]
     found = [
-        _meet(run, one, other, free[one], free[other])
+        _agreeing_places(run, one, other, free[one], free[other])
         for one, other in itertools.combinations(range(len(free)), 2)
     ]
     points = np.concatenate([np.zeros((0, 6)), *found])
@@ -79,13 +79,13 @@ def unclaimed(run: Run) -> list[Unclaimed]:
     return list(_chains(points, run.sequence.step_time))
 
 
-def _free(run: Run, number: int) -> _Free:
+def _unexplained_boxes(run: Run, number: int) -> _UnexplainedBoxes:
     """Return the boxes of the camera with an index that no track explains."""
     camera, boxes = run.sequence.cameras[number], run.views.column("boxes", number, last=run.done)
     steps, all_boxes = boxes.steps, boxes.values.reshape(-1, 4)
     explained = _explained(run, camera, steps, all_boxes)
     own = all_boxes[~explained]
-    return _Free(steps[~explained], camera.back_project(own[:, :2]), 2.0 * own[:, 3])
+    return _UnexplainedBoxes(steps[~explained], camera.back_project(own[:, :2]), 2.0 * own[:, 3])
 
 
 def _explained(
@@ -119,7 +119,9 @@ def _at_one_step(
     return np.repeat(np.arange(len(one)), counts), np.repeat(first, counts) + within
 
 
-def _meet(run: Run, one: int, other: int, first: _Free, second: _Free) -> Float[ndarray, "M 6"]:
+def _agreeing_places(
+    run: Run, one: int, other: int, first: _UnexplainedBoxes, second: _UnexplainedBoxes
+) -> Float[ndarray, "M 6"]:
     """Return the places on which boxes of two cameras agree, of all pairs of boxes.
 
     Args:
@@ -176,7 +178,7 @@ def _chains(points: Float[ndarray, "M 6"], step_time: float) -> Iterator[Unclaim
     """Chain places that follow each other, and yield each chain that is long enough as a person.
 
     Args:
-        points: The rows of :func:`_meet` of all pairs of cameras, in the order of steps.
+        points: The rows of :func:`_agreeing_places` of all pairs of cameras, in the order of steps.
         step_time: Duration of a step, seconds.
     """
     going: list[list[ndarray]] = []

@@ -6,7 +6,7 @@ multi-target, multi-camera tracking", ECCV workshops 2016: IDF1.
 
 from __future__ import annotations
 
-from collections.abc import Sequence as Items
+from collections.abc import Sequence as Many
 from dataclasses import dataclass
 
 import numpy as np
@@ -58,7 +58,7 @@ class Disagreement:
     """The disagreement, in a few words."""
 
 
-def compared(
+def compare_runs(
     here: Tracks, there: Tracks, steps: int, half_extents: Float[ndarray, " 3"]
 ) -> Comparison:
     """Compare two runs by the protocol of the evaluation, the first in the place of the truth.
@@ -90,7 +90,7 @@ def differences(comparison: Comparison, step_time: float) -> list[Difference]:
     Identities of the two runs are matched as for IDF1, rows as for CLEAR MOT.
 
     Args:
-        comparison: The comparison, as returned by :func:`compared`.
+        comparison: The comparison, as returned by :func:`compare_runs`.
         step_time: Duration of a step, seconds.
     """
     truth, tracks = comparison.truth, comparison.tracks
@@ -105,13 +105,13 @@ def differences(comparison: Comparison, step_time: float) -> list[Difference]:
     result = []
     for person in range(len(truth.names)):
         rows = np.flatnonzero(truth.indices == person)
-        result += _stretches(
+        result += _differences_of_track(
             truth.frames[rows], identities[rows], person, truth.names, max(_BRIEF / step_time, 1.0)
         )
     return result
 
 
-def _stretches(
+def _differences_of_track(
     frames: Int[ndarray, " K"],
     identities: Int[ndarray, " K"],
     person: int,
@@ -141,7 +141,7 @@ def _stretches(
 
 
 def disagreements(
-    found: Items[tuple[str, Items[Difference]]], step_time: float
+    found: Many[tuple[str, Many[Difference]]], step_time: float
 ) -> tuple[Disagreement, ...]:
     """Group the differences of several runs into moments, the most important first.
 

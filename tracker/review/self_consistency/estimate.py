@@ -20,7 +20,7 @@ from tracker.parameters.catalogue import RunParameters
 from tracker.review.self_consistency.agreement import (
     Disagreement,
     agreement,
-    compared,
+    compare_runs,
     differences,
     disagreements,
 )
@@ -98,7 +98,7 @@ def estimate(
     common = Common(sequence, run.parameters, run.seed, run.views.before(steps))
     every = variants(len(sequence.views))
     found = map_in_processes(
-        _work,
+        _track_in_worker,
         [(common, variant) for variant in every],
         steps=steps * len(every),
         processes=processes,
@@ -106,7 +106,7 @@ def estimate(
         cancelled=cancelled,
     )
     half = sequence.target_half_extents
-    comparisons = [compared(run.tracks, other, steps, half) for other in found]
+    comparisons = [compare_runs(run.tracks, other, steps, half) for other in found]
     agreed = [agreement(one) for one in comparisons]
     backwards, without = agreed[0], tuple(agreed[1:])
     score = backwards * (float(np.mean(without)) if without else 1.0)
@@ -126,7 +126,7 @@ def estimate(
     )
 
 
-def _work(item: tuple[Common, Variant], control: WorkerControl) -> Trajectories:
+def _track_in_worker(item: tuple[Common, Variant], control: WorkerControl) -> Trajectories:
     """Track one variant in a worker process."""
     common, variant = item
     return track_variant(common, variant, control.advance, control.cancelled)
@@ -213,10 +213,10 @@ def track_variant(
         on_progress=on_progress,
         cancelled=cancelled,
     ).tracks
-    return mirrored(tracks, len(views)) if variant.backwards else tracks
+    return reverse_steps(tracks, len(views)) if variant.backwards else tracks
 
 
-def mirrored(tracks: Trajectories, steps: int) -> Trajectories:
+def reverse_steps(tracks: Trajectories, steps: int) -> Trajectories:
     """Reverse the steps 0 … ``steps`` − 1 of tracks; rows are again sorted by step and then id."""
     order = np.lexsort((tracks.ids, -tracks.frames))
     columns = {name: getattr(tracks, name)[order] for name in Trajectories.__slots__}
@@ -271,7 +271,7 @@ def overlap(
 
 
 @cache
-def _measured() -> Float[ndarray, "K 2"]:
+def _read_calibration() -> Float[ndarray, "K 2"]:
     """Return the estimate and the true IDF1 of K runs of the calibration, equally many of each
     recording."""
     kept = json.loads(FILE.read_text(encoding="utf-8"))
@@ -285,7 +285,7 @@ def interval(score: float) -> tuple[float, float]:
     They are the estimate plus the 5 % and the 95 % quantile of the error (true IDF1 − estimate) of
     the :data:`_ALIKE` runs of the calibration with the nearest estimates.
     """
-    measured = _measured()
+    measured = _read_calibration()
     near = measured[np.argsort(np.abs(measured[:, 0] - score), kind="stable")[:_ALIKE]]
     errors = near[:, 1] - near[:, 0]
     low, high = np.quantile(errors, [(1.0 - _WITHIN) / 2.0, (1.0 + _WITHIN) / 2.0])

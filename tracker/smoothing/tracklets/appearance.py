@@ -48,6 +48,7 @@ class Means:
     """The mean embeddings of n tracklets in D dimensions, and the number of boxes of each."""
 
     values: Float[ndarray, "n D"]
+    """Mean embedding of each tracklet, 0 without a box."""
     counts: Float[ndarray, " n"]
     """Weighted number of boxes; 0 without any."""
 
@@ -110,7 +111,7 @@ class AppearanceModel:
         )
         both = (first.counts > 0.0) & (second.counts > 0.0)
         same = log_ratio_of(self._between, first.take(both), second.take(both))
-        i, j = _together(tracklets)
+        i, j = _overlapping_pairs(tracklets)
         seen = (self._means.counts[i] > 0.0) & (self._means.counts[j] > 0.0)
         one, two = self._means.take(i[seen]), self._means.take(j[seen])
         other = log_ratio_of(self._between, one, two)
@@ -260,7 +261,7 @@ def _means(
     return Means(values / np.where(counts > 0.0, counts, 1.0)[:, None], counts)
 
 
-def _together(tracklets: Paths) -> tuple[Int[ndarray, " P"], Int[ndarray, " P"]]:
+def _overlapping_pairs(tracklets: Paths) -> tuple[Int[ndarray, " P"], Int[ndarray, " P"]]:
     """The pairs of tracklets that overlap in time, and so are of two people."""
     i, j = np.triu_indices(len(tracklets.labels), 1)
     lasts = tracklets.lasts

@@ -16,12 +16,12 @@ from tracker.corrections.constraints import Constraints
 from tracker.corrections.lookup import TrackIndex, mostly_inside
 from tracker.smoothing.paths import Paths
 from tracker.smoothing.smoother import Fitted
-from tracker.smoothing.tracklets.exchanges import turn
+from tracker.smoothing.tracklets.exchanges import find_exchange
 
 _EVER = int(np.iinfo(np.int64).max)
 
 
-def parted(
+def split_by_gap(
     constraints: Constraints[int], tracklets: Paths, longest: int
 ) -> tuple[Constraints[int], Constraints[int]]:
     """Split the constraints into those for links over short gaps and those over long ones.
@@ -40,7 +40,7 @@ def parted(
     return replace(constraints, must_link=near), replace(constraints, must_link=far)
 
 
-def limits(
+def existence_spans(
     constraints: Constraints[int], chains: Many[Many[int]], tracklets: Paths
 ) -> dict[int, tuple[int, int]]:
     """The first and the last step at which the tracks of some chains may exist.
@@ -77,7 +77,7 @@ def limits(
     return found
 
 
-def of_chains(
+def constraints_on_chains(
     constraints: Constraints[int], chains: Many[Many[int]], tracklets: Paths
 ) -> Constraints[int] | None:
     """The same constraints on chains of tracklets, by their indices.
@@ -94,7 +94,7 @@ def of_chains(
     found = replace(constraints, targets=frozenset(), clutter=frozenset()).mapped(number)
     firsts = np.array([tracklets.firsts[chain[0]] for chain in chains], dtype=np.int64)
     lasts = np.array([tracklets.lasts[chain[-1]] for chain in chains], dtype=np.int64)
-    return possible(firsts, lasts, [found], strict=True)
+    return combine_constraints(firsts, lasts, [found], strict=True)
 
 
 class ConstraintResolver:
@@ -169,7 +169,7 @@ class ConstraintResolver:
                     [row for place in some if (row := self._rows[place]) is not None]
                     for some in (one.places[:2], one.places[2:])
                 )
-            found += turn(
+            found += find_exchange(
                 self._fitted, int(self._owners[earlier]), int(self._owners[later]),
                 int(self._steps[before].max()), int(self._steps[after].min()),
             )  # fmt: skip
@@ -182,8 +182,8 @@ class ConstraintResolver:
                 found.append(earlier + 1 + int(np.argmax(self._jumps[between])))
         return found
 
-    def meant(self, tracklets: Paths, source_rows: Int[ndarray, " M"]) -> set[int]:
-        """The tracklets that a correction refers to.
+    def referenced_tracklets(self, tracklets: Paths, source_rows: Int[ndarray, " M"]) -> set[int]:
+        """The tracklets that any correction refers to.
 
         Args:
             tracklets: The tracklets, with M rows.
@@ -203,7 +203,7 @@ class ConstraintResolver:
             source_rows: Index of each of the M rows in the paths before the splits.
         """
         wanted = [self._resolved(one, tracklets, source_rows) for one in self._corrections]
-        found = possible(tracklets.firsts, tracklets.lasts, wanted)
+        found = combine_constraints(tracklets.firsts, tracklets.lasts, wanted)
         assert found is not None
         return found
 
@@ -267,7 +267,7 @@ class ConstraintResolver:
         return int(tracklets.owners[own[here]])
 
 
-def possible(
+def combine_constraints(
     firsts: Int[ndarray, " n"],
     lasts: Int[ndarray, " n"],
     wanted: Iterable[Constraints[int]],

@@ -12,7 +12,7 @@ from numpy import ndarray
 from tracker.fusion import visibility
 from tracker.kernels.smoothing import evidence
 from tracker.parameters.groups.smoothing import SmoothingParams
-from tracker.smoothing.lifetimes import independence, misses
+from tracker.smoothing.lifetimes import independent_share, log_miss_likelihoods
 from tracker.smoothing.paths import Links, Paths, join_chains, renumber_rows, same_label
 from tracker.smoothing.smoother import BoxAssociations, Fitted, Smoother
 from tracker.smoothing.tracklets.appearance import AppearanceModel
@@ -104,7 +104,9 @@ def tracklet_odds(
     """
     step_time, paths = smoother.model.step_time, fitted.paths
     count = len(paths.labels)
-    rows = fitted.odds + independence(step_time, parameters.memory) * misses(shared)
+    rows = fitted.odds + independent_share(step_time, parameters.memory) * log_miss_likelihoods(
+        shared
+    )
     rows += rates.survival
     worths = np.bincount(paths.owners, rows, count) + smoother.log_place
     births = np.where(paths.firsts <= 0, 0.0, rates.restart - rates.leave)
@@ -139,7 +141,7 @@ class ShortGapOdds:
             rates: How often people come and leave.
         """
         self._smoother, self._paths, self._rates = smoother, paths, rates
-        self._share = independence(smoother.model.step_time, p.memory)
+        self._share = independent_share(smoother.model.step_time, p.memory)
         self._near = near = near_pairs(
             paths,
             longest=max(round(p.longest / smoother.model.step_time), 1),
@@ -266,7 +268,7 @@ def _seen_empty(
     part = np.cumsum(inner) // _POINTS
     for own in np.split(np.arange(len(inner)), np.flatnonzero(np.diff(part)) + 1):
         total[own] = _seen_empty_at(smoother, paths, pairs.take(own))
-    return total * independence(smoother.model.step_time, memory)
+    return total * independent_share(smoother.model.step_time, memory)
 
 
 def _seen_empty_at(smoother: Smoother, paths: Paths, pairs: Pairs) -> Float[ndarray, " P"]:

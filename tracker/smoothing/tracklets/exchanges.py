@@ -7,10 +7,7 @@ from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
 from tracker.smoothing.smoother import Fitted
-from tracker.smoothing.tracklets.motion import log_integral
-
-_BEYOND = 1e-9
-"""Share of the prior information that is left, so that a row without boxes has about 0."""
+from tracker.smoothing.tracklets.motion import PRIOR_LEFT, log_integral
 
 
 def exchange_breaks(
@@ -33,14 +30,16 @@ def exchange_breaks(
     one, other = _pairs(fitted, reach)
     if not len(one):
         return breaks
-    gains = gains_of(fitted, one, other)
-    for chosen in _best(paths.owners[one], paths.owners[other], paths.steps[one], gains, apart):
+    gains = exchange_log_odds(fitted, one, other)
+    for chosen in _best_of_encounters(
+        paths.owners[one], paths.owners[other], paths.steps[one], gains, apart
+    ):
         if gains[chosen] > least:
             breaks[[one[chosen], other[chosen]]] = True
     return breaks
 
 
-def gains_of(
+def exchange_log_odds(
     fitted: Fitted, one: Int[ndarray, " P"], other: Int[ndarray, " P"]
 ) -> Float[ndarray, " P"]:
     """Compute the log odds of a swap at pairs of rows of one step.
@@ -50,22 +49,27 @@ def gains_of(
 
         g = ℓ(a_i, A_i; η_j, Λ_j) + ℓ(a_j, A_j; η_i, Λ_i) − ℓ(a_i, A_i; η_i, Λ_i)
             − ℓ(a_j, A_j; η_j, Λ_j),    ℓ = log ∫ N(x; a, A) e^{ηᵀx − ½ xᵀΛx} dx
+
+    Args:
+        fitted: The paths, fitted to their boxes.
+        one: Index of the row of path i, of each of P pairs.
+        other: Index of the row of path j, at the same step.
     """
     paths = fitted.paths
     rows, place = np.unique(np.concatenate([one, other]), return_inverse=True)
     i, j = place[: len(one)], place[len(one) :]
     a, spread = fitted.ahead[rows], fitted.ahead_covariances[rows]
     inverse, before = np.linalg.inv(paths.covariances[rows]), np.linalg.inv(spread)
-    information = inverse - (1.0 - _BEYOND) * before
+    information = inverse - (1.0 - PRIOR_LEFT) * before
     vectors = np.einsum("nij,nj->ni", inverse, paths.states[rows])
-    vectors -= (1.0 - _BEYOND) * np.einsum("nij,nj->ni", before, a)
+    vectors -= (1.0 - PRIOR_LEFT) * np.einsum("nij,nj->ni", before, a)
     own = log_integral(a, spread, information, vectors)
     gains = log_integral(a[i], spread[i], information[j], vectors[j])
     gains += log_integral(a[j], spread[j], information[i], vectors[i])
     return np.asarray(gains - own[i] - own[j])
 
 
-def turn(fitted: Fitted, one: int, other: int, after: int, until: int) -> list[int]:
+def find_exchange(fitted: Fitted, one: int, other: int, after: int, until: int) -> list[int]:
     """Find the rows before which two paths are split so that the one continues as the other.
 
     They are those of the step at which the swap has the largest log odds.
@@ -88,7 +92,7 @@ def turn(fitted: Fitted, one: int, other: int, after: int, until: int) -> list[i
     steps = np.arange(first, last + 1)
     own = int(paths.starts[one]) + steps - int(paths.firsts[one])
     others = int(paths.starts[other]) + steps - int(paths.firsts[other])
-    best = int(np.argmax(gains_of(fitted, own, others)))
+    best = int(np.argmax(exchange_log_odds(fitted, own, others)))
     return [int(own[best]), int(others[best])]
 
 
@@ -110,7 +114,7 @@ def _pairs(fitted: Fitted, reach: float) -> tuple[Int[ndarray, " P"], Int[ndarra
     return one[near], other[near]
 
 
-def _best(
+def _best_of_encounters(
     one: Int[ndarray, " P"],
     other: Int[ndarray, " P"],
     steps: Int[ndarray, " P"],

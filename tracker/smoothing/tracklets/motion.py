@@ -13,8 +13,13 @@ from tracker.filters.models import Motion
 from tracker.smoothing.paths import Paths, same_label
 from tracker.smoothing.smoother import Fitted
 
-_BEYOND = 1e-9
-"""Share of the prior information that is left, so that a tracklet without boxes has about 0."""
+PRIOR_LEFT = 1e-9
+"""Share of the prior's information that is not subtracted from that of the estimates, so that
+rounding leaves boxes without information about 0 and not less."""
+
+SLACK = 1.0
+"""Distance beyond what a person can walk within which two tracks are compared, metres: estimates at
+the ends of tracks err."""
 
 _CHANGES = 0.1
 """Probability that a person's process noise returns to the model's within a gap."""
@@ -98,7 +103,7 @@ class Ends:
         ends[joined[goes_on]] = chains.ahead[after] @ back.T
         covariances[joined[goes_on]] = back @ (chains.ahead_covariances[after] - added) @ back.T
         inverse = np.linalg.inv(paths.covariances[first])
-        before = (1.0 - _BEYOND) * np.linalg.inv(chains.ahead_covariances[first])
+        before = (1.0 - PRIOR_LEFT) * np.linalg.inv(chains.ahead_covariances[first])
         information, vectors = self.information.copy(), self.vectors.copy()
         information[joined] = inverse - before
         vectors[joined] = np.einsum("pij,pj->pi", inverse, paths.states[first])
@@ -162,7 +167,7 @@ def near_pairs(tracklets: Paths, *, longest: int, fastest: float) -> Pairs:
     later = order[np.repeat(low, high - low) + offset] if len(earlier) else earlier
     gaps = firsts[later] - lasts[earlier]
     way = tracklets.states[begins[later], :3] - tracklets.states[ends[earlier], :3]
-    near = np.linalg.norm(way, axis=1) <= 1.0 + fastest * gaps
+    near = np.linalg.norm(way, axis=1) <= SLACK + fastest * gaps
     # a pair with one label of the filter is always possible
     goes_on = np.full(len(lasts), -1)
     for one, other in same_label(tracklets):
@@ -236,7 +241,14 @@ def log_integral(
     information: Float[ndarray, "P d d"],
     vectors: Float[ndarray, "P d"],
 ) -> Float[ndarray, " P"]:
-    """Compute log ∫ N(x; m, P) e^{ηᵀx − ½ xᵀΛx} dx for P Gaussians and information pairs."""
+    """Compute log ∫ N(x; m, P) e^{ηᵀx − ½ xᵀΛx} dx for P Gaussians and information pairs.
+
+    Args:
+        means: m of each Gaussian, metres and metres per second.
+        covariances: P of each Gaussian.
+        information: Λ, an information matrix for each; it may be singular.
+        vectors: η, an information vector for each.
+    """
     if not len(means):
         return np.zeros(0)
     bracket = np.eye(means.shape[1]) + information @ covariances

@@ -22,11 +22,11 @@ _AS_THE_FILTER = FusionParams()
 """The filter's default parameters, by which colours are weighted whatever the filter is set to."""
 
 _OWN = 0.7
-"""Least association probability of a box whose colours count."""
+"""Association probability above which the colours of a box count."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Seen:
+class Appearances:
     """The appearance of the boxes of all steps, camera by camera; None where none is known."""
 
     embeddings: Many[Float[ndarray, "B A"]] | None = None
@@ -35,12 +35,13 @@ class Seen:
     """Probability of each of G people with templates for each box, 1/G each where it is unknown."""
 
     @staticmethod
-    def of(views: Steps[tuple[ViewResult, ...]]) -> Seen:
+    def of(views: Steps[tuple[ViewResult, ...]]) -> Appearances:
         """Collect the appearance of boxes from the results of stage 1 for each step."""
-        return Seen(_embeddings(views), _likenesses(views))
+        return Appearances(_embeddings(views), _likenesses(views))
 
 
 def _embeddings(views: Steps[tuple[ViewResult, ...]]) -> list[Float[ndarray, "B A"]] | None:
+    """The embeddings of each camera's boxes; None where there are none, or of several sizes."""
     cameras = range(views.width or 0)
     shapes = {shape for c in cameras for shape in views.shapes("embeddings", c)}
     sizes = {size for (size,) in shapes if size}
@@ -59,6 +60,7 @@ def _embeddings(views: Steps[tuple[ViewResult, ...]]) -> list[Float[ndarray, "B 
 
 
 def _likenesses(views: Steps[tuple[ViewResult, ...]]) -> list[Float[ndarray, "B G"]] | None:
+    """The likelihoods of each camera's boxes for G people; None for fewer than two people."""
     cameras = range(views.width or 0)
     shapes = {shape for c in cameras for shape in views.shapes("likenesses", c)}
     people = max((size for (size,) in shapes), default=0)
@@ -84,7 +86,7 @@ def _with_counts(
 
 
 def template_log_odds(
-    tracklets: Paths, links: Links, smoother: Smoother, seen: Seen, weight: float
+    tracklets: Paths, links: Links, smoother: Smoother, seen: Appearances, weight: float
 ) -> Float[ndarray, "n G"]:
     """Compute the log likelihood of each tracklet's colours under each of G people with templates.
 
@@ -131,7 +133,7 @@ def _clear(links: Links, cameras: Many[CameraBoxes]) -> Bool[ndarray, " L"]:
     return np.asarray(result)
 
 
-def of_chains(scores: Float[ndarray, "n G"], chains: Many[Many[int]]) -> Float[ndarray, "m G"]:
+def sum_by_chain(scores: Float[ndarray, "n G"], chains: Many[Many[int]]) -> Float[ndarray, "m G"]:
     """Sum the log likelihoods over the tracklets of each chain, less the largest of each chain.
 
     Args:

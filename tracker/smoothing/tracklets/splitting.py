@@ -9,22 +9,23 @@ from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
 from tracker.parameters.groups.smoothing import SmoothingParams
-from tracker.smoothing.lifetimes import independence, lifetimes
+from tracker.smoothing.lifetimes import estimate_lifetimes, independent_share
 from tracker.smoothing.paths import Paths, split_paths
 from tracker.smoothing.smoother import BoxAssociations, Fitted, Smoother
 from tracker.smoothing.tracklets.constraints import ConstraintResolver
 from tracker.smoothing.tracklets.costs import FASTEST, Rates
 from tracker.smoothing.tracklets.exchanges import exchange_breaks
+from tracker.smoothing.tracklets.motion import SLACK
 
 GAP = 1.0
 """Time without a detection from which a track is split, seconds. From 0.3 to 4 s, no figure of the
 random rooms, random crowds and recordings of ``tests/papers/rooms/fusion_ablations.md`` changes by
 as much as 0.001: the parts are linked again."""
 
-_FED = 0.3
+_DETECTED = 0.3
 """Sum of association probabilities over all cameras above which a row counts as detected."""
 
-_AROUND = 0.2
+_AROUND_A_JUMP = 0.2
 """Seconds before and after a jump that are left out of both tracklets."""
 
 _SHORTEST = 0.4
@@ -49,7 +50,7 @@ class Tracked:
     """The filter's label of each row, -1 where it had no track."""
 
     def forget_predictions(self) -> None:
-        """Free the memory of what is read by :func:`cuts` and by corrections alone."""
+        """Free the memory of what only :func:`find_splits` and corrections read."""
         self.fitted = self.fitted.without_predictions()
 
     def forget_states(self) -> None:
@@ -82,20 +83,24 @@ def find_splits(tracked: Tracked, p: SmoothingParams) -> Splits:
     from the future exceeds ``p.jump``), and where no camera detected the track for longer than
     1 s. Tracks are also split where a swap with another track has log odds of at least
     ``p.exchange``.
+
+    Args:
+        tracked: The tracks, with N rows.
+        p: Thresholds of the splits.
     """
     smoother, fitted, shared = tracked.smoother, tracked.fitted, tracked.shared
     step_time, paths = smoother.model.step_time, fitted.paths
     rows = len(paths.states)
-    there, odds = lifetimes(smoother, paths, shared, p)
+    there, odds = estimate_lifetimes(smoother, paths, shared, p)
     reasons = np.zeros(rows, dtype=np.int64)
-    fed = np.bincount(shared.links.rows, shared.links.shares, rows) > _FED
-    fed[smoother.rows_with_places(paths)[0]] = True
+    detected = np.bincount(shared.links.rows, shared.links.shares, rows) > _DETECTED
+    detected[smoother.rows_with_places(paths)[0]] = True
     too_long = round(GAP / step_time)
-    away = _long_gaps(paths, fed, too_long) | (there < 0.5)
-    reasons[away | _not_bridged(paths, tracked.had, away, too_long)] = 3
-    around = round(_AROUND / step_time)
+    away = _long_gaps(paths, detected, too_long) | (there < 0.5)
+    reasons[away | _gaps_without_boxes(paths, tracked.had, away, too_long)] = 3
+    around = round(_AROUND_A_JUMP / step_time)
     # errors of boxes are correlated: the distance is reduced to that of independent evidence
-    jumps = np.flatnonzero(fitted.jumps * independence(step_time, p.memory) > p.jump)
+    jumps = np.flatnonzero(fitted.jumps * independent_share(step_time, p.memory) > p.jump)
     owners = paths.owners
     for offset in range(-around, around):
         near = np.clip(jumps + offset, 0, rows - 1)
@@ -105,10 +110,10 @@ def find_splits(tracked: Tracked, p: SmoothingParams) -> Splits:
     breaks = np.zeros(rows, dtype=bool)
     breaks[jumps] = True
     breaks |= exchange_breaks(
-        fitted, reach=1.0 + FASTEST * step_time, least=p.exchange, apart=too_long
+        fitted, reach=SLACK + FASTEST * step_time, least=p.exchange, apart=too_long
     )
-    clear = _between(paths, fed & (reasons == 0)) & (reasons == 0)
-    begins, between = _of_two(paths, tracked.names)
+    clear = _between(paths, detected & (reasons == 0)) & (reasons == 0)
+    begins, between = _label_changes(paths, tracked.names)
     return Splits(reasons, clear & ~between, breaks | begins, Rates.of(smoother, paths, odds > 0.0))
 
 
@@ -135,13 +140,15 @@ def split_tracks(
     np.maximum.at(longest, of, lengths)
     shortest = round(_SHORTEST / tracked.smoother.model.step_time)
     short = (lengths < shortest) & (longest[of] >= shortest)
-    short[list(resolver.meant(tracklets, source_rows))] = False
+    short[list(resolver.referenced_tracklets(tracklets, source_rows))] = False
     clear[source_rows[np.repeat(short, lengths)]] = False
     tracklets, source_rows = split_paths(paths, clear, breaks)
-    return replace(tracklets, labels=_named(tracklets, tracked.names[source_rows])), source_rows
+    return replace(
+        tracklets, labels=_filter_labels(tracklets, tracked.names[source_rows])
+    ), source_rows
 
 
-def _of_two(
+def _label_changes(
     paths: Paths, names: Int[ndarray, " N"]
 ) -> tuple[Bool[ndarray, " N"], Bool[ndarray, " N"]]:
     """Find the rows at which the filter's label of a path changes.
@@ -162,7 +169,7 @@ def _of_two(
     return begins, between
 
 
-def _named(tracklets: Paths, names: Int[ndarray, " M"]) -> Int[ndarray, " n"]:
+def _filter_labels(tracklets: Paths, names: Int[ndarray, " M"]) -> Int[ndarray, " n"]:
     """Return the filter's label of each tracklet; one without such a label retains its own."""
     labels = tracklets.labels.copy()
     known = np.flatnonzero(names >= 0)
@@ -178,13 +185,13 @@ def _runs(paths: Paths, flags: Bool[ndarray, " N"]) -> Int[ndarray, " N"]:
     return np.asarray(np.cumsum(change) - 1)
 
 
-def _long_gaps(paths: Paths, fed: Bool[ndarray, " N"], longest: int) -> Bool[ndarray, " N"]:
-    """Find the rows in runs of more than ``longest`` rows that are not ``fed``."""
-    run = _runs(paths, fed)
-    return np.asarray(~fed & (np.bincount(run)[run] > longest)) if len(fed) else fed
+def _long_gaps(paths: Paths, detected: Bool[ndarray, " N"], longest: int) -> Bool[ndarray, " N"]:
+    """Find the rows in runs of more than ``longest`` rows without a detection."""
+    run = _runs(paths, detected)
+    return np.asarray(~detected & (np.bincount(run)[run] > longest)) if len(detected) else detected
 
 
-def _not_bridged(
+def _gaps_without_boxes(
     paths: Paths, had: Bool[ndarray, " N"], away: Bool[ndarray, " N"], longest: int
 ) -> Bool[ndarray, " N"]:
     """Find the rows of the filter's long gaps of which a part is ``away``, without boxes for long.

@@ -1,4 +1,4 @@
-"""Stated places among the rows of paths: information added, enforced, and the way there and
+"""Place constraints on rows of paths: their information, their enforcement, the way there and
 back."""
 
 from __future__ import annotations

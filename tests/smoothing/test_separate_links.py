@@ -1,4 +1,4 @@
-"""Whose boxes bear witness to a person more, beside somebody who is surer."""
+"""Which boxes are evidence for a track beside a track of greater odds."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tests.smoothing.known import PLAIN, Known, Step, known
 from tracker.parameters.catalogue import METHODS, RunParameters, method_of
 from tracker.parameters.values import with_values
 from tracker.smoothing import create
-from tracker.smoothing.lifetimes import lifetimes, shown_apart
+from tracker.smoothing.lifetimes import estimate_lifetimes, select_separate_links
 from tracker.smoothing.paths import Paths
 from tracker.smoothing.smoother import BoxAssociations, Smoother
 
@@ -62,12 +62,14 @@ def test_nobody_is_shown_apart_who_never_leaves_the_side_of_who_is_surer(swapped
     surer = 1 if swapped else 0
     odds = np.where(np.arange(2) == surer, 9.0, 4.0)
     of_surer = paths.owners[shared.links.rows] == surer
-    assert np.array_equal(shown_apart(smoother, paths, shared, everywhere(paths), odds), of_surer)
+    assert np.array_equal(
+        select_separate_links(smoother, paths, shared, everywhere(paths), odds), of_surer
+    )
 
 
 def test_who_came_from_elsewhere_is_shown_apart_wherever_the_boxes_are() -> None:
     smoother, paths, shared = tracked(second(4.0 * WIDTH, 0.6 * WIDTH))
-    apart = shown_apart(smoother, paths, shared, everywhere(paths), np.array([9.0, 4.0]))
+    apart = select_separate_links(smoother, paths, shared, everywhere(paths), np.array([9.0, 4.0]))
     own = paths.owners[shared.links.rows] == 1
     steps = paths.steps[shared.links.rows]
     assert apart[~own].all()
@@ -81,20 +83,22 @@ def test_who_is_gone_takes_nothing_from_who_stands_there_now() -> None:
     smoother, paths, shared = tracked(second(0.6 * WIDTH, 0.9 * WIDTH))
     there = np.where(paths.steps < (BEGIN + END) // 2, 1.0, 0.0)
     there[paths.owners == 1] = 1.0
-    apart = shown_apart(smoother, paths, shared, there, np.array([9.0, 4.0]))
+    apart = select_separate_links(smoother, paths, shared, there, np.array([9.0, 4.0]))
     late = paths.steps[shared.links.rows] >= (BEGIN + END) // 2
     assert apart[late & (paths.owners[shared.links.rows] == 1)].all()
 
 
 def test_equals_take_nothing_from_each_other() -> None:
     smoother, paths, shared = tracked(second(0.6 * WIDTH, 0.9 * WIDTH))
-    assert shown_apart(smoother, paths, shared, everywhere(paths), np.array([4.0, 4.0])).all()
+    assert select_separate_links(
+        smoother, paths, shared, everywhere(paths), np.array([4.0, 4.0])
+    ).all()
 
 
 def test_doubtful_boxes_beside_somebody_are_nobodys_and_elsewhere_somebodys() -> None:
     beside = tracked(second(0.6 * WIDTH, 0.9 * WIDTH))
     elsewhere = tracked(second(4.0 * WIDTH, 5.0 * WIDTH))
-    odds = [lifetimes(*one, PLAIN.smoothing)[1] for one in (beside, elsewhere)]
+    odds = [estimate_lifetimes(*one, PLAIN.smoothing)[1] for one in (beside, elsewhere)]
     assert odds[0][0] > 0.0 > odds[0][1]
     assert (odds[1] > 0.0).all()
 
@@ -103,8 +107,8 @@ def test_what_a_detector_keeps_beside_another_box_shows_somebody_more() -> None:
     other = second(0.6 * WIDTH, 0.9 * WIDTH)
     drawn = tracked(other, embeddings=False)
     kept = tracked(other, embeddings=False, several=False)
-    assert lifetimes(*drawn, PLAIN.smoothing)[1][1] < 0.0, "two boxes around one person"
-    assert lifetimes(*kept, PLAIN.smoothing)[1][1] > 0.0
+    assert estimate_lifetimes(*drawn, PLAIN.smoothing)[1][1] < 0.0, "two boxes around one person"
+    assert estimate_lifetimes(*kept, PLAIN.smoothing)[1][1] > 0.0
 
 
 @pytest.mark.parametrize("name", list(METHODS["single_view"]))

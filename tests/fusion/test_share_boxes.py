@@ -1,4 +1,4 @@
-"""What the order of the cameras does to the plain recursion, and a label that is one person."""
+"""The order of the cameras in the plain PHD recursion, and with one target for each label."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Who is meant by a place."""
+"""Which track a place refers to."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from tracker.corrections import Place
 from tracker.corrections.kinds import make
 from tracker.corrections.lookup import TrackIndex
 from tracker.corrections.outcomes import outcomes
-from tracker.corrections.relabelling import relabelled
+from tracker.corrections.relabelling import relabel
 
 
 def walked() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -50,7 +50,7 @@ def test_who_begins_at_the_last_step_of_nobody_is_somebody() -> None:
     until = make(kind="nobody", places=[[0, 0.0, 0.0, 1.0], [40, 0.0, 0.0, 1.0]])
     (told,) = outcomes(steps, ids, where, [until], leeway=25)
     assert told.met, told.why
-    assert len(relabelled(steps, ids, where, [until], leeway=25)[1]) == 60
+    assert len(relabel(steps, ids, where, [until], leeway=25)[1]) == 60
     at_once = make(kind="nobody", places=[[40, 0.0, 0.0, 1.0]])
     assert not outcomes(steps, ids, where, [at_once], leeway=25)[0].met
     (short,) = outcomes(steps[:1], ids[:1], where[:1], [until], leeway=25)

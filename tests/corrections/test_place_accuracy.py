@@ -1,4 +1,4 @@
-"""A stated place against all else: who weighs them comes to within the place's accuracy."""
+"""A place that contradicts the estimate: the result is within the accuracy of the place."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Who goes on as whom stays as it was where nobody said anything of it."""
+"""Links that no correction refers to remain those of the result without corrections."""
 
 from __future__ import annotations
 

@@ -16,11 +16,11 @@ from tracker.parameters.catalogue import RunParameters
 from tracker.review.self_consistency import estimate
 from tracker.review.self_consistency.agreement import (
     agreement,
-    compared,
+    compare_runs,
     differences,
     disagreements,
 )
-from tracker.review.self_consistency.estimate import FILE, interval, mirrored, overlap
+from tracker.review.self_consistency.estimate import FILE, interval, overlap, reverse_steps
 from tracker.runs import pipeline
 from tracker.runs.pipeline import Cancelled
 from tracker.single_view.protocol import ViewResult
@@ -83,7 +83,7 @@ def test_one_camera_alone_is_held_against_the_way_back() -> None:
 
 def test_seen_backwards_twice_is_the_same() -> None:
     run = pipeline.compute(random_room(5, cameras=3, people=3, steps=80), BOXES)
-    twice = mirrored(mirrored(run.tracks, 80), 80)
+    twice = reverse_steps(reverse_steps(run.tracks, 80), 80)
     for name in Trajectories.__slots__:
         assert_allclose(getattr(twice, name), getattr(run.tracks, name))
 
@@ -91,7 +91,7 @@ def test_seen_backwards_twice_is_the_same() -> None:
 def test_who_is_exchanged_is_told_with_step_and_ids() -> None:
     here = tracks([[1] * 40, [2] * 40])
     there = tracks([[7] * 25 + [8] * 15, [8] * 25 + [7] * 15])
-    comparison = compared(here, there, 40, HALF)
+    comparison = compare_runs(here, there, 40, HALF)
     assert agreement(comparison) == pytest.approx(25 / 40)
     found = disagreements([("backwards", differences(comparison, 0.1))], 0.1)
     assert {(one.step, one.ids) for one in found} == {(25, (1, 2)), (25, (2, 1))}
@@ -101,13 +101,13 @@ def test_who_is_exchanged_is_told_with_step_and_ids() -> None:
 def test_who_is_missed_is_told_after_who_is_another() -> None:
     here = tracks([[1] * 40, [2] * 40, [3] * 40])
     there = tracks([[7] * 20 + [8] * 20, [8] * 20 + [7] * 20, [9] * 10 + [0] * 30])
-    comparison = compared(here, there, 40, HALF)
+    comparison = compare_runs(here, there, 40, HALF)
     found = disagreements([("a", differences(comparison, 0.1))], 0.1)
     assert [one.ids[0] for one in found] == [1, 2, 3]
     assert found[-1].why == "3 is not there a"
     # what two runs see otherwise comes first, whatever it is
     other = tracks([[1] * 40, [2] * 40, [3] * 10 + [0] * 30])
-    second = differences(compared(here, other, 40, HALF), 0.1)
+    second = differences(compare_runs(here, other, 40, HALF), 0.1)
     both = disagreements([("a", differences(comparison, 0.1)), ("b", second)], 0.1)
     assert (both[0].ids, both[0].variants) == ((3,), ("a", "b"))
 
@@ -115,12 +115,12 @@ def test_who_is_missed_is_told_after_who_is_another() -> None:
 def test_a_moment_is_no_difference() -> None:
     here = tracks([[1] * 40])
     there = tracks([[5] * 20 + [0] * 2 + [5] * 18])
-    assert differences(compared(here, there, 40, HALF), 0.1) == []
+    assert differences(compare_runs(here, there, 40, HALF), 0.1) == []
 
 
 def test_nobody_anywhere_is_agreement() -> None:
     nobody = Trajectories.empty(1)
-    assert agreement(compared(nobody, nobody, 10, HALF)) == 1.0
+    assert agreement(compare_runs(nobody, nobody, 10, HALF)) == 1.0
 
 
 def test_boxes_elsewhere_are_a_veto() -> None:

@@ -1,4 +1,4 @@
-"""The joining of pieces under what a person said: exact against all ways that obey."""
+"""Tracklets linked under constraints: the optimum of all links that satisfy them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy import ndarray
 
 from tests.smoothing.test_linking import chains, graph_of, value_of, worth_of
 from tracker.corrections.constraints import Constraints
-from tracker.smoothing.tracklets.constraints import possible
+from tracker.smoothing.tracklets.constraints import combine_constraints
 from tracker.smoothing.tracklets.solver import TrackletGraph, link_tracklets
 
 
@@ -52,7 +52,7 @@ def drawn_ties(rng: np.random.Generator, count: int) -> Constraints:
         )
         for _ in range(3)
     ]
-    found = possible(firsts, lasts, told)
+    found = combine_constraints(firsts, lasts, told)
     assert found is not None
     return found
 
@@ -106,10 +106,12 @@ def test_what_lies_between_two_who_are_one_leads_from_the_one_to_the_other() -> 
 
 def test_the_earlier_of_two_that_cannot_both_be_counts() -> None:
     firsts, lasts = np.array([0, 5, 20]), np.array([10, 15, 30])
-    constraints = possible(firsts, lasts, [Constraints(((0, 2),)), Constraints(((1, 2),))])
+    constraints = combine_constraints(
+        firsts, lasts, [Constraints(((0, 2),)), Constraints(((1, 2),))]
+    )
     assert constraints == Constraints(((0, 2),), targets=frozenset({0, 2}))
     assert (
-        possible(
+        combine_constraints(
             firsts,
             lasts,
             [
@@ -124,5 +126,7 @@ def test_the_earlier_of_two_that_cannot_both_be_counts() -> None:
         )
         is None
     )
-    parted = possible(firsts, lasts, [Constraints(cannot_link=((0, 2),)), Constraints(((0, 2),))])
+    parted = combine_constraints(
+        firsts, lasts, [Constraints(cannot_link=((0, 2),)), Constraints(((0, 2),))]
+    )
     assert parted == Constraints(cannot_link=((0, 2),))

@@ -1,4 +1,4 @@
-"""What smoothing must hold whatever the recording: least squares, covariances, symmetries."""
+"""Properties of the smoother on any recording: least squares, covariances, symmetries."""
 
 from __future__ import annotations
 
