@@ -281,7 +281,7 @@ def _size(sequence: Sequence, told: BoxesTell) -> Check:
     if _fits(height, known):
         return good(
             "size of people",
-            f"boxes are {height:.2f} m tall in the room, [target] says {known:.2f} m",
+            f"boxes are {height:.2f} m tall in the room, the target is {known:.2f} m",
             height=height,
         )
     own = suggest(sequence.cameras, told.given.consensus)
@@ -292,7 +292,7 @@ def _size(sequence: Sequence, told: BoxesTell) -> Check:
     )
     return warning(
         "size of people",
-        f"boxes are {height:.2f} m tall in the room, [target] says {known:.2f} m",
+        f"boxes are {height:.2f} m tall in the room, the target is {known:.2f} m",
         *remedy,
         height=height,
     )
@@ -315,7 +315,7 @@ def _inside(sequence: Sequence, told: BoxesTell) -> Check:
         )
         return warning(
             "people are in the room",
-            f"only {percent(inside)} of {people} are in [room]",
+            f"only {percent(inside)} of {people} are in the room",
             Remedy("room.min", low),
             Remedy("room.max", high),
             inside=inside,
@@ -325,13 +325,13 @@ def _inside(sequence: Sequence, told: BoxesTell) -> Check:
         if abs(off) > _FLOOR_OFF:
             return warning(
                 "people are in the room",
-                f"people stand at z = {own.floor:.2f} m, the floor of [room] is at "
+                f"people stand at z = {own.floor:.2f} m, the floor of the room is at "
                 f"{float(room.minimum[2]):.2f} m",
                 floor=own.floor,
             )
     return good(
         "people are in the room",
-        f"{percent(inside)} of {people} are in [room]",
+        f"{percent(inside)} of {people} are in the room",
         inside=inside,
     )
 

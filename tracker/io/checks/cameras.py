@@ -58,8 +58,8 @@ def check_places(cameras: Many[Camera], room: Room) -> Iterator[Check]:
         lowest = min(float(c.centre[2]) for c in cameras)
         yield warning(
             "cameras above the floor",
-            f"{listed(below)} {'is' if len(below) == 1 else 'are'} below the floor of [room] "
-            f"(z = {lowest:.2f} m): check the up axis, the poses' direction, and [room]",
+            f"{listed(below)} {'is' if len(below) == 1 else 'are'} below the floor of the room "
+            f"(z = {lowest:.2f} m): check the up axis, the poses' direction, and the room",
             lowest=lowest,
         )
     else:
@@ -72,8 +72,8 @@ def check_places(cameras: Many[Camera], room: Room) -> Iterator[Check]:
     if blind:
         yield warning(
             "cameras see the room",
-            f"{listed(blind)} {'sees' if len(blind) == 1 else 'see'} nothing of [room]: check that "
-            "R and t lead from world to camera, that t is in metres, and [room]",
+            f"{listed(blind)} {'sees' if len(blind) == 1 else 'see'} nothing of the room: check "
+            "that R and t lead from world to camera, that t is in metres, and the room",
         )
     else:
         yield good("cameras see the room", "every camera sees a part of the room")
