@@ -25,7 +25,7 @@ class ToState(Command):
         self.change(owners)
         return results.state_of(owners.workbench.snapshot())
 
-    def change(self, owners: Owners) -> object:
+    def change(self, owners: Owners) -> None:
         """Do it.
 
         Raises:
@@ -43,8 +43,8 @@ class SetParameters(ToState):
     """By key."""
     origin: str = Field("", max_length=100)
 
-    def change(self, owners: Owners) -> object:
-        return owners.workbench.set_parameters(self.changes, self.origin or "api")
+    def change(self, owners: Owners) -> None:
+        owners.workbench.set_parameters(self.changes, self.origin or "api")
 
 
 class ResetParameters(ToState):
@@ -55,8 +55,8 @@ class ResetParameters(ToState):
     keys: list[str] | None = None
     """All, the methods included, where none are named."""
 
-    def change(self, owners: Owners) -> object:
-        return owners.workbench.reset_parameters(self.keys)
+    def change(self, owners: Owners) -> None:
+        owners.workbench.reset_parameters(self.keys)
 
 
 class ApplyPreset(ToState):
@@ -66,8 +66,8 @@ class ApplyPreset(ToState):
     name: Literal["apply_preset"]
     preset: str
 
-    def change(self, owners: Owners) -> object:
-        return owners.workbench.apply_preset(self.preset)
+    def change(self, owners: Owners) -> None:
+        owners.workbench.apply_preset(self.preset)
 
 
 class UseAgain(ToState):
@@ -77,8 +77,8 @@ class UseAgain(ToState):
     run: int
     """Its number in the tab Runs."""
 
-    def change(self, owners: Owners) -> object:
-        return owners.history.use_again(self.run, owners.teaching.restore)
+    def change(self, owners: Owners) -> None:
+        owners.history.use_again(self.run, owners.teaching.restore)
 
 
 class SavePreset(ToState):
@@ -87,8 +87,8 @@ class SavePreset(ToState):
     name: Literal["save_preset"]
     preset: str = Field(max_length=4096)
 
-    def change(self, owners: Owners) -> object:
-        return owners.presets.save(self.preset)
+    def change(self, owners: Owners) -> None:
+        owners.presets.save(self.preset)
 
 
 class RenamePreset(ToState):
@@ -98,8 +98,8 @@ class RenamePreset(ToState):
     preset: str
     to: str = Field(max_length=4096)
 
-    def change(self, owners: Owners) -> object:
-        return owners.presets.rename(self.preset, self.to)
+    def change(self, owners: Owners) -> None:
+        owners.presets.rename(self.preset, self.to)
 
 
 class RemovePreset(ToState):
@@ -108,8 +108,8 @@ class RemovePreset(ToState):
     name: Literal["remove_preset"]
     preset: str
 
-    def change(self, owners: Owners) -> object:
-        return owners.presets.remove(self.preset)
+    def change(self, owners: Owners) -> None:
+        owners.presets.remove(self.preset)
 
 
 class Undo(ToState):
@@ -117,8 +117,8 @@ class Undo(ToState):
 
     name: Literal["undo"]
 
-    def change(self, owners: Owners) -> object:
-        return _turn(owners, "Undone", owners.edits.undo)
+    def change(self, owners: Owners) -> None:
+        _turn(owners, "Undone", owners.edits.undo)
 
 
 class Redo(ToState):
@@ -126,8 +126,8 @@ class Redo(ToState):
 
     name: Literal["redo"]
 
-    def change(self, owners: Owners) -> object:
-        return _turn(owners, "Done again", owners.edits.redo)
+    def change(self, owners: Owners) -> None:
+        _turn(owners, "Done again", owners.edits.redo)
 
 
 def _turn(owners: Owners, what: str, act: Callable[[], Edit]) -> None:

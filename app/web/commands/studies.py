@@ -52,10 +52,10 @@ class UseTrial(_OfStudy):
 
     name: Literal["use_trial"]
 
-    def change(self, owners: Owners) -> object:
+    def change(self, owners: Owners) -> None:
         parameters = self.parameters(owners)
         values = {key: value_of(parameters, key) for key in (*METHODS, *PARAMETERS)}
-        return owners.workbench.set_parameters(values, "api")
+        owners.workbench.set_parameters(values, "api")
 
 
 class KeepTrial(_OfStudy):
@@ -64,9 +64,9 @@ class KeepTrial(_OfStudy):
     name: Literal["keep_trial"]
     preset: str = Field(max_length=4096)
 
-    def change(self, owners: Owners) -> object:
+    def change(self, owners: Owners) -> None:
         defaults = owners.workbench.snapshot().defaults
-        return owners.presets.keep(self.preset, changed_values(self.parameters(owners), defaults))
+        owners.presets.keep(self.preset, changed_values(self.parameters(owners), defaults))
 
 
 StudiesCommand = UseTrial | KeepTrial

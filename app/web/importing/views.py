@@ -119,7 +119,7 @@ def _recording(settled: ImportPlan | None) -> dict[str, Any]:
     }
 
 
-def _boxes(known: Known) -> dict[str, str]:
+def _boxes(known: Known) -> dict[str, Any]:
     """How files of boxes are read, as the page's choices name it, where all are read alike."""
     settled = known.settled
     pieces = [] if settled is None else [view.matched.detections for view in settled.views]

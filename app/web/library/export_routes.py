@@ -14,7 +14,8 @@ from app.models import Model
 from app.models.base import RowNumber
 from app.state.workers.exporter import Exporter
 from app.web.dependencies import ERRORS, Bench, not_finished
-from app.web.library.routes import Kept, no_library
+from app.web.library.errors import no_library
+from app.web.library.routes import Kept
 from app.web.views.link import address_of
 from tracker.export.exported_run import ExportedRun, Options
 from tracker.export.registry import FORMATS

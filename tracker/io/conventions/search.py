@@ -962,7 +962,10 @@ def _drifting(
     for _ in range(2):
         for part in ("begins", "ends"):
             near = range(getattr(own, part) - reach, getattr(own, part) + reach + 1)
-            tried = [replace(own, **{part: lag}) for lag in near]
+            tried = [
+                replace(own, begins=lag) if part == "begins" else replace(own, ends=lag)
+                for lag in near
+            ]
             rows = [each.frames(moments) for each in tried]
             nats = likelihood.of_camera(best, camera, rows, clocks).sum(axis=1)
             own = tried[int(np.argmax(nats))]
