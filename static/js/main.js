@@ -90,6 +90,8 @@ const brought = /** @type {const} */ ([
 	["help", readSheets],
 	["keepLayout", readSheets],
 	["keepPicture", readKeep],
+	["copyRun", readRest],
+	["swap", readRest],
 ]);
 for (const [name, read] of brought) {
 	const early = async (/** @type {any} */ what = undefined) => {

@@ -5,6 +5,7 @@
  */
 import { all, allow, choices, one, parts, write, fill, h, icon } from "../elements/dom.js";
 import { redraw } from "../elements/drawn.js";
+import { valuesOf } from "../state/actions.js";
 import { fetcher, getJson } from "../state/api.js";
 import { eventsNow, scoresOf } from "../state/events.js";
 import { compareTables, eventTable, runTable, seriesOf, stepTables } from "./panels.js";
@@ -169,6 +170,26 @@ export function mountTables(root, context) {
 		});
 		store.watch([...keys, "tab", "sequence"], refresh);
 	}
+
+	actions.swap = async () => {
+		const { server, run } = store.get();
+		if (!server?.pinned || run?.state !== "done") return;
+		const { parameters, differs } = server.pinned;
+		if (!(await actions.ask("POST", "run/pin"))) return;
+		await actions.change(Object.fromEntries(differs.map((key) => [key, parameters[key]])));
+	};
+
+	actions.copyRun = async (what) => {
+		const { server } = store.get();
+		if (!server?.sequence) return;
+		const text = what === "json" ? JSON.stringify(valuesOf(server), null, 2) : server.command;
+		try {
+			await navigator.clipboard.writeText(text);
+			actions.note("info", "Copied", text.length < 400 ? text : "");
+		} catch {
+			actions.note("warn", "The browser does not let the page use the clipboard", text);
+		}
+	};
 
 	kind.addEventListener("change", () =>
 		store.set({ eventKind: /** @type {LaneEvent["kind"]} */ (kind.value) }),

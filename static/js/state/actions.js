@@ -262,13 +262,7 @@ export function createActions({ store, seek, send, receive }) {
 			void actions.change({ smoothing_method: now !== "none" ? "none" : (smoothing ?? usual) });
 		},
 		async compareWith() {},
-		async swap() {
-			const { server, run } = store.get();
-			if (!server?.pinned || run?.state !== "done") return;
-			const { parameters, differs } = server.pinned;
-			if (!(await actions.ask("POST", "run/pin"))) return;
-			await actions.change(Object.fromEntries(differs.map((key) => [key, parameters[key]])));
-		},
+		async swap() {},
 		undo(direction) {
 			// Pressed again before the last answer came, it waits for its turn.
 			const name = direction < 0 ? "undo" : "redo";
@@ -278,17 +272,7 @@ export function createActions({ store, seek, send, receive }) {
 			});
 			return turn;
 		},
-		async copyRun(what) {
-			const { server } = store.get();
-			if (!server?.sequence) return;
-			const text = what === "json" ? JSON.stringify(valuesOf(server), null, 2) : server.command;
-			try {
-				await navigator.clipboard.writeText(text);
-				actions.note("info", "Copied", text.length < 400 ? text : "");
-			} catch {
-				actions.note("warn", "The browser does not let the page use the clipboard", text);
-			}
-		},
+		async copyRun() {},
 
 		drawTemplate() {},
 		editRoom: () =>
