@@ -23,13 +23,16 @@ class AssociationMatrixParams(Params):
     reach: Annotated[
         float, Field(ge=0.1, le=10.0), ui("T_d", "Motion", unit="object sizes", step=0.1)
     ] = 1.0
-    """Same count: how far an object may move in a step, in roots of half width × half height."""
+    """While the number of objects stays the same: largest distance that one moves in a step, in
+    roots of half width × half height."""
 
     overlap: Annotated[Literal["pixels", "boxes"], ui("O∩O", published="boxes")] = "pixels"
-    """Other count: whether the pixels that two objects share count, or those of their boxes."""
+    """Where the number of objects changes: whether the pixels that two objects share count, or
+    those of their boxes."""
 
     overlap_area: Annotated[int, Field(ge=0, le=5000), ui("T_s", unit="px", step=1)] = 30
-    """Other count: objects of two steps that share more than this are the same."""
+    """Where the number of objects changes: objects of two steps that share more than this are
+    one."""
 
     confirmation_steps: Annotated[
         int, Field(ge=1, le=100), ui("n_c", "Birth", unit="steps", step=1, published=1)

@@ -59,9 +59,9 @@ class ColourPeakParams(Params):
     shapes: Annotated[
         Literal["never", "unsure", "fitting", "always"], ui("S_h", published="never")
     ] = "unsure"
-    """Whether people detected by shape count as well: never; where the foreground misses a person,
-    or, if shapes agree with the templates, where templates are few; wherever shapes agree with the
-    templates; or always."""
+    """When people detected by shape count as well. Unsure: where the foreground misses a person, or
+    where templates are few and shapes agree with them. Fitting: there, and wherever shapes agree
+    with the templates."""
 
     shape_odds: Annotated[
         float,

@@ -35,20 +35,20 @@ class ForegroundParams(Params):
     restless_from: Annotated[
         float, Field(ge=0.0, le=1.0), ui("u_0", step=0.01, advanced=True, when=_LEARNT)
     ] = 0.25
-    """Learnt: the median is uncertain from this share on of changing pixels that are often away
-    from it."""
+    """Learnt: share of the changing pixels that are often away from their median, above which the
+    background is uncertain."""
 
     restless_to: Annotated[
         float, Field(ge=0.0, le=1.0), ui("u_1", step=0.01, advanced=True, when=_LEARNT)
     ] = 0.35
-    """Learnt: the median is not used from this share on of changing pixels that are often away from
-    it, since people then stay in one place."""
+    """Learnt: the same share from which the background is wholly uncertain, since people stay in
+    one place, and motion is remembered for the full time."""
 
     motion_memory: Annotated[
         float, Field(ge=0.0, le=4.0), ui("T_m", unit="s", step=0.1, published=0.0, when=_LEARNT)
     ] = 0.6
-    """Learnt: where the median is uncertain, pixels that changed within this time are
-    foreground."""
+    """Learnt: pixels that changed within this time are foreground as well, where the background is
+    wholly uncertain; where it is less so, within a share of it."""
 
     motion_threshold: Annotated[
         float,

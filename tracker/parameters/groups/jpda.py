@@ -77,7 +77,7 @@ class JpdaParams(Params):
         Field(ge=0.1, le=200.0),
         ui("σ_a", "Motion", unit="half sizes/s^1.5", step=0.1, log=True),
     ] = 8.0
-    """How much a person's velocity in the picture changes in one second."""
+    """Standard deviation of the change of a person's velocity in the picture in one second."""
 
     velocity_sigma: Annotated[
         float, Field(ge=0.1, le=100.0), ui("σ_v", "Motion", unit="half sizes/s", step=0.1, log=True)
@@ -160,8 +160,8 @@ class JpdaParams(Params):
     one_side: Annotated[
         float, Field(ge=1.0, le=10.0), ui("k_e", step=0.1, advanced=True, when=_FIVE)
     ] = 2.0
-    """An edge of a piece of foreground is a hidden target's if the boxes measured in the piece
-    leave this factor more free there than at the opposite edge."""
+    """A hidden target is placed at an edge of its piece of foreground if the boxes measured there
+    leave more than this factor as much space at that edge as at the opposite one."""
 
     cover: Annotated[
         float,

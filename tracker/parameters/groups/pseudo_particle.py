@@ -82,7 +82,7 @@ class PseudoParticleParams(Params):
     velocity_share: Annotated[
         float, Field(ge=0.0, le=1.0), ui("v", "Motion", step=0.05, published=0.0, when=_PSEUDO)
     ] = 0.8
-    """How much of its mean displacement a target repeats: 0 is a random walk."""
+    """Share of its mean displacement that a target repeats at each step; 0 is a random walk."""
 
     clusters: Annotated[
         Literal["each", "together"], ui("m", published="together", when=_PSEUDO)
