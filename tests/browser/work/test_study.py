@@ -178,7 +178,7 @@ def test_trials_are_sorted_by_a_column(study: Page) -> None:
         head.get_by_role("button").click()
         expect(head).to_have_attribute("aria-sort", order)
         errors = [
-            float(row.locator("td").nth(column).inner_text().split()[0])
+            row.locator("td").nth(column).evaluate("cell => Number(cell.firstChild.textContent)")
             for row in study.locator("tr[data-trial]").all()
         ]
         assert errors == sorted(errors, reverse=turn < 0), errors
