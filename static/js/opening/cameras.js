@@ -279,6 +279,6 @@ function agreement({ steps, offsets, agreement, sure }, late) {
 		},
 		y: { ends: [low, high], ticks: [] },
 		marks,
-		margin: [10, 4, 10, 13],
+		margin: [10, 4, 10, 17],
 	};
 }
