@@ -29,6 +29,7 @@ from tracker.io.checks.synchronisation import CameraOffset
 from tracker.io.importing.finding.angles import open_turns, product_in_words, turns_in_words
 from tracker.io.importing.finding.times import first_index
 from tracker.io.importing.options import ImportOptions
+from tracker.io.importing.remedies import unsaid
 from tracker.io.importing.usage import FileUse, file_uses
 from tracker.io.read.pieces import CalibrationPiece, DetectionPiece
 
@@ -36,8 +37,7 @@ if TYPE_CHECKING:
     from app.state.importing.looking import Looked
     from tracker.geometry.consistency.entrances import Door
     from tracker.io.conventions.questions import Question
-    from tracker.io.importing.remedies import unsaid
-from tracker.io.importing.settling import ImportPlan, PlannedView
+    from tracker.io.importing.settling import ImportPlan, PlannedView
 
 MOST_OFFSETS = 241
 """Values of a curve of agreement."""

@@ -32,9 +32,6 @@ _WHOLE = (
     (r" \(`multiview-phd formats` lists them\)", ""),
     (r"timestamps in sequence\.toml", "in a file of time stamps"),
     (r"name (a video or images|a file of detections) in sequence\.toml", r"add \1"),
-    (r" in the room, \[target\] says", ", the target is"),
-    (r"of the people whom the boxes show are in \[room\]", "of those whom two cameras show"),
-    (r"the floor of \[room\] is", "the room's floor is"),
     (r"\[(room|target)\]", r"the \1"),
     (r" or by `[^`]*`, or start the program with --detector model\.onnx", ""),
 )

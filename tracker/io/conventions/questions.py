@@ -226,7 +226,7 @@ def rearranged(
     return [replace(raw, name=name) for raw, name in zip(changed, names, strict=True)], found
 
 
-_TIMES = "give the time of each frame: timestamps in sequence.toml"
+_TIMES = "give the time of each frame, timestamps in sequence.toml"
 
 
 def describe_clocks(clocks: Mapping[int, ClockFit], names: Sequence[str], fps: float) -> list[str]:
