@@ -12,7 +12,7 @@ from app.web.commands.command import Command, Owners
 from app.web.corrections.errors import alternative_of, known_item, refusing
 from app.web.corrections.wishes import corrections_of
 from app.web.dependencies import nothing_open
-from tracker.review.queue.item import confirmed
+from tracker.review.queue.item import confirm
 
 
 def _open(owners: Owners) -> Snapshot:
@@ -70,7 +70,7 @@ class Answer(Command):
             return
         with refusing():
             note = item.title if self.alternative else ""
-            owners.correcting.add(confirmed(chosen.corrections, note))
+            owners.correcting.add(confirm(chosen.corrections, note))
 
 
 class Skip(Command):
