@@ -3,7 +3,7 @@ import { all, h, one } from "../elements/dom.js";
 import { redraw } from "../elements/drawn.js";
 import { ApiError, fetcher, getJson, request, sendJson } from "../state/api.js";
 import { draftSheet } from "./draft.js";
-import { startSheet } from "./start.js";
+import { startHead, startSheet } from "./start.js";
 
 /* ---------- Files that a person drops or chooses, and the way of their bytes to the server. */
 
@@ -357,8 +357,10 @@ export function mountOpening({ store, actions }) {
 		toggle() {
 			if (dialog.open) return dialog.close();
 			dialog.showModal();
-			if (info) take(info);
-			else void attempt(start);
+			if (info) return take(info);
+			// At once, also where the server is busy.
+			draw(startHead());
+			void attempt(start);
 		},
 		/** What was dropped. @param {any[]} entries */
 		take: (entries) =>

@@ -12,23 +12,28 @@ const UNDERSTOOD = [
 	],
 ];
 
+/** What stands there before the list of recordings is. */
+export const startHead = () => [
+	h(
+		"header",
+		{ class: "s-head" },
+		h("h2", {}, "Open a recording"),
+		grow(),
+		h("input", {
+			id: "open-find",
+			type: "search",
+			placeholder: "find by name",
+			"aria-label": "Find by name",
+		}),
+		close(),
+	),
+];
+
 /** @param {Server.Recordings} known */
 export function startSheet(known) {
 	const { recordings } = known;
 	return [
-		h(
-			"header",
-			{ class: "s-head" },
-			h("h2", {}, "Open a recording"),
-			grow(),
-			h("input", {
-				id: "open-find",
-				type: "search",
-				placeholder: "find by name",
-				"aria-label": "Find by name",
-			}),
-			close(),
-		),
+		...startHead(),
 		div(
 			{ class: "open-body" },
 			files(known),

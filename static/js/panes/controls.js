@@ -27,7 +27,15 @@ export function mountDoor(context) {
 	let sheet;
 	const read = () =>
 		(sheet ??= import("../opening/sheet.js").then(({ mountOpening }) => mountOpening(context)));
-	context.actions.openSheet = () => void read().then(({ toggle }) => toggle());
+	/** Whoever asks again while it is read wants it open, not closed as soon as it is there. */
+	let waits = false;
+	context.actions.openSheet = () => {
+		if (waits) return;
+		waits = true;
+		void read()
+			.then(({ toggle }) => toggle())
+			.finally(() => (waits = false));
+	};
 
 	// The layer lies over the 3D view, which would swallow a drop.
 	const carries = (/** @type {DragEvent} */ { dataTransfer }) =>

@@ -364,6 +364,22 @@ def test_the_sheet_opens_what_is_there(flat_page: Page, server: Server, folder: 
     expect(sheet).not_to_be_visible()
 
 
+def test_keys_that_are_pressed_again_while_the_sheet_is_read_open_it(flat_page: Page) -> None:
+    """It is there before the list of recordings is."""
+    page = flat_page
+    waiting: list[Route] = []
+    page.route("**/opening/sheet.js", lambda route: waiting.append(route))
+    page.route("**/api/recordings", lambda route: None)  # the server is busy
+    page.reload()
+    page.locator(".cam canvas").first.wait_for()
+    with page.expect_request("**/opening/sheet.js"):
+        page.keyboard.press("Control+o")
+    page.keyboard.press("Control+o")
+    waiting[0].continue_()
+    expect(page.get_by_role("heading", name="Open a recording")).to_be_visible()
+    page.keyboard.press("Escape")
+
+
 def test_a_path_is_looked_into_by_enter(flat_page: Page, files: Path, folder: Path) -> None:
     page = flat_page
     shutil.copytree(files, folder / "data/by-path")
