@@ -14,7 +14,10 @@ from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
 
 from app.described import Described
+from tracker.corrections import CorrectionError
+from tracker.library.errors import LibraryError, NoSuchRun
 from tracker.parameters.values import ParameterError
+from tracker.studies.errors import StudyError
 
 logger = logging.getLogger("app")
 
@@ -59,6 +62,15 @@ PROBLEM = "application/problem+json"
 
 COMMANDS = "/api/commands"
 """The address of commands."""
+
+
+REFUSED: dict[type[Exception], tuple[int, str, str | None]] = {
+    CorrectionError: (422, "cannot_correct", "Nothing was changed."),
+    LibraryError: (409, "no_library", None),
+    NoSuchRun: (404, "no_run", None),
+    StudyError: (409, "no_study", None),
+}
+"""Failures whose words are the engine's: status, code and hint of the answer."""
 
 
 class ApiError(Exception):
@@ -142,6 +154,15 @@ def install(app: FastAPI) -> None:
     @app.exception_handler(ParameterError)
     async def _parameter(_: Request, error: ParameterError) -> JSONResponse:
         return _answer(422, parameter_detail(error))
+
+    async def _refused(_: Request, error: Exception) -> JSONResponse:
+        status, code, hint = next(REFUSED[kind] for kind in type(error).__mro__ if kind in REFUSED)
+        return _answer(
+            status, ErrorDetail(code=code, message=as_sentence(sentence(error)), hint=hint)
+        )
+
+    for kind in REFUSED:
+        app.add_exception_handler(kind, _refused)
 
     @app.exception_handler(RequestValidationError)
     async def _request(request: Request, error: RequestValidationError) -> JSONResponse:

@@ -11,13 +11,13 @@ from fastapi import APIRouter, Depends, Query, Request, Response
 
 from app import models
 from app.errors import ApiError
-from app.state.kept.history import History
 from app.state.snapshot import Snapshot
 from app.state.workers.sensitivity import Sensitivity, shares
 from app.web.dependencies import (
     ERRORS,
     FOR_EVER,
     Bench,
+    Owned,
     Part,
     Work,
     file_name,
@@ -97,9 +97,8 @@ async def run_again(bench: Bench, jobs: Work) -> models.State:
 
 
 @router.get("/runs")
-def past_runs(request: Request, bench: Bench) -> models.PastRuns:
+def past_runs(owners: Owned, bench: Bench) -> models.PastRuns:
     """The current run and those before it since the server was started."""
-    history: History = request.app.state.history
     now = bench.snapshot()
     name = now.sequence.name if now.sequence is not None else ""
     return models.PastRuns(
@@ -118,7 +117,7 @@ def past_runs(request: Request, bench: Bench) -> models.PastRuns:
                 steps_per_second=run.state.steps_per_second,
                 changes=run.changes,
             )
-            for run in history.runs
+            for run in owners.history.runs
         ]
     )
 

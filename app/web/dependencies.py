@@ -10,6 +10,7 @@ from fastapi import Depends, Query, Request
 from app.errors import ApiError, Problem
 from app.state.workbench import Workbench
 from app.state.workers.jobs import Jobs
+from app.web.commands.command import Owners
 from app.web.views.timeline import BUCKETS, Window
 
 FOR_EVER = "private, max-age=31536000, immutable"
@@ -29,6 +30,11 @@ def _workbench(request: Request) -> Workbench:
 def _jobs(request: Request) -> Jobs:
     jobs: Jobs = request.app.state.jobs
     return jobs
+
+
+def _owners(request: Request) -> Owners:
+    owners: Owners = request.app.state.owners
+    return owners
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +60,7 @@ def _shown(
 
 Part = Annotated[Shown, Depends(_shown)]
 Bench = Annotated[Workbench, Depends(_workbench)]
+Owned = Annotated[Owners, Depends(_owners)]
 Work = Annotated[Jobs, Depends(_jobs)]
 
 

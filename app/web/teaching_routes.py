@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import asyncio
 from pathlib import Path
-from typing import Annotated
 
-from fastapi import APIRouter, Depends, Request, Response
+from fastapi import APIRouter, Request, Response
 
 from app import models
 from app.models.teaching import (
@@ -16,10 +15,9 @@ from app.models.teaching import (
     Taught,
     TemplateInfo,
 )
-from app.state.teaching import Teaching
 from app.state.workers.fetching import DetectorFetching
 from app.web.commands.teaching import NOTHING_LOST, refusing
-from app.web.dependencies import ERRORS, FOR_EVER, Bench, Work, nothing_open
+from app.web.dependencies import ERRORS, FOR_EVER, Bench, Owned, Work, nothing_open
 from app.web.opening import begun, told_in_the_answer
 from app.web.pictures.swatches import Swatches
 from app.web.views import results
@@ -31,16 +29,8 @@ from tracker.sequences.writing.teaching import changes, taught_values
 router = APIRouter(prefix="/api/teach", responses=ERRORS)
 
 
-def _teaching(request: Request) -> Teaching:
-    teaching: Teaching = request.app.state.teaching
-    return teaching
-
-
-Teach = Annotated[Teaching, Depends(_teaching)]
-
-
 @router.get("")
-def taught(bench: Bench, teach: Teach) -> Taught:
+def taught(bench: Bench, owners: Owned) -> Taught:
     """What the open sequence was taught, what its tracks offer, and how it can be saved."""
     snapshot = bench.snapshot()
     sequence, saved, parameters = snapshot.sequence, snapshot.saved, snapshot.parameters
@@ -55,7 +45,7 @@ def taught(bench: Bench, teach: Teach) -> Taught:
     if snapshot.offers is not None:
         offered = [
             OfferInfo(template=_template(one.template), track=one.track, reason=one.reason)
-            for one in teach.offered()
+            for one in owners.teaching.offered()
         ]
     network = sequence.detector
     detector = None
@@ -72,9 +62,9 @@ def taught(bench: Bench, teach: Teach) -> Taught:
         sizes=dict(PRESETS),
         unsaved=changes(taught_values(saved), taught_values(sequence)),
         file=f"{sequence.folder.name}/sequence.toml",
-        read_only=teach.why_not_in_place(),
+        read_only=owners.teaching.why_not_in_place(),
         built_in=bool(opens_by_name(sequence.folder)),
-        copy_to=str(teach.copy_folder()),
+        copy_to=str(owners.teaching.copy_folder()),
     )
 
 

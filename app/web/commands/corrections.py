@@ -9,7 +9,7 @@ from pydantic import Field
 from app.models.correcting import CorrectionWish
 from app.state.snapshot import Snapshot
 from app.web.commands.command import Command, Owners
-from app.web.corrections.errors import alternative_of, known_item, refusing
+from app.web.corrections.items import alternative_of, known_item
 from app.web.corrections.wishes import corrections_of
 from app.web.dependencies import nothing_open
 from tracker.review.queue.item import confirm
@@ -31,14 +31,10 @@ class Correct(Command):
 
     def apply(self, owners: Owners) -> None:
         snapshot = _open(owners)
-        with refusing():
-            owners.correcting.add(
-                [
-                    one
-                    for wish in self.corrections
-                    for one in corrections_of(wish, snapshot, self.note)
-                ]
-            )
+        wishes = self.corrections
+        owners.correcting.add(
+            [one for wish in wishes for one in corrections_of(wish, snapshot, self.note)]
+        )
 
 
 class DropCorrection(Command):
@@ -49,8 +45,7 @@ class DropCorrection(Command):
 
     def apply(self, owners: Owners) -> None:
         _open(owners)
-        with refusing(404):
-            owners.correcting.remove(self.id)
+        owners.correcting.remove(self.id)
 
 
 class Answer(Command):
@@ -68,9 +63,8 @@ class Answer(Command):
         if not chosen.corrections:
             owners.correcting.skipped.add(item.id)
             return
-        with refusing():
-            note = item.title if self.alternative else ""
-            owners.correcting.add(confirm(chosen.corrections, note))
+        note = item.title if self.alternative else ""
+        owners.correcting.add(confirm(chosen.corrections, note))
 
 
 class Skip(Command):

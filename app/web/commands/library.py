@@ -8,8 +8,6 @@ from pydantic import Field
 
 from app.models.base import Model, RowNumber
 from app.web.commands.command import Command, Owners
-from app.web.library.errors import no_library
-from tracker.library.errors import LibraryError
 
 
 class MarkRun(Command):
@@ -26,10 +24,7 @@ class MarkRun(Command):
     def apply(self, owners: Owners) -> None:
         said = {"name": self.title, "star": self.star, "note": self.note, "tags": self.tags}
         marks = {key: value for key, value in said.items() if value is not None}
-        try:
-            owners.marking.mark(self.run, marks)
-        except LibraryError as error:
-            raise no_library(error) from None
+        owners.marking.mark(self.run, marks)
 
 
 class Deleted(Model):
@@ -46,10 +41,7 @@ class DeleteRuns(Command):
     runs: list[RowNumber] = Field(min_length=1, max_length=10_000)
 
     def apply(self, owners: Owners) -> Deleted:
-        try:
-            return Deleted(bytes=owners.marking.delete(self.runs))
-        except LibraryError as error:
-            raise no_library(error) from None
+        return Deleted(bytes=owners.marking.delete(self.runs))
 
 
 LibraryCommand = MarkRun | DeleteRuns

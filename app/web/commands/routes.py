@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from fastapi import APIRouter, Body, Depends, Request, Response
+from fastapi import APIRouter, Body, Response
 from fastapi.concurrency import run_in_threadpool
 
 from app.errors import COMMANDS
 from app.models import Model, State
-from app.web.commands.command import Owners
 from app.web.commands.corrections import CorrectionsCommand
 from app.web.commands.library import Deleted, LibraryCommand
 from app.web.commands.parameters import ParametersCommand
 from app.web.commands.studies import StudiesCommand
 from app.web.commands.teaching import TeachingCommand
-from app.web.dependencies import ERRORS
+from app.web.dependencies import ERRORS, Owned
 
 AnyCommand = (
     ParametersCommand | TeachingCommand | CorrectionsCommand | LibraryCommand | StudiesCommand
@@ -26,15 +25,10 @@ DONE = {"description": "It is done; what has changed is told over the socket."}
 router = APIRouter(responses=ERRORS)
 
 
-def _owners(request: Request) -> Owners:
-    owners: Owners = request.app.state.owners
-    return owners
-
-
 @router.post(COMMANDS, response_model=State | Deleted, responses={204: DONE})
 async def do(
     command: Annotated[AnyCommand, Body(discriminator="name")],
-    owners: Annotated[Owners, Depends(_owners)],
+    owners: Owned,
 ) -> Model | Response:
     """Do one thing; everyone who looks is told what has changed."""
     if command.in_order:

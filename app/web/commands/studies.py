@@ -10,7 +10,7 @@ from app.errors import ApiError
 from app.web.commands.command import Owners
 from app.web.commands.parameters import ToState
 from app.web.dependencies import nothing_open
-from app.web.studies.dependencies import no_study, no_trial, store_of
+from app.web.studies.dependencies import no_trial, store_of
 from tracker.parameters.catalogue import METHODS, PARAMETERS, RunParameters
 from tracker.parameters.values import changed_values, value_of, with_values
 from tracker.studies.errors import StudyError
@@ -38,10 +38,7 @@ class _OfStudy(ToState):
             except StudyError as error:
                 raise no_trial(error, "trial") from None
             return {**definition.held(), **(found.values if self.trial else {})}
-        try:
-            proposed, definition = store.fact("tuned"), store.definition()
-        except StudyError as error:
-            raise no_study(error) from None
+        proposed, definition = store.fact("tuned"), store.definition()
         if proposed is None or not proposed["better"]:
             raise ApiError(409, "nothing_better", f"The study {store.name} proposes nothing.")
         return {**definition.held(), **proposed["values"]}

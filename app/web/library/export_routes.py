@@ -14,12 +14,10 @@ from app.models import Model
 from app.models.base import RowNumber
 from app.state.workers.exporter import Exporter
 from app.web.dependencies import ERRORS, Bench, not_finished
-from app.web.library.errors import no_library
 from app.web.library.routes import Kept
 from app.web.views.link import address_of
 from tracker.export.exported_run import ExportedRun, Options
 from tracker.export.registry import FORMATS
-from tracker.library.errors import LibraryError
 from tracker.library.keeping import remarks_of
 from tracker.runs import gaps
 from tracker.runs.fitting import default_parameters
@@ -142,10 +140,7 @@ def begin(
         except ValueError as error:
             raise ApiError(422, "cannot_export", sentence(error), field="format") from None
         return ExportInfo(**asdict(exporter.start(form, lambda: written, named.name, options)))
-    try:
-        result = keeper.library().result(wish.run)
-    except LibraryError as error:
-        raise no_library(error) from None
+    result = keeper.library().result(wish.run)
 
     def make() -> ExportedRun:
         sequence = sequences.open_sequence(result.place)

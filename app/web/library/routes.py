@@ -16,7 +16,6 @@ from app.models.base import RowNumber
 from app.state.workers.keeper import Keeper
 from app.web.dependencies import ERRORS, Bench, Work, nothing_open
 from app.web.library import models, preview
-from app.web.library.errors import no_library
 from app.web.opening import begun, told_in_the_answer
 from app.web.views import results
 from tracker.library.errors import LibraryError
@@ -46,10 +45,7 @@ Kept = Annotated[Keeper, Depends(_keeper)]
 
 
 def _library(keeper: Kept) -> Library:
-    try:
-        return keeper.library()
-    except LibraryError as error:
-        raise no_library(error) from None
+    return keeper.library()
 
 
 Opened = Annotated[Library, Depends(_library)]
@@ -112,10 +108,7 @@ def _recording(recording: Recording) -> models.RecordingInfo:
 )
 def thumbnail(recording: RowNumber, opened: Opened) -> Response:
     """A recording in one picture."""
-    try:
-        picture = opened.thumbnail(recording)
-    except LibraryError as error:
-        raise no_library(error) from None
+    picture = opened.thumbnail(recording)
     if picture is None:
         raise ApiError(404, "no_picture", f"Recording {recording} has no picture.")
     return Response(picture, media_type="image/jpeg", headers={"cache-control": "max-age=60"})
@@ -124,33 +117,25 @@ def thumbnail(recording: RowNumber, opened: Opened) -> Response:
 @router.get("/recordings/{recording}/runs")
 def runs(recording: RowNumber, opened: Opened) -> models.KeptRuns:
     """The kept runs of a recording, the newest first."""
-    try:
-        return models.KeptRuns(runs=[_info(run) for run in opened.runs(recording)])
-    except LibraryError as error:
-        raise no_library(error) from None
+    return models.KeptRuns(runs=[_info(run) for run in opened.runs(recording)])
 
 
 @router.post("/recordings/{recording}/place")
 async def move(recording: int, wish: models.Place, opened: Opened) -> models.RecordingInfo:
     """Say where a recording lies now, of which only the runs were still there."""
     folder = Path(wish.place).expanduser()
-    try:
-        known = next((r for r in opened.recordings() if r.id == recording), None)
-        if known is None:
-            raise ApiError(404, "no_recording", f"There is no recording {recording}.")
-        with told_in_the_answer(
-            known.name, field="place", hint="Its runs stay readable all the same."
-        ):
-            sequence = await asyncio.to_thread(sequences.open_sequence, str(folder))
-            if sequence.digest != known.digest:
-                raise ValueError(
-                    f"{folder}: expected the recording of which these runs are, found another "
-                    f"content ({sequence.name})"
-                )
-        opened.move(recording, str(sequence.folder.absolute()))
-        return next(_recording(r) for r in opened.recordings() if r.id == recording)
-    except LibraryError as error:
-        raise no_library(error) from None
+    known = next((r for r in opened.recordings() if r.id == recording), None)
+    if known is None:
+        raise ApiError(404, "no_recording", f"There is no recording {recording}.")
+    with told_in_the_answer(known.name, field="place", hint="Its runs stay readable all the same."):
+        sequence = await asyncio.to_thread(sequences.open_sequence, str(folder))
+        if sequence.digest != known.digest:
+            raise ValueError(
+                f"{folder}: expected the recording of which these runs are, found another "
+                f"content ({sequence.name})"
+            )
+    opened.move(recording, str(sequence.folder.absolute()))
+    return next(_recording(r) for r in opened.recordings() if r.id == recording)
 
 
 @router.get("/runs/{number}")
@@ -159,7 +144,7 @@ def run(number: RowNumber, opened: Opened, bench: Bench) -> models.Preview:
 
     The room is there where it is known: that of the open recording.
     """
-    result, now = _result(opened, number), bench.snapshot()
+    result, now = opened.result(number), bench.snapshot()
     fps = next((r.fps for r in opened.recordings() if r.id == result.run.recording), 25.0)
     tracks, steps = result.kept.tracks, result.run.steps
     known = now.saved is not None and (
@@ -181,7 +166,7 @@ def run(number: RowNumber, opened: Opened, bench: Bench) -> models.Preview:
 @router.post("/runs/{number}/open")
 async def open_run(number: RowNumber, opened: Opened, bench: Bench, jobs: Work) -> State:
     """Show a run as it was: its tracks at once; its recording is opened first where it is not."""
-    result = await asyncio.to_thread(_result, opened, number)
+    result = await asyncio.to_thread(opened.result, number)
     now = bench.snapshot()
     place = "" if now.saved is None else record_of_recording(now.saved, now.opened_as).place
     with told_in_the_answer(
@@ -199,7 +184,7 @@ async def open_run(number: RowNumber, opened: Opened, bench: Bench, jobs: Work) 
 @router.post("/runs/{number}/pin")
 def pin(number: RowNumber, opened: Opened, bench: Bench) -> State:
     """Pin a kept run of the open recording: others are compared with it."""
-    result = _result(opened, number)
+    result = opened.result(number)
     now = bench.snapshot()
     if now.sequence is None or now.saved is None:
         raise nothing_open()
@@ -236,13 +221,6 @@ def then_show(opening: Future[None], jobs: Work, bench: Bench, result: Result) -
 
     opening.add_done_callback(show)
     return shown
-
-
-def _result(opened: Library, number: int) -> Result:
-    try:
-        return opened.result(number)
-    except LibraryError as error:
-        raise no_library(error) from None
 
 
 def _info(run: KeptRun) -> models.KeptRunInfo:

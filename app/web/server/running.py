@@ -79,8 +79,8 @@ async def lifespan(app: FastAPI) -> AsyncIterator[None]:
     )
     pictures = app.state.pictures = Pictures(workbench)
     app.state.timelines = Timelines()
-    history = app.state.history = History(workbench)
-    edits = app.state.edits = Edits(
+    history = History(workbench)
+    edits = Edits(
         workbench,
         settings_folder() / "edits" if kept else None,
         settings_folder() / "corrections" if kept else None,
@@ -89,12 +89,12 @@ async def lifespan(app: FastAPI) -> AsyncIterator[None]:
     presets = app.state.presets = OwnPresets(workbench, edits, own_presets)
     app.state.likelihoods = Likelihoods()
     app.state.swatches = Swatches()
-    teaching = app.state.teaching = Teaching(
+    teaching = Teaching(
         workbench, edits, settings.data, settings_folder() / "unsaved" if kept else None
     )
-    correcting = app.state.correcting = Correcting(workbench, edits)
+    correcting = Correcting(workbench, edits)
     edits.follow()
-    doubting = app.state.doubting = Doubting()
+    doubting = Doubting()
     desk = app.state.desk = Desk(workbench, settings.data)
     recents = app.state.recents = Recents(
         workbench, settings_folder() / "recent.json" if kept else None
@@ -108,17 +108,9 @@ async def lifespan(app: FastAPI) -> AsyncIterator[None]:
     sensitivity = app.state.sensitivity = Sensitivity(workbench, settings.seed)
     keeper = app.state.keeper = Keeper(workbench, settings.library, settings.keep, names_of)
     marking = Marking(workbench, edits, keeper.library)
-    study_desk = app.state.studies = StudyDesk(workbench, studies_folder())
+    study_desk = StudyDesk(workbench, studies_folder())
     app.state.owners = Owners(
-        workbench=workbench,
-        edits=edits,
-        presets=presets,
-        history=history,
-        teaching=teaching,
-        correcting=correcting,
-        doubting=doubting,
-        marking=marking,
-        studies=study_desk,
+        workbench, edits, presets, history, teaching, correcting, doubting, marking, study_desk
     )
     told = app.state.stream = Stream(workbench)
     door = app.state.gateway = Gateway()

@@ -4,26 +4,21 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from fastapi import Depends, Request
+from fastapi import Depends
 
 from app.errors import ApiError, sentence
 from app.state.studies import StudyDesk
+from app.web.dependencies import Owned
 from tracker.sequences.errors import SequenceError
 from tracker.studies.errors import StudyError
 from tracker.studies.store import Store
 
 
-def _desk(request: Request) -> StudyDesk:
-    desk: StudyDesk = request.app.state.studies
-    return desk
+def _desk(owners: Owned) -> StudyDesk:
+    return owners.studies
 
 
 Desk = Annotated[StudyDesk, Depends(_desk)]
-
-
-def no_study(error: StudyError | OSError) -> ApiError:
-    """The answer where a study is not as it must be."""
-    return ApiError(409, "no_study", f"{sentence(error)}.")
 
 
 def no_trial(error: StudyError | SequenceError, field: str) -> ApiError:

@@ -8,9 +8,10 @@ from typing import Annotated, Literal
 
 from fastapi import APIRouter, Query, Response
 
+from app.errors import sentence
 from app.web.dependencies import ERRORS, file_name
 from app.web.studies import models, views
-from app.web.studies.dependencies import Named, no_study, no_trial
+from app.web.studies.dependencies import Named, no_trial
 from tracker.sequences.errors import SequenceError
 from tracker.studies.errors import StudyError
 from tracker.studies.summary import track_commands
@@ -30,10 +31,7 @@ def trials(
     store: Named, after: Annotated[float, Query(description="Seconds since 1970.")] = 0.0
 ) -> models.TrialList:
     """The trials that ended, or those since a moment."""
-    try:
-        found = store.trials(after)
-    except StudyError as error:
-        raise no_study(error) from None
+    found = store.trials(after)
     return models.TrialList(
         trials=[views.trial_of(one) for one in found],
         last=max((one.ended for one in found), default=after),
@@ -65,10 +63,7 @@ def trial(store: Named, number: int) -> models.TrialDetail:
 @router.get("/{name}/tuned")
 def tuned(store: Named) -> models.Tuned:
     """What a study proposes at its end."""
-    try:
-        found = store.fact("tuned")
-    except StudyError as error:
-        raise no_study(error) from None
+    found = store.fact("tuned")
     return views.tuned_of(found)
 
 
@@ -91,8 +86,8 @@ def export(store: Named, file: Literal["report.html", "trials.csv", "study.json"
             path = Path(folder) / file
             write(path, store)
             data = path.read_bytes()
-    except (StudyError, OSError) as error:
-        raise no_study(error) from None
+    except OSError as error:
+        raise StudyError(sentence(error)) from error
     name = file_name(store.name, file)
     return Response(
         data,

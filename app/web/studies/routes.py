@@ -12,13 +12,12 @@ from app.state.snapshot import Snapshot
 from app.state.studies import StudyDesk
 from app.web.dependencies import ERRORS, Bench, nothing_open
 from app.web.studies import models, views
-from app.web.studies.dependencies import Desk, Named, no_study
+from app.web.studies.dependencies import Desk, Named
 from tracker.parameters.values import changed_values
 from tracker.runs.processes import available_cores
 from tracker.studies.definition import StudyDefinition, definition_of
 from tracker.studies.errors import StudyError
 from tracker.studies.objectives import OBJECTIVES, SELF_CONSISTENCY, WITH_TRUTH, chosen
-from tracker.studies.store import Store
 from tracker.studies.tuning import tuning
 
 router = APIRouter(prefix="/api/studies", responses=ERRORS)
@@ -30,13 +29,6 @@ FEWEST_STEPS = 50
 """Of a run before its speed says anything: the first ones wait for what is compiled and read."""
 
 SECONDS_FOR_A_SCHEDULER = 5.0
-
-
-def _told(desk: StudyDesk, store: Store) -> models.Study:
-    try:
-        return views.study_of(desk, store)
-    except StudyError as error:
-        raise no_study(error) from None
 
 
 @router.get("")
@@ -182,7 +174,7 @@ def _minutes(seconds: float) -> str:
 def define(wish: models.StudyWish, desk: Desk, bench: Bench) -> models.Study:
     """Make a study; it is started by a call of its own."""
     try:
-        return _told(desk, desk.define(_definition(wish, bench)))
+        return views.study_of(desk, desk.define(_definition(wish, bench)))
     except StudyError as error:
         raise ApiError(422, "bad_study", f"{sentence(error)}.") from None
 
@@ -207,41 +199,35 @@ def tune(wish: models.TuneWish, desk: Desk, bench: Bench) -> models.Study:
     snapshot = bench.snapshot()
     if snapshot.sequence is None:
         raise nothing_open()
-    try:
-        desk.check_place(wish.workers, wish.scheduler)
-        definition = tuning(
-            _free_name(desk, f"tune {snapshot.sequence.name}"),
-            [views.place_of(snapshot)],
-            minutes=wish.minutes,
-            changes=changed_values(snapshot.parameters, snapshot.defaults),
-            ignore_truth=wish.without_truth,
-        )
-        desk.define(definition)
-        return _told(desk, desk.start(definition.name, wish.workers, wish.scheduler))
-    except StudyError as error:
-        raise no_study(error) from None
+    desk.check_place(wish.workers, wish.scheduler)
+    definition = tuning(
+        _free_name(desk, f"tune {snapshot.sequence.name}"),
+        [views.place_of(snapshot)],
+        minutes=wish.minutes,
+        changes=changed_values(snapshot.parameters, snapshot.defaults),
+        ignore_truth=wish.without_truth,
+    )
+    desk.define(definition)
+    return views.study_of(desk, desk.start(definition.name, wish.workers, wish.scheduler))
 
 
 @router.get("/{name}", operation_id="get_study")
 def study(store: Named, desk: Desk) -> models.Study:
     """Everything of a study but its trials."""
-    return _told(desk, store)
+    return views.study_of(desk, store)
 
 
 @router.post("/{name}/start")
 def start(store: Named, desk: Desk, wish: models.StartWish | None = None) -> models.Study:
     """Start a study, or go on with it."""
     wish = wish or models.StartWish()
-    try:
-        return _told(desk, desk.start(store.name, wish.workers, wish.scheduler))
-    except StudyError as error:
-        raise no_study(error) from None
+    return views.study_of(desk, desk.start(store.name, wish.workers, wish.scheduler))
 
 
 @router.post("/{name}/stop")
 def stop(store: Named, desk: Desk) -> models.Study:
     """Stop a study, or pause it: everything is kept, and starting it goes on."""
-    return _told(desk, desk.stop(store.name))
+    return views.study_of(desk, desk.stop(store.name))
 
 
 @router.delete("/{name}")
@@ -249,6 +235,6 @@ def remove(store: Named, desk: Desk) -> models.StudyList:
     """Delete a study with everything in it."""
     try:
         desk.remove(store.name)
-    except (StudyError, OSError) as error:
-        raise no_study(error) from None
+    except OSError as error:
+        raise StudyError(sentence(error)) from error
     return studies(desk)

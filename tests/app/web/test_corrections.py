@@ -169,7 +169,7 @@ def test_what_cannot_be_is_refused_with_a_sentence(desk: TestClient, own: Path) 
         assert answer.status_code == 422, wish
         assert words in answer.json()["detail"], answer.text
     assert not (own / "corrections.toml").exists()
-    assert command(desk, "drop_correction", id="nothing").status_code == 404
+    assert command(desk, "drop_correction", id="nothing").status_code == 422
 
 
 def test_a_malformed_log_is_told_and_the_recording_stays_usable(own: Path) -> None:
@@ -358,7 +358,7 @@ def test_the_feet_of_a_track_that_goes_over_the_floor_stay_where_they_are(own: P
 
 @pytest.mark.full
 def test_only_what_was_checked_counts_as_truth(desk: TestClient, own: Path, run: Runs) -> None:
-    assert desk.get(f"{PLACE}/truth.csv").status_code == 409
+    assert desk.get(f"{PLACE}/truth.csv").status_code == 422
     wish = [
         {"kind": "checked", "first": 10, "last": 19},
         {"kind": "checked", "first": 20, "last": 29},

@@ -1,23 +1,9 @@
-"""What cannot be corrected or answered, in the one shape of errors."""
+"""Moments under review that are asked for by their ids."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
-
-from app.errors import ApiError, as_sentence
-from tracker.corrections import CorrectionError
+from app.errors import ApiError
 from tracker.review.queue import ReviewItem
-
-
-@contextmanager
-def refusing(status: int = 422) -> Iterator[None]:
-    """Within it a correction that does not fit is the client's to mend."""
-    try:
-        yield
-    except CorrectionError as error:
-        words = as_sentence(str(error))
-        raise ApiError(status, "cannot_correct", words, hint="Nothing was changed.") from None
 
 
 def known_item(item: ReviewItem | None, identity: str) -> ReviewItem:
