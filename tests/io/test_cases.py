@@ -47,7 +47,11 @@ HOLD: dict[str, Callable[[ImportPlan], bool]] = {
     ),
     "grid-truth": lambda plan: "MultiviewX so that 100 %" in _found(plan, "truth"),
     "mirrored-world": lambda plan: "left-handed" in _found(plan, "mirrored"),
-    "mot-labels": lambda plan: _counts(plan) == [300] * 4 and len(plan.told) == 4,
+    "mot-labels": lambda plan: (
+        _counts(plan) == [300] * 4
+        and [told[-9:] for told in plan.told] == ["(200 car)"]
+        and all(f"cam{number}/gt/gt.txt" in plan.told[0] for number in range(1, 5))
+    ),
     "mot-none-counts": lambda plan: min(_counts(plan)) > 220,
     "nan-people": lambda plan: min(_counts(plan)) > 110,
     "sparse-truth": lambda plan: (
