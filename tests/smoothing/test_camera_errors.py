@@ -148,10 +148,10 @@ def test_notes_say_where_a_camera_lost_frames_as_the_check_says_it() -> None:
     lost = replace(view, detections=Detections(frames[kept], own.boxes[kept], own.scores[kept]))
     views = (*sequence.views[:2], lost, *sequence.views[3:])
     sequence = replace(sequence, views=views)
-    found = [one.sentence for one in check(sequence) if "jumps" in one.sentence]
+    found = [one.sentence for one in check(sequence) if "lost about" in one.sentence]
     assert found
     notes = camera_notes(compute(sequence, default_parameters(sequence)))
-    assert [note for note in notes if "jumps" in note] == found
+    assert [note for note in notes if "lost about" in note] == found
     assert not any(" early" in note for note in notes)
 
 

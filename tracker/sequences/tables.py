@@ -283,7 +283,7 @@ def read_ground_truth(fields: Fields, reading: Reading, frames: int) -> GroundTr
     )
 
 
-def truth_of(path: Path, where: str, frames: int, told: list[str] | None = None) -> GroundTruth:
+def truth_of(path: Path, where: str, frames: int, notes: list[str] | None = None) -> GroundTruth:
     """Read a file of ground truth.
 
     Args:
@@ -292,7 +292,7 @@ def truth_of(path: Path, where: str, frames: int, told: list[str] | None = None)
             covers all, or every second, third … one where it has rows of these alone.
         where: The file's name, for messages.
         frames: The number of steps of the sequence.
-        told: Receives a sentence on rows of later steps, which are left out; without it such a row
+        notes: Receives a sentence on rows of later steps, which are left out; without it such a row
             is an error.
 
     Raises:
@@ -301,7 +301,7 @@ def truth_of(path: Path, where: str, frames: int, told: list[str] | None = None)
     columns = read_columns(
         path, where, needed=("frame", "id", "x", "y", "z"), optional={"valid": 1.0}
     )
-    steps = columns.whole("frame", 0, frames - 1 if told is None else None, "the step")
+    steps = columns.whole("frame", 0, frames - 1 if notes is None else None, "the step")
     ids = columns.whole("id", 0, None, "the person")
     valid = columns.whole("valid", 0, 1, "1 certain, 0 not")
     order = columns.one_row_each(steps, ids, "person")
@@ -310,7 +310,7 @@ def truth_of(path: Path, where: str, frames: int, told: list[str] | None = None)
     if known is None:
         known = covered_steps(steps, frames)
     order = order[steps[order] < frames]
-    if told is not None and len(order) < len(steps):
+    if notes is not None and len(order) < len(steps):
         if not len(order):
             raise columns.error(
                 int(columns.lines[0]),
@@ -318,7 +318,7 @@ def truth_of(path: Path, where: str, frames: int, told: list[str] | None = None)
                 f"expected steps 0 … {frames - 1} as the sequence has them, found none below "
                 f"{int(steps.min())}; name the truth of this recording",
             )
-        told.append(
+        notes.append(
             f"{where}: {len(steps) - len(order):,} of {len(steps):,} rows are left out: of steps "
             f"after {frames - 1}, the sequence's last."
         )

@@ -80,6 +80,8 @@ class Desk:
         if not place.exists():
             where = "" if given.is_absolute() else f" in {self._data}"
             raise UploadError(f"{path}: there is no such file or folder{where}")
+        if not (place.is_dir() or place.is_file()):
+            raise UploadError(f"{path}: expected a folder or a file, found neither; name one")
         return self._new(place.stem if place.is_file() else place.name, place)
 
     def folders(self) -> list[str]:

@@ -3,6 +3,9 @@
 The curves are computed one after the other in the background, kept for as long as the recording
 is open, and given up at once when somebody works: moves a slider, teaches, opens another
 recording, plays or seeks.
+
+[HHL14] Hutter, Hoos, Leyton-Brown, "An efficient approach for assessing hyperparameter
+importance", ICML 2014 (fANOVA).
 """
 
 from __future__ import annotations
@@ -82,7 +85,7 @@ def shares(curves: Mapping[str, Curve]) -> dict[str, float]:
     """Return the share of the variance of the measure that each parameter explains alone, by key.
 
     The variance is that of the scores along the parameter's curve, and the shares sum to one over
-    all curves that are whole. It is the first-order share of fANOVA [HHL14]_, which studies report,
+    all curves that are whole. It is the first-order share of fANOVA [HHL14], which studies report,
     where one parameter is moved at a time and the others stay. Empty for fewer than two parameters.
 
     Args:

@@ -27,14 +27,12 @@ export function mountDoor(context) {
 	let sheet;
 	const read = () =>
 		(sheet ??= import("../opening/sheet.js").then(({ mountOpening }) => mountOpening(context)));
-	/** Whoever asks again while it is read wants it open, not closed as soon as it is there. */
-	let waits = false;
+	/** Whoever asks again while it is read wants it open. @type {Promise<void> | undefined} */
+	let waits;
 	context.actions.openSheet = () => {
-		if (waits) return;
-		waits = true;
-		void read()
+		waits ??= read()
 			.then(({ toggle }) => toggle())
-			.finally(() => (waits = false));
+			.finally(() => (waits = undefined));
 	};
 
 	// The layer lies over the 3D view, which would swallow a drop.
