@@ -27,12 +27,12 @@ export function mountDoor(context) {
 	let sheet;
 	const read = () =>
 		(sheet ??= import("../opening/sheet.js").then(({ mountOpening }) => mountOpening(context)));
-	/** Whoever asks again while it is read wants it open. @type {Promise<void> | undefined} */
-	let waits;
+	/** Who asks again while it is read wants it open. @type {Promise<void> | undefined} */
+	let due;
 	context.actions.openSheet = () => {
-		waits ??= read()
+		due ??= read()
 			.then(({ toggle }) => toggle())
-			.finally(() => (waits = undefined));
+			.finally(() => (due = undefined));
 	};
 
 	// The layer lies over the 3D view, which would swallow a drop.
