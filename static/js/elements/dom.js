@@ -128,10 +128,10 @@ export function idTag(id) {
 	return h("span", { class: "id", "--c": `var(--id-${n})`, "--on-id": `var(--on-${n})` }, id);
 }
 
-/** A symbol's letter, and its index set low; a method's key is words. @param {string} symbol  such as p_D */
+/** A symbol with indices set low; a method's key is words. @param {string} symbol  such as p_D or σ_z/σ_x */
 export function symbolParts(symbol) {
-	const [, letter, index] = symbol.match(/^(.{1,4})_(.+)/) ?? [0, symbol.replaceAll("_", " ")];
-	return /** @type {const} */ ([letter, index ? h("sub", {}, index) : null]);
+	if (!/^.{1,4}_/.test(symbol)) return [symbol.replaceAll("_", " ")];
+	return symbol.split(/_([^/()+]+)/).map((part, k) => (k % 2 ? h("sub", {}, part) : part));
 }
 
 /** @param {string} symbol */

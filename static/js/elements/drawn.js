@@ -54,8 +54,7 @@ export function redraw(root, ...children) {
 
 /** A parameter: its words with its symbol; what it means comes with the pointer. @param {Server.ParameterInfo} of */
 export function parameterName({ label, symbol, help }) {
-	const [letter, index] = symbolParts(symbol);
-	return h("span", { title: help }, `${label} `, h("i", {}, letter), index);
+	return h("span", { title: help }, `${label} `, h("i", {}, ...symbolParts(symbol)));
 }
 
 /** Text in a muted colour. @param {...(Child | Child[])} children */

@@ -247,11 +247,10 @@ export function mountParameters(root, { store, actions }) {
 				})
 			);
 		}
-		const [letter, index] = symbolParts(symbol);
 		const name = h(
 			"button",
 			{ class: "name", "aria-expanded": "false", title: of.help, onclick: () => unfold(key) },
-			h("i", {}, letter, index),
+			h("i", {}, ...symbolParts(symbol)),
 			h("span", {}, label),
 			h("span", { class: "q" }, ` ${group.replaceAll("_", " ")}`),
 		);
