@@ -33,9 +33,11 @@ HOLD: dict[str, Callable[[ImportPlan], bool]] = {
     "camera-without-pose": lambda plan: (
         [view.camera.name for view in plan.views] == ["cam1", "cam2", "cam4"]
         and any("cam3: no pose" in told for told in plan.told)
+        and not any("belongs to no camera" in told for told in plan.told)
     ),
     "coco-frame-step": lambda plan: (
         any("taken for the number of the frame" in told for told in plan.told)
+        and not _found(plan, "matching")
         and all(view.looked_at is not None and view.looked_at[1] == 5 for view in plan.views)
     ),
     "dropped-frames": lambda plan: any(

@@ -36,7 +36,7 @@ def test_right_truth_raises_no_alarm_and_another_unit_or_origin_does(seed: int) 
     for factor, by in ((100.0, 0.0), (0.01, 0.0), (1.0, 20.0)):
         wrong = check_truth(moved(sequence, factor, by))
         assert wrong.status == "warning", (factor, by, wrong.sentence)
-        assert "origin, axes, grid or unit may be others" in wrong.sentence
+        assert "origin, axes, grid, unit or frame numbers may be others" in wrong.sentence
     found = {one.name: one.status for one in check(moved(sequence, 100.0, 0.0), quick=True)}
     assert found[right.name] == "warning"
 

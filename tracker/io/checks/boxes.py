@@ -361,7 +361,10 @@ def _stray_cameras(sequence: Sequence, told: BoxesTell) -> Iterator[Check]:
                 share=share,
             )
     if shares and min(shares.values()) >= _OWN_SHARE:
-        yield good(name_of_check, "each one's boxes meet others'")
+        # boxes of one that nothing confirms may meet those of others by chance
+        sure = [name for name in names if name not in doubtful.doubtful]
+        whose = f"{', '.join(sure)}: " if 0 < len(sure) < len(names) else ""
+        yield good(name_of_check, f"{whose}each one's boxes meet others'")
 
 
 def _moved_cameras(sequence: Sequence, told: BoxesTell) -> Iterator[Check]:

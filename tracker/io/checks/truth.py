@@ -46,8 +46,8 @@ def check_truth(sequence: Sequence) -> Check:
         return warning(
             name,
             f"{percent(share)} of the truth's places lie in boxes of the cameras that see them: "
-            "its origin, axes, grid or unit may be others than the calibration's, and figures "
-            "against it mean nothing",
+            "its origin, axes, grid, unit or frame numbers may be others than the calibration's "
+            "and the boxes', and figures against it mean nothing",
             share=share,
         )
     return good(name, f"{percent(share)} of the truth's places lie in boxes", share=share)

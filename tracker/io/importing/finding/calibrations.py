@@ -25,6 +25,8 @@ class CameraSet:
     cameras: tuple[RawCamera, ...]
     sources: frozenset[Path]
     """The files that the cameras are of."""
+    incomplete: tuple[str, ...] = ()
+    """Names of cameras that their file has too, without a lens or without a pose."""
 
     @property
     def posed(self) -> bool:
@@ -95,7 +97,8 @@ def _whole(one: CameraSet) -> CameraSet | None:
         for c in one.cameras
         if c.projection is not None or (c.rotation is not None and c.intrinsics is not None)
     )
-    return replace(one, cameras=whole) if len(whole) > 1 else None
+    incomplete = tuple(c.name for c in one.cameras if c not in whole)
+    return replace(one, cameras=whole, incomplete=incomplete) if len(whole) > 1 else None
 
 
 def _lacking(one: CameraSet, whole: CameraSet) -> list[str]:

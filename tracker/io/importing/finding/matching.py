@@ -106,8 +106,8 @@ def match_all(
             told.append(f"{other.label}: is another calibration; it is not used")
     cameras = [MatchedCamera(raw, raw.name) for raw in chosen.cameras]
     _by_flag(cameras, videos, detections, options)
-    _match_pictures(cameras, videos, told)
-    _match_boxes(cameras, detections, _spoilt(taken), told)
+    _match_pictures(cameras, videos, chosen.incomplete, told)
+    _match_boxes(cameras, detections, _spoilt(taken), chosen.incomplete, told)
     _match_times(cameras, _times(taken), told)
     _exchange(cameras, options)
     wanted = [c for c in cameras if c.raw.name not in options.left_out]
@@ -159,13 +159,21 @@ def _by_kind(
     pictures: _Pictures = []
     boxes: _Boxes = []
     truths: list[tuple[str, TruthPiece]] = []
+    cameras: dict[str, list[str]] = {}
+    for one in taken:
+        for piece in one.pieces:
+            if isinstance(piece, DetectionPiece):
+                cameras.setdefault(piece.format, []).append(piece.camera)
+    # what all files of a format call their camera, such as "frame", tells none from another
+    alike = {form for form, own in cameras.items() if len(own) > 1 and len(set(own)) == 1}
     for one in taken:
         for piece in one.pieces:
             label = one.label.split(" … ")[0].rsplit(".", 1)[0]
             if isinstance(piece, VideoPiece | ImagesPiece):
                 pictures.append((label, piece))
             elif isinstance(piece, DetectionPiece):
-                boxes.append((piece.camera or _own_label(one, piece.source, label), piece))
+                own = "" if piece.format in alike else piece.camera
+                boxes.append((own or _own_label(one, piece.source, label), piece))
             elif isinstance(piece, TruthPiece):
                 truths.append((one.label, piece))
     return pictures, boxes, truths
@@ -250,7 +258,12 @@ def _give_pictures(camera: MatchedCamera, piece: VideoPiece | ImagesPiece, how: 
     camera.how["pictures"] = how
 
 
-def _match_pictures(cameras: list[MatchedCamera], pictures: _Pictures, told: list[str]) -> None:
+def _match_pictures(
+    cameras: list[MatchedCamera],
+    pictures: _Pictures,
+    incomplete: Sequence[str],
+    told: list[str],
+) -> None:
     free = [c for c in cameras if c.video is None and c.images is None]
     labels = [label for label, _ in pictures]
     found = match([c.raw.name for c in free], labels) if labels and free else None
@@ -271,11 +284,16 @@ def _match_pictures(cameras: list[MatchedCamera], pictures: _Pictures, told: lis
             _give_pictures(free[pairs[place]], piece, how)
         elif label not in explained:
             strangers.append(label)
-    told += _of_no_camera(strangers, cameras)
+    told += _of_no_camera(strangers, cameras, incomplete)
 
 
-def _of_no_camera(labels: Sequence[str], cameras: Sequence[MatchedCamera]) -> list[str]:
-    """One sentence on all files that belong to no camera; none where there are none."""
+def _of_no_camera(
+    labels: Sequence[str], cameras: Sequence[MatchedCamera], incomplete: Sequence[str]
+) -> list[str]:
+    """One sentence on all files that belong to no camera, nor to one that has no pose or lens, of
+    which the calibration tells; none where there are none."""
+    known_ones = match(incomplete, labels, by_order=False) if incomplete and labels else None
+    labels = [x for n, x in enumerate(labels) if known_ones is None or n not in known_ones[0]]
     if not labels:
         return []
     known = first_of([camera.raw.name for camera in cameras])
@@ -356,6 +374,7 @@ def _match_boxes(
     cameras: list[MatchedCamera],
     boxes: _Boxes,
     spoilt: Sequence[tuple[str, str]],
+    incomplete: Sequence[str],
     told: list[str],
 ) -> None:
     """Boxes of one format together; of several formats the one that serves most cameras.
@@ -393,7 +412,7 @@ def _match_boxes(
             else:
                 free[pairs[n]].detections = piece
                 free[pairs[n]].how["detections"] = how
-    told += _of_no_camera(strangers, cameras)
+    told += _of_no_camera(strangers, cameras, incomplete)
 
 
 def _by_pictures(

@@ -68,40 +68,47 @@ def settle_truth(
         given = piece.positions.copy()
         given[~np.isfinite(given[:, 2]), 2] = 0.0
         on_floor = ~np.isfinite(piece.positions[:, 2])
+        keep = (own >= 0) & (own < frames)
+        told = keep if keep.any() else np.ones(len(own), dtype=bool)
+
+        def inside(moved: Float[ndarray, "G 3"]) -> float:
+            """The share in boxes of what the recording will have, as its check compares it."""
+            return share_in_boxes(own[told], moved[told], cameras, detections)  # noqa: B023
+
         candidates: list[tuple[str, Float[ndarray, "G 3"]]] = []
         grids = GRIDS if piece.cells is not None else (None,)
         for grid in grids:
             if grid is not None and piece.cells is not None:
                 given = np.column_stack([grid.places(piece.cells), np.zeros(len(given))])
-            for factor, turn in _ways(piece, reading):
+            for factor, turn, how in _ways(piece, reading):
                 moved = _moved(given, on_floor, factor, turn, middle)
-                candidates.append(("" if grid is None else f"the grid of {grid.name}", moved))
-        scores = [share_in_boxes(own, moved, cameras, detections) for _, moved in candidates]
+                taken = how if grid is None else f"taken with the grid of {grid.name}"
+                candidates.append((taken, moved))
+        scores = [inside(moved) for _, moved in candidates]
         if piece.cells is not None and max(scores) < _MOST_INSIDE:
             inferred = infer_grid(piece.cells, feet_on_floor(piece, views, cameras, floor))
             if inferred is not None:
                 moved = np.column_stack([inferred[0], np.full(len(given), middle)])
-                candidates.append((f"a grid of {inferred[1]}, by where the boxes stand", moved))
-                scores.append(share_in_boxes(own, moved, cameras, detections))
+                how = f"taken with a grid of {inferred[1]}, by where the boxes stand,"
+                candidates.append((how, moved))
+                scores.append(inside(moved))
         best = int(np.argmax(scores))
         if scores[best] < max(scores[0] + _CLEARLY, _MOST_INSIDE):
             best = 0
-        moved = candidates[best][1]
+        how, moved = candidates[best]
         if any(each is not None for each in detections) and contradicts(
-            scores[best], own, moved, cameras, detections
+            scores[best], own[told], moved[told], cameras, detections
         ):
             found.append(
                 ("truth", f"{piece.source.name}: {100 * scores[best]:.0f} % of its places lie in "
-                 "boxes; its origin, axes, grid or unit may be others than the calibration's")
+                 "boxes; its origin, axes, grid, unit or frame numbers may be others than the "
+                 "calibration's and the boxes'")
             )  # fmt: skip
-        grid_words, moved = candidates[best]
         if best:
-            how = "turned" if grid_words == candidates[0][0] else f"taken with {grid_words}"
             found.append(
                 ("truth", f"{piece.source.name}: {how} so that {100 * scores[best]:.0f} % of its "
                  f"places lie in boxes ({100 * scores[0]:.0f} % as it is)")
             )  # fmt: skip
-        keep = (own >= 0) & (own < frames)
         beyond += int((~keep).sum())
         steps.append(own[keep])
         ids.append(piece.ids[keep])
@@ -137,8 +144,11 @@ def in_gaps(gap: int) -> str:
     return f"every {names.get(gap, f'{gap}th')} frame"
 
 
-def _ways(piece: TruthPiece, reading: Reading) -> Iterator[tuple[float, Float[ndarray, "3 3"]]]:
-    """Metres in a unit and rotation into the cameras' world, the plain reading first."""
+def _ways(
+    piece: TruthPiece, reading: Reading
+) -> Iterator[tuple[float, Float[ndarray, "3 3"], str]]:
+    """Metres in a unit, rotation into the cameras' world, and both in words, the plain reading
+    first."""
     same = piece.up in (None, reading.up)
     own = levelled(reading) if same else upright(piece.up or reading.up)
     units: tuple[Unit, ...] = (
@@ -149,7 +159,9 @@ def _ways(piece: TruthPiece, reading: Reading) -> Iterator[tuple[float, Float[nd
             angle = turn * np.pi / 2.0
             c, s = round(np.cos(angle)), round(np.sin(angle))
             yaw = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-            yield METRES[unit], yaw @ own
+            words = [f"read in {unit}"] if unit != units[0] else []
+            words += [f"turned by {90 * turn}°"] if turn else []
+            yield METRES[unit], yaw @ own, " and ".join(words)
 
 
 def _moved(
