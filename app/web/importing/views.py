@@ -27,7 +27,6 @@ from app.web.importing.words import on_page
 from tracker.io.checks import Check
 from tracker.io.checks.synchronisation import CameraOffset
 from tracker.io.importing.finding.angles import open_turns, product_in_words, turns_in_words
-from tracker.io.importing.finding.times import first_index
 from tracker.io.importing.options import ImportOptions
 from tracker.io.importing.remedies import unsaid
 from tracker.io.importing.usage import FileUse, file_uses
@@ -121,6 +120,8 @@ def _recording(settled: ImportPlan | None) -> dict[str, Any]:
 
 def _boxes(known: Known) -> dict[str, Any]:
     """How files of boxes are read, as the page's choices name it, where all are read alike."""
+    from tracker.io.importing.finding.times import first_index  # with every format
+
     settled = known.settled
     pieces = [] if settled is None else [view.matched.detections for view in settled.views]
     own = [piece for piece in pieces if piece is not None and len(piece.frames)]

@@ -139,12 +139,12 @@ export function mountControls({ store, actions, press }) {
 		for (const command of early.splice(0)) perform(command, actions);
 	});
 	// A click leaves the focus where it was, so that Space goes on meaning play, but for fields and
-	// sliders; only the 3D view, which keeps all keys to itself while it has the focus, gives it back.
+	// sliders; only the 3D view, which keeps all keys while it has the focus, gives it back.
 	document.addEventListener("mousedown", (event) => {
 		if (document.activeElement instanceof HTMLIFrameElement) document.activeElement.blur();
 		const at =
 			event.target instanceof Element && event.target.closest("input, select, button, tr, .cam");
-		if (at && !at.matches("input, select")) event.preventDefault();
+		if (at && !at.matches("input:not([type=checkbox]), select")) event.preventDefault();
 	});
 }
 

@@ -41,7 +41,7 @@ MOVED = {
     "fusion.survival_probability": 0.9,
     "fusion.detection_probability": 0.7,
     "fusion.clutter_rate": 6.0,
-    "fusion.birth_rate": 0.1,
+    "fusion.birth_rate": 0.3,  # a pixel of the slider is a hundredth
     "fusion.pruning_threshold": 1e-3,
     "colour_phd.merging_threshold": 2.0,
 }
@@ -190,9 +190,8 @@ def move_slider(server: Server, page: Page, key: str, to: float) -> None:
         page.get_by_role("tab", name="Parameters").click()
         page.get_by_label("Find a parameter").fill(key)
         slider = page.locator(f'tr[data-key="{key}"]').get_by_role("slider")
-        assert parameter.log
-        ends = parameter.minimum, parameter.maximum, to
-        low, high, place = (np.log10(end) for end in ends)  # type: ignore[arg-type]
+        ends = np.array([parameter.minimum, parameter.maximum, to], dtype=float)
+        low, high, place = np.log10(ends) if parameter.log else ends
         share, rim = (place - low) / (high - low), THUMB / 2
     box = still(slider)
     x = rim + (box["width"] - 2 * rim) * share
