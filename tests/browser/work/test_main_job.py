@@ -43,7 +43,7 @@ MOVED = {
     "fusion.clutter_rate": 6.0,
     "fusion.birth_rate": 0.3,  # a pixel of the slider is a hundredth
     "fusion.pruning_threshold": 1e-3,
-    "colour_phd.merging_threshold": 2.0,
+    "colour_phd.merging_threshold": 20.0,  # beside the thumb, which a click does not move
 }
 """Where the sliders are moved to, of the methods that a built-in sequence is tracked with: its
 fusion merges nobody who was detected, so that merging is that of the single view."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shutil
+import time
 from collections.abc import Iterator
 from itertools import combinations
 from pathlib import Path
@@ -401,6 +402,10 @@ def test_an_upload_is_stopped_cleanly(flat_page: Page, files: Path, folder: Path
     expect(sheet.locator(".in-files")).to_contain_text("session/cam1.avi")
     sheet.get_by_role("button", name="Stop").click()
     expect(sheet).to_contain_text("Open a recording")
+    # the sheet does not wait for the server to have taken it away
+    deadline = time.monotonic() + 20.0
+    while list((folder / "data").glob(".import-*")) and time.monotonic() < deadline:
+        time.sleep(0.1)
     assert not list((folder / "data").glob(".import-*"))
 
 
