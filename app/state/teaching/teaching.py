@@ -59,7 +59,7 @@ class Teaching(Taught):
 
         Args:
             camera: Its name.
-            step: Of the picture that the box lies in; None for the playhead's.
+            step: The step of the picture that the box lies in; None for the playhead's.
             box: left, top, width, height in pixels; what sticks out is cut off.
             name: Whose it is; a new person's where none is given.
 

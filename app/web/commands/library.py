@@ -16,7 +16,7 @@ class MarkRun(Command):
     name: Literal["mark_run"]
     run: RowNumber
     title: str | None = Field(default=None, max_length=200)
-    """Its name."""
+    """The run's name."""
     star: bool | None = None
     note: str | None = Field(default=None, max_length=10_000)
     tags: list[str] | None = Field(default=None, max_length=50)

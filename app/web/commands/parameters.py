@@ -75,7 +75,7 @@ class UseAgain(ToState):
 
     name: Literal["use_again"]
     run: int
-    """Its number in the tab Runs."""
+    """The run's number in the tab Runs."""
 
     def change(self, owners: Owners) -> None:
         owners.history.use_again(self.run, owners.teaching.restore)

@@ -18,9 +18,9 @@ from tracker.studies.errors import StudyError
 
 class _OfStudy(ToState):
     study: str
-    """Its name."""
+    """The study's name."""
     trial: int | None = None
-    """Its number, 0 for what the study began with; null for what the study proposes."""
+    """The trial's number, 0 for what the study began with; null for what the study proposes."""
 
     def parameters(self, owners: Owners) -> RunParameters:
         """The values of the trial, what its study holds, and the defaults."""

@@ -56,15 +56,15 @@ class AddTemplate(_Teach):
 
     name: Literal["add_template"]
     camera: str = Field(max_length=200)
-    """Its name."""
+    """The camera's name."""
     step: int | None = None
-    """Of the picture; the playhead's where none is given."""
+    """The step of the picture; the playhead's where none is given."""
     left: float
     top: float
     width: float
     height: float
     person: str = Field(default="", max_length=200)
-    """Whose it is; a new person's where none is given."""
+    """The person whom it models; a new person's where none is given."""
 
     def teach(self, teaching: Teaching) -> None:
         box = (self.left, self.top, self.width, self.height)

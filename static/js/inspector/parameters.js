@@ -35,11 +35,11 @@ export function valueAt({ minimum, maximum, log, kind }, place) {
 
 /** Whether a parameter's name, symbol, key, unit or help has all words of a text. @param {Parameter} of @param {string} text */
 export function matches({ label, symbol, key, unit, help }, text) {
-	const said = `${label} ${symbol} ${key} ${unit} ${help}`.toLowerCase();
+	const searched = `${label} ${symbol} ${key} ${unit} ${help}`.toLowerCase();
 	return text
 		.toLowerCase()
 		.split(/\s+/)
-		.every((word) => said.includes(word));
+		.every((word) => searched.includes(word));
 }
 
 /** @param {any} value */
@@ -184,6 +184,7 @@ export function mountParameters(root, { store, actions }) {
 		const id = `value-${key}`;
 		// Several methods have a parameter of this name.
 		const whose = `${label}, ${group.replaceAll("_", " ")}`;
+		const published = store.get().schema?.presets.published?.[key];
 		const called = { "aria-label": whose, "aria-describedby": `help-${key}` };
 		/** @type {Part | undefined} */
 		let slider;
@@ -208,7 +209,6 @@ export function mountParameters(root, { store, actions }) {
 			);
 		else {
 			const [min, max, step] = placesOf(of);
-			const published = store.get().schema?.presets.published?.[key];
 			const at = (placeOf(of, Number(published)) - min) / (max - min);
 			const bar = (slider = /** @type {any} */ (
 				h("input", {
@@ -272,7 +272,6 @@ export function mountParameters(root, { store, actions }) {
 			effect,
 			h("td", {}, reset),
 		);
-		const published = store.get().schema?.presets.published?.[key];
 		const range =
 			slider &&
 			`${written(of.minimum)} … ${written(of.maximum)}${unit && ` ${unit}`}, ${of.log ? "logarithmic, " : ""}`;
@@ -421,7 +420,7 @@ export function mountParameters(root, { store, actions }) {
 			row.classList.toggle("changed", changed.has(key));
 			reset.hidden = !changed.has(key);
 			field.disabled = reset.disabled = locked;
-			if (of.kind === "choice") offerChoices(field, of, String(value), server.unfit[key] ?? {});
+			if (of.kind === "choice") fillChoices(field, of, String(value), server.unfit[key] ?? {});
 			if (slider) slider.disabled = locked;
 			if (key in wished || key in sent || held === slider) continue;
 			if (of.kind === "bool") field.checked = value;
@@ -436,7 +435,7 @@ export function mountParameters(root, { store, actions }) {
 	}
 
 	/** @param {Part} field @param {Parameter} of @param {string} value @param {Record<string, string>} unfit */
-	function offerChoices(field, { choices: names }, value, unfit) {
+	function fillChoices(field, { choices: names }, value, unfit) {
 		choices(
 			/** @type {any} */ (field),
 			names.map((name) => [name, `${written(name)}${name in unfit ? " · not here" : ""}`]),

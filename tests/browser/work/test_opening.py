@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import shutil
-import time
 from collections.abc import Iterator
 from itertools import combinations
 from pathlib import Path
@@ -14,6 +13,7 @@ from playwright.sync_api import Browser, Page, Route, expect
 
 from tests.browser.access.test_accessibility import found
 from tests.browser.conftest import opened
+from tests.browser.looking import until
 from tests.browser.serving import Server
 from tests.browser.walkers import write_walkers
 from tests.io.importing.test_angles import lay_out
@@ -403,10 +403,8 @@ def test_an_upload_is_stopped_cleanly(flat_page: Page, files: Path, folder: Path
     sheet.get_by_role("button", name="Stop").click()
     expect(sheet).to_contain_text("Open a recording")
     # the sheet does not wait for the server to have taken it away
-    deadline = time.monotonic() + 20.0
-    while list((folder / "data").glob(".import-*")) and time.monotonic() < deadline:
-        time.sleep(0.1)
-    assert not list((folder / "data").glob(".import-*"))
+    data = folder / "data"
+    until(page, lambda: not list(data.glob(".import-*")), "the upload is taken away", 20.0)
 
 
 @pytest.mark.data

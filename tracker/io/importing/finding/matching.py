@@ -292,8 +292,9 @@ def _of_no_camera(
 ) -> list[str]:
     """One sentence on all files that belong to no camera, nor to one that has no pose or lens, of
     which the calibration tells; none where there are none."""
-    known_ones = match(incomplete, labels, by_order=False) if incomplete and labels else None
-    labels = [x for n, x in enumerate(labels) if known_ones is None or n not in known_ones[0]]
+    found = match(incomplete, labels, by_order=False) if incomplete and labels else None
+    of_incomplete = found[0] if found is not None else {}
+    labels = [label for place, label in enumerate(labels) if place not in of_incomplete]
     if not labels:
         return []
     known = first_of([camera.raw.name for camera in cameras])

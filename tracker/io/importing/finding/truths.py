@@ -69,12 +69,9 @@ def settle_truth(
         given[~np.isfinite(given[:, 2]), 2] = 0.0
         on_floor = ~np.isfinite(piece.positions[:, 2])
         keep = (own >= 0) & (own < frames)
-        told = keep if keep.any() else np.ones(len(own), dtype=bool)
-
-        def inside(moved: Float[ndarray, "G 3"]) -> float:
-            """The share in boxes of what the recording will have, as its check compares it."""
-            return share_in_boxes(own[told], moved[told], cameras, detections)  # noqa: B023
-
+        # what the recording will have is compared, as its check compares it
+        compared = keep if keep.any() else np.ones(len(own), dtype=bool)
+        steps_compared = own[compared]
         candidates: list[tuple[str, Float[ndarray, "G 3"]]] = []
         grids = GRIDS if piece.cells is not None else (None,)
         for grid in grids:
@@ -84,20 +81,23 @@ def settle_truth(
                 moved = _moved(given, on_floor, factor, turn, middle)
                 taken = how if grid is None else f"taken with the grid of {grid.name}"
                 candidates.append((taken, moved))
-        scores = [inside(moved) for _, moved in candidates]
+        scores = [
+            share_in_boxes(steps_compared, moved[compared], cameras, detections)
+            for _, moved in candidates
+        ]
         if piece.cells is not None and max(scores) < _MOST_INSIDE:
             inferred = infer_grid(piece.cells, feet_on_floor(piece, views, cameras, floor))
             if inferred is not None:
                 moved = np.column_stack([inferred[0], np.full(len(given), middle)])
                 how = f"taken with a grid of {inferred[1]}, by where the boxes stand,"
                 candidates.append((how, moved))
-                scores.append(inside(moved))
+                scores.append(share_in_boxes(steps_compared, moved[compared], cameras, detections))
         best = int(np.argmax(scores))
         if scores[best] < max(scores[0] + _CLEARLY, _MOST_INSIDE):
             best = 0
         how, moved = candidates[best]
         if any(each is not None for each in detections) and contradicts(
-            scores[best], own[told], moved[told], cameras, detections
+            scores[best], steps_compared, moved[compared], cameras, detections
         ):
             found.append(
                 ("truth", f"{piece.source.name}: {100 * scores[best]:.0f} % of its places lie in "
