@@ -59,13 +59,10 @@ def test_the_motion_is_the_one_that_the_parameters_name(step_time: float) -> Non
     assert (walk.dimension, walk.start_velocity) == (3, 0.0)
     assert_array_equal(walk.transition, np.eye(3))
     assert_allclose(walk.noise, 0.09 * step_time * np.eye(3))
-    p = FusionParams(
-        motion="constant_velocity", acceleration_sigma=1.5, vertical_share=0.2,
-        velocity_memory=1.7, start_velocity=0.6,
-    )  # fmt: skip
+    p = FusionParams(motion="constant_velocity", acceleration_sigma=1.5)
     straight = Motion.of(p, step_time)
-    transition, noise = models.constant_velocity(np.array([1.5, 1.5, 0.3]), step_time, 1.7)
-    assert (straight.dimension, straight.start_velocity) == (6, 0.6)
+    transition, noise = models.constant_velocity(np.array([1.5, 1.5, 0.15]), step_time, 2.0)
+    assert (straight.dimension, straight.start_velocity) == (6, 0.7)
     assert_array_equal(straight.transition, transition)
     assert_allclose(straight.noise, noise)
     state = world.gaussians(np.array([[1.0, 2.0, 0.85]]), weights=0.7)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import replace
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -256,6 +257,12 @@ def test_the_order_of_cameras_and_of_tracks_changes_nothing() -> None:
         assert_allclose(posterior.covariances, runs[0][0].covariances, atol=1e-4)
 
 
+class _Millimetres(FusionParams):
+    """The constant velocity in millimetres per second."""
+
+    start_velocity: ClassVar[float] = 1000.0 * FusionParams.start_velocity
+
+
 @both_methods
 def test_metres_may_be_millimetres(method: Method) -> None:
     """Lengths times a thousand, pixels as they are: the same people with the same weights."""
@@ -264,8 +271,9 @@ def test_metres_may_be_millimetres(method: Method) -> None:
     scaled = [replace(camera, translation=k * camera.translation) for camera in CAMERAS]
     room = world.volume(2.2 * k, 2.2 * k, [(-1900.0, -1900.0, 850.0)], (300.0, 300.0, 100.0))
     p = PLAIN.model_copy(update={"birth_rate": 2.0, "merging_threshold": 2.0})
-    lengths = ("acceleration_sigma", "start_velocity", "motion_sigma", "followed_margin")
-    wide = p.model_copy(update={name: k * getattr(p, name) for name in lengths})
+    lengths = ("acceleration_sigma", "motion_sigma", "followed_margin")
+    longer = {name: k * getattr(p, name) for name in lengths}
+    wide = _Millimetres.model_construct(**{**p.model_dump(), **longer})
     metres, millimetres = (
         method(whole, RunParameters(fusion=own))
         for whole, own in (
@@ -454,7 +462,7 @@ def test_who_is_hidden_is_reported_with_who_hides_him(method: Method) -> None:
 @pytest.mark.parametrize(
     "changes",
     [
-        {"detection_probability": 1.0, "survival_probability": 1.0, "gate_probability": 1.0},
+        {"detection_probability": 1.0, "survival_probability": 1.0},
         {"detection_probability": 0.05, "merging_threshold": 0.0, "occlusion": 1.0},
         {"measurement": "centre", "motion": "random_walk", "max_components": 5},
         {"measurement": "box_and_width", "update": "unscented", "edge": "hard", "memory": 0.0},

@@ -70,7 +70,7 @@ def test_a_study_opens_without_the_removed_and_notes_them(tmp_path: Path, flat: 
     tables = {"values": written({next(iter(REMOVED)): 7}), "parameters": written(varied)}
     definition = definition_of(study(**tables), where="old.toml", folder=tmp_path)
     assert [one.key for one in definition.varied] == ["fusion.clutter_rate"]
-    assert (dict(definition.values), definition.notes) == ({}, NOTES)
+    assert (dict(definition.values), sorted(definition.notes)) == ({}, sorted(NOTES))
 
 
 def test_a_study_of_removed_parameters_alone_says_so(tmp_path: Path) -> None:

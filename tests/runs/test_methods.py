@@ -183,22 +183,16 @@ def test_the_memory_of_motion_is_for_methods_without_colours(name: str, model: s
 def test_noise_of_widths_counts_where_widths_are_measured(
     recording: Sequence, measurement: str
 ) -> None:
-    """Stage 1 states it in any case; those of the other posture are shown only where they count."""
     some = replace(recording, frames=warm_up.EMPTY + 6)
     own = {"single_view": "none", "fusion.measurement": measurement}
     reference = pipeline.compute(some, with_values(RunParameters(), own))
-    shown = shown_keys(reference.parameters)
     assert len(reference.tracks.positions)
-    for key in (
-        "detection_boxes.width_sigma",
-        "fusion.posture_width",
-        "fusion.posture_width_sigma",
-    ):
-        changes = {**own, key: moved(PARAMETERS[key])}
-        other = pipeline.compute(some, with_values(RunParameters(), changes))
-        same = np.array_equal(reference.tracks.positions, other.tracks.positions)
-        assert same == (measurement != "box_and_width")
-        assert (key in shown) == (key.startswith("detection_boxes") or not same)
+    key = "detection_boxes.width_sigma"
+    changes = {**own, key: moved(PARAMETERS[key])}
+    other = pipeline.compute(some, with_values(RunParameters(), changes))
+    same = np.array_equal(reference.tracks.positions, other.tracks.positions)
+    assert same == (measurement != "box_and_width")
+    assert key in shown_keys(reference.parameters)
 
 
 @pytest.mark.parametrize("key", METHODS)

@@ -109,12 +109,12 @@ def test_ended_while_it_measures_again_it_goes_on(tmp_path: Path) -> None:
 
 def test_the_dozen_are_varied_around_where_somebody_is(tmp_path: Path) -> None:
     place = recording(tmp_path / "recording")
-    changes = {"fusion.detection_probability": 0.6, "fusion.vertical_share": 0.5}
+    changes = {"fusion.detection_probability": 0.6, "fusion.duplicate_distance": 0.4}
     made = tuning("t", [str(place)], minutes=5.0, changes=changes)
     assert 8 <= len(made.varied) <= 12
     assert made.objectives == ("score",)
     assert dict(made.start) == {"fusion.detection_probability": 0.6}
-    assert dict(made.values) == {"fusion.vertical_share": 0.5}
+    assert dict(made.values) == {"fusion.duplicate_distance": 0.4}
     for one in made.varied:
         now = made.start.get(one.key, PARAMETERS[one.key].default)
         assert one.nearest(now) == now

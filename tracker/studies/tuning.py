@@ -18,7 +18,6 @@ from tracker.studies.space import around
 MORE = (
     "fusion.measurement_sigma",
     "fusion.occlusion",
-    "fusion.start_velocity",
     "smoothing.ambiguity_threshold",
 )
 """Keys of parameters that are varied besides the essential ones."""

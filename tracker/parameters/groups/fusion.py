@@ -6,14 +6,14 @@ density filtering", 2021.
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
 from tracker.parameters.definition import Params, ui
 from tracker.parameters.method import Method, Reads, Uses, Values
 
-_BOXES, _WIDTHS = {"measurement": ("box", "box_and_width")}, {"measurement": ("box_and_width",)}
+_BOXES = {"measurement": ("box", "box_and_width")}
 _RECOGNITION = {"recognition": (True,)}
 _WALK, _VELOCITY = {"motion": ("random_walk",)}, {"motion": ("constant_velocity",)}
 
@@ -104,23 +104,16 @@ class FusionParams(Params):
     """Constant velocity: standard deviation of the change of a person's velocity in one second,
     along each horizontal axis."""
 
-    vertical_share: Annotated[
-        float, Field(ge=0.01, le=1.0), ui("σ_z/σ_x", "Motion", step=0.01, when=_VELOCITY)
-    ] = 0.1
+    vertical_share: ClassVar[float] = 0.1
     """Constant velocity: σ_a along the vertical axis, as a share of that along the floor."""
 
-    velocity_memory: Annotated[
-        float,
-        Field(ge=0.1, le=100.0),
-        ui("τ", "Motion", unit="s", step=0.1, log=True, when=_VELOCITY),
-    ] = 2.0
-    """Constant velocity: time after which a person who is not seen has slowed to a third."""
+    velocity_memory: ClassVar[float] = 2.0
+    """Constant velocity: time after which a person who is not seen has slowed to a third,
+    seconds."""
 
-    start_velocity: Annotated[
-        float, Field(ge=0.01, le=5.0), ui("σ_v0", "Motion", unit="m/s", step=0.1, when=_VELOCITY)
-    ] = 0.7
-    """Constant velocity: standard deviation of a new target's velocity along each axis, around
-    0."""
+    start_velocity: ClassVar[float] = 0.7
+    """Constant velocity: standard deviation of a new target's velocity along each axis, around 0,
+    m/s."""
 
     birth: Annotated[
         Literal["entrances", "measurements", "both"], ui("γ(x)", "Birth", published="entrances")
@@ -168,8 +161,8 @@ class FusionParams(Params):
     measurement_sigma: Annotated[float, Field(ge=0.1, le=10.0), ui("σ_v", step=0.1, log=True)] = 1.0
     """Factor on the noise that the single-view stage states for its boxes."""
 
-    gate_probability: Annotated[float, Field(ge=0.5, le=1.0), ui("P_G", step=0.0001)] = 0.9999
-    """Probability that a person's own box lies inside the gate; 1 switches gating off."""
+    gate_probability: ClassVar[float] = 0.9999
+    """Probability that a person's own box lies inside the gate."""
 
     pruning_threshold: Annotated[float, Field(ge=1e-8, le=0.1), ui("T", "Extraction", log=True)] = (
         1e-4
@@ -204,26 +197,14 @@ class FusionParams(Params):
     ] = 0.5
     """Other posture: half height of the target, relative to the upright one's half height."""
 
-    posture_width: Annotated[
-        float,
-        Field(ge=0.1, le=2.0),
-        ui("w_p", unit="half heights", step=0.05, advanced=True, when=_WIDTHS),
-    ] = 0.6
+    posture_width: ClassVar[float] = 0.6
     """Other posture: half width of the target, relative to the upright one's half height."""
 
-    posture_centre_sigma: Annotated[
-        float,
-        Field(ge=0.01, le=2.0),
-        ui("σ_pc", unit="half heights", step=0.01, advanced=True, when=_BOXES),
-    ] = 0.15
-    """Other posture: standard deviation of the box's centre, across and down."""
+    posture_centre_sigma: ClassVar[float] = 0.15
+    """Other posture: standard deviation of the box's centre, across and down, half heights."""
 
-    posture_width_sigma: Annotated[
-        float,
-        Field(ge=0.01, le=2.0),
-        ui("σ_pw", unit="half heights", step=0.01, advanced=True, when=_WIDTHS),
-    ] = 0.5
-    """Other posture: standard deviation of the box's half width."""
+    posture_width_sigma: ClassVar[float] = 0.5
+    """Other posture: standard deviation of the box's half width, half heights."""
 
     posture_height_sigma: Annotated[
         float,
@@ -232,16 +213,11 @@ class FusionParams(Params):
     ] = 0.25
     """Other posture: standard deviation of the box's half height."""
 
-    posture_drop: Annotated[
-        float,
-        Field(ge=0.0, le=1.0),
-        ui("σ_pd", unit="half heights", step=0.05, advanced=True, when=_BOXES),
-    ] = 0.3
-    """Other posture: standard deviation of the vertical displacement of the person's centre."""
+    posture_drop: ClassVar[float] = 0.3
+    """Other posture: standard deviation of the vertical displacement of the person's centre, half
+    heights."""
 
-    memory_gate_probability: Annotated[
-        float, Field(ge=0.1, le=0.9999), ui("P_m", "Motion", step=0.01, advanced=True)
-    ] = 0.9
+    memory_gate_probability: ClassVar[float] = 0.9
     """Probability that a person who comes back is within the gate of the predicted position."""
 
     recognition_outlier_probability: Annotated[
