@@ -34,7 +34,7 @@ def smoother(*cameras: object) -> Any:
 
 
 NOBODYS = Links(*(np.zeros(0, dtype=np.int64) for _ in range(3)), np.zeros(0))
-P = SmoothingParams(memory=0.25)
+P = SmoothingParams()
 """Two fifths of a step's evidence are new."""
 RATES = costs.Rates(BIRTH * STEP, 1.0 - SURVIVAL)
 
@@ -143,7 +143,7 @@ def test_looks_weigh_in_a_link_and_in_a_return(weight: float) -> None:
     # the last comes after all others
     pieces = [(k, 0, 7, 3.0 * k) for k in range(6)]
     later = standing(*pieces, (6, 9, 16, 0.1))
-    p = SmoothingParams(appearance=weight, memory=0.25)
+    p = SmoothingParams(appearance=weight)
     alike = AppearanceModel(later, links, [camera], [embeddings], STEP)
     ratio, known = alike.log_ratio(np.arange(6), np.full(6, 6))
     assert known.all()

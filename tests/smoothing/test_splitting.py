@@ -117,7 +117,7 @@ def test_before_and_after_a_jump_rows_belong_to_neither_side() -> None:
     assert set(found.reasons[[13, 14, 15, 16]].tolist()) == {2}
     assert found.clear[:10].all()
     assert found.clear[20:].all()
-    calm = find_splits(tracked(known(path[:, None])), replace_p(jump=1000.0, memory=10.0))
+    calm = find_splits(tracked(known(path[:, None])), replace_p(jump=1e6))
     assert not calm.breaks.any()
 
 

@@ -54,21 +54,14 @@ CONDITIONS: dict[str, dict[str, Any]] = {"fusion.motion_sigma": {"fusion.motion"
 """Values of other parameters with which a parameter has an effect."""
 
 RANGES: dict[str, tuple[Any, ...]] = {
-    "fusion.start_velocity": (0.2, 2.0),
-    "fusion.gate_probability": (0.99, 1.0),
     "fusion.merging_threshold": (1.0, 9.0),
-    "fusion.memory_gate_probability": (0.5, 0.99),
     "fusion.recognition_outlier_probability": (0.01, 0.4),
     "fusion.recognition_interval": (0.1, 10.0),
-    "fusion.recognition_swap": (5.0, 200.0),
     "fusion.recognition_odds": (3.0, 200.0),
-    "fusion.recognition_own_odds": (1.0, 10.0),
-    "smoothing.memory": (0.05, 2.0),
     "smoothing.change": (0.0, 10.0),
     "smoothing.jump": (15.0, 150.0),
     "smoothing.exchange": (-8.0, 8.0),
     "smoothing.longest": (0.5, 6.0),
-    "smoothing.rounds": (1, 3),
     "smoothing.appearance": (0.0, 2.0),
 }
 """Both ends of a range where half and double the default are too near to it to show an effect."""

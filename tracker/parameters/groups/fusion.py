@@ -234,12 +234,9 @@ class FusionParams(Params):
     ] = 1.0
     """Recognition: pictures within this time are alike and count as one observation of colours."""
 
-    recognition_swap: Annotated[
-        float,
-        Field(ge=0.1, le=1000.0),
-        ui("T_r", "Motion", unit="s", log=True, advanced=True, when=_RECOGNITION),
-    ] = 30.0
-    """Recognition: time constant with which earlier evidence of a track's identity fades."""
+    recognition_swap: ClassVar[float] = 30.0
+    """Recognition: time constant with which earlier evidence of a track's identity fades,
+    seconds."""
 
     recognition_odds: Annotated[
         float,
@@ -249,11 +246,7 @@ class FusionParams(Params):
     """Recognition: least odds of the best assignment of ids against the best without a pair, for
     the pair to be accepted."""
 
-    recognition_own_odds: Annotated[
-        float,
-        Field(ge=1.0, le=1000.0),
-        ui("o_o", "Motion", log=True, advanced=True, when=_RECOGNITION),
-    ] = 3.0
+    recognition_own_odds: ClassVar[float] = 3.0
     """Recognition: least odds of a track's colours, for one person against every other, for it to
     get that person's id."""
 

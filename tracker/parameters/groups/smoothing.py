@@ -15,7 +15,7 @@ class SmoothingParams(Params):
 
     topic: ClassVar[Topic] = "Extraction"
 
-    iterations: Annotated[int, Field(ge=1, le=10), ui("n", step=1)] = 2
+    iterations: ClassVar[int] = 2
     """Number of times that boxes are associated with the smoothed tracks, and tracks fitted to
     them."""
 
@@ -23,11 +23,9 @@ class SmoothingParams(Params):
     """Whether people's heights and process noise, the cameras' offsets and noise, and the offset of
     boxes from the templates are estimated."""
 
-    memory: Annotated[
-        float, Field(ge=0.05, le=10.0), ui("τ_z", "Motion", unit="s", step=0.05, log=True)
-    ] = 0.25
-    """Correlation time of a camera's boxes and misses, within which they count as one
-    observation."""
+    memory: ClassVar[float] = 0.25
+    """Correlation time of a camera's boxes and misses, within which they count as one observation,
+    seconds."""
 
     change: Annotated[float, Field(ge=0.0, le=20.0), ui("c", step=0.5)] = 4.0
     """Log odds against a person becoming absent within a track, and against a return."""
@@ -48,16 +46,14 @@ class SmoothingParams(Params):
     """Identities: tracklets are linked by motion over gaps up to this, by appearance over
     longer."""
 
-    rounds: Annotated[int, Field(ge=1, le=5), ui("n_i", step=1)] = 2
+    rounds: ClassVar[int] = 2
     """Identities: number of resolutions, each from the tracks of the one before."""
 
     appearance: Annotated[float, Field(ge=0.0, le=5.0), ui("α", step=0.1)] = 1.0
     """Identities: weight of the appearance; 0 leaves it out."""
 
 
-_IDENTITIES_ONLY = frozenset(
-    {"ambiguity_threshold", "jump", "exchange", "longest", "rounds", "appearance"}
-)
+_IDENTITIES_ONLY = frozenset({"ambiguity_threshold", "jump", "exchange", "longest", "appearance"})
 
 NONE = Method(
     name="none",
