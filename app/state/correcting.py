@@ -11,7 +11,7 @@ from app.state.edits import Edits
 from app.state.snapshot import Change
 from app.state.workbench import Workbench
 from tracker.corrections import Correction, CorrectionError
-from tracker.corrections.contradictions import find_repeated, refuse_contradiction
+from tracker.corrections.consistency import find_repeated, refuse_contradiction
 from tracker.corrections.log import Log, open_log, own_place, remark_on, write_log, writing_place
 from tracker.sequences.sequence import Sequence as Recording
 

@@ -16,14 +16,14 @@ from numpy import ndarray
 
 from tests import world
 from tracker.corrections import Correction, CorrectionError, Place
+from tracker.corrections.consistency import along, find_repeated, refuse_contradiction
 from tracker.corrections.constraints import Constraints
-from tracker.corrections.contradictions import along, find_repeated, refuse_contradiction
+from tracker.corrections.finished_tracks import relabel
 from tracker.corrections.kinds import content_of, digest, leeway, make
 from tracker.corrections.lookup import TrackIndex, mostly_inside
 from tracker.corrections.merging import difference, merge
 from tracker.corrections.outcomes import Outcome, names_by_track, outcomes, supporting_corrections
 from tracker.corrections.pointing import foot_on_floor, ground_under, stands, triangulate
-from tracker.corrections.relabelling import relabel
 from tracker.corrections.truth import checked_ranges, write_truth
 
 ABOVE = 1e-6

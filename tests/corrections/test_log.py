@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tracker.corrections import Correction, CorrectionError
-from tracker.corrections.contradictions import find_repeated, refuse_contradiction
+from tracker.corrections.consistency import find_repeated, refuse_contradiction
 from tracker.corrections.kinds import KINDS, digest, make
 from tracker.corrections.log import (
     FILE,

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from tracker.corrections import Place
+from tracker.corrections.finished_tracks import relabel
 from tracker.corrections.kinds import make
 from tracker.corrections.lookup import TrackIndex
 from tracker.corrections.outcomes import outcomes
-from tracker.corrections.relabelling import relabel
 
 
 def walked() -> tuple[np.ndarray, np.ndarray, np.ndarray]:

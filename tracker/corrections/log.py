@@ -17,7 +17,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from tracker.corrections.contradictions import refuse_contradiction
+from tracker.corrections.consistency import refuse_contradiction
 from tracker.corrections.kinds import KINDS, Correction, CorrectionError, sentence_of
 from tracker.files.atomic import replacing
 from tracker.files.folders import settings_folder

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
-from tracker.corrections.contradictions import NEAR, along
+from tracker.corrections.consistency import NEAR, along
 from tracker.corrections.kinds import REACH, Correction, Place
 
 

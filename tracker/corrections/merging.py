@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence as Many
 from dataclasses import dataclass
 
-from tracker.corrections.contradictions import refuse_contradiction, refuse_two_names
+from tracker.corrections.consistency import refuse_contradiction, refuse_two_names
 from tracker.corrections.kinds import Correction, CorrectionError, content_of
 
 

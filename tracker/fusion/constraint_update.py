@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy import ndarray
 
-from tracker.corrections.contradictions import NEAR
+from tracker.corrections.consistency import NEAR
 from tracker.corrections.inflation import inflation
 from tracker.filters import gaussian_mixture, models
 from tracker.filters.gaussian_mixture import GaussianMixture

@@ -10,7 +10,7 @@ from jaxtyping import Float
 from numpy import ndarray
 
 from tracker.corrections import Correction
-from tracker.corrections.contradictions import along
+from tracker.corrections.consistency import along
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -13,8 +13,8 @@ from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
 from tracker.corrections import Correction
+from tracker.corrections.finished_tracks import relabel
 from tracker.corrections.kinds import leeway
-from tracker.corrections.relabelling import relabel
 from tracker.filters import gaussian_mixture
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion.protocol import FusionResult
@@ -195,7 +195,7 @@ def apply_corrections(
 ) -> Trajectories:
     """Apply the corrections of identity to finished tracks, without any image or box.
 
-    See :func:`tracker.corrections.relabelling.relabel`.
+    See :func:`tracker.corrections.finished_tracks.relabel`.
 
     Args:
         tracks: The tracks of a run.

@@ -13,7 +13,7 @@ from numpy import ndarray
 from tracker.corrections import Correction, Place
 from tracker.corrections.kinds import Kind, leeway
 from tracker.fusion.trajectories import Trajectories
-from tracker.review.queue import moves, single_tracks
+from tracker.review.queue import links, lost_people, single_tracks
 from tracker.review.queue.clear_places import ClearPlaces
 from tracker.review.queue.item import Alternative, ReviewItem, TrackRows, propose
 from tracker.review.queue.linking import Move
@@ -158,10 +158,10 @@ def _identity_items(
     run: Run, track_rows: TrackRows, backwards: Trajectories | None
 ) -> Iterable[ReviewItem]:
     """Yield the items on identities: all moves, grouped by the track and place that they change."""
-    tracklets, joined = moves.tracklets_of(run, track_rows)
-    every: list[Move] = [] if joined is None else list(moves.moves_of_links(tracklets, joined))
+    tracklets, joined = links.tracklets_of(run, track_rows)
+    every: list[Move] = [] if joined is None else list(links.moves_of_links(tracklets, joined))
     known = {(move.earlier[0].end, move.later[-1].begin) for move in every}
-    every += moves.joins_of_lost_people(run, track_rows, known)
+    every += lost_people.joins_of_lost_people(run, track_rows, known)
     every += single_tracks.moves(run, track_rows)
     every += meetings(run, track_rows)
     step_time = run.sequence.step_time

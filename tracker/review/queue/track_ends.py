@@ -11,7 +11,7 @@ from numpy import ndarray
 from tracker.corrections import Correction, Place
 from tracker.corrections.kinds import leeway
 from tracker.review.queue.item import Alternative, ReviewItem, TrackRows, propose
-from tracker.review.queue.moves import leaving_probability
+from tracker.review.queue.lost_people import leaving_probability
 from tracker.review.queue.unclaimed import Unclaimed, find_unclaimed
 from tracker.runs.run import Run
 

@@ -10,7 +10,7 @@ from tests.engine.synthetic import crossing, sequence
 from tracker.parameters.catalogue import RunParameters
 from tracker.review.queue import queue
 from tracker.review.queue.item import TrackRows
-from tracker.review.queue.moves import tracklets_of
+from tracker.review.queue.links import tracklets_of
 from tracker.runs import pipeline
 from tracker.smoothing import Decision, names_of
 

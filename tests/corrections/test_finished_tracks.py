@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from numpy import ndarray
 
 from tracker.corrections import Correction
+from tracker.corrections.finished_tracks import relabel
 from tracker.corrections.kinds import make
 from tracker.corrections.outcomes import outcomes
-from tracker.corrections.relabelling import relabel
 
 STEPS, LEEWAY = 60, 5
 
