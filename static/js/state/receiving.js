@@ -110,7 +110,7 @@ export function createReceiver({ store, playback, actions, address, isOld }) {
 	function showRun({ run, revision }) {
 		const { basis, revision: before } = store.get();
 		if (run === basis && revision === before) return;
-		store.set(run === basis ? { revision } : { basis: run, revision, timeline: null });
+		store.set({ basis: run, revision });
 		void fetchTimeline();
 	}
 
@@ -125,8 +125,8 @@ export function createReceiver({ store, playback, actions, address, isOld }) {
 
 	/** While a run goes on, lanes that are there grow once a second. */
 	const rest = () => {
-		const { run, timeline } = store.get();
-		return timeline && run?.state === "computing" ? 1000 : 150;
+		const { run, timeline, basis } = store.get();
+		return timeline?.run === basis && run?.state === "computing" ? 1000 : 150;
 	};
 
 	const fetchTimeline = fetcher(async () => {
