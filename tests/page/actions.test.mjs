@@ -38,6 +38,17 @@ test("what was refused is said until the like is accepted", async () => {
   assert.deepEqual(said(), ["Worth knowing"]);
 });
 
+test("a value that was refused is back at what it was, and its note goes by itself", async () => {
+  const { store, actions } = page([
+    [422, { detail: "Clutter rate: must be between 0 and 50, got 70", code: "bad_parameter" }],
+    [422, { detail: "There is no such file.", code: "no_file" }],
+  ]);
+  await actions.change({ "fusion.clutter_rate": 70 });
+  await actions.ask("POST", "sequence", { name: "nowhere" });
+  const levels = store.get().notes.map(({ level }) => level);
+  assert.deepEqual(levels, ["info", "error"], "notes of what was done go, errors stay");
+});
+
 test("a command is answered by nothing, or by what only who asked needs", async () => {
   const { store, actions } = page([
     [204, null],

@@ -203,7 +203,8 @@ export function mountTop(root, { store, actions }) {
 	store.watch(["server", "sequences", "schema", "link"], lists);
 	store.watch(["server", "run", "link"], status);
 	store.watch(["run", "timeline", "result", "scores"], (state) => {
-		for (const [part, of] of DRAWN) one(part).classList.toggle("old", isOld(state, of(state)));
+		for (const [drawn, of] of DRAWN)
+			for (const part of all(drawn)) part.classList.toggle("old", isOld(state, of(state)));
 	});
 	// What stands there is of what was open before, and goes.
 	store.watch(["server"], ({ server }) =>
@@ -217,11 +218,12 @@ export function mountTop(root, { store, actions }) {
  * @type {[string, (state: Readonly<PageState>) => string | undefined][]}
  */
 const DRAWN = [
-	...[".lanes", ".plot canvas", "#panel-tracks .scroll", "#panel-events"].map(
-		(part) => /** @type {any} */ ([part, ({ timeline }) => timeline?.run]),
-	),
-	["#panel-step", ({ result }) => result?.run],
-	["#panel-compare", ({ scores }) => scores?.series.run],
+	[
+		".lanes, .plot canvas, #panel-tracks .scroll, #panel-events [data-fill]",
+		({ timeline }) => timeline?.run,
+	],
+	["#panel-step [data-fill]", ({ result }) => result?.run],
+	["#panel-compare [data-fill]", ({ scores }) => scores?.series.run],
 ];
 
 /** @type {Record<Server.RunInfo["state"], [string, string]>} */

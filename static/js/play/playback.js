@@ -229,8 +229,7 @@ export function createPlayback(store, sendSeek) {
 		if (!lost && maps.flat().length < names.flat().length) return null;
 		const frame = { step, pictures: found, maps };
 		const computing = state.run?.state === "computing";
-		if (result?.computed)
-			return { ...frame, result, stale: isOld(state, result.run) };
+		if (result?.computed) return { ...frame, result, stale: isOld(state, result.run) };
 		// Until the new run comes to this step, the one before is faintly better than nothing.
 		const before = state.result;
 		if (computing && before?.computed && before.step === step && state.shown === step) {

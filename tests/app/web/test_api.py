@@ -217,7 +217,7 @@ def test_parameters_are_set_and_what_differs_is_told(client: TestClient) -> None
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({P_D: 7}, ("must be between 0.05 and 1", "got 7")),
+        ({P_D: 7}, ("Detection probability: must be between 0.05 and 1", "got 7")),
         ({"fusion.detection_probabilty": 0.5}, ("did you mean fusion.detection_probability",)),
         ({P_D: "high"}, ("expected a number",)),
         ({"single_view": "magic"}, ("expected one of", "colour_phd")),
