@@ -33,6 +33,8 @@ const FORGOTTEN = /** @type {const} */ ({
 export function createReceiver({ store, playback, actions, address, isOld }) {
 	/** A part was asked for, and not the whole. */
 	let partial = false;
+	/** Whether the server has figures of what is open. */
+	let scored = false;
 
 	/**
 	 * @param {Server.State} told
@@ -50,6 +52,7 @@ export function createReceiver({ store, playback, actions, address, isOld }) {
 		if (before?.sequence && !server.sequence) address.returnTo(before);
 		if (before === null) address.begin(server);
 		if (changed) {
+			scored = false;
 			if (before?.sequence && server.sequence) tellWhoOpened(before.sequence, server.sequence);
 			playback.clear(server.playhead);
 			store.set({
@@ -137,9 +140,8 @@ export function createReceiver({ store, playback, actions, address, isOld }) {
 	}, rest);
 
 	const fetchScores = fetcher(async () => {
-		const { sequence, run } = store.get();
-		// A run without a step has no figures; they come with its first news.
-		if (!sequence?.has_truth || (!run?.done && run?.state !== "failed")) return;
+		const { sequence } = store.get();
+		if (!sequence || !scored) return;
 		const scores = await getJson(`/api/evaluation/curves?${part()}`);
 		if (store.get().sequence?.key === sequence.key) store.set({ scores });
 	});
@@ -172,7 +174,10 @@ export function createReceiver({ store, playback, actions, address, isOld }) {
 			showRun(news);
 			void fetchTimeline();
 		},
-		evaluation: () => void fetchScores(),
+		evaluation() {
+			scored = true;
+			void fetchScores();
+		},
 		tasks: ({ tasks }) => store.set({ tasks }),
 		study({ study }) {
 			const before = store.get().study;
@@ -208,7 +213,6 @@ export function createReceiver({ store, playback, actions, address, isOld }) {
 			// The server's first word has it asked for.
 			if (store.get().server) void fetchSequences();
 			void fetchTimeline();
-			void fetchScores();
 		},
 	};
 }
