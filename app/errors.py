@@ -16,7 +16,8 @@ from starlette.exceptions import HTTPException
 from app.described import Described
 from tracker.corrections import CorrectionError
 from tracker.library.errors import LibraryError, NoSuchRun
-from tracker.parameters.values import ParameterError
+from tracker.parameters.catalogue import METHODS, PARAMETERS
+from tracker.parameters.values import ParameterError, label_of
 from tracker.studies.errors import StudyError
 
 logger = logging.getLogger("app")
@@ -115,10 +116,12 @@ def _answer(
 
 
 def parameter_detail(error: ParameterError) -> ErrorDetail:
-    """A parameter, or what else was asked for, that does not exist or does not fit."""
+    """A parameter, by the name that a person sees, or what else was asked for, that does not exist
+    or does not fit."""
+    known = error.key in METHODS or error.key in PARAMETERS
     return ErrorDetail(
         code="bad_parameter",
-        message=str(error),
+        message=f"{label_of(error.key)}: {error.message}" if known else str(error),
         field=error.key,
         hint=error.hint or "The manual lists every parameter with its range.",
     )

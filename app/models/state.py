@@ -230,6 +230,8 @@ class ParameterInfo(Model):
     advanced: bool
     essential: bool
     """Among the few that are shown first."""
+    slider: tuple[float, float, float] | None
+    """Of an essential one, the ends of its sliders and the step of the one beside the 3D view."""
 
 
 class GroupInfo(Model):

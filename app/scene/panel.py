@@ -13,6 +13,7 @@ from typing import Any
 
 import viser
 
+from app.errors import parameter_detail
 from app.scene.keys import hotkeys
 from app.scene.worker import LatestWorker
 from app.state.snapshot import Change, Snapshot
@@ -156,7 +157,7 @@ class Panel:
         try:
             self._workbench.set_parameters(changes, ORIGIN)
         except ParameterError as error:
-            self._workbench.notify("error", str(error))
+            self._workbench.notify("error", parameter_detail(error).message)
 
     def _refresh(self, snapshot: Snapshot) -> None:
         parameters = snapshot.parameters
@@ -191,9 +192,11 @@ class Panel:
                 return
             if options:
                 _put(handle, "options", options)
-            elif not handle.min <= value <= handle.max:  # a value from elsewhere may be further out
-                _put(handle, "min", min(handle.min, value))
-                _put(handle, "max", max(handle.max, value))
+            else:
+                for name, end in zip(
+                    ("min", "max"), PARAMETERS[key].slider_range(value), strict=True
+                ):
+                    _put(handle, name, end)
             if handle.value != value:
                 handle.value = value
             self._known[key] = handle.value

@@ -25,7 +25,7 @@ from app.state.workbench import Workbench
 from tracker.corrections import Correction, CorrectionError
 from tracker.files.validated import read_as, write_json
 from tracker.parameters.catalogue import PARAMETERS, RunParameters
-from tracker.parameters.values import changed_values, value_of
+from tracker.parameters.values import changed_values, label_of, value_of
 from tracker.sequences.built_in import key_of
 from tracker.sequences.sequence import Sequence
 from tracker.sequences.writing.teaching import Values, changes, taught_values
@@ -447,8 +447,8 @@ def _words_of(parts: Parts, now: Snapshot) -> str:
     if len(after) == 1:
         ((key, value),) = after.items()
         if isinstance(value, bool):
-            return f"{_label_of(key)} {'on' if value else 'off'}"
-        return _words_of_number(parts) or f"{_label_of(key)} {value}"
+            return f"{label_of(key)} {'on' if value else 'off'}"
+        return _words_of_number(parts) or f"{label_of(key)} {value}"
     if now.parameters == now.defaults:
         return "all parameters reset"
     return f"preset {now.preset}" if now.preset is not None else f"{len(after)} parameters"
@@ -463,12 +463,7 @@ def _words_of_number(parts: Parts) -> str | None:
     if isinstance(value, bool) or not isinstance(value, int | float):
         return None
     unit = PARAMETERS[key].unit
-    return f"{_label_of(key)} {before[key]:.6g} → {value:.6g}{unit and ' '}{unit}"
-
-
-def _label_of(key: str) -> str:
-    known = PARAMETERS.get(key)
-    return known.label if known is not None else key.replace("_", " ")
+    return f"{label_of(key)} {before[key]:.6g} → {value:.6g}{unit and ' '}{unit}"
 
 
 def _moved(parts: Parts) -> set[tuple[Any, ...]] | None:

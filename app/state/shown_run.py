@@ -81,11 +81,17 @@ class ShownRun(Store):
             )
             return before
 
-    def run_begins(self, key: str) -> None:
-        """The parameters ask for the run with this key: from now on only its news count."""
+    def run_begins(self, key: str, message: str = "") -> None:
+        """The parameters ask for the run with this key: from now on only its news count.
+
+        Args:
+            key: The run's.
+            message: What it waits for, where it cannot begin at once.
+        """
         with self._edit() as now:
             total = now.sequence.frames if now.sequence is not None else 0
-            self._put("run", run_state=RunState(key=key, state="computing", total=total))
+            state = RunState(key=key, state="computing", total=total, message=message)
+            self._put("run", run_state=state)
 
     def run_waits(self, key: str, message: str) -> None:
         """The run with this key comes no further for now, and why: it has no speed meanwhile."""
@@ -97,7 +103,7 @@ class ShownRun(Store):
                 self._put("progress", run_state=waits)
 
     def run_progresses(self, run: Run, progress: Progress) -> None:
-        """A run has new steps; from its first call on it is the one that is shown."""
+        """A run has new steps; from its first step on it is the one that is shown."""
         with self._edit() as now:
             if run.key != now.run_state.key:  # superseded
                 return
@@ -109,7 +115,10 @@ class ShownRun(Store):
                 seconds_left=progress.seconds_left,
                 message=progress.stage.replace("_", " "),
             )
-            self._put("run" if now.run is not run else "progress", run=run, run_state=state)
+            if now.run is not run and (progress.done or now.run is None):
+                self._put("run", run=run, run_state=state)
+            else:
+                self._put("progress", run_state=state)
 
     def run_ends(
         self,

@@ -276,7 +276,7 @@ class StudyDesk:
                     now = store.touched(), store.status().state
                     if self._seen.get(store.name) != now:
                         self._seen[store.name] = now
-                        if not first:
+                        if not first or now[1] == "running":
                             self._workbench.study_changed(self.info(store))
             except (OSError, StudyError) as error:  # a folder that is being made or deleted
                 logger.debug("studies: %s", error)

@@ -46,6 +46,10 @@ from tracker.sequences.sequence import Sequence
 class Workbench(ShownRun):
     """Thread-safe; what a person does is here, what is reported of runs in its base."""
 
+    def __init__(self) -> None:
+        super().__init__()
+        self._running: list[StudyNews] = []
+
     def set_parameters(self, changes: Mapping[str, Any], origin: str) -> RunParameters:
         """Change some values by key, all or none.
 
@@ -333,5 +337,16 @@ class Workbench(ShownRun):
         self._tell(Notice(level, message, hint))
 
     def study_changed(self, told: Mapping[str, Any]) -> None:
-        """Tell everyone who looks of a study."""
-        self._tell(StudyNews(told))
+        """Tell everyone who looks of a study, and whoever looks later of those that run."""
+        news = StudyNews(told)
+        with self._lock:
+            self._running = [one for one in self._running if one.told["name"] != told["name"]]
+            if told["state"] == "running":
+                self._running.append(news)
+        self._tell(news)
+
+    @property
+    def running_studies(self) -> tuple[StudyNews, ...]:
+        """The newest of each study that runs."""
+        with self._lock:
+            return tuple(self._running)

@@ -114,8 +114,8 @@ class Stream:
         match event:
             case Command(name):
                 text = json.dumps({"type": "command", "name": name})
-            case StudyNews(told):
-                text = json.dumps({"type": "study", "study": told})
+            case StudyNews():
+                text = _study(event)
             case Notice():
                 text = _notice(event)
                 if not self._pages:
@@ -135,6 +135,7 @@ class Stream:
             page.messages.append(_notice(self._before))
             if time.monotonic() - self._begun > BACK_SECONDS:
                 self._before = None
+        page.messages += [_study(news) for news in self._workbench.running_studies]
         self._pages.add(page)
         sender = asyncio.create_task(self._tell(socket, page))
         try:
@@ -270,6 +271,10 @@ class Stream:
             state = results.state_of(snapshot).model_dump_json()
             self._state = (snapshot.version, f'{{"type":"state","state":{state}}}')
         return self._state[1]
+
+
+def _study(news: StudyNews) -> str:
+    return json.dumps({"type": "study", "study": news.told})
 
 
 def _notice(notice: Notice) -> str:

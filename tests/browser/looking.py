@@ -136,10 +136,11 @@ _OPENED = """() => new Promise((done, late) => {
   const button = [...document.querySelectorAll('.lib .btn')].find(
     (one) => one.textContent === 'Open in Tune');
   const time = document.querySelector('.time');
+  const lanes = time.querySelector('.lanes');
   const begin = performance.now();
-  let renewed = false;
-  new MutationObserver(() => (renewed = true)).observe(
-    time.querySelector('.lanes'), { childList: true });
+  let renewed = false;  // those of the run before stay until then, and are marked
+  new MutationObserver(() => (renewed = !lanes.matches('.old'))).observe(
+    lanes, { childList: true, attributeFilter: ['class'] });
   setTimeout(() => late(new Error('the lanes were not painted')), 30000);
   const look = () => {
     const there = renewed && time.checkVisibility() && time.querySelectorAll('.lane').length >= 3

@@ -3,6 +3,7 @@ import assert from "node:assert/strict";
 import test from "node:test";
 
 import { createActions } from "../../static/js/state/actions.js";
+import { isOld } from "../../static/js/state/events.js";
 import { createReceiver } from "../../static/js/state/receiving.js";
 import { createStore } from "../../static/js/state/store.js";
 
@@ -36,6 +37,17 @@ test("what was refused is said until the like is accepted", async () => {
   actions.note("warn", "Worth knowing", "");
   await actions.ask("POST", "corrections", {});
   assert.deepEqual(said(), ["Worth knowing"]);
+});
+
+test("a value that was refused is back at what it was, and its note goes by itself", async () => {
+  const { store, actions } = page([
+    [422, { detail: "Clutter rate: must be between 0 and 50, got 70", code: "bad_parameter" }],
+    [422, { detail: "There is no such file.", code: "no_file" }],
+  ]);
+  await actions.change({ "fusion.clutter_rate": 70 });
+  await actions.ask("POST", "sequence", { name: "nowhere" });
+  const levels = store.get().notes.map(({ level }) => level);
+  assert.deepEqual(levels, ["info", "error"], "notes of what was done go, errors stay");
 });
 
 test("a command is answered by nothing, or by what only who asked needs", async () => {
@@ -108,4 +120,50 @@ test("only a recording that this window did not ask for was opened in another", 
       told,
     );
   }
+});
+
+/** A receiver of a recording with truth, whose requests are written down. */
+function receiver() {
+  const { store, actions } = page([]);
+  const asked = [];
+  globalThis.fetch = async (path) => {
+    asked.push(path.split("?")[0]);
+    return new Response(JSON.stringify({ run: path.includes("timeline") ? "second" : "" }));
+  };
+  const nothing = () => {};
+  const made = createReceiver({
+    store,
+    actions,
+    playback: { clear: nothing, receive: nothing },
+    address: { begin: nothing, arrive: nothing },
+    isOld: () => false,
+  });
+  const sequence = { key: "hall", name: "hall", opened_as: "hall", cameras: [], has_truth: true };
+  const run = { key: "first", state: "computing", done: 40 };
+  const state = { version: 1, parameters: {}, methods: {}, layers: {}, run, sequence };
+  made.receiveState(state, true);
+  return { store, made, asked };
+}
+
+test("figures are asked for once the server has some", async () => {
+  const { made, asked } = receiver();
+  made.refresh();
+  await new Promise((resolve) => setTimeout(resolve, 10));
+  assert.ok(asked.includes("/api/timeline"));
+  assert.ok(!asked.includes("/api/evaluation/curves"));
+  made.receive({ type: "evaluation", run: "first" });
+  await new Promise((resolve) => setTimeout(resolve, 400));
+  assert.ok(asked.includes("/api/evaluation/curves"));
+});
+
+test("lanes of the run before stay, and are old, until those of the new run are there", async () => {
+  const { store, made } = receiver();
+  store.set({ basis: "first", timeline: { run: "first" }, run: { key: "second" } });
+  made.receive({ type: "timeline", run: "second", revision: 1 });
+  assert.equal(store.get().timeline.run, "first");
+  assert.ok(isOld(store.get(), store.get().timeline.run));
+  await new Promise((resolve) => setTimeout(resolve, 10));
+  assert.equal(store.get().timeline.run, "second");
+  assert.ok(!isOld(store.get(), "second"));
+  assert.ok(!isOld({ run: { key: "second", state: "failed" } }, "first"), "it is meant to be seen");
 });

@@ -20,7 +20,7 @@ test("both ends and any value between stand on the slider, and come back", () =>
     [count, [10, 316, 5000]],
     [{ ...linear, step: null, minimum: 0, maximum: 30 }, [0, 3, 30]],
   ]) {
-    const [low, high, step] = placesOf(of);
+    const [low, high, step] = placesOf(of, values[1]);
     assert.ok(step > 0 && step < high - low);
     for (const value of values) {
       const place = placeOf(of, value);
@@ -34,12 +34,19 @@ test("both ends and any value between stand on the slider, and come back", () =>
 
 test("a logarithmic slider moves by decades, a whole number stays whole", () => {
   assert.deepEqual(
-    placesOf(log).map((place) => Number(place.toFixed(9))),
+    placesOf(log, 1e-4).map((place) => Number(place.toFixed(9))),
     [-6, -1, 0.01],
   );
   assert.equal(valueAt(log, -4.005), 9.89e-5);
   assert.equal(valueAt(count, 2.5), 316);
-  assert.deepEqual(placesOf({ ...count, log: false, step: 0.5 }), [10, 5000, 1]);
+  assert.deepEqual(placesOf({ ...count, log: false, step: 0.5 }, 20), [10, 5000, 1]);
+});
+
+test("a slider ends where the one beside the 3D view does, unless its value is further out", () => {
+  const essential = { ...linear, slider: [0.5, 0.9, 0.05] };
+  assert.deepEqual(placesOf(essential, 0.6), [0.5, 0.9, 0.01]);
+  assert.deepEqual(placesOf(essential, 0.2), [0.2, 0.9, 0.01]);
+  assert.deepEqual(placesOf({ ...essential, log: true }, 1), [Math.log10(0.5), 0, 0.01]);
 });
 
 test("a parameter is found by its name, symbol, key, unit and help, by all words", () => {

@@ -313,6 +313,13 @@ class Parameter:
     """The least value, the largest and the step of the linear slider of an essential parameter;
     None for the others."""
 
+    def slider_range(self, value: float) -> tuple[float, float]:
+        """Return the ends of every slider of an essential parameter while it has a value: those of
+        :attr:`slider`, and further out where the value is."""
+        assert self.slider is not None
+        low, high, _ = self.slider
+        return min(low, value), max(high, value)
+
 
 def _group_stage(group: str) -> Stage:
     fused = (method.own_group for method in REGISTERED["fusion_method"].values())

@@ -39,6 +39,7 @@ class ParameterError(ValueError):
     def __init__(self, key: str, message: str, hint: str | None = None) -> None:
         super().__init__(f"{key}: {message}")
         self.key = key
+        self.message = message
         self.hint = hint
 
 
@@ -60,6 +61,12 @@ def with_current_keys(values: Mapping[str, Any]) -> dict[str, Any]:
 def removed_notes(keys: Iterable[str]) -> tuple[str, ...]:
     """Return one sentence for each key of a parameter that no longer exists: what holds instead."""
     return tuple(f"{key} no longer exists: {REMOVED[key]}" for key in keys if key in REMOVED)
+
+
+def label_of(key: str) -> str:
+    """Return what a parameter, or the choice of a method, is called in words."""
+    known = PARAMETERS.get(key)
+    return known.label if known is not None else key.replace("_", " ").capitalize()
 
 
 def value_of(parameters: RunParameters, key: str) -> Any:

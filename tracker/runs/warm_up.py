@@ -73,6 +73,12 @@ filter, which takes longest to compile, with the smoothing."""
 COMPILING = "compiling the kernels, once per machine"
 """The sentence that is reported while kernels are compiled."""
 
+WAITING = "waiting for another program that compiles the kernels, once per machine"
+"""The sentence that is reported while another caller's processes compile."""
+
+BACKGROUND = "--background"
+"""The argument with which a process that compiles gives way to rendering and tracking."""
+
 _SECONDS_BETWEEN = 0.1
 """Interval at which the processes that compile are looked at, seconds."""
 
@@ -247,17 +253,21 @@ def ensure_compiled(
     progress: Callable[[int, int], None] = lambda done, total: None,
     ready: Callable[[], None] = lambda: None,
     stopped: Callable[[], bool] = lambda: False,
+    background: bool = False,
 ) -> int:
     """Compile all kernels, unless that was done on this machine, and return when they are there.
 
-    Two processes of a low priority compile, for one caller of the machine at a time; the others
-    wait, and go on where it was ended.
+    Two processes compile, for one caller of the machine at a time; the others wait, and go on
+    where it was ended.
 
     Args:
-        tell: A callback that gets a sentence if there is something to compile.
+        tell: A callback that gets a sentence if there is something to compile, and again with
+            each kernel that is there.
         progress: A callback that gets the number of compiled kernels and of all.
         ready: A callback that is called when the first run may begin.
         stopped: A function that returns whether to end the processes; what they compiled remains.
+        background: Whether the processes get a lower priority, because nobody waits for all
+            kernels.
 
     Returns:
         0 if all kernels are compiled, else the status of a process that failed or was ended.
@@ -268,22 +278,34 @@ def ensure_compiled(
     if compilation.is_compiled():
         return 0
     tell(COMPILING)
+    waits = False
 
     def wait() -> bool:
+        nonlocal waits
+        if not waits:
+            waits = True
+            tell(WAITING)
         ready()  # what another caller's processes have compiled is used from now on
         compilation.news_of_compiling()
         return not stopped()
+
+    def count(done: int, total: int) -> None:
+        progress(done, total)
+        tell(f"{COMPILING}, {done} of {total}")
 
     with ExitStack() as held:
         with suppress(OSError):  # nothing can be stored: each caller compiles for itself
             held.enter_context(locked(compilation.kernel_folder() / "compiling", wait=wait))
         if not compilation.is_compiled() and not stopped():
-            return _compile_in_processes(progress, ready, stopped)
+            return _compile_in_processes(count, ready, stopped, background)
     return int(not compilation.is_compiled())
 
 
 def _compile_in_processes(
-    progress: Callable[[int, int], None], ready: Callable[[], None], stopped: Callable[[], bool]
+    progress: Callable[[int, int], None],
+    ready: Callable[[], None],
+    stopped: Callable[[], bool],
+    background: bool,
 ) -> int:
     """Run a process for each half, and follow what they print until both have ended."""
     counts: dict[str, tuple[int, int]] = {}
@@ -305,9 +327,10 @@ def _compile_in_processes(
 
     readers: list[tuple[threading.Thread, subprocess.Popen[str]]] = []
     try:
+        flags = [BACKGROUND] if background else []
         for half in HALVES:
             process = subprocess.Popen(
-                [sys.executable, "-m", "tracker.runs.warm_up", half], text=True,
+                [sys.executable, "-m", "tracker.runs.warm_up", *flags, half], text=True,
                 stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
             )  # fmt: skip
             reader = threading.Thread(
@@ -329,11 +352,12 @@ def _compile_in_processes(
 
 
 def main() -> int:
-    """Compile one half and print the progress, or compile both in processes; with low priority."""
+    """Compile one half and print the progress, or compile both in processes."""
     if len(sys.argv) < 2:
         return ensure_compiled()
-    half = sys.argv[1]
-    _give_way(5 if half == HALVES[0] else 19)
+    half, background = sys.argv[-1], BACKGROUND in sys.argv
+    if background:
+        _give_way(5 if half == HALVES[0] else 19)
 
     def report(line: str) -> None:
         sys.stdout.write(f"{line}\n")
@@ -341,7 +365,8 @@ def main() -> int:
 
     def ready() -> None:
         report("ready")
-        _give_way(10)
+        if background:
+            _give_way(10)
 
     compile_kernels(half, lambda done, total: report(f"{done} {total}"), ready)
     return 0

@@ -78,6 +78,7 @@ class Compiling:
                 progress=self._progress,
                 ready=self._ready.set,
                 stopped=self._stopped.is_set,
+                background=True,
             )
         except OSError as error:  # each kernel is then compiled where it is first needed
             logger.warning("the kernels are compiled when they are needed: %s", error)

@@ -44,6 +44,9 @@ CRASHED = (
     "the program crashed while this run was computed; it is left out until it is asked for again"
 )
 
+ENDING = "ending the run before"
+"""What a run waits for while the one before it comes to a place where it can stop."""
+
 SWITCH_SECONDS = 0.001
 """A thread that computes gives the interpreter back this soon; Python's own 5 ms add up
 when a request needs it several times."""
@@ -247,7 +250,8 @@ class Jobs:
             self._wanted = _Wanted(snapshot, key)
             # subscribers are called under the lock, so that of two changes at once the newer comes
             # last; they only take note and return
-            self._workbench.run_begins(key)
+            waits = ENDING if self._under_way is not None else ""
+            self._workbench.run_begins(key, waits)
             self._condition.notify_all()
 
     def _work(self) -> None:
@@ -279,8 +283,9 @@ class Jobs:
                 workbench.run_waits(wanted.key, words)
 
         def on_compiling(done: int, total: int) -> None:
-            if total and not wanted.cancelled.is_set():
-                workbench.run_waits(wanted.key, f"{COMPILING}, {done} of {total}")
+            if not wanted.cancelled.is_set():
+                count = f", {done} of {total}" if total else ""
+                workbench.run_waits(wanted.key, f"{COMPILING}{count}")
 
         try:
             if self._compiling is not None:

@@ -55,6 +55,9 @@ ROUTERS = (
 ASK_AGAIN = "no-cache"
 """The page's files are kept by the browser but checked by their ETag each time."""
 
+ICON, A_DAY = "icon.svg", "max-age=86400"
+"""The icon is not checked for a day: browsers want it again with every change of the address."""
+
 
 def create_app(settings: Settings) -> FastAPI:
     """The whole application; it owns threads from its start to its end."""
@@ -98,5 +101,5 @@ class _PageFiles(StaticFiles):
 
     async def get_response(self, path: str, scope: Scope) -> Response:
         response = await super().get_response(path, scope)
-        response.headers["cache-control"] = ASK_AGAIN
+        response.headers["cache-control"] = A_DAY if path == ICON else ASK_AGAIN
         return response

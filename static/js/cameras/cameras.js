@@ -548,7 +548,7 @@ export function mountCameras(root, { store, actions, playback }) {
 		if (roomy && own)
 			words.push(`${own.id} ± ${own.sigma.map((v) => (100 * v).toFixed(0)).join(", ")} cm`);
 		const view = result?.cameras[index];
-		if (stale) words.push("computing");
+		if (stale) words.push("run before");
 		else if (result && !result.computed)
 			words.push(store.get().run?.state === "computing" ? "computing" : "not computed");
 		else if (view && roomy) {

@@ -15,9 +15,14 @@ const LOG_STEP = 0.01;
 /** Significant digits of a value that comes from a logarithmic slider. */
 const DIGITS = 3;
 
-/** Least place, largest place and step of a parameter's slider. @param {Parameter} of @returns {[number, number, number]} */
-export function placesOf({ minimum, maximum, step, log, kind }) {
-	const [low, high] = [minimum ?? 0, maximum ?? 1];
+/**
+ * Least place, largest place and step of a parameter's slider: where it has one beside the 3D view
+ * it ends where that does, and further out where its value is.
+ * @param {Parameter} of @param {number} value @returns {[number, number, number]}
+ */
+export function placesOf({ minimum, maximum, step, log, kind, slider }, value) {
+	const [least, most] = slider ?? [minimum ?? 0, maximum ?? 1];
+	const [low, high] = [Math.min(least, value), Math.max(most, value)];
 	if (log) return [Math.log10(low), Math.log10(high), LOG_STEP];
 	if (kind === "int") return [low, high, Math.max(1, Math.trunc(step ?? 1))];
 	return [low, high, step ?? 10 ** Math.floor(Math.log10((high - low) / 50))];
@@ -208,13 +213,9 @@ export function mountParameters(root, { store, actions }) {
 				})
 			);
 		else {
-			const [min, max, step] = placesOf(of);
-			const at = (placeOf(of, Number(published)) - min) / (max - min);
 			const bar = (slider = /** @type {any} */ (
 				h("input", {
 					type: "range",
-					min,
-					max,
 					// Its own places are on no grid: a value from elsewhere stands where it is.
 					step: "any",
 					...called,
@@ -224,13 +225,11 @@ export function mountParameters(root, { store, actions }) {
 						if (!by) return;
 						event.preventDefault();
 						event.stopPropagation();
-						bar.value = String(Number(bar.value) + by * step);
+						bar.value = String(Number(bar.value) + by * placesOf(of, now(key))[2]);
 						slide(bar, of);
 					},
 				})
 			));
-			if (published !== undefined)
-				bar.style.setProperty("--published", String(Math.min(1, Math.max(0, at))));
 			field = /** @type {any} */ (
 				h("input", {
 					id,
@@ -252,7 +251,7 @@ export function mountParameters(root, { store, actions }) {
 			{ class: "name", "aria-expanded": "false", title: of.help, onclick: () => unfold(key) },
 			h("i", {}, ...symbolParts(symbol)),
 			h("span", {}, label),
-			h("span", { class: "q" }, ` ${group.replaceAll("_", " ")}`),
+			h("span", { class: "q" }, group.replaceAll("_", " ")),
 		);
 		const reset = h(
 			"button",
@@ -266,9 +265,12 @@ export function mountParameters(root, { store, actions }) {
 			{ "data-key": key },
 			h("td", {}, name),
 			slider
-				? [h("td", { class: "slider" }, slider), h("td", { class: "field" }, field)]
-				: h("td", { class: "pick", colspan: 2 }, field),
-			h("td", { class: "unit", title: unit }, unit),
+				? [
+						h("td", { class: "slider" }, slider),
+						h("td", { class: "field" }, field),
+						h("td", { class: "unit" }, unit),
+					]
+				: h("td", { class: "pick", colspan: 3 }, field),
 			effect,
 			h("td", {}, reset),
 		);
@@ -299,7 +301,8 @@ export function mountParameters(root, { store, actions }) {
 
 	/** @param {Part} bar @param {Parameter} of */
 	function slide(bar, of) {
-		const [min, max, step] = placesOf(of);
+		const [min, max] = [Number(bar.min), Number(bar.max)];
+		const step = placesOf(of, now(of.key))[2];
 		// The ends are on no grid of steps.
 		const place = Number(bar.value);
 		const onGrid = Math.min(max, min + Math.round((place - min) / step) * step);
@@ -370,6 +373,9 @@ export function mountParameters(root, { store, actions }) {
 		const shown = new Set([...server.shown, ...Object.keys(METHOD_LABELS)]);
 		const only = changedOnly.ariaPressed === "true";
 		const looks = Boolean(sought.trim() || only);
+		const labels = [...rows.values()].flatMap(({ of }) => (shown.has(of.key) ? [of.label] : []));
+		for (const { of, name } of rows.values())
+			name.classList.toggle("shared", labels.filter((label) => label === of.label).length > 1);
 		let count = 0;
 		for (const [topic, { body, words, fold }] of topics) {
 			const own = [...rows.values()].filter(({ of }) => of.topic === topic && shown.has(of.key));
@@ -428,7 +434,12 @@ export function mountParameters(root, { store, actions }) {
 			// Who types has a text that is not the value yet.
 			if (field !== document.activeElement || field.defaultValue === field.value)
 				field.value = field.defaultValue = written(value);
-			slider.value = String(placeOf(of, value));
+			const [min, max] = placesOf(of, value);
+			Object.assign(slider, { min, max, value: placeOf(of, value) });
+			const published = store.get().schema?.presets.published?.[key];
+			const at = (placeOf(of, Number(published)) - min) / (max - min);
+			if (published !== undefined)
+				slider.style.setProperty("--published", String(Math.min(1, Math.max(0, at))));
 			slider.ariaValueText = `${written(value)} ${of.unit}`.trim();
 		}
 		drawEffects();

@@ -1,6 +1,7 @@
 /** The top bar: its places, what is open, which methods run, how far they are. */
 import { allow, fill, h, one, parts, write, all, refill } from "../elements/dom.js";
 import { PLACES, isBench, placeOf } from "../state/address.js";
+import { isOld } from "../state/events.js";
 
 /* ---------- The words of the top bar that lead from place to place, and what they lead to. A
    part of the page belongs to a place by its `data-place`; `bench` stands for all that are the
@@ -201,11 +202,29 @@ export function mountTop(root, { store, actions }) {
 
 	store.watch(["server", "sequences", "schema", "link"], lists);
 	store.watch(["server", "run", "link"], status);
+	store.watch(["run", "timeline", "result", "scores"], (state) => {
+		for (const [drawn, of] of DRAWN)
+			for (const part of all(drawn)) part.classList.toggle("old", isOld(state, of(state)));
+	});
 	// What stands there is of what was open before, and goes.
 	store.watch(["server"], ({ server }) =>
 		one(".app").classList.toggle("leaving", Boolean(server?.opening && server.sequence)),
 	);
 }
+
+/**
+ * What is drawn from a run, and from which: it stays, marked, until the new one has the same. Of the
+ * pictures only what lies over them is.
+ * @type {[string, (state: Readonly<PageState>) => string | undefined][]}
+ */
+const DRAWN = [
+	[
+		".lanes, .plot canvas, #panel-tracks .scroll, #panel-events [data-fill]",
+		({ timeline }) => timeline?.run,
+	],
+	["#panel-step [data-fill]", ({ result }) => result?.run],
+	["#panel-compare [data-fill]", ({ scores }) => scores?.series.run],
+];
 
 /** @type {Record<Server.RunInfo["state"], [string, string]>} */
 const WORDS = {

@@ -6,7 +6,7 @@
  * animation frame. Until then the last whole step stays.
  */
 import { getJson } from "../state/api.js";
-import { shownVersion, versionOf } from "../state/events.js";
+import { isOld, shownVersion, versionOf } from "../state/events.js";
 import {
 	createCache,
 	createPictures,
@@ -229,12 +229,11 @@ export function createPlayback(store, sendSeek) {
 		if (!lost && maps.flat().length < names.flat().length) return null;
 		const frame = { step, pictures: found, maps };
 		const computing = state.run?.state === "computing";
-		if (result?.computed)
-			return { ...frame, result, stale: computing && result.run !== state.run?.key };
+		if (result?.computed) return { ...frame, result, stale: isOld(state, result.run) };
 		// Until the new run comes to this step, the one before is faintly better than nothing.
 		const before = state.result;
 		if (computing && before?.computed && before.step === step && state.shown === step) {
-			return { ...frame, result: before, stale: before.run !== state.run?.key };
+			return { ...frame, result: before, stale: isOld(state, before.run) };
 		}
 		return result || lost ? { ...frame, result: result ?? null, stale: false } : null;
 	}

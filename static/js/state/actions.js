@@ -87,7 +87,9 @@ export function createActions({ store, seek, send, receive }) {
 			if (!(error instanceof ApiError)) throw error;
 			// This the socket tells, to all tabs.
 			if (error.code === "cannot_open") return;
-			actions.note("error", error.message, error.hint ?? "", undefined, about);
+			// A value that was refused is back at what it was: nothing is left to mend.
+			const level = error.code === "bad_parameter" ? "info" : "error";
+			actions.note(level, error.message, error.hint ?? "", undefined, about);
 		},
 		accepted(about) {
 			const { notes } = store.get();

@@ -6,6 +6,15 @@ export const versionOf = ({ run, revision }) => `${run || "none"} ${revision}`;
 /** Of the run that the server shows. @param {Readonly<PageState>} state */
 export const shownVersion = ({ basis, revision }) => versionOf({ run: basis, revision });
 
+/**
+ * Whether what is drawn is of an older run than the one that is asked for, which may have no step
+ * yet; after a failure the last good one is meant to be seen.
+ * @param {Readonly<PageState>} state
+ * @param {string | null | undefined} of  the run that it is drawn from
+ */
+export const isOld = ({ run }, of) =>
+	Boolean(of && run?.key && run.key !== of && run.state !== "failed");
+
 /** The scores, where they are of the run that is shown. @param {Readonly<PageState>} state */
 export const scoresOf = ({ scores, basis }) => (scores?.series.run === basis ? scores : null);
 

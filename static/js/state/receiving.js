@@ -33,6 +33,8 @@ const FORGOTTEN = /** @type {const} */ ({
 export function createReceiver({ store, playback, actions, address, isOld }) {
 	/** A part was asked for, and not the whole. */
 	let partial = false;
+	/** Whether the server has figures of what is open. */
+	let scored = false;
 
 	/**
 	 * @param {Server.State} told
@@ -50,6 +52,7 @@ export function createReceiver({ store, playback, actions, address, isOld }) {
 		if (before?.sequence && !server.sequence) address.returnTo(before);
 		if (before === null) address.begin(server);
 		if (changed) {
+			scored = false;
 			if (before?.sequence && server.sequence) tellWhoOpened(before.sequence, server.sequence);
 			playback.clear(server.playhead);
 			store.set({
@@ -110,7 +113,7 @@ export function createReceiver({ store, playback, actions, address, isOld }) {
 	function showRun({ run, revision }) {
 		const { basis, revision: before } = store.get();
 		if (run === basis && revision === before) return;
-		store.set(run === basis ? { revision } : { basis: run, revision, timeline: null });
+		store.set({ basis: run, revision });
 		void fetchTimeline();
 	}
 
@@ -125,8 +128,8 @@ export function createReceiver({ store, playback, actions, address, isOld }) {
 
 	/** While a run goes on, lanes that are there grow once a second. */
 	const rest = () => {
-		const { run, timeline } = store.get();
-		return timeline && run?.state === "computing" ? 1000 : 150;
+		const { run, timeline, basis } = store.get();
+		return timeline?.run === basis && run?.state === "computing" ? 1000 : 150;
 	};
 
 	const fetchTimeline = fetcher(async () => {
@@ -137,9 +140,8 @@ export function createReceiver({ store, playback, actions, address, isOld }) {
 	}, rest);
 
 	const fetchScores = fetcher(async () => {
-		const { sequence, run } = store.get();
-		// A run without a step has no figures; they come with its first news.
-		if (!sequence?.has_truth || (!run?.done && run?.state !== "failed")) return;
+		const { sequence } = store.get();
+		if (!sequence || !scored) return;
 		const scores = await getJson(`/api/evaluation/curves?${part()}`);
 		if (store.get().sequence?.key === sequence.key) store.set({ scores });
 	});
@@ -172,7 +174,10 @@ export function createReceiver({ store, playback, actions, address, isOld }) {
 			showRun(news);
 			void fetchTimeline();
 		},
-		evaluation: () => void fetchScores(),
+		evaluation() {
+			scored = true;
+			void fetchScores();
+		},
 		tasks: ({ tasks }) => store.set({ tasks }),
 		study({ study }) {
 			const before = store.get().study;
@@ -208,7 +213,6 @@ export function createReceiver({ store, playback, actions, address, isOld }) {
 			// The server's first word has it asked for.
 			if (store.get().server) void fetchSequences();
 			void fetchTimeline();
-			void fetchScores();
 		},
 	};
 }

@@ -210,7 +210,6 @@ interface Actions {
 	) => void;
 	/** Says what was just edited, with a button that takes it back. */
 	noteEdit: (title: string, text: string) => Promise<void>;
-	/** Null after a failure, which is told. */
 	/** Says what the server told of it; throws what is no answer of the server. */
 	refused: (error: unknown, about: string) => void;
 	/** What was refused before is no longer said. */

@@ -898,6 +898,8 @@ declare namespace Server {
 		advanced: boolean;
 		/** Among the few that are shown first. */
 		essential: boolean;
+		/** Of an essential one, the ends of its sliders and the step of the one beside the 3D view. */
+		slider: [number, number, number] | null;
 	}
 
 	/** One run, finished or not. */

@@ -136,8 +136,11 @@ def test_a_value_beyond_the_slider_stands_where_it_is(panel: Panel, workbench: W
         assert panel.wait(SECONDS)
         handle = panel._inputs[BIRTH]
         assert handle.value == number
-        assert handle.min <= number <= handle.max
+        assert (handle.min, handle.max) == (min(low, number), max(high, number))
         assert value(workbench, BIRTH) == number, "it is not written back"
+    workbench.reset_parameters([BIRTH])
+    assert panel.wait(SECONDS)
+    assert (handle.min, handle.max) == (low, high)
 
 
 def test_a_slider_that_is_being_moved_is_not_written(panel: Panel, workbench: Workbench) -> None:

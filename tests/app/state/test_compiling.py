@@ -235,3 +235,28 @@ def test_who_is_stopped_while_it_waits_compiles_nothing(
     with locked(elsewhere):
         assert warm_up.ensure_compiled(stopped=lambda: True) != 0
     assert processes == []
+
+
+def test_who_waits_for_all_kernels_is_told_how_many_there_are_and_not_slowed(
+    elsewhere: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    lines: list[list[str]] = []
+    processes = instead(monkeypatch, 'print("3 50", flush=True)')
+    start = warm_up.subprocess.Popen
+    monkeypatch.setattr(
+        warm_up.subprocess, "Popen", lambda line, **how: lines.append(line) or start(line, **how)
+    )
+    said: list[str] = []
+    assert warm_up.ensure_compiled(said.append) == 0
+    assert len(processes) == 2
+    assert said[0] == COMPILING
+    assert f"{COMPILING}, 3 of 50" in said
+    assert not any(warm_up.BACKGROUND in line for line in lines)
+
+
+def test_who_waits_for_another_that_compiles_is_told_so(elsewhere: Path) -> None:
+    said: list[str] = []
+    with locked(elsewhere):
+        asked = iter([False, True])
+        warm_up.ensure_compiled(said.append, stopped=lambda: next(asked, True))
+    assert said == [COMPILING, warm_up.WAITING]

@@ -177,7 +177,7 @@ def test_methods_that_are_switched_twice_are_two_edits(bench: Workbench, edits: 
     bench.set_parameters({"smoothing_method": usual}, "api")
     edits.undo()
     assert bench.snapshot().parameters.smoothing_method == "none"
-    assert bench.snapshot().redo_words == f"smoothing method {usual}"
+    assert bench.snapshot().redo_words == f"Smoothing method {usual}"
 
 
 @given(st.lists(st.sampled_from(["p_d", "p_s", "preset", "undo", "redo"]), max_size=20))

@@ -188,7 +188,10 @@ def test_a_superseded_run_stops_midway(desk: Desk, slow: dict[str, int]) -> None
     desk.bench.set_parameters({P_D: 0.7}, "test")
     wait_until(lambda: slow["now"] == 1)
     runs = slow["runs"]
+    said: list[str] = []
+    desk.bench.subscribe(lambda change: said.append(desk.now.run_state.message))
     desk.bench.set_parameters({P_D: 0.8}, "test")
+    assert "ending the run before" in said
     wait_until(lambda: slow["runs"] == runs + 1)
     assert slow["stopped"] == 1
     desk.wait("done")

@@ -211,6 +211,22 @@ def test_news_of_a_superseded_run_are_dropped(bench: Workbench) -> None:
     assert now.run_state.key == new.key
 
 
+def test_the_run_before_is_shown_until_the_new_one_has_a_step(bench: Workbench) -> None:
+    old = run_of(bench)
+    bench.run_begins(old.key)
+    bench.run_progresses(old, progress(120))
+    bench.run_ends(old.key, "done")
+    bench.set_parameters({P_D: 0.7}, "test")
+    new = run_of(bench)
+    bench.run_begins(new.key, "ending the run before")
+    assert bench.snapshot().run_state.message == "ending the run before"
+    bench.run_progresses(new, progress(0))
+    assert bench.snapshot().run is old
+    assert bench.snapshot().run_state.message == "fusion"
+    bench.run_progresses(new, progress(1))
+    assert bench.snapshot().run is new
+
+
 def test_a_run_that_is_silent_has_no_speed_and_says_what_it_does(bench: Workbench) -> None:
     run = run_of(bench)
     bench.run_begins(run.key)

@@ -217,7 +217,7 @@ def test_parameters_are_set_and_what_differs_is_told(client: TestClient) -> None
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({P_D: 7}, ("must be between 0.05 and 1", "got 7")),
+        ({P_D: 7}, ("Detection probability: must be between 0.05 and 1", "got 7")),
         ({"fusion.detection_probabilty": 0.5}, ("did you mean fusion.detection_probability",)),
         ({P_D: "high"}, ("expected a number",)),
         ({"single_view": "magic"}, ("expected one of", "colour_phd")),
@@ -356,6 +356,8 @@ def test_the_page_and_its_files_are_checked_by_their_etag(client: TestClient) ->
         assert answer.headers["cache-control"] == "no-cache"
         again = client.get(path, headers={"if-none-match": answer.headers["etag"]})
         assert again.status_code == 304
+    # browsers want the icon again with every change of the address
+    assert client.get("/static/icon.svg").headers["cache-control"] == "max-age=86400"
     policy = client.get("/").headers["content-security-policy"]
     assert "script-src 'self'; style-src 'self';" in policy
     assert policy.endswith("require-trusted-types-for 'script'; trusted-types 'none'")

@@ -6,6 +6,7 @@ import json
 import re
 import shutil
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -316,6 +317,25 @@ def test_what_is_checked_leaves_the_queue_though_the_run_stays_the_same(
     assert desk.get(f"{PLACE}/queue").json()["doubts"] == []
     command(desk, "undo")
     assert desk.get(f"{PLACE}/queue").json()["doubts"] != []
+
+
+@pytest.mark.full
+def test_an_answer_that_is_taken_back_is_no_answer_before_the_run_is_another(
+    desk: TestClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tracker.review.queue.ranking.LEAST", 0.0)
+    monkeypatch.setattr("tracker.review.queue.meetings._CLOSE", 8.0)
+    command(desk, "set_parameters", changes={"fusion.survival_probability": 0.97})
+    settled(desk)
+    before = desk.get(f"{PLACE}/queue").json()
+    command(desk, "answer", doubt=before["doubts"][0]["id"], alternative=0)
+    settled(desk)
+    told = desk.get(f"{PLACE}/queue").json()
+    assert told["answered"] > before["answered"]
+    now = desk.app.state.workbench.snapshot()  # type: ignore[attr-defined]
+    assert now.run.corrections
+    assert Doubting().of(now).answered == told["answered"]
+    assert Doubting().of(replace(now, corrections=())).answered == before["answered"]
 
 
 @pytest.mark.full

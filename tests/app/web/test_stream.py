@@ -58,6 +58,17 @@ def test_work_in_the_background_is_told_until_it_is_over(client: TestClient) -> 
     assert not any(message["type"] == "state" for message in messages), "nothing else is told anew"
 
 
+def test_a_page_that_comes_later_is_told_of_the_studies_that_run(client: TestClient) -> None:
+    bench: Workbench = client.app.state.workbench  # type: ignore[attr-defined]
+    for name, state in (("long", "running"), ("short", "running"), ("short", "done")):
+        bench.study_changed({"name": name, "state": state, "done": 3})
+    with connect(client) as socket:
+        messages = read_until(socket, is_type("timeline"))
+    told = [message["study"]["name"] for message in messages if message["type"] == "study"]
+    assert told == ["long"]
+    bench.study_changed({"name": "long", "state": "done", "done": 3})
+
+
 def test_a_seek_reaches_every_page(client: TestClient) -> None:
     with (
         connect(client) as one,

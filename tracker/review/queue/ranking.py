@@ -61,6 +61,10 @@ class Queue:
     """The evidence that the items are based on, in words."""
 
 
+_Satisfied = list[tuple[Kind, tuple[int, ...]]]
+"""The kind and the ids of the tracks of corrections."""
+
+
 def queue(
     run: Run,
     backwards: Trajectories | None = None,
@@ -83,7 +87,8 @@ def queue(
     found = [*linked, *single_tracks.items(run, track_rows), *track_ends(run, track_rows, asked)]
     ordered = sorted(found, key=lambda one: (-one.weight, one.first, one.id))
     steps = leeway(run.sequence.step_time)
-    parted, people = _parted_by(run), _people(run)
+    satisfied = _satisfied(run, made)
+    parted, people = _parted_by(satisfied), _people(satisfied)
     items: list[ReviewItem] = []
     answered = 0
     for one in once_each(ordered, round(_SAME_MOMENT / run.sequence.step_time)):
@@ -100,27 +105,27 @@ def queue(
     return Queue(tuple(items), answered, how)
 
 
-def _parted_by(run: Run) -> Callable[[int, int], bool]:
+def _parted_by(applied: _Satisfied) -> Callable[[int, int], bool]:
     """Return a function that gets the ids of two tracks and returns whether corrections rule out
     their join: they state that these are different people, that the first left, or that the second
     came in."""
-    applied = _satisfied(run)
     parted = {frozenset(tracks) for kind, tracks in applied if kind == "different"}
     left = {track for kind, tracks in applied if kind == "left" for track in tracks}
     came = {track for kind, tracks in applied if kind == "came" for track in tracks}
     return lambda one, other: one in left or other in came or frozenset((one, other)) in parted
 
 
-def _people(run: Run) -> set[int]:
+def _people(applied: _Satisfied) -> set[int]:
     """Return the ids of the tracks that corrections declare to be people."""
     kinds = ("here", "name", "came", "left", "same")
-    return {track for kind, tracks in _satisfied(run) if kind in kinds for track in tracks}
+    return {track for kind, tracks in applied if kind in kinds for track in tracks}
 
 
-def _satisfied(run: Run) -> list[tuple[Kind | None, tuple[int, ...]]]:
-    """Return the kind and the ids of the tracks of each correction that the run satisfies."""
-    kinds = {one.id: one.kind for one in run.corrections}
-    return [(kinds.get(one.id), one.tracks) for one in run.outcomes if one.met]
+def _satisfied(run: Run, corrections: Many[Correction]) -> _Satisfied:
+    """Return the kind and the ids of the tracks of each of the corrections that the run
+    satisfies."""
+    kinds = {one.id: one.kind for one in corrections}
+    return [(kinds[one.id], one.tracks) for one in run.outcomes if one.met and one.id in kinds]
 
 
 def once_each(ordered: Iterable[ReviewItem], pause: int) -> Iterable[ReviewItem]:
