@@ -390,7 +390,7 @@ def test_what_is_asked_of_is_the_nearest_place_where_the_track_stands_clear() ->
     rng = np.random.default_rng(3)
     paths = np.cumsum(rng.normal(0.0, 0.12, (90, 4, 3)) * [1.0, 1.0, 0.0], axis=0)
     paths[60:75, 0] = np.nan
-    run = scene(paths + [0.0, 0.0, 0.85])
+    run = scene(paths + np.array([0.0, 0.0, 0.85]))
     seen = rng.random((len(run.tracks), 3)) < 0.4
     run.tracks = tracks = replace(run.tracks, seen=seen)
     lanes, width = TrackRows(tracks), 0.3

@@ -270,8 +270,8 @@ def test_a_box_of_a_rolled_camera_bounds_whom_it_shows() -> None:
 
 def moments(*rows: tuple[int, int, int, bool, int, float]) -> Moments:
     """Track, camera, step, whether the camera sees the track itself, how many do, and height."""
-    tracks, cameras, steps, own, agreeing, heights = (np.array(column) for column in zip(*rows,
-                                                                                strict=True))  # fmt: skip
+    columns = (np.array(column) for column in zip(*rows, strict=True))
+    tracks, cameras, steps, own, agreeing, heights = columns
     boxes = np.column_stack([np.zeros((len(rows), 2)), heights / 3.0, heights])
     there = np.arange(3) < agreeing[:, None]
     return Moments(tracks, cameras, steps, boxes, own, there, np.zeros(len(rows)))
@@ -299,9 +299,9 @@ def test_a_box_is_whole_within_the_picture_and_of_twelve_pixels() -> None:
     camera = CAMERAS[0]
     width, height = camera.image_size
     inside = np.array([-0.5, -0.5, width, height])
-    rows = [inside, inside - [0.1, 0, 0, 0], inside - [0, 0.1, 0, 0], inside + [0, 0, 0.1, 0],
-            inside + [0, 0, 0, 0.1], [9, 9, 12, 12], [9, 9, 11.9, 12], [9, 9, 12, 11.9],
-            [np.nan] * 4]  # fmt: skip
+    beyond = [inside + change for change in 0.1 * np.array([-1, -1, 1, 1]) * np.eye(4)]
+    sizes = [[9, 9, 12, 12], [9, 9, 11.9, 12], [9, 9, 12, 11.9], [np.nan] * 4]
+    rows = [inside, *beyond, *sizes]
     assert _whole(camera, np.array(rows)).tolist() == [True, *[False] * 4, True, *[False] * 3]
 
 
