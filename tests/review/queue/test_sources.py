@@ -356,6 +356,11 @@ def test_of_who_meets_at_an_end_the_way_tells_nothing_and_apart_are_two_meetings
         again = scene(paths)
         found = [m for m in meetings(again, TrackRows(again.tracks)) if len(m.earlier) == 2]
         assert len(found) == 2 * count, pause
+    for pause, count in ((1, 1), (2, 2)):  # where a step is a second, of more than two steps
+        paths = standing((0, 9, 0.0, 0.0), (0, 9, 0.5, 0.0), steps=10)
+        paths[4 : 4 + pause, 1, 0] = 1.3
+        slow = scene(paths, fps=1.0)
+        assert len(list(meetings(slow, TrackRows(slow.tracks)))) == 4 * count
     edge = scene(standing((0, 9, 0.0, 0.0), (0, 9, 1.2, 0.0), steps=10))
     assert not list(meetings(edge, TrackRows(edge.tracks)))
 
@@ -631,7 +636,12 @@ def test_boxes_of_two_cameras_meet_where_somebody_is_as_high_as_a_person() -> No
         ([(k, 0.69 * k) for k in range(10)], [(0, 9, 1.0)]),  # half a metre and two a second
         ([(k, 0.71 * k) for k in range(10)], []),
         ([(k, x) for k in range(12) for x in (0.0, 2.0)], [(0, 11, 1.0), (0, 11, 1.0)]),
+        ([(k, x) for k in range(12) for x in (0.0, 0.6)], [(0, 11, 1.0), (0, 11, 1.0)]),
         ([(k, x) for k in range(12) for x in (0.0, 0.2)], [(0, 11, 1.0)]),  # of one step the mean
+        (  # the one is waited for while others go on
+            sorted([*((k, 0.0) for k in range(10)), *((k, 9.0) for k in range(5, 15))]),
+            [(0, 9, 1.0), (5, 14, 1.0)],
+        ),
     ],
 )
 def test_places_in_a_row_are_one_person(
@@ -642,6 +652,7 @@ def test_places_in_a_row_are_one_person(
     assert [(one.places[0].step, one.places[-1].step, one.share) for one in found] == chains
     assert all(one.cameras == (0, 2) for one in found)
     own = {step: [x for k, x in points if k == step] for step, _ in points}
+    assert all(np.ptp([place.x for place in one.places]) == 0.0 for one in found[1:])
     if len(found) == 1:
         for place in found[0].places:
             assert place.x == pytest.approx(np.mean(own[place.step]))
