@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -35,6 +37,7 @@ from tracker.review.queue.ranking import (
     _with_none_of_them,
     is_answered,
     once_each,
+    words_of,
 )
 
 PAIRED = ("same", "different", "exchanged")
@@ -489,3 +492,29 @@ def test_the_other_run_tells_joins_and_exchanges_of_stretches_that_last() -> Non
     assert told({1: [7] * 25, 2: [8] * 25, 3: [8] * 30 + [7] * 30}) == [
         ("exchange", [3, 1], [3]), ("exchange", [3], [3, 2])
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("move", "title", "why"),
+    [
+        (Move((ONE,), (AFTER,), "join", 0.0), "Track 1 goes on as track 3?",
+         "track 1 ends and track 3 begins 0.5 m away, 1.0 s later"),
+        (Move((ONE,), (replace(AFTER, track=1),), "cut", 0.0), "Track 1 is two people?",
+         "after step 10 it goes on at the same place, 1.0 s later"),
+        (Move((ONE, OTHER), (AFTER, ANOTHER), "exchange", 0.0), "Tracks 1 and 4 exchanged?",
+         "track 4 is where track 1 may have gone on, 2.0 m away, 1.1 s later"),
+        (Move((ONE, OTHER), (replace(OTHER, track=2), replace(AFTER, track=1)), "exchange", 0.0),
+         "Tracks 1 and 2 exchanged?", "track 2 fits what track 1 does from step 20 on"),
+        (Move((ONE,), (replace(AFTER, track=1), replace(ANOTHER, track=1)), "exchange", 0.0),
+         "Track 1 goes on elsewhere?",
+         "another piece of track 1 fits, at the same place, 1.1 s later"),
+        (Move((ONE,), (replace(AFTER, begin=Place(5, 0.1, 0.0, 1.0)),), "join", 0.0),
+         "Track 1 goes on as track 3?",
+         "track 1 ends and track 3 begins 0.5 m away, 0.5 s before that"),
+        (Move((ONE,), (AFTER,), "gap", 0.0, "because", "a title"), "a title", "because"),
+    ],
+)  # fmt: skip
+def test_what_is_asked_in_words(move: Move, title: str, why: str) -> None:
+    tracks = world.tracks(lines((0, 29, 0.0), (0, 29, 1.0), (5, 29, 0.5), (0, 29, 2.0)))
+    run = cast("Any", SimpleNamespace(tracks=tracks, sequence=SimpleNamespace(step_time=0.1)))
+    assert words_of(run, move) == (title, why)

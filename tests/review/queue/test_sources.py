@@ -419,6 +419,18 @@ def test_what_is_asked_of_is_the_nearest_place_where_the_track_stands_clear() ->
             assert found == lanes.place(track, step, after=after)
 
 
+@pytest.mark.parametrize(("away", "clear"), [(49, True), (50, True), (51, False)])
+def test_a_clear_place_is_looked_for_within_five_seconds(away: int, clear: bool) -> None:
+    """Two who stand side by side but for one step."""
+    paths = standing((0, 120, 0.0, 0.0), (0, 120, 0.3, 0.0), steps=121)
+    for at in (60 - away, 60 + away):
+        paths[at, 1, 0] = 2.0
+    lanes = TrackRows(scene(paths).tracks)
+    found = ClearPlaces(lanes, 0.1, 0.3)
+    before, after = found.before(1, 60).step, found.after(1, 60).step
+    assert (before, after) == ((60 - away, 60 + away) if clear else (56, 64))
+
+
 def test_rows_of_a_track_are_counted_and_found_by_step() -> None:
     paths = standing((2, 9, 0.0, 0.0), (0, 20, 1.0, 0.0), steps=21)
     paths[5:7, 0] = np.nan
