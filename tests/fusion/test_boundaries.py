@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence as Many
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from numpy import ndarray
 from numpy.testing import assert_allclose, assert_array_equal
+from scipy.stats import multivariate_normal
 
 from tests import world
 from tests.fusion.rooms import (
@@ -30,7 +32,7 @@ from tracker.fusion.memory import Memory, recall
 from tracker.fusion.missing_frames import StepEvidence
 from tracker.fusion.model import FusionModel, all_boxes
 from tracker.fusion.multi_bernoulli import MultiBernoulli, MultiBernoulliState
-from tracker.fusion.place_constraints import constraints_by_step
+from tracker.fusion.place_constraints import PlaceConstraints, constraints_by_step
 from tracker.fusion.protocol import FusionResult
 from tracker.fusion.record import Ledger, Record, sum_associations
 from tracker.fusion.reidentification import IdentityBeliefs
@@ -401,6 +403,102 @@ def test_a_stated_place_updates_whom_it_means_or_begins_somebody() -> None:
     assert (found.size, free) == (2, 9)
     assert abs(found.means[1, 0] + edge) < 0.2
     assert_array_equal(found.means[0], mixture.means[0])
+
+
+def here(*places: Many[float], accuracy: float = 0.2) -> PlaceConstraints:
+    """Somebody is said to be at each of these places."""
+    said = [make(kind="here", places=[[0, *place]], accuracy=accuracy) for place in places]
+    return constraints_by_step(said)[0]
+
+
+def constrained(
+    mixture: GaussianMixture, told: PlaceConstraints
+) -> tuple[GaussianMixture, Record, int]:
+    """What a place makes of components; labels from 9 on are free."""
+    blank = Record.blank(4, mixture.size)
+    return apply_constraints(mixture, blank, told, MODEL, first_new_label=9, next_label=9)
+
+
+def test_a_place_that_contradicts_widens_whom_it_means_before_and_after() -> None:
+    """P + W instead of P along x, W = (1 − 1/a) ν νᵀ, and W is left."""
+    found, _, _ = constrained(people((3, 0.6, 0.0)), here([0.6, 0.0, 0.85]))
+    a = 0.36 / (0.01 + 0.04)
+    widened = (1.0 - 1.0 / a) * 0.36
+    wide = 0.01 + widened
+    assert found.means[0, 0] == pytest.approx(0.6 * wide / (wide + 0.04))
+    assert found.covariances[0, 0, 0] == pytest.approx(wide * 0.04 / (wide + 0.04) + widened)
+    assert found.covariances[0, 1, 1] == pytest.approx(0.01 * 0.04 / 0.05)
+
+
+def test_all_components_of_whom_a_place_means_count_and_new_ones_have_labels_of_their_own() -> None:
+    both = people((3, 0.5, 0.0), (3, 0.3, 0.9), (4, 0.9, 2.0))
+    found, _, _ = constrained(both, here([0.0, 0.0, 0.85]))
+    assert found.weights.tolist() == [pytest.approx(0.999 - 0.3), 0.3, 0.9]
+    sure = people((3, 0.9, 0.0), (3, 0.3, 0.9))
+    assert constrained(sure, here([0.0, 0.0, 0.85]))[0].weights.tolist() == [0.9, 0.3]
+    more, record, free = constrained(both, here([-1.5, 1.5, 0.85], [-1.5, -1.5, 0.85]))
+    assert (more.labels.tolist(), free, record.sources.shape) == ([3, 3, 4, 9, 10], 11, (4, 5))
+
+
+@pytest.mark.parametrize(("beyond", "named"), [(-0.01, True), (0.01, False)])
+def test_a_reference_means_who_is_within_its_gate_of_three_tenths_of_a_metre(
+    beyond: float, named: bool
+) -> None:
+    apart = float(np.sqrt(MODEL.place_gate * (0.01 + 0.3**2))) + beyond
+    told = constraints_by_step(
+        [make(kind="here", places=[[0, -2.0, 0.0, 0.85], [0, apart, 0.0, 0.85]], accuracy=0.2)]
+    )[0]
+    found, _, _ = constrained(people((3, 0.6, 0.0)), told)
+    assert found.size == (1 if named else 2)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_place_means_the_component_of_the_largest_density_there(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    mixture = people(*((k, float(rng.uniform(0.1, 0.9)), 0.0) for k in range(1, 6)))
+    mixture.means[:, :3] += rng.normal(0.0, 0.15, (5, 3))
+    mixture.covariances[:] *= rng.uniform(0.5, 20.0, (5, 1, 1))
+    place = np.array([0.05, 0.0, 0.85])
+    densities = [
+        weight * multivariate_normal(mean[:3], spread[:3, :3] + 0.04 * np.eye(3)).pdf(place)
+        for weight, mean, spread in zip(
+            mixture.weights, mixture.means, mixture.covariances, strict=True
+        )
+    ]
+    found, _, _ = constrained(mixture, here(place.tolist()))
+    assert np.flatnonzero(found.weights != mixture.weights).tolist() == [np.argmax(densities)]
+
+
+def test_after_a_place_components_of_the_phd_filter_are_heaviest_first() -> None:
+    tracks = people((3, 0.6, 0.0), (4, 0.9, 1.5))
+    p = FusionParams(birth="measurements", memory=0.0)
+    fusion = SequentialPhd(empty_room(), RunParameters(fusion=p))
+    state = SequentialPhdState(tracks, 50, Memory.start(6))
+    told = here([-1.0, 1.0, 0.85])
+    _, result = fusion.step(state, (NO_FRAME,) * 4, told)
+    assert result.posterior.labels.tolist() == [50, 4, 3]
+    assert (np.diff(result.posterior.weights) <= 0.0).all()
+
+
+def test_who_was_renamed_to_whom_is_waited_for_no_more() -> None:
+    memory = Memory(
+        people((7, 0.9, 0.0)), people((1, 0.9, 0.0), (2, 0.8, 1.0)), np.array([0.1, 0.2]),
+        np.array([5, 6]),
+    ).relabelled({7: 1})  # fmt: skip
+    assert memory.known.labels.tolist() == [1]
+    assert memory.lost.labels.tolist() == [2]
+    assert (memory.ages.tolist(), memory.newer.tolist()) == ([0.2], [6])
+
+
+def test_of_too_many_meeting_points_those_whose_rays_pass_nearest_are_tried(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("tracker.fusion.measurement_births._MOST_SEEDS", 1)
+    other = PLACE + np.array([-0.9, 0.5, 0.2])  # of whom the second camera is a bit off
+    first, second = exact([other, PLACE])[0], exact([other + np.array([0.0, 0.0, 0.05]), PLACE])[1]
+    found = births().propose(evidence((first, second, NO_BOXES, NO_BOXES)))
+    assert found is not None
+    assert found.sources.T.tolist() == [[1, 1, -1, -1]]
 
 
 @pytest.mark.parametrize(("beyond", "born"), [(-0.01, False), (0.01, True)])

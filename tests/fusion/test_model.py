@@ -66,3 +66,11 @@ def test_two_within_a_share_of_a_persons_width_are_one_unless_each_has_a_box() -
         means = np.array([[0.0, 0.0, 0.85], [apart, 0.0, 0.85 + above]])
         found = made.duplicates(means, np.array([0.9, 0.9]), np.array([1, 2]), sources)
         assert found.tolist() == [False, duplicate]
+
+
+def test_the_middle_of_who_lies_is_the_lowest_and_who_stands_on_the_floor_is_free() -> None:
+    low = model(posture_share=0.1).heights
+    assert low is not None
+    assert low.low == pytest.approx(FusionParams().posture_height * HALF_EXTENTS[2])
+    assert low.high == pytest.approx(2.2 - low.low)
+    assert model(posture_share=0.0).heights is None

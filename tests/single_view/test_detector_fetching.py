@@ -11,12 +11,23 @@ import json
 import os
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
 import pytest
+from numpy import ndarray
 
-from tests.single_view.graph_models import OUTPUTS, SIDE, answer, detector
+from tests.single_view.graph_models import (
+    OUTPUTS,
+    SIDE,
+    GraphModel,
+    answer,
+    detector,
+    ints,
+    numbers,
+    text,
+)
 from tests.single_view.packages import (
     GRAPH,
     LICENCE,
@@ -277,3 +288,156 @@ def test_the_command_fetches_and_lists(
     (listed,) = json.loads(capsys.readouterr().out)
     assert (listed["name"], listed["size"]) == ("tiny", 0)
     assert listed["damage"].startswith("is damaged")
+
+
+# ── graphs of a few operations
+
+
+def begun(side: int = 8) -> GraphModel:
+    """A graph that has its picture alone."""
+    graph = GraphModel(5)
+    shape = {"dim": [{"size": str(size)} for size in (1, 3, side, side)]}
+    graph.node("Placeholder", "images", [], shape={"shape": shape})
+    return graph
+
+
+def window(op: str, graph: GraphModel, inputs: list[str], **changes: Any) -> str:
+    """A window of two rows and three columns that moves by one row and two columns."""
+    attributes = {
+        "padding": text("VALID"), "data_format": text("NHWC"), "strides": numbers(1, 1, 2, 1),
+        "ksize": numbers(1, 2, 3, 1), **changes,
+    }  # fmt: skip
+    return graph.node(op, "window", inputs, **attributes)
+
+
+def kernel(graph: GraphModel, inputs: int = 3) -> str:
+    values = np.random.default_rng(2).normal(size=(2, 3, inputs, 4)).astype("<f2")
+    return graph.constant("kernel", values)
+
+
+def _conv(g: GraphModel, **changes: Any) -> str:
+    return window("Conv2D", g, [g.last("last", "images"), kernel(g)], **changes)
+
+
+REFUSED: dict[str, tuple[Callable[[GraphModel], str], str]] = {
+    "padding": (lambda g: _conv(g, padding=text("SAME")), "only windows over"),
+    "order": (lambda g: _conv(g, data_format=text("NCHW")), "only windows over"),
+    "dilated": (lambda g: _conv(g, dilations=numbers(1, 2, 2, 1)), "only windows over"),
+    "first": (lambda g: window("Conv2D", g, ["images", kernel(g)]), "only windows over"),
+    "border": (lambda g: window("MaxPool", g, [g.last("last", g.padded("pad", "images"))]),
+               "only windows over"),
+    "borders of channels": (
+        lambda g: g.node("Pad", "pad", ["images", g.constant(
+            "borders", ints(*[0] * 3, 1, *[0] * 4).reshape(4, 2))]),
+        "only borders of height and width"),
+    "sum with a border": (lambda g: g.node("Sigmoid", "s", [g.padded("pad", "images")]),
+                          "of an image with a border"),
+    "transposition": (lambda g: g.transposed("t", "images", [0, 3, 1, 2]), "the transposition"),
+    "twice": (lambda g: g.last("b", g.last("a", "images")), "the transposition"),
+    "sum": (lambda g: g.node("Add", "s", ["images", g.last("last", "images")]),
+            "tensors of different shapes"),
+    "sum of sizes": (lambda g: g.node("Add", "s", [_conv(g), "last"]),
+                     "tensors of different shapes"),
+    "bias of a picture": (lambda g: g.node("Add", "s", ["images", g.constant("b", np.ones(3))]),
+                          "only a value for each channel"),
+    "bias of one": (lambda g: g.node("Add", "s", [_conv(g), g.constant("b", np.ones(1))]),
+                    "only a value for each channel"),
+    "bias of first": (
+        lambda g: g.node("Add", "s", [g.first("f", _conv(g)), g.constant("b", np.ones(4))]),
+        "only a value for each channel"),
+    "bias afterwards": (
+        lambda g: g.node("Add", "s", [g.node("Identity", "i", [_conv(g)]), g.constant(
+            "b", g.node("Sigmoid", "used", ["window"]) and np.ones(4))]),
+        "only a value for each channel"),
+    "orders": (lambda g: g.node("ConcatV2", "c", ["images", g.last("last", "images"),
+                                                  g.constant("axis", np.array(1))]),
+               "images in different orders"),
+    "resize": (lambda g: g.node("ResizeBilinear", "r", [g.last("last", "images"), g.constant(
+        "size", ints(4, 4))], half_pixel_centers={"b": False}), "only a resize between"),
+    "resize first": (lambda g: g.node("ResizeBilinear", "r", ["images", g.constant(
+        "size", ints(4, 4))], half_pixel_centers={"b": True}), "only a resize between"),
+    "reshape": (lambda g: g.node("Reshape", "r", ["images", g.constant("to", ints(1, -1, 3))]),
+                "the reshape of"),
+    "reshape last": (lambda g: g.node("Reshape", "r", [g.last("last", "images"), g.constant(
+        "to", ints(1, 3, -1))]), "the reshape of"),
+    "constant first": (lambda g: g.node("Add", "s", [g.constant("b", np.ones(3)), "images"]),
+                       "with a constant as its first input"),
+    "constants": (lambda g: g.node("Sigmoid", "s", [g.node("Mul", "m", [
+        g.constant("a", np.ones(3)), g.constant("b", np.ones(3))])]), "Mul of constants"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_a_graph_that_would_be_converted_wrongly_is_refused(name: str) -> None:
+    graph = begun()
+    build, words = REFUSED[name]
+    last = build(graph)
+    with pytest.raises(ValueError, match=words):
+        converted(graph.model, graph.weights, {"out": last}, {})
+
+
+def test_a_graph_without_a_picture_or_of_other_weights_is_refused() -> None:
+    with pytest.raises(ValueError, match="the graph has no input"):
+        converted(GraphModel().model, b"", {}, {})
+    graph = begun()
+    graph.constant("one", np.ones(3))
+    graph.table[0] = {"name": "one", "shape": [3], "dtype": "uint8"}
+    with pytest.raises(ValueError, match="weights of type uint8 are not read"):
+        converted(graph.model, graph.weights, {}, {})
+
+
+def run_converted(graph: GraphModel, outputs: dict[str, str], side: int = 8) -> list[ndarray]:
+    """What OpenCV makes of a picture by the converted graph."""
+    model = converted(graph.model, graph.weights, outputs, {})
+    net = cv2.dnn.readNetFromONNX(np.frombuffer(model, np.uint8))
+    net.setInput(PICTURE[:, :, :side, :side].astype(np.float32), "images")
+    return list(net.forward(list(outputs)))
+
+
+BIAS = np.array([0.5, -1.0, 2.0, 0.25])
+PICTURE = np.random.default_rng(9).normal(size=(1, 3, 8, 8))
+
+
+def test_windows_and_borders_need_be_neither_square_nor_even() -> None:
+    graph = begun()
+    borders = np.array([[0, 0], [0, 0], [1, 2], [3, 0]])
+    padded = graph.node("Pad", "pad", ["images", graph.constant("borders", borders)])
+    bias = graph.constant("bias", BIAS)
+    convolved = window("Conv2D", graph, [graph.last("last", padded), kernel(graph)])
+    summed = graph.node("Add", "sum", [convolved, bias])
+    (found,) = run_converted(graph, {"out": graph.first("out/first", summed)})
+    whole = np.pad(PICTURE, borders)
+    values = np.random.default_rng(2).normal(size=(2, 3, 3, 4)).astype("<f2").astype(float)
+    assert found.shape == (1, 4, 8 + 3 - 1, (8 + 3 - 3) // 2 + 1)
+    for y, x in np.ndindex(found.shape[2:]):
+        patch = whole[0, :, y : y + 2, 2 * x : 2 * x + 3]
+        expected = np.einsum("crs,rsck->k", patch, values) + BIAS
+        np.testing.assert_allclose(found[0, :, y, x], expected, rtol=1e-4, atol=1e-4)
+
+
+def test_axes_are_counted_from_either_end_and_a_leak_has_tensorflows_slope() -> None:
+    graph = begun()
+    last = graph.last("last", "images")
+    relu = graph.node("LeakyRelu", "relu", [last])
+    axis = graph.constant("axis", np.array(-1))
+    both = graph.node("ConcatV2", "both", [relu, last, axis])
+    sizes, split_axis = graph.constant("sizes", ints(1, 5)), graph.constant("at", np.array(3))
+    graph.node("SplitV", "split", [both, sizes, split_axis])
+    outputs = {"one": graph.first("one/first", "split"), "rest": graph.first("two", "split:1")}
+    one, rest = run_converted(graph, outputs)
+    leaked = np.where(PICTURE < 0.0, 0.2 * PICTURE, PICTURE)
+    whole = np.concatenate([leaked, PICTURE], axis=1)
+    np.testing.assert_allclose(one, whole[:, :1], rtol=1e-5)
+    np.testing.assert_allclose(rest, whole[:, 1:], rtol=1e-5)
+
+
+def test_a_sparse_constant_has_its_values_at_their_places() -> None:
+    graph = begun()
+    names = [
+        graph.constant("places", np.array([[0], [2]])), graph.constant("size", ints(3)),
+        graph.constant("values", ints(1, -1)), graph.constant("rest", np.array(3)),
+    ]  # fmt: skip
+    asked = graph.node("SparseToDense", "asked", names)
+    shaped = graph.node("Reshape", "out", ["images", asked])  # to 1, 3 and what is left
+    (found,) = run_converted(graph, {"result": shaped})
+    np.testing.assert_allclose(found, PICTURE.reshape(1, 3, -1), rtol=1e-5)

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,9 +13,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy import ndarray
 
+from tracker.parameters.groups.pseudo_particle import PseudoParticleParams
 from tracker.single_view.protocol import ViewEvent
 from tracker.single_view.pseudo_particle import hypotheses
 from tracker.single_view.pseudo_particle.hypotheses import best_hypothesis, target_probabilities
+from tracker.single_view.pseudo_particle.method import PseudoParticle
 from tracker.single_view.pseudo_particle.track_management import Targets, Tracks, manage
 
 LIKELY, UNLIKELY = 0.2, 0.9
@@ -177,3 +182,55 @@ def test_a_label_is_given_once() -> None:
         assert np.all(np.bincount(story.tracks.targets.persons, minlength=2) <= 2)
     assert len(given) > 5
     assert given == list(range(1, len(given) + 1))
+
+
+# particles of a target, and around it
+
+
+def with_numbers(**numbers: object) -> Any:
+    """What the method's steps ask of it: its parameters and the time of a step."""
+    return SimpleNamespace(_parameters=PseudoParticleParams(**numbers), _step_time=0.04)
+
+
+def test_a_particle_belongs_to_the_nearest_target_within_its_gate() -> None:
+    method = with_numbers(position_gate=2.0, position_sigma=1.5)
+    there = targets([LEFT, [90.0, 60.0, 10.0, 14.0], [60.0, 20.0, 0.1, 0.1]], [0, 1, 0])
+    boxes = np.array([
+        [79.9, 60.0, 1, 1], [80.1, 60.0, 1, 1], [69.9, 60.0, 1, 1], [50.0, 101.9, 1, 1],
+        [50.0, 102.1, 1, 1], [119.9, 60.0, 1, 1], [120.1, 60.0, 1, 1], [61.4, 20.0, 1, 1],
+    ], dtype=float)  # fmt: skip
+    found = PseudoParticle._nearest(method, boxes, there)
+    assert found.tolist() == [1, 1, 0, 0, 3, 1, 3, 2]
+    assert PseudoParticle._nearest(method, boxes, Targets.none()).tolist() == [0] * len(boxes)
+    gates = PseudoParticle._gates(method, there)
+    np.testing.assert_allclose(gates[0], [50.0, 60.0, 30.0**2, 0.0, 42.0**2])
+
+
+def test_particles_are_drawn_again_around_where_each_target_goes_the_wider_the_longer_unseen() -> (
+    None
+):
+    method = with_numbers(samples=5000, newcomer_share=0.25, velocity_share=0.5,
+                          redistribution=0.4, motion_sigma=2.0)  # fmt: skip
+    there = replace(
+        targets([LEFT, [190.0, 60.0, 10.0, 14.0], [390.0, 60.0, 10.0, 14.0]], [0, 1, 0]),
+        velocities=np.array([[4.0, 0.0], [0.0, -2.0], [0.0, 0.0]]), misses=np.array([0, 0, 9]),
+    )  # fmt: skip
+    rng = np.random.default_rng(0)
+    drawn = PseudoParticle._around(method, there, np.zeros((0, 4)), rng)
+    assert len(drawn) == 3750
+    for middle, wide, own in zip(
+        ([52.0, 60.0], [190.0, 59.0], [390.0, 60.0]),
+        (0.4, 0.4, np.sqrt(0.4**2 + 4.0 * 0.04 * 9)),
+        (drawn[drawn[:, 0] < 120], drawn[np.abs(drawn[:, 0] - 190) < 60], drawn[drawn[:, 0] > 260]),
+        strict=True,
+    ):
+        assert len(own) == 1250
+        np.testing.assert_allclose(own[:, :2].mean(axis=0), middle, atol=0.12 * wide * 14.0)
+        np.testing.assert_allclose(own[:, :2].std(axis=0), [wide * 10.0, wide * 14.0], rtol=0.06)
+        np.testing.assert_array_equal(own[:, 2:], np.tile([10.0, 14.0], (1250, 1)))
+    assert PseudoParticle._around(method, Targets.none(), drawn, rng).shape == (0, 4)
+    plain = with_numbers(samples=60, newcomer_share=0.25, redistribution=0.0)
+    resampled = np.arange(240.0).reshape(60, 4)
+    kept = PseudoParticle._around(plain, there, resampled, rng)
+    assert len(kept) == len(np.unique(kept[:, 0])) == 45
+    assert np.isin(kept[:, 0], resampled[:, 0]).all()

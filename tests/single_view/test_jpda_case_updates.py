@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy import ndarray
@@ -104,3 +106,42 @@ def test_of_two_measurements_that_both_may_have_made_each_takes_its_own() -> Non
     assert below.targets.positions[1, 0] - below.targets.positions[0, 0] < 4.0
     classical = moved(some, seen, shares, [0, 1], [-1, -1], JpdaParams(five_cases=False))
     assert_allclose(classical.matrix, shares)
+
+
+def test_sizes_follow_what_is_measured_and_counts_what_became_of_each() -> None:
+    """By their cases: measured whole, missed, split, hidden behind another, and hidden itself."""
+    p = JpdaParams(size_rate=0.25)
+    some = targets((100, 100), (200, 100), (300, 100), (400, 100), (404, 100))
+    some = replace(some, misses=np.array([2, 2, 0, 0, 0]), hidden=np.array([0, 3, 0, 0, 4]))
+    rows = [(100.0, 100.0, 6.0, 12.0), (300.0, 100.0, 6.0, 12.0), (400.0, 100.0, *HALF)]
+    seen = measured(rows, [*rows[:2], (402.0, 100.0, 9.0, 12.0)])
+    own, shared = np.array([0, -1, 1, 2, -1]), np.array([-1, -1, -1, 2, 2])
+    flags = np.eye(5, dtype=bool)
+    cases = Cases(own, shared, flags[2], flags[1], np.zeros(3, bool))
+    matrix = np.zeros((5, 3))
+    matrix[[0, 2, 3], [0, 1, 2]] = 0.8, 0.9, 1.0
+    found = innovations(some, seen.boxes[:, :2], seen.sigmas[:, :2])
+    result = update_by_case(some, found, matrix, cases, seen, p)
+    after = result.targets
+    assert after.hits.tolist() == [2, 0, 2, 2, 2]
+    assert after.misses.tolist() == [0, 3, 0, 0, 0]
+    assert after.hidden.tolist() == [0, 0, 0, 0, 5]
+    expected = np.tile(HALF, (5, 1))
+    expected[0] += 0.25 * 0.8 * (np.array([6.0, 12.0]) - HALF)
+    # of the fourth, which is in front, the box is as large as it was
+    assert_allclose(after.half_sizes, expected)
+    assert result.hidden.tolist() == [False, False, False, False, True]
+    assert not result.matrix[[1, 4]].any()
+
+
+@pytest.mark.parametrize(
+    ("factors", "alike"),
+    [((1.49, 1.0), True), ((1.51, 1.0), False), ((1.0, 0.67), True), ((1.0, 0.66), False)],
+)
+def test_who_is_in_front_has_a_box_of_about_the_own_size(
+    factors: tuple[float, float], alike: bool
+) -> None:
+    some = targets((100, 100))
+    seen = measured([(100.0, 100.0, *np.multiply(HALF, factors))], [(100.0, 100.0, 9.0, 12.0)])
+    result = moved(some, seen, [[1.0]], [0], [0], JpdaParams(same_size=1.5))
+    assert result.hidden.tolist() == [not alike]

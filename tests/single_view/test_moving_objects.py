@@ -8,7 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.single_view.pieces import PUBLISHED, Rectangle, labels_by_place, person, play
-from tracker.single_view.association_matrix.moving_objects import Situation
+from tracker.single_view.association_matrix.method import _apart, _estimates, _labels_of_fits
+from tracker.single_view.association_matrix.moving_objects import MovingObject, Situation, Track
+from tracker.single_view.association_matrix.silhouettes import Fits
 from tracker.single_view.protocol import ViewEvent
 
 RED, BLUE, GREEN = 1, 2, 3
@@ -172,6 +174,48 @@ def test_a_step_leaves_the_situation_before_as_it_was() -> None:
     play(meeting()[4:], situation=before)
     assert before.tracks == tracks
     np.testing.assert_array_equal(before.tracks[1].box, box)
+
+
+# ── what is handed on of them
+
+
+def situation_of(*objects: tuple[tuple[int, ...], bool], ages: dict[int, int]) -> Situation:
+    """Objects by their labels and whether both are followed apart; tracks of label k at 10 k."""
+    tracks = {
+        k: Track(k, np.array([10.0 * k, 5.0, 2.0, 3.0]), 9.0, np.ones(1), age)
+        for k, age in ages.items()
+    }
+    found = tuple(
+        MovingObject(labels, np.array([100.0 + k, 5.0, 8.0, 3.0]), 9, np.zeros(2), 0, followed)
+        for k, (labels, followed) in enumerate(objects)
+    )
+    return Situation(tracks, found, (), None, 9)
+
+
+FIVE = situation_of(
+    ((2,), False), ((5, 1), True), ((3, 4), False), ages={1: 4, 2: 3, 3: 2, 4: 9, 5: 3}
+)
+
+
+def test_who_is_followed_apart_has_a_box_of_his_own_and_who_is_hidden_that_of_both() -> None:
+    boxes, labels = _apart(FIVE)
+    assert labels.tolist() == [2, 5, 1, -1]
+    assert boxes[:, 0].tolist() == [20.0, 50.0, 10.0, 102.0]
+    boxes, labels = _estimates(FIVE, 3)
+    assert labels.tolist() == [1, 2, 4, 5]
+    assert boxes[:, 0].tolist() == [10.0, 20.0, 40.0, 50.0]
+    nobody = _estimates(Situation.start(), 1), _apart(Situation.start())
+    assert [one.shape for one, _ in nobody] == [(0, 4)] * 2
+
+
+def test_fits_in_an_object_are_named_if_it_is_one_persons_or_from_left_to_right() -> None:
+    owners = np.array([0, 0, 1, 1, 1, 2, 2])
+    boxes = np.array([[x, 5.0, 2.0, 3.0] for x in (1, 2, 60, 40, 50, 3, 4)], dtype=float)
+    fits = Fits(boxes, np.zeros(7), owners, np.ones(3, dtype=bool))
+    # the likeliest comes first: of two people the first two, and 1 is on the left of 5
+    assert _labels_of_fits(fits, FIVE).tolist() == [2, -1, 5, 1, -1, -1, -1]
+    one = Fits(boxes[2:3], np.zeros(1), owners[2:3], np.ones(3, dtype=bool))
+    assert _labels_of_fits(one, FIVE).tolist() == [-1]
 
 
 pieces = st.lists(

@@ -30,7 +30,7 @@ from tracker.sequences.reader import read_sequence
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.onnx.file import ports_of
 from tracker.single_view.onnx.layouts import proposals
-from tracker.single_view.onnx.network import Network, Settings
+from tracker.single_view.onnx.network import Network, Settings, _own
 
 SIZE = (64, 64)
 """Of the networks' pictures: 64 + 16 + 4 cells in YOLO's three grids."""
@@ -268,6 +268,112 @@ def test_an_unknown_layout_is_named_with_its_shapes() -> None:
         proposals({"features": np.zeros((1, 512))}, SIZE)
 
 
+# ── which layout it is, by its sizes
+
+
+def table_of(rows: int, columns: int, seed: int = 1) -> ndarray:
+    """Numbers between 0 and 1, boxes of 10 pixels and more."""
+    table = np.random.default_rng(seed).uniform(0.0, 1.0, (1, rows, columns)).astype(np.float32)
+    return table
+
+
+@pytest.mark.parametrize(("rows", "columns"), [(1000, 8), (300, 84), (1, 9)])
+def test_queries_of_one_table_are_people_by_themselves(rows: int, columns: int) -> None:
+    table = table_of(rows, columns)
+    found = proposals({"out": table}, (320, 320))
+    assert found.suppressed
+    np.testing.assert_allclose(found.scores, table[0, :, 4])
+    half = table[0, :, 2:4] / 2.0
+    corners = np.concatenate([table[0, :, :2] - half, table[0, :, :2] + half], axis=1)
+    np.testing.assert_allclose(found.corners, 320.0 * corners, rtol=1e-4, atol=1e-3)
+
+
+def test_a_table_of_another_grid_is_told_by_which_side_is_longer() -> None:
+    table = table_of(1001, 1002)
+    found = proposals({"out": table}, (320, 320))
+    assert not found.suppressed
+    np.testing.assert_allclose(found.scores, table[0, 4])
+    for rows, columns in ((1002, 1001), (1001, 8), (2000, 2000)):
+        with pytest.raises(ValueError, match="of no known layout"):
+            proposals({"out": table_of(rows, columns)}, (320, 320))
+    # the grid of YOLO with 80 classes and objectness, and with one class
+    grid = 40 * 40 + 20 * 20 + 10 * 10
+    with_objects = table_of(grid, 6)
+    found = proposals({"out": with_objects}, (320, 320))
+    np.testing.assert_allclose(found.scores, with_objects[0, :, 4] * with_objects[0, :, 5])
+    assert not found.suppressed
+    (three,) = (proposals({"out": table_of(3 * grid, 85)}, (320, 320)),)
+    assert len(three.scores) == 3 * grid
+
+
+def test_only_the_first_pictures_rows_of_a_list_count() -> None:
+    table = yolo_7_end_to_end()
+    table[1] = 1.0, *CORNERS, 0.0, 0.8
+    np.testing.assert_allclose(proposals({"out": table}, SIZE).scores, [0.9])
+    several = ssd()
+    several[0, 0, 3] = -1.0, 1.0, 0.7, *shares(CORNERS)
+    np.testing.assert_allclose(proposals({"out": several}, SIZE).scores, [0.9])
+
+
+@pytest.mark.parametrize(
+    ("rows", "count", "person", "suppressed"),
+    [
+        (1000, 80, 0, True), (1000, 91, 1, True), (1000, 90, 0, True), (1000, 92, 1, True),
+        (1001, 80, 1, False), (1001, 1, 0, False), (1001, 2, 1, False),
+    ],
+)  # fmt: skip
+def test_boxes_beside_scores_are_queries_or_places(
+    rows: int, count: int, person: int, suppressed: bool
+) -> None:
+    scores, boxes = table_of(rows, count), table_of(rows, 4, 2)
+    found = proposals({"a": scores, "b": boxes}, SIZE)
+    assert found.suppressed is suppressed
+    expected = scores[0]
+    if count == 92:  # the last one is nothing
+        powers = np.exp(expected)
+        expected = (powers / powers.sum(axis=1, keepdims=True))[:, :-1]
+    np.testing.assert_allclose(found.scores, expected[:, person], rtol=1e-5)
+    corners = boxes[0]
+    if suppressed:
+        half = corners[:, 2:] / 2.0
+        corners = np.concatenate([corners[:, :2] - half, corners[:, :2] + half], axis=1)
+    np.testing.assert_allclose(found.corners, 64.0 * corners, rtol=1e-4, atol=1e-3)
+
+
+@pytest.mark.parametrize(("largest", "factor"), [(1.5, 64.0), (1.6, 1.0)])
+def test_what_is_hardly_larger_than_one_is_a_share_of_the_picture(
+    largest: float, factor: float
+) -> None:
+    table = end_to_end()
+    table[0, :, :4] = 0.0
+    table[0, 0, :4] = 0.1, 0.2, largest, 0.9
+    found = proposals({"out": table}, (64, 64)).corners[0]
+    np.testing.assert_allclose(found, factor * table[0, 0, :4], rtol=1e-6)
+
+
+def test_peaks_of_a_map_are_the_highest_of_nine_and_two_hundred_at_most() -> None:
+    rng = np.random.default_rng(3)
+    heat, extent, offset = rng.random((1, 2, 60, 80)), *rng.random((2, 1, 2, 60, 80))
+    found = proposals({"hm": heat, "wh": extent, "off": offset}, (320, 240), 1)
+    peaks = [
+        (heat[0, 1, y, x], y, x)
+        for y, x in np.ndindex(60, 80)
+        if heat[0, 1, y, x] >= heat[0, 1, max(y - 1, 0) : y + 2, max(x - 1, 0) : x + 2].max()
+    ]
+    peaks = sorted(peaks, reverse=True)
+    assert len(peaks) > 200
+    assert len(found.scores) == 200
+    for (score, y, x), own, corners in zip(peaks, found.scores, found.corners, strict=False):
+        assert own == pytest.approx(score, rel=1e-5)
+        centre = np.array([x, y]) + offset[0, :, y, x]
+        half = extent[0, :, y, x] / 2.0
+        expected = 4.0 * np.concatenate([centre - half, centre + half])
+        np.testing.assert_allclose(corners, expected, rtol=1e-3, atol=1e-3)
+    assert found.suppressed
+    with pytest.raises(ValueError, match="of no known layout"):
+        proposals({"hm": heat[..., 1:], "wh": extent, "off": offset}, (320, 240))
+
+
 # ── into the network's picture and back ──────────────────────────────────────
 
 
@@ -387,6 +493,42 @@ def test_score_and_overlap(tmp_path: Path) -> None:
     )
     both = Network(path, Settings(overlap=0.98)).detect(dark)
     np.testing.assert_allclose(both.scores, [0.9, 0.7], atol=1e-5)
+
+
+def test_boxes_are_sorted_by_score_within_the_picture_and_of_half_a_pixel_at_least(
+    tmp_path: Path,
+) -> None:
+    table = np.zeros((1, 30, 6), np.float32)
+    rows = [
+        (-20.0, 10.0, 30.0, 50.0, 0.5, 0.0), (40.0, 10.0, 90.0, 50.0, 1.2, 0.0),
+        (10.0, 10.0, 10.4, 50.0, 0.9, 0.0), (10.0, 10.0, 10.6, 50.0, 0.35, 0.0),
+        (10.0, 10.0, 10.6, 50.0, 0.34, 0.0), (np.nan, 10.0, 20.0, 50.0, 0.9, 0.0),
+        (10.0, 40.0, 30.0, 40.4, 0.9, 0.0), (70.0, 10.0, 90.0, 50.0, 0.9, 0.0),
+        (8.0, 9.0, 10.0, 70.0, 0.6, 0.0),
+    ]  # fmt: skip
+    table[0, : len(rows)] = rows
+    table[0, 20:, :4] = 64.0  # in pixels
+    path = answering(tmp_path / "m.onnx", {"out": table})
+    found = Network(path, Settings()).detect(np.zeros((64, 64, 3), np.uint8))
+    np.testing.assert_allclose(found.scores, [1.0, 0.6, 0.5, 0.35])
+    np.testing.assert_allclose(
+        found.boxes,
+        [[39.5, 9.5, 24.0, 40.0], [7.5, 8.5, 2.0, 55.0], [-0.5, 9.5, 30.0, 40.0],
+         [9.5, 9.5, 0.6, 40.0]],
+        atol=1e-5,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("side", "values", "expected"),
+    [("2048", "bytes", (2048, "bytes")), ("2049", "signed", (640, "signed")),
+     ("0", "nothing", (640, "unit")), ("1", "", (1, "unit")), ("4.5", "unit", (640, "unit"))],
+)  # fmt: skip
+def test_what_a_file_says_of_its_pictures_counts_if_it_can_be(
+    side: str, values: str, expected: tuple[int, str]
+) -> None:
+    assert _own({"input_side": side, "pixel_values": values}) == expected
+    assert _own({}) == (640, "unit")
 
 
 # ── files that are no such networks ──────────────────────────────────────────

@@ -25,7 +25,7 @@ from tracker.sequences.sequence import Sequence, Template, View
 from tracker.single_view.box_sizes import upright_boxes
 from tracker.single_view.dropped import Dropped
 from tracker.single_view.pictures.foreground import pack, unpack
-from tracker.single_view.protocol import ViewResult
+from tracker.single_view.protocol import ViewResult, pack_samples, unpack_samples
 from tracker.single_view.rectification.sequence import RectifiedSequence
 from tracker.single_view.rectification.view import RectifiedView, rectified_view
 
@@ -262,6 +262,43 @@ def test_methods_get_the_reduced_recording_and_their_results_come_back(tmp_path:
         assert back.foreground is not None
         reduced = np.rint(view.factors * [1280, 800])
         assert unpack(back.foreground).shape == (reduced[1], reduced[0])
+
+
+def test_everything_that_a_result_draws_comes_back(tmp_path: Path) -> None:
+    sequence = recording(tmp_path, rolled(CAMERAS[0], 0.4))
+    rng = np.random.default_rng(2)
+    boxes, estimates, measurements = (
+        np.column_stack([rng.uniform(50.0, 200.0, (n, 2)), rng.uniform(5.0, 30.0, (n, 2))])
+        for n in (2, 3, 4)
+    )
+    with FrameReader(sequence) as reader:
+        rectified = RectifiedSequence.of(sequence, RunParameters(), reader)
+    view = rectified.views[0]
+    assert view is not None
+    sigmas, gates = rng.uniform(1.0, 5.0, (2, 4)), np.array([[50.0, 60.0, 90.0, 20.0, 400.0]])
+    result = replace(
+        ViewResult.of_boxes(boxes, np.ones(2), sigmas), estimates=estimates, gates=gates,
+        measurements=measurements, samples=pack_samples(boxes, np.array([0.5, 1.0])),
+    )  # fmt: skip
+    back = rectified.back(0, result)
+    np.testing.assert_allclose(back.boxes, view.boxes_back(boxes))
+    np.testing.assert_allclose(back.estimates, view.boxes_back(estimates))
+    np.testing.assert_allclose(back.measurements, view.boxes_back(measurements))
+    np.testing.assert_allclose(back.sigmas, view.sigmas_back(sigmas))
+    np.testing.assert_allclose(back.gates, view.gates_back(gates))
+    centres, weights = unpack_samples(back.samples)
+    np.testing.assert_allclose(centres, view.points_back(boxes[:, :2]), atol=0.4)
+    np.testing.assert_allclose(weights, [0.5, 1.0])
+    assert back.foreground is None
+    plain = replace(rectified, views=(None,))
+    assert plain.back(0, result) is result
+    # the template's bounds, upright again
+    (template,) = rectified.sequence.templates
+    drawn = np.array([340.0, 300.0, 40.0, 100.0])
+    own = view.drawn_box(drawn, HALF_EXTENTS)
+    np.testing.assert_allclose(
+        template.box, [own[0] - own[2], own[1] - own[3], 2.0 * own[2], 2.0 * own[3]], atol=1.0
+    )
 
 
 def test_methods_that_look_at_no_pictures_get_the_recording_as_it_is(tmp_path: Path) -> None:

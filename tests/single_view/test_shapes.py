@@ -15,7 +15,7 @@ from tracker.kernels.pictures.channels import ORIENTATIONS, gradients
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import upright_boxes
-from tracker.single_view.colour.peaks import colour_ratios
+from tracker.single_view.colour.peaks import PeakFinder, _discount, colour_ratios
 from tracker.single_view.colour.trust import templates_suffice
 from tracker.single_view.pictures.foreground import BackgroundModel, tone_curve
 from tracker.single_view.pictures.foreground.exposure import square_roots
@@ -202,3 +202,26 @@ def test_colours_speak_for_a_shape_by_a_peak_and_against_it_by_its_own_box() -> 
     np.testing.assert_allclose(
         colour_ratios(np.zeros((2, 0), bool), np.zeros(0), of_shapes[2:], 0.1), [0.0, -1.0]
     )
+
+
+def test_whoever_shares_a_shape_with_somebody_nearer_to_its_middle_is_behind() -> None:
+    """Two peaks of one person are one; the other's peak farther from the shape's middle is not."""
+    boxes = np.array([[100.0, 60.0, 8.0, 20.0], [200.0, 60.0, 8.0, 20.0]])
+    none = np.zeros((0, 4))
+    found = Shapes(boxes, np.zeros(2), np.array([[20.0, 40.0]] * 2), none, Windows(none, none),
+                   np.zeros(0))  # fmt: skip
+    # by its width the first is farther off than the second by the height
+    peaks = np.array([[103.0, 60.0, 8, 20], [100.0, 65.0, 8, 20], [101.0, 66.0, 8, 20],
+                      [204.0, 60.0, 8, 20]])  # fmt: skip
+    supported = np.array([[True, True, True, False], [False, False, False, True]])
+    person = np.array([0, 1, 1, 0])
+    assert PeakFinder._behind(found, peaks, person, supported).tolist() == [True] + [False] * 3
+    assert not PeakFinder._behind(found, peaks, np.zeros(4, dtype=int), supported).any()
+    edges = np.array([[106.9, 60.0], [107.1, 60.0], [100.0, 79.9], [100.0, 80.1]])
+    near = PeakFinder._near(found, np.column_stack([edges, np.ones((4, 2))]))
+    assert near.tolist() == [[True, False, True, False], [False] * 4]
+
+
+def test_doubt_is_discounted_by_the_share_that_would_not_be_seen_and_belief_is_not() -> None:
+    found = _discount(np.array([-3.0, -3.0, -3.0, 2.0]), np.array([0.0, 1.0, 0.25, 0.5]))
+    assert_allclose(found, [-3.0, 0.0, np.log(0.25 + 0.75 * np.exp(-3.0)), 2.0], atol=1e-12)

@@ -167,3 +167,45 @@ def test_the_radius_of_walkers_is_found_and_positions_gain_by_it(radius: float) 
     ]
     stated, held = ((own < chi2.ppf(0.95, 2)).mean() for own in squares)
     assert stated < 0.9 < held
+
+
+def test_radius_and_level_are_those_of_one_least_squares_fit_of_everything() -> None:
+    """Of every row's place, radius, level, offsets and sizes at once, each by its prior."""
+    seen, independent = rows_of(np.random.default_rng(7), 0.15, 0.2, cameras=3, rows=40), 0.7
+    seen.there[::5, 1] = 0.0
+    seen.there[3] = [1.0, 0.0, 0.0]  # of one camera alone nothing is taken
+    found = estimate_bodies(seen, upright(3), 2, independent, PRIORS)
+    there = seen.there * (seen.there.sum(axis=1) >= 2.0)[:, None]
+    values = seen.residuals[there > 0.0]
+    variances = np.maximum(((values - values.mean(axis=0)) ** 2).mean(axis=0), 1e-6)
+    rows, unknown = [], 2 + 6 + 2
+    for k, c in zip(*np.nonzero(there), strict=True):
+        for number in range(3):
+            row = np.zeros(3 * 40 + unknown + 1)
+            row[3 * k : 3 * k + 3] = seen.jacobians[k, c, number]
+            if number:
+                row[120] = seen.edges[k, c, number - 1]
+                row[122 + 2 * c + number - 1] = 1.0
+            else:
+                row[121] = seen.levels[k, c]
+            row[128 + seen.owners[k]] = upright(3)[number]
+            row[-1] = seen.residuals[k, c, number]
+            rows.append(np.sqrt(independent / variances[number]) * row)
+    sigmas = [PRIORS.radius, 0.3, *[PRIORS.offset] * 6, *[PRIORS.size] * 2]
+    design = np.array(rows)
+    precision = design[:, :-1].T @ design[:, :-1]
+    precision += np.diag([*[1e-6] * 120, *(1.0 / np.square(sigmas))])
+    covariance = np.linalg.inv(precision)
+    best = covariance @ design[:, :-1].T @ design[:, -1]
+    assert found.radius == pytest.approx(best[120], rel=1e-3)
+    assert found.radius_sigma == pytest.approx(np.sqrt(covariance[120, 120]), rel=1e-3)
+    level = np.hypot(best[121], np.sqrt(covariance[121, 121]))
+    assert found.level_sigma == pytest.approx(level, rel=1e-3)
+    # what the radius moves in all others, where it alone is added
+    rest = np.delete(np.arange(130), 120)
+    moved = -np.linalg.solve(precision[np.ix_(rest, rest)], precision[rest, 120]) * best[120]
+    assert_allclose(found.sizes, moved[-2:], rtol=1e-3, atol=1e-6)
+    offsets = moved[121:127].reshape(3, 2)
+    shift = (best[120] * seen.edges + offsets).mean(axis=2)
+    offsets -= (shift * there).sum() / there.sum()
+    assert_allclose(found.offsets[:, 1:], offsets, rtol=1e-3, atol=1e-6)

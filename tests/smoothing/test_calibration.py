@@ -12,6 +12,7 @@ from numpy.testing import assert_allclose
 
 from tests import world
 from tests.smoothing.known import CAMERAS, Known, given, known
+from tracker.kernels.gating import Measurements
 from tracker.smoothing.calibration import (
     FEWEST,
     NARROWEST,
@@ -21,6 +22,7 @@ from tracker.smoothing.calibration import (
     Calibration,
     free,
 )
+from tracker.smoothing.noise import NoiseModel
 from tracker.smoothing.smoother import Smoother
 
 U, W = np.array([0.0, -1.0, 1.0]), np.array([0.0, 1.0, 1.0])
@@ -152,3 +154,14 @@ def test_the_error_of_the_path_itself_adds_to_the_noise_and_boxes_that_err_alike
     alike = replace(wide, seen=[replace(o, boxes=b) for o, b in zip(wide.seen, first, strict=True)])
     same = alike.smoother()
     assert (same.learn(paths, links, same.uncalibrated(paths)).noises > 1.5 * plain).all()
+
+
+def test_with_the_noise_of_the_recording_a_box_is_as_exact_as_it_is_small() -> None:
+    noise = NoiseModel(np.array([0.02, 0.03, 0.04]), 2.0, np.array([0.05, 0.03, 0.01]), 1.0, 1.0)
+    values = np.array([[9.0, 100.0, 160.0], [9.0, 100.0, 101.0]])
+    learnt = replace(Calibration.none(1, 3, 3), noise=noise)
+    found = learnt.measured(1, Measurements(values, np.ones((2, 3, 3))))
+    assert found.values is values
+    shares = noise.white**2 + noise.persistent**2
+    for own, half in zip(found.noises, (30.0, 1.0), strict=True):  # a pixel at least
+        assert_allclose(own, np.diag(half**2 * shares + 4.0))

@@ -9,13 +9,18 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from tests import world
+from tests.smoothing.known import PLAIN, known
 from tests.smoothing.test_appearance import noisy, recording
 from tests.smoothing.test_boundaries import PRIOR, fitted, standing
+from tracker.corrections.kinds import make
 from tracker.filters.models import Motion
+from tracker.fusion.visibility import inside_probability
 from tracker.parameters.groups.fusion import FusionParams
 from tracker.parameters.groups.smoothing import SmoothingParams
-from tracker.smoothing.paths import Links
-from tracker.smoothing.smoother import BoxAssociations
+from tracker.single_view.protocol import ViewResult
+from tracker.smoothing.paths import Links, Paths
+from tracker.smoothing.smoother import BoxAssociations, Smoother
 from tracker.smoothing.tracklets import costs, linking
 from tracker.smoothing.tracklets.appearance import AppearanceModel
 from tracker.smoothing.tracklets.motion import Ends, Pairs, motion_gains
@@ -200,3 +205,65 @@ def test_a_join_is_told_with_its_odds_against_the_best_other() -> None:
     assert (told.other, told.probability, told.reason) == (4, 1.0, "a person said so")
     (tied,) = linking.join_decisions(cut, pairs, [[2, 3]], [8], -3.0, set())
     assert tied.reason == "a person said so"
+
+
+def test_an_empty_way_between_two_pieces_counts_against_their_link(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Of each step of the gap, straight from the one to the other: log(1 − p_D) of each camera
+    that has a frame and shows the place and no box there."""
+    path = world.walk([(-0.4, 0.0), (0.5, 0.3)], [0.0, 3.0], 10.0)[:30, None]
+    scene = known(path, hidden=lambda camera, person, step: 10 <= step < 15 and camera != 2)
+    views = scene.views
+    views[12] = (ViewResult.of_no_frame(), *views[12][1:])
+    smoother = Smoother(scene.whole, PLAIN.fusion, views)
+    states, spread = np.zeros((30, 6)), np.tile(np.eye(6), (30, 1, 1))
+    states[:, :3] = path[:, 0]
+    own = [np.arange(10), np.arange(15, 20), np.arange(21, 30)]
+    paths = Paths.of(
+        [1, 2, 3], [0, 15, 21], [states[rows] for rows in own], [spread[rows] for rows in own], 6
+    )
+    pairs = Pairs(np.array([0, 0, 1]), np.array([1, 2, 2]), np.array([6, 12, 2]), np.zeros(3))
+    expected = []
+    for i, j in ((0, 1), (0, 2), (1, 2)):
+        begin, end = paths.lasts[i], paths.firsts[j]
+        total = 0.0
+        for step in range(begin + 1, end):
+            share = (step - begin) / (end - begin)
+            place = ((1.0 - share) * states[begin] + share * states[end])[None]
+            for c, camera in enumerate(scene.whole.cameras):
+                seen = smoother.model.target.expected(camera, place)
+                chance = 0.95 * inside_probability(camera, seen, np.zeros((1, 6, 6)))[0]
+                if not len(views[step][c].boxes) and not views[step][c].blind:
+                    total += np.log(1.0 - chance)
+        expected.append(total)
+    assert max(expected[:2]) < -20.0
+    assert_allclose(costs._seen_empty(smoother, paths, pairs, 0.25), 0.4 * np.array(expected))
+    monkeypatch.setattr(costs, "_POINTS", 3)
+    assert_allclose(costs._seen_empty(smoother, paths, pairs, 0.25), 0.4 * np.array(expected))
+
+
+# ── corrections that wait until the links without them are known
+
+
+@pytest.mark.parametrize(
+    ("x", "careful", "unmet"),
+    [
+        # two tracks at 0 and 5 m, and nobody at 9 m; "different" of one track is not met
+        ([0.0, 0.0, 5.0], True, [0, 2]), ([0.0, 0.0, 5.0], False, [0, 1, 2]),
+        ([9.0, 0.0, 5.0], True, [0]), ([0.0, 9.0, 5.0], True, [0]),
+        ([9.0, 0.0, 5.0], False, [0, 1, 2]), ([], True, []),
+    ],
+)  # fmt: skip
+def test_corrections_that_are_not_met_are_applied_one_of_a_track_at_a_time(
+    x: list[float], careful: bool, unmet: list[int]
+) -> None:
+    paths = standing((1, 0, 9, 0.0), (2, 0, 9, 5.0))
+    waiting = [
+        make(kind="different", places=[[k + 1, at, 0.0, 0.85], [8, at, 0.0, 0.85]])
+        for k, at in enumerate(x)
+    ]
+    found = linking._unmet(paths, waiting, 2, careful=careful)
+    assert found == [waiting[k] for k in unmet]
+    met = make(kind="different", places=[[1, 0.0, 0.0, 0.85], [8, 5.0, 0.0, 0.85]])
+    assert linking._unmet(paths, [met, *waiting], 2, careful=careful) == found

@@ -10,7 +10,7 @@ from numpy import ndarray
 from numpy.testing import assert_allclose
 
 from tracker.kernels.smoothing.presence import ExistenceTransitions, presence
-from tracker.smoothing.paths import Links, Paths, contested_shares, split_paths
+from tracker.smoothing.paths import Links, Paths, contested_shares, join_chains, split_paths
 from tracker.smoothing.tracklets.solver import TrackletGraph, link_tracklets
 
 
@@ -209,3 +209,34 @@ def test_a_cut_leaves_the_clear_rows_where_they_were() -> None:
     assert np.diff(pieces.starts).tolist() == [2, 2, 1, 3]
     assert_allclose(pieces.states, paths.states[kept])
     assert pieces.steps.tolist() == paths.steps[kept].tolist()
+
+
+def test_pieces_in_a_row_are_one_path_straight_through_their_gaps() -> None:
+    pieces = together(straight(1, 3, 0.0, 3), straight(2, 0, 5.0, 2), straight(7, 8, 1.4, 4))
+    whole, place = join_chains(pieces, [[1], [0, 2]], [9, 4])
+    assert (whole.labels.tolist(), whole.firsts.tolist()) == ([9, 4], [0, 3])
+    assert whole.lasts.tolist() == [1, 11]
+    assert place.tolist() == [2, 3, 4, 0, 1, 7, 8, 9, 10]
+    assert_allclose(whole.states[place], pieces.states)
+    assert_allclose(whole.covariances[place], pieces.covariances)
+    assert_allclose(whole.states[5:7, 0], [0.2 + 0.4, 0.2 + 0.8])
+    assert_allclose(whole.covariances[5:7], np.tile(np.eye(6), (2, 1, 1)))
+    some, left_out = join_chains(pieces, [[2]], [5])
+    assert left_out.tolist() == [-1] * 5 + [0, 1, 2, 3]
+    assert some.firsts.tolist() == [8]
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_box_is_lost_to_the_other_with_the_largest_share(seed: int) -> None:
+    """Of each row the share of its boxes that another row has too, by going through all links."""
+    rng = np.random.default_rng(seed)
+    paths = together(straight(1, 0, 0.0, 3), straight(2, 0, 0.0, 3))
+    links = Links(*rng.integers(0, [[2], [6], [3]], (3, 14)), rng.uniform(0.05, 1.0, 14))
+    own, lost = np.zeros(6), np.zeros(6)
+    for k in range(14):
+        same = (links.cameras == links.cameras[k]) & (links.boxes == links.boxes[k])
+        same[k] = False
+        rival = links.shares[same].max(initial=0.0)
+        own[links.rows[k]] += links.shares[k]
+        lost[links.rows[k]] += min(links.shares[k], rival)
+    assert_allclose(contested_shares(paths, links), lost / np.maximum(own, 1e-12))

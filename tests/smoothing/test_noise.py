@@ -342,3 +342,46 @@ def test_ellipses_hold_the_truth_where_calibrations_are_off(*, smoothed: bool) -
         for room, seed in zip(rooms, seeds, strict=True)
     ]
     assert np.mean(shares) > 0.9
+
+
+def test_a_sample_is_cut_into_windows_with_the_boxes_of_their_rows() -> None:
+    """By going through the rows one after another."""
+    rng = np.random.default_rng(4)
+    paths = paths_of(2 * WINDOW + 5, 30)
+    paths.states[:] = rng.normal(size=paths.states.shape)
+    rows = np.array([*range(WINDOW + 10), *range(WINDOW + 15, 2 * WINDOW + 5),
+                     *range(2 * WINDOW + 5, 2 * WINDOW + 30)])  # fmt: skip
+    boxes = rng.permutation([(c, r) for c in range(3) for r in range(2 * WINDOW + 35)
+                             if rng.random() < 0.6])  # fmt: skip
+    count = len(boxes)
+    seen = SureBoxes(
+        boxes[:, 0], boxes[:, 1], rng.normal(size=(count, 3)), rng.normal(size=(count, 3, 3)),
+        rng.uniform(20.0, 80.0, count),
+    )  # fmt: skip
+    scales, motion = rng.uniform(0.5, 2.0, len(paths.states)), motion_of()
+    sample = NoiseSample(paths, rows, seen, motion, scales, STEP)
+    windows, order = sample.windows()
+    starts = [
+        k for k, row in enumerate(rows.tolist())
+        if k == 0 or rows[k - 1] != row - 1 or row in (WINDOW, 2 * WINDOW, 2 * WINDOW + 5)
+    ]  # fmt: skip
+    assert windows.starts.tolist() == [*starts, len(rows)]
+    assert_allclose(windows.noise_scales, scales[rows])
+    names: dict[tuple[int, int], int] = {}
+    for k, row in enumerate(rows.tolist()):
+        expected = np.zeros(6)
+        if k not in starts:
+            expected = motion.transition @ paths.states[row - 1] - paths.states[row]
+        assert_allclose(windows.drifts[k], expected)
+        own = order[windows.boxes[k] : windows.boxes[k + 1]]
+        assert sorted(own.tolist()) == np.flatnonzero(seen.rows == row).tolist()
+        window = int(np.searchsorted(starts, k, side="right"))
+        for place, box in enumerate(own.tolist(), int(windows.boxes[k])):
+            slot = int(windows.slots[place])
+            assert 0 <= slot < 3
+            assert names.setdefault((window, int(seen.cameras[box])), slot) == slot
+            assert_allclose(windows.residuals[place], seen.residuals[box])
+            assert_allclose(windows.jacobians[place], seen.jacobians[box])
+            assert windows.half_heights[place] == seen.half_heights[box]
+    assert len({(window, slot) for (window, _), slot in names.items()}) == len(names)
+    assert_allclose(np.diag(sample.deviation.prior), [0.25] * 3 + [1.0] * 3)

@@ -10,12 +10,14 @@ import pytest
 from numpy import ndarray
 from numpy.testing import assert_allclose
 from scipy.optimize import least_squares
+from scipy.stats import multivariate_normal
 
 from tests import world
 from tests.smoothing.known import PLAIN, Known, backwards, known
 from tracker.filters.models import Motion
 from tracker.kernels.smoothing import passes
-from tracker.smoothing.smoother import START_SIGMA
+from tracker.smoothing.calibration import FEWEST
+from tracker.smoothing.smoother import START_SIGMA, _step_correlation
 
 
 def one_walker(steps: int = 20) -> Known:
@@ -156,3 +158,62 @@ def test_boxes_however_precise_leave_covariances_positive(step: float, precision
         )  # fmt: skip
         assert np.linalg.eigvalsh(found.covariances).min() > 0.0
         assert_allclose(found.means[:, :3], np.tile(place, (rows, 1)), atol=1.0)
+
+
+def test_long_recordings_are_smoothed_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Rows, steps and boxes seven at a time instead of all at once."""
+    scene = known(np.tile([[0.3, 0.2, 0.85], [-0.6, 0.5, 0.85]], (60, 1, 1)), sigma=2.0)
+
+    def everything() -> list[ndarray]:
+        smoother, (paths, links) = scene.smoother(), scene.paths(sigma=0.1)
+        fitted = smoother.fit(paths, links, 2)
+        shared = smoother.associate(fitted.paths)
+        learnt = smoother.learn(fitted.paths, shared.links, smoother.uncalibrated(paths))
+        reported = smoother.reported(fitted, shared.links, learnt)
+        assert reported is not None
+        heights = smoother.heights(fitted.paths, shared.links, reported.learnt, reported.noise)
+        order = np.lexsort((shared.links.boxes, shared.links.rows, shared.links.cameras))
+        links = shared.links.take(order)
+        return [
+            fitted.paths.states, fitted.odds, shared.chances, shared.missed, shared.hidden_by,
+            links.rows, links.boxes, links.shares, learnt.offsets, learnt.noises,
+            reported.covariances, *heights,
+        ]  # fmt: skip
+
+    whole = everything()
+    monkeypatch.setattr("tracker.smoothing.smoother._AT_ONCE", 7)
+    for found, expected in zip(everything(), whole, strict=True):
+        assert_allclose(found, expected, rtol=1e-5, atol=1e-9)
+
+
+def test_a_newcomer_is_anywhere_in_the_room_and_as_fast_as_newcomers_are() -> None:
+    """The prior is wide, and its density at its middle stands for one over the room's volume."""
+    smoother = one_walker().smoother()
+    prior, motion = smoother.prior, smoother.model.motion
+    assert_allclose(np.diag(prior), [START_SIGMA**2] * 3 + [motion.start_velocity**2] * 3)
+    density = multivariate_normal(np.zeros(3), prior[:3, :3]).pdf(np.zeros(3))
+    assert np.exp(-smoother.log_place) == pytest.approx(density * 4.4 * 4.4 * 2.2)
+
+
+def test_errors_of_one_step_and_the_next_correlate_within_a_path() -> None:
+    rng = np.random.default_rng(2)
+    rows = np.delete(np.arange(150), [20, 21, 90])
+    owners = np.repeat([0, 1], 75)
+    residuals = rng.normal(size=(len(rows), 3))
+    residuals[1:] += 0.6 * residuals[:-1]
+    pairs = [
+        (k, m)
+        for k, m in itertools.product(range(len(rows)), repeat=2)
+        if rows[m] == rows[k] + 1 and owners[rows[m]] == owners[rows[k]]
+    ]
+    one, other = (residuals[list(side)].ravel() for side in zip(*pairs, strict=True))
+    expected = one @ other / np.sqrt((one @ one) * (other @ other))
+    mixed = rng.permutation(len(rows))
+    found = _step_correlation(rows[mixed], owners, residuals[mixed])
+    assert found == pytest.approx(expected)
+    assert _step_correlation(rows, owners, -np.ones((len(rows), 3))) == 0.95
+    assert _step_correlation(rows, owners, (-1.0) ** rows[:, None]) == 0.0
+    assert _step_correlation(rows[:20], owners, np.ones((20, 3))) == 0.0  # of too few
+    few = np.arange(FEWEST + 1)
+    assert _step_correlation(few, np.zeros(200, dtype=int), np.ones((FEWEST + 1, 1))) > 0.0
+    assert _step_correlation(few[1:], np.zeros(200, dtype=int), np.ones((FEWEST, 1))) == 0.0

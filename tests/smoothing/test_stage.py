@@ -13,6 +13,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from tests import world
 from tests.random_rooms import random_room
 from tests.smoothing.known import CAMERAS, PLAIN, Known, backwards, known
+from tests.smoothing.test_boundaries import standing
 from tracker.corrections.kinds import make
 from tracker.corrections.outcomes import outcomes
 from tracker.evaluation import evaluate_sequence
@@ -21,6 +22,7 @@ from tracker.parameters.values import with_values
 from tracker.runs import pipeline
 from tracker.smoothing import create
 from tracker.smoothing.result import Smoothed
+from tracker.smoothing.stage import _outside_spans, _removal
 
 SETTLED = with_values(PLAIN, {"smoothing_method": "identities", "smoothing.learning": True})
 POSITIONS = with_values(SETTLED, {"smoothing_method": "positions"})
@@ -289,3 +291,37 @@ def test_with_unscented_points_gaps_are_judged_by_the_cameras_as_with_the_linear
         for kind in ("extended", "unscented")
     ]
     assert scores[1] == pytest.approx(scores[0], abs=0.01)
+
+
+@pytest.mark.parametrize("method", [POSITIONS, SETTLED])
+def test_a_long_recording_is_read_in_parts(
+    method: RunParameters, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene = passing()
+    whole = smoothed(scene, labels_of(scene), method)
+    monkeypatch.setattr("tracker.smoothing.stage._AT_ONCE", 7)
+    parts = smoothed(scene, labels_of(scene), method)
+    assert_array_equal(parts.labels, whole.labels)
+    assert_allclose(parts.means, whole.means, atol=1e-9)
+    assert_allclose(parts.covariances, whole.covariances, atol=1e-9)
+
+
+def test_who_is_removed_is_told_with_the_odds_against_it() -> None:
+    paths = standing((4, 3, 9, 0.0), (6, 5, 9, 1.0))
+    for odds, reason in (
+        (-2.0, "over its whole life it is likelier nobody"),
+        (0.0, "over its whole life it is likelier nobody"),
+        (1.5, "no piece of it stands by boxes of its own"),
+    ):
+        found = _removal(paths, 1, odds)
+        assert (found.kind, found.step, found.label, found.other) == ("removed", 5, 6, 6)
+        assert found.probability == pytest.approx(1.0 / (1.0 + np.exp(odds)))
+        assert found.against == pytest.approx(1.0 - found.probability)
+        assert found.reason == reason
+
+
+def test_outside_the_steps_that_are_said_nobody_is_there() -> None:
+    paths = standing((4, 3, 9, 0.0), (6, 5, 9, 1.0))
+    away = _outside_spans(paths, {4: (5, 8), 6: (0, 9), 7: (0, 0)})
+    assert paths.steps[away].tolist() == [3, 4, 9]
+    assert set(paths.owners[away].tolist()) == {0}

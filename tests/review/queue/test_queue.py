@@ -2,21 +2,43 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
+
 import numpy as np
 import pytest
+from numpy import ndarray
 
+from tests import world
 from tests.conftest import short
 from tests.engine.synthetic import crossing, sequence, walk
 from tests.runs.test_corrected_runs import run_of, with_a_gap
-from tracker.corrections import Place
-from tracker.corrections.kinds import Kind
+from tracker.corrections import Correction, Place
+from tracker.corrections.kinds import Kind, make
 from tracker.fusion.trajectories import Trajectories, apply_corrections
 from tracker.review.queue import queue
 from tracker.review.queue.clear_places import ClearPlaces
-from tracker.review.queue.item import Alternative, TrackRows, confirm, propose
+from tracker.review.queue.item import (
+    Alternative,
+    ItemKind,
+    ReviewItem,
+    TrackRows,
+    confirm,
+    propose,
+)
 from tracker.review.queue.linking import Move, Tracklet
 from tracker.review.queue.other_run import OtherRun
-from tracker.review.queue.ranking import IdentityReach, _with_none_of_them
+from tracker.review.queue.ranking import (
+    IdentityReach,
+    _as_it_is,
+    _Site,
+    _with_halves,
+    _with_none_of_them,
+    is_answered,
+    once_each,
+    words_of,
+)
 
 PAIRED = ("same", "different", "exchanged")
 """Kinds of corrections of two places or more of one person or of two."""
@@ -214,3 +236,285 @@ def test_who_was_named_is_not_asked_whether_he_is_anybody() -> None:
     after = queue(run_of(whole, confirm((named,))))
     assert "short" not in [one.kind for one in after.items]
     assert after.answered > 0
+
+
+# ── what is asked, by hand
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_what_hangs_on_a_place_is_every_row_by_the_odds_that_no_mistake_lies_between(
+    seed: int,
+) -> None:
+    rng = np.random.default_rng(seed)
+    paths = np.full((40, 2, 3), 1.0)
+    paths[rng.random(40) < 0.2, 0] = np.nan
+    lanes = TrackRows(world.tracks(paths))
+    mistakes = [
+        (1, int(at), int(at + rng.integers(1, 5)), float(rng.uniform(0.1, 1.2)))
+        for at in rng.integers(-2, 42, 5)
+    ]
+    reach = IdentityReach(lanes, mistakes)
+    frames = lanes.tracks.frames[lanes.rows[1]].tolist()
+    parts = dict.fromkeys(range(len(frames)), 1.0)
+    for _, before, after, wrong in mistakes:  # at the first row from the middle on
+        place = next((k for k, f in enumerate(frames) if f >= (before + after + 1) // 2), 0)
+        parts[place] *= 1.0 - min(wrong, 0.95)
+    for step in (*frames[::6], frames[-1]):
+        at = frames.index(step)
+        heads = sum(float(np.prod([parts[m] for m in range(k + 1, at + 1)])) for k in range(at + 1))
+        tails = sum(
+            float(np.prod([parts[m] for m in range(at + 1, k + 1)])) for k in range(at, len(frames))
+        )
+        assert reach.before(1, step) == pytest.approx(heads)
+        assert reach.after(1, step) == pytest.approx(tails)
+    assert (reach.before(2, 9), reach.after(2, 9)) == (10.0, 31.0)
+    assert (reach.before(1, -1), reach.after(1, 40)) == (0.0, 0.0)
+
+
+def stretch(track: int, first: int, last: int, x: float) -> Tracklet:
+    """Somebody who stands at x."""
+    return Tracklet(track, Place(first, x, 0.0, 1.0), Place(last, x, 0.0, 1.0))
+
+
+ONE, OTHER = stretch(1, 0, 10, 0.0), stretch(2, 0, 11, 1.0)
+AFTER, ANOTHER = stretch(3, 20, 30, 0.1), stretch(4, 21, 30, 1.1)
+
+
+@pytest.mark.parametrize(
+    ("move", "words", "kinds", "pairs", "as_it_is"),
+    [
+        (Move((ONE,), (AFTER,), "join", 0.0), "1 goes on as 3", ["same"], [(10, 20)],
+         [("different", (10, 20))]),
+        (Move((ONE,), (AFTER,), "cut", 0.0), "two people", ["different"], [(10, 20)],
+         [("same", (10, 20))]),
+        (Move((ONE, OTHER), (AFTER, ANOTHER), "exchange", 0.0), "exchanged with 2", ["exchanged"],
+         [(10, 21), (11, 20)], [("same", (10, 20)), ("same", (11, 21))]),
+        (Move((ONE, OTHER), (AFTER,), "exchange", 0.0), "2 goes on as 3", ["same"], [(11, 20)],
+         [("same", (10, 20))]),
+        (Move((ONE,), (AFTER, ANOTHER), "exchange", 0.0), "1 goes on as 4", ["same"], [(10, 21)],
+         [("same", (10, 20))]),
+        # of one track, which comes first: it is exchanged with the one that it goes on as
+        (Move((ONE, replace(OTHER, track=1)), (AFTER, ANOTHER), "exchange", 0.0),
+         "exchanged with 4", ["exchanged"], [(10, 21), (11, 20)],
+         [("same", (10, 20)), ("same", (11, 21))]),
+        (Move((ONE,), (replace(AFTER, track=1),), "join", 0.0), "1 goes on", ["same"], [(10, 20)],
+         [("different", (10, 20))]),
+    ],
+)  # fmt: skip
+def test_what_a_move_says_otherwise_and_what_it_says_as_it_is(
+    move: Move, words: str, kinds: list[str], pairs: list[tuple[int, int]],
+    as_it_is: list[tuple[str, tuple[int, int]]],
+) -> None:  # fmt: skip
+    found = move.alternative
+    assert found.words == words
+    assert [one.kind for one in found.corrections] == kinds
+    linked = [
+        (a.step, b.step)
+        for one in found.corrections
+        for a, b in (*one.constraints.must_link, *one.constraints.cannot_link)
+    ]
+    assert linked[: len(pairs)] == pairs
+    now = _as_it_is(move)
+    assert [(one.kind, (one.places[0].step, one.places[1].step)) for one in now] == as_it_is
+    assert move.stake([3.0, 4.0], [2.0, 9.0]) == 7.0
+    assert move.stake([3.0, 4.0], [2.0]) == 2.0
+    halves = [[c.places[0].step for c in half.corrections] for half in move.halves]
+    assert halves == ([[10], [11]] if kinds == ["exchanged"] else [])
+
+
+def test_moves_of_one_place_share_what_is_left_of_one_and_a_half_is_a_tenth() -> None:
+    """exp(l) over 1 and the sum of all; of two that say the same the likelier counts."""
+    exchange = Move((ONE, OTHER), (AFTER, ANOTHER), "exchange", -0.5)
+    moves = [
+        Move((ONE,), (AFTER,), "cut", 0.2), exchange, replace(exchange, log_odds=-2.0),
+        Move((ONE,), (AFTER, ANOTHER), "exchange", -1.0),
+    ]  # fmt: skip
+    site = _Site.of(moves)
+    total = 1.0 + np.exp(0.2) + np.exp(-0.5) + np.exp(-1.0)
+    shares = [np.exp(0.2) / total, np.exp(-0.5) / total, np.exp(-1.0) / total]
+    assert [one.probability for one in site.alternatives] == pytest.approx(shares)
+    assert site.wrong == pytest.approx(sum(shares))
+    assert site.move is exchange, "a cut is asked as what it may be instead"
+    assert _Site.of(moves[:1]).move is moves[0]
+    halves = _with_halves(site.moves, list(site.alternatives))
+    assert [one.words for one in halves] == [
+        "two people", "exchanged with 2", "1 goes on as 4", "2 goes on as 3"
+    ]  # fmt: skip
+    # the first half is there already
+    assert [one.probability for one in halves] == pytest.approx(
+        [shares[0], 0.9 * shares[1], shares[2], 0.1 * shares[1]]
+    )
+    both = _with_halves((exchange,), [site.alternatives[1]])
+    assert [one.probability for one in both] == pytest.approx(
+        [share * shares[1] for share in (0.8, 0.1, 0.1)]
+    )
+    assert _with_halves(site.moves, list(site.alternatives[:1])) == [site.alternatives[0]]
+
+
+def asked(*corrections: Correction, first: int = 10, last: int = 20) -> ReviewItem:
+    """What would be answered by corrections."""
+    return ReviewItem(
+        "join", "", "", first, last, (1, 3), (ONE.end, AFTER.begin), 0.5, 10,
+        (Alternative("as it is", 0.5, ()), Alternative("other", 0.5, corrections)),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("kind", "late", "x", "answered"),
+    [
+        ("same", 0, 0.0, True), ("different", 0, 0.0, True), ("same", 5, 0.0, True),
+        ("same", 6, 0.0, False), ("same", -5, 0.5, True), ("same", -6, 0.0, False),
+        ("same", 0, 0.51, False), ("name", 0, 0.0, False), ("came", 0, 0.0, False),
+    ],
+)  # fmt: skip
+def test_what_was_said_of_nearly_the_same_places_is_an_answer(
+    kind: Kind, late: int, x: float, answered: bool
+) -> None:
+    (own,) = propose("same", (ONE.end, AFTER.begin))
+    places = [place._replace(step=place.step + late, x=place.x + x)
+              for place in (ONE.end, AFTER.begin)]  # fmt: skip
+    told = propose(kind, places if kind in PAIRED else places[:1],
+                   **({"name": "Anna"} if kind == "name" else {}))  # fmt: skip
+    assert is_answered(asked(own), told, 5) is answered
+    # both places must be near
+    half = propose("same", (ONE.end, AFTER.begin._replace(x=3.0)))
+    assert not is_answered(asked(own), half, 5)
+    (came,) = propose("came", (AFTER.begin,))
+    assert is_answered(asked(came), (came,), 5)
+    assert not is_answered(asked(came), propose("left", (AFTER.begin,)), 5)
+
+
+@pytest.mark.parametrize(
+    ("first", "last", "answered"), [(10, 20, True), (11, 20, False), (10, 19, False), (0, 99, True)]
+)
+def test_what_lies_in_steps_that_were_checked_is_answered(
+    first: int, last: int, answered: bool
+) -> None:
+    said = [make(kind="checked", first=first, last=last)]
+    assert is_answered(asked(), said, 5) is answered
+
+
+def test_two_of_one_pair_within_a_moment_are_one_question() -> None:
+    def one(first: int, last: int, x: float, stake: int = 10) -> ReviewItem:
+        (own,) = propose("came", (Place(first, x, 0.0, 1.0),))
+        item = replace(asked(own, first=first, last=last), stake=stake)
+        return replace(item, places=own.places)
+
+    first = one(10, 20, 0.0)
+    for begin, end, told in ((25, 30, False), (26, 30, True), (2, 5, False), (2, 4, True)):
+        second = one(begin, end, 5.0)
+        assert list(once_each([first, second], 5)) == [first, *([second] if told else [])]
+    third = replace(one(12, 20, 5.0), tracks=(1, 4))
+    assert list(once_each([first, third], 5)) == [first, third]
+    assert list(once_each([first, replace(third, places=first.places)], 5)) == [first]
+    exactly, less = one(10, 20, 0.0, stake=2), replace(first, probability=0.499, stake=2)
+    assert list(once_each([exactly], 5)) == [exactly]
+    assert not list(once_each([less], 5))
+    same = replace(first, alternatives=(first.alternatives[0], Alternative("", 0.5, propose(
+        "same", (ONE.end, AFTER.begin)))))  # fmt: skip
+    again = replace(same, tracks=(7,), places=(ANOTHER.begin,))
+    assert list(once_each([same, again], 5)) == [same]
+
+
+# ── the same recording as another run sees it
+
+
+def lines(*spans: tuple[int, int, float], steps: int = 60) -> ndarray:
+    """First and last step and x of people who stand."""
+    paths = np.full((steps, len(spans), 3), np.nan)
+    for person, (first, last, x) in enumerate(spans):
+        paths[first : last + 1, person] = [x, 0.0, 1.0]
+    return paths
+
+
+def test_the_other_runs_person_is_the_most_frequent_of_a_while_within_its_reach() -> None:
+    tracks = world.tracks(lines((0, 59, 0.0), (0, 59, 3.0)))
+    other = world.tracks(lines((0, 24, 0.69), (25, 59, 0.69), (0, 59, 3.71)), ids=[7, 8, 9])
+    seen = OtherRun(tracks, other, 0.1)
+    assert set(seen.ids[tracks.ids == 2]) == {-1}
+    own = seen.ids[tracks.ids == 1]
+    assert own.tolist() == [7] * 25 + [8] * 35
+    # of the eighteen steps up to a place, or from it on; of as many of both the first
+    for step, before, name in (
+        (24, True, 7), (33, True, 7), (34, True, 8), (25, False, 8), (16, False, 7), (17, False, 8),
+    ):  # fmt: skip
+        assert seen.at(1, Place(step, 0.0, 0.0, 1.0), before=before) == name
+    assert seen.at(2, Place(30, 3.0, 0.0, 1.0), before=True) == -1
+
+
+@pytest.mark.parametrize(
+    ("who", "kind", "earlier", "later", "added"),
+    [
+        # 7 goes on as 7 across the place, and so does 8
+        ("7788", "join", [1], [3], 2.5), ("7788", "cut", [1], [3], -2.5),
+        ("7878", "join", [1], [3], -2.5), ("7878", "cut", [1], [3], 2.5),
+        ("7.88", "join", [1], [3], 0.0),
+        ("7788", "exchange", [1, 2], [3, 4], -2.5), ("7887", "exchange", [1, 2], [3, 4], 2.5),
+        ("7887", "exchange", [1], [3, 4], 2.5), ("7788", "exchange", [1], [3, 4], -2.5),
+        ("7887", "exchange", [1, 2], [3], 2.5), ("7788", "exchange", [1, 2], [3], -2.5),
+        ("7999", "exchange", [1, 2], [3, 4], 0.0), ("7..7", "exchange", [1, 2], [3, 4], 2.5),
+    ],
+)  # fmt: skip
+def test_a_move_gains_what_the_other_run_says_of_who_goes_on(
+    who: str, kind: ItemKind, earlier: list[int], later: list[int], added: float
+) -> None:
+    """Who the tracks 1 and 3, 2 and 4 are there: 1 goes on as 3 and 2 as 4."""
+    tracks = world.tracks(lines((0, 24, 0.0), (0, 24, 2.0), (35, 59, 0.0), (35, 59, 2.0)))
+    names = dict(zip((1, 3, 2, 4), who, strict=True))
+    seen = OtherRun(tracks, tracks, 0.1)
+    seen.ids[:] = [-1 if names[k] == "." else int(names[k]) for k in tracks.ids.tolist()]
+    lanes = TrackRows(tracks)
+    pieces = {k: Tracklet(k, lanes.of_row(int(rows[0])), lanes.of_row(int(rows[-1])))
+              for k, rows in lanes.rows.items()}  # fmt: skip
+    move = Move(tuple(pieces[k] for k in earlier), tuple(pieces[k] for k in later), kind, 0.7)
+    assert seen.with_evidence(move).log_odds == pytest.approx(0.7 + added)
+
+
+def test_the_other_run_tells_joins_and_exchanges_of_stretches_that_last() -> None:
+    spans = (0, 24, 0.0), (35, 59, 0.0), (0, 59, 2.0)
+    tracks = world.tracks(lines(*spans))
+    seen = OtherRun(tracks, tracks, 0.1)
+
+    def told(names: dict[int, list[int]]) -> list[tuple[str, list[int], list[int]]]:
+        for track, own in names.items():
+            seen.ids[tracks.ids == track] = own
+        return [(m.kind, [p.track for p in m.earlier], [p.track for p in m.later])
+                for m in seen.moves()]  # fmt: skip
+
+    assert told({1: [7] * 25, 2: [7] * 25, 3: [8] * 60}) == [("join", [1], [2])]
+    assert all(m.log_odds == -2.5 for m in seen.moves())
+    # the third is somebody else for a while: too briefly, or as long as it must
+    brief = [8] * 30 + [9] * 5 + [8] * 25
+    assert told({1: [7] * 25, 2: [7] * 25, 3: brief}) == [("join", [1], [2])]
+    assert told({1: [7] * 25, 2: [-1] * 25, 3: [8] * 30 + [7] * 6 + [8] * 24}) == [
+        ("exchange", [3, 1], [3])
+    ]
+    assert told({1: [7] * 25, 2: [8] * 25, 3: [8] * 30 + [7] * 30}) == [
+        ("exchange", [3, 1], [3]), ("exchange", [3], [3, 2])
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("move", "title", "why"),
+    [
+        (Move((ONE,), (AFTER,), "join", 0.0), "Track 1 goes on as track 3?",
+         "track 1 ends and track 3 begins 0.5 m away, 1.0 s later"),
+        (Move((ONE,), (replace(AFTER, track=1),), "cut", 0.0), "Track 1 is two people?",
+         "after step 10 it goes on at the same place, 1.0 s later"),
+        (Move((ONE, OTHER), (AFTER, ANOTHER), "exchange", 0.0), "Tracks 1 and 4 exchanged?",
+         "track 4 is where track 1 may have gone on, 2.0 m away, 1.1 s later"),
+        (Move((ONE, OTHER), (replace(OTHER, track=2), replace(AFTER, track=1)), "exchange", 0.0),
+         "Tracks 1 and 2 exchanged?", "track 2 fits what track 1 does from step 20 on"),
+        (Move((ONE,), (replace(AFTER, track=1), replace(ANOTHER, track=1)), "exchange", 0.0),
+         "Track 1 goes on elsewhere?",
+         "another piece of track 1 fits, at the same place, 1.1 s later"),
+        (Move((ONE,), (replace(AFTER, begin=Place(5, 0.1, 0.0, 1.0)),), "join", 0.0),
+         "Track 1 goes on as track 3?",
+         "track 1 ends and track 3 begins 0.5 m away, 0.5 s before that"),
+        (Move((ONE,), (AFTER,), "gap", 0.0, "because", "a title"), "a title", "because"),
+    ],
+)  # fmt: skip
+def test_what_is_asked_in_words(move: Move, title: str, why: str) -> None:
+    tracks = world.tracks(lines((0, 29, 0.0), (0, 29, 1.0), (5, 29, 0.5), (0, 29, 2.0)))
+    run = cast("Any", SimpleNamespace(tracks=tracks, sequence=SimpleNamespace(step_time=0.1)))
+    assert words_of(run, move) == (title, why)

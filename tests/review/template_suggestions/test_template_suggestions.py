@@ -16,7 +16,13 @@ from tracker.fusion.trajectories import Trajectories
 from tracker.geometry.boxes import box_overlaps
 from tracker.parameters.catalogue import RunParameters
 from tracker.review.template_suggestions import (
+    Moments,
     Suggestion,
+    _apart,
+    _best,
+    _considered,
+    _long_lived,
+    _whole,
     drawn_boxes,
     suggest_templates,
     without_templates,
@@ -257,3 +263,85 @@ def test_a_box_of_a_rolled_camera_bounds_whom_it_shows() -> None:
     (lying,) = drawn_boxes(rolled, place, half)
     assert upright[3] / upright[2] > 2.0
     assert lying[2] / lying[3] > 2.0
+
+
+# ── which moments are taken
+
+
+def moments(*rows: tuple[int, int, int, bool, int, float]) -> Moments:
+    """Track, camera, step, whether the camera sees the track itself, how many do, and height."""
+    columns = (np.array(column) for column in zip(*rows, strict=True))
+    tracks, cameras, steps, own, agreeing, heights = columns
+    boxes = np.column_stack([np.zeros((len(rows), 2)), heights / 3.0, heights])
+    there = np.arange(3) < agreeing[:, None]
+    return Moments(tracks, cameras, steps, boxes, own, there, np.zeros(len(rows)))
+
+
+def test_the_best_moments_are_seen_by_the_camera_by_most_others_and_large_and_a_second_apart() -> (
+    None
+):
+    found = _best(
+        moments(
+            (1, 0, 0, False, 3, 90.0), (1, 0, 10, True, 2, 80.0), (1, 0, 14, True, 3, 70.0),
+            (1, 0, 24, True, 3, 60.0), (1, 0, 33, True, 3, 50.0), (1, 0, 60, True, 2, 40.0),
+            (2, 0, 14, True, 2, 30.0), (1, 1, 14, True, 2, 20.0),
+        ),
+        10.0,
+    )  # fmt: skip
+    rows = list(zip(found.tracks.tolist(), found.cameras.tolist(), found.steps.tolist(),
+                    strict=True))  # fmt: skip
+    # step 10 is too near to 14, 33 to 24, and of three at most the one that it does not see is left
+    assert rows == [(1, 0, 14), (1, 0, 24), (1, 0, 60), (1, 1, 14), (2, 0, 14)]
+    assert len(_best(Moments.none(3), 10.0)) == 0
+
+
+def test_a_box_is_whole_within_the_picture_and_of_twelve_pixels() -> None:
+    camera = CAMERAS[0]
+    width, height = camera.image_size
+    inside = np.array([-0.5, -0.5, width, height])
+    beyond = [inside + change for change in 0.1 * np.array([-1, -1, 1, 1]) * np.eye(4)]
+    sizes = [[9, 9, 12, 12], [9, 9, 11.9, 12], [9, 9, 12, 11.9], [np.nan] * 4]
+    rows = [inside, *beyond, *sizes]
+    assert _whole(camera, np.array(rows)).tolist() == [True, *[False] * 4, True, *[False] * 3]
+
+
+def test_two_boxes_of_a_step_are_apart_if_a_twentieth_of_neither_is_the_others() -> None:
+    frames = np.array([3, 3, 4, 4, 5, 5, 6, 7])
+    boxes = np.array([
+        [0, 0, 10, 20], [9.5, 0, 10, 20], [0, 0, 10, 20], [9.4, 0, 10, 20],
+        [0, 0, 10, 20], [9, 15, 40, 80], [0, 0, 10, 20], [0, 0, 10, 20],
+    ], dtype=float)  # fmt: skip
+    assert _apart(frames, boxes).tolist() == [True] * 2 + [False] * 2 + [True] * 4
+    boxes[5] = [-1, -1, 5, 5]
+    assert _apart(frames, boxes)[4:6].tolist() == [False, False]
+
+
+def test_a_drawn_box_is_as_wide_and_as_high_as_who_stands_there() -> None:
+    camera, half = CAMERAS[0], np.array([0.2, 0.3, 0.8])
+    place = np.array([0.1, 0.3, 1.0])
+    ((left, top, width, height),) = drawn_boxes(camera, place[None], half)
+    across = camera.rotation[0] * [1.0, 1.0, 0.0]
+    across *= 0.25 / np.linalg.norm(across)
+    left_end, right_end = camera.project(np.array([place - across, place + across]))[0]
+    low, high = camera.project(place + np.array([[0.0, 0.0, -0.8], [0.0, 0.0, 0.8]]))[0]
+    sizes = np.hypot(right_end - left_end, high - low)
+    assert (width, height) == pytest.approx(tuple(sizes))
+    assert (left + width / 2.0, top + height / 2.0) == pytest.approx(tuple((low + high) / 2.0))
+    behind = camera.centre - 2.0 * camera.rotation[2]
+    assert np.isnan(drawn_boxes(camera, behind[None], half)).all()
+
+
+def test_tracks_are_looked_at_in_two_hundred_steps_and_last_a_second(room: Sequence) -> None:
+    run = tracked(room)
+    assert len(_considered(run)) == 2 * STEPS
+    run.done = 40
+    assert set(_considered(run).frames.tolist()) == set(range(40))
+    run.tracks = replace(run.tracks, frames=7 * run.tracks.frames)
+    run.done = 420
+    assert set(_considered(run).frames.tolist()) == set(range(0, 420, 21))
+    for count, there in ((24, [1]), (25, [1, 2])):
+        brief = tracked(room)
+        brief.tracks = brief.tracks.take((brief.tracks.ids == 1) | (brief.tracks.frames < count))
+        assert _long_lived(brief).tolist() == there
+        brief.done = 24
+        assert _long_lived(brief).tolist() == [1, 2], "of a shorter recording all of it"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -203,3 +204,35 @@ def test_by_boxes_keeps_the_cardinality_and_the_mean() -> None:
 def test_without_boxes_both_rules_agree() -> None:
     result = boxed([0.7, 0.2, 0.9], [3, 4, 5], np.full((CAMERAS, 3), -1).tolist())
     assert_same(extract([result]), extract([result], rule="boxes"))
+
+
+@given(runs())
+def test_long_recordings_are_read_in_parts(results: list[FusionResult]) -> None:
+    whole = extract(results, first_frame=3)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(trajectories, "_AT_ONCE", 2)
+        assert_same(extract(results, first_frame=3), whole)
+
+
+def test_sigmas_and_the_covariance_on_the_ground_are_those_of_the_component() -> None:
+    result = posterior([0.9, 0.8], [4, 9])
+    spread = np.array([[4.0, 0.5, 0.1], [0.5, 9.0, 0.2], [0.1, 0.2, 16.0]])
+    mixture = result.posterior
+    covariances = np.stack([mixture.covariances[0], spread])
+    tracks = extract([replace(result, posterior=replace(mixture, covariances=covariances))])
+    assert_array_equal(tracks.covariances_xy, [0.0, 0.5])
+    assert_array_equal(tracks.sigmas[1], [2.0, 3.0, 4.0])
+    assert np.isnan(tracks.heights).all()
+    assert np.isnan(tracks.sigma_heights).all()
+
+
+@given(st.lists(runs(), min_size=1, max_size=5))
+def test_what_grows_is_what_was_there_and_what_came(parts: list[list[FusionResult]]) -> None:
+    pieces = [extract(results) for results in parts]
+    growing = trajectories.GrowingTrajectories(pieces[0])
+    seen = [(pieces[0], pieces[0])]
+    for number, piece in enumerate(pieces[1:], 2):
+        whole = trajectories.concatenate(pieces[:number], CAMERAS)
+        seen.append((growing.append(piece), whole))
+    for found, expected in seen:
+        assert_same(found, expected)
