@@ -9,6 +9,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 from numpy import ndarray
+from tracker.review.queue.moves import joins_of_lost_people, leaving_probability, moves_of_links
 
 from tests import world
 from tests.engine.synthetic import HALF_EXTENTS, sequence, walk
@@ -22,7 +23,6 @@ from tracker.review.queue.clear_places import ClearPlaces
 from tracker.review.queue.item import Alternative, ReviewItem, TrackRows, confirm, propose
 from tracker.review.queue.linking import Tracklet
 from tracker.review.queue.meetings import ambiguous_shares, meetings
-from tracker.review.queue.moves import joins_of_lost_people, leaving_probability, moves_of_links
 from tracker.review.queue.ranking import is_answered, once_each
 from tracker.review.queue.unclaimed import Unclaimed, _chains, find_unclaimed
 from tracker.runs.run import Run
