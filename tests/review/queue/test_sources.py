@@ -9,7 +9,6 @@ from typing import Any, cast
 import numpy as np
 import pytest
 from numpy import ndarray
-from tracker.review.queue.moves import joins_of_lost_people, leaving_probability, moves_of_links
 
 from tests import world
 from tests.engine.synthetic import HALF_EXTENTS, sequence, walk
@@ -22,6 +21,8 @@ from tracker.review.queue import queue, single_tracks, track_ends
 from tracker.review.queue.clear_places import ClearPlaces
 from tracker.review.queue.item import Alternative, ReviewItem, TrackRows, confirm, propose
 from tracker.review.queue.linking import Tracklet
+from tracker.review.queue.links import moves_of_links
+from tracker.review.queue.lost_people import joins_of_lost_people, leaving_probability
 from tracker.review.queue.meetings import ambiguous_shares, meetings
 from tracker.review.queue.ranking import is_answered, once_each
 from tracker.review.queue.unclaimed import Unclaimed, _chains, find_unclaimed
