@@ -58,6 +58,10 @@ def some(views: tuple[ViewResult, ...], *cameras: int) -> tuple[ViewResult, ...]
 # ── newcomers
 
 
+NO_PAIR = np.full((1, 2), -1)
+"""A seed that was not found by two boxes."""
+
+
 @pytest.mark.parametrize(
     ("cameras", "count"), [((), 0), ((0,), 0), ((3,), 0), ((0, 1), 1), ((0, 1, 2, 3), 1)]
 )
@@ -79,11 +83,25 @@ def test_where_of_two_boxes_only_one_fits_nobody_begins() -> None:
     views = (sure, high, NO_BOXES, NO_BOXES)
     told = evidence(views)
     fitted = kernels.fit_places(
-        np.array([PLACE]), told.measurements, np.ones(2, dtype=bool), told.starts,
+        np.array([PLACE]), NO_PAIR, told.measurements, np.ones(2, dtype=bool), told.starts,
         TargetModel(world.PERSON, "box").target(3), stacked(CAMERAS), Refinement(1.0, 3, 21.0),
     )  # fmt: skip
     assert fitted.sources[:, 0].tolist() == [0, -1, -1, -1]
     assert births().propose(told) is None
+
+
+@pytest.mark.parametrize("away", [0.6, 1.0, 1.5, 2.0])
+def test_a_newcomer_whom_two_cameras_see_is_not_drawn_to_others(away: float) -> None:
+    """In a crowd cameras without a box of the newcomer have boxes of people nearby."""
+    others = [PLACE + away * np.array([np.cos(a), np.sin(a), 0.0]) for a in (0.4, 2.2)]
+    views = list(exact([PLACE]))
+    for camera, other in zip((2, 3), others, strict=True):
+        views[camera] = exact([other])[camera]
+    found = births().propose(evidence(tuple(views)))
+    assert found is not None
+    one = int(np.flatnonzero(found.sources[0] == 0)[0])
+    assert found.sources[:, one].tolist() == [0, 0, -1, -1]
+    assert_allclose(found.positions[one], PLACE, atol=1e-3)
 
 
 @pytest.mark.parametrize("first", [False, True])
@@ -121,7 +139,7 @@ def test_a_box_belongs_to_a_place_by_the_uncertainty_of_both() -> None:
     target, cameras = TargetModel(world.PERSON, "box").target(3), stacked(CAMERAS)
     for seed in (PLACE, PLACE + np.array([0.4, 0.3, 0.1])):
         fitted = kernels.fit_places(
-            np.array([seed]), told.measurements, np.ones(4, dtype=bool), told.starts,
+            np.array([seed]), NO_PAIR, told.measurements, np.ones(4, dtype=bool), told.starts,
             target, cameras, Refinement(1.0, 3, 21.0),
         )  # fmt: skip
         assert fitted.sources[:, 0].tolist() == [0, 0, 0, 0]
@@ -137,7 +155,7 @@ def test_the_error_of_a_newcomers_place_is_chi_squared() -> None:
         views = tuple(of_boxes(v.boxes + sigma * rng.normal(size=(1, 4)), sigma) for v in plain)
         told = evidence(views)
         fitted = kernels.fit_places(
-            np.array([PLACE]), told.measurements, np.ones(4, dtype=bool), told.starts,
+            np.array([PLACE]), NO_PAIR, told.measurements, np.ones(4, dtype=bool), told.starts,
             TargetModel(world.PERSON, "box").target(3), stacked(CAMERAS), Refinement(1.0, 2, 50.0),
         )  # fmt: skip
         off = fitted.positions[0] - PLACE

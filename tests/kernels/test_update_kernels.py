@@ -114,17 +114,18 @@ def test_rays_meet_where_two_lines_are_nearest(seed: int, first: int, second: in
     rays /= np.linalg.norm(rays, axis=1, keepdims=True)
     centres = rng.uniform(-2.0, 2.0, (2, 3))
     starts = np.array([0, first, first + second])
-    points, gaps = birth_kernels.meeting_points(rays, starts, centres, 1.5)
+    points, gaps, pairs = birth_kernels.meeting_points(rays, starts, centres, 1.5)
     expected = []
-    for u in rays[:first]:
-        for v in rays[first:]:
+    for i, u in enumerate(rays[:first]):
+        for j, v in enumerate(rays[first:], first):
             along, _, _, _ = np.linalg.lstsq(
                 np.stack([u, -v], axis=1), centres[1] - centres[0], rcond=None
             )
             on_a, on_b = centres[0] + along[0] * u, centres[1] + along[1] * v
             if (along > 0.1).all() and np.linalg.norm(on_a - on_b) < 1.5:
-                expected.append((*(on_a + on_b) / 2.0, np.linalg.norm(on_a - on_b)))
-    assert_allclose(np.column_stack([points, gaps]), np.array(expected).reshape(-1, 4), atol=1e-6)
+                expected.append((*(on_a + on_b) / 2.0, np.linalg.norm(on_a - on_b), i, j))
+    found = np.column_stack([points, gaps, pairs])
+    assert_allclose(found, np.array(expected).reshape(-1, 6), atol=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -145,7 +146,7 @@ def test_rays_meet_ahead_of_both_lenses_and_close_by(
     place: tuple[float, ...], largest_gap: float, meets: bool
 ) -> None:
     rays, centres = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]), np.array([[0.0] * 3, place])
-    points, gaps = birth_kernels.meeting_points(rays, np.arange(3), centres, largest_gap)
+    points, gaps, _ = birth_kernels.meeting_points(rays, np.arange(3), centres, largest_gap)
     assert gaps.tolist() == ([abs(place[2])] if meets else [])
     assert points.tolist() == ([[place[0], 0.0, place[2] / 2.0]] if meets else [])
 
@@ -153,7 +154,7 @@ def test_rays_meet_ahead_of_both_lenses_and_close_by(
 def test_nearly_parallel_rays_meet_as_those_a_thousandth_apart_do() -> None:
     half = 2.5e-4  # so sin² of the angle between is a quarter of the millionth that counts
     rays = np.array([[np.cos(half), sign * np.sin(half), 0.0] for sign in (1.0, -1.0)])
-    points, _ = birth_kernels.meeting_points(
+    points, _, _ = birth_kernels.meeting_points(
         rays, np.arange(3), np.array([[0.0, 0.0, 0.0], [0.0, 0.001, 0.0]]), 9.0
     )
     # 0.001 / (2 sin ½α) = 2 m ahead, of which a quarter
@@ -164,6 +165,9 @@ CAMERAS = ring(4, 4.4)
 NOTHING = 2
 """The camera that has no box."""
 
+NO_PAIR = np.full((1, 2), -1)
+"""A seed that was not found by two boxes."""
+
 
 def seen_by(camera: int, model: TargetModel, places: ndarray) -> Any:
     """What a camera should measure of people."""
@@ -172,19 +176,22 @@ def seen_by(camera: int, model: TargetModel, places: ndarray) -> Any:
 
 def reference_fit(
     start: ndarray,
+    pair: list[tuple[int, int]],
     boxes: list[tuple[ndarray, ndarray, ndarray]],
     model: TargetModel,
     refinement: birth_kernels.Refinement,
 ) -> tuple[ndarray, ndarray, list[int]]:
-    """Gauss-Newton of one place, with NumPy's inverse."""
+    """Gauss-Newton of one place, with NumPy's inverse; first by a pair of cameras and boxes."""
     place, bound = start, np.eye(3) / refinement.start_sigma**2
     covariance, chosen = np.linalg.inv(bound), [-1] * len(boxes)
-    for _ in range(refinement.passes):
+    for turn in range(refinement.passes + 1):
         information, pull = bound.copy(), bound @ start
         for c, (values, noises, free) in enumerate(boxes):
             expected = seen_by(c, model, place[None])
             slope, best, chosen[c] = expected.jacobians[0], refinement.gate, -1
-            for box in np.flatnonzero(free):
+            for box in (
+                [one for camera, one in pair if camera == c] if turn == 0 else np.flatnonzero(free)
+            ):
                 residual = values[box] - expected.values[0]
                 spread = noises[box] + slope @ covariance @ slope.T
                 distance = residual @ np.linalg.inv(spread) @ residual
@@ -220,17 +227,22 @@ def test_places_are_fitted_as_by_numpy(
     starts = people[rng.integers(0, 4, 8)] + rng.normal(0.0, 0.3, (8, 3))
     starts[7] = np.add(CAMERAS[0].centre, [0.5, 0.0, 0.0])  # behind its lens
     counts = np.array([len(one[0]) for one in measured])
+    pairs = [[(0, n % 3), (1, n % 4)] if n % 2 else [] for n in range(8)]
     if seed == 1:  # no box at all, rather than none that may be a newcomer's
         keep = np.repeat(np.arange(4), counts) != NOTHING
         values, noises, free = values[keep], noises[keep], free[keep]
         counts[NOTHING], measured[NOTHING] = 0, (values[:0], noises[:0], free[:0])
     refinement = birth_kernels.Refinement(start_sigma=sigma, passes=passes, gate=21.0)
+    begins = np.cumsum([0, *counts])
+    among_all = np.array(
+        [[begins[camera] + box for camera, box in pair] or [-1, -1] for pair in pairs]
+    )
     places, covariances, sources, fits = birth_kernels.fit_places(
-        starts, Measurements(values, noises), free, np.cumsum([0, *counts]), model.target(3),
+        starts, among_all, Measurements(values, noises), free, begins, model.target(3),
         stacked(CAMERAS), refinement,
     )  # fmt: skip
     for n, start in enumerate(starts):
-        place, covariance, chosen = reference_fit(start, measured, model, refinement)
+        place, covariance, chosen = reference_fit(start, pairs[n], measured, model, refinement)
         assert_allclose(places[n], place, atol=1e-7)
         assert_allclose(covariances[n], covariance, atol=1e-9)
         assert sources[:, n].tolist() == chosen
@@ -256,7 +268,7 @@ def fit_one(
     model, start = TargetModel(PERSON, "box"), np.array([[0.1, 0.2, 0.85]])
     expected = seen_by(0, model, start).values
     found = birth_kernels.fit_places(
-        start, Measurements(expected + offsets, np.tile(noise, (len(offsets), 1, 1))),
+        start, NO_PAIR, Measurements(expected + offsets, np.tile(noise, (len(offsets), 1, 1))),
         np.full(len(offsets), free), np.array([0, len(offsets)]), model.target(3),
         stacked(CAMERAS[:1]), birth_kernels.Refinement(sigma, 1, gate),
     )  # fmt: skip

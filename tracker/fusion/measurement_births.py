@@ -138,10 +138,10 @@ class MeasurementBirths:
 
     def propose(self, evidence: Evidence) -> Newborns | None:
         """Propose newborn targets that share no box, by decreasing existence; None for none."""
-        seeds = self._meeting_points(evidence)
+        seeds, pairs = self._meeting_points(evidence)
         if not len(seeds):
             return None
-        found = self._fit(seeds, evidence)
+        found = self._fit(seeds, pairs, evidence)
         used: set[tuple[int, int]] = set()
         chosen: list[int] = []
         for index in np.argsort(-found.existences, kind="stable").tolist():
@@ -152,11 +152,17 @@ class MeasurementBirths:
                 chosen.append(index)
         return found.take(np.array(chosen)) if chosen else None
 
-    def _meeting_points(self, evidence: Evidence) -> Float[ndarray, "N 3"]:
-        """Find midpoints between nearby rays of unexplained boxes of two cameras, world metres."""
+    def _meeting_points(
+        self, evidence: Evidence
+    ) -> tuple[Float[ndarray, "N 3"], Int[ndarray, "N 2"]]:
+        """Find midpoints between nearby rays of unexplained boxes of two cameras.
+
+        Returns:
+            The points, world metres; the index of both boxes of each.
+        """
         free = births.free_boxes(evidence.unexplained, evidence.starts, UNEXPLAINED)
         if free.cameras < 2:
-            return np.zeros((0, 3))
+            return np.zeros((0, 3)), np.zeros((0, 2), dtype=np.int64)
         centres = evidence.centres.take(free.indices, 0)
         rays = np.concatenate(
             [
@@ -167,19 +173,21 @@ class MeasurementBirths:
             ]
         )
         met = births.meeting_points(rays, free.starts, self._centres, self._model.largest_gap)
-        inside = self._room.contains(met.points, self._model.margin)
-        points, gaps = met.points[inside], met.gaps[inside]
-        if len(points) > _MOST_SEEDS:
-            points = points[np.argsort(gaps, kind="stable")[:_MOST_SEEDS]]
-        return np.asarray(points)
+        chosen = np.flatnonzero(self._room.contains(met.points, self._model.margin))
+        if len(chosen) > _MOST_SEEDS:
+            chosen = chosen[np.argsort(met.gaps[chosen], kind="stable")[:_MOST_SEEDS]]
+        return met.points[chosen], free.indices[met.pairs[chosen]]
 
-    def _fit(self, seeds: Float[ndarray, "N 3"], evidence: Evidence) -> Newborns:
+    def _fit(
+        self, seeds: Float[ndarray, "N 3"], pairs: Int[ndarray, "N 2"], evidence: Evidence
+    ) -> Newborns:
         """Fit each seed to the nearest box in every camera, and compute its existence probability.
 
         A seed that ends outside the room or with fewer than two boxes is left out.
         """
         fitted = births.fit_places(
             seeds,
+            pairs,
             evidence.measurements,
             evidence.unexplained > UNEXPLAINED,
             evidence.starts,
