@@ -2,6 +2,9 @@
 
 [ZW21] Zhu, Wang, "3D target position tracking based on probability hypothesis
 density filtering", 2021.
+
+Numbers that are class variables are constants: over their ranges recall, false positives and IDF1
+change by no more than they scatter (``tests/papers/rooms/fusion_constants.md``).
 """
 
 from __future__ import annotations
