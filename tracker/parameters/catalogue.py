@@ -85,6 +85,7 @@ REMOVED: Mapping[str, str] = {
     "fusion.posture_width": "a person in another posture is 0.6 half heights wide to each side",
     "fusion.posture_centre_sigma": "another posture's centre has a σ of 0.15 half heights",
     "fusion.posture_width_sigma": "another posture's half width has a σ of 0.5 half heights",
+    "fusion.posture_height_sigma": "another posture's half height has a σ of 0.25 half heights",
     "fusion.posture_drop": "the height of another posture's centre has a σ of 0.3 half heights",
     "fusion.vertical_share": "σ_a along the vertical axis is a tenth of that along the floor",
     "fusion.velocity_memory": "a person who is not seen slows to a third in 2 s",

@@ -209,12 +209,8 @@ class FusionParams(Params):
     posture_width_sigma: ClassVar[float] = 0.5
     """Other posture: standard deviation of the box's half width, half heights."""
 
-    posture_height_sigma: Annotated[
-        float,
-        Field(ge=0.01, le=2.0),
-        ui("σ_ph", unit="half heights", step=0.01, advanced=True, when=_BOXES),
-    ] = 0.25
-    """Other posture: standard deviation of the box's half height."""
+    posture_height_sigma: ClassVar[float] = 0.25
+    """Other posture: standard deviation of the box's half height, half heights."""
 
     posture_drop: ClassVar[float] = 0.3
     """Other posture: standard deviation of the vertical displacement of the person's centre, half
