@@ -88,7 +88,6 @@ REMOVED: Mapping[str, str] = {
     "fusion.posture_height_sigma": "another posture's half height has a σ of 0.25 half heights",
     "fusion.posture_drop": "the height of another posture's centre has a σ of 0.3 half heights",
     "fusion.vertical_share": "σ_a along the vertical axis is a tenth of that along the floor",
-    "fusion.velocity_memory": "a person who is not seen slows to a third in 2 s",
     "fusion.start_velocity": "a new target's velocity has a σ of 0.7 m/s along each axis",
     "fusion.memory_gate_probability": "a lost track is recalled within a gate of 0.9",
     "fusion.recognition_swap": "evidence of who a track is fades with a time constant of 30 s",

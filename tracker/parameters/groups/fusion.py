@@ -110,9 +110,12 @@ class FusionParams(Params):
     vertical_share: ClassVar[float] = 0.1
     """Constant velocity: σ_a along the vertical axis, as a share of that along the floor."""
 
-    velocity_memory: ClassVar[float] = 2.0
-    """Constant velocity: time after which a person who is not seen has slowed to a third,
-    seconds."""
+    velocity_memory: Annotated[
+        float,
+        Field(ge=0.1, le=100.0),
+        ui("τ", "Motion", unit="s", step=0.1, log=True, when=_VELOCITY),
+    ] = 2.0
+    """Constant velocity: time after which a person who is not seen has slowed to a third."""
 
     start_velocity: ClassVar[float] = 0.7
     """Constant velocity: standard deviation of a new target's velocity along each axis, around 0,
