@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
@@ -20,7 +21,7 @@ from tracker.review.queue import queue, single_tracks, track_ends
 from tracker.review.queue.clear_places import ClearPlaces
 from tracker.review.queue.item import TrackRows, confirm
 from tracker.review.queue.linking import Tracklet
-from tracker.review.queue.links import moves_of_links
+from tracker.review.queue.links import moves_of_links, tracklets_of
 from tracker.review.queue.lost_people import joins_of_lost_people, leaving_probability
 from tracker.review.queue.meetings import ambiguous_shares, meetings
 from tracker.review.queue.ranking import is_answered
@@ -620,3 +621,34 @@ def test_places_in_a_row_are_one_person(
     if len(found) == 1:
         for place in found[0].places:
             assert place.x == pytest.approx(np.mean(own[place.step]))
+
+
+def test_pieces_are_those_of_the_tracks_that_the_smoothed_labels_became() -> None:
+    run = scene(standing((0, 19, 0.0, 0.0), (5, 30, 1.0, 0.0)))
+    lanes = TrackRows(run.tracks)
+    pieces, joined = tracklets_of(run, lanes)
+    whole = [Tracklet(k, lanes.of_row(int(rows[0])), lanes.of_row(int(rows[-1])))
+             for k, rows in lanes.rows.items()]  # fmt: skip
+    assert (pieces, joined) == (whole, None)
+    labels, nothing = np.array([8, 4, 6, 8]), np.zeros(0)
+    begins, ends = np.arange(12.0).reshape(4, 3), np.arange(12.0, 24.0).reshape(4, 3)
+    links = LinkedTracklets(
+        labels, np.array([5, 0, 3, 21]), np.array([20, 19, 9, 30]), begins, ends,
+        *[np.zeros(4)] * 3, *[np.zeros(0, dtype=np.int64)] * 2, nothing,
+    )  # fmt: skip
+    tracks = run.tracks
+    smoothed = SimpleNamespace(
+        joined=links, frames=tracks.frames, means=tracks.positions,
+        labels=np.where(tracks.ids == 1, 4, 8),
+    )  # fmt: skip
+    run.smoothed = cast("Any", smoothed)
+    pieces, joined = tracklets_of(run, lanes)
+    assert joined is links
+    assert pieces == [
+        Tracklet(2, Place(5, 0.0, 1.0, 2.0), Place(20, 12.0, 13.0, 14.0)),
+        Tracklet(1, Place(0, 3.0, 4.0, 5.0), Place(19, 15.0, 16.0, 17.0)),
+        None,  # a label that no track has
+        Tracklet(2, Place(21, 9.0, 10.0, 11.0), Place(30, 21.0, 22.0, 23.0)),
+    ]
+    run.smoothed = cast("Any", SimpleNamespace(**{**vars(smoothed), "means": begins[[0] * 46]}))
+    assert tracklets_of(run, lanes) == (whole, None)
