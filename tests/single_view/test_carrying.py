@@ -18,6 +18,7 @@ from tracker.parameters.groups.foreground import ForegroundParams
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.reader import read_sequence
 from tracker.sequences.sequence import Sequence, Template
+from tracker.single_view.colour import carrying
 from tracker.single_view.colour.carrying import with_carried
 from tracker.single_view.colour.trust import template_trust
 from tracker.single_view.pictures.foreground import learn
@@ -106,3 +107,31 @@ def test_the_foreground_is_believed_by_its_share_in_the_templates(two: Sequence)
     assert trust[0]["walks"] == 1.0
     assert trust[0]["sits"] == 0.0
     assert trust[1] == trust[0]  # who has no template there is judged by those elsewhere
+
+
+@pytest.mark.parametrize("at_once", [7, 4096])
+def test_a_place_stands_out_if_hardly_any_other_is_as_alike(
+    at_once: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By trying all places but those within the box around it."""
+    monkeypatch.setattr(carrying, "_AT_ONCE", at_once)
+    rng = np.random.default_rng(3)
+    bins = np.kron(rng.integers(0, 6, (12, 16)), np.ones((5, 5))).astype(np.uint16)
+    template = np.zeros(512)
+    template[:6] = rng.dirichlet(np.ones(6))
+    picture = carrying._Picture.of(bins, template, "rgb", "flat")
+    place = np.array([30.0, 25.0, 6.0, 9.0])
+    others = [
+        [x, y, 6.0, 9.0]
+        for y in np.arange(4.5, 60.0, 2.25)
+        for x in np.arange(3.0, 80.0, 3.0)
+        if abs(x - 30.0) > 6.0 or abs(y - 25.0) > 9.0
+    ]
+    distances = np.sort(picture.distances(np.array(others)))
+    most = int(0.15 * len(others))
+    assert distances[most] < distances[most + 1]
+    assert carrying._stands_out(picture, place, distances[most])
+    assert not carrying._stands_out(picture, place, np.nextafter(distances[most], 1.0))
+    # where the box is all that there is nothing else is alike
+    alone = carrying._Picture.of(bins[:8, :8], template, "rgb", "flat")
+    assert carrying._stands_out(alone, np.array([4.0, 4.0, 9.0, 9.0]), 0.9)
