@@ -51,6 +51,17 @@ def test_a_window_hangs_from_the_crown_and_the_targets_box_reaches_the_floor() -
     assert_allclose(heads.boxes, expected)
 
 
+def test_whoever_reaches_behind_the_lens_has_no_window() -> None:
+    """The head and chest of one who stands below a camera that looks up are before it."""
+    camera = world.look_at("up", (0.0, 0.0, 1.0), (0.0, 1.0, 2.7), image_size=(640, 400), focal=120)
+    crowns = np.array([[0.0, 0.8, 1.9], [0.0, 2.9, 1.9]])
+    found, there = Windows.at(camera, crowns, HALF)
+    middles = (found.edges[:, :2] + found.edges[:, 2:]) / 2.0
+    assert camera.contains(middles).all()
+    assert np.isnan(found.boxes[0]).all()
+    assert there.tolist() == [False, True]
+
+
 def test_windows_cover_everybody_in_the_room_and_no_two_are_alike() -> None:
     windows = Windows.of(CAMERA, ROOM, HALF)
     rng = np.random.default_rng(0)
