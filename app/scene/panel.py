@@ -15,7 +15,7 @@ import viser
 
 from app.errors import parameter_detail
 from app.scene.keys import hotkeys
-from app.scene.worker import LatestWorker
+from app.scene.worker import Follower
 from app.state.snapshot import Change, Snapshot
 from app.state.workbench import Workbench
 from tracker.parameters import MethodKey
@@ -40,7 +40,7 @@ UNFIT = " · not here"
 """Text behind the name of a method that cannot work on the open sequence, as on the page."""
 
 
-class Panel:
+class Panel(Follower):
     """viser's panel, kept equal to the workbench's parameters, and the other way round.
 
     What the server writes into an input comes back without a client and is ignored. An input is
@@ -56,14 +56,14 @@ class Panel:
             server: The server whose panel belongs to this object.
             workbench: The store of the parameters.
         """
-        self._server, self._workbench = server, workbench
+        super().__init__("panel", workbench)
+        self._server = server
         self._lock = threading.Lock()
         self._moved: set[str] = set()
         """The keys of inputs that a browser has moved, and that were not taken yet."""
         self._known: dict[str, Any] = {}
         """The value that was written into each input or told of it last, by key."""
         self._built = threading.Event()
-        self._worker = LatestWorker("panel", self._work)
         server.gui.main_panel.dock_right()
         server.gui.main_panel.set_width(WIDTH)
         essential = [parameter for parameter in PARAMETERS.values() if parameter.essential]
@@ -89,22 +89,8 @@ class Panel:
             )
             command.on_trigger(partial(self._relay, hotkey.name))
         self._refresh(workbench.snapshot())
-        self._unsubscribe = workbench.subscribe(self._note)
         self._built.set()
-        self._worker.ask("refresh")
-
-    def wait(self, timeout: float) -> bool:
-        """Block until all edits and changes are done; whether within ``timeout`` seconds.
-
-        Raises:
-            Exception: What went wrong meanwhile.
-        """
-        return self._worker.wait(timeout)
-
-    def close(self) -> None:
-        """Stop following; the panel stays as it is."""
-        self._unsubscribe()
-        self._worker.close()
+        self.follow()
 
     def _slider(self, parameter: Parameter) -> viser.GuiSliderHandle[float]:
         assert parameter.slider is not None

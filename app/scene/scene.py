@@ -22,7 +22,7 @@ from app.scene.tracks.ghosts import GhostNodes
 from app.scene.tracks.people import PeopleNodes, room_taken
 from app.scene.tracks.reference import ReferenceNodes
 from app.scene.views import Views
-from app.scene.worker import LatestWorker
+from app.scene.worker import Follower
 from app.state import opening_step
 from app.state.snapshot import Change, Snapshot, View
 from app.state.workbench import Workbench
@@ -40,7 +40,7 @@ PICTURE_SECONDS = 20.0
 """A browser without a graphics card takes a while to draw."""
 
 
-class Scene:
+class Scene(Follower):
     """viser's scene, kept equal to the workbench's state."""
 
     def __init__(self, server: viser.ViserServer, workbench: Workbench) -> None:
@@ -50,8 +50,8 @@ class Scene:
             server: Its scene, theme and viewpoints belong to this object.
             workbench: What to show.
         """
+        super().__init__("scene", workbench)
         self._server = server
-        self._workbench = workbench
         self._shown = Snapshot()
         self._drawn: tuple[object, ...] = ()
         self._looking: View = None
@@ -69,17 +69,7 @@ class Scene:
         self._people = PeopleNodes(server, self._pick)
         self._ghosts = GhostNodes(server)
         self._views = Views(server, self._overview)
-        self._worker = LatestWorker("scene", self._work)
-        self._unsubscribe = workbench.subscribe(self._note)
-        self._worker.ask("sequence")
-
-    def wait(self, timeout: float) -> bool:
-        """Block until the newest state is drawn; whether it was within ``timeout`` seconds.
-
-        Raises:
-            Exception: What went wrong while drawing.
-        """
-        return self._worker.wait(timeout)
+        self.follow()
 
     def picture(self, width: int, height: int) -> Rgb:
         """What the browser that came last shows, on the ground of the theme.
@@ -107,9 +97,8 @@ class Scene:
         return mixed
 
     def close(self) -> None:
-        """Stop following; the nodes stay as they are."""
-        self._unsubscribe()
-        self._worker.close()
+        """Stop following, and flying as well."""
+        super().close()
         self._views.close()
 
     # what happens elsewhere: these return at once

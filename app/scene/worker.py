@@ -1,4 +1,4 @@
-"""One thread that does the newest of what it was asked for."""
+"""A thread that does the newest of what it was asked for, and what follows the workbench by it."""
 
 from __future__ import annotations
 
@@ -6,6 +6,9 @@ import logging
 import threading
 import time
 from collections.abc import Callable, Set
+
+from app.state.snapshot import Change
+from app.state.workbench import Workbench
 
 logger = logging.getLogger(__name__)
 
@@ -22,18 +25,15 @@ class LatestWorker:
         self,
         name: str,
         work: Callable[[Set[str]], None],
-        on_failure: Callable[[Exception], None] | None = None,
     ) -> None:
         """Start the thread.
 
         Args:
             name: Of the thread, for logs and debuggers.
-            work: Gets the topics; always called from the worker's thread.
-            on_failure: Told of an exception of ``work``, which is also logged;
-                the worker goes on with the next topic.
+            work: Gets the topics; always called from the worker's thread. After an exception of
+                it, which is logged, the worker goes on with the next topic.
         """
         self._work = work
-        self._on_failure = on_failure
         self._changed = threading.Condition()
         self._topics: set[str] = set()
         self._busy = False
@@ -93,9 +93,48 @@ class LatestWorker:
             except Exception as failure:
                 logger.exception("%s: %s failed", self._thread.name, ", ".join(sorted(topics)))
                 self._failure = failure
-                if self._on_failure is not None:
-                    self._on_failure(failure)
             finally:
                 with self._changed:
                     self._busy = False
                     self._changed.notify_all()
+
+
+class Follower:
+    """A part of the 3D view that is kept equal to the workbench by a thread of its own."""
+
+    def __init__(self, name: str, workbench: Workbench) -> None:
+        """Start the thread, which is asked for nothing yet.
+
+        Args:
+            name: The name of the thread.
+            workbench: The workbench to follow.
+        """
+        self._workbench = workbench
+        self._worker = LatestWorker(name, self._work)
+        self._unsubscribe: Callable[[], None] = lambda: None
+
+    def follow(self) -> None:
+        """Follow the workbench from now on, and show first what it has already."""
+        self._unsubscribe = self._workbench.subscribe(self._note)
+        self._worker.ask("sequence")
+
+    def wait(self, timeout: float) -> bool:
+        """Block until all that was asked for is done; whether it was within ``timeout`` seconds.
+
+        Raises:
+            Exception: What went wrong meanwhile.
+        """
+        return self._worker.wait(timeout)
+
+    def close(self) -> None:
+        """Stop following; what is in the view stays as it is."""
+        self._unsubscribe()
+        self._worker.close()
+
+    def _note(self, change: Change) -> None:
+        """Ask the worker for what a change concerns; this returns at once."""
+        raise NotImplementedError
+
+    def _work(self, topics: Set[str]) -> None:
+        """Do what was asked for, in the worker's thread."""
+        raise NotImplementedError

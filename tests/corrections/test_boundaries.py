@@ -669,3 +669,21 @@ def test_what_is_said_twice_in_one_log_stays_twice() -> None:
     other = make(kind="left", id="c", places=[at(9)], time=begin)
     assert len(merge(twice, [other])) == 3
     assert len(merge(twice, [other, twice[0].model_copy(update={"id": "d"})])) == 2
+
+
+@pytest.mark.parametrize(
+    ("values", "sentence"),
+    [
+        ({"kind": "here", "places": [at(1)], "accuracy": 9.0},
+         "accuracy: Input should be less than or equal to 5, found 9.0"),
+        ({"kind": "came", "places": [[1, "x", 0.0, 1.0]]},
+         "places.0.1: Input should be a valid number, unable to parse string as a number, "
+         "found 'x'"),
+        ({"kind": "came", "places": []}, "places: came has 1, found 0"),
+        ({"kind": "came", "places": 3}, "places: Input should be a valid tuple, found 3"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_one_sentence(values: dict, sentence: str) -> None:
+    with pytest.raises(CorrectionError) as error:
+        make(**values)
+    assert str(error.value) == sentence

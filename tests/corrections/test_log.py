@@ -250,20 +250,6 @@ def test_two_logs_that_give_one_person_two_names_are_not_merged() -> None:
     assert set(merge((anna, bob), (anna, bob))) == {anna, bob}
 
 
-def test_a_folder_that_may_only_be_read_has_its_log_with_the_user(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("MULTIVIEW_PHD_SETTINGS", str(tmp_path / "settings"))
-    folder = tmp_path / "recording"
-    folder.mkdir()
-    assert place_of(folder) == folder / "corrections.toml"
-    monkeypatch.setattr("os.access", lambda path, mode: False)
-    place = place_of(folder)
-    assert place.is_relative_to(tmp_path / "settings")
-    write_log(place, parse(LOG, "one"))
-    assert open_log(folder).corrections == parse(LOG, "one")
-
-
 @pytest.mark.parametrize("target", ["/etc/passwd", "/dev/zero", "corrections.toml"])
 def test_a_link_out_of_the_folder_is_neither_read_nor_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, target: str
@@ -300,3 +286,51 @@ def test_what_was_said_while_a_folder_could_not_be_written_to_counts_afterwards(
     os.utime(own, (1.0, 1.0))
     assert place_of(folder) == folder / FILE
     assert str(own) in str(remark_on(folder))
+
+
+@pytest.mark.parametrize(
+    ("beside", "own", "read_only", "at_own"),
+    [
+        # the time of each file, None where it is not there
+        (None, None, False, False), (None, None, True, True), (1.0, None, False, False),
+        (1.0, None, True, False), (None, 1.0, False, True), (None, 1.0, True, True),
+        (2.0, 1.0, False, False), (1.0, 2.0, False, True), (1.0, 1.0, False, True),
+        (2.0, 1.0, True, True),
+    ],
+)  # fmt: skip
+def test_the_log_that_was_written_last_counts_and_of_a_folder_that_is_read_the_users(
+    settings: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    beside: float | None, own: float | None, read_only: bool, at_own: bool,
+) -> None:  # fmt: skip
+    folder = tmp_path / "recording"
+    folder.mkdir()
+    for path, time in ((folder / FILE, beside), (own_place(folder), own)):
+        if time is not None:
+            write_log(path, parse(LOG, "log"))
+            os.utime(path, (time, time))
+    monkeypatch.setattr("os.access", lambda path, mode: not read_only)
+    assert place_of(folder) == (own_place(folder) if at_own else folder / FILE)
+    assert writing_place(folder) == (own_place(folder) if read_only else folder / FILE)
+
+
+def test_a_log_is_read_up_to_its_largest_size(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / FILE).write_text(LOG, encoding="utf-8")
+    size = len(LOG.encode())
+    monkeypatch.setattr("tracker.corrections.log._MOST_BYTES", size)
+    assert len(read_log(tmp_path / FILE)) == 2
+    monkeypatch.setattr("tracker.corrections.log._MOST_BYTES", size - 1)
+    with pytest.raises(CorrectionError, match="expected a log of at most 0 MB, found 0 MB"):
+        read_log(tmp_path / FILE)
+
+
+def test_a_log_is_written_as_people_write_it() -> None:
+    when = datetime(2026, 11, 22, 11, 32, 9)  # without a zone
+    told = [one.model_copy(update={"time": when}) for one in parse(LOG, "log")]
+    here = told[1].model_copy(update={"note": "", "places": (told[1].places[0],)})
+    text = dump([told[0], here])
+    kept = [line for line in text.splitlines() if line and not line.startswith(("#", "id"))]
+    expected = f"{LOG}accuracy = 0.1".splitlines()
+    assert sorted(kept) == sorted(line for line in expected if line)
+    assert dump([]).splitlines()[-1] == "format = 1"

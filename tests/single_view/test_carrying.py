@@ -17,7 +17,9 @@ from tracker.geometry.boxes import Boxes
 from tracker.parameters.groups.foreground import ForegroundParams
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.reader import read_sequence
-from tracker.sequences.sequence import Sequence, Template
+from tracker.sequences.sequence import Room, Sequence, Template
+from tracker.single_view.box_sizes import upright_boxes
+from tracker.single_view.colour import carrying
 from tracker.single_view.colour.carrying import with_carried
 from tracker.single_view.colour.trust import template_trust
 from tracker.single_view.pictures.foreground import learn
@@ -106,3 +108,69 @@ def test_the_foreground_is_believed_by_its_share_in_the_templates(two: Sequence)
     assert trust[0]["walks"] == 1.0
     assert trust[0]["sits"] == 0.0
     assert trust[1] == trust[0]  # who has no template there is judged by those elsewhere
+
+
+@pytest.mark.parametrize("at_once", [7, 4096])
+def test_a_place_stands_out_if_hardly_any_other_is_as_alike(
+    at_once: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By trying all places but those within the box around it."""
+    monkeypatch.setattr(carrying, "_AT_ONCE", at_once)
+    rng = np.random.default_rng(3)
+    bins = np.kron(rng.integers(0, 6, (12, 16)), np.ones((5, 5))).astype(np.uint16)
+    template = np.zeros(512)
+    template[:6] = rng.dirichlet(np.ones(6))
+    picture = carrying._Picture.of(bins, template, "rgb", "flat")
+    place = np.array([30.0, 25.0, 6.0, 9.0])
+    others = [
+        [x, y, 6.0, 9.0]
+        for y in np.arange(4.5, 60.0, 2.25)
+        for x in np.arange(3.0, 80.0, 3.0)
+        if abs(x - 30.0) > 6.0 or abs(y - 25.0) > 9.0
+    ]
+    distances = np.sort(picture.distances(np.array(others)))
+    most = int(0.15 * len(others))
+    assert distances[most] < distances[most + 1]
+    assert carrying._stands_out(picture, place, distances[most])
+    assert not carrying._stands_out(picture, place, np.nextafter(distances[most], 1.0))
+    # where the box is all that there is nothing else is alike
+    alone = carrying._Picture.of(bins[:8, :8], template, "rgb", "flat")
+    assert carrying._stands_out(alone, np.array([4.0, 4.0, 9.0, 9.0]), 0.9)
+
+
+@pytest.mark.parametrize(
+    ("floor", "larger"), [(0.0, 1.0), (0.9, 1.0), (0.0, 2.8), (0.0, 0.65)]
+)  # and those who would stand before the room or beyond it, too
+def test_who_a_template_is_may_stand_along_its_ray_in_the_room_as_high_as_it_is(
+    two: Sequence, floor: float, larger: float
+) -> None:
+    """And where people stand, on the floor."""
+    top = 1.9 if floor == 0.0 else 1.3
+    room = Room(np.array([-1.2, -1.2, floor]), np.array([1.2, 1.2, top]))
+    whole, camera, half = replace(two, room=room), CAMERAS[0], two.target_half_extents
+    (box,) = world.upright(camera, np.array([[0.1, 0.3, 1.1]]), half)
+    box[3] *= larger
+    positions, scores = carrying._along_ray(camera, whole, box)
+    ray = camera.back_project(box[None, :2])[0]
+    away = (positions - camera.centre) @ ray
+    assert_allclose(positions, camera.centre + away[:, None] * ray, atol=1e-9)
+    low, high = room.minimum - half, room.maximum + half
+    stands = 4.0 * half[2] > top - floor
+    assert stands == (floor > 0.0)
+    steps = []
+    corners = [[x, y, z] for x in (-1.2, 1.2) for y in (-1.2, 1.2) for z in (floor, top)]
+    reach = max(np.linalg.norm(corner - camera.centre) for corner in corners)
+    for distance in 0.05 * reach * 20.0 ** (np.arange(400) / 399.0):
+        place = camera.centre + distance * ray
+        drawn, seen = upright_boxes(camera, place[None], half)
+        if not ((place >= low) & (place <= high)).all() or not seen[0]:
+            continue
+        ratio = np.log(drawn[0, 3] / box[3])
+        if abs(ratio) > 0.36:
+            continue
+        score = -0.5 * (ratio / 0.12) ** 2
+        if stands:
+            score -= 0.5 * ((place[2] - half[2] - room.minimum[2]) / 0.2) ** 2
+        steps.append((distance, score))
+    assert len(steps) > 5
+    assert_allclose(np.column_stack([away, scores]), steps, atol=1e-8)

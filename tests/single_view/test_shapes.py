@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import cv2
 import numpy as np
@@ -17,6 +19,7 @@ from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import upright_boxes
 from tracker.single_view.colour.peaks import PeakFinder, _discount, colour_ratios
 from tracker.single_view.colour.trust import templates_suffice
+from tracker.single_view.dropped import GATES
 from tracker.single_view.pictures.foreground import BackgroundModel, tone_curve
 from tracker.single_view.pictures.foreground.exposure import square_roots
 from tracker.single_view.shape.channels import Channels
@@ -46,6 +49,17 @@ def test_a_window_hangs_from_the_crown_and_the_targets_box_reaches_the_floor() -
     heads, _ = Windows.at(CAMERA, crowns[:1], world.HEAD)
     expected, _ = upright_boxes(CAMERA, crowns[:1] - [0.0, 0.0, 0.12], world.HEAD)
     assert_allclose(heads.boxes, expected)
+
+
+def test_whoever_reaches_behind_the_lens_has_no_window() -> None:
+    """The head and chest of one who stands below a camera that looks up are before it."""
+    camera = world.look_at("up", (0.0, 0.0, 1.0), (0.0, 1.0, 2.7), image_size=(640, 400), focal=120)
+    crowns = np.array([[0.0, 0.8, 1.9], [0.0, 2.9, 1.9]])
+    found, there = Windows.at(camera, crowns, HALF)
+    middles = (found.edges[:, :2] + found.edges[:, 2:]) / 2.0
+    assert camera.contains(middles).all()
+    assert np.isnan(found.boxes[0]).all()
+    assert there.tolist() == [False, True]
 
 
 def test_windows_cover_everybody_in_the_room_and_no_two_are_alike() -> None:
@@ -225,3 +239,42 @@ def test_whoever_shares_a_shape_with_somebody_nearer_to_its_middle_is_behind() -
 def test_doubt_is_discounted_by_the_share_that_would_not_be_seen_and_belief_is_not() -> None:
     found = _discount(np.array([-3.0, -3.0, -3.0, 2.0]), np.array([0.0, 1.0, 0.25, 0.5]))
     assert_allclose(found, [-3.0, 0.0, np.log(0.25 + 0.75 * np.exp(-3.0)), 2.0], atol=1e-12)
+
+
+def test_a_candidate_falls_at_the_first_gate_that_it_does_not_pass() -> None:
+    """Of what colours, foreground and shapes say of each, and which persons they are taken for."""
+    rows = [
+        # x, score, colour distance, share of foreground, person, gate
+        (0.0, -1.0, 0.4, 0.9, 0, None), (5.0, -1.5, 0.4, 0.9, 1, "another at its place"),
+        (11.0, -1.6, 0.4, 0.9, 0, None), (8.0, -1.7, 0.4, 0.9, 0, "another at its place"),
+        (30.0, -2.0, 0.6, 0.3, 0, None), (40.0, -2.1, 0.6, 0.9, 0, "colour"),
+        (50.0, -2.1, 0.5, 0.1, 0, "foreground"), (60.0, -1.0, 0.5, 0.29, 0, "foreground"),
+        (70.0, -2.1, 0.5, 0.9, 0, "surroundings"), (80.0, -2.1, 0.5, 0.2, 1, "shape"),
+        (90.0, -1.0, 0.6, 0.1, 0, "colour"), (105.0, -1.9, 0.4, 0.15, 1, None),
+    ]  # fmt: skip
+    x, best, distances, inside, person = (np.array(c) for c in list(zip(*rows, strict=True))[:5])
+    scores = np.full((len(rows), 2), -9.0)
+    scores[np.arange(len(rows)), person] = best
+    p = SimpleNamespace(
+        acceptance_distance=0.5, likelihood_sigma=0.25, acceptance_foreground=0.3,
+        same_person_distance=1.0, merge_distance=0.6,
+    )  # fmt: skip
+    trust = np.array([1.0, 0.5])  # half of the foreground is asked of the second
+    finder: Any = SimpleNamespace(
+        _parameters=p, _instead=np.array([0.9, 0.6]), _trusted=lambda person: trust[person],
+        _score=lambda *_: (scores, np.column_stack([distances, distances + 0.1]), inside),
+    )  # fmt: skip
+    candidates = np.column_stack([x, np.full(len(x), 9.0), np.full((len(x), 2), 10.0)])
+    scene: Any = SimpleNamespace(mask=np.zeros((1, 1)))
+    boxes, near, whose, dropped = PeakFinder._accept(finder, scene, None, candidates)
+    kept = np.flatnonzero([gate is None for *_, gate in rows])
+    order = kept[np.argsort(-best[kept], kind="stable")]
+    assert_array_equal(boxes, candidates[order])
+    assert_array_equal(near, distances[order])
+    assert_array_equal(whose, person[order])
+    told = [None if gate is None else GATES.index(gate) for *_, gate in rows]
+    assert dropped.gates.tolist() == [gate for gate in told if gate is not None]
+    assert_array_equal(dropped.boxes[:, 0], np.delete(x, kept))
+    scene.mask = None  # without foreground none is asked for
+    boxes, *_ = PeakFinder._accept(finder, scene, None, candidates)
+    assert {60.0, 90.0} <= set(boxes[:, 0].tolist())

@@ -12,7 +12,13 @@ from numpy import ndarray
 from tests.world import HEAD as HALF_EXTENTS
 from tests.world import SMALL_CAMERAS as CAMERAS
 from tests.world import SMALL_ROOM as ROOM
+from tracker import single_view
+from tracker.parameters.catalogue import RunParameters
 from tracker.parameters.groups.association_matrix import AssociationMatrixParams
+from tracker.parameters.values import with_values
+from tracker.sequences.pictures.frames import FrameReader
+from tracker.sequences.sequence import Sequence
+from tracker.single_view.association_matrix import method as association
 from tracker.single_view.association_matrix.method import join
 from tracker.single_view.association_matrix.silhouettes import Fits, Silhouettes
 from tracker.single_view.box_sizes import upright_boxes
@@ -144,3 +150,18 @@ def test_joining_loses_no_pixel_and_keeps_the_order(seed: int, gap: float) -> No
 def test_few_pieces_are_joined_to_nothing() -> None:
     empty = blobs(np.zeros((10, 10), np.uint8), 1)
     assert join(empty, np.zeros(0)) is empty
+
+
+@pytest.mark.parametrize(("gap", "count"), [(0.0, 2), (1.0, 1)])
+def test_pieces_are_joined_where_a_gap_is_said(
+    gap: float, count: int, heads: Sequence, reader: FrameReader, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    mask = np.zeros((72, 96), np.uint8)
+    mask[20:30, 40:50] = mask[33:50, 40:50] = 1
+    monkeypatch.setattr(association, "blobs", lambda *_: blobs(mask, 1))
+    values = {"association_matrix.join_gap": gap, "association_matrix.output": "objects"}
+    method = single_view.create(
+        "association_matrix", heads, 0, with_values(RunParameters(), values), reader
+    )
+    _, result = method.step(method.start(), 4, reader.picture(0, 4), np.random.default_rng(0))
+    assert len(result.measurements) == count

@@ -124,6 +124,18 @@ def test_two_who_exchange_are_tied_across_and_parted() -> None:
     assert 4 <= rows[0] <= 6
 
 
+@pytest.mark.parametrize(("before", "after"), [(1, 3), (3, 6), (3, 4), (2, 3)])
+def test_of_who_exchange_in_a_gap_what_ends_before_and_what_begins_after_it_is_meant(
+    before: int, after: int
+) -> None:
+    """Both are in pieces that end at step 2 and begin at step 4."""
+    cut = standing((1, 0, 2, 0.0), (1, 4, 9, 0.0), (2, 0, 2, 5.0), (2, 4, 9, 5.0))
+    kept = np.delete(np.arange(20), [3, 13])
+    one = said("exchanged", at(before), at(before, 5.0), at(after, 5.0), at(after))
+    found = resolver(one, paths=standing((1, 0, 9, 0.0), (2, 0, 9, 5.0))).constraints(cut, kept)
+    assert (found.must_link, found.cannot_link) == (((0, 3), (2, 1)), ((0, 1), (2, 3)))
+
+
 def test_all_pieces_that_are_spoken_of_are_meant() -> None:
     cut, kept = pieces()
     told = [said("same", at(8), at(15)), said("here", at(4)), said("nobody", at(0), at(2))]

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 from tests.random_rooms import random_room
+from tests.smoothing.known import given, known
 from tracker.runs.pipeline import compute, default_parameters
 from tracker.smoothing.heights import BoxTops, standing_heights
 from tracker.smoothing.noise import NoiseModel
@@ -100,3 +104,33 @@ def test_heights_are_those_of_the_people_in_the_room() -> None:
         assert height == pytest.approx(true, abs=0.02)
         assert abs(height - true) < 4.0 * sigma
         assert sigma < 0.02
+
+
+def test_a_height_is_where_the_tops_of_boxes_are_but_for_what_cameras_and_marks_explain() -> None:
+    """Boxes as they are expected, their tops moved by what is known of each camera and person, and
+    by the persons' own heights."""
+    places = np.tile([[0.3, 0.2, 0.85], [-0.6, 0.5, 0.85]], (12, 1, 1))
+    scene = known(places, sigma=1.0)
+    smoother, (paths, links) = scene.smoother(), scene.paths(sigma=0.01)
+    offsets, marks, taller = np.array([0.03, -0.01, 0.05]), [0.02, -0.04], [0.08, -0.1]
+    for c, camera in enumerate(smoother.cameras):
+        own = links.take(links.cameras == c)
+        seen = smoother.model.target.expected(
+            smoother.model.cameras[c], paths.states[own.rows], paths.covariances[own.rows]
+        )
+        half = (seen.boxes[:, 3] - seen.boxes[:, 1]) / 2.0
+        values, who = seen.values.copy(), paths.owners[own.rows]
+        values[:, 1] += half * (offsets[c] - offsets.mean() + np.array(marks)[who])
+        values[:, 1] += seen.jacobians[:, 1, 2] * np.array(taller)[who]
+        smoother.cameras[c] = given(camera, own.boxes, values)
+    learnt = replace(smoother.uncalibrated(paths), shifts=np.array(marks))
+    learnt.offsets[:, 1] = offsets
+    model = NoiseModel(np.full(3, 0.02), 1.0, np.full(3, 0.01), 1.0, 1.0)
+    heights, sigmas = smoother.heights(paths, links, learnt, model)
+    assert_allclose(heights, 1.7 + np.array(taller), atol=1e-6)
+    # of rows that agree: white and lasting errors of a box, and of where the person stands
+    low = np.linalg.norm(sigmas)
+    loose = paths.with_states(paths.states, 100.0 * paths.covariances)
+    assert np.linalg.norm(smoother.heights(loose, links, learnt, model)[1]) > low
+    none = replace(links, shares=np.full(len(links.shares), 0.5))
+    assert np.isnan(smoother.heights(paths, none, learnt, model)[0]).all()

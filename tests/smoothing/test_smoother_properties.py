@@ -214,6 +214,7 @@ def test_errors_of_one_step_and_the_next_correlate_within_a_path() -> None:
     assert _step_correlation(rows, owners, -np.ones((len(rows), 3))) == 0.95
     assert _step_correlation(rows, owners, (-1.0) ** rows[:, None]) == 0.0
     assert _step_correlation(rows[:20], owners, np.ones((20, 3))) == 0.0  # of too few
+    assert _step_correlation(rows, owners, np.zeros((len(rows), 3))) == 0.0
     few = np.arange(FEWEST + 1)
     assert _step_correlation(few, np.zeros(200, dtype=int), np.ones((FEWEST + 1, 1))) > 0.0
     assert _step_correlation(few[1:], np.zeros(200, dtype=int), np.ones((FEWEST, 1))) == 0.0

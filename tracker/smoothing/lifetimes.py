@@ -16,7 +16,9 @@ from tracker.smoothing.smoother import BoxAssociations, Smoother
 
 UNSURE = 0.3
 """Prior existence probability, for the association of boxes, of a row beyond a path's ends or in a
-gap."""
+gap. Within a second of the ends of the filter's tracks, the person was there and followed by no
+other track in 40 % of 424 such rows in ten random crowds, in 26 % of 295 in a piece of
+``wildtrack-points-300`` and in 22 % of 36 in one of ``cmc2``."""
 
 _MEETING_BY_CHANCE = 2
 """Number of cameras whose false boxes always have rays that nearly intersect somewhere."""

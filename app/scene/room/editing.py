@@ -21,7 +21,7 @@ from app.colours import PALETTES
 from app.errors import sentence
 from app.scene import geometry
 from app.scene.nodes import Lines, Tag, Tags
-from app.scene.worker import LatestWorker
+from app.scene.worker import Follower
 from app.state.snapshot import Change, Snapshot
 from app.state.teaching import Side, Teaching
 from app.state.workbench import Workbench
@@ -54,7 +54,7 @@ SIDES: tuple[Side, ...] = ("min", "max")
 FACES = tuple(Face(side, axis) for side in SIDES for axis in range(3))
 
 
-class RoomEditing:
+class RoomEditing(Follower):
     """The handles, kept where the room is; a drag of one teaches the sequence."""
 
     def __init__(self, server: viser.ViserServer, workbench: Workbench, teaching: Teaching) -> None:
@@ -65,8 +65,8 @@ class RoomEditing:
             workbench: Whose room.
             teaching: Who is told what was dragged.
         """
+        super().__init__("room editing", workbench)
         self._server = server
-        self._workbench = workbench
         self._teaching = teaching
         self._lock = threading.Lock()
         self._held: dict[Grip, Float[ndarray, " 3"]] = {}
@@ -76,24 +76,9 @@ class RoomEditing:
         """By what they move; those of entrances are made as they are needed."""
         self._box = Lines(server, "/editing/box", 2.0)
         self._words = Tags(server, "/editing/words", 1, 0.85)
-        self._worker = LatestWorker("room editing", self._work)
         for face in FACES:
             self._make(face)
-        self._unsubscribe = workbench.subscribe(self._note)
-        self._worker.ask("refresh")
-
-    def wait(self, timeout: float) -> bool:
-        """Block until all is done; whether within ``timeout`` seconds.
-
-        Raises:
-            Exception: What went wrong meanwhile.
-        """
-        return self._worker.wait(timeout)
-
-    def close(self) -> None:
-        """Stop following; the nodes stay as they are."""
-        self._unsubscribe()
-        self._worker.close()
+        self.follow()
 
     def _make(self, grip: Grip) -> None:
         face = isinstance(grip, Face)

@@ -367,6 +367,8 @@ export function mountLibrary(root, { store, actions }) {
 		const same = (/** @type {Server.RecordingInfo} */ one) =>
 			[one.place, one.name].includes(recording?.place ?? sequence?.opened_as ?? "");
 		const found = library.recordings.find(same) ?? library.recordings[0] ?? null;
+		// The runs come with an answer of their own.
+		if (!writing) recordings.show(library, found);
 		await choose(found, true);
 	}
 

@@ -133,7 +133,15 @@ function ways({ courses, room }) {
 	const ends = [0, 1].map((axis) => {
 		const sorted = points.map((point) => point[axis]).sort((a, b) => a - b);
 		const [low, high] = [quantile(sorted, 0.005), quantile(sorted, 0.995)];
-		return room ? [Math.min(low, room.min[axis]), Math.max(high, room.max[axis])] : [low, high];
+		const known = room
+			? [
+					[room.min[axis], room.max[axis]],
+					...room.entrances.map(({ position, sigma }) =>
+						[-2, 2].map((times) => position[axis] + times * sigma[axis]),
+					),
+				].flat()
+			: [];
+		return [Math.min(low, ...known), Math.max(high, ...known)];
 	});
 	const [[left, right], [low, high]] = ends;
 	const side = Math.max(right - left, high - low, 1);

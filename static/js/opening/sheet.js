@@ -1,6 +1,7 @@
 /** The sheet that opens recordings: by a key, by a drop anywhere, from files or from the disk. */
 import { all, h, one } from "../elements/dom.js";
 import { redraw } from "../elements/drawn.js";
+import { isBench } from "../state/address.js";
 import { ApiError, fetcher, getJson, request, sendJson } from "../state/api.js";
 import { draftSheet } from "./draft.js";
 import { startHead, startSheet } from "./start.js";
@@ -94,6 +95,8 @@ export function mountOpening({ store, actions }) {
 	/** What was dropped and is on its way: all is looked into when the last of it is here. */
 	let under = 0;
 	let [trouble, turns] = ["", 0];
+	/** Whether what is written is opened as well. */
+	let opens = false;
 	/** What is being wished, one after the other; looking and writing come after it. */
 	let wishing = Promise.resolve();
 
@@ -135,6 +138,7 @@ export function mountOpening({ store, actions }) {
 			past = [];
 			dialog.close();
 			actions.note("info", `${next.wish.name} was imported`, next.folder);
+			if (opens) toBench();
 		} else {
 			draw(draftSheet(next, store.get().schema?.methods ?? {}, (room) => wish({ room })));
 			// It may have been told of before this answer came.
@@ -277,6 +281,7 @@ export function mountOpening({ store, actions }) {
 		attempt(async () => {
 			await wishing;
 			if (!info || one("[data-do=track]", dialog).disabled) return;
+			opens = open;
 			if (open) store.set({ asked: info.wish.name });
 			take(await sendJson("POST", `/api/import/${info.key}/write`, { open }));
 		});
@@ -288,9 +293,15 @@ export function mountOpening({ store, actions }) {
 		input.click();
 	}
 
+	/** Who opens a recording wants to see it, wherever he was. */
+	function toBench() {
+		if (!isBench(store.get().place)) location.hash = "#tune";
+	}
+
 	/** @param {string} name */
 	function recording(name) {
 		dialog.close();
+		toBench();
 		void actions.open(name);
 	}
 

@@ -105,6 +105,23 @@ def test_the_last_runs_of_a_recording_are_taken_back(library: Page) -> None:
     expect(library.locator("tr[data-run]")).to_have_count(2)
 
 
+def test_recordings_are_listed_before_their_runs_and_a_plan_holds_its_entrances(
+    library: Page,
+) -> None:
+    cut = """svg => { const edge = svg.getBoundingClientRect();
+      return [...svg.querySelectorAll('ellipse, rect')].some((one) => {
+        const { left, right, top, bottom } = one.getBoundingClientRect();
+        return left < edge.left || right > edge.right || top < edge.top || bottom > edge.bottom;
+      }); }"""
+    plan = library.get_by_role("img", name="Ways from above")
+    assert plan.locator("ellipse").count() > 0
+    assert not plan.evaluate(cut)
+    library.route("**/api/library/recordings/*/runs", lambda route: None)  # it never comes
+    library.reload()
+    expect(library.locator(".lib .item").first).to_be_visible()
+    expect(library.locator("tr[data-run]")).to_have_count(0)
+
+
 def test_finding_leaves_what_matches(library: Page) -> None:
     library.keyboard.press("/")
     library.keyboard.type("no such run")

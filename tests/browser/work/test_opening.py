@@ -95,8 +95,11 @@ def test_dropped_files_become_tracks(
         page.screenshot(path=screenshots / "open-dropped.png")
     sheet.locator("#in-name").fill("living room")
     sheet.locator("#in-name-1").fill("window")
+    page.evaluate("location.hash = '#study'")
     page.keyboard.press("Control+Enter")
     expect(sheet).not_to_be_visible(timeout=LONG)
+    tune = page.get_by_role("link", name="Tune")
+    expect(tune).to_have_attribute("aria-current", "page")  # where its tracks are seen
     state = server.wait(lambda now: now["sequence"]["name"] == "living room")
     assert [camera["name"] for camera in state["sequence"]["cameras"]][1] == "window"
     state = server.wait_for_run()

@@ -17,6 +17,7 @@ from tests.runs.test_corrected_runs import run_of, with_a_gap
 from tracker.corrections import Correction, Place
 from tracker.corrections.kinds import Kind, make
 from tracker.fusion.trajectories import Trajectories, apply_corrections
+from tracker.parameters.catalogue import RunParameters
 from tracker.review.queue import queue
 from tracker.review.queue.clear_places import ClearPlaces
 from tracker.review.queue.item import (
@@ -32,6 +33,7 @@ from tracker.review.queue.other_run import OtherRun
 from tracker.review.queue.ranking import (
     IdentityReach,
     _as_it_is,
+    _item_of,
     _Site,
     _with_halves,
     _with_none_of_them,
@@ -39,6 +41,9 @@ from tracker.review.queue.ranking import (
     once_each,
     words_of,
 )
+from tracker.runs.run import Run
+from tracker.single_view.protocol import ViewResult
+from tracker.steps.steps import Steps
 
 PAIRED = ("same", "different", "exchanged")
 """Kinds of corrections of two places or more of one person or of two."""
@@ -119,19 +124,6 @@ def test_who_is_who_is_asked_between_places_where_people_stand_clear() -> None:
     assert abs(before.step - (near[0] - 1)) <= 2
     assert abs(after.step - (near[-1] + 1)) <= 2
     assert clear.before(third, 3).step == 3
-
-
-def test_what_hangs_on_a_moment_ends_where_the_next_mistake_may_be() -> None:
-    run = run_of(sequence([(0, walk((-1.1, 0.0, 1.0), (1.1, 0.0, 1.0), 60))], 60))
-    lanes = TrackRows(run.tracks)
-    track = int(lanes.ids[0])
-    first, last = lanes.span(track)
-    whole = IdentityReach(lanes, [])
-    assert whole.before(track, last) == whole.after(track, first) == last - first + 1
-    half = IdentityReach(lanes, [(track, 19, 20, 0.5)])
-    assert half.before(track, 39) == pytest.approx(20 + 0.5 * (20 - first))
-    assert half.after(track, 10) == pytest.approx(10 + 0.5 * (last - 19))
-    assert half.after(track, 20) == last - 19
 
 
 def test_none_of_those_who_are_told_may_be_said() -> None:
@@ -402,7 +394,7 @@ def test_two_of_one_pair_within_a_moment_are_one_question() -> None:
 
     first = one(10, 20, 0.0)
     for begin, end, told in ((25, 30, False), (26, 30, True), (2, 5, False), (2, 4, True)):
-        second = one(begin, end, 5.0)
+        second = replace(one(begin, end, 5.0), tracks=(3, 1))
         assert list(once_each([first, second], 5)) == [first, *([second] if told else [])]
     third = replace(one(12, 20, 5.0), tracks=(1, 4))
     assert list(once_each([first, third], 5)) == [first, third]
@@ -518,3 +510,59 @@ def test_what_is_asked_in_words(move: Move, title: str, why: str) -> None:
     tracks = world.tracks(lines((0, 29, 0.0), (0, 29, 1.0), (5, 29, 0.5), (0, 29, 2.0)))
     run = cast("Any", SimpleNamespace(tracks=tracks, sequence=SimpleNamespace(step_time=0.1)))
     assert words_of(run, move) == (title, why)
+
+
+def test_a_question_has_the_odds_of_all_its_moves_and_the_rows_that_hang_on_them() -> None:
+    tracks = world.tracks(lines((0, 10, 0.0), (0, 11, 1.0), (20, 59, 0.1), (21, 30, 1.1)))
+    run = cast("Any", SimpleNamespace(tracks=tracks, sequence=SimpleNamespace(step_time=0.1)))
+    reach = IdentityReach(TrackRows(tracks), [])
+    exchange = Move((ONE, OTHER), (AFTER, ANOTHER), "exchange", 1.0)
+    goes_on = Move((ONE,), (AFTER, ANOTHER), "exchange", 0.0)
+    site = _Site.of([goes_on, exchange])
+    item = _item_of(run, site, reach)
+    assert item is not None
+    total = 2.0 + np.e
+    assert item.probability == pytest.approx((1.0 + np.e) / total)
+    # the lesser of what is before and what is after: min(11 + 12, 40 + 10), min(11, 40 + 10)
+    assert item.stake == round((np.e * 23 + 11) / (np.e + 1.0))
+    assert (item.first, item.last, item.tracks) == (10, 21, (1, 2, 3, 4))
+    assert [place.step for place in item.places] == [10, 11, 20, 21]
+    now, *others = item.alternatives
+    assert (now.words, now.probability) == ("as it is", pytest.approx(1.0 / total))
+    assert [one.words for one in others] == [
+        "exchanged with 2", "1 goes on as 4", "2 goes on as 3", "none of these"
+    ]  # fmt: skip
+    assert [one.probability for one in others] == pytest.approx(
+        [0.9 * np.e / total, 1.0 / total, 0.1 * np.e / total, 0.0]
+    )
+    moment = replace(ONE, moment=7), replace(AFTER, moment=9)
+    apart = _item_of(run, _Site.of([Move(moment[:1], moment[1:], "join", 0.0)]), reach)
+    assert apart is not None
+    assert (apart.first, apart.last, apart.stake) == (7, 9, 8)
+    # nothing else can be said of places in the wrong order
+    late = Move((replace(ONE, end=Place(30, 0.0, 0.0, 1.0)),), (AFTER,), "join", 0.0)
+    assert _item_of(run, _Site.of([late]), reach) is None
+
+
+def test_so_many_are_asked_and_all_that_are_answered_are_counted(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    tracks = world.tracks(lines((0, 20, 0.0), (30, 59, 0.1), (0, 59, 1.5)))
+    run = Run(world.sequence(world.ring(3), lines((0, 59, 0.0))), RunParameters(), 0, {})
+    run.done, run.tracks, run.filtered = 60, tracks, tracks
+    run.tracks = replace(tracks, seen=np.ones((len(tracks), 3), dtype=bool))
+    run.views = Steps.of([(ViewResult.of_no_frame(),) * 3] * 60, ViewResult, 3)
+    whole = queue(run)
+    assert len(whole.items) > 2
+    assert whole.answered == 0
+    assert whole.how == (
+        "where tracks end and begin; less than 1 step expected to be wrong is left out"
+    )
+    first = whole.items[0]
+    rest = queue(run, corrections=first.alternatives[0].corrections)
+    assert rest.answered >= 1
+    assert first.id not in [one.id for one in rest.items]
+    monkeypatch.setattr("tracker.review.queue.ranking.MOST", 2)
+    assert queue(run).items == whole.items[:2]
+    backwards = queue(run, tracks)
+    assert "backwards in time" in backwards.how

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
@@ -15,16 +16,15 @@ from tests.engine.synthetic import HALF_EXTENTS, sequence, walk
 from tests.runs.test_corrected_runs import run_of
 from tracker.corrections import Place
 from tracker.fusion.protocol import Associations, FusionResult
-from tracker.fusion.trajectories import Trajectories
 from tracker.parameters.catalogue import RunParameters
 from tracker.review.queue import queue, single_tracks, track_ends
 from tracker.review.queue.clear_places import ClearPlaces
-from tracker.review.queue.item import Alternative, ReviewItem, TrackRows, confirm, propose
+from tracker.review.queue.item import TrackRows, confirm
 from tracker.review.queue.linking import Tracklet
-from tracker.review.queue.links import moves_of_links
+from tracker.review.queue.links import moves_of_links, tracklets_of
 from tracker.review.queue.lost_people import joins_of_lost_people, leaving_probability
 from tracker.review.queue.meetings import ambiguous_shares, meetings
-from tracker.review.queue.ranking import is_answered, once_each
+from tracker.review.queue.ranking import is_answered
 from tracker.review.queue.unclaimed import Unclaimed, _chains, find_unclaimed
 from tracker.runs.run import Run
 from tracker.sequences.sequence import Room
@@ -54,32 +54,6 @@ def near() -> Run:
     one = walk((-1.2, 0.14, 1.0), (1.1, 0.14, 1.0), 60)
     other = walk((1.2, -0.14, 1.0), (-1.1, -0.14, 1.0), 60)
     return run_of(sequence([(0, one), (0, other)], 60))
-
-
-def exchanged(tracks: Trajectories, step: int) -> Trajectories:
-    """Two tracks, exchanged from a step on."""
-    ids, names, late = tracks.ids.copy(), np.unique(tracks.ids), tracks.frames >= step
-    ids[late] = np.where(ids[late] == names[0], names[1], names[0])
-    changed = replace(tracks, ids=ids)
-    return changed.take(np.lexsort((ids, tracks.frames)))
-
-
-def test_who_goes_straight_on_is_himself_and_who_turns_back_was_exchanged() -> None:
-    run = near()
-    straight = [
-        one.log_odds for one in meetings(run, TrackRows(run.tracks)) if len(one.earlier) == 2
-    ]
-    assert straight
-    run.tracks = exchanged(run.tracks, 30)
-    turned = [one.log_odds for one in meetings(run, TrackRows(run.tracks)) if len(one.earlier) == 2]
-    assert min(turned) > max(straight) + 2.0
-
-
-def test_boxes_are_drawn_between_people_no_more_than_they_are() -> None:
-    run = near()
-    shares = ambiguous_shares(run)
-    assert all(0.0 < share <= 1.0 for share in shares.values())
-    assert all(one < other for one, other, _ in shares)
 
 
 class Growing:
@@ -148,28 +122,6 @@ def test_a_track_that_begins_or_ends_inside_is_asked_for(first: int, last: int, 
     assert other.corrections[0].kind == "here"
     assert is_answered(told[0], confirm(now.corrections), 25)
     assert not [one for one in queue(two()).items if one.kind in ("begins", "ends")]
-
-
-def test_a_place_is_told_once_and_only_where_something_is_at_stake() -> None:
-    place = Place(30, 0.0, 0.0, 1.0)
-
-    def doubt(tracks: tuple[int, ...], first: int, stake: int, x: float) -> ReviewItem:
-        other = replace_place(place, x)
-        return ReviewItem(
-            "exchange", "", "", first, first + 4, tracks, (place, other), 0.5, stake,
-            (Alternative("as it is", 0.5, ()), Alternative("other", 0.5, propose("name", [other],
-                                                                               name="A"))),
-        )  # fmt: skip
-
-    first, mirrored = doubt((1, 2), 30, 80, 0.1), doubt((2, 1), 40, 60, 0.2)
-    later, others = doubt((2, 1), 120, 50, 0.3), doubt((1, 3), 31, 40, 0.4)
-    little = doubt((4,), 31, 1, 0.5)
-    told = list(once_each([first, mirrored, later, others, little], 25))
-    assert told == [first, later, others]
-
-
-def replace_place(place: Place, x: float) -> Place:
-    return place._replace(x=x)
 
 
 # ── by their formulas, on tracks that are made up
@@ -669,3 +621,34 @@ def test_places_in_a_row_are_one_person(
     if len(found) == 1:
         for place in found[0].places:
             assert place.x == pytest.approx(np.mean(own[place.step]))
+
+
+def test_pieces_are_those_of_the_tracks_that_the_smoothed_labels_became() -> None:
+    run = scene(standing((0, 19, 0.0, 0.0), (5, 30, 1.0, 0.0)))
+    lanes = TrackRows(run.tracks)
+    pieces, joined = tracklets_of(run, lanes)
+    whole = [Tracklet(k, lanes.of_row(int(rows[0])), lanes.of_row(int(rows[-1])))
+             for k, rows in lanes.rows.items()]  # fmt: skip
+    assert (pieces, joined) == (whole, None)
+    labels, nothing = np.array([8, 4, 6, 8]), np.zeros(0)
+    begins, ends = np.arange(12.0).reshape(4, 3), np.arange(12.0, 24.0).reshape(4, 3)
+    links = LinkedTracklets(
+        labels, np.array([5, 0, 3, 21]), np.array([20, 19, 9, 30]), begins, ends,
+        *[np.zeros(4)] * 3, *[np.zeros(0, dtype=np.int64)] * 2, nothing,
+    )  # fmt: skip
+    tracks = run.tracks
+    smoothed = SimpleNamespace(
+        joined=links, frames=tracks.frames, means=tracks.positions,
+        labels=np.where(tracks.ids == 1, 4, 8),
+    )  # fmt: skip
+    run.smoothed = cast("Any", smoothed)
+    pieces, joined = tracklets_of(run, lanes)
+    assert joined is links
+    assert pieces == [
+        Tracklet(2, Place(5, 0.0, 1.0, 2.0), Place(20, 12.0, 13.0, 14.0)),
+        Tracklet(1, Place(0, 3.0, 4.0, 5.0), Place(19, 15.0, 16.0, 17.0)),
+        None,  # a label that no track has
+        Tracklet(2, Place(21, 9.0, 10.0, 11.0), Place(30, 21.0, 22.0, 23.0)),
+    ]
+    run.smoothed = cast("Any", SimpleNamespace(**{**vars(smoothed), "means": begins[[0] * 46]}))
+    assert tracklets_of(run, lanes) == (whole, None)

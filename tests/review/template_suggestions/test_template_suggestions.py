@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from typing import Any, cast
 
 import cv2
 import numpy as np
@@ -22,6 +23,8 @@ from tracker.review.template_suggestions import (
     _best,
     _considered,
     _long_lived,
+    _names,
+    _on_templates,
     _whole,
     drawn_boxes,
     suggest_templates,
@@ -345,3 +348,106 @@ def test_tracks_are_looked_at_in_two_hundred_steps_and_last_a_second(room: Seque
         assert _long_lived(brief).tolist() == there
         brief.done = 24
         assert _long_lived(brief).tolist() == [1, 2], "of a shorter recording all of it"
+
+
+# ── whose they are, and which of them are worth it
+
+
+def root(distance: float, side: int = 0) -> ndarray:
+    """A look so far from the first one, towards one of two sides."""
+    cosine = 1.0 - distance**2
+    found = np.zeros(3)
+    found[0], found[1 + side] = cosine, np.sqrt(1.0 - cosine**2)
+    return found
+
+
+def named(room: Sequence, names: list[str]) -> Run:
+    """A run of which some people have templates, all of step 0 that nobody is near."""
+    far = np.array([0.0, 0.0, 1.0, 1.0])
+    templates = tuple(Template(name, "left", 0, far) for name in names)
+    return tracked(replace(room, templates=templates))
+
+
+@pytest.mark.parametrize(
+    ("looks", "name"),
+    [
+        ([0.1], "anna"), ([0.45], "anna"), ([0.9], "person2"),  # like nobody who is known
+        ([0.1, 0.1, 0.95], "anna"), ([0.1, 0.95, 0.95], "person2"),  # by the median
+    ],
+)  # fmt: skip
+def test_a_track_is_whose_templates_most_of_its_moments_look_like(
+    room: Sequence, looks: list[float], name: str
+) -> None:
+    run = named(room, ["anna", "person1"])
+    known = [root(0.0), root(0.98, side=1)]
+    rows = moments(*((1, 0, 20 * k, True, 3, 90.0) for k in range(len(looks))))
+    found = _names(run, rows, np.array([root(one) for one in looks]), known)
+    assert found == {1: name}
+    several = moments((1, 0, 0, True, 3, 90.0), (2, 0, 0, True, 3, 90.0))
+    two = _names(run, several, np.array([root(0.97), root(0.97)]), [root(0.0), root(0.0)])
+    assert two == {1: "person2", 2: "person3"}
+
+
+@pytest.mark.parametrize(("apart", "known"), [(0.06, True), (0.04, False)])
+def test_a_track_that_looks_like_two_people_alike_is_nobodys(
+    room: Sequence, apart: float, known: bool
+) -> None:
+    run = named(room, ["anna", "anna", "bert"])
+    looks = [root(0.9), root(0.2), root(0.2 + apart, side=1)]  # the nearest of a person counts
+    rows = moments((1, 0, 0, True, 3, 90.0))
+    assert _names(run, rows, root(0.0)[None], looks) == ({1: "anna"} if known else {})
+    alone = named(room, ["anna"])
+    assert _names(alone, rows, root(0.0)[None], looks[1:2]) == {1: "anna"}
+
+
+@pytest.mark.parametrize(("share", "stands"), [(0.41, True), (0.39, False)])
+def test_a_track_is_whoever_has_most_templates_where_it_is(
+    room: Sequence, share: float, stands: bool
+) -> None:
+    def template(name: str, step: int, width: float) -> Template:
+        (box,) = drawn_boxes(CAMERAS[0], PATHS["bert"][step][None], HALF_EXTENTS)
+        return Template(name, "left", step, box * [1.0, 1.0, width, 1.0])
+
+    run = tracked(replace(room, templates=(template("carl", 5, share),)))
+    assert _on_templates(run) == ({2: "carl"} if stands else {})
+    several = (template("carl", 5, 1.0), template("anna", 9, 1.0), template("anna", 20, 0.9))
+    assert _on_templates(tracked(replace(room, templates=several))) == {2: "anna"}
+    elsewhere = replace(several[0], camera="nowhere")
+    late = replace(several[0], frame=STEPS)
+    assert _on_templates(tracked(replace(room, templates=(elsewhere, late)))) == {}
+
+
+@pytest.mark.parametrize(
+    ("looks", "suggested"),
+    [
+        ([0.0, 0.24], [0]), ([0.0, 0.26], [0, 1]),  # another look
+        ([0.0, 0.5, 0.9], [0, 1]),  # two at most
+        ([0.0, 0.1, 0.5], [0, 2]),
+    ],
+)  # fmt: skip
+def test_of_one_person_two_looks_are_offered_in_a_camera(
+    room: Sequence, looks: list[float], suggested: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rows = moments(*((1, 0, 20 * k, True, 3, 90.0) for k in range(len(looks))))
+    own = np.array([root(one) for one in looks])
+    place = "tracker.review.template_suggestions"
+    monkeypatch.setattr(f"{place}.best_moments", lambda run: rows)
+    monkeypatch.setattr(f"{place}._appearances", lambda found, pictures: (found, own))
+    nobody = cast("Any", None)
+    found = suggest_templates(tracked(room), nobody)
+    assert [one.template.frame for one in found] == [20 * k for k in suggested]
+    assert {one.template.name for one in found} == {"person1"}
+    # one who has templates: by the nearest of the own ones, if no other person's is nearer
+    known = [root(0.3), root(0.0, side=1)]
+    monkeypatch.setattr(f"{place}._known", lambda sequence, pictures: known)
+    monkeypatch.setattr(f"{place}._names", lambda *_: {1: "anna"})
+    for names, count in ((["anna", "anna"], 0), (["anna", "bert"], 0), (["anna"], 1)):
+        known[:] = [root(0.3), root(0.0, side=1)][: len(names)]
+        templates = tuple(
+            Template(name, "left", 0, np.array([0.0, 0.0, 9.0, 9.0])) for name in names
+        )
+        found = suggest_templates(tracked(replace(room, templates=templates)), nobody)
+        assert len([one for one in found if one.template.frame == 0]) == count, names
+        if count:
+            assert found[0].difference == pytest.approx(0.3, abs=1e-9)
+            assert found[0].known_here

@@ -2,6 +2,9 @@
 
 [ZW21] Zhu, Wang, "3D target position tracking based on probability hypothesis
 density filtering", 2021.
+
+Numbers that are class variables are constants: over their ranges recall, false positives and IDF1
+change by no more than they scatter (``tests/papers/rooms/fusion_constants.md``).
 """
 
 from __future__ import annotations
@@ -107,9 +110,12 @@ class FusionParams(Params):
     vertical_share: ClassVar[float] = 0.1
     """Constant velocity: σ_a along the vertical axis, as a share of that along the floor."""
 
-    velocity_memory: ClassVar[float] = 2.0
-    """Constant velocity: time after which a person who is not seen has slowed to a third,
-    seconds."""
+    velocity_memory: Annotated[
+        float,
+        Field(ge=0.1, le=100.0),
+        ui("τ", "Motion", unit="s", step=0.1, log=True, when=_VELOCITY),
+    ] = 2.0
+    """Constant velocity: time after which a person who is not seen has slowed to a third."""
 
     start_velocity: ClassVar[float] = 0.7
     """Constant velocity: standard deviation of a new target's velocity along each axis, around 0,
@@ -206,12 +212,8 @@ class FusionParams(Params):
     posture_width_sigma: ClassVar[float] = 0.5
     """Other posture: standard deviation of the box's half width, half heights."""
 
-    posture_height_sigma: Annotated[
-        float,
-        Field(ge=0.01, le=2.0),
-        ui("σ_ph", unit="half heights", step=0.01, advanced=True, when=_BOXES),
-    ] = 0.25
-    """Other posture: standard deviation of the box's half height."""
+    posture_height_sigma: ClassVar[float] = 0.25
+    """Other posture: standard deviation of the box's half height, half heights."""
 
     posture_drop: ClassVar[float] = 0.3
     """Other posture: standard deviation of the vertical displacement of the person's centre, half

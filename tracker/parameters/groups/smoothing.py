@@ -1,4 +1,8 @@
-"""Parameters of the smoothing over the whole recording."""
+"""Parameters of the smoothing over the whole recording.
+
+Numbers that are class variables are constants: over their ranges recall, false positives and IDF1
+change by no more than they scatter (``tests/papers/rooms/fusion_constants.md``).
+"""
 
 from __future__ import annotations
 

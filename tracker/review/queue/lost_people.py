@@ -17,21 +17,27 @@ _LONGEST = 20.0
 seconds."""
 
 _SPEED = 0.6
-"""Standard deviation of the velocity of a lost person, metres per second."""
+"""Standard deviation of the velocity of a lost person along each axis, metres per second. In one
+second people move by 0.4 to 0.8 m along an axis (root mean square) in five recordings and four
+random crowds."""
 
 _STRAIGHT = 4.0
 """Time for which a lost person keeps direction and velocity, seconds; later the displacement grows
-as that of a random walk."""
+as that of a random walk. In the same recordings it grows like the time up to two to four seconds,
+to 1.0 to 2.6 m, and after eight it has grown by no more than two thirds."""
 
 _NEAR = 0.4
-"""Standard deviation of the place of a person that has just been lost, metres."""
+"""Standard deviation of the place of a person that has just been lost, metres: 99 % of the places
+of tracks err by less than 0.6 m in three recordings and ten random crowds."""
 
 _EDGE = 0.5
 """Distance from the room's sides within which people leave and come, metres."""
 
 _LEAVES_AT_AN_EDGE, _LEAVES_INSIDE = 0.9, 0.2
 """Prior probability that the person of a track has left the room where the track ends: at a side or
-an entrance of the room, and elsewhere."""
+an entrance of the room, and elsewhere. It is a prior that no recording tells: inside the room
+88 % of the ends are such in a piece of ``wildtrack-points-300``, whose truth is of a part of the
+square, and none are in random crowds, which nobody leaves."""
 
 
 def joins_of_lost_people(

@@ -18,14 +18,19 @@ _CLOSE = 2.0
 
 _EXCHANGED = 0.12
 """Prior probability that the tracks of two people at the same place are exchanged; it falls with
-their distance d as exp(−d / w), with w the width of a target."""
+their distance d as exp(−d / w), with w the width of a target. In ten random crowds 5.0 % of 625
+pairs of tracks that met within half a width were exchanged, 0.7 % of 824 within a width and none of
+1,204 within two. With a decay twice as fast, fifteen truthful answers win as much in two of these
+crowds and 0.01 more of IDF1 in a third."""
 
 _ALONE = 1.5
 """Log odds of an exchange against its half, after which one track follows the other's person and
 the other track ends."""
 
 _TURN = 0.6
-"""Standard deviation of the change of a person's velocity at a meeting, metres per second."""
+"""Standard deviation of the change of a person's velocity at a meeting, along each axis, metres per
+second. Of people within two widths of each other it is 0.34 in ``cmc2``, 0.31 to 0.42 in random
+crowds and 0.54 in ``wildtrack-points-300``; the places of tracks err besides."""
 
 _STRIDE = 0.5
 """Time before and after a meeting over which velocities are measured, seconds."""

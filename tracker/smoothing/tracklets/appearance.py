@@ -31,10 +31,12 @@ _FEWEST = 5
 
 _CORRELATION = 0.3
 """Correlation of the boxes of one tracklet: n boxes have the information of n / (1 + 0.3 (n − 1))
-independent ones."""
+independent ones. From 0.1 to 0.7 the IDF1 of five of the six pairs of cameras of ``cmc2-looks``
+changes by at most 0.0005; that of the sixth is higher by 0.026 at 0.1."""
 
 _DRIFT = 0.15
-"""Variance of one person's appearance between tracklets, as a share of that between persons."""
+"""Variance of one person's appearance between tracklets, as a share of that between persons. From
+0.05 to 0.45 the IDF1 of each pair of cameras of ``cmc2-looks`` changes by at most 0.0002."""
 
 _ROUNDING = 1e-6
 """Least variance within a tracklet: that of unit vectors in half precision, 2⁻¹⁰ squared."""

@@ -22,7 +22,8 @@ SLACK = 1.0
 the ends of tracks err."""
 
 _CHANGES = 0.1
-"""Probability that a person's process noise returns to the model's within a gap."""
+"""Probability that a person's process noise returns to the model's within a gap: who stood may walk
+on. From 0.02 to 0.4 no figure of four random crowds and four recordings changes."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -23,7 +23,9 @@ random rooms, random crowds and recordings of ``tests/papers/rooms/fusion_ablati
 as much as 0.001: the parts are linked again."""
 
 _DETECTED = 0.3
-"""Sum of association probabilities over all cameras above which a row counts as detected."""
+"""Sum of association probabilities over all cameras above which a row counts as detected.
+From 0.1 to 0.9 no figure of four random crowds and four recordings changes: nearly every row has a
+box of its own or none."""
 
 _AROUND_A_JUMP = 0.2
 """Seconds before and after a jump that are left out of both tracklets."""
