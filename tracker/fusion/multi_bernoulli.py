@@ -165,7 +165,9 @@ class MultiBernoulli:
                 seen.starts,
                 seen.clutter_factors,
             )
-            proposed, recent = self._model.newborns_and_recent(evidence, seen.boxes, views, recent)
+            proposed, recent = self._model.newborns_and_recent(
+                evidence, seen.boxes, views, recent, tracks
+            )
             if proposed is not None:
                 born, newborns = proposed
                 born = models.label_births(born, next_label)
