@@ -67,7 +67,9 @@ def call(folder: Path, seed: int, which: tuple[str, ...], examples: int) -> Roun
     running = Server(sequence, folder / "home", data=data, token=TOKEN)
     try:
         state = running.wait_for_run()
-        definition = definition_of({**STUDY, "recordings": [str(sequence)]}, "study", folder)
+        definition = definition_of(
+            {**STUDY, "recordings": [str(sequence)]}, where="study", folder=folder
+        )
         create(definition, folder / "home" / "studies")
         there = {"sequence_key": state["sequence"]["key"], "name": STUDY["name"], "run": 1}
         lines = [f'"path.{name}" = {json.dumps(value)}\n' for name, value in there.items()]
