@@ -13,6 +13,9 @@ import json
 import subprocess
 import sys
 import tempfile
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,6 +23,7 @@ from tests.app.folders import write_crossing
 from tests.browser.serving import Server
 from tracker.files.atomic import write_whole
 from tracker.studies.definition import definition_of
+from tracker.studies.errors import StudyError
 from tracker.studies.store import create
 
 CHECKS = (
@@ -82,13 +86,33 @@ def call(folder: Path, seed: int, which: tuple[str, ...], examples: int) -> Roun
             "--max-examples", str(examples), "--request-timeout", "30", "--continue-on-failure",
             "--no-shrink", "--report", "json", "--report-json-path", str(report), *which,
         ]  # fmt: skip
-        done = subprocess.run(line, cwd=folder, capture_output=True, text=True)
+        with _ending_studies(running):
+            done = subprocess.run(line, cwd=folder, capture_output=True, text=True)
         assert running.get("/api/state").status_code == 200
         cases = json.loads(report.read_bytes())["test_cases"]["generated"]
         return Round(cases, done.returncode, done.stdout[-8000:] + done.stderr[-2000:])
     finally:
         running.stop()
         running.end_studies()
+
+
+@contextmanager
+def _ending_studies(running: Server) -> Iterator[None]:
+    """Within it the studies that calls start end soon: each would compute for minutes."""
+    over = threading.Event()
+
+    def end() -> None:
+        while not over.wait(3.0):
+            with suppress(StudyError, OSError, AssertionError):  # a call may delete it meanwhile
+                running.end_studies()
+
+    thread = threading.Thread(target=end)
+    thread.start()
+    try:
+        yield
+    finally:
+        over.set()
+        thread.join()
 
 
 def main() -> int:
