@@ -37,7 +37,7 @@ TOKEN = "the-token-of-these-calls"
 
 EVERYTHING = ("--exclude-path", "/api/teach/detector/fetched")  # it would have npm download
 COMMANDS = ("--include-path", "/api/commands")
-EXAMPLES = {EVERYTHING: 8, COMMANDS: 500}
+EXAMPLES = {EVERYTHING: 8, COMMANDS: 200}
 """Of each operation in a round."""
 
 STUDY = {
