@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import signal
 import subprocess
 import sys
 import tempfile
@@ -121,6 +122,8 @@ def main() -> int:
     parser.add_argument("--cases", type=int, default=10_000)
     parser.add_argument("--resume", type=Path, required=True, help="keeps what was done")
     arguments = parser.parse_args()
+    # a shell has its background jobs ignore Ctrl-C, and servers that inherit that never end
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     stored = {"rounds": 0, "cases": 0, "failed": []}
     if arguments.resume.exists():
         stored = json.loads(arguments.resume.read_text(encoding="utf-8"))
