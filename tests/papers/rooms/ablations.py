@@ -221,7 +221,7 @@ def effects(
             means = changes.mean(axis=0) if there else ()
             acts = bool((np.abs(changes) >= LEAST).any())
             found.append(
-                {"method": method, "parameter": key, "rooms": len(there),
+                {"method": method, "parameter": key, "rooms": tuple(there),
                  "changes": dict(zip(own, means, strict=False)),
                  "acts": acts,
                  "flat": bool(there) and not acts,
@@ -233,30 +233,41 @@ def effects(
     return found
 
 
-def table(found: list[Mapping[str, Any]], seeds: tuple[int, ...], steps: int) -> str:
-    """The effects as a Markdown table."""
+def table(found: list[Mapping[str, Any]], steps: int, earlier: str = "") -> str:
+    """The effects as a Markdown table, after the lines of what was measured earlier alone.
+
+    Args:
+        found: The effects of this run.
+        steps: Number of steps of each room.
+        earlier: The table as it was.
+    """
     lines = [
         "# Stage 1: what each parameter changes in random rooms",
         "",
-        f"Rooms {', '.join(map(str, seeds))} of random rooms, {steps} steps, seed 0: change of the "
-        "means of recall, false positives a step and IDF1 against the defaults. Published and "
-        "essential parameters are not judged. *acts*: a figure of one room changes by "
-        f"{LEAST:g} or more, and no further room was run; *flat*: none does; *same*: every number "
-        "of the tracks is as without the change. A parameter that no longer exists was judged "
-        "before it went. Made by `python -m tests.papers.rooms.ablations`.",
+        f"{steps} steps of random rooms, seed 0: change of the means of recall, false positives a "
+        "step and IDF1 against the defaults. Published and essential parameters are not judged. "
+        f"*acts*: a figure of one room changes by {LEAST:g} or more, and no further room was run; "
+        "*flat*: none does; *same*: every number of the tracks is as without the change. "
+        "A parameter that no longer exists was judged before it went. Made by "
+        "`python -m tests.papers.rooms.ablations`.",
         "",
         "| method | parameter | value | rooms | recall | false | IDF1 | |",
         "|---|---|---|---|---|---|---|---|",
     ]
+    measured = {(one["method"], one["parameter"], tuple(one["rooms"])) for one in found}
+    for line in earlier.splitlines():
+        cells = [cell.strip() for cell in line.split("|")]
+        if len(cells) == len(lines[-1].split("|")) and "." in cells[2]:
+            if (cells[1], cells[2], tuple(map(int, cells[4].split()))) not in measured:
+                lines.append(line)
     for one in found:
+        rooms = " ".join(map(str, one["rooms"]))
         for value, changes in one["changes"].items():
-            cells = " | ".join(f"{change:+.3f}" for change in changes)
-            shown = f"{value:g}" if isinstance(value, float) else value
+            cells = [f"{change:+.3f}" for change in changes]
+            shown = f"{value:g}" if isinstance(value, float) else f"{value}"
             flat = "same" if one["same"] else "flat" if one["flat"] else "acts"
-            lines.append(
-                f"| {one['method']} | {one['parameter']} | {shown} | {one['rooms']} "
-                f"| {cells} | {flat} |"
-            )
+            row = [one["method"], one["parameter"], shown, rooms, *cells, flat]
+            lines.append(f"| {' | '.join(row)} |")
     return "\n".join(lines) + "\n"
 
 
@@ -281,9 +292,9 @@ def main(arguments: list[str] | None = None) -> int:
     seeds, methods = tuple(islice(crowded, given.count)), tuple(given.method or METHODS)
     rows = read_rows(given.output)
     fill(rows, seeds, given.steps, methods, given.output)
-    given.table.write_text(
-        table(effects(rows, seeds, given.steps, methods), seeds, given.steps), encoding="utf-8"
-    )
+    earlier = given.table.read_text(encoding="utf-8") if given.table.is_file() else ""
+    found = effects(rows, seeds, given.steps, methods)
+    given.table.write_text(table(found, given.steps, earlier), encoding="utf-8")
     return 0
 
 

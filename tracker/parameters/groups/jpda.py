@@ -228,7 +228,8 @@ def _uses(parameters: Values) -> Uses:
     if source == "foreground":
         return Uses(pictures=True, reads=(own, Reads("pictures"), Reads("foreground")))
     # without a single template the foreground's boxes are taken instead
-    colours = Reads("colour_phd", only=ColourPeakParams)
+    walk = frozenset({"motion_sigma", "growth_sigma"})  # its targets have a motion of their own
+    colours = Reads("colour_phd", only=ColourPeakParams, without=walk)
     reads = (own, Reads("pictures"), Reads("foreground"), colours)
     return Uses(pictures=True, templates="if there", reads=reads)
 
