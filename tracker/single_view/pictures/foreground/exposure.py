@@ -39,9 +39,8 @@ four of rooms where people stay 0.22 to 0.28, so that the two differ; with 0.2 i
 overlapped (0.17 to 0.31, and 0.26 to 0.48)."""
 
 AWAY = 24
-"""Difference from the median, on the scale 16 √level, above which a pixel is away from it: that from
-which it is foreground by default. With half of it, noise made the shares of the rooms at
-:data:`OFTEN` overlap."""
+"""Difference from the median, on the scale 16 √level, above which a pixel is away from it: that
+from which it is foreground by default. With half of it the shares of the same rooms overlapped."""
 
 LEAST_CHANGING = 0.005
 """Least share of changing pixels in the image for an estimate of :attr:`changing_share`."""
