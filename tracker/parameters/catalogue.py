@@ -108,6 +108,7 @@ REMOVED: Mapping[str, str] = {
     "detection_phd.merging_threshold": "components within a squared distance of 4 are merged",
     "detection_phd.max_components": "the 60 heaviest components are kept",
     "detection_phd.extraction_threshold": "components heavier than 0.5 are estimates",
+    "colour_phd.extraction_threshold": "components heavier than 0.5 are estimates",
     "pseudo_particle.colour_space": "all colours have colour_phd.colour_space",
     "pseudo_particle.histogram_kernel": "all colours have colour_phd.histogram_kernel",
     "pseudo_particle.acceptance_foreground": "all colours have colour_phd.acceptance_foreground",

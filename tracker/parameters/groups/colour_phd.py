@@ -2,11 +2,13 @@
 
 [ZW21] Zhu, Wang, "3D target position tracking based on probability hypothesis
 density filtering", 2021.
+[VM06] Vo, Ma, "The Gaussian mixture probability hypothesis density filter", IEEE TSP
+54(11), 2006.
 """
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
@@ -157,6 +159,10 @@ class ColourPeakParams(ColourBoxParams):
 class ColourPhdParams(ColourPeakParams):
     """Single-view GM-PHD filter on colour likelihood ([ZW21] §2.1–2.3)."""
 
+    extraction_threshold: ClassVar[float] = 0.5
+    """A component whose weight is above this is a 2D estimate: more likely than not there is
+    somebody ([VM06]). By default no estimate goes to the fusion."""
+
     survival_probability: Annotated[
         float, Field(ge=0.5, le=1.0), ui("p_S", "Motion", step=0.001)
     ] = 0.99
@@ -194,11 +200,6 @@ class ColourPhdParams(ColourPeakParams):
 
     max_components: Annotated[int, Field(ge=1, le=300), ui("J_max", "Extraction", step=1)] = 30
     """The heaviest components that are kept."""
-
-    extraction_threshold: Annotated[
-        float, Field(ge=0.01, le=0.99), ui("T_e", "Extraction", step=0.01)
-    ] = 0.5
-    """A component whose weight is above this is a 2D estimate."""
 
     output: Annotated[
         Literal["peaks", "estimates"], ui("Y", "Extraction", published="estimates")
