@@ -1,4 +1,8 @@
-"""The association matrix of one step: probabilities of all pairs of target and measurement."""
+"""The association matrix of one step: probabilities of all pairs of target and measurement.
+
+[FBS83] Fortmann, Bar-Shalom, Scheffe, "Sonar tracking of multiple targets using joint
+probabilistic data association", IEEE Journal of Oceanic Engineering 8(3), 1983.
+"""
 
 from __future__ import annotations
 
