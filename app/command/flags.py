@@ -78,6 +78,17 @@ def set_values(items: tuple[str, ...]) -> dict[str, str]:
     return {key: text for key, text in values.items() if key not in REMOVED}
 
 
+def preset_values(name: str | None) -> dict[str, Any]:
+    """The values of ``--preset`` by key; none where none is named.
+
+    Raises:
+        ParameterError: If there is no such preset.
+    """
+    if name is not None and name not in PRESETS:
+        raise ParameterError("--preset", f"expected one of {', '.join(PRESETS)}, got {name!r}")
+    return {} if name is None else dict(PRESETS[name])
+
+
 @dataclass
 class Serve:
     """Start the workbench and serve its page on this machine."""
@@ -179,13 +190,7 @@ class Track:
         Raises:
             ParameterError: If the preset or a ``--set`` is not as it must be.
         """
-        changes: dict[str, Any] = {}
-        if self.preset is not None:
-            if self.preset not in PRESETS:
-                known = ", ".join(PRESETS)
-                raise ParameterError("--preset", f"expected one of {known}, got {self.preset!r}")
-            changes.update(PRESETS[self.preset])
-        changes.update(set_values(self.set))
+        changes: dict[str, Any] = {**preset_values(self.preset), **set_values(self.set)}
         for key, chosen in (
             ("single_view", self.single_view),
             ("fusion_method", self.fusion_method),

@@ -43,6 +43,9 @@ MOST = 500
 WRITES_AFTER = 0.5
 """Time after an edit at which it is written, seconds: a slider that is dragged is written once."""
 
+OPENS_WITHIN = 10.0
+"""How long an undo waits for the edits of a recording that was just opened, seconds."""
+
 Parts = Mapping[Part, tuple[Any, Any]]
 """Each part that an edit changed, before and after. ``parameters``, ``presets`` and ``runs`` have
 what differs alone, by key; ``taught`` and ``corrections`` have all of it."""
@@ -116,6 +119,7 @@ class Edits:
         """
         self._workbench, self._folder, self._earlier = workbench, folder, earlier
         self._lock = threading.RLock()
+        self._opened = threading.Condition(self._lock)
         self._telling, self._turning = threading.Lock(), threading.Lock()
         self._done: list[Edit] = []
         self._undone: list[Edit] = []
@@ -132,7 +136,7 @@ class Edits:
         self._timer: threading.Timer | None = None
         if folder is not None:
             self._take_up(folder / "everywhere.json")
-        self._unsubscribe: Callable[[], None] = lambda: None
+        self._unsubscribe: Callable[[], None] | None = None
         self._show_words()
 
     def follow(self) -> None:
@@ -142,7 +146,8 @@ class Edits:
 
     def close(self) -> None:
         """Follow no more, and write what is not written yet."""
-        self._unsubscribe()
+        if self._unsubscribe is not None:
+            self._unsubscribe()
         self._write()
 
     def own(self, part: Part, put: Callable[[Any], object]) -> None:
@@ -198,6 +203,7 @@ class Edits:
     def _turn(self, side: Literal[0, 1]) -> Edit:
         with self._turning:
             with self._lock:
+                self._opened.wait_for(self._has_taken_up, OPENS_WITHIN)
                 stack = (self._done, self._undone)[side]
                 if not stack:
                     raise EditError(f"there is nothing to {'redo' if side else 'undo'}")
@@ -211,6 +217,14 @@ class Edits:
                 raise EditError(f"{edit.words}: {sentence(error)}") from error
             self._move(edit, 1 - side)
         return edit
+
+    def _has_taken_up(self) -> bool:
+        """Whether the edits are those of the recording that is open: who opens it tells others
+        first."""
+        now, own = self._workbench.snapshot().sequence, self._sequence
+        if self._unsubscribe is None or now is None:
+            return True
+        return own is not None and own.views is now.views
 
     def _restore(self, edit: Edit, side: Literal[0, 1]) -> None:
         values = {part: pair[side] for part, pair in edit.parts.items()}
@@ -282,6 +296,7 @@ class Edits:
             before, values = self._sequence, self._parameters
             if before is None or before.views is not now.sequence.views:
                 self._open(now)
+                self._opened.notify_all()
             else:
                 self._sequence, self._parameters = now.sequence, now.parameters
                 self._defaults = now.defaults

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from tracker.parameters.catalogue import METHODS, PARAMETERS, PRESETS, RunParameters
+from tracker.parameters.groups.colour_phd import ColourBoxParams
 from tracker.parameters.values import with_values
 from tracker.runs import pipeline
 from tracker.runs.pipeline import Run
@@ -81,7 +82,7 @@ def alternatives(sequence: Sequence) -> list[Combination]:
             values = (not parameter.default,)
         for new in values:
             if new != parameter.default and _possible(sequence, key, new):
-                for single_view, changes in _reading(sequence, parameter.group):
+                for single_view, changes in _reading(sequence, parameter.group, parameter.name):
                     for fusion_method in _asking(parameter.group):
                         own = dict(changes)
                         if parameter.group == "smoothing":
@@ -124,18 +125,22 @@ def _fusions(preset: str) -> tuple[str, ...]:
     return METHODS["fusion_method"] if chosen is None else (chosen,)
 
 
-def _reading(sequence: Sequence, group: str) -> Iterator[tuple[str, tuple[tuple[str, Any], ...]]]:
-    """The single-view methods that a group of parameters matters to."""
+def _reading(
+    sequence: Sequence, group: str, name: str = ""
+) -> Iterator[tuple[str, tuple[tuple[str, Any], ...]]]:
+    """The single-view methods that a parameter of a group matters to."""
     possible = dict(_single_views(sequence))
     if group in ("fusion", "smoothing"):
         names = ("none",) if sequence.has_detections else ("colour_phd",)
     elif group == "foreground":
         names = ("colour_phd", "jpda", "association_matrix")
+    elif group == "colour_phd" and name in ColourBoxParams.model_fields:
+        names = ("colour_phd", "pseudo_particle")
     else:
         names = ("none" if group == "detection_boxes" else group,)
-    for name in names:
-        if name in possible:
-            yield name, possible[name]
+    for method in names:
+        if method in possible:
+            yield method, possible[method]
 
 
 def _asking(group: str) -> tuple[str, ...]:

@@ -17,7 +17,7 @@ from tracker.parameters.values import value_of, with_values
 @pytest.mark.parametrize("method", METHODS)
 def test_published_and_essential_parameters_are_not_judged(method: str) -> None:
     keys = judged(method)
-    assert len(keys) > 5
+    assert len(keys) > 3
     for key in keys:
         parameter = PARAMETERS[key]
         assert (parameter.stage, parameter.published) == ("single_view", None)
@@ -43,26 +43,57 @@ def test_every_trial_has_a_key_of_its_own() -> None:
     assert made[0].row_key(100) != made[0].row_key(50)
 
 
-def test_a_parameter_is_flat_where_no_value_changes_a_mean(tmp_path: Path) -> None:
+def measured(folder: Path, seed: int, trial: Trial, recall: float) -> None:
+    row: dict[str, Any] = {"seed": seed, "key": trial.row_key(9), "false_per_step": 0, "idf1": 1}
+    keep_row(folder, row | {"found_share": recall})
+
+
+def test_a_parameter_acts_where_a_value_changes_a_figure_of_one_room(tmp_path: Path) -> None:
     first, second = judged("jpda")[:2]
     for seed in (1, 2):
         for trial in trials(("jpda",)):
-            if trial.key not in ("", first, second):
-                continue
-            # the changes of the first parameter cancel, those of the second do not
-            moved = {first: 0.1 if seed == 1 else -0.1, second: 0.02, "": 0.0}[trial.key]
-            row: dict[str, Any] = {"seed": seed, "key": trial.row_key(9)}
-            keep_row(tmp_path, row | {"found_share": 0.5 + moved, "false_per_step": 0, "idf1": 1})
-    found = {
-        one["parameter"]: one for one in effects(read_rows(tmp_path), range(1, 3), 9, ("jpda",))
-    }
+            if trial.key in ("", first, second):
+                # the changes of the second parameter cancel in the mean
+                by = 0.1 if seed == 1 else -0.1
+                moved = {first: 0.004, second: by, "": 0.0}[trial.key]
+                measured(tmp_path, seed, trial, 0.5 + moved)
+    seeds = (1, 2)
+    found = {one["parameter"]: one for one in effects(read_rows(tmp_path), seeds, 9, ("jpda",))}
     assert [found[key]["flat"] for key in (first, second)] == [True, False]
-    assert found[second]["rooms"] == 2
-    assert next(iter(found[second]["changes"].values()))[0] == pytest.approx(0.02)
-    assert not found[judged("jpda")[2]]["flat"], "what was not measured is not flat"
-    text = table(list(found.values()), range(1, 3), 9)
-    assert text.count("| flat |") == len(ends(first))
+    assert [found[key]["acts"] for key in (first, second)] == [False, True]
+    assert found[second]["rooms"] == seeds
+    assert next(iter(found[second]["changes"].values()))[0] == pytest.approx(0.0)
+    assert next(iter(found[first]["changes"].values()))[0] == pytest.approx(0.004)
+    other = found[judged("jpda")[2]]
+    assert not other["flat"], "what was not measured is not flat"
+    assert not other["acts"]
+    earlier = (
+        f"| jpda | jpda.gone | 2 | 7 8 | +0.000 | +0.000 | +0.000 | flat |\n| jpda | {first} | 9 "
+    )
+    earlier += "| 1 2 | +0.000 | +0.000 | +0.000 | same |\n"
+    text = table(list(found.values()), 9, earlier)
+    assert "| jpda.gone | 2 | 7 8 |" in text
+    assert "| 9 | 1 2 |" not in text, "measured anew"
+    assert text.count("| flat |") == len(ends(first)) + 1
+    assert text.count("| acts |") == len(ends(second))
     assert f"| {second} " in text
+
+
+def test_what_acts_in_the_first_rooms_is_not_run_in_further(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run, acting = [], judged("none")[0]
+
+    def fill(rows: Any, seed: int, steps: int, missing: list[Trial], folder: Path) -> None:
+        run.append((seed, {trial.key for trial in missing}))
+        for trial in missing:
+            measured(folder, seed, trial, 0.5 + 0.2 * (seed == 5 and trial.key == acting))
+        rows |= read_rows(folder)
+
+    monkeypatch.setattr(ablations, "_fill_room", fill)
+    ablations.fill({}, (4, 5, 6), 9, ("none",), tmp_path)
+    everything = {"", *judged("none")}
+    assert run == [(4, everything), (5, everything), (6, everything - {acting})]
 
 
 def test_what_has_a_row_is_not_run_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

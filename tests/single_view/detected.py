@@ -19,7 +19,7 @@ from tracker.single_view.protocol import ViewResult
 
 CAMERA = world.ring(1)[0]
 
-ANYWHERE = {"detection_boxes.room_tolerance": 100.0, "detection_phd.room_tolerance": 100.0}
+ANYWHERE = {"detection_boxes.room_tolerance": 100.0}
 """No box contradicts the room."""
 
 
@@ -38,8 +38,9 @@ def detected(
 
 
 def run(name: str, whole: Sequence, **changes: Any) -> list[ViewResult]:
-    """Every step of a method that looks at no pictures; changes of its own parameters."""
-    values = {f"{name}.{key}": value for key, value in changes.items()}
+    """Every step of a method that looks at no pictures; changes of its own parameters, or of
+    others by their whole keys."""
+    values = {key if "." in key else f"{name}.{key}": value for key, value in changes.items()}
     if name == "jpda":
         values["jpda.measurements"] = "detections"
     parameters = with_values(RunParameters(), ANYWHERE | values)

@@ -7,6 +7,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from tests.single_view.test_scenes import SMALL
+from tracker.parameters.groups.colour_phd import ColourPhdParams
 from tracker.parameters.groups.foreground import ForegroundParams
 from tracker.parameters.groups.pseudo_particle import PseudoParticleParams
 from tracker.sequences.pictures.frames import FrameReader
@@ -95,11 +96,12 @@ def test_a_centre_in_the_outer_pixels_is_in_the_picture_and_sizes_are_cut(
 def test_particles_walk_in_half_sizes_and_grow_as_a_whole(
     heads: Sequence, reader: FrameReader
 ) -> None:
-    p = PseudoParticleParams(
-        motion_sigma=0.8, growth_sigma=0.1, birth="picture", foreground_weight=0.0,
-        surroundings_weight=0.0, acceptance_foreground=0.0,
+    p = PseudoParticleParams(birth="picture")
+    colours = ColourPhdParams(
+        motion_sigma=0.8, growth_sigma=0.1, foreground_weight=0.0, surroundings_weight=0.0,
+        acceptance_foreground=0.0,
     )  # fmt: skip
-    model = ColourParticles(heads, 0, p, ForegroundParams(), reader)
+    model = ColourParticles(heads, 0, p, colours, ForegroundParams(), reader)
     sizes = appearance(heads, reader, 0.0).sizes
     middle = np.sqrt(sizes.smallest * sizes.largest)
     before = np.tile([48.0, 36.0, *middle], (5000, 1))

@@ -303,14 +303,14 @@ def test_boxes_end_where_the_picture_ends_and_contradict_a_room_they_are_not_in(
     cut, above = [640.0, 760.0, 60.0, 100.0], [640.0, -90.0, 20.0, 50.0]
     boxes = np.array([good, giant, dwarf, cut, above])
     whole = detected([boxes])
-    p = DetectionBoxParams(room_tolerance=0.3, depth_sigmas=2.0)
+    p = DetectionBoxParams(room_tolerance=0.3)
     found = judge_boxes(whole, CAMERA, Boxes(boxes).left_top, np.linspace(0.1, 0.5, 5), p)
     assert found.plausible[:3].tolist() == [True, False, False]
     expected = boxes.copy()
     expected[3] = [640.0, (660.0 + 799.0) / 2.0, 60.0, (799.0 - 660.0) / 2.0]
     assert_allclose(found.boxes, expected)  # what lies wholly outside is left as it is
-    # an error of two deviations of its height is forgiven
-    nearest, farthest = standing_range(CAMERA, boxes, 0.85, 2.0 * found.sigmas[:, 3] / boxes[:, 3])
+    # an error of three deviations of its height is forgiven
+    nearest, farthest = standing_range(CAMERA, boxes, 0.85, 3.0 * found.sigmas[:, 3] / boxes[:, 3])
     assert_array_equal(found.plausible, meets_room(whole.room, nearest, farthest, 0.3))
 
 

@@ -23,22 +23,22 @@ from tracker.single_view.detection_phd import DetectionPhd
 from tracker.single_view.detector_boxes import detector_sigmas
 
 NUMBERS: dict[str, object] = {
-    "clutter_rate": 3.0, "score_clutter": 2.0, "detection_probability": 0.8,
-    "birth_rate": 0.7, "motion_sigma": 0.9, "growth_sigma": 0.3, "merging_threshold": 1e-6,
-    "extraction_threshold": 0.4,
+    "survival_probability": 0.95, "pruning_threshold": 1e-8, "clutter_rate": 3.0,
+    "score_clutter": 2.0, "detection_probability": 0.8, "birth_rate": 0.7, "motion_sigma": 0.9,
+    "growth_sigma": 0.3, "merging_threshold": 1e-6, "extraction_threshold": 0.4,
 }  # fmt: skip
 FPS = 10.0
 
 
 @pytest.fixture(autouse=True)
 def numbers(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Constants that keep every component, and a survival that shows."""
-    monkeypatch.setattr(DetectionPhdParams, "survival_probability", 0.95)
-    monkeypatch.setattr(DetectionPhdParams, "pruning_threshold", 1e-8)
+    """Constants that keep every component and show in the result."""
+    for name, value in NUMBERS.items():
+        monkeypatch.setattr(DetectionPhdParams, name, value)
 
 
 def parameters(**changes: object) -> RunParameters:
-    values = {f"detection_phd.{key}": value for key, value in (NUMBERS | changes).items()}
+    values = {f"detection_phd.{key}": value for key, value in changes.items()}
     return with_values(RunParameters(), ANYWHERE | values)
 
 
@@ -68,7 +68,7 @@ def test_a_step_is_bayes_rule_with_a_clutter_that_falls_with_the_score() -> None
     width, height = CAMERA.image_size
     clutter = 3.0 * np.exp(2.0 * 2.0 * (0.5 - np.array(SCORES))) / (width * height) ** 2 * 4.0
     spread = np.diag([9.0, 16.0, 4.0, 9.0]) + walked(KNOWN)[:, :, None] * np.eye(4)
-    noise = detector_sigmas(SEEN, p.detection_phd)[:, :, None] ** 2 * np.eye(4)
+    noise = detector_sigmas(SEEN, p.detection_boxes)[:, :, None] ** 2 * np.eye(4)
     pairs = np.zeros((2, 3))
     for j, z in np.ndindex(2, 3):
         offset, covariance = SEEN[z] - KNOWN[j], spread[j] + noise[z]
@@ -97,9 +97,12 @@ def test_a_step_is_bayes_rule_with_a_clutter_that_falls_with_the_score() -> None
     assert_array_equal(result.estimates, after.mixture.means[after.mixture.weights > 0.4])
 
 
-def test_a_newcomer_begins_where_a_box_was_left_unexplained_as_unsure_as_box_and_step() -> None:
+def test_a_newcomer_begins_where_a_box_was_left_unexplained_as_unsure_as_box_and_step(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    p = parameters()
     for rate, weight in ((0.7, 0.07), (50.0, 1.0)):  # at most one person a box
-        p = parameters(birth_rate=rate)
+        monkeypatch.setattr(DetectionPhdParams, "birth_rate", rate)
         method = DetectionPhd(detected([[], []], fps=FPS), 0, p)
         state = BoxPhdState(GaussianMixture.empty(4), SEEN, next_label=5)
         after, _ = method.step(state, 0, None, np.random.default_rng(0))
@@ -109,7 +112,7 @@ def test_a_newcomer_begins_where_a_box_was_left_unexplained_as_unsure_as_box_and
         assert after.unexplained.shape == (0, 4)
         order = np.argsort(after.mixture.labels)
         assert_allclose(after.mixture.means[order], SEEN)
-        born = detector_sigmas(SEEN, p.detection_phd) ** 2 + walked(SEEN)
+        born = detector_sigmas(SEEN, p.detection_boxes) ** 2 + walked(SEEN)
         assert_allclose(after.mixture.covariances[order], born[:, :, None] * np.eye(4))
         later, _ = method.step(after, 1, None, np.random.default_rng(0))
         assert_allclose(later.mixture.weights, 0.95 * 0.2**2 * weight)

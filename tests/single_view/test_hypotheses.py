@@ -13,6 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy import ndarray
 
+from tracker.parameters.groups.colour_phd import ColourPhdParams
 from tracker.parameters.groups.pseudo_particle import PseudoParticleParams
 from tracker.single_view.protocol import ViewEvent
 from tracker.single_view.pseudo_particle import hypotheses
@@ -189,7 +190,12 @@ def test_a_label_is_given_once() -> None:
 
 def with_numbers(**numbers: object) -> Any:
     """What the method's steps ask of it: its parameters and the time of a step."""
-    return SimpleNamespace(_parameters=PseudoParticleParams(**numbers), _step_time=0.04)
+    of_colours = {key: numbers.pop(key) for key in ("samples", "motion_sigma") if key in numbers}
+    return SimpleNamespace(
+        _parameters=PseudoParticleParams(**numbers),
+        _colours=ColourPhdParams(**of_colours),
+        _step_time=0.04,
+    )
 
 
 def test_a_particle_belongs_to_the_nearest_target_within_its_gate() -> None:

@@ -38,7 +38,7 @@ def enumerated(
     densities, clutter = found.densities, p.clutter_rate / AREA
     if p.clutter == "diffuse":
         densities = densities * np.sqrt(np.linalg.det(found.covariances))
-        clutter = 1.0 / p.gate_volume
+        clutter = 1.0 / (-2.0 * math.pi * math.log(1.0 - p.gate_probability))
     matrix, total, best = np.zeros((targets, count)), 0.0, (-1.0, ())
     for event in itertools.product(range(-1, count), repeat=targets):
         pairs = [(t, j) for t, j in enumerate(event) if j >= 0]

@@ -62,8 +62,9 @@ def test_a_peaks_noise_is_a_share_of_its_width_and_height_and_no_more_of_a_large
 def test_the_noise_of_particles_is_a_share_of_width_and_height(
     heads: Sequence, reader: FrameReader
 ) -> None:
-    p = PseudoParticleParams(centre_sigma=0.4, size_sigma=0.3, birth="picture", **UNSEEN)
-    model = ColourParticles(heads, 0, p, ForegroundParams(), reader)
+    p = PseudoParticleParams(birth="picture")
+    colours = ColourPhdParams(centre_sigma=0.4, size_sigma=0.3, **UNSEEN)
+    model = ColourParticles(heads, 0, p, colours, ForegroundParams(), reader)
     assert_allclose(model.sigmas(BOXES), shares(0.4, 0.3))
 
 

@@ -629,13 +629,14 @@ def red_head(folder: Path, camera: Camera, model: Path) -> Sequence:
 
 def parameters(**more: float) -> RunParameters:
     values = {f"onnx_detector.{name}": value for name, value in more.items()}
-    return with_values(RunParameters(), {"single_view": "onnx_detector", **values})
+    anywhere = {"detection_boxes.room_tolerance": 100.0}
+    return with_values(RunParameters(), {"single_view": "onnx_detector", **anywhere, **values})
 
 
 def test_what_it_finds_is_tracked_in_full_pixels(tmp_path: Path) -> None:
     model = pooling(tmp_path / "model.onnx", 256)
     sequence = red_head(tmp_path / "level", look_at("level", (0.0, -4.0, 1.2)), model)
-    run = pipeline.compute(sequence, parameters(score_threshold=0.25, room_tolerance=100.0))
+    run = pipeline.compute(sequence, parameters(score_threshold=0.25))
     for step, (view,) in enumerate(run.views):
         (box,) = truth(sequence, step)
         distances = np.linalg.norm(view.measurements[:, :2] - box[:2], axis=1)
@@ -669,7 +670,7 @@ def test_a_rolled_camera_is_looked_at_upright(tmp_path: Path) -> None:
     images = tuple(turned / path.name for path in plain.views[0].images)
     view = replace(plain.views[0], camera=rolled, images=images)
     on_its_side = replace(plain, views=(view,), digest="rolled")
-    values = parameters(score_threshold=0.25, room_tolerance=100.0)
+    values = parameters(score_threshold=0.25)
     upright, sideways = (pipeline.compute(s, values).views for s in (plain, on_its_side))
     assert sum(len(step[0].measurements) for step in upright) >= STEPS
     for (a,), (b,) in zip(upright, sideways, strict=True):
@@ -691,7 +692,7 @@ def test_every_second_picture_is_seen(tmp_path: Path) -> None:
     """Steps between are without a frame, which is no missing picture; the others are as before."""
     model = pooling(tmp_path / "model.onnx", 256)
     sequence = red_head(tmp_path / "level", look_at("level", (0.0, -4.0, 1.2)), model)
-    values = parameters(score_threshold=0.25, room_tolerance=100.0)
+    values = parameters(score_threshold=0.25)
     whole = pipeline.compute(sequence, values)
     half = pipeline.compute(sequence, with_values(values, {"onnx_detector.every": 2}))
     for step, ((a,), (b,)) in enumerate(zip(whole.views, half.views, strict=True)):
@@ -710,7 +711,7 @@ def test_it_sees_the_full_picture(tmp_path: Path) -> None:
     """However the other methods' pictures are reduced, its boxes are the same."""
     model = pooling(tmp_path / "model.onnx", 256)
     sequence = red_head(tmp_path / "level", look_at("level", (0.0, -4.0, 1.2)), model)
-    values = parameters(score_threshold=0.25, room_tolerance=100.0)
+    values = parameters(score_threshold=0.25)
     reduced = with_values(values, {"pictures.lines": 120})
     for one, other in zip(
         pipeline.compute(sequence, values).views,

@@ -17,7 +17,7 @@ from tracker.single_view.protocol import ViewResult
 
 METHODS: dict[str, dict[str, object]] = {
     "none": {},
-    "detection_phd": {"pixel_sigma": 0.0},
+    "detection_phd": {"detection_boxes.pixel_sigma": 0.0},
     "jpda": {"confirmation_steps": 2, "detection_probability": 0.8},
 }
 methods = pytest.mark.parametrize("name", METHODS)

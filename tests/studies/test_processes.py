@@ -131,7 +131,7 @@ def test_the_command_of_a_trial_gives_the_same_tracks(
         kept = store.outcome(row.key)
         assert kept is not None
         assert tracks_hash(again) == kept.tracks
-        file = tmp_path / words[words.index("--output") + 1]
+        file = tmp_path / words[words.index("-o") + 1]
         expected = tmp_path / "expected.csv"
         written = ExportedRun(sequence, again.tracks, parameters, row.seed)
         save(expected, format_of(expected, None), written, Options())

@@ -64,7 +64,7 @@ def test_a_grid_has_every_combination_once() -> None:
 def test_a_grid_leaves_out_what_differs_only_where_it_has_no_effect() -> None:
     # the threshold belongs to a method of stage 1 that is chosen by nobody here
     varied = (
-        Varied("detection_phd.clutter_rate", 1.0, 9.0, steps=3),
+        Varied("jpda.clutter_rate", 1.0, 9.0, steps=3),
         Varied("fusion.clutter_rate", 1.0, 9.0, steps=2),
     )
     assert len(list(space.grid(varied, [BASE]))) == 2

@@ -17,6 +17,7 @@ from tracker import __version__
 from tracker.corrections.kinds import leeway, make
 from tracker.corrections.outcomes import outcomes
 from tracker.evaluation import Evaluation
+from tracker.export.exported_run import ExportedRun
 from tracker.library.columns import KeptTracks
 from tracker.library.records import HEADLINES, NewRecording, NewRun, Result, Source
 from tracker.parameters.values import changed_values
@@ -214,6 +215,20 @@ def remarks_of(result: Result) -> tuple[str, ...]:
     pictures = (f"{missing} pictures were missing",) if missing else ()
     words = "1 correction" if corrected == 1 else f"{corrected} corrections"
     return pictures + ((f"{words} of a person obeyed",) if corrected else ())
+
+
+def run_for_export(sequence: Sequence, result: Result, back: str = "") -> ExportedRun:
+    """Return a stored run as the input of every export format.
+
+    Args:
+        sequence: The recording.
+        result: The stored run.
+        back: The URL of the page that shows the run; empty if there is none.
+    """
+    steps, tracks, seed = result.run.steps, result.kept.tracks, result.run.seed
+    done = None if steps >= sequence.frames else steps
+    words = remarks_of(result)
+    return ExportedRun(sequence, tracks, result.parameters, seed, done, words, back=back)
 
 
 def run_for_display(sequence: Sequence, result: Result) -> Run:

@@ -31,8 +31,8 @@ _SLIDERS = {
     ("jpda", "a place outside the room"): "raise detection_boxes.room_tolerance",
     ("association_matrix", "foreground"): "lower association_matrix.least_inside",
     ("association_matrix", "outline"): "lower association_matrix.acceptance",
-    ("onnx_detector", "a place outside the room"): "raise onnx_detector.room_tolerance",
-    ("detection_phd", "a place outside the room"): "raise detection_phd.room_tolerance",
+    ("onnx_detector", "a place outside the room"): "raise detection_boxes.room_tolerance",
+    ("detection_phd", "a place outside the room"): "raise detection_boxes.room_tolerance",
     ("none", "a place outside the room"): "raise detection_boxes.room_tolerance",
 }
 """What lets more candidates through, by method and gate; at other gates it is no single value."""
@@ -43,7 +43,7 @@ _NO_CANDIDATES = {
     "jpda": "lower foreground.threshold",
     "association_matrix": "lower foreground.threshold",
     "onnx_detector": "lower onnx_detector.score_threshold",
-    "detection_phd": "lower detection_phd.score_threshold",
+    "detection_phd": "lower detection_boxes.score_threshold",
     "none": "lower detection_boxes.score_threshold",
 }
 """What gives more candidates, by method."""

@@ -34,6 +34,11 @@ def opens_by_name(folder: Path) -> bool:
     return built_in_name(folder) is not None or folder.absolute().is_relative_to(cache_folder())
 
 
+def place_of(folder: Path) -> str:
+    """Return what opens a recording again, wherever the program is started: its name or folder."""
+    return folder.name if opens_by_name(folder) else str(folder.absolute())
+
+
 def cached_rooms() -> Path:
     """Return the folder into which earlier versions of the program rendered recordings."""
     return cache_folder() / "rooms" / "version-4"

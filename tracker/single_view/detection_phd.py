@@ -9,7 +9,7 @@ from numpy import ndarray
 
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.filters.phd import PhdUpdate
-from tracker.parameters.groups.detections import DetectionPhdParams
+from tracker.parameters.groups.detections import DetectionBoxParams, DetectionPhdParams
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_phd import EXPLAINED, BoxPhd, BoxPhdState
 from tracker.single_view.detector_boxes import Detected, DetectorBoxes, detector_sigmas
@@ -44,7 +44,8 @@ class DetectionPhd:
             ValueError: If the camera has no detections.
         """
         self._parameters = p = parameters.of(DetectionPhdParams)
-        self._boxes = DetectorBoxes(sequence, camera_index, p)
+        self._box_parameters = parameters.of(DetectionBoxParams)
+        self._boxes = DetectorBoxes(sequence, camera_index, self._box_parameters)
         self._filter = BoxPhd(p, sequence.step_time, upright=True)
         width, height = sequence.cameras[camera_index].image_size
         # half sizes up to half of the image's, as in the fusion's clutter
@@ -65,7 +66,8 @@ class DetectionPhd:
         p, found = self._parameters, self._boxes.at(frame)
         good = np.flatnonzero(found.plausible)
         births = state.unexplained
-        variances = detector_sigmas(births, p) ** 2 + self._filter.walk_variances(births)
+        variances = detector_sigmas(births, self._box_parameters) ** 2
+        variances += self._filter.walk_variances(births)
         after, updated = self._filter.update(
             self._filter.predict(state, self._filter.births(births, variances)),
             found.boxes[good],

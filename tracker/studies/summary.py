@@ -3,8 +3,6 @@ commands that repeat a trial."""
 
 from __future__ import annotations
 
-import json
-import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +12,7 @@ from tracker.files.text import shown
 from tracker.parameters.values import changed_values, with_values
 from tracker.review.self_consistency.estimate import WARNING
 from tracker.runs import pipeline
+from tracker.runs.track_command import track_command
 from tracker.sequences.library import open_sequence
 from tracker.studies.definition import StudyDefinition
 from tracker.studies.errors import StudyError
@@ -193,7 +192,13 @@ def track_commands(definition: StudyDefinition, trial: Trial) -> list[str]:
     Raises:
         SequenceError: If a recording cannot be read.
     """
-    return [_command(definition, trial, row) for row in trial.jobs]
+    return [
+        track_command(
+            row.recording, _output_of(definition, trial, row),
+            changes_of(definition, trial, row.recording), row.seed, "--no-corrections",
+        )
+        for row in trial.jobs
+    ]  # fmt: skip
 
 
 def changes_of(definition: StudyDefinition, trial: Trial, recording: str) -> dict[str, Any]:
@@ -209,11 +214,6 @@ def changes_of(definition: StudyDefinition, trial: Trial, recording: str) -> dic
     return changed_values(with_values(defaults, {**definition.held(), **values}), defaults)
 
 
-def _command(definition: StudyDefinition, trial: Trial, row: JobRow) -> str:
-    """Return the ``track`` command of one run of a trial."""
-    words = ["multiview-phd", "track", row.recording, "--no-corrections", "--seed", str(row.seed)]
-    for key, value in changes_of(definition, trial, row.recording).items():
-        text = json.dumps(value) if not isinstance(value, str) else value
-        words += ["--set", f"{key}={text}"]
+def _output_of(definition: StudyDefinition, trial: Trial, row: JobRow) -> str:
     name = f"{definition.name} trial {trial.number} {Path(row.recording).name} seed {row.seed}"
-    return shlex.join([*words, "--output", f"{name.replace(' ', '-')}.csv"])
+    return f"{name.replace(' ', '-')}.csv"

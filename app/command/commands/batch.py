@@ -9,11 +9,11 @@ from collections.abc import Sequence
 
 from app.command.arguments.studies import Batch
 from app.command.commands.studies import INTERRUPTED, crew_of, to_be_stopped
-from app.command.flags import set_values
+from app.command.flags import preset_values, set_values
 from app.command.terminal import FAILURE, Bar, print_table, say
 from tracker.files.folders import library_file
 from tracker.library.store import open_library
-from tracker.parameters.catalogue import PRESETS, RunParameters
+from tracker.parameters.catalogue import RunParameters
 from tracker.parameters.values import ParameterError, with_values
 from tracker.studies.batches import BatchRun, places_of, run_batch
 
@@ -26,13 +26,7 @@ def batch(command: Batch) -> int:
     Raises:
         StudyError: If a name stands for nothing, or the workers cannot work on.
     """
-    changes: dict[str, object] = {}
-    if command.preset is not None:
-        if command.preset not in PRESETS:
-            known = ", ".join(PRESETS)
-            raise ParameterError("--preset", f"expected one of {known}, got {command.preset!r}")
-        changes |= PRESETS[command.preset]
-    changes |= set_values(command.set)
+    changes = {**preset_values(command.preset), **set_values(command.set)}
     with_values(RunParameters(), changes)  # wrong usage shows before any work
     if command.seeds < 1:
         raise ParameterError("--seeds", f"expected a whole number from 1, got {command.seeds}")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import sys
-from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +15,8 @@ from app.command.arguments.corrections import (
     MergeCorrections,
     TruthOfCorrections,
 )
-from app.command.terminal import Bar, CommandError, print_table, say
+from app.command.computing import compute
+from app.command.terminal import CommandError, print_table, say
 from tracker.corrections import Correction, CorrectionError
 from tracker.corrections.log import FILE, place_of, read_log, remark_on, write_log
 from tracker.corrections.merging import difference, merge
@@ -127,21 +127,8 @@ def _row(one: Correction) -> tuple[str, ...]:
 
 def _tracked(name: str, file: Path | None) -> Run:
     """A sequence tracked with its corrections."""
-    from app.state.workers.compiling import Compiling
-    from tracker.runs import pipeline
-    from tracker.runs.stage_cache import StageCache
-
     sequence = library.open_sequence(name)
-    told = of_run(sequence, file)
-    with Bar("tracking", "step") as tracking, closing(Compiling(say)) as compiling:
-        compiling.wait(lambda done, total: None, lambda: False)
-        return pipeline.compute(
-            sequence,
-            pipeline.default_parameters(sequence),
-            corrections=told,
-            cache=StageCache.on_disk(),
-            on_progress=lambda _, progress: tracking.at(progress.done, progress.total),
-        )
+    return compute(sequence, corrections=of_run(sequence, file))
 
 
 def _truth(action: TruthOfCorrections) -> None:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import csv
-from contextlib import closing
 from pathlib import Path
 
 import numpy as np
 
+from app.command.computing import compute
 from app.command.flags import Detect, set_values
-from app.command.terminal import Bar, CommandError, say
+from app.command.terminal import CommandError, say
 
 
 def detect(command: Detect) -> None:
@@ -23,13 +23,10 @@ def detect(command: Detect) -> None:
         CommandError: If the folder cannot be written to.
         ValueError: If the sequence or the model cannot be used.
     """
-    from app.state.workers.compiling import Compiling
     from tracker.files.atomic import file_names, replacing
     from tracker.geometry.boxes import Boxes
     from tracker.parameters.catalogue import RunParameters
     from tracker.parameters.values import with_values
-    from tracker.runs import pipeline
-    from tracker.runs.stage_cache import StageCache
     from tracker.sequences import library
 
     changes = set_values(command.set)
@@ -45,15 +42,7 @@ def detect(command: Detect) -> None:
             "file by --model"
         )
     parameters = with_values(RunParameters(), {**changes, "single_view": "onnx_detector"})
-    with Bar("detecting", "step") as bar, closing(Compiling(say)) as compiling:
-        bar.at(0, sequence.frames)
-        compiling.wait(lambda done, total: None, lambda: False)
-        run = pipeline.compute(
-            sequence,
-            parameters,
-            cache=StageCache.on_disk(),
-            on_progress=lambda _, progress: bar.at(progress.done, progress.total),
-        )
+    run = compute(sequence, parameters, words="detecting")
     command.output.mkdir(parents=True, exist_ok=True)
     counts = []
     files = file_names([camera.name for camera in sequence.cameras])

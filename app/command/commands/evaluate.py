@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import sys
-from contextlib import closing
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
 
+from app.command.computing import compute
 from app.command.flags import Evaluate
 from app.command.terminal import Bar, CommandError, print_json, print_table, say
-from app.state.workers.compiling import Compiling
 from tracker import __version__
 from tracker.evaluation import Evaluation, EvaluationSettings, evaluate_sequence
 from tracker.evaluation.figures import number
@@ -99,22 +98,13 @@ def estimate_without_truth(command: Evaluate) -> None:
 
     from tracker.review.self_consistency import estimate
     from tracker.review.self_consistency.estimate import WARNING
-    from tracker.runs import gaps, pipeline
+    from tracker.runs import gaps
     from tracker.runs.processes import available_cores
-    from tracker.runs.stage_cache import StageCache
 
     sequence = library.open_sequence(command.sequence)
     for sentence in sequence.warnings:
         say(sentence)
-    with Bar("tracking", "step") as tracking, closing(Compiling(say)) as compiling:
-        tracking.at(0, sequence.frames)
-        compiling.wait(lambda done, total: None, lambda: False)
-        run = pipeline.compute(
-            sequence,
-            pipeline.default_parameters(sequence),
-            cache=StageCache.on_disk(),
-            on_progress=lambda _, progress: tracking.at(progress.done, progress.total),
-        )
+    run = compute(sequence)
     for sentence in gaps.sentences(run):
         say(sentence)
     with Bar("looking in other ways", "step") as looking:

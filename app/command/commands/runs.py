@@ -216,23 +216,14 @@ def _date(seconds: float) -> str:
 
 
 def _export(library: Library, command: ExportRun) -> None:
-    from tracker.export.exported_run import ExportedRun, Options
+    from tracker.export.exported_run import Options
     from tracker.export.registry import format_of, save
-    from tracker.library.keeping import remarks_of
+    from tracker.library.keeping import run_for_export
     from tracker.sequences import library as sequences
 
     form = format_of(command.output, command.format)
     result = library.result(library.find(command.run).id)
-    sequence = sequences.open_sequence(result.place)
-    done = None if result.run.steps >= sequence.frames else result.run.steps
-    written = ExportedRun(
-        sequence,
-        result.kept.tracks,
-        result.parameters,
-        result.run.seed,
-        done,
-        remarks_of(result),
-    )
+    written = run_for_export(sequences.open_sequence(result.place), result)
     with Bar("writing", "step") as writing:
         options = Options(command.first, command.last, command.speed, writing.at)
         save(command.output, form, written, options)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +12,8 @@ from app.command.arguments.templates import (
     RemoveTemplates,
     Templates,
 )
-from app.command.terminal import Bar, CommandError, check_seed, print_json, print_table, say
+from app.command.computing import compute
+from app.command.terminal import CommandError, check_seed, print_json, print_table, say
 from tracker.review import template_suggestions
 from tracker.sequences import library
 from tracker.sequences.pictures.frames import FrameReader
@@ -89,20 +89,8 @@ def _found(
 ) -> tuple[template_suggestions.Suggestion, ...]:
     """What a run offers, its pictures written where they are wanted."""
     from app.command.commands.correcting import of_run
-    from app.state.workers.compiling import Compiling
-    from tracker.runs import pipeline
-    from tracker.runs.stage_cache import StageCache
 
-    with Bar("tracking", "step") as tracking, closing(Compiling(say)) as compiling:
-        compiling.wait(lambda done, total: None, lambda: False)
-        run = pipeline.compute(
-            sequence,
-            pipeline.default_parameters(sequence),
-            seed=action.seed,
-            corrections=of_run(sequence, None),
-            cache=StageCache.on_disk(),
-            on_progress=lambda _, progress: tracking.at(progress.done, progress.total),
-        )
+    run = compute(sequence, seed=action.seed, corrections=of_run(sequence, None))
     with FrameReader(sequence) as reader:
         found = template_suggestions.suggest_templates(run, reader)
         if action.pictures is not None:

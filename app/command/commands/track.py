@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import time
-from contextlib import closing
 from typing import TYPE_CHECKING
 
+from app.command.computing import compute
 from app.command.flags import Track
-from app.command.interruption import between_steps
 from app.command.terminal import FAILURE, Bar, CommandError, check_keep, check_seed, say
 from tracker.files.folders import library_file
 from tracker.parameters import Stage
@@ -34,7 +33,6 @@ def track(command: Track) -> int:
         raise CommandError(f"--output {output}: there is no folder {output.parent}; make it first")
 
     from app.command.commands.correcting import of_run
-    from app.state.workers.compiling import Compiling
     from tracker.io.checks import check
     from tracker.runs import gaps, pipeline
     from tracker.runs.camera_notes import camera_notes
@@ -42,7 +40,6 @@ def track(command: Track) -> int:
     from tracker.runs.gates import notices
     from tracker.runs.outcome import why_no_tracks
     from tracker.runs.run import given_names, row_corrections
-    from tracker.runs.stage_cache import StageCache
     from tracker.sequences import library
 
     sequence = library.open_sequence(command.sequence)
@@ -65,27 +62,10 @@ def track(command: Track) -> int:
     told_by_hand = of_run(sequence, command.corrections, none=command.no_corrections)
     begin, began = time.perf_counter(), time.time()
     stages: set[Stage] = set()
-
-    def told(_: pipeline.Run, progress: pipeline.Progress) -> None:
-        stages.add(progress.stage)
-        tracking.at(progress.done, progress.total)
-
-    with (
-        Bar("tracking", "step") as tracking,
-        closing(Compiling(say)) as compiling,
-        between_steps() as interrupted,
-    ):
-        tracking.at(0, sequence.frames)
-        compiling.wait(lambda done, total: None, interrupted)
-        run = pipeline.compute(
-            sequence,
-            parameters,
-            seed=command.seed,
-            corrections=told_by_hand,
-            cache=StageCache.on_disk() if command.cache else None,
-            on_progress=told,
-            cancelled=interrupted,
-        )
+    run = compute(
+        sequence, parameters, seed=command.seed, corrections=told_by_hand, cached=command.cache,
+        stages=stages,
+    )  # fmt: skip
     seconds = time.perf_counter() - begin
     with Bar("writing", "step") as writing:
         missing = gaps.sentences(run)

@@ -18,7 +18,7 @@ from app.web.library.routes import Kept
 from app.web.views.link import address_of
 from tracker.export.exported_run import ExportedRun, Options
 from tracker.export.registry import FORMATS
-from tracker.library.keeping import remarks_of
+from tracker.library.keeping import run_for_export
 from tracker.runs import gaps
 from tracker.runs.fitting import default_parameters
 from tracker.runs.run import given_names, row_corrections
@@ -144,15 +144,8 @@ def begin(
 
     def make() -> ExportedRun:
         sequence = sequences.open_sequence(result.place)
-        return ExportedRun(
-            sequence,
-            result.kept.tracks,
-            result.parameters,
-            result.run.seed,
-            result.run.steps,
-            remarks_of(result),
-            back=address_of(base, result.place, result.parameters, default_parameters(sequence)),
-        )
+        back = address_of(base, result.place, result.parameters, default_parameters(sequence))
+        return run_for_export(sequence, result, back)
 
     name = f"{result.run.recording_name}-{result.run.name or result.run.id}"
     return ExportInfo(**asdict(exporter.start(form, make, name, options)))

@@ -119,13 +119,18 @@ class StudyWish(Model):
     prune: bool = True
 
 
-class CostWish(StudyWish):
-    """A study, and where it is to run."""
+class StartWish(Model):
+    """Where a study runs."""
 
     workers: int | None = Field(default=None, ge=1, le=1024)
-    """Processes on this machine; null for one a core."""
+    """Processes on this machine."""
     scheduler: str | None = None
-    """Address of a Dask scheduler; null for this machine."""
+    """Address of a Dask scheduler. With neither it runs where it ran last, and at first with one
+    process a core of this machine."""
+
+
+class CostWish(StudyWish, StartWish):
+    """A study, and where it is to run."""
 
 
 class StudyCost(Model):
@@ -138,16 +143,6 @@ class StudyCost(Model):
     words: str
     error: str | None
     """Why it would be refused."""
-
-
-class StartWish(Model):
-    """Where a study runs."""
-
-    workers: int | None = Field(default=None, ge=1, le=1024)
-    """Processes on this machine."""
-    scheduler: str | None = None
-    """Address of a Dask scheduler. With neither it runs where it ran last, and at first with one
-    process a core of this machine."""
 
 
 class SchedulerWish(Model):
@@ -276,14 +271,12 @@ class TrialDetail(Model):
     commands: list[str]
 
 
-class TuneWish(Model):
+class TuneWish(StartWish):
     """The open recording is to be tuned, from today's values."""
 
     minutes: float = Field(default=5.0, gt=0, le=10_000)
     without_truth: bool = False
     """Whether truth is not looked at though it is there."""
-    workers: int | None = Field(default=None, ge=1, le=1024)
-    scheduler: str | None = None
 
 
 class TunedRow(Model):

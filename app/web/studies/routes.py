@@ -15,6 +15,7 @@ from app.web.studies import models, views
 from app.web.studies.dependencies import Desk, Named
 from tracker.parameters.values import changed_values
 from tracker.runs.processes import available_cores
+from tracker.sequences.built_in import place_of
 from tracker.studies.definition import StudyDefinition, definition_of
 from tracker.studies.errors import StudyError
 from tracker.studies.objectives import OBJECTIVES, SELF_CONSISTENCY, WITH_TRUTH, chosen
@@ -63,7 +64,7 @@ def draft(
     has_truth = snapshot.sequence.ground_truth is not None
     return models.StudyDraft(
         name=_free_name(desk, snapshot.sequence.name),
-        recordings=[views.place_of(snapshot)],
+        recordings=[place_of(snapshot.sequence.folder)],
         has_truth=has_truth,
         parameters=views.ranges_of(snapshot, wanted),
         objectives=list(WITH_TRUTH if has_truth else SELF_CONSISTENCY),
@@ -102,7 +103,7 @@ def _definition(wish: models.StudyWish, bench: Bench) -> StudyDefinition:
     return definition_of(
         {
             "name": wish.name,
-            "recordings": wish.recordings or [views.place_of(snapshot)],
+            "recordings": wish.recordings or [place_of(snapshot.sequence.folder)],
             "trials": wish.trials,
             **({} if wish.minutes is None else {"minutes": wish.minutes}),
             "seeds": wish.seeds,
@@ -202,7 +203,7 @@ def tune(wish: models.TuneWish, desk: Desk, bench: Bench) -> models.Study:
     desk.check_place(wish.workers, wish.scheduler)
     definition = tuning(
         _free_name(desk, f"tune {snapshot.sequence.name}"),
-        [views.place_of(snapshot)],
+        [place_of(snapshot.sequence.folder)],
         minutes=wish.minutes,
         changes=changed_values(snapshot.parameters, snapshot.defaults),
         ignore_truth=wish.without_truth,

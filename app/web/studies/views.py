@@ -8,7 +8,6 @@ from typing import Any
 from app.state.snapshot import Snapshot
 from app.state.studies import StudyDesk
 from app.web.studies import models
-from tracker.files.folders import cache_folder
 from tracker.parameters.catalogue import METHODS, PARAMETERS
 from tracker.parameters.values import shown_keys, value_of, with_values
 from tracker.studies.objectives import Objective
@@ -117,14 +116,6 @@ def tuned_of(found: dict[str, Any] | None) -> models.Tuned:
         rows=rows,
         figures=[models.TunedFigure(**one) for one in found["figures"]],
     )
-
-
-def place_of(snapshot: Snapshot) -> str:
-    """What opens the recording again, wherever the program is started."""
-    sequence = snapshot.sequence
-    assert sequence is not None
-    folder = sequence.folder.absolute()
-    return snapshot.opened_as if folder.is_relative_to(cache_folder()) else str(folder)
 
 
 def ranges_of(snapshot: Snapshot, keys: list[str] | None) -> list[models.RangeInfo]:

@@ -6,10 +6,14 @@ import os
 import signal
 import threading
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
 from app.command.interruption import between_steps
+from app.command.main import INTERRUPTED
+from tests.app.conftest import Runs
+from tracker.runs import pipeline
 
 Heard = Callable[[], bool]
 
@@ -84,3 +88,20 @@ def test_in_another_thread_nothing_is_taken_over() -> None:
     thread.start()
     thread.join()
     assert found == [(False, before)]
+
+
+@pytest.mark.parametrize("line", [("evaluate",), ("corrections", "check")])
+def test_a_command_that_computes_a_run_ends_between_two_steps(
+    line: tuple[str, ...], crossing: Path, run: Runs, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    went_on: list[str] = []
+
+    def compute(*_: object, cancelled: Heard, **options: object) -> None:
+        press()
+        went_on.append("to the end of its step")
+        if cancelled():
+            raise RuntimeError("cancelled")
+
+    monkeypatch.setattr(pipeline, "compute", compute)
+    assert run(*line, crossing)[0] == INTERRUPTED
+    assert went_on

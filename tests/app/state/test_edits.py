@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import threading
+import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +17,7 @@ from starlette.testclient import TestClient
 
 from app.state import edits as module
 from app.state.edits import EditError, Edits
-from app.state.snapshot import Event, Notice
+from app.state.snapshot import Change, Event, Notice
 from app.state.workbench import Workbench
 from app.web.server import Settings, create_app
 from tests.app.conftest import ADDRESS, command, wait_until
@@ -266,6 +269,37 @@ def test_edits_are_taken_up_after_a_start_where_they_still_fit(
     edits = followed(opened(crossing), tmp_path)
     assert edits._done[-1].words == "Detection probability 0.95 → 0.5"
     edits.close()
+
+
+def test_an_undo_right_after_the_opening_is_of_the_recording(
+    crossing: Path, tmp_path: Path
+) -> None:
+    """Others are told first that it is open, and may take a while."""
+    bench = opened(crossing)
+    first = followed(bench, tmp_path)
+    first.done("a preset saved", "presets", {"own": None}, {"own": {}})
+    bench.set_parameters({P_D: 0.8}, "viser")
+    first.close()
+    again, told, goes_on = Workbench(), threading.Event(), threading.Event()
+
+    def take_a_while(change: Change) -> None:
+        told.set()
+        assert goes_on.wait(60.0)
+
+    second = Edits(again, tmp_path)
+    again.subscribe(take_a_while)
+    second.follow()
+    with ThreadPoolExecutor(2) as threads:
+        opening = threads.submit(
+            again.open, bench.snapshot().sequence, "key", None, bench.snapshot().defaults
+        )
+        assert told.wait(60.0)
+        undoing = threads.submit(second.undo)
+        time.sleep(0.1)
+        goes_on.set()
+        opening.result()
+        assert undoing.result().words.startswith("Detection probability")
+    second.close()
 
 
 def test_a_note_says_what_was_undone(crossing: Path) -> None:

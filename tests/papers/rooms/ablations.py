@@ -1,8 +1,9 @@
 """The worth of stage 1's parameters: each at both ends of a range, in random rooms.
 
 ``python -m tests.papers.rooms.ablations -o FOLDER`` renders the rooms, runs what no earlier start
-ran, one row a run, and writes the table. A parameter counts as flat where no value of it changes
-any figure's mean over the rooms by as much as :data:`LEAST`.
+ran, one row a run, and writes the table. A parameter acts where a value of it changes a figure of
+one room by :data:`LEAST` or more; it is not run in further rooms. The first :data:`ROOMS_FOR_ALL`
+rooms come first, for every parameter.
 """
 
 from __future__ import annotations
@@ -14,13 +15,14 @@ import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
+from itertools import count, islice
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from tests.papers.rooms.kept import Rows, keep_row, read_rows
-from tests.rooms import render_random
+from tests.rooms import choose, render_random
 from tests.rooms.random_rooms import VERSION
 from tracker.evaluation import evaluate_sequence
 from tracker.parameters import Stage
@@ -34,7 +36,9 @@ from tracker.sequences.sequence import Sequence
 
 FIGURES = ("found_share", "false_per_step", "idf1")
 LEAST = 0.005
-"""Change of a figure's mean over the rooms from which a parameter has an effect."""
+"""Change of a figure in one room from which a parameter acts."""
+ROOMS_FOR_ALL = 2
+"""Number of rooms in which every parameter is run; the others are for those that do not act yet."""
 FACTOR = 2.0
 """Both ends of a number's range: its default times and over this, within its bounds."""
 METHODS = {
@@ -146,39 +150,58 @@ def measure(sequence: Sequence, reader: FrameReader, trial: Trial, steps: int) -
     return {**figures, "tracks": digest.hexdigest()[:16]}
 
 
-def _given(whole: Sequence) -> dict[str, Sequence]:
-    """A room with its templates, with its pictures alone, and with the boxes of a detector."""
+def _given(whole: Sequence, given: str) -> Sequence:
+    """A room with its templates, with its pictures alone, or with the boxes of a detector."""
+    if given == "detections":
+        return whole
     views = tuple(replace(view, detections=None) for view in whole.views)
     templates = replace(whole, views=views, digest=f"{whole.digest}-without-boxes")
-    bare = replace(templates, templates=(), digest=f"{whole.digest}-without-templates")
-    return {"templates": templates, "pictures": bare, "detections": whole}
+    if given == "templates":
+        return templates
+    return replace(templates, templates=(), digest=f"{whole.digest}-without-templates")
 
 
-def fill(rows: Rows, seeds: range, steps: int, methods: tuple[str, ...], folder: Path) -> None:
-    """Run what has no row yet; every row is written as soon as it is there."""
-    for seed in seeds:
-        missing = [t for t in trials(methods) if (seed, t.row_key(steps)) not in rows]
-        if not missing:
-            continue
-        room = folder / f"{seed}"
-        if not (room / "sequence.toml").is_file():
-            render_random(seed, room, detections=True, frames=steps)
-        for given, sequence in _given(read_sequence(room)).items():
-            if given == "templates" and not sequence.templates:
-                continue  # nobody of this room stands free in these steps
-            with FrameReader(sequence) as reader:
-                for trial in missing:
-                    if METHODS[trial.method] != given:
-                        continue
-                    row = {"seed": seed, "key": trial.row_key(steps), "method": trial.method,
-                           "parameter": trial.key, "value": trial.value}  # fmt: skip
-                    row |= measure(sequence, reader, trial, min(steps, sequence.frames))
-                    keep_row(folder, row)
-                    rows[seed, row["key"]] = row
+def fill(
+    rows: Rows, seeds: tuple[int, ...], steps: int, methods: tuple[str, ...], folder: Path
+) -> None:
+    """Run what has no row yet, method by method; every row is written as soon as it is there."""
+    first, further = seeds[:ROOMS_FOR_ALL], seeds[ROOMS_FOR_ALL:]
+    for method in methods:
+        for seed in (*first, *further):
+            acting = set()
+            if seed in further:
+                found = effects(rows, seeds, steps, (method,))
+                acting = {one["parameter"] for one in found if one["acts"]}
+            missing = [
+                trial
+                for trial in trials((method,))
+                if trial.key not in acting and (seed, trial.row_key(steps)) not in rows
+            ]
+            if missing:
+                _fill_room(rows, seed, steps, missing, folder)
 
 
-def effects(rows: Rows, seeds: range, steps: int, methods: tuple[str, ...]) -> list[dict[str, Any]]:
-    """The largest change of each figure's mean over the rooms, by parameter.
+def _fill_room(rows: Rows, seed: int, steps: int, missing: list[Trial], folder: Path) -> None:
+    """Run trials of one method in one room."""
+    method, room = missing[0].method, folder / f"{seed}"
+    if not (room / "sequence.toml").is_file():
+        render_random(seed, room, detections=True, frames=steps)
+    sequence = _given(read_sequence(room), METHODS[method])
+    if METHODS[method] == "templates" and not sequence.templates:
+        return  # nobody of this room stands free in these steps
+    with FrameReader(sequence) as reader:
+        for trial in missing:
+            row = {"seed": seed, "key": trial.row_key(steps), "method": method,
+                   "parameter": trial.key, "value": trial.value}  # fmt: skip
+            row |= measure(sequence, reader, trial, min(steps, sequence.frames))
+            keep_row(folder, row)
+            rows[seed, row["key"]] = row
+
+
+def effects(
+    rows: Rows, seeds: tuple[int, ...], steps: int, methods: tuple[str, ...]
+) -> list[dict[str, Any]]:
+    """The change of each figure's mean over the rooms by parameter and value, and what it means.
 
     Rooms in which the comparison or any value has no row are left out.
     """
@@ -188,18 +211,20 @@ def effects(rows: Rows, seeds: range, steps: int, methods: tuple[str, ...]) -> l
         for key in judged(method):
             own = {value: Trial(method, key, value).row_key(steps) for value in ends(key)}
             there = [s for s in seeds if all((s, k) in rows for k in (usual, *own.values()))]
-            changes = {
-                value: [
-                    np.mean([(rows[s, k][f] or 0.0) - (rows[s, usual][f] or 0.0) for s in there])
-                    for f in FIGURES
+            changes = np.array(
+                [
+                    [[(rows[s, k][f] or 0.0) - (rows[s, usual][f] or 0.0) for f in FIGURES]
+                     for k in own.values()]
+                    for s in there
                 ]
-                for value, k in own.items()
-                if there
-            }
-            most = np.abs(list(changes.values())).max(axis=0) if changes else np.full(3, np.nan)
+            ).reshape(len(there), len(own), len(FIGURES))  # fmt: skip
+            means = changes.mean(axis=0) if there else ()
+            acts = bool((np.abs(changes) >= LEAST).any())
             found.append(
-                {"method": method, "parameter": key, "rooms": len(there), "changes": changes,
-                 "flat": bool(there) and bool((most < LEAST).all()),
+                {"method": method, "parameter": key, "rooms": tuple(there),
+                 "changes": dict(zip(own, means, strict=False)),
+                 "acts": acts,
+                 "flat": bool(there) and not acts,
                  "same": bool(there) and all(
                      rows[s, k].get("tracks", k) == rows[s, usual].get("tracks")
                      for s in there for k in own.values()
@@ -208,32 +233,41 @@ def effects(rows: Rows, seeds: range, steps: int, methods: tuple[str, ...]) -> l
     return found
 
 
-def table(found: list[Mapping[str, Any]], seeds: range, steps: int) -> str:
-    """The effects as a Markdown table."""
-    methods = dict.fromkeys(one["method"] for one in found)
+def table(found: list[Mapping[str, Any]], steps: int, earlier: str = "") -> str:
+    """The effects as a Markdown table, after the lines of what was measured earlier alone.
+
+    Args:
+        found: The effects of this run.
+        steps: Number of steps of each room.
+        earlier: The table as it was.
+    """
     lines = [
         "# Stage 1: what each parameter changes in random rooms",
         "",
-        f"Rooms {seeds.start} to {seeds.stop - 1}, {steps} steps, seed 0: change of the means of "
-        "recall, false positives a step and IDF1 against the defaults. Published and essential "
-        f"parameters are not judged. *flat*: every change is below {LEAST:g}; *same*: every number "
-        "of the tracks is as without the change. A parameter that no longer exists was judged "
-        "before it went. Made by `python -m tests.papers.rooms.ablations -o FOLDER --first "
-        f"{seeds.start} --count {len(seeds)} --steps {steps}"
-        f"{''.join(f' --method {name}' for name in methods)}`.",
+        f"{steps} steps of random rooms, seed 0: change of the means of recall, false positives a "
+        "step and IDF1 against the defaults. Published and essential parameters are not judged. "
+        f"*acts*: a figure of one room changes by {LEAST:g} or more, and no further room was run; "
+        "*flat*: none does; *same*: every number of the tracks is as without the change. "
+        "A parameter that no longer exists was judged before it went. Made by "
+        "`python -m tests.papers.rooms.ablations`.",
         "",
         "| method | parameter | value | rooms | recall | false | IDF1 | |",
         "|---|---|---|---|---|---|---|---|",
     ]
+    measured = {(one["method"], one["parameter"], tuple(one["rooms"])) for one in found}
+    for line in earlier.splitlines():
+        cells = [cell.strip() for cell in line.split("|")]
+        if len(cells) == len(lines[-1].split("|")) and "." in cells[2]:
+            if (cells[1], cells[2], tuple(map(int, cells[4].split()))) not in measured:
+                lines.append(line)
     for one in found:
+        rooms = " ".join(map(str, one["rooms"]))
         for value, changes in one["changes"].items():
-            cells = " | ".join(f"{change:+.3f}" for change in changes)
-            shown = f"{value:g}" if isinstance(value, float) else value
-            flat = "same" if one["same"] else "flat" if one["flat"] else ""
-            lines.append(
-                f"| {one['method']} | {one['parameter']} | {shown} | {one['rooms']} "
-                f"| {cells} | {flat} |"
-            )
+            cells = [f"{change:+.3f}" for change in changes]
+            shown = f"{value:g}" if isinstance(value, float) else f"{value}"
+            flat = "same" if one["same"] else "flat" if one["flat"] else "acts"
+            row = [one["method"], one["parameter"], shown, rooms, *cells, flat]
+            lines.append(f"| {' | '.join(row)} |")
     return "\n".join(lines) + "\n"
 
 
@@ -252,13 +286,15 @@ def main(arguments: list[str] | None = None) -> int:
     """Measure what is missing and write the table; returns the exit status."""
     parser = common_arguments("ablations", TABLE, 401)
     parser.add_argument("--method", action="append", choices=list(METHODS), help="repeatable")
+    parser.add_argument("--people", type=int, default=1, help="at least so many in each room")
     given = parser.parse_args(arguments)
-    seeds, methods = range(given.first, given.first + given.count), tuple(given.method or METHODS)
+    crowded = (seed for seed in count(given.first) if choose(seed).people >= given.people)
+    seeds, methods = tuple(islice(crowded, given.count)), tuple(given.method or METHODS)
     rows = read_rows(given.output)
     fill(rows, seeds, given.steps, methods, given.output)
-    given.table.write_text(
-        table(effects(rows, seeds, given.steps, methods), seeds, given.steps), encoding="utf-8"
-    )
+    earlier = given.table.read_text(encoding="utf-8") if given.table.is_file() else ""
+    found = effects(rows, seeds, given.steps, methods)
+    given.table.write_text(table(found, given.steps, earlier), encoding="utf-8")
     return 0
 
 

@@ -2,11 +2,13 @@
 
 [ZW21] Zhu, Wang, "3D target position tracking based on probability hypothesis
 density filtering", 2021.
+[VM06] Vo, Ma, "The Gaussian mixture probability hypothesis density filter", IEEE TSP
+54(11), 2006.
 """
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
@@ -15,8 +17,8 @@ from tracker.parameters.groups.foreground import ForegroundParams
 from tracker.parameters.method import Method, Reads, Uses, Values
 
 
-class ColourPeakParams(Params):
-    """Peaks of the colour likelihood ([ZW21] §2.2)."""
+class ColourBoxParams(Params):
+    """Boxes with the colours of templates: what all methods on colours have in common."""
 
     colour_space: Annotated[Literal["hue_saturation", "rgb"], ui("u", published="rgb")] = (
         "hue_saturation"
@@ -28,19 +30,10 @@ class ColourPeakParams(Params):
     )
     """How a box's pixels count: less towards the edge of the ellipse in it, or all the same."""
 
-    likelihood_sigma: Annotated[float, Field(ge=0.02, le=0.5), ui("σ", step=0.01)] = 0.1
-    """Spread of the distance D to the nearest template in the colour likelihood N(D; 0, σ²)."""
-
-    acceptance_distance: Annotated[
-        float, Field(ge=0.05, le=1.0), ui("D_max", step=0.01, published=1.0, essential=True)
-    ] = 0.52
-    """A peak is rejected if its likelihood, that of its foreground included, is below the colour
-    likelihood at this distance."""
-
     acceptance_foreground: Annotated[
         float, Field(ge=0.0, le=1.0), ui("f_min", "Foreground", step=0.01, published=0.0)
     ] = 0.35
-    """A peak with a smaller share of foreground in its box is rejected."""
+    """A peak or mode with a smaller share of foreground in its box is rejected."""
 
     foreground_weight: Annotated[
         float, Field(ge=0.0, le=10.0), ui("a", "Foreground", step=0.1, published=0.0)
@@ -51,6 +44,53 @@ class ColourPeakParams(Params):
         float, Field(ge=0.0, le=10.0), ui("b", step=0.1, published=0.0)
     ] = 3.0
     """The likelihood falls by exp(-b · share of foreground above and beside the box)."""
+
+    samples: Annotated[int, Field(ge=20, le=5000), ui("S", unit="1/(camera·step)", log=True)] = 400
+    """Boxes, or particles of all targets together, that are compared with the templates."""
+
+    motion_sigma: Annotated[
+        float, Field(ge=0.1, le=50.0), ui("σ_w", "Motion", unit="half sizes/√s", step=0.1, log=True)
+    ] = 3.0
+    """Random walk: standard deviation of a person's displacement in the picture in one second."""
+
+    growth_sigma: Annotated[
+        float,
+        Field(ge=0.01, le=5.0),
+        ui("σ_H", "Motion", unit="half sizes/√s", step=0.01, log=True),
+    ] = 0.4
+    """Random walk: standard deviation of the change of a box's half sizes in one second."""
+
+    centre_sigma: Annotated[
+        float, Field(ge=0.02, le=3.0), ui("σ_x", unit="half sizes", step=0.01, log=True)
+    ] = 0.5
+    """Standard deviation of the centre of a peak or mode."""
+
+    size_sigma: Annotated[
+        float, Field(ge=0.02, le=3.0), ui("σ_h", unit="half sizes", step=0.01, log=True)
+    ] = 0.5
+    """Standard deviation of the half sizes of a peak or mode, which colour hardly determines."""
+
+    size_jitter: Annotated[float, Field(ge=0.0, le=1.0), ui("σ_s", step=0.01, advanced=True)] = 0.1
+    """Relative spread of the samples' sizes around that of a target at the place: people differ."""
+
+    @property
+    def weighs_foreground(self) -> bool:
+        """Whether the foreground in a box counts."""
+        weights = (self.acceptance_foreground, self.foreground_weight, self.surroundings_weight)
+        return max(weights) > 0.0
+
+
+class ColourPeakParams(ColourBoxParams):
+    """Peaks of the colour likelihood ([ZW21] §2.2)."""
+
+    likelihood_sigma: Annotated[float, Field(ge=0.02, le=0.5), ui("σ", step=0.01)] = 0.1
+    """Spread of the distance D to the nearest template in the colour likelihood N(D; 0, σ²)."""
+
+    acceptance_distance: Annotated[
+        float, Field(ge=0.05, le=1.0), ui("D_max", step=0.01, published=1.0, essential=True)
+    ] = 0.52
+    """A peak is rejected if its likelihood, that of its foreground included, is below the colour
+    likelihood at this distance."""
 
     carry_templates: Annotated[bool, ui("q_c", published=False)] = True
     """Whether a camera without a template of a person gets one at the place that the calibration
@@ -69,9 +109,6 @@ class ColourPeakParams(Params):
         ui("ln o", step=0.1, when={"shapes": ("unsure", "fitting", "always")}),
     ] = 2.0
     """Log odds from which a person detected by shape is passed on like a peak."""
-
-    samples: Annotated[int, Field(ge=20, le=5000), ui("S", unit="1/(camera·step)", log=True)] = 400
-    """Boxes that are compared with the templates."""
 
     foreground_samples: Annotated[
         float, Field(ge=0.0, le=1.0), ui("s", "Foreground", step=0.05, published=0.0)
@@ -93,24 +130,11 @@ class ColourPeakParams(Params):
     ] = 0.8
     """Width of the mean shift's kernel."""
 
-    centre_sigma: Annotated[
-        float, Field(ge=0.02, le=3.0), ui("σ_x", unit="half sizes", step=0.01, log=True)
-    ] = 0.5
-    """Standard deviation of a peak's centre."""
-
-    size_sigma: Annotated[
-        float, Field(ge=0.02, le=3.0), ui("σ_h", unit="half sizes", step=0.01, log=True)
-    ] = 0.5
-    """Standard deviation of a peak's half sizes, which colour alone hardly determines."""
-
     sigma_height: Annotated[
         float, Field(ge=5.0, le=1000.0), ui("h_σ", unit="px", log=True, advanced=True)
     ] = 60.0
     """Half height up to which a peak's deviations grow with its size: a large target shows
     details."""
-
-    size_jitter: Annotated[float, Field(ge=0.0, le=1.0), ui("σ_s", step=0.01, advanced=True)] = 0.1
-    """Relative spread of the samples' sizes around that of a target at the place: people differ."""
 
     merge_distance: Annotated[
         float,
@@ -129,17 +153,15 @@ class ColourPeakParams(Params):
     @property
     def asks_foreground(self) -> bool:
         """Whether any parameter makes use of the foreground."""
-        asked = (
-            self.acceptance_foreground,
-            self.foreground_weight,
-            self.surroundings_weight,
-            self.foreground_samples,
-        )
-        return max(asked) > 0.0
+        return self.weighs_foreground or self.foreground_samples > 0.0
 
 
 class ColourPhdParams(ColourPeakParams):
     """Single-view GM-PHD filter on colour likelihood ([ZW21] §2.1–2.3)."""
+
+    extraction_threshold: ClassVar[float] = 0.5
+    """A component whose weight is above this is a 2D estimate: more likely than not there is
+    somebody ([VM06]). By default no estimate goes to the fusion."""
 
     survival_probability: Annotated[
         float, Field(ge=0.5, le=1.0), ui("p_S", "Motion", step=0.001)
@@ -150,18 +172,6 @@ class ColourPhdParams(ColourPeakParams):
         float, Field(ge=0.05, le=1.0), ui("p_D", step=0.01, published=0.98)
     ] = 0.8
     """Probability that a person in the picture makes a colour peak."""
-
-    motion_sigma: Annotated[
-        float, Field(ge=0.1, le=50.0), ui("σ_w", "Motion", unit="half sizes/√s", step=0.1, log=True)
-    ] = 3.0
-    """Random walk: standard deviation of a person's displacement in the picture in one second."""
-
-    growth_sigma: Annotated[
-        float,
-        Field(ge=0.01, le=5.0),
-        ui("σ_H", "Motion", unit="half sizes/√s", step=0.01, log=True),
-    ] = 0.4
-    """Random walk: standard deviation of the change of a box's half sizes in one second."""
 
     birth: Annotated[
         Literal["peaks", "entrances", "both"], ui("γ(x)", "Birth", published="entrances")
@@ -190,11 +200,6 @@ class ColourPhdParams(ColourPeakParams):
 
     max_components: Annotated[int, Field(ge=1, le=300), ui("J_max", "Extraction", step=1)] = 30
     """The heaviest components that are kept."""
-
-    extraction_threshold: Annotated[
-        float, Field(ge=0.01, le=0.99), ui("T_e", "Extraction", step=0.01)
-    ] = 0.5
-    """A component whose weight is above this is a 2D estimate."""
 
     output: Annotated[
         Literal["peaks", "estimates"], ui("Y", "Extraction", published="estimates")

@@ -64,14 +64,6 @@ class JpdaParams(Params):
     ] = 0.5
     """For poisson: expected number of false measurements, uniform over the picture."""
 
-    gate_volume: Annotated[
-        float,
-        Field(ge=1.0, le=1000.0),
-        ui("V", "Clutter", unit="√|S|", log=True, advanced=True, when={"clutter": ("diffuse",)}),
-    ] = 9.5
-    """For diffuse: volume of a gate, in which a false measurement is uniform, in standard
-    deviations of the innovation."""
-
     acceleration_sigma: Annotated[
         float,
         Field(ge=0.1, le=200.0),
@@ -236,7 +228,8 @@ def _uses(parameters: Values) -> Uses:
     if source == "foreground":
         return Uses(pictures=True, reads=(own, Reads("pictures"), Reads("foreground")))
     # without a single template the foreground's boxes are taken instead
-    colours = Reads("colour_phd", only=ColourPeakParams)
+    walk = frozenset({"motion_sigma", "growth_sigma"})  # its targets have a motion of their own
+    colours = Reads("colour_phd", only=ColourPeakParams, without=walk)
     reads = (own, Reads("pictures"), Reads("foreground"), colours)
     return Uses(pictures=True, templates="if there", reads=reads)
 

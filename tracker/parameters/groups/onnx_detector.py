@@ -6,12 +6,11 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from tracker.parameters.definition import ui
-from tracker.parameters.groups.detections import DetectionBoxParams
+from tracker.parameters.definition import Params, ui
 from tracker.parameters.method import Method, Reads, Uses, Values
 
 
-class OnnxDetectorParams(DetectionBoxParams):
+class OnnxDetectorParams(Params):
     """Single-view boxes of a detection network (ONNX) that is run on the pictures."""
 
     score_threshold: Annotated[
@@ -46,6 +45,9 @@ class OnnxDetectorParams(DetectionBoxParams):
     ImageNet's (DETR), −1 … 1, 0 … 255, or ImageNet's with blue first (NanoDet)."""
 
 
+_BOXES = Reads("detection_boxes", without=frozenset({"score_threshold"}))
+"""A network's boxes have the noise of every detector's, and a least score of their own."""
+
 _PICTURES = Reads(
     "pictures", without=frozenset({"lines", "target_height", "least_height", "steady_from"})
 )
@@ -57,7 +59,7 @@ def _uses(values: Values) -> Uses:
         pictures=True,
         detector=True,
         every=values.of(OnnxDetectorParams).every,
-        reads=(Reads("onnx_detector"), _PICTURES),
+        reads=(Reads("onnx_detector"), _BOXES, _PICTURES),
     )
 
 

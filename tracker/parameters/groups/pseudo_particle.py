@@ -12,6 +12,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from tracker.parameters.definition import Params, ui
+from tracker.parameters.groups.colour_phd import ColourBoxParams, ColourPhdParams
 from tracker.parameters.groups.foreground import ForegroundParams
 from tracker.parameters.method import Method, Reads, Uses, Values
 
@@ -24,33 +25,10 @@ class PseudoParticleParams(Params):
     filter: Annotated[Literal["pseudo", "classical"], ui("p(x|z)")] = "pseudo"
     """Clusters of particles as targets, or one posterior whose mean is the only one."""
 
-    samples: Annotated[int, Field(ge=20, le=5000), ui("S", unit="1/(camera·step)", log=True)] = 400
-    """Number of particles of all targets together."""
-
-    colour_space: Annotated[Literal["hue_saturation", "rgb"], ui("u", published="rgb")] = (
-        "hue_saturation"
-    )
-    """Bins of the histograms: 16 hues × 16 saturations and 16 greys, or RGB 8×8×8."""
-
-    histogram_kernel: Annotated[Literal["epanechnikov", "flat"], ui("k(r)", published="flat")] = (
-        "epanechnikov"
-    )
-    """How a box's pixels count: less towards the edge of the ellipse in it, or all the same."""
-
     sharpness: Annotated[
         float, Field(ge=1.0, le=200.0), ui("λ", step=1.0, log=True, published=20.0)
     ] = 40.0
     """How fast a particle's weight exp(-λ d) falls with the distance d to a target's colours."""
-
-    foreground_weight: Annotated[
-        float, Field(ge=0.0, le=10.0), ui("a", "Foreground", step=0.1, published=0.0)
-    ] = 3.0
-    """The weight is multiplied by the share of foreground in the box to this power."""
-
-    surroundings_weight: Annotated[
-        float, Field(ge=0.0, le=10.0), ui("b", step=0.1, published=0.0)
-    ] = 3.0
-    """The weight falls by exp(-b · share of foreground above and beside the box)."""
 
     birth: Annotated[Literal["foreground", "picture"], ui("γ(x)", "Birth", published="picture")] = (
         "foreground"
@@ -66,18 +44,6 @@ class PseudoParticleParams(Params):
         Literal["each", "together"], ui("w_i", "Extraction", published="together", when=_PSEUDO)
     ] = "each"
     """Whether each target's particles, and the newcomers', keep their number, or all compete."""
-
-    motion_sigma: Annotated[
-        float, Field(ge=0.1, le=50.0), ui("σ_w", "Motion", unit="half sizes/√s", step=0.1, log=True)
-    ] = 3.0
-    """Random walk: standard deviation of a person's displacement in the picture in one second."""
-
-    growth_sigma: Annotated[
-        float,
-        Field(ge=0.01, le=5.0),
-        ui("σ_H", "Motion", unit="half sizes/√s", step=0.01, log=True),
-    ] = 0.4
-    """Random walk: standard deviation of the change of a box's half sizes in one second."""
 
     velocity_share: Annotated[
         float, Field(ge=0.0, le=1.0), ui("v", "Motion", step=0.05, published=0.0, when=_PSEUDO)
@@ -114,13 +80,6 @@ class PseudoParticleParams(Params):
     """Colour distance of the background: a mode less likely than a box at this distance is
     background."""
 
-    acceptance_foreground: Annotated[
-        float,
-        Field(ge=0.0, le=1.0),
-        ui("f_min", "Foreground", step=0.01, published=0.0, when=_PSEUDO),
-    ] = 0.35
-    """A mode with a smaller share of foreground in its box is background."""
-
     position_sigma: Annotated[
         float,
         Field(ge=0.1, le=10.0),
@@ -155,24 +114,10 @@ class PseudoParticleParams(Params):
     ] = 10.0
     """Time after a target vanished within which one of the same colours continues its id."""
 
-    centre_sigma: Annotated[
-        float, Field(ge=0.02, le=3.0), ui("σ_x", unit="half sizes", step=0.01, log=True)
-    ] = 0.5
-    """Standard deviation of a mode's centre, as measurement noise of the fusion."""
-
-    size_sigma: Annotated[
-        float, Field(ge=0.02, le=3.0), ui("σ_h", unit="half sizes", step=0.01, log=True)
-    ] = 0.5
-    """Standard deviation of a mode's half sizes, which colour alone hardly determines."""
-
     output: Annotated[
         Literal["modes", "targets"], ui("Y", "Extraction", published="targets", when=_PSEUDO)
     ] = "modes"
     """What goes to the fusion: every mode that is not background, or the confirmed targets."""
-
-    size_jitter: Annotated[float, Field(ge=0.0, le=1.0), ui("σ_s", step=0.01, advanced=True)] = 0.1
-    """Relative spread of new particles' sizes around that of a target at the place: people
-    differ."""
 
     merge_distance: Annotated[
         float,
@@ -198,17 +143,19 @@ class PseudoParticleParams(Params):
     ] = 3.0
     """A target at an unknown place is as likely as one so many standard deviations σ_a away."""
 
-    @property
-    def asks_foreground(self) -> bool:
+    def asks_foreground(self, colours: ColourBoxParams) -> bool:
         """Whether any parameter makes use of the foreground."""
-        asked = (self.foreground_weight, self.surroundings_weight, self.acceptance_foreground)
-        return self.birth == "foreground" or max(asked) > 0.0
+        return self.birth == "foreground" or colours.weighs_foreground
 
 
 def _uses(parameters: Values) -> Uses:
-    asked = parameters.of(PseudoParticleParams).asks_foreground
+    p = parameters.of(PseudoParticleParams)
+    asked = p.asks_foreground(parameters.of(ColourPhdParams))
     foreground = parameters.of(ForegroundParams).read_by_colours if asked else ()
-    reads = (Reads("pseudo_particle"), Reads("pictures"), *foreground)
+    # the one mean of the classical filter is no mode that could be rejected
+    without = frozenset({"acceptance_foreground"} if p.filter == "classical" else ())
+    colours = Reads("colour_phd", only=ColourBoxParams, without=without)
+    reads = (Reads("pseudo_particle"), colours, Reads("pictures"), *foreground)
     return Uses(pictures=True, templates="needed", reads=reads)
 
 

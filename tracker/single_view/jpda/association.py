@@ -1,4 +1,8 @@
-"""The association matrix of one step: probabilities of all pairs of target and measurement."""
+"""The association matrix of one step: probabilities of all pairs of target and measurement.
+
+[FBS83] Fortmann, Bar-Shalom, Scheffe, "Sonar tracking of multiple targets using joint
+probabilistic data association", IEEE Journal of Oceanic Engineering 8(3), 1983.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +13,7 @@ from scipy.special import gammaln
 
 from tracker.filters import association
 from tracker.filters.association import MOST_ITEMS, Marginals
+from tracker.filters.gaussian_mixture import gate_distance
 from tracker.parameters.groups.jpda import JpdaParams
 from tracker.single_view.jpda.targets import Innovations
 
@@ -24,8 +29,9 @@ def associate(
     By Bayes' rule a joint event has the weight Π_t P_D Λ_tj or 1 − P_D P_G, times
 
     * **poisson**: λ_c / area for each false measurement;
-    * **diffuse**, as published: Φ! / V^Φ, for an unknown number Φ. V is one
-      number for all gates, so it is in units of √|S|, as is then Λ.
+    * **diffuse**, as published: Φ! / V^Φ, for an unknown number Φ. V is the area of the ellipse
+      that is a gate with P_G, π γ √|S| ([FBS83]_); so that it is one number for all gates, it is
+      in units of √|S|, as is then Λ.
 
     Groups of targets that share no measurement are independent.
 
@@ -46,7 +52,7 @@ def associate(
     densities, clutter = found.densities, p.clutter_rate / area
     if p.clutter == "diffuse":
         densities = densities * np.sqrt(np.linalg.det(found.covariances))
-        clutter = 1.0 / p.gate_volume
+        clutter = 1.0 / (np.pi * gate_distance(p.gate_probability, 2))
     detected = np.where(possible, p.detection_probability * densities, 0.0)
     # a density may underflow to 0 inside its gate; the pair remains possible
     detected[possible] = np.maximum(detected[possible], np.finfo(float).tiny)

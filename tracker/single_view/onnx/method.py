@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy import ndarray
 
+from tracker.parameters.groups.detections import DetectionBoxParams
 from tracker.parameters.groups.onnx_detector import OnnxDetectorParams
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.detector_boxes import judge_boxes
@@ -51,7 +52,10 @@ class OnnxDetector:
                 f"{sequence.name} has no detector; fetch one under Teach or by `multiview-phd "
                 "detector get`, start with --detector model.onnx, or choose another single_view"
             )
-        p = self._parameters = parameters.of(OnnxDetectorParams)
+        p, self._box_parameters = (
+            parameters.of(OnnxDetectorParams),
+            parameters.of(DetectionBoxParams),
+        )
         self._sequence, self._camera = sequence, sequence.views[camera_index].camera
         settings = Settings(
             p.person_class, p.score_threshold, p.suppression_overlap, p.input_side, p.pixel_values
@@ -72,7 +76,9 @@ class OnnxDetector:
         if picture is None:
             return None, ViewResult.of_no_frame()
         seen = self._network.detect(picture)
-        found = judge_boxes(self._sequence, self._camera, seen.boxes, seen.scores, self._parameters)
+        found = judge_boxes(
+            self._sequence, self._camera, seen.boxes, seen.scores, self._box_parameters
+        )
         good = found.plausible
         result = ViewResult.of_boxes(found.boxes[good], found.scores[good], found.sigmas[good])
         dropped = found.dropped

@@ -13,6 +13,7 @@ from jaxtyping import Float, Int, Int16, UInt8
 from numpy import ndarray
 from scipy.special import expit
 
+from tracker.parameters.groups.colour_phd import ColourPhdParams
 from tracker.parameters.groups.pseudo_particle import PseudoParticleParams
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
@@ -81,7 +82,10 @@ class PseudoParticle:
             ValueError: If there are no pictures or templates, or a template cannot be read.
         """
         self._parameters = p = parameters.of(PseudoParticleParams)
-        self._model = ColourParticles(sequence, camera_index, p, parameters.foreground, reader)
+        self._colours = colours = parameters.of(ColourPhdParams)
+        self._model = ColourParticles(
+            sequence, camera_index, p, colours, parameters.foreground, reader
+        )
         self._step_time = sequence.step_time
 
     def start(self) -> PseudoParticleState:
@@ -117,8 +121,8 @@ class PseudoParticle:
         rng: np.random.Generator,
     ) -> tuple[Float[ndarray, "S 4"], Tracks, ViewResult]:
         """Clusters, hypothesis matrix, and new particles: particles, targets and result."""
-        p = self._parameters
-        samples = np.concatenate([moved, self._model.draw_new(p.samples - len(moved), scene, rng)])
+        p, count = self._parameters, self._colours.samples
+        samples = np.concatenate([moved, self._model.draw_new(count - len(moved), scene, rng)])
         expected = tracks.targets.moved(p.velocity_share)
         scores, persons = self._model.scores(scene, samples)
         weights = (
@@ -126,7 +130,7 @@ class PseudoParticle:
             if p.resampling == "together"
             else particle_set.normalised_by_group(scores, self._nearest(samples, expected))
         )
-        counts = particle_set.resample(weights, p.samples, rng)
+        counts = particle_set.resample(weights, count, rng)
         found = particle_set.clusters(
             samples,
             counts,
@@ -137,7 +141,7 @@ class PseudoParticle:
         modes = found.modes[found.shares >= p.smallest_cluster]
         distances = self._model.distances(scene, modes)
         evidence, inside = self._model.evidence(scene, modes)
-        good = inside >= p.acceptance_foreground
+        good = inside >= self._colours.acceptance_foreground
         modes, distances, evidence = modes[good], distances[good], evidence[good]
 
         vacant = hypotheses.vacancies(expected, self._model.persons, p.targets_per_person)
@@ -199,10 +203,10 @@ class PseudoParticle:
         self, moved: Float[ndarray, "S 4"], scene: Scene, rng: np.random.Generator
     ) -> tuple[Float[ndarray, "S 4"], ViewResult]:
         """Sampling, importance weights and resampling: one posterior, and its mean."""
-        p = self._parameters
-        samples = moved if len(moved) else self._model.draw_new(p.samples, scene, rng)
+        p, count = self._parameters, self._colours.samples
+        samples = moved if len(moved) else self._model.draw_new(count, scene, rng)
         weights = particle_set.normalised(self._model.scores(scene, samples)[0])
-        counts = particle_set.resample(weights, p.samples if len(samples) else 0, rng)
+        counts = particle_set.resample(weights, count if len(samples) else 0, rng)
         mean = (weights @ samples)[None] if len(samples) else np.zeros((0, 4))
         scores, _ = self._model.scores(scene, mean)
         existence = expit(scores + p.sharpness * p.acceptance_distance)
@@ -236,15 +240,15 @@ class PseudoParticle:
         self, targets: Targets, resampled: Float[ndarray, "S 4"], rng: np.random.Generator
     ) -> Float[ndarray, "S 4"]:
         """The particles for the next step: new ones around targets, or the resampled ones."""
-        p = self._parameters
+        p, colours = self._parameters, self._colours
         if not len(targets):
             return np.zeros((0, 4))
-        count = p.samples - round(p.newcomer_share * p.samples)
+        count = colours.samples - round(p.newcomer_share * colours.samples)
         if p.redistribution == 0.0:
             return np.asarray(rng.permutation(resampled)[:count])
         expected = targets.moved(p.velocity_share)
         # a target that is not detected may be anywhere within its drift since
-        strayed = p.motion_sigma**2 * self._step_time * targets.misses
+        strayed = colours.motion_sigma**2 * self._step_time * targets.misses
         spread = np.sqrt(p.redistribution**2 + strayed)
         sigmas = spread[:, None] * expected.boxes[:, 2:]
         return particle_set.redistribute(expected.boxes, sigmas, count, rng)

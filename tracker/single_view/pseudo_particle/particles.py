@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float, Int, UInt8
 from numpy import ndarray
 
+from tracker.parameters.groups.colour_phd import ColourBoxParams
 from tracker.parameters.groups.foreground import ForegroundParams
 from tracker.parameters.groups.pseudo_particle import PseudoParticleParams
 from tracker.sequences.pictures.frames import Pictures
@@ -30,6 +31,7 @@ class ColourParticles:
         sequence: Sequence,
         camera_index: int,
         parameters: PseudoParticleParams,
+        colours: ColourBoxParams,
         foreground: ForegroundParams,
         reader: Pictures,
     ) -> None:
@@ -38,15 +40,15 @@ class ColourParticles:
         Raises:
             ValueError: If there are no pictures or templates, or a template cannot be read.
         """
-        p = self._parameters = parameters
+        self._parameters, self._colours = parameters, colours
         self._appearance = Appearance(
             sequence,
             camera_index,
             reader,
-            colour_space=p.colour_space,
-            histogram_kernel=p.histogram_kernel,
-            size_jitter=p.size_jitter,
-            foreground=foreground if p.asks_foreground else None,
+            colour_space=colours.colour_space,
+            histogram_kernel=colours.histogram_kernel,
+            size_jitter=colours.size_jitter,
+            foreground=foreground if parameters.asks_foreground(colours) else None,
         )
         self._root_time = float(np.sqrt(sequence.step_time))
         self.persons = len(self._appearance.model.names)
@@ -75,7 +77,7 @@ class ColourParticles:
         Returns:
             At most S particles: those whose centres are still in the image.
         """
-        p, root = self._parameters, self._root_time
+        p, root = self._colours, self._root_time
         noise = rng.standard_normal((len(particles), 3))
         moved = particles.copy()
         moved[:, :2] += p.motion_sigma * root * particles[:, 2:] * noise[:, :2]
@@ -108,7 +110,7 @@ class ColourParticles:
         Returns:
             As :func:`tracker.single_view.pictures.foreground.shape_scores`.
         """
-        p = self._parameters
+        p = self._colours
         return self._appearance.shape_scores(
             scene, boxes, inside_weight=p.foreground_weight, around_weight=p.surroundings_weight
         )
@@ -136,5 +138,5 @@ class ColourParticles:
 
     def sigmas(self, boxes: Float[ndarray, "N 4"]) -> Float[ndarray, "N 4"]:
         """Standard deviations of modes: proportional to the box."""
-        p = self._parameters
+        p = self._colours
         return box_sigmas(boxes, p.centre_sigma, p.size_sigma)

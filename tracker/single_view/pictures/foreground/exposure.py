@@ -32,10 +32,15 @@ MEDIAN_VALUES = 50_000
 
 OFTEN = 0.3
 """Share of the images above which a pixel is often away from its median: where people pass through,
-a pixel shows a person in fewer images."""
+a pixel shows a person in fewer images.
+
+In five cameras of rooms where all walk about, the share of such pixels was 0.06 to 0.14, and in
+four of rooms where people stay 0.22 to 0.28, so that the two differ; with 0.2 in place of 0.3 they
+overlapped (0.17 to 0.31, and 0.26 to 0.48)."""
 
 AWAY = 24
-"""Difference from the median, on the scale 16 √level, above which a pixel is away from it."""
+"""Difference from the median, on the scale 16 √level, above which a pixel is away from it: that
+from which it is foreground by default. With half of it the shares of the same rooms overlapped."""
 
 LEAST_CHANGING = 0.005
 """Least share of changing pixels in the image for an estimate of :attr:`changing_share`."""

@@ -30,7 +30,8 @@ BLUR = 1.0
 """Standard deviation of the blur against noise and compression, before comparison, pixels."""
 
 BLIND = 0.5
-"""Share of an image above which a simultaneous change is one of light and not of motion."""
+"""Share of an image above which a simultaneous change is one of light and not of motion: light
+changes in the whole room, and people who fill half of an image leave no background to learn."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
