@@ -183,9 +183,9 @@ class FusionModel:
     ) -> Float[ndarray, "C N"]:
         """Compute p_D in each camera of N newborn targets, which the tracks may occlude."""
         count = len(positions)
-        nobody = np.full(count, -1, dtype=np.int64)
-        born = self.motion.at_rest(GaussianMixture(np.zeros(count), positions, covariances, nobody))
-        every = gaussian_mixture.concatenate([tracks, born])
+        unlabelled = np.full(count, -1, dtype=np.int64)
+        born = GaussianMixture(np.zeros(count), positions, covariances, unlabelled)
+        every = gaussian_mixture.concatenate([tracks, self.motion.at_rest(born)])
         seen = [
             self.visible(c, self.expected(c, every), every, every.weights)
             for c in range(len(self.cameras))
