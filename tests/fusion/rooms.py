@@ -8,13 +8,7 @@ import numpy as np
 from numpy import ndarray
 
 from tests import world
-from tracker.fusion.measurement_births import (
-    BirthModel,
-    Evidence,
-    MeasurementBirths,
-    Newborns,
-    Visible,
-)
+from tracker.fusion.measurement_births import BirthModel, Evidence, MeasurementBirths
 from tracker.fusion.model import all_boxes
 from tracker.fusion.multi_bernoulli import MultiBernoulli
 from tracker.fusion.protocol import FusionResult
@@ -81,26 +75,14 @@ def exact(places: Many[Many[float]], cameras: Many[Camera] = CAMERAS, sigma: flo
     return tuple(of_boxes(world.upright(camera, where), sigma) for camera in cameras)
 
 
-class AloneBirths(MeasurementBirths):
-    """Births in a room where nobody stands in front of anybody."""
-
-    def __init__(self, kind: MeasurementKind, model: BirthModel, p_d: float) -> None:
-        super().__init__(CAMERAS, ROOM, TargetModel(HALF_EXTENTS, kind), model)
-        self._p_d = p_d
-
-    def propose(self, evidence: Evidence, visible: Visible | None = None) -> Newborns | None:
-        def alone(positions: ndarray, covariances: ndarray) -> ndarray:
-            return np.array([self._p_d * camera.sees(positions) for camera in CAMERAS])
-
-        return super().propose(evidence, visible or alone)
-
-
 def births(
     kind: MeasurementKind = "box", margin: float = 0.0, p_d: float = 0.95, gap: float = 1.0
-) -> AloneBirths:
+) -> MeasurementBirths:
     """The values are those of the room with four cameras."""
-    model = BirthModel(0.005, np.full(4, 1e-8 if kind != "centre" else 1e-6), 21.0, margin, gap)
-    return AloneBirths(kind, model, p_d)
+    model = BirthModel(
+        0.005, p_d, np.full(4, 1e-8 if kind != "centre" else 1e-6), 21.0, margin, gap
+    )
+    return MeasurementBirths(CAMERAS, ROOM, TargetModel(HALF_EXTENTS, kind), model)
 
 
 def evidence(

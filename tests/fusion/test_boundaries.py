@@ -204,55 +204,9 @@ def test_a_camera_without_a_frame_misses_no_newcomer_and_one_that_is_sure_never_
     assert every.existences[0] > 0.99
 
 
-def test_a_box_where_a_target_is_hardly_seen_counts_no_less_than_a_miss() -> None:
-    """By (1 − p) + p g / κ of each camera, which nears 1 − p where the box fits nothing."""
-    told = evidence(exact([PLACE]))
-    odds = []
-    for chance in (0.95, 0.3, 1e-12, 0.0):
-        chances = np.array([0.95, 0.95, 0.95, chance])
-        found = births().propose(
-            told, lambda places, _, chances=chances: np.tile(chances[:, None], len(places))
-        )
-        assert found is not None
-        odds.append(float(np.log(found.existences[0]) - np.log1p(-found.existences[0])))
-    ratio = np.exp(odds[0] - odds[3])  # 1 - p + p g / κ at p = 0.95
-    expected = np.log(0.7 + 0.3 * (ratio - 0.05) / 0.95)
-    assert odds[1] - odds[3] == pytest.approx(expected, abs=0.01)
-    assert odds[2] == pytest.approx(odds[3], abs=0.01)
-    assert ratio > 100.0
-
-
 # ── who is lost, and for how long
 
 MODEL = FusionModel(empty_room(), FusionParams())
-
-
-@pytest.mark.parametrize("existence", [0.0, 0.6, 1.0])
-def test_a_camera_that_somebody_blocks_misses_a_newcomer_with_less_weight(
-    existence: float,
-) -> None:
-    """In the way before the third camera stands one who exists; the fourth sees past both."""
-    camera = CAMERAS[2]
-    between = PLACE + 0.25 * (camera.centre - PLACE) * [1.0, 1.0, 0.0]
-    told = evidence(some(exact([PLACE]), 0, 1))
-    nobody, blocking = people(), people((7, existence, 0.0))
-    blocking.means[:, :3] = between
-    odds = []
-    for tracks in (nobody, blocking):
-        found = MODEL.newborns(told, tracks)
-        assert found is not None
-        odds.append(float(np.log(found[0].weights[0]) - np.log1p(-found[0].weights[0])))
-    both = people((7, existence, 0.0), (8, 0.0, 0.0))
-    both.means[:, :3] = [between, found[1].positions[0]]
-    both.covariances[1, :3, :3] = found[1].covariances[0]
-    p = FusionParams()
-    expected = 0.0
-    for index in (2, 3):
-        seen = MODEL.visible(index, MODEL.expected(index, both), both, both.weights)
-        chance = seen.detection_probabilities[1]
-        expected += np.log1p(-chance) - np.log1p(-p.detection_probability)
-    assert odds[1] - odds[0] == pytest.approx(expected, abs=1e-3)
-    assert (expected > 0.5) == (existence > 0.5)
 
 
 def people(*who: tuple[int, float, float]) -> GaussianMixture:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -78,10 +77,12 @@ class Newborns:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BirthModel:
-    """The model of births and of clutter."""
+    """The model of births, of their detection, and of clutter."""
 
     birth_rate: float
     """λ_b, expected number of newborn targets per step."""
+    detection_probability: float
+    """p_D of a target in the picture."""
     clutter: Float[ndarray, " C"]
     """κ of each camera, per unit of the measurement space."""
     gate: float
@@ -90,10 +91,6 @@ class BirthModel:
     """Distance from the room's volume within which targets are born as well, metres."""
     largest_gap: float
     """Largest distance between the rays of two boxes of one target, metres."""
-
-
-Visible = Callable[[Float[ndarray, "N 3"], Float[ndarray, "N 3 3"]], Float[ndarray, "C N"]]
-"""Detection probability in each camera of N targets by their positions and covariances."""
 
 
 class MeasurementBirths:
@@ -105,11 +102,11 @@ class MeasurementBirths:
 
         Λ = λ_b/V ∫ Π_c (1 − p_c + p_c g(z_c | x) / κ_c) dx
 
-    without the second term for a camera without such a box, and the existence probability of that
-    target is Λ / (1 + Λ): the rule for new tracks of the Poisson multi-Bernoulli filter, applied to
-    all cameras at once. The detection probability p_c is lower where an existing target stands in
-    front, and κ_c is multiplied by the box's clutter factor, where stage 1 gives one. The integral
-    is approximated by Laplace's method, around the place that fits the boxes best. This follows the
+    without the second term for a camera that has no box within the gate, and the existence
+    probability of that target is Λ / (1 + Λ): the rule for new tracks of the Poisson
+    multi-Bernoulli filter, applied to all cameras at once; p_c is 0 where the camera does not see
+    x, and κ_c is multiplied by the box's clutter factor, where stage 1 gives one. The integral is
+    approximated by Laplace's method, around the place that fits the boxes best. This follows the
     adaptive birth of Ristic, Clark, Vo and Vo (IEEE TAES 48(2), 2012), with the rule for new tracks
     of Williams (IEEE TAES 51(3), 2015).
     """
@@ -128,25 +125,24 @@ class MeasurementBirths:
         self._cameras = cameras
         self._room = room
         self._model = model
+        p_d = model.detection_probability
         volume = max(float(np.prod(room.maximum - room.minimum)), _LEAST_VOLUME)
         self._log_density = np.log(model.birth_rate / volume)
+        self._log_hit = float(np.log(p_d))
+        # at p_D = 1 a miss has probability 0
+        self._log_miss = float(np.log1p(-p_d)) if p_d < 1.0 else -np.inf
         self._log_clutter = np.log(model.clutter)
         self._centres = np.array([camera.centre for camera in cameras])
         self._calibrations = stacked(cameras)
         self._target = target.target(3)
         self._refinement = Refinement(_START_SIGMA, _REFINEMENTS, model.gate)
 
-    def propose(self, evidence: Evidence, visible: Visible) -> Newborns | None:
-        """Propose newborn targets that share no box, by decreasing existence; None for none.
-
-        Args:
-            evidence: The boxes of a step, and what explains them.
-            visible: Detection probabilities of targets beside those that exist.
-        """
+    def propose(self, evidence: Evidence) -> Newborns | None:
+        """Propose newborn targets that share no box, by decreasing existence; None for none."""
         seeds, pairs = self._meeting_points(evidence)
         if not len(seeds):
             return None
-        found = self._fit(seeds, pairs, evidence, visible)
+        found = self._fit(seeds, pairs, evidence)
         used: set[tuple[int, int]] = set()
         chosen: list[int] = []
         for index in np.argsort(-found.existences, kind="stable").tolist():
@@ -184,11 +180,7 @@ class MeasurementBirths:
         return met.points[chosen], free.indices[met.pairs[chosen]]
 
     def _fit(
-        self,
-        seeds: Float[ndarray, "N 3"],
-        pairs: Int[ndarray, "N 2"],
-        evidence: Evidence,
-        visible: Visible,
+        self, seeds: Float[ndarray, "N 3"], pairs: Int[ndarray, "N 2"], evidence: Evidence
     ) -> Newborns:
         """Fit each seed to the nearest box in every camera, and compute its existence probability.
 
@@ -214,28 +206,23 @@ class MeasurementBirths:
         )
         from scipy.special import expit  # a server starts without it
 
-        existences = expit(self._log_odds(found, fitted.fits[:, kept], evidence, visible))
+        existences = expit(self._log_odds(found, fitted.fits[:, kept], evidence))
         return Newborns(found.positions, found.covariances, existences, found.sources)
 
     def _log_odds(
-        self,
-        found: Newborns,
-        fits: Float[ndarray, "C N"],
-        evidence: Evidence,
-        visible: Visible,
+        self, found: Newborns, fits: Float[ndarray, "C N"], evidence: Evidence
     ) -> Float[ndarray, " N"]:
         """Compute log Λ of each newborn target from the log likelihoods ``fits`` of its boxes."""
-        chances = visible(found.positions, found.covariances)
         log_odds = self._log_density + 1.5 * np.log(2.0 * np.pi)
         log_odds = log_odds + 0.5 * np.linalg.slogdet(found.covariances)[1]
-        with np.errstate(divide="ignore"):  # of a camera that surely sees it, or surely does not
-            log_hits, log_misses = np.log(chances), np.log1p(-chances)
-        for c in range(len(self._cameras)):
-            if evidence.seeing is not None and not evidence.seeing[c]:
-                log_misses[c] = 0.0
-            factor, hit = log_misses[c], np.flatnonzero(found.sources[c] >= 0)
+        for c, camera in enumerate(self._cameras):
+            sees, hit = camera.sees(found.positions), np.flatnonzero(found.sources[c] >= 0)
+            misses = evidence.seeing is None or evidence.seeing[c]
+            factor = np.where(sees & misses, self._log_miss, 0.0)
             clutter = evidence.clutter_factors[evidence.starts[c] + found.sources[c][hit]]
             log_ratios = fits[c][hit] - self._log_clutter[c] - np.log(clutter)
-            factor[hit] = np.logaddexp(factor[hit], log_hits[c][hit] + log_ratios)
+            # a box says nothing of a place that its camera does not see
+            log_hits = np.where(sees[hit], self._log_hit + log_ratios, -np.inf)
+            factor[hit] = np.logaddexp(factor[hit], log_hits)
             log_odds += factor
         return np.asarray(log_odds)

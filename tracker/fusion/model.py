@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence as Many
-from functools import partial
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -86,6 +85,7 @@ class FusionModel:
             self.target,
             BirthModel(
                 birth_rate=p.birth_rate * sequence.step_time,
+                detection_probability=p.detection_probability,
                 clutter=self.clutter,
                 gate=self.gate,
                 margin=p.followed_margin,
@@ -160,37 +160,14 @@ class FusionModel:
             reporting_threshold=reporting_threshold,
         )
 
-    def newborns(
-        self, evidence: Evidence, tracks: GaussianMixture
-    ) -> tuple[GaussianMixture, Newborns] | None:
+    def newborns(self, evidence: Evidence) -> tuple[GaussianMixture, Newborns] | None:
         """Propose births where unexplained boxes of several cameras agree on a place.
-
-        Args:
-            evidence: The boxes of a step and how far tracks explain them.
-            tracks: The targets that exist, which may occlude newborn ones.
 
         Returns:
             Components without labels, and the boxes behind each; None for no birth.
         """
-        found = self._newborns.propose(evidence, partial(self._visible_beside, tracks))
+        found = self._newborns.propose(evidence)
         return None if found is None else self._at_rest(found)
-
-    def _visible_beside(
-        self,
-        tracks: GaussianMixture,
-        positions: Float[ndarray, "N 3"],
-        covariances: Float[ndarray, "N 3 3"],
-    ) -> Float[ndarray, "C N"]:
-        """Compute p_D in each camera of N newborn targets, which the tracks may occlude."""
-        count = len(positions)
-        unlabelled = np.full(count, -1, dtype=np.int64)
-        born = GaussianMixture(np.zeros(count), positions, covariances, unlabelled)
-        every = gaussian_mixture.concatenate([tracks, self.motion.at_rest(born)])
-        seen = [
-            self.visible(c, self.expected(c, every), every, every.weights)
-            for c in range(len(self.cameras))
-        ]
-        return np.stack([one.detection_probabilities[tracks.size :] for one in seen])
 
     def newborns_and_recent(
         self,
@@ -198,7 +175,6 @@ class FusionModel:
         boxes: Float[ndarray, "B 4"],
         views: Many[ViewResult],
         recent: Recent,
-        tracks: GaussianMixture,
     ) -> tuple[tuple[GaussianMixture, Newborns] | None, Recent]:
         """Propose births as :meth:`newborns` does, also from recent frames of asynchronous cameras.
 
@@ -207,7 +183,6 @@ class FusionModel:
             boxes: centre_x, centre_y, half_width, half_height of these boxes, pixels.
             views: The result of each camera, which says whether it has a frame.
             recent: The evidence of the last steps; empty at the start.
-            tracks: The targets that exist, which may occlude newborn ones.
 
         Returns:
             Components and the boxes behind them, or None for no birth; and the recent evidence
@@ -217,9 +192,9 @@ class FusionModel:
         now = StepEvidence(evidence, boxes, blind)
         later = missing_frames.remember(recent, now, self.step_time)
         if not blind.any():
-            return self.newborns(evidence, tracks), later
+            return self.newborns(evidence), later
         joined = missing_frames.with_recent(now, recent, self.step_time, self.target.half_height)
-        proposed = self._newborns.propose(joined, partial(self._visible_beside, tracks))
+        proposed = self._newborns.propose(joined)
         if proposed is None:
             return None, later
         found = missing_frames.with_present_boxes(proposed, blind)

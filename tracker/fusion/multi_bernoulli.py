@@ -165,9 +165,7 @@ class MultiBernoulli:
                 seen.starts,
                 seen.clutter_factors,
             )
-            proposed, recent = self._model.newborns_and_recent(
-                evidence, seen.boxes, views, recent, tracks
-            )
+            proposed, recent = self._model.newborns_and_recent(evidence, seen.boxes, views, recent)
             if proposed is not None:
                 born, newborns = proposed
                 born = models.label_births(born, next_label)

@@ -224,9 +224,7 @@ class SequentialPhd:
         evidence = Evidence(
             seen.boxes[:, :2], measured, unexplained, seen.starts, seen.clutter_factors
         )
-        found, later = self._model.newborns_and_recent(
-            evidence, seen.boxes, views, recent, work.mixture
-        )
+        found, later = self._model.newborns_and_recent(evidence, seen.boxes, views, recent)
         if found is None:
             return later
         born, newborns = found
