@@ -44,7 +44,7 @@ def compute(
     from tracker.runs import pipeline
     from tracker.runs.stage_cache import StageCache
 
-    def told(_: Run, progress: Progress) -> None:
+    def report(_: Run, progress: Progress) -> None:
         if stages is not None:
             stages.add(progress.stage)
         bar.at(progress.done, progress.total)
@@ -62,6 +62,6 @@ def compute(
             seed=seed,
             corrections=corrections,
             cache=StageCache.on_disk() if cached else None,
-            on_progress=told,
+            on_progress=report,
             cancelled=interrupted,
         )

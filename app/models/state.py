@@ -231,7 +231,8 @@ class ParameterInfo(Model):
     essential: bool
     """Among the few that are shown first."""
     slider: tuple[float, float, float] | None
-    """Of an essential one, the ends of its sliders and the step of the one beside the 3D view."""
+    """The ends of the sliders of an essential one, and the step of the one beside the 3D view; None
+    for the others."""
 
 
 class GroupInfo(Model):

@@ -242,7 +242,7 @@ def test_doubt_is_discounted_by_the_share_that_would_not_be_seen_and_belief_is_n
 
 
 def test_a_candidate_falls_at_the_first_gate_that_it_does_not_pass() -> None:
-    """Of what colours, foreground and shapes say of each, and which persons they are taken for."""
+    """Suggestions follow from colours, foreground and shapes, and name whom each is taken for."""
     rows = [
         # x, score, colour distance, share of foreground, person, gate
         (0.0, -1.0, 0.4, 0.9, 0, None), (5.0, -1.5, 0.4, 0.9, 1, "another at its place"),

@@ -170,7 +170,7 @@ def test_the_radius_of_walkers_is_found_and_positions_gain_by_it(radius: float) 
 
 
 def test_radius_and_level_are_those_of_one_least_squares_fit_of_everything() -> None:
-    """Of every row's place, radius, level, offsets and sizes at once, each by its prior."""
+    """The fit is of rows' places, radius, level, offsets and sizes at once, with their priors."""
     seen, independent = rows_of(np.random.default_rng(7), 0.15, 0.2, cameras=3, rows=40), 0.7
     seen.there[::5, 1] = 0.0
     seen.there[3] = [1.0, 0.0, 0.0]  # of one camera alone nothing is taken

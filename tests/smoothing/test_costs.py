@@ -210,7 +210,7 @@ def test_a_join_is_told_with_its_odds_against_the_best_other() -> None:
 def test_an_empty_way_between_two_pieces_counts_against_their_link(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Of each step of the gap, straight from the one to the other: log(1 − p_D) of each camera
+    """Each step of the gap, straight from the one to the other, adds log(1 − p_D) of each camera
     that has a frame and shows the place and no box there."""
     path = world.walk([(-0.4, 0.0), (0.5, 0.3)], [0.0, 3.0], 10.0)[:30, None]
     scene = known(path, hidden=lambda camera, person, step: 10 <= step < 15 and camera != 2)

@@ -206,6 +206,8 @@ def fit_places(
                     near = free[box]
                     if turn == 0:
                         near = box == pairs[n, 0] or box == pairs[n, 1]
+                    if not near:
+                        continue
                     for p in range(size):
                         residual[p] = values[box, p] - expected[n, p]
                         for q in range(size):

@@ -898,7 +898,10 @@ declare namespace Server {
 		advanced: boolean;
 		/** Among the few that are shown first. */
 		essential: boolean;
-		/** Of an essential one, the ends of its sliders and the step of the one beside the 3D view. */
+		/**
+		 * The ends of the sliders of an essential one, and the step of the one beside the 3D view; None
+		 * for the others.
+		 */
 		slider: [number, number, number] | null;
 	}
 

@@ -65,7 +65,7 @@ def call(folder: Path, seed: int, which: tuple[str, ...], examples: int) -> Roun
         seed: The same one makes the same calls; 0 those of every bound, at addresses of nothing.
             With others the recording, the run and the study of an address are there.
         which: The operations, by the flags of the tool.
-        examples: Of each operation.
+        examples: The number of cases for each operation.
     """
     data, report = folder / "data", folder / "calls.json"
     sequence = write_crossing(data / "crossing")

@@ -39,6 +39,15 @@ def progress(done: int) -> Progress:
     return Progress("fusion", done, 120, 1.0, done)
 
 
+def finished(bench: Workbench) -> Run:
+    """A run of the workbench's parameters, up to its end."""
+    run = run_of(bench)
+    bench.run_begins(run.key)
+    bench.run_progresses(run, progress(120))
+    bench.run_ends(run.key, "done")
+    return run
+
+
 def test_values_are_taken_all_or_none(bench: Workbench) -> None:
     bench.set_parameters({P_D: 0.7}, "test")
     with pytest.raises(ParameterError, match="must be between"):
@@ -212,10 +221,7 @@ def test_news_of_a_superseded_run_are_dropped(bench: Workbench) -> None:
 
 
 def test_the_run_before_is_shown_until_the_new_one_has_a_step(bench: Workbench) -> None:
-    old = run_of(bench)
-    bench.run_begins(old.key)
-    bench.run_progresses(old, progress(120))
-    bench.run_ends(old.key, "done")
+    old = finished(bench)
     bench.set_parameters({P_D: 0.7}, "test")
     new = run_of(bench)
     bench.run_begins(new.key, "ending the run before")
@@ -240,10 +246,7 @@ def test_a_run_that_is_silent_has_no_speed_and_says_what_it_does(bench: Workbenc
 
 
 def test_a_failure_shows_the_last_good_run_again(bench: Workbench) -> None:
-    good = run_of(bench)
-    bench.run_begins(good.key)
-    bench.run_progresses(good, progress(120))
-    bench.run_ends(good.key, "done")
+    good = finished(bench)
     bench.set_parameters({P_D: 0.7}, "test")
     bad = run_of(bench)
     bench.run_begins(bad.key)

@@ -216,16 +216,20 @@ def test_a_log_that_another_program_writes_is_read_again(own: Path) -> None:
         assert client.get("/api/state").json()["edits"]["undo"] is None
 
 
+def raise_doubts(desk: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is hardly doubtful is asked, too: who passes metres apart."""
+    monkeypatch.setattr("tracker.review.queue.ranking.LEAST", 0.0)
+    monkeypatch.setattr("tracker.review.queue.meetings._CLOSE", 8.0)
+    command(desk, "set_parameters", changes={"fusion.survival_probability": 0.97})
+    settled(desk)
+
+
 @pytest.mark.full
 def test_the_queue_is_answered_previewed_and_skipped(
     desk: TestClient, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert desk.get(f"{PLACE}/queue").json()["doubts"] == [], "all is clear here"
-    # so that what is hardly doubtful is told, too: who passes metres apart
-    monkeypatch.setattr("tracker.review.queue.ranking.LEAST", 0.0)
-    monkeypatch.setattr("tracker.review.queue.meetings._CLOSE", 8.0)
-    command(desk, "set_parameters", changes={"fusion.survival_probability": 0.97})
-    settled(desk)
+    raise_doubts(desk, monkeypatch)
     queue = desk.get(f"{PLACE}/queue").json()
     assert queue["complete"]
     assert queue["doubts"], queue
@@ -304,10 +308,7 @@ def test_what_is_answered_of_the_run_before_counts_in_the_one_that_came_meanwhil
 def test_what_is_checked_leaves_the_queue_though_the_run_stays_the_same(
     desk: TestClient, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("tracker.review.queue.ranking.LEAST", 0.0)
-    monkeypatch.setattr("tracker.review.queue.meetings._CLOSE", 8.0)
-    command(desk, "set_parameters", changes={"fusion.survival_probability": 0.97})
-    settled(desk)
+    raise_doubts(desk, monkeypatch)
     first, last = 0, desk.app.state.workbench.snapshot().sequence.frames - 1  # type: ignore[attr-defined]
     assert desk.get(f"{PLACE}/queue").json()["doubts"] != []
     wish = {"kind": "checked", "first": first, "last": last}
@@ -323,10 +324,7 @@ def test_what_is_checked_leaves_the_queue_though_the_run_stays_the_same(
 def test_an_answer_that_is_taken_back_is_no_answer_before_the_run_is_another(
     desk: TestClient, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("tracker.review.queue.ranking.LEAST", 0.0)
-    monkeypatch.setattr("tracker.review.queue.meetings._CLOSE", 8.0)
-    command(desk, "set_parameters", changes={"fusion.survival_probability": 0.97})
-    settled(desk)
+    raise_doubts(desk, monkeypatch)
     before = desk.get(f"{PLACE}/queue").json()
     command(desk, "answer", doubt=before["doubts"][0]["id"], alternative=0)
     settled(desk)

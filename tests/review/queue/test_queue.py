@@ -450,7 +450,7 @@ def test_the_other_runs_person_is_the_most_frequent_of_a_while_within_its_reach(
 def test_a_move_gains_what_the_other_run_says_of_who_goes_on(
     who: str, kind: ItemKind, earlier: list[int], later: list[int], added: float
 ) -> None:
-    """Who the tracks 1 and 3, 2 and 4 are there: 1 goes on as 3 and 2 as 4."""
+    """``who`` names the tracks 1, 3, 2 and 4 there; here 1 goes on as 3 and 2 as 4."""
     tracks = world.tracks(lines((0, 24, 0.0), (0, 24, 2.0), (35, 59, 0.0), (35, 59, 2.0)))
     names = dict(zip((1, 3, 2, 4), who, strict=True))
     seen = OtherRun(tracks, tracks, 0.1)
@@ -467,21 +467,21 @@ def test_the_other_run_tells_joins_and_exchanges_of_stretches_that_last() -> Non
     tracks = world.tracks(lines(*spans))
     seen = OtherRun(tracks, tracks, 0.1)
 
-    def told(names: dict[int, list[int]]) -> list[tuple[str, list[int], list[int]]]:
+    def moves_with(names: dict[int, list[int]]) -> list[tuple[str, list[int], list[int]]]:
         for track, own in names.items():
             seen.ids[tracks.ids == track] = own
         return [(m.kind, [p.track for p in m.earlier], [p.track for p in m.later])
                 for m in seen.moves()]  # fmt: skip
 
-    assert told({1: [7] * 25, 2: [7] * 25, 3: [8] * 60}) == [("join", [1], [2])]
+    assert moves_with({1: [7] * 25, 2: [7] * 25, 3: [8] * 60}) == [("join", [1], [2])]
     assert all(m.log_odds == -2.5 for m in seen.moves())
     # the third is somebody else for a while: too briefly, or as long as it must
     brief = [8] * 30 + [9] * 5 + [8] * 25
-    assert told({1: [7] * 25, 2: [7] * 25, 3: brief}) == [("join", [1], [2])]
-    assert told({1: [7] * 25, 2: [-1] * 25, 3: [8] * 30 + [7] * 6 + [8] * 24}) == [
+    assert moves_with({1: [7] * 25, 2: [7] * 25, 3: brief}) == [("join", [1], [2])]
+    assert moves_with({1: [7] * 25, 2: [-1] * 25, 3: [8] * 30 + [7] * 6 + [8] * 24}) == [
         ("exchange", [3, 1], [3])
     ]
-    assert told({1: [7] * 25, 2: [8] * 25, 3: [8] * 30 + [7] * 30}) == [
+    assert moves_with({1: [7] * 25, 2: [8] * 25, 3: [8] * 30 + [7] * 30}) == [
         ("exchange", [3, 1], [3]), ("exchange", [3], [3, 2])
     ]  # fmt: skip
 

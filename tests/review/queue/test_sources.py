@@ -486,7 +486,7 @@ def unclaimed(*places: tuple[int, float]) -> Unclaimed:
 def test_an_end_is_explained_by_boxes_that_lead_to_it(
     step: int, x: float, before: bool, shown: bool
 ) -> None:
-    """Of those from step 10 at 5 m to step 30 at 0 m: a second and a walk of it, and a metre."""
+    """Boxes from step 10 at 5 m to step 30 at 0 m count within a second, a walk and a metre."""
     run, free = scene(standing((0, 99, 0.0, 0.0))), [unclaimed((10, 5.0), (30, 0.0))]
     assert track_ends._shown(Place(step, x, 0.0, 0.85), free, run, before=before) is shown
 

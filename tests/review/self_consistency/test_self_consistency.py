@@ -170,7 +170,7 @@ def test_a_difference_lasts_at_least_four_tenths_of_a_second(
 
 @pytest.mark.parametrize(("gap", "count"), [(3, 1), (4, 2)])
 def test_a_track_that_pauses_for_longer_is_told_twice(gap: int, count: int) -> None:
-    """Its steps are those of this run: from step to step at most four."""
+    """The track's steps are those of this run: from step to step at most four."""
     names = [1] * 10 + [0] * gap + [1] * 10
     here, there = tracks([names]), tracks([[0] * len(names), [6] * len(names)])
     found = differences(compare_runs(here, there, len(names), HALF), 0.1)
@@ -178,7 +178,7 @@ def test_a_track_that_pauses_for_longer_is_told_twice(gap: int, count: int) -> N
     assert (found[0].first, found[-1].last) == (0, len(names) - 1)
 
 
-def told_of(*spans: tuple[str, int, int, int, int | None, bool]) -> list[tuple[int, tuple, str]]:
+def made_of(*spans: tuple[str, int, int, int, int | None, bool]) -> list[tuple[int, tuple, str]]:
     """Step, variants and words of what is made of differences: variant, person, first, last,
     other and whether the person is missing, of each."""
     every: dict[str, list[Difference]] = {}
@@ -190,15 +190,15 @@ def told_of(*spans: tuple[str, int, int, int, int | None, bool]) -> list[tuple[i
 
 def test_what_begins_within_a_second_of_the_first_is_one_moment() -> None:
     a, b = ("a", 1, 10, 30, 2, False), ("b", 1, 20, 30, 3, False)
-    assert told_of(a, b) == [(10, ("a", "b"), "1 is taken for 2 or 3 a, b")]
-    assert [one[0] for one in told_of(a, ("b", 1, 21, 90, 3, False))] == [21, 10]  # the longer one
-    assert [one[0] for one in told_of(a, b, ("c", 1, 21, 30, 3, False))] == [10, 21]
-    assert len(told_of(a, ("b", 2, 20, 30, 3, False))) == len(told_of(a, ("b", 1, 20, 30, None,
+    assert made_of(a, b) == [(10, ("a", "b"), "1 is taken for 2 or 3 a, b")]
+    assert [one[0] for one in made_of(a, ("b", 1, 21, 90, 3, False))] == [21, 10]  # the longer one
+    assert [one[0] for one in made_of(a, b, ("c", 1, 21, 30, 3, False))] == [10, 21]
+    assert len(made_of(a, ("b", 2, 20, 30, 3, False))) == len(made_of(a, ("b", 1, 20, 30, None,
                                                                          True))) == 2  # fmt: skip
-    (nobody,) = told_of(("a", 1, 10, 30, None, False))
+    (nobody,) = made_of(("a", 1, 10, 30, None, False))
     assert nobody[2] == "1 is somebody else a"
     # who is another is worse than who is missing, for however long
-    both = told_of(("a", 1, 10, 90, None, True), ("a", 2, 10, 20, 3, False))
+    both = made_of(("a", 1, 10, 90, None, True), ("a", 2, 10, 20, 3, False))
     assert [one[2] for one in both] == ["2 is taken for 3 a", "1 is not there a"]
 
 

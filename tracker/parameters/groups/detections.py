@@ -58,8 +58,8 @@ class DetectionPhdParams(Params):
 
     The class's constants were parameters. Halved and doubled, or their distances from 1, none
     changed recall, false positives a step or IDF1 by as much as 0.003 in six random rooms, two of
-    which were chosen for four people and more (``tests.papers.rooms.ablations``): the boxes go to the fusion,
-    and the filter decides only which of them no target explains.
+    which were chosen for four people and more (``tests.papers.rooms.ablations``): the boxes go to
+    the fusion, and the filter decides only which of them no target explains.
     """
 
     survival_probability: ClassVar[float] = 0.99
