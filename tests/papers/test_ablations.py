@@ -106,7 +106,7 @@ def test_what_has_a_row_is_not_run_again(tmp_path: Path, monkeypatch: pytest.Mon
 
     monkeypatch.setattr(ablations, "render_random", fails)
     shown = tmp_path / "table.md"
-    words = ["-o", tmp_path, "--table", shown, "--first", 7, "--count", 1, "--steps", 9]
+    words = ["-o", tmp_path, "--table", shown, "--seeds", 7, "--steps", 9]
     assert ablations.main([*map(str, words), "--method", "jpda"]) == 0
     assert "flat" in shown.read_text(encoding="utf-8")
     with pytest.raises(AssertionError, match="rendered"):

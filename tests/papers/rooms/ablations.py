@@ -15,14 +15,13 @@ import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
-from itertools import count, islice
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from tests.papers.rooms.kept import Rows, keep_row, read_rows
-from tests.rooms import choose, render_random
+from tests.rooms import render_random
 from tests.rooms.random_rooms import VERSION
 from tracker.evaluation import evaluate_sequence
 from tracker.parameters import Stage
@@ -271,25 +270,22 @@ def table(found: list[Mapping[str, Any]], steps: int, earlier: str = "") -> str:
     return "\n".join(lines) + "\n"
 
 
-def common_arguments(module: str, table: Path, first: int) -> argparse.ArgumentParser:
+def common_arguments(module: str, table: Path, seeds: range) -> argparse.ArgumentParser:
     """The arguments that the studies of parameters share."""
     parser = argparse.ArgumentParser(prog=f"python -m tests.papers.rooms.{module}")
     parser.add_argument("-o", "--output", type=Path, required=True, help="rows and rooms")
     parser.add_argument("--table", type=Path, default=table, help="the Markdown file")
-    parser.add_argument("--first", type=int, default=first, help="seed of the first room")
-    parser.add_argument("--count", type=int, default=6, help="number of rooms for all")
+    parser.add_argument("--seeds", type=int, nargs="+", default=seeds, help="of the rooms for all")
     parser.add_argument("--steps", type=int, default=100)
     return parser
 
 
 def main(arguments: list[str] | None = None) -> int:
     """Measure what is missing and write the table; returns the exit status."""
-    parser = common_arguments("ablations", TABLE, 401)
+    parser = common_arguments("ablations", TABLE, range(401, 407))
     parser.add_argument("--method", action="append", choices=list(METHODS), help="repeatable")
-    parser.add_argument("--people", type=int, default=1, help="at least so many in each room")
     given = parser.parse_args(arguments)
-    crowded = (seed for seed in count(given.first) if choose(seed).people >= given.people)
-    seeds, methods = tuple(islice(crowded, given.count)), tuple(given.method or METHODS)
+    seeds, methods = tuple(given.seeds), tuple(given.method or METHODS)
     rows = read_rows(given.output)
     fill(rows, seeds, given.steps, methods, given.output)
     earlier = given.table.read_text(encoding="utf-8") if given.table.is_file() else ""

@@ -285,13 +285,14 @@ def table(rows: Rows, keys: Iterable[str], rooms: Mapping[str, Iterable[str]], s
 
 def main(arguments: list[str] | None = None) -> int:
     """Measure what is missing and write the table; returns the exit status."""
-    parser = common_arguments("fusion_ablations", TABLE, 911)
-    parser.add_argument("--more", type=int, default=20, help="number of rooms for flat ones")
+    parser = common_arguments("fusion_ablations", TABLE, range(911, 917))
+    more = range(917, 931)
+    parser.add_argument("--more", type=int, nargs="*", default=more, help="of rooms for flat ones")
     parser.add_argument("--table-only", action="store_true", help="of what was run before")
     given = parser.parse_args(arguments)
-    seeds = [str(seed) for seed in range(given.first, given.first + given.more)]
+    few = [str(seed) for seed in given.seeds]
+    seeds = [*few, *map(str, given.more)]
     rows, keys, folder = read_rows(given.output), judged(), given.output
-    few = seeds[: given.count]
     if given.table_only:
         given.table.write_text(table(rows, keys, dict.fromkeys(keys, seeds), given.steps), "utf-8")
         return 0
