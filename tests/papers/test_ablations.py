@@ -48,21 +48,21 @@ def measured(folder: Path, seed: int, trial: Trial, recall: float) -> None:
     keep_row(folder, row | {"found_share": recall})
 
 
-def test_a_parameter_acts_where_a_value_changes_a_figure_of_one_room(tmp_path: Path) -> None:
+def test_a_parameter_acts_where_a_value_changes_the_mean_of_a_figure(tmp_path: Path) -> None:
     first, second = judged("jpda")[:2]
     for seed in (1, 2):
         for trial in trials(("jpda",)):
             if trial.key in ("", first, second):
-                # the changes of the second parameter cancel in the mean
-                by = 0.1 if seed == 1 else -0.1
-                moved = {first: 0.004, second: by, "": 0.0}[trial.key]
+                # those of the first cancel: what differs by chance does so in every room
+                by = 0.1 if seed == 1 else -0.092
+                moved = {first: by, second: 0.006, "": 0.0}[trial.key]
                 measured(tmp_path, seed, trial, 0.5 + moved)
     seeds = (1, 2)
     found = {one["parameter"]: one for one in effects(read_rows(tmp_path), seeds, 9, ("jpda",))}
     assert [found[key]["flat"] for key in (first, second)] == [True, False]
     assert [found[key]["acts"] for key in (first, second)] == [False, True]
     assert found[second]["rooms"] == seeds
-    assert next(iter(found[second]["changes"].values()))[0] == pytest.approx(0.0)
+    assert next(iter(found[second]["changes"].values()))[0] == pytest.approx(0.006)
     assert next(iter(found[first]["changes"].values()))[0] == pytest.approx(0.004)
     other = found[judged("jpda")[2]]
     assert not other["flat"], "what was not measured is not flat"
@@ -91,6 +91,7 @@ def test_what_acts_in_the_first_rooms_is_not_run_in_further(
         rows |= read_rows(folder)
 
     monkeypatch.setattr(ablations, "_fill_room", fill)
+    monkeypatch.setattr(ablations, "ROOMS_FOR_ALL", 2)
     ablations.fill({}, (4, 5, 6), 9, ("none",), tmp_path)
     everything = {"", *judged("none")}
     assert run == [(4, everything), (5, everything), (6, everything - {acting})]
