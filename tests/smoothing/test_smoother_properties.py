@@ -186,6 +186,19 @@ def test_long_recordings_are_smoothed_in_parts(monkeypatch: pytest.MonkeyPatch) 
         assert_allclose(found, expected, rtol=1e-5, atol=1e-9)
 
 
+def test_boxes_far_from_what_their_paths_expect_tell_nothing_of_the_noise() -> None:
+    """Tracks of false boxes have links, and none of them is near its path."""
+    scene = known(np.tile([[0.3, 0.2, 0.85], [-0.6, 0.5, 0.85]], (60, 1, 1)), sigma=2.0)
+    smoother, (paths, links) = scene.smoother(), scene.paths(sigma=0.1)
+    fitted, learnt = smoother.fit(paths, links, 2), smoother.uncalibrated(paths)
+    found = smoother.reported(fitted, links, learnt)
+    assert found is not None
+    assert np.isfinite(found.noise.white).all()
+    raised = fitted.paths.states + np.eye(6)[2] * 2.0
+    away = replace(fitted, paths=replace(fitted.paths, states=raised))
+    assert smoother.reported(away, links, learnt) is None
+
+
 def test_a_newcomer_is_anywhere_in_the_room_and_as_fast_as_newcomers_are() -> None:
     """The prior is wide, and its density at its middle stands for one over the room's volume."""
     smoother = one_walker().smoother()

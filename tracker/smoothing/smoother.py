@@ -655,7 +655,8 @@ class Smoother:
             learnt: The self-calibration of the boxes.
 
         Returns:
-            None where two cameras see too few rows, or boxes have no height.
+            None where two cameras see too few rows wholly, near their expected boxes, or boxes have
+            no height.
         """
         given = fitted.paths
         sure = links.shares > _NOISE_SHARE
@@ -669,6 +670,8 @@ class Smoother:
         chosen = links.take(sure & np.isin(links.rows, rows))
         parts = [*self._sure_boxes(paths, chosen, learnt)]
         seen = SureBoxes(*(np.concatenate(each) for each in zip(*parts, strict=True)))
+        if np.count_nonzero(np.bincount(seen.rows) >= 2) < LEAST_ROWS:
+            return None
         sample = NoiseSample(
             paths, rows, seen, self.model.motion, fitted.noise_scales, self.model.step_time
         )
