@@ -96,12 +96,14 @@ def is_free(key: str) -> bool:
 
 
 def judged(method: str) -> tuple[str, ...]:
-    """The parameters of stage 1 that a method reads, less published and essential ones."""
-    defaults = Trial(method).parameters
+    """The parameters of stage 1 that a method reads and that may go, and its switches and choices:
+    what these choose is a mechanism, whose worth is judged whether or not it is published."""
+    keys = [key for key in shown_keys(Trial(method).parameters) if key in PARAMETERS]
     return tuple(
         key
-        for key in shown_keys(defaults)
-        if key in PARAMETERS and PARAMETERS[key].stage == "single_view" and is_free(key)
+        for key in keys
+        if PARAMETERS[key].stage == "single_view"
+        and (is_free(key) or PARAMETERS[key].kind in ("bool", "choice"))
     )
 
 
@@ -244,7 +246,7 @@ def table(found: list[Mapping[str, Any]], steps: int, earlier: str = "") -> str:
         "# Stage 1: what each parameter changes in random rooms",
         "",
         f"{steps} steps of random rooms, seed 0: change of the means of recall, false positives a "
-        "step and IDF1 against the defaults. Published and essential parameters are not judged. "
+        "step and IDF1 against the defaults. No published and no essential number is judged. "
         f"*acts*: the mean of a figure changes by {LEAST:g} or more in the first {ROOMS_FOR_ALL} "
         "rooms, and no further one was run; *flat*: none does; *same*: every number of the tracks "
         "is as without the change. A parameter that no longer exists was judged before it went, "
