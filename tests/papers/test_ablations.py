@@ -58,8 +58,8 @@ def test_a_parameter_acts_where_a_value_changes_the_mean_of_a_figure(tmp_path: P
     for seed in (1, 2):
         for trial in trials(("jpda",)):
             if trial.key in ("", first, second):
-                # those of the first cancel: what differs by chance does so in every room
-                by = 0.1 if seed == 1 else -0.092
+                # that of the first is of one room: by chance a track comes or goes there
+                by = 0.1 if seed == 1 else 0.0
                 moved = {first: by, second: 0.006, "": 0.0}[trial.key]
                 measured(tmp_path, seed, trial, 0.5 + moved)
     seeds = (1, 2)
@@ -68,7 +68,7 @@ def test_a_parameter_acts_where_a_value_changes_the_mean_of_a_figure(tmp_path: P
     assert [found[key]["acts"] for key in (first, second)] == [False, True]
     assert found[second]["rooms"] == seeds
     assert next(iter(found[second]["changes"].values()))[0] == pytest.approx(0.006)
-    assert next(iter(found[first]["changes"].values()))[0] == pytest.approx(0.004)
+    assert next(iter(found[first]["changes"].values()))[0] == pytest.approx(0.05)
     other = found[judged("jpda")[2]]
     assert not other["flat"], "what was not measured is not flat"
     assert not other["acts"]
@@ -92,7 +92,7 @@ def test_what_acts_in_the_first_rooms_is_not_run_in_further(
     def fill(rows: Any, seed: int, steps: int, missing: list[Trial], folder: Path) -> None:
         run.append((seed, {trial.key for trial in missing}))
         for trial in missing:
-            measured(folder, seed, trial, 0.5 + 0.2 * (seed == 5 and trial.key == acting))
+            measured(folder, seed, trial, 0.5 + 0.2 * (trial.key == acting))
         rows |= read_rows(folder)
 
     monkeypatch.setattr(ablations, "_fill_room", fill)
