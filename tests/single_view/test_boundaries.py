@@ -26,7 +26,7 @@ from tracker.single_view.rectification.stabilisation import LARGEST, LEAST_CORNE
 from tracker.single_view.shape.finder import strongest
 from tracker.single_view.shape.windows import Windows
 
-JPDA = JpdaParams(vanish_steps=3, return_steps=5, confirmation_steps=5)
+JPDA = JpdaParams(confirmation_steps=5)  # vanished after 3, returned within 5
 
 # ── jpda
 

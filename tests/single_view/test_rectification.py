@@ -46,8 +46,13 @@ def rolled(camera: Camera, angle: float, **changes: object) -> Camera:
     return replace(turned, **changes)  # type: ignore[arg-type]
 
 
+def numbers_of(**numbers: float) -> PictureParams:
+    """Parameters with other numbers, and constants too."""
+    return PictureParams().model_copy(update=numbers)
+
+
 def seen(camera: Camera, **numbers: float) -> RectifiedView:
-    view = rectified_view(camera, ROOM, HALF_EXTENTS, PictureParams(**numbers))
+    view = rectified_view(camera, ROOM, HALF_EXTENTS, numbers_of(**numbers))
     assert view is not None
     return view
 
@@ -117,7 +122,7 @@ def test_what_is_in_the_picture_is_where_the_working_calibration_says() -> None:
 def test_a_picture_is_reduced_to_so_many_lines(lines: int, shorter: int) -> None:
     camera = replace(CAMERAS[0])
     numbers = {"lines": lines, "target_height": 2000}
-    view = rectified_view(camera, ROOM, HALF_EXTENTS, PictureParams(**numbers))
+    view = rectified_view(camera, ROOM, HALF_EXTENTS, numbers_of(**numbers))
     assert (camera if view is None else view.camera).image_size[1] == shorter
 
 
@@ -184,10 +189,10 @@ def test_deviations_come_back_turned(angle: float) -> None:
 def test_a_picture_is_left_alone_from_a_twentieth_less_on() -> None:
     numbers = {"target_height": 2000, "least_height": 8}
     for lines, alone in ((800, True), (761, True), (760, False), (759, False)):
-        view = rectified_view(CAMERAS[0], ROOM, HALF_EXTENTS, PictureParams(lines=lines, **numbers))
+        view = rectified_view(CAMERAS[0], ROOM, HALF_EXTENTS, numbers_of(lines=lines, **numbers))
         assert (view is None) == alone
     view = rectified_view(
-        rolled(CAMERAS[0], 0.6), ROOM, HALF_EXTENTS, PictureParams(lines=761, **numbers)
+        rolled(CAMERAS[0], 0.6), ROOM, HALF_EXTENTS, numbers_of(lines=761, **numbers)
     )
     assert view is not None  # turned, and as large as it was
     assert view.factors[0] == 1.0
@@ -210,7 +215,7 @@ def test_targets_are_made_so_high_and_pictures_at_most_half_as_large_for_it() ->
 
 def test_what_is_seen_from_above_or_skewed_is_not_turned() -> None:
     def turned(camera: Camera, **numbers: float) -> bool:
-        view = rectified_view(camera, ROOM, HALF_EXTENTS, PictureParams(**numbers))
+        view = rectified_view(camera, ROOM, HALF_EXTENTS, numbers_of(**numbers))
         return view is not None and view.turn is not None
 
     for slope, expected in ((0.19, False), (0.21, True)):  # of the sine of its tilt

@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -39,8 +41,7 @@ VARIANTS: dict[str, dict[str, Any]] = {
                            "colour_phd.shape_odds": -1.0},
     "colours, published": PUBLISHED | {"single_view": "colour_phd", "colour_phd.samples": 90,
                                        "colour_phd.mean_shift_starts": 6},
-    "particles": {"single_view": "pseudo_particle", "colour_phd.samples": 80,
-                  "pseudo_particle.confirmation": 2},
+    "particles": {"single_view": "pseudo_particle", "colour_phd.samples": 80},
     "particles, published": PUBLISHED | {"single_view": "pseudo_particle",
                                          "colour_phd.samples": 160},
     "particles, classical": {"single_view": "pseudo_particle", "colour_phd.samples": 60,
@@ -55,8 +56,7 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "matrices, published": PUBLISHED | {
         "single_view": "association_matrix", "foreground.least_threshold": 20.0,
     },
-    "shapes": {"single_view": "shapes", "shapes.least_odds": -2.0, "shapes.passed_odds": -3.0,
-               "jpda.confirmation_steps": 1},
+    "shapes": {"single_view": "shapes", "shapes.least_odds": -2.0, "shapes.passed_odds": -3.0},
 }  # fmt: skip
 every_variant = pytest.mark.parametrize("variant", VARIANTS)
 
@@ -144,6 +144,25 @@ def test_people_by_shape_that_lie_where_the_templates_are_go_on_with_their_odds(
     by_shape = shapes_of_templates(heads, reader)
     found.append([*(by_shape.trust[name] for name in sorted(by_shape.trust)), by_shape.fit])
     stays("colours and fitting shapes", found, request)
+
+
+def test_people_by_shape_carry_the_ids_of_the_targets_at_their_boxes(
+    heads: Sequence, reader: FrameReader
+) -> None:
+    method: Any = method_of("shapes", heads, reader)
+    _, (first, *_) = run(method_of("crowns", heads, reader), film(reader, 1))
+    windows = np.array([[20.0, 30.0, 4.0, 6.0], [60.0, 30.0, 5.0, 7.0], [90.0, 40.0, 4.0, 5.0]])
+    tracked = replace(
+        first, boxes=windows[[2, 0]], weights=np.ones(2), labels=np.array([7, 4]),
+        sigmas=np.ones((2, 4)), measurements=windows, measurement_scores=np.array([0.9, 0.5, 0.6]),
+    )  # fmt: skip
+    method._tracking = SimpleNamespace(step=lambda *_: ("state", tracked))
+    state, found = method.step(None, 0, None, np.random.default_rng(0))
+    assert state == "state"
+    assert found.labels.tolist() == [4, -1, 7], "what no target has goes on without an id"
+    assert_allclose(found.boxes, windows)
+    assert_allclose(found.weights, [0.9, 0.5, 0.6])
+    assert found.log_ratios[0] > found.log_ratios[2] > found.log_ratios[1]
 
 
 def truth(heads: Sequence, step: int) -> ndarray:

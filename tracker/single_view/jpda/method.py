@@ -87,12 +87,13 @@ class Jpda:
             camera_index: Index of the camera.
             parameters: Parameters of the association and of the measurements.
             reader: Reader of the images.
-            source: The source of measurements; None for that of the parameters.
+            source: The source of measurements of another method, whose targets are followed with
+                the default parameters; None for what the parameters say.
 
         Raises:
             ValueError: If the camera lacks data for the measurements.
         """
-        self._parameters = p = parameters.of(JpdaParams)
+        self._parameters = p = parameters.of(JpdaParams) if source is None else JpdaParams()
         self._source = source or source_of(sequence, camera_index, parameters, reader)
         self._step_time = sequence.step_time
         self._longest_hidden = max(1, round(p.longest_hidden * sequence.fps))
