@@ -156,9 +156,7 @@ REMOVED: Mapping[str, str] = {
     "jpda.vanish_steps": "a target without measurement at 3 steps in a row has vanished",
     "jpda.return_steps": "a new target continues one that vanished at most 5 steps ago",
     "jpda.longest_hidden": "a target that stays occluded for longer than 4 s is dropped",
-    "jpda.one_side": "a hidden target is at an edge that leaves more than twice the space",
     "shapes.cover": "an occluded person lies within 2 half sizes of the box that hides them",
-    "jpda.shoulder_down": "another top within 1.5 half heights below may be a shoulder",
 }
 """The keys of parameters of earlier versions that no longer exist, and what holds instead: files,
 addresses and commands that name them are read without them, and a note says so."""

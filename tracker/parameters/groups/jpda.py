@@ -148,7 +148,9 @@ class JpdaParams(Params):
     ] = 2.0
     """A target in a merged piece takes a measurement outside its gate if it is this near."""
 
-    one_side: ClassVar[float] = 2.0
+    one_side: Annotated[
+        float, Field(ge=1.0, le=10.0), ui("k_e", step=0.1, advanced=True, when=_FIVE)
+    ] = 2.0
     """A hidden target is placed at an edge of its piece of foreground if the boxes measured there
     leave more than this factor as much space at that edge as at the opposite one."""
 
@@ -208,7 +210,11 @@ class JpdaParams(Params):
     ] = 1.0
     """Largest distance aside of a target's top at which another top may be its shoulder."""
 
-    shoulder_down: ClassVar[float] = 1.5
+    shoulder_down: Annotated[
+        float,
+        Field(ge=0.0, le=5.0),
+        ui("h_s", unit="half heights", step=0.1, advanced=True, when=_CROWNS),
+    ] = 1.5
     """Largest distance below a target's top at which another top may be its shoulder."""
 
 
