@@ -61,6 +61,18 @@ def test_the_moments_are_those_of_the_truncated_density(
     assert_allclose(after.covariances[0, 2, 2], variance, rtol=1e-2, atol=2e-5)
 
 
+@pytest.mark.parametrize("sigma", [0.05, 0.5])
+@pytest.mark.parametrize(("bound", "inwards"), [(0.4, 1.0), (1.6, -1.0)])
+def test_a_height_within_one_standard_deviation_of_a_bound_is_truncated(
+    bound: float, inwards: float, sigma: float
+) -> None:
+    near = track(bound + inwards * 0.99 * sigma, sigma)
+    moved = BOUNDS.truncate(near).means[0, 2] - near.means[0, 2]
+    assert inwards * moved > 1e-3 * sigma
+    away = track(bound + inwards * 1.01 * sigma, sigma)
+    assert_array_equal(BOUNDS.truncate(away).means, away.means)
+
+
 def test_the_rest_of_the_state_follows_the_height() -> None:
     before = track(0.2, 0.5, along=2.0)
     after = BOUNDS.truncate(before)

@@ -6,10 +6,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
 from tests.single_view.detected import detected, run
 from tracker.parameters.catalogue import PRESETS, RunParameters
 from tracker.parameters.values import stage_values, with_values
+from tracker.single_view.jpda import association, method
+from tracker.single_view.jpda.targets import Innovations
 from tracker.single_view.protocol import ViewResult
 
 HALF = (6.0, 12.0)
@@ -26,7 +29,7 @@ def track(steps: list[list[tuple[float, ...]]], **changes: Any) -> list[ViewResu
     return run("jpda", detected(boxes, fps=25.0), **{"confirmation_steps": 1, **changes})
 
 
-def told(results: list[ViewResult], kind: str) -> list[tuple[int, tuple[int, ...]]]:
+def events_of(results: list[ViewResult], kind: str) -> list[tuple[int, tuple[int, ...]]]:
     """Step and labels of all events of a kind."""
     return [(k, e.labels) for k, r in enumerate(results) for e in r.events if e.kind == kind]
 
@@ -51,9 +54,9 @@ def meeting(steps: int = 60, merged: range = range(24, 36)) -> list:
 
 def test_two_who_pass_each_other_keep_their_labels() -> None:
     results = track(meeting())
-    assert told(results, "new") == [(0, (1, )), (0, (2,))]  # fmt: skip
-    assert not told(results, "vanished")
-    occluded = [k for k, labels in told(results, "occluded") if labels == (1, 2)]
+    assert events_of(results, "new") == [(0, (1, )), (0, (2,))]  # fmt: skip
+    assert not events_of(results, "vanished")
+    occluded = [k for k, labels in events_of(results, "occluded") if labels == (1, 2)]
     assert set(occluded) >= set(range(26, 36))
     for k in (20, 50):
         places = dict(zip(results[k].labels.tolist(), results[k].estimates[:, 0], strict=True))
@@ -67,7 +70,12 @@ def test_two_who_pass_each_other_keep_their_labels() -> None:
 def test_as_published_the_occluded_stand_still_in_the_middle_of_what_is_seen() -> None:
     steps = meeting(merged=range(28, 33))
     results = track(steps, **PUBLISHED)
-    assert {k for k, labels in told(results, "occluded") if labels == (1, 2)} >= {29, 30, 31, 32}
+    assert {k for k, labels in events_of(results, "occluded") if labels == (1, 2)} >= {
+        29,
+        30,
+        31,
+        32,
+    }
     middle = results[30]
     assert len(middle.boxes) == 2
     np.testing.assert_allclose(middle.boxes[0, :2], middle.boxes[1, :2])
@@ -83,7 +91,7 @@ def test_two_pieces_of_one_person_are_one() -> None:
         x, y = steps[k][0]
         steps[k] = [(x, y - 4.0, 6.0, 7.0), (x, y + 5.0, 6.0, 6.0)]
     results = track(steps)
-    assert told(results, "split")
+    assert events_of(results, "split")
     assert {label for result in results for label in result.estimate_labels.tolist()} == {1}
     assert results[-1].estimates[0, 3] == pytest.approx(HALF[1], abs=1.0), "the size stands"
 
@@ -103,6 +111,26 @@ def test_measurements_can_go_on_instead_of_estimates() -> None:
     kept = result.boxes[result.labels == 1]
     np.testing.assert_allclose(kept, [(*walking(30)[-1], *HALF)])
     assert len(result.measurements) == 2
+
+
+def test_the_gate_is_the_quantile_of_its_probability(monkeypatch: pytest.MonkeyPatch) -> None:
+    squared, inside = [np.zeros(0)], [np.zeros(0, dtype=bool)]
+
+    def associate(found: Innovations, possible: Any, *rest: Any) -> Any:
+        squared.append(found.squared.ravel())
+        inside.append(possible.ravel())
+        return association.associate(found, possible, *rest)
+
+    monkeypatch.setattr(method, "associate", associate)
+    steps: list = [[place] for place in walking(15)]
+    x, y = steps[-1][0]
+    steps[-1] = [(x + 0.5 * k, y) for k in range(60)]
+    track(steps, gate_probability=0.9)
+    distances, bound = np.concatenate(squared), chi2.ppf(0.9, 2)
+    np.testing.assert_array_equal(np.concatenate(inside), distances <= bound)
+    ratios = distances / bound
+    assert ((ratios > 0.5) & (ratios < 1.0)).any()
+    assert ((ratios > 1.0) & (ratios < 2.0)).any()
 
 
 def test_only_what_the_source_reads_counts() -> None:

@@ -4,30 +4,13 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Iterable
-from typing import Protocol, TextIO
+from typing import TextIO
 
 import numpy as np
-from jaxtyping import Float, Int
-from numpy import ndarray
 
 from tracker.corrections.kinds import Correction, CorrectionError
+from tracker.sequences.sequence import LabelledPositions
 from tracker.sequences.tables import KNOWN_STEPS
-
-
-class Tracks(Protocol):
-    """Labelled positions as N rows, by step and then id."""
-
-    @property
-    def frames(self) -> Int[ndarray, " N"]:
-        """Step of each row."""
-
-    @property
-    def ids(self) -> Int[ndarray, " N"]:
-        """Track of each row."""
-
-    @property
-    def positions(self) -> Float[ndarray, "N 3"]:
-        """Position of each row, world metres."""
 
 
 def checked_ranges(corrections: Iterable[Correction]) -> list[tuple[int, int]]:
@@ -41,14 +24,16 @@ def checked_ranges(corrections: Iterable[Correction]) -> list[tuple[int, int]]:
     return found
 
 
-def write_truth(stream: TextIO, tracks: Tracks, corrections: Iterable[Correction]) -> None:
+def write_truth(
+    stream: TextIO, tracks: LabelledPositions, corrections: Iterable[Correction]
+) -> None:
     """Write the tracks of the checked steps in the form of a sequence's ground truth.
 
     A comment at the top names these steps: other steps have no truth and are not evaluated.
 
     Args:
         stream: Text stream, opened with ``newline=""``.
-        tracks: Tracks of a run with the corrections.
+        tracks: Tracks of a run with the corrections, by step and then id.
         corrections: The corrections, among them those of kind ``checked``.
 
     Raises:

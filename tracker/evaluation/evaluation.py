@@ -15,7 +15,7 @@ from tracker.evaluation.clear import CLEAR, clear
 from tracker.evaluation.figures import Definition, Figure, figures
 from tracker.evaluation.hota import HOTA, hota
 from tracker.evaluation.identity import IDENTITY, identity
-from tracker.evaluation.matching import Comparison, GatedDistance, Tracks, prepare
+from tracker.evaluation.matching import Comparison, GatedDistance, prepare
 from tracker.evaluation.ospa import GOSPA, OSPA, OSPA2, gospa, ospa, ospa2
 from tracker.evaluation.pixels import PICTURES, CameraScore, pixels, together
 from tracker.evaluation.positions import POSITIONS, positions
@@ -23,7 +23,7 @@ from tracker.evaluation.settings import EvaluationSettings
 from tracker.evaluation.tables import PersonRow, TrackRow, person_rows, track_rows
 from tracker.geometry.camera import Camera
 from tracker.io.checks.truth import check_truth
-from tracker.sequences.sequence import GroundTruth, Sequence
+from tracker.sequences.sequence import GroundTruth, LabelledPositions, Sequence
 
 DEFINITIONS: tuple[Definition[Any], ...] = (
     *CLEAR, *IDENTITY, *HOTA, *OSPA, *OSPA2, *GOSPA, *POSITIONS, *PICTURES,
@@ -166,7 +166,7 @@ def _plain(values: ndarray) -> list[Any]:
 
 def evaluate(
     truth: GroundTruth | None,
-    tracks: Tracks,
+    tracks: LabelledPositions,
     settings: EvaluationSettings | None = None,
     *,
     steps: int | None = None,
@@ -209,7 +209,7 @@ def evaluate(
 
 def evaluate_sequence(
     sequence: Sequence,
-    tracks: Tracks,
+    tracks: LabelledPositions,
     settings: EvaluationSettings | None = None,
     *,
     steps: int | None = None,

@@ -33,7 +33,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -41,28 +40,12 @@ from numpy import ndarray
 
 from tracker.evaluation.settings import Distance
 from tracker.geometry.assignment import linear_sum_assignment
-from tracker.sequences.sequence import GroundTruth
+from tracker.sequences.sequence import GroundTruth, LabelledPositions
 
 RowPairs = tuple[Int[ndarray, " M"], Int[ndarray, " M"]]
 """The rows and the columns of the pairs of one step."""
 
 _NONE = np.zeros(0, dtype=np.int64)
-
-
-class Tracks(Protocol):
-    """Labelled positions by columns, in any order: a run's trajectories, or a file's."""
-
-    @property
-    def frames(self) -> Int[ndarray, " N"]:
-        """The step of each row."""
-
-    @property
-    def ids(self) -> Int[ndarray, " N"]:
-        """The track id of each row."""
-
-    @property
-    def positions(self) -> Float[ndarray, "N 3"]:
-        """The position of each row, world metres."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -268,7 +251,7 @@ class Comparison:
 
 def prepare(
     truth: GroundTruth | None,
-    tracks: Tracks,
+    tracks: LabelledPositions,
     measure: GatedDistance,
     *,
     steps: int,

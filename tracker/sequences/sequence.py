@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 from jaxtyping import Bool, Float, Float16, Int
@@ -91,6 +92,22 @@ class Detections:
         """Return the slice of the rows of one step."""
         first, last = np.searchsorted(self.frames, [frame, frame + 1])
         return slice(int(first), int(last))
+
+
+class LabelledPositions(Protocol):
+    """Positions with a track or person each, by columns: a run's tracks, a file's, or the truth."""
+
+    @property
+    def frames(self) -> Int[ndarray, " N"]:
+        """Step of each row, an index from 0."""
+
+    @property
+    def ids(self) -> Int[ndarray, " N"]:
+        """Track or person of each row."""
+
+    @property
+    def positions(self) -> Float[ndarray, "N 3"]:
+        """Position of each row, world metres."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -23,7 +23,6 @@ from tracker.filters.association import (
     marginals_of,
     murty,
     simplified_murty,
-    validation_matrix,
 )
 
 sizes = st.integers(0, 4)
@@ -179,7 +178,6 @@ def test_each_simplified_event_is_the_heaviest_matching_of_what_is_left(
 
 def test_indicators_of_an_event() -> None:
     events = JointEvents(np.array([[1, -1, 0], [-1, -1, -1]]), 3)
-    assert_array_equal(events.measurement_indicators, [[1, 0, 1], [0, 0, 0]])
     assert_array_equal(events.target_indicators, [[1, 1, 0], [0, 0, 0]])
     assert_array_equal(events.false_counts, [1, 3])
 
@@ -199,14 +197,7 @@ def test_bayes_rule_of_the_patent() -> None:
     assert found[0] == pytest.approx(math.log(2.0 / volume**2 * 0.03 * p_d * (1.0 - p_d)))
 
 
-def test_the_validation_matrix_has_a_row_a_measurement_and_false_alarms_first() -> None:
-    distances = np.array([[1.0, 20.0, 9.0], [np.inf, 4.0, 9.3]])
-    assert_array_equal(validation_matrix(distances, 9.21), [[1, 1, 0], [1, 0, 1], [1, 1, 0]])
-    assert validation_matrix(np.zeros((0, 2)), 9.21).tolist() == [[True], [True]]
-    assert validation_matrix(np.zeros((2, 0)), 9.21).shape == (0, 3)
-
-
-def test_clusters_share_measurements_with_nobody_else() -> None:
+def test_clusters_share_no_measurements() -> None:
     possible = np.zeros((5, 6), dtype=bool)
     possible[0, [1, 4]] = possible[3, [4, 5]] = possible[1, 0] = possible[4, [0]] = True
     groups = [(t.tolist(), m.tolist()) for t, m in clusters(possible)]

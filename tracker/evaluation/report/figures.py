@@ -15,8 +15,7 @@ from numpy import ndarray
 from plotly.subplots import make_subplots
 
 from tracker.evaluation import Evaluation
-from tracker.evaluation.matching import Tracks
-from tracker.sequences.sequence import Sequence
+from tracker.sequences.sequence import LabelledPositions, Sequence
 
 INK, MUTED, GRID, LINE = "#1b1b1b", "#707070", "#e9e9e7", "#77777a"
 NEAR, COUNT, FALSE = "#8fb2d6", "#d79a45", "#c98a7f"
@@ -174,7 +173,7 @@ def _lanes(evaluation: Evaluation, people: list[int]) -> list[go.Scatter]:
     return traces
 
 
-def top_view(sequence: Sequence, tracks: Tracks, evaluation: Evaluation) -> go.Figure:
+def top_view(sequence: Sequence, tracks: LabelledPositions, evaluation: Evaluation) -> go.Figure:
     """Plot the paths of people (dotted) and tracks (lines) on the floor, with room and cameras."""
     figure = go.Figure()
     truth = sequence.ground_truth

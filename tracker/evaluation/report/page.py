@@ -10,7 +10,6 @@ from plotly.offline import get_plotlyjs
 
 from tracker import __version__
 from tracker.evaluation import DEFINITIONS, Evaluation
-from tracker.evaluation.matching import Tracks
 from tracker.evaluation.report.figures import DARK, over_time, top_view
 from tracker.evaluation.report.tables import (
     camera_table,
@@ -22,7 +21,7 @@ from tracker.evaluation.report.tables import (
 )
 from tracker.files.atomic import replacing
 from tracker.parameters.catalogue import RunParameters
-from tracker.sequences.sequence import Sequence
+from tracker.sequences.sequence import LabelledPositions, Sequence
 
 _HERE = Path(__file__).parent
 
@@ -30,7 +29,7 @@ _HERE = Path(__file__).parent
 def write_report(
     path: Path | str,
     sequence: Sequence,
-    tracks: Tracks,
+    tracks: LabelledPositions,
     parameters: RunParameters | Mapping[str, str] | None,
     evaluation: Evaluation,
     *,
@@ -59,7 +58,7 @@ def write_report(
 
 def report_html(
     sequence: Sequence,
-    tracks: Tracks,
+    tracks: LabelledPositions,
     parameters: RunParameters | Mapping[str, str] | None,
     evaluation: Evaluation,
     *,

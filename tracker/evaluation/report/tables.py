@@ -11,7 +11,6 @@ import numpy as np
 from tracker.evaluation import Evaluation
 from tracker.evaluation.difference import Difference, compare
 from tracker.evaluation.figures import number
-from tracker.evaluation.matching import Tracks
 from tracker.evaluation.report.figures import DARK, colour
 from tracker.parameters.catalogue import METHODS, PARAMETERS, RunParameters
 from tracker.parameters.values import (
@@ -23,7 +22,7 @@ from tracker.parameters.values import (
     with_values,
 )
 from tracker.runs.fitting import default_parameters
-from tracker.sequences.sequence import Sequence
+from tracker.sequences.sequence import LabelledPositions, Sequence
 
 MOST_ROWS = 60
 """Most rows of a table that does not scroll."""
@@ -141,7 +140,7 @@ def people_table(evaluation: Evaluation) -> str:
     )  # fmt: skip
 
 
-def track_table(tracks: Tracks, evaluation: Evaluation) -> str:
+def track_table(tracks: LabelledPositions, evaluation: Evaluation) -> str:
     """Return the table of tracks; false tracks are faded."""
     if not evaluation.tracks:
         return "<p class='muted'>There are no tracks.</p>"

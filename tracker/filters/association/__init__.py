@@ -27,6 +27,7 @@ from tracker.filters.association.belief_propagation import (
     Marginals,
     marginals,
 )
+from tracker.filters.association.clustering import clusters
 from tracker.filters.association.events import (
     JointEvents,
     log_weights,
@@ -35,7 +36,6 @@ from tracker.filters.association.events import (
     simplified_murty,
 )
 from tracker.filters.association.exact import MOST_ITEMS, exact_marginals
-from tracker.filters.association.validation import clusters, validation_matrix
 
 __all__ = [
     "CONVERGENCE",
@@ -51,5 +51,4 @@ __all__ = [
     "marginals_of",
     "murty",
     "simplified_murty",
-    "validation_matrix",
 ]

@@ -38,11 +38,6 @@ class JointEvents:
         return len(self.sources)
 
     @property
-    def measurement_indicators(self) -> Bool[ndarray, "K M"]:
-        """τ_j: whether measurement j is of a target."""
-        return np.asarray(self.sources >= 0)
-
-    @property
     def target_indicators(self) -> Bool[ndarray, "K n"]:
         """δ_t: whether target t has a measurement."""
         present = np.zeros((self.size, self.targets + 1), dtype=bool)

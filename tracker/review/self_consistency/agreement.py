@@ -15,9 +15,9 @@ from numpy import ndarray
 
 from tracker.evaluation.clear import clear
 from tracker.evaluation.identity import identity
-from tracker.evaluation.matching import Comparison, GatedDistance, Tracks, prepare
+from tracker.evaluation.matching import Comparison, GatedDistance, prepare
 from tracker.evaluation.settings import EvaluationSettings
-from tracker.sequences.sequence import GroundTruth
+from tracker.sequences.sequence import GroundTruth, LabelledPositions
 
 _BRIEF = 0.4
 """Length up to which a difference is ignored, seconds, since tracks may begin a little earlier or
@@ -59,7 +59,10 @@ class Disagreement:
 
 
 def compare_runs(
-    here: Tracks, there: Tracks, steps: int, half_extents: Float[ndarray, " 3"]
+    here: LabelledPositions,
+    there: LabelledPositions,
+    steps: int,
+    half_extents: Float[ndarray, " 3"],
 ) -> Comparison:
     """Compare two runs by the protocol of the evaluation, the first in the place of the truth.
 

@@ -37,8 +37,7 @@ def associate(
 
     Args:
         found: Innovations of all targets and measurements.
-        possible: Whether each measurement is in the gate of each target: the validation matrix
-            without its column of false alarms, transposed.
+        possible: Whether each measurement is in the gate of each target.
         area: Area of the image, square pixels.
         parameters: P_D, P_G, the kind of joint events, and the model of Φ.
 

@@ -13,7 +13,6 @@ import numpy as np
 from jaxtyping import UInt8
 from numpy import ndarray
 
-from tracker.filters.association import validation_matrix
 from tracker.filters.gaussian_mixture import gate_distance
 from tracker.parameters.groups.jpda import JpdaParams
 from tracker.sequences.pictures.frames import Pictures
@@ -120,7 +119,7 @@ class Jpda:
         boxes = expected.as_boxes(self._source.sigmas(expected.boxes))
         source, seen = self._source.measure(state.source, frame, picture, boxes, rng)
         found = innovations(expected, seen.boxes[:, :2], seen.sigmas[:, :2])
-        possible = validation_matrix(found.squared, self._gate)[:, 1:].T
+        possible = found.squared <= self._gate
         matrix, own = associate(found, possible, self._area, p)
         cases, matrix = self._cases(expected, matrix, own, seen)
         updated = update_by_case(expected, found, matrix, cases, seen, p)
