@@ -25,7 +25,6 @@ from tracker.sequences.writing.taught_fields import read_room, read_target, read
 
 FILE = "sequence.toml"
 FORMAT = 1
-MOST_FRAMES = LARGEST_COUNT
 MOST_BYTES = 4 * 2**20
 """Largest size of a sequence.toml, which is enough for thousands of templates, bytes."""
 LONGEST_PATH = 4000
@@ -72,7 +71,7 @@ def read_sequence(folder: Path | str) -> Sequence:
     reading = Reading(folder)
     frames = None
     if "frames" in fields:
-        frames = fields.integer("frames", minimum=1, maximum=MOST_FRAMES)
+        frames = fields.integer("frames", minimum=1, maximum=LARGEST_COUNT)
     fps = fields.rate("fps") if "fps" in fields else None
     room = read_room(fields) if "room" in fields else None
     half_extents = read_target(fields)
@@ -128,7 +127,7 @@ def read_summary(folder: Path | str) -> SequenceSummary:
         name=fields.text("name"),
         description=fields.text("description", ""),
         fps=fields.rate("fps") if "fps" in fields else None,
-        frames=fields.integer("frames", minimum=1, maximum=MOST_FRAMES)
+        frames=fields.integer("frames", minimum=1, maximum=LARGEST_COUNT)
         if "frames" in fields
         else None,
         cameras=len(fields.tables("camera", CAMERA, "[[camera]]")),

@@ -15,6 +15,7 @@ from numpy import ndarray
 from tests.io.read.rig import SIZE, boxes, cameras, read, walks
 from tracker.io.conventions.reading import read_boxes
 from tracker.io.importing.finding.times import on_one_clock
+from tracker.io.read.columns import people
 from tracker.io.read.pieces import DetectionPiece, FormatError, TruthPiece
 from tracker.io.read.registry import recognise
 from tracker.io.read.source import SourceFile
@@ -699,3 +700,9 @@ def test_lists_of_something_else_are_no_boxes(tmp_path: Path, content: object) -
     path.write_text(json.dumps(content))
     found, _, _ = recognise(SourceFile(path))
     assert found is None or found.KIND != "detections"
+
+
+def test_every_name_of_people_counts_in_every_table() -> None:
+    assert people(["player", "ball", "Woman "]).tolist() == [True, False, True]
+    assert people(["1", "0", "2"]).tolist() == [False, True, False]
+    assert people(["1", "2"]).tolist() == [True, False]

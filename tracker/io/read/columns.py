@@ -20,7 +20,7 @@ from numpy import ndarray
 
 from tracker.files.text import shown
 from tracker.io.read.picture_names import camera_of, number_in
-from tracker.io.read.pieces import DetectionPiece, Layout, Piece, TruthPiece, Unit
+from tracker.io.read.pieces import DetectionPiece, Layout, Piece, TruthPiece, unit_named
 from tracker.io.read.source import SourceFile
 from tracker.io.read.values import plain
 
@@ -58,8 +58,11 @@ WORDS: dict[str, tuple[str, ...]] = {
 }  # fmt: skip
 """Names, without case, blanks and underscores, of each meaning; the first that is there counts."""
 
-PEOPLE = ("person", "pedestrian", "people", "human", "1", "0")
-"""Classes that are people: by name, or the first of COCO (1) and of YOLO (0)."""
+PEOPLE = ("person", "people", "pedestrian", "human", "man", "woman", "player")
+"""Names of classes that are people."""
+
+_FIRST_CLASSES = ("0", "1")
+"""The numbers of people among the classes of YOLO and of COCO."""
 
 _LISTED = 4
 """Classes that a sentence names."""
@@ -94,6 +97,11 @@ Column = Sequence[Any]
 def decimal_point(cell: str) -> str:
     """A number with a decimal comma as one with a point; any other cell as it is."""
     return cell.replace(",", ".") if _DECIMAL_COMMA.fullmatch(cell.strip()) else cell
+
+
+def delimiter_of(line: str) -> str:
+    """The sign between the cells of a row: of comma, semicolon and tab the most frequent one."""
+    return max(",;\t", key=line.count)
 
 
 def decimal_points(line: str) -> str:
@@ -372,7 +380,7 @@ def people(classes: Sequence[str]) -> Bool[ndarray, " D"]:
     A single class other than those is taken for people whatever it is called.
     """
     words = [re.sub(r"\.0$", "", word.strip().lower()) for word in classes]
-    for group in (PEOPLE[:4], ("0",), ("1",)):
+    for group in (PEOPLE, *((number,) for number in _FIRST_CLASSES)):
         is_one = np.array([word in group for word in words], dtype=bool)
         if is_one.any():
             return is_one
@@ -395,10 +403,6 @@ def _truth(
     valid = None
     if "valid" in found:
         valid = _numbers(file, found["valid"], columns[found["valid"]]) > 0.5
-    unit: Unit | None = None
-    ending = plain(found["x"])[-2:]
-    if ending in ("mm", "cm"):
-        unit = "mm" if ending == "mm" else "cm"
     good = np.isfinite(places[:, :2]).all(axis=1)
     return TruthPiece(
         source=file.path,
@@ -406,7 +410,7 @@ def _truth(
         frames=frames[good],
         ids=ids[good],
         positions=places[good],
-        unit=unit,
+        unit=unit_named(plain(found["x"])[-2:]),
         valid=None if valid is None else valid[good],
         fps=when.fps,
         begins=when.begins,

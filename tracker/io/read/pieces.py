@@ -42,6 +42,19 @@ METRES: dict[Unit, float] = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 """Metres in one of each unit."""
 
 
+_UNIT_WORDS: dict[Unit, tuple[str, ...]] = {
+    "m": ("m", "meter", "metre"),
+    "cm": ("cm", "centimeter", "centimetre"),
+    "mm": ("mm", "millimeter", "millimetre"),
+}
+
+
+def unit_named(word: str) -> Unit | None:
+    """Return the unit that a file names, short or in full; None for any other word."""
+    name = word.strip().lower().removesuffix("s")
+    return next((unit for unit, words in _UNIT_WORDS.items() if name in words), None)
+
+
 class FormatError(ValueError):
     """A file cannot be read; the message names the file and the field, and says what to do."""
 

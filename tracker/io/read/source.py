@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import json
+import math
 import os
 import re
 import tomllib
@@ -17,9 +18,11 @@ import zlib
 from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
+import numpy as np
 import yaml
+from numpy import ndarray
 
 from tracker.files.text import not_utf_8
 from tracker.io.read.pieces import FormatError
@@ -398,7 +401,36 @@ for _kind in ("opencv-matrix", "opencv-nd-matrix"):
     _Loader.add_constructor(f"tag:yaml.org,2002:{_kind}", _matrix)
 
 
-def npz_members(data: bytes, most: int) -> dict[str, bytes] | None:
+NPY, ZIP = b"\x93NUMPY", b"PK\x03\x04"
+"""The first bytes of a NumPy array, and of an archive such as one of several arrays."""
+
+
+def npy_header(stream: IO[bytes]) -> tuple[tuple[int, ...], np.dtype[Any]]:
+    """Read the shape and the kind of numbers of a NumPy array; its numbers follow in the stream.
+
+    Raises:
+        ValueError: If it is no header of an array.
+    """
+    old = np.lib.format.read_magic(stream) == (1, 0)
+    read = np.lib.format.read_array_header_1_0 if old else np.lib.format.read_array_header_2_0
+    shape, _, kind = read(stream)
+    return shape, kind
+
+
+def read_npy(data: bytes) -> ndarray:
+    """Read a NumPy array, for which no more memory is taken than its bytes.
+
+    Raises:
+        ValueError: If it is cut short or has Python's objects.
+    """
+    stream = io.BytesIO(data)
+    shape, kind = npy_header(stream)
+    if kind.hasobject or math.prod(shape) * kind.itemsize != len(data) - stream.tell():
+        raise ValueError("the header says another size")
+    return np.asarray(np.load(io.BytesIO(data), allow_pickle=False))
+
+
+def read_npz(data: bytes, most: int) -> dict[str, ndarray] | None:
     """Unpack the arrays of an ``.npz``, of which a few bytes may stand for gigabytes.
 
     Args:
@@ -406,17 +438,19 @@ def npz_members(data: bytes, most: int) -> dict[str, bytes] | None:
         most: Largest size of all arrays together, bytes.
 
     Returns:
-        The content of each ``.npy`` by its name; None if together they are larger.
+        The arrays by their names; None if together they are larger.
 
     Raises:
-        ValueError: If it is no archive, or a damaged one.
+        ValueError: If it is no archive, or a damaged one, or an array is not valid.
     """
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             members = [one for one in archive.infolist() if one.filename.endswith(".npy")]
             if sum(one.file_size for one in members) > most:
                 return None
-            return {one.filename.removesuffix(".npy"): archive.read(one) for one in members}
+            return {
+                one.filename.removesuffix(".npy"): read_npy(archive.read(one)) for one in members
+            }
     except (zipfile.BadZipFile, EOFError, NotImplementedError, zlib.error) as error:
         raise ValueError(f"is no intact archive ({error})") from None
 

@@ -9,8 +9,6 @@ Source: NumPy, "numpy.lib.format".
 
 from __future__ import annotations
 
-import io
-import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -21,7 +19,7 @@ from tracker.io.read.columns import Column, has_boxes, is_table, read_table, sin
 from tracker.io.read.detections import numbers
 from tracker.io.read.pieces import Piece
 from tracker.io.read.protocol import Certainty, Kind
-from tracker.io.read.source import SourceFile, npz_members
+from tracker.io.read.source import NPY, ZIP, SourceFile, read_npy, read_npz
 
 NAME = "NumPy arrays of boxes or places"
 KIND: Kind = "detections"
@@ -30,13 +28,11 @@ SERIES = False
 MOST_BYTES = 64 * 2**20
 """Of a file, packed and unpacked: a few bytes may stand for gigabytes."""
 
-_ARRAY, _ARCHIVE = b"\x93NUMPY", b"PK\x03\x04"
-
 
 def recognise(file: SourceFile) -> Certainty:
     """Judge whether columns are named as those of boxes or places, or rows have a frame and a
     box."""
-    known = file.head.startswith((_ARRAY, _ARCHIVE)) and any(True for _ in _tables(file))
+    known = file.head.startswith((NPY, ZIP)) and any(True for _ in _tables(file))
     return Certainty.POSSIBLE if known else Certainty.NO
 
 
@@ -80,24 +76,8 @@ def _arrays(file: SourceFile) -> dict[str, ndarray]:
         return {}
     data = file.bytes(MOST_BYTES)
     try:
-        if data.startswith(_ARRAY):
-            return {"": _array(data)}
-        members = npz_members(data, MOST_BYTES) or {}
-        return {name: _array(own) for name, own in members.items()}
+        if data.startswith(NPY):
+            return {"": read_npy(data)}
+        return read_npz(data, MOST_BYTES) or {}
     except (ValueError, EOFError):
         return {}  # other arrays, or some other archive
-
-
-def _array(data: bytes) -> ndarray:
-    """One array, for which no more memory is taken than its bytes.
-
-    Raises:
-        ValueError: If it is cut short or has Python's objects.
-    """
-    stream = io.BytesIO(data)
-    old = np.lib.format.read_magic(stream) == (1, 0)
-    header = np.lib.format.read_array_header_1_0 if old else np.lib.format.read_array_header_2_0
-    shape, _, kind = header(stream)
-    if kind.hasobject or math.prod(shape) * kind.itemsize != len(data) - stream.tell():
-        raise ValueError("the header says another size")
-    return np.asarray(np.load(io.BytesIO(data), allow_pickle=False))

@@ -17,7 +17,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from tracker.io.read.columns import decimal_points, no_people, to_unit
+from tracker.io.read.columns import PEOPLE, decimal_points, no_people, to_unit
 from tracker.io.read.pieces import DetectionPiece, Piece, TruthPiece
 from tracker.io.read.protocol import Certainty, Kind
 from tracker.io.read.source import SourceFile
@@ -26,7 +26,7 @@ NAME = "MOTChallenge text"
 KIND: Kind = "detections"
 SERIES = False
 
-PEOPLE = (1, 2, 7)
+_PEOPLE_NUMBERS = (1, 2, 7)
 """Classes of the ground truth: pedestrian, person on a vehicle, static person."""
 
 LABELS = "labels.txt"
@@ -39,7 +39,6 @@ GROUND_PLANE = "-ground-plane"
 """The end of the name of a sequence whose boxes are outlines on the floor in metres, as this
 program exports them."""
 
-_PEOPLE_WORDS = ("person", "people", "pedestrian", "human", "man", "woman", "player")
 _MOST_LABELS = 2**16  # bytes
 
 
@@ -87,8 +86,8 @@ def read(file: SourceFile) -> Iterator[Piece]:
     left_out = ""
     if is_truth:
         labels = _labels(file)
-        named = [n for n, name in labels.items() if name.lower() in _PEOPLE_WORDS]
-        of_people = np.isin(table[:, 7], named or PEOPLE)
+        named = [n for n, name in labels.items() if name.lower() in PEOPLE]
+        of_people = np.isin(table[:, 7], named or _PEOPLE_NUMBERS)
         keep = (table[:, 6] == 1.0) & of_people
         others = [
             "with 0 in column 7, not to count"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -12,9 +13,7 @@ from tracker.io.read.columns import only_people
 from tracker.io.read.picture_names import number_in
 from tracker.io.read.pieces import DetectionPiece
 from tracker.io.read.source import SourceFile
-
-_MOST_PIXELS = 65536
-"""No picture is as wide or as high."""
+from tracker.io.read.values import stated_size
 
 
 class PicturedBoxes:
@@ -43,10 +42,9 @@ class PicturedBoxes:
             self._looked_at.append(place if number is None else number)
             yield self._file.member(path)
 
-    def sized(self, width: int, height: int) -> None:
+    def sized(self, width: Any, height: Any) -> None:
         """The pictures' size in pixels, where it can be one."""
-        if 0 < width < _MOST_PIXELS and 0 < height < _MOST_PIXELS:
-            self._size = (width, height)
+        self._size = stated_size(width, height) or self._size
 
     def add(self, corners: Float[ndarray, " 4"], label: str) -> None:
         """A box in the picture at hand: left, top, right and bottom, and what it is of."""

@@ -15,7 +15,7 @@ from tracker.io.read.picture_names import number_in
 from tracker.io.read.pieces import Piece, TruthPiece
 from tracker.io.read.protocol import Certainty, Kind
 from tracker.io.read.source import SourceFile
-from tracker.io.read.values import is_list_of_tables, numbers
+from tracker.io.read.values import field_of, numbers, tables
 
 NAME = "Panoptic Studio 3D skeletons"
 KIND: Kind = "truth"
@@ -40,11 +40,7 @@ def read(file: SourceFile) -> Iterator[Piece]:
     for count, path in enumerate(file.series):
         member = file.member(path)
         number = number_in(path.name)
-        bodies = member.json.get("bodies") if isinstance(member.json, dict) else None
-        if not is_list_of_tables(bodies):
-            raise member.error('expected a list "bodies" of tables')
-        assert isinstance(bodies, list)
-        for body in bodies:
+        for body in tables(member, "bodies", field_of(member.json, "bodies")):
             given = next((body[name] for name in JOINTS if name in body), None)
             joints = numbers(member, "joints", [] if given is None else given)
             if len(joints) % 4 or len(joints) <= 4 * BODY_CENTRE:
