@@ -182,9 +182,6 @@ def save(
     options = options or Options()
     form.check(run.sequence)
     if not form.folder:
-        if not path.is_dir() and path.exists() and not path.is_file():
-            form.write(path, run, options)  # a pipe or device
-            return
         with replacing(path) as temporary:
             form.write(temporary, run, options)
     elif zipped:
