@@ -15,7 +15,7 @@ import tomllib
 import xml.etree.ElementTree as ElementTree
 import zipfile
 import zlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import IO, Any
@@ -25,6 +25,7 @@ import yaml
 from numpy import ndarray
 
 from tracker.files.text import not_utf_8
+from tracker.io.read.picture_names import number_in
 from tracker.io.read.pieces import FormatError
 
 HEAD_BYTES = 65536
@@ -110,6 +111,13 @@ class SourceFile:
         member = SourceFile(path, self._root)
         member.companions = self.companions
         return member
+
+    def frames(self) -> Iterator[tuple[int, SourceFile]]:
+        """Yield each file of a series of one file a frame, after its frame: the number in its name,
+        else its place in the series."""
+        for place, path in enumerate(self.series):
+            number = number_in(path.name)
+            yield place if number is None else number, self.member(path)
 
     @property
     def label(self) -> str:

@@ -11,7 +11,6 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from tracker.io.read.picture_names import number_in
 from tracker.io.read.pieces import Piece, TruthPiece
 from tracker.io.read.protocol import Certainty, Kind
 from tracker.io.read.source import SourceFile
@@ -37,16 +36,14 @@ def read(file: SourceFile) -> Iterator[Piece]:
     """One piece with the places of everybody in all frames of the series."""
     rows: list[tuple[int, int]] = []
     places: list[np.ndarray] = []
-    for count, path in enumerate(file.series):
-        member = file.member(path)
-        number = number_in(path.name)
+    for frame, member in file.frames():
         for body in tables(member, "bodies", field_of(member.json, "bodies")):
             given = next((body[name] for name in JOINTS if name in body), None)
             joints = numbers(member, "joints", [] if given is None else given)
             if len(joints) % 4 or len(joints) <= 4 * BODY_CENTRE:
                 raise member.error("expected x, y, z and confidence of 15 or 19 joints", "joints")
             if joints.reshape(-1, 4)[BODY_CENTRE, 3] > 0.0:
-                rows.append((count if number is None else number, int(body.get("id", 0))))
+                rows.append((frame, int(body.get("id", 0))))
                 places.append(joints.reshape(-1, 4)[BODY_CENTRE, :3])
     table = np.array(rows, dtype=np.int64).reshape(-1, 2)
     yield TruthPiece(

@@ -33,7 +33,7 @@ def recognise(file: SourceFile) -> Certainty:
 
 def read(file: SourceFile) -> Iterator[Piece]:
     """One piece with the boxes of all pictures of the series."""
-    found = PicturedBoxes(file)
+    found = PicturedBoxes(file, NAME)
     for member in found.pictures():
         shapes = tables(member, "shapes", field_of(member.json, "shapes"))
         found.sized(member.json.get("imageWidth"), member.json.get("imageHeight"))
@@ -45,4 +45,4 @@ def read(file: SourceFile) -> Iterator[Piece]:
                 table = points.reshape(-1, 2)
                 corners = np.concatenate([table.min(axis=0), table.max(axis=0)])
                 found.add(corners, str(shape.get("label", "")))
-    yield found.piece(NAME)
+    yield from found.pieces()

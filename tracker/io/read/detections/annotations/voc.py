@@ -30,7 +30,7 @@ def recognise(file: SourceFile) -> Certainty:
 
 def read(file: SourceFile) -> Iterator[Piece]:
     """One piece with the boxes of all pictures of the series."""
-    found = PicturedBoxes(file)
+    found = PicturedBoxes(file, NAME)
     for member in found.pictures():
         found.sized(member.xml.findtext("size/width"), member.xml.findtext("size/height"))
         for n, one in enumerate(member.xml.iter("object")):
@@ -38,4 +38,4 @@ def read(file: SourceFile) -> Iterator[Piece]:
             if None in given:
                 raise member.error(f"expected a bndbox with {', '.join(_CORNERS)}", f"object {n}")
             found.add(numbers(member, f"object {n} bndbox", given), one.findtext("name", ""))
-    yield found.piece(NAME)
+    yield from found.pieces()
