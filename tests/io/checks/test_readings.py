@@ -14,10 +14,10 @@ from tests.random_rooms import random_room
 from tracker.geometry.consistency.consensus import Consensus
 from tracker.geometry.consistency.suggestion import consensus_of_cameras, suggest
 from tracker.io.checks import check
-from tracker.io.checks.boxes import listen, raw_cameras
+from tracker.io.checks.boxes import judge_boxes, raw_cameras
 from tracker.io.checks.timing import check_counting
+from tracker.io.conventions.judge import Seen
 from tracker.io.conventions.reading import FLIP, Reading, pose, read_boxes, to_camera, upright
-from tracker.io.conventions.readings import Seen
 from tracker.io.conventions.search import as_meant, find_reading
 from tracker.io.conventions.sizes import likely_unit
 from tracker.io.read.pieces import METRES, Layout, RawCamera
@@ -129,7 +129,7 @@ def test_one_camera_alone_tells_nothing() -> None:
     sequence = random_room(0, cameras=2)
     assert find_reading(raw_cameras(sequence), [seen(sequence)[0], None], fps=10.0) is None
     alone = replace(sequence, views=sequence.views[:1])
-    assert listen(alone) is None
+    assert judge_boxes(alone) is None
     assert {each.status for each in check(alone)} <= {"good", "absent"}
 
 
@@ -146,7 +146,7 @@ def test_up_becomes_z(up: str) -> None:
 @pytest.mark.parametrize("height", [0.25, 0.9, 1.2, 1.7])
 @pytest.mark.parametrize("unit", METRES)
 def test_the_unit_follows_from_how_tall_and_far_people_are(unit: str, height: float) -> None:
-    agreed = listen(random_room(0, steps=60))
+    agreed = judge_boxes(random_room(0, steps=60))
     assert agreed is not None
     one = METRES[unit]  # type: ignore[index]
     scaled = replace(agreed.given.consensus, rise=np.array([0.0, 0.0, height / one]))

@@ -219,7 +219,7 @@ def _pieces(
 ) -> Iterator[DetectionPiece | TruthPiece]:
     found = meanings(list(columns))
     rows = len(next(iter(columns.values()), ()))
-    when = Times()
+    when = RowTimes()
     if frame is None and "frame" not in found and "time" in found:
         column = found["time"]
         times = _numbers(file, column, [_seconds(cell) for cell in columns[column]])
@@ -279,7 +279,7 @@ def _detections(
     frames: Int[ndarray, " D"],
     boxes: Float[ndarray, "D 4"],
     layout: Layout | None,
-    when: Times,
+    when: RowTimes,
 ) -> Iterator[DetectionPiece]:
     scores = np.ones(len(frames))
     if "score" in found:
@@ -393,7 +393,7 @@ def _truth(
     columns: Mapping[str, Column],
     found: Mapping[str, str],
     frames: Int[ndarray, " G"],
-    when: Times,
+    when: RowTimes,
 ) -> TruthPiece:
     axes = [axis for axis in "xyz" if axis in found]
     places = np.full((len(frames), 3), np.nan)
@@ -469,7 +469,7 @@ def _number_of(cell: Any) -> float:
     return np.nan if number is None else float(number)
 
 
-class Times(NamedTuple):
+class RowTimes(NamedTuple):
     """What a column of times says of frames."""
 
     fps: float | None = None
@@ -480,7 +480,7 @@ class Times(NamedTuple):
 
 def frames_of_times(
     times: Float[ndarray, " D"], milliseconds: bool = False
-) -> tuple[Int[ndarray, " D"], Times]:
+) -> tuple[Int[ndarray, " D"], RowTimes]:
     """Frames that are as far apart as the times, counted from time 0 or the first of dates.
 
     Times are seconds, or milliseconds where whole numbers would be :data:`_SELDOM` apart; since the
@@ -513,7 +513,7 @@ def frames_of_times(
     steps = np.round(apart / np.median(apart))
     fps = float(round(steps.sum() / apart[steps > 0].sum(), 3))
     begins = None if parts is None else first / parts
-    return np.round(seconds * fps).astype(np.int64), Times(fps, begins)
+    return np.round(seconds * fps).astype(np.int64), RowTimes(fps, begins)
 
 
 def parts_of_date(time: float) -> float | None:

@@ -15,7 +15,6 @@ from tracker.io.read.pieces import DetectionPiece, Layout
 from tracker.io.read.source import SourceFile
 from tracker.io.read.values import stated_size
 
-
 Box = Sequence[float] | Float[ndarray, " 4"]
 """The four numbers of a box."""
 
