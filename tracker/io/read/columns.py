@@ -149,13 +149,8 @@ def is_table(names: Sequence[str]) -> bool:
     found = meanings(names)
     when = "frame" in found or "time" in found
     placed = "place" in found or ("x" in found and "y" in found)
-    return layout_of(found) is not None or (when and "id" in found and placed)
-
-
-def has_boxes(names: Sequence[str]) -> bool:
-    """Whether there are frames or times, and a column with all numbers of a box."""
-    found = meanings(names)
-    return "box" in found and not found.keys().isdisjoint(("frame", "time"))
+    has_boxes = "box" in found or layout_of(found) is not None
+    return has_boxes or (when and "id" in found and placed)
 
 
 def singular(name: str) -> str:

@@ -242,7 +242,10 @@ class SourceFile:
             except RecursionError:
                 raise self._too_deep() from None
             except ValueError:
-                raise self.error(f"line {number}: is not valid JSON, expected a record") from None
+                raise self.error(
+                    f"line {number}: is not valid JSON, expected a record; "
+                    "it may be cut short: get the file again"
+                ) from None
         return values
 
     @cached_property
@@ -278,7 +281,7 @@ class SourceFile:
                 "it may be cut short: get the file again"
             ) from None
         if root is None:
-            raise self.error("is not valid XML: it is empty")
+            raise self.error("is not valid XML: it is empty; get the file again")
         return root
 
     @cached_property
@@ -313,7 +316,9 @@ class SourceFile:
         try:
             return tomllib.loads(self.text(MOST_CONFIGURATION_BYTES))
         except tomllib.TOMLDecodeError as error:
-            raise self.error(f"is not valid TOML ({error})") from None
+            raise self.error(
+                f"is not valid TOML ({error}); it may be cut short: get the file again"
+            ) from None
         except RecursionError:
             raise self._too_deep() from None
         except ValueError:

@@ -18,6 +18,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
+from tracker.files.text import shown
 from tracker.geometry.calibration import is_rotation
 from tracker.io.read.pieces import CalibrationPiece, Convention, Piece, RawCamera
 from tracker.io.read.protocol import Certainty, Kind
@@ -70,7 +71,10 @@ def read(file: SourceFile) -> Iterator[Piece]:
 
 def _camera(file: SourceFile, name: str, matrix: Float[ndarray, "3 n"]) -> RawCamera:
     if not np.isfinite(matrix).all():
-        raise file.error("expected finite numbers", f"camera {name}")
+        raise file.error(
+            f"expected finite numbers, found {shown(matrix.tolist())}; calibrate again",
+            f"camera {name}".strip(),
+        )
     if matrix.shape == (3, 3) and is_rotation(matrix):
         raise file.error(
             "is a rotation alone, expected [R | t] or a lens; save K, R and t of a camera "

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy import ndarray
 
-from tracker.io.read.columns import Column, has_boxes, is_table, read_table, singular
+from tracker.io.read.columns import Column, is_table, read_table, singular
 from tracker.io.read.detections import numbers
 from tracker.io.read.pieces import Piece
 from tracker.io.read.protocol import Certainty, Kind
@@ -46,23 +46,19 @@ def _tables(file: SourceFile) -> Iterator[tuple[str, Mapping[str, Column]]]:
     """The columns of each table by their names, after what it is called."""
     arrays = _arrays(file)
     together = {singular(name): _cells(own) for name, own in arrays.items() if own.ndim}
-    if len({len(cells) for cells in together.values()}) == 1 and _is_table(together):
+    if len({len(cells) for cells in together.values()}) == 1 and is_table([*together]):
         yield NAME, together
         return
     for name, own in arrays.items():
         if own.dtype.names:
             columns: dict[str, Column] = {one: _cells(own[one]) for one in own.dtype.names}
-            if _is_table(columns):
+            if is_table([*columns]):
                 yield NAME, columns
         elif own.ndim == 2 and np.issubdtype(own.dtype, np.number):
             found = numbers.table_of(own.astype(float))
             if found is not None:
                 where, columns = found
                 yield f"{NAME} ({where})", {**columns, "camera": [name] * len(own)}
-
-
-def _is_table(columns: Mapping[str, Column]) -> bool:
-    return is_table([*columns]) or has_boxes([*columns])
 
 
 def _cells(own: ndarray) -> Column:

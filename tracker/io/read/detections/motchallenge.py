@@ -17,6 +17,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
+from tracker.files.text import shown
 from tracker.io.read.columns import PEOPLE, decimal_points, no_people, to_unit
 from tracker.io.read.pieces import DetectionPiece, Piece, TruthPiece
 from tracker.io.read.protocol import Certainty, Kind
@@ -149,6 +150,11 @@ def _table(file: SourceFile) -> Float[ndarray, "N C"]:
         table = np.loadtxt(lines, ndmin=2, comments=None)
     except ValueError as error:
         raise file.error(f"expected rows of the same count of numbers ({error})") from None
-    if not np.isfinite(table).all() or (np.abs(table) > 2**53).any():
-        raise file.error("expected finite numbers")
+    odd = ~(np.abs(table) <= 2.0**53)
+    if odd.any():
+        row = int(np.argmax(odd.any(axis=1)))
+        raise file.error(
+            f"expected finite numbers, found {shown(lines[row])}; correct or remove the row",
+            f"row {row + 1}",
+        )
     return table

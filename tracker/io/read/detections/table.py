@@ -61,11 +61,10 @@ def recognise(file: SourceFile) -> Certainty:
         names = list(flat(records[0][1])) if records else []
         if not _LENS.isdisjoint(map(plain, names)):
             return Certainty.NO
-        has_box = "box" in meanings(names) or layout_of(meanings(names)) is not None
-        return Certainty.LIKELY if has_box or is_table(names) else Certainty.NO
+        return Certainty.LIKELY if is_table(names) else Certainty.NO
     lines = _data_lines(file.head_text)
     names = _cells(lines[0], delimiter_of(lines[0])) if lines else []
-    known = len(names) > 3 and (is_table(_flat_names(names)) or bool(_people_of(names)))
+    known = len(names) > 3 and (is_table(names) or bool(_people_of(names)))
     return Certainty.LIKELY if known else Certainty.NO
 
 
@@ -240,10 +239,6 @@ def flat(record: Mapping[str, Any]) -> dict[str, Any]:
         if isinstance(record.get(key), dict):
             flat.update(record[key])
     return flat
-
-
-def _flat_names(names: list[str]) -> list[str]:
-    return [*names, "x1", "y1", "x2", "y2"] if "box" in names or "bbox" in names else names
 
 
 def _data_lines(text: str) -> list[str]:

@@ -41,7 +41,11 @@ def read(file: SourceFile) -> Iterator[Piece]:
             given = next((body[name] for name in JOINTS if name in body), None)
             joints = numbers(member, "joints", [] if given is None else given)
             if len(joints) % 4 or len(joints) <= 4 * BODY_CENTRE:
-                raise member.error("expected x, y, z and confidence of 15 or 19 joints", "joints")
+                raise member.error(
+                    "expected x, y, z and confidence of 15 or 19 joints, found "
+                    f"{len(joints)} numbers; get the file again",
+                    "joints",
+                )
             if joints.reshape(-1, 4)[BODY_CENTRE, 3] > 0.0:
                 rows.append((frame, int(body.get("id", 0))))
                 places.append(joints.reshape(-1, 4)[BODY_CENTRE, :3])

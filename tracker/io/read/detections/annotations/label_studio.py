@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 from tracker.io.read.detections.pictured import PicturedBoxes
 from tracker.io.read.picture_names import camera_of, number_in
@@ -54,7 +54,7 @@ def read(file: SourceFile) -> Iterator[Piece]:
         is_video = any("sequence" in _value(one) for one in results)
         camera = name.rsplit("/", 1)[-1].rsplit(".", 1)[0] if is_video else camera_of(name)
         frame = place if (number := number_in(name)) is None else number
-        first = 1 if is_video else None
+        first: Literal[1] | None = 1 if is_video else None
         found.look_at(camera, first or frame, first)
         for n, one in enumerate(results):
             found.sized(one.get("original_width"), one.get("original_height"))
