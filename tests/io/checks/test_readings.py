@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import get_args
+from typing import Any, get_args
 
 import numpy as np
 import pytest
@@ -17,6 +17,7 @@ from tracker.io.checks import check
 from tracker.io.checks.boxes import judge_boxes, raw_cameras
 from tracker.io.checks.timing import check_counting
 from tracker.io.conventions.judge import Seen
+from tracker.io.conventions.questions import stating_flags
 from tracker.io.conventions.reading import FLIP, Reading, pose, read_boxes, to_camera, upright
 from tracker.io.conventions.search import as_meant, find_reading
 from tracker.io.conventions.sizes import likely_unit
@@ -243,3 +244,22 @@ def test_a_room_of_seated_people_reaches_a_whole_size_above_and_below_them() -> 
     # middles at 1.0
     assert found.floor == pytest.approx(-0.2)
     assert (found.minimum[2], found.maximum[2]) == pytest.approx((-0.2, 2.2), abs=0.1001)
+
+
+def test_flags_state_what_differs_and_the_form_of_boxes_once() -> None:
+    given = Reading()
+
+    def flags(**parts: Any) -> list[str]:
+        return [str(one) for one in stating_flags(replace(given, **parts), given, ["a", "b"])]
+
+    assert flags() == []
+    assert flags(layout="xyxy") == ["--boxes xyxy"]
+    assert flags(parts=1) == ["--boxes ltwh-normalised"]
+    assert flags(layout="xyxy", parts=1) == ["--boxes xyxy-normalised"]
+    assert flags(direction="camera-to-world", order=(1, 0)) == [
+        "--pose camera-to-world",
+        "--swap a=b",
+    ]
+    both = replace(given, layout="xyxy", parts=1)
+    found = stating_flags(both, replace(both, layout="cxcywh"), ["a", "b"])
+    assert list(map(str, found)) == ["--boxes xyxy"]

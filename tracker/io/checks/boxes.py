@@ -26,8 +26,9 @@ from tracker.io.conventions.questions import (
     PARTS,
     describe_moved,
     describe_unconfirmed,
+    stating_flags,
 )
-from tracker.io.conventions.reading import Reading, exchanged, exchanges
+from tracker.io.conventions.reading import Reading, exchanged
 from tracker.io.conventions.search import Verdict, as_meant, find_reading
 from tracker.io.conventions.sizes import likely_unit
 from tracker.io.read.pieces import METRES, RawCamera
@@ -179,24 +180,17 @@ def _mistake(sequence: Sequence, judged: JudgedBoxes) -> Check:
     reading, agreed = judged.reading, judged.chosen.consensus
     names = [camera.name for camera in sequence.cameras]
     words: list[str] = []
-    remedies: list[Remedy] = []
+    remedies = stating_flags(reading, AS_GIVEN, names)
     if reading.direction != "world-to-camera":
         words.append("the poses inverted")
-        remedies.append(Remedy("--pose", reading.direction))
     if reading.axes != "opencv":
         words.append("OpenGL's camera axes (y up, z back)")
-        remedies.append(Remedy("--axes", reading.axes))
     if reading.layout != "ltwh":
         words.append(f"boxes read as {LAYOUTS[reading.layout]}")
-        remedies.append(Remedy("--boxes", reading.layout))
     if reading.parts:
         words.append(f"boxes read as {PARTS[reading.parts]}")
-    if reading.parts == 1:
-        remedies.append(Remedy("--boxes", f"{reading.layout}-normalised"))
     if reading.order is not None:
-        pairs = exchanged(reading.order, names)
-        words.append(f"the calibrations exchanged ({pairs})")
-        remedies += [Remedy("--swap", f"{a}={b}") for a, b in exchanges(reading.order, names)]
+        words.append(f"the calibrations exchanged ({exchanged(reading.order, names)})")
     if reading.mirrored:
         words.append("a left-handed world")
     if reading.flipped:
