@@ -11,8 +11,8 @@ from scipy.spatial.transform import Rotation
 from tests.conftest import DATA, short
 from tests.random_rooms import random_room
 from tracker.io.checks.boxes import raw_cameras
+from tracker.io.conventions.judge import Open, Seen
 from tracker.io.conventions.reading import FLIP, Reading, with_pixels
-from tracker.io.conventions.readings import Open, Seen
 from tracker.io.conventions.search import Verdict, find_reading
 from tracker.io.read.pieces import Convention, RawCamera
 from tracker.sequences.reader import read_sequence

@@ -21,7 +21,7 @@ from tracker.sequences.filling import check_missing, find_room, find_time
 from tracker.sequences.pictures.media import PictureProperties, check_pictures
 from tracker.sequences.pictures.video import VideoIndex, index_video
 from tracker.sequences.sequence import View
-from tracker.sequences.tables import BoxTable, Reading
+from tracker.sequences.tables import BoxTable, OpenedFiles
 from tracker.sequences.views import Source, read_views
 from tracker.sequences.writing.teaching import Values, carried_over, changes
 
@@ -212,7 +212,7 @@ def view_of(
     film = Path("a.mp4") if pictures else None
     one = Source("a", own, film, (), np.ones(9, dtype=bool), pictures, Timing(), None)
     time = find_time([one], 5.0, steps, own)
-    return read_views([one], replace(time, own_rates=True), Reading(Path()))[0]
+    return read_views([one], replace(time, own_rates=True), OpenedFiles(Path()))[0]
 
 
 POSE = {"K": [[60.0, 0, 31.5], [0, 60.0, 23.6], [0, 0, 1]], "R": np.eye(3).tolist(),

@@ -19,7 +19,7 @@ from tracker.runs.pipeline import Run
 from tracker.runs.stage_cache import StageCache
 from tracker.runs.stage_files import StageFiles
 from tracker.sequences.pictures.frames import FrameReader
-from tracker.sequences.pictures.numbering import whole_row
+from tracker.sequences.pictures.numbering import by_number, whole_row
 from tracker.sequences.reader import read_sequence
 from tracker.sequences.sequence import Sequence
 
@@ -174,3 +174,7 @@ def test_which_names_are_a_row(names: list[str], row: list[str] | None) -> None:
     found, there = whole_row([Path(name) for name in names])
     assert [path.as_posix() for path in found] == (row or names)
     assert [path.as_posix() for path, has in zip(found, there, strict=True) if has] == names
+
+
+def test_names_are_ordered_by_their_numbers_whatever_else_is_in_them() -> None:
+    assert sorted(["cam10", "cam9", "cam¹", "²"], key=by_number) == ["cam9", "cam10", "cam¹", "²"]

@@ -9,7 +9,7 @@ import numpy as np
 
 from tracker import __version__
 from tracker.export.exported_run import ExportedRun, Options
-from tracker.export.tracks_csv import BOX, COVARIANCE, HEIGHT
+from tracker.export.tracks_csv import BOX, COLUMNS, CORRECTION, COVARIANCE, HEIGHT, NAME
 
 _ROWS = 1 << 17
 """Number of rows of a row group, which is held in memory."""
@@ -26,19 +26,20 @@ def write(path: Path, run: ExportedRun, options: Options) -> None:
     metadata = {
         "multiview-phd": json.dumps({"version": __version__, **facts, "parameters": settings})
     }
-    columns: dict[str, np.ndarray] = {
-        "frame": tracks.frames,
-        "time": tracks.frames * sequence.step_time,
-        "id": tracks.ids,
-        **{axis: tracks.positions[:, k] for k, axis in enumerate("xyz")},
-        "existence": tracks.existences,
-        **{f"sigma_{axis}": tracks.sigmas[:, k] for k, axis in enumerate("xyz")},
-    }
+    values = (
+        tracks.frames,
+        tracks.frames * sequence.step_time,
+        tracks.ids,
+        *tracks.positions.T,
+        tracks.existences,
+        *tracks.sigmas.T,
+    )
+    columns: dict[str, np.ndarray] = dict(zip(COLUMNS, values, strict=True))
     if run.names:
         called = [run.names.get(track, "") for track in tracks.ids.tolist()]
-        columns["name"] = np.array(called, dtype=object)
+        columns[NAME] = np.array(called, dtype=object)
     if run.row_corrections:
-        columns["correction"] = np.array(run.row_corrections, dtype=object)
+        columns[CORRECTION] = np.array(run.row_corrections, dtype=object)
     for index, camera in enumerate(sequence.cameras):
         boxes, visible = run.boxes[index]
         columns[f"{camera.name}_seen"] = tracks.seen[:, index]

@@ -13,6 +13,7 @@ from numpy import ndarray
 
 from tracker.export.json_file import TracksFile
 from tracker.export.tracks_csv import BOX, COLUMNS, COVARIANCE, HEIGHT, TrackFile, read_tracks_csv
+from tracker.export.trc import Y_UP
 from tracker.files.validated import InvalidJson, parse_json
 from tracker.io.read.pieces import FormatError, TruthPiece
 from tracker.io.read.registry import recognise
@@ -22,9 +23,6 @@ from tracker.sequences.errors import SequenceError
 
 _ROUNDING_SIGMA, _ROUNDING_COVARIANCE = 0.5e-4, 0.5e-6
 """Half of the last decimal that a CSV track file has of σ, metres, and of the covariance."""
-
-_Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
-"""Rotation from a world with y up to one with z up."""
 
 
 def read_tracks(path: Path | str) -> TrackFile:
@@ -286,7 +284,7 @@ def _places(path: Path) -> TrackFile:
         raise SequenceError(f"{where}: expected places in metres, found them in {truth.unit}")
     frames = truth.frames - int(truth.first_index or 0)
     order = _in_order(where, frames, truth.ids)
-    places = truth.positions @ _Y_UP.T if truth.up == "y" else truth.positions
+    places = truth.positions @ Y_UP if truth.up == "y" else truth.positions
     values = dict(zip("xyz", _finite(where, "places", places).T, strict=True))
     nothing = np.full(len(order), np.nan)
     values |= {

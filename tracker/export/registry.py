@@ -69,9 +69,16 @@ class Format:
 
 
 def _write_report(path: Path, run: ExportedRun, options: Options) -> None:
-    from tracker.export import report  # imports the evaluation
+    """Evaluate the tracks against the sequence's ground truth, and write the report."""
+    from tracker.evaluation import evaluate_sequence
+    from tracker.evaluation.report.page import report_html  # imports plotly
 
-    report.write(path, run, options)
+    evaluation = evaluate_sequence(run.sequence, run.tracks, steps=run.steps)
+    text = report_html(
+        run.sequence, run.tracks, run.parameters, evaluation, seed=run.seed, back=run.back
+    )
+    path.write_text(text, encoding="utf-8")
+    options.at(run.steps, run.steps)
 
 
 def _write_video(path: Path, run: ExportedRun, options: Options) -> None:
@@ -182,9 +189,6 @@ def save(
     options = options or Options()
     form.check(run.sequence)
     if not form.folder:
-        if not path.is_dir() and path.exists() and not path.is_file():
-            form.write(path, run, options)  # a pipe or device
-            return
         with replacing(path) as temporary:
             form.write(temporary, run, options)
     elif zipped:

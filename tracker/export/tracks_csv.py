@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import csv
 import io
-import itertools
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from collections.abc import Sequence as Many
@@ -280,12 +279,10 @@ def save_tracks_csv(
     Raises:
         OSError: If the file cannot be written; the message says why.
     """
-    path = Path(path)
-    if not path.is_dir() and path.exists() and not path.is_file():
-        with path.open("w", encoding="utf-8", newline="") as stream:
-            write_tracks_csv(stream, sequence, tracks, parameters, seed, done=done, remarks=remarks)
-        return
-    with replacing(path) as temporary, temporary.open("x", encoding="utf-8", newline="") as stream:
+    with (
+        replacing(Path(path)) as temporary,
+        temporary.open("w", encoding="utf-8", newline="") as stream,
+    ):
         write_tracks_csv(stream, sequence, tracks, parameters, seed, done=done, remarks=remarks)
 
 
@@ -297,7 +294,7 @@ def read_tracks_csv(path: Path | str) -> TrackFile:
             and the column, and states what was expected and found.
     """
     path = Path(path)
-    header = _header(path)
+    comments, header = _head(path)
     cameras = [name.removesuffix("_left") for name in header if name.endswith("_left")]
     sides = tuple(f"{camera}_{side}" for camera in cameras for side in BOX)
     columns = read_columns(
@@ -317,53 +314,40 @@ def read_tracks_csv(path: Path | str) -> TrackFile:
         values,
         cameras,
         order,
-        settings=_settings(path),
-        done=_done(path),
-        remarks=_remarks(path),
+        settings=_settings(comments),
+        done=_done(comments),
+        remarks=_remarks(comments),
     )
 
 
-def _header(path: Path) -> list[str]:
-    """Return the names of the columns."""
-    for line in _beginning(path):
-        if line.strip() and not line.startswith("#"):
-            return [unguarded(cell.strip()) for cell in next(csv.reader([line]))]
-    return []
-
-
-def _settings(path: Path) -> dict[str, str]:
-    """Return the values of the comment lines ``# key = value``, by key."""
-    settings = {}
-    for line in _beginning(path):
-        if not line.startswith("#"):
-            break
-        key, equals, setting = line[1:].partition("=")
-        if equals:
-            settings[key.strip()] = unguarded(setting.strip())
-    return settings
-
-
-def _done(path: Path) -> int | None:
-    """Return the number of steps that the comment line ``# partial: …`` states; None without it."""
-    for line in _beginning(path):
-        if not line.startswith("#"):
-            break
-        if partial := re.match(r"# partial: the first (\d+) of ", line):
-            return int(partial[1])
-    return None
-
-
-def _remarks(path: Path) -> tuple[str, ...]:
-    """Return the sentences of the comment lines ``# incomplete: …``."""
-    head = itertools.takewhile(lambda line: line.startswith("#"), _beginning(path))
-    found = (re.match(r"# incomplete: (.*)", line) for line in head)
-    return tuple(unguarded(one[1].strip()) for one in found if one)
-
-
-def _beginning(path: Path) -> Iterator[str]:
-    """Yield the lines of a file, which is closed once the caller stops."""
+def _head(path: Path) -> tuple[list[str], list[str]]:
+    """Return the comment lines above the header without the sign #, and the columns' names."""
+    comments: list[str] = []
     try:
         with path.open(encoding="utf-8-sig", errors="replace") as stream:
-            yield from stream
+            for line in stream:
+                if line.startswith("#"):
+                    comments.append(line[1:].strip())
+                elif line.strip():
+                    return comments, [unguarded(cell.strip()) for cell in next(csv.reader([line]))]
     except OSError as error:
         raise SequenceError(f"{path}: cannot be read ({error.strerror})") from None
+    return comments, []
+
+
+def _settings(comments: Many[str]) -> dict[str, str]:
+    """Return the values of the comments ``key = value``, by key."""
+    pairs = (line.partition("=") for line in comments)
+    return {key.strip(): unguarded(value.strip()) for key, equals, value in pairs if equals}
+
+
+def _done(comments: Many[str]) -> int | None:
+    """Return the number of steps that the comment ``partial: …`` states; None without it."""
+    found = (re.match(r"partial: the first (\d+) of ", line) for line in comments)
+    return next((int(one[1]) for one in found if one), None)
+
+
+def _remarks(comments: Many[str]) -> tuple[str, ...]:
+    """Return the sentences of the comments ``incomplete: …``."""
+    found = (re.match(r"incomplete: (.*)", line) for line in comments)
+    return tuple(unguarded(one[1].strip()) for one in found if one)

@@ -13,6 +13,9 @@ import numpy as np
 
 from tracker.export.exported_run import ExportedRun, Options
 
+Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+"""The rotation from world axes (z up) to those of the file (y up)."""
+
 
 def write(path: Path, run: ExportedRun, options: Options) -> None:
     """Write a run as markers, step by step."""
@@ -33,13 +36,9 @@ def write(path: Path, run: ExportedRun, options: Options) -> None:
             options.at(step, steps)
             cells = [""] * (3 * len(ids))
             rows = tracks.at(step)
-            turned = tracks.positions[rows] @ _Y_UP.T
+            turned = tracks.positions[rows] @ Y_UP.T
             for number, (x, y, z) in zip(tracks.ids[rows].tolist(), turned.tolist(), strict=True):
                 first = 3 * place[number]
                 cells[first : first + 3] = [f"{x:.6f}", f"{y:.6f}", f"{z:.6f}"]
             file.write(f"{step + 1}\t{step * sequence.step_time:.6f}\t" + "\t".join(cells) + "\n")
     options.at(steps, steps)
-
-
-_Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
-"""The rotation from world axes (z up) to those of the file (y up)."""

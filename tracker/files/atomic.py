@@ -41,6 +41,8 @@ write takes seconds; a process that was suspended for longer finds its file gone
 def replacing(path: Path, *, transient: bool = False) -> Iterator[Path]:
     """Yield a temporary file that replaces a file when the block ends without an exception.
 
+    A pipe or device is yielded itself: it has no content that could be replaced.
+
     Args:
         path: The file to write; an existing one is replaced.
         transient: Whether the file is written again soon, so that it may be lost when the machine
@@ -52,6 +54,9 @@ def replacing(path: Path, *, transient: bool = False) -> Iterator[Path]:
     """
     if path.is_dir():
         raise IsADirectoryError(f"{path}: expected a file to write, found a folder; add a name")
+    if path.exists() and not path.is_file():
+        yield path
+        return
     _check_folder(path)
     path = path.resolve()  # a symbolic link stays, and what it names is replaced
     sweep(path.parent, path.name)

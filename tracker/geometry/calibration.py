@@ -139,6 +139,12 @@ def checked_distortion(
     return np.pad(found[:5], (0, max(0, 5 - len(found)))), "pinhole"
 
 
+def size_around(principal_point: Float[ndarray, " 2"]) -> tuple[int, int]:
+    """Return the size of pictures in whose middle a principal point lies, pixels."""
+    sides = np.clip(np.round(2.0 * principal_point + 1.0), 2.0, LARGEST_SIDE)
+    return int(sides[0]), int(sides[1])
+
+
 def checked_size(found: Float[ndarray, " 2"]) -> tuple[int, int]:
     """Return width and height of a picture, pixels.
 

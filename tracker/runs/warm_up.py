@@ -131,8 +131,8 @@ def _import(recording: Sequence) -> None:
     # who only waits for the kernels does not load the import
     from tracker.io.checks import check
     from tracker.io.checks.boxes import raw_cameras
+    from tracker.io.conventions.judge import Seen
     from tracker.io.conventions.reading import Reading
-    from tracker.io.conventions.readings import Seen
     from tracker.io.conventions.search import Likelihood
 
     check(recording, pictures=False)

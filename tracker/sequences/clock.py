@@ -16,6 +16,10 @@ from tracker.sequences.fields import Fields, listed
 FIELDS = ("fps", "time_offset", "timestamps")
 """The fields of a camera that give it a clock of its own."""
 
+STAMP, CAMERAS = "frame_time", ("cam_id", "port")
+"""The columns of Caliscope's tables of time stamps: the time of a frame, seconds, and the number of
+its camera, in files of earlier versions under the second name."""
+
 _LONGEST_OFFSET = 86400.0
 """Largest time offset of a camera, seconds."""
 
@@ -163,11 +167,12 @@ def _stamps(file: Path, where: str, camera: str) -> tuple[float, ...]:
     columns = read_columns(
         file,
         where,
-        needed=("frame_time",),
-        optional={"port": -1.0, "cam_id": -1.0},
+        needed=(STAMP,),
+        optional=dict.fromkeys(CAMERAS, -1.0),
         largest=_LATEST,
     )
-    ports = columns.values["port" if "port" in columns.names else "cam_id"]
+    column = next((name for name in CAMERAS if name in columns.names), CAMERAS[0])
+    ports = columns.values[column]
     rows = np.ones(len(columns), dtype=bool)
     if len(np.unique(ports)) > 1:
         number = re.search(r"\d+(?=\D*$)", camera)
@@ -176,8 +181,8 @@ def _stamps(file: Path, where: str, camera: str) -> tuple[float, ...]:
             known = listed(f"{port:g}" for port in np.unique(ports))
             raise columns.error(
                 int(columns.lines[0]),
-                "port" if "port" in columns.names else "cam_id",
+                column,
                 f'expected rows of camera "{camera}", whose name ends in the number of its port, '
                 f"found ports {known}; name the camera after its port",
             )
-    return tuple(np.sort(columns.values["frame_time"][rows]).tolist())
+    return tuple(np.sort(columns.values[STAMP][rows]).tolist())

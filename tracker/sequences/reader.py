@@ -19,13 +19,12 @@ from tracker.sequences.errors import SequenceError
 from tracker.sequences.fields import LARGEST_COUNT, LONGEST_NAME, Fields, did_you_mean
 from tracker.sequences.filling import check_missing, find_room, find_time
 from tracker.sequences.sequence import FileState, Sequence
-from tracker.sequences.tables import Reading, read_ground_truth
+from tracker.sequences.tables import OpenedFiles, read_ground_truth
 from tracker.sequences.views import CAMERA, read_sources, read_views
 from tracker.sequences.writing.taught_fields import read_room, read_target, read_templates
 
 FILE = "sequence.toml"
 FORMAT = 1
-MOST_FRAMES = LARGEST_COUNT
 MOST_BYTES = 4 * 2**20
 """Largest size of a sequence.toml, which is enough for thousands of templates, bytes."""
 LONGEST_PATH = 4000
@@ -69,10 +68,10 @@ def read_sequence(folder: Path | str) -> Sequence:
     """
     folder, text = _find(Path(folder))
     fields = _parse(folder, text)
-    reading = Reading(folder)
+    reading = OpenedFiles(folder)
     frames = None
     if "frames" in fields:
-        frames = fields.integer("frames", minimum=1, maximum=MOST_FRAMES)
+        frames = fields.integer("frames", minimum=1, maximum=LARGEST_COUNT)
     fps = fields.rate("fps") if "fps" in fields else None
     room = read_room(fields) if "room" in fields else None
     half_extents = read_target(fields)
@@ -128,7 +127,7 @@ def read_summary(folder: Path | str) -> SequenceSummary:
         name=fields.text("name"),
         description=fields.text("description", ""),
         fps=fields.rate("fps") if "fps" in fields else None,
-        frames=fields.integer("frames", minimum=1, maximum=MOST_FRAMES)
+        frames=fields.integer("frames", minimum=1, maximum=LARGEST_COUNT)
         if "frames" in fields
         else None,
         cameras=len(fields.tables("camera", CAMERA, "[[camera]]")),
@@ -268,7 +267,7 @@ def _parse(folder: Path, text: str) -> Fields:
     return fields
 
 
-def _states(reading: Reading) -> tuple[FileState, ...]:
+def _states(reading: OpenedFiles) -> tuple[FileState, ...]:
     try:
         return tuple(FileState.of(path) for path in reading.files)
     except OSError as error:

@@ -38,8 +38,8 @@ _AT_ONCE = 4096
 
 
 @dataclass(slots=True)
-class Reading:
-    """The files and warnings that are collected while a sequence is read."""
+class OpenedFiles:
+    """The files that were opened while a sequence is read, and the warnings on them."""
 
     folder: Path
     """The folder of the sequence."""
@@ -175,7 +175,7 @@ class BoxTable:
             )
 
 
-def read_box_table(fields: Fields, reading: Reading, file_starts: int) -> BoxTable | None:
+def read_box_table(fields: Fields, reading: OpenedFiles, file_starts: int) -> BoxTable | None:
     """Read the file of boxes that ``detections`` names; None if there is none.
 
     Args:
@@ -267,7 +267,7 @@ def read_embeddings(path: Path, fields: Fields, boxes: str, rows: int) -> Float1
     return units
 
 
-def read_ground_truth(fields: Fields, reading: Reading, frames: int) -> GroundTruth | None:
+def read_ground_truth(fields: Fields, reading: OpenedFiles, frames: int) -> GroundTruth | None:
     """Read the file that ``[ground_truth]`` names; None if there is none.
 
     Raises:

@@ -11,7 +11,7 @@ from jaxtyping import Bool
 from numpy import ndarray
 
 from tracker.files.text import shown
-from tracker.geometry.calibration import LARGEST_SIDE, checked_size
+from tracker.geometry.calibration import checked_size, size_around
 from tracker.sequences.calibration import POSE, read_camera
 from tracker.sequences.clock import FIELDS, Timing, read_timing
 from tracker.sequences.fields import Fields
@@ -26,7 +26,7 @@ from tracker.sequences.pictures.media import (
 )
 from tracker.sequences.pictures.video import read_image, why_no_picture
 from tracker.sequences.sequence import View
-from tracker.sequences.tables import BoxTable, Reading, read_box_table
+from tracker.sequences.tables import BoxTable, OpenedFiles, read_box_table
 
 CAMERA = (
     "name", "image_size", "video", "images", "first_frame", *FIELDS, "background",
@@ -71,7 +71,7 @@ class Time:
     """Whether each video has its own rate, since none is stated and they differ."""
 
 
-def read_sources(tables: Many[Fields], reading: Reading) -> tuple[Source, ...]:
+def read_sources(tables: Many[Fields], reading: OpenedFiles) -> tuple[Source, ...]:
     """Read the tables and find the files of all cameras.
 
     Raises:
@@ -110,7 +110,7 @@ def _check_lengths(sources: Many[Source]) -> None:
             )
 
 
-def _source(name: str, fields: Fields, reading: Reading) -> Source:
+def _source(name: str, fields: Fields, reading: OpenedFiles) -> Source:
     """Read the files that the table of a camera names."""
     if "image_size" in fields:
         _image_size(fields, None)
@@ -134,7 +134,7 @@ def _source(name: str, fields: Fields, reading: Reading) -> Source:
     return Source(name, fields, video, images, there, pictures, timing, table)
 
 
-def read_views(sources: Many[Source], time: Time, reading: Reading) -> tuple[View, ...]:
+def read_views(sources: Many[Source], time: Time, reading: OpenedFiles) -> tuple[View, ...]:
     """Make the views: cameras with their pictures and boxes by step.
 
     Raises:
@@ -143,7 +143,7 @@ def read_views(sources: Many[Source], time: Time, reading: Reading) -> tuple[Vie
     return tuple(_view(source, time, reading) for source in sources)
 
 
-def _view(source: Source, time: Time, reading: Reading) -> View:
+def _view(source: Source, time: Time, reading: OpenedFiles) -> View:
     """Return a camera with its boxes and pictures on the steps of the sequence."""
     fields, pictures, timing = source.fields, source.pictures, source.timing
     if time.own_rates and timing.fps is None and pictures is not None and pictures.fps:
@@ -169,7 +169,7 @@ def _view(source: Source, time: Time, reading: Reading) -> View:
     return replace(view, background=_background(view, fields, time.steps, reading))
 
 
-def _background(view: View, fields: Fields, steps: int, reading: Reading) -> Path | range:
+def _background(view: View, fields: Fields, steps: int, reading: OpenedFiles) -> Path | range:
     """Read the field ``background``: a picture of the empty scene, or steps without people.
 
     Raises:
@@ -217,8 +217,4 @@ def _image_size(fields: Fields, pictures: PictureProperties | None) -> tuple[int
         return width, height
     if pictures is not None:
         return pictures.size
-    lens = read_camera("", (1, 1), fields).intrinsics
-    width, height = (
-        min(LARGEST_SIDE, max(2, round(2.0 * float(middle) + 1.0))) for middle in lens[:2, 2]
-    )
-    return width, height
+    return size_around(read_camera("", (1, 1), fields).intrinsics[:2, 2])

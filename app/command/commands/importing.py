@@ -49,8 +49,9 @@ def _import(command: Import) -> int:
     from tracker.io.importing.remedies import for_import, unsaid
     from tracker.io.importing.settling import settle
     from tracker.io.importing.usage import file_uses
-    from tracker.io.importing.writing import FILE, write
+    from tracker.io.importing.writing import write
     from tracker.sequences import library
+    from tracker.sequences.reader import FILE
 
     if command.output is not None and (command.output / FILE).exists():
         raise CommandError(f"{command.output}: holds a {FILE} already; name another folder")

@@ -12,12 +12,12 @@ from app.state.teaching.entrances import entrances_of
 from tracker.geometry.consistency.consensus import Consensus
 from tracker.geometry.consistency.entrances import Door
 from tracker.io.checks import Check
-from tracker.io.checks.boxes import check_boxes, listen
+from tracker.io.checks.boxes import check_boxes, judge_boxes
 from tracker.io.checks.cameras import check_lenses, check_places
 from tracker.io.checks.synchronisation import CameraOffset, synchronise
 from tracker.io.checks.timing import check_counting, check_time
 from tracker.io.checks.truth import check_truth
-from tracker.io.conventions.readings import EVERY_ORDER
+from tracker.io.conventions.judge import EVERY_ORDER
 from tracker.io.importing.preview import as_sequence
 from tracker.io.importing.remedies import for_import
 from tracker.io.importing.settling import ImportPlan
@@ -74,7 +74,7 @@ def look_into(settled: ImportPlan, name: str, cancelled: Callable[[], bool]) -> 
 
     Args:
         settled: The recording.
-        name: Of it.
+        name: The name of the sequence.
         cancelled: Asked between two pictures.
 
     Raises:
@@ -83,16 +83,16 @@ def look_into(settled: ImportPlan, name: str, cancelled: Callable[[], bool]) -> 
     sequence = as_sequence(settled, name)
     looked = _with_methods(Looked(draw_plan(settled, None)), sequence)
     yield looked
-    told = listen(sequence, exchanges=len(sequence.views) <= EVERY_ORDER)
+    judged = judge_boxes(sequence, exchanges=len(sequence.views) <= EVERY_ORDER)
     _stop_if(cancelled)
-    checks = [*check_boxes(sequence, told), check_lenses(sequence.cameras)]
-    mistaken = told is not None and told.mistaken
+    checks = [*check_boxes(sequence, judged), check_lenses(sequence.cameras)]
+    mistaken = judged is not None and judged.mistaken
     if not mistaken:
         checks += check_places(sequence.cameras, sequence.room)
-    counting = [] if told is None else [check_counting(sequence, places=not mistaken)]
+    counting = [] if judged is None else [check_counting(sequence, places=not mistaken)]
     if not mistaken:
         counting.append(check_truth(sequence))
-    agreed = None if told is None else told.given.consensus
+    agreed = None if judged is None else judged.given.consensus
     looked = replace(
         looked,
         plan=draw_plan(settled, agreed),
@@ -109,7 +109,7 @@ def look_into(settled: ImportPlan, name: str, cancelled: Callable[[], bool]) -> 
         if len(sequence.views) > 1:
             offsets = synchronise(sequence, reader=reader, most_steps=MOST_STEPS)
         _stop_if(cancelled)
-        verdict = None if told is None else told.verdict
+        verdict = None if judged is None else judged.verdict
         timing = list(check_time(sequence, found=offsets, verdict=verdict))
         found = _for_import((*checks, *timing, *counting), settled)
         looked = replace(looked, checks=found, offsets=offsets, under_way="first tracks")

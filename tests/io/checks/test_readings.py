@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import get_args
+from typing import Any, get_args
 
 import numpy as np
 import pytest
@@ -14,10 +14,11 @@ from tests.random_rooms import random_room
 from tracker.geometry.consistency.consensus import Consensus
 from tracker.geometry.consistency.suggestion import consensus_of_cameras, suggest
 from tracker.io.checks import check
-from tracker.io.checks.boxes import listen, raw_cameras
+from tracker.io.checks.boxes import judge_boxes, raw_cameras
 from tracker.io.checks.timing import check_counting
+from tracker.io.conventions.judge import Seen
+from tracker.io.conventions.questions import stating_flags
 from tracker.io.conventions.reading import FLIP, Reading, pose, read_boxes, to_camera, upright
-from tracker.io.conventions.readings import Seen
 from tracker.io.conventions.search import as_meant, find_reading
 from tracker.io.conventions.sizes import likely_unit
 from tracker.io.read.pieces import METRES, Layout, RawCamera
@@ -129,7 +130,7 @@ def test_one_camera_alone_tells_nothing() -> None:
     sequence = random_room(0, cameras=2)
     assert find_reading(raw_cameras(sequence), [seen(sequence)[0], None], fps=10.0) is None
     alone = replace(sequence, views=sequence.views[:1])
-    assert listen(alone) is None
+    assert judge_boxes(alone) is None
     assert {each.status for each in check(alone)} <= {"good", "absent"}
 
 
@@ -146,7 +147,7 @@ def test_up_becomes_z(up: str) -> None:
 @pytest.mark.parametrize("height", [0.25, 0.9, 1.2, 1.7])
 @pytest.mark.parametrize("unit", METRES)
 def test_the_unit_follows_from_how_tall_and_far_people_are(unit: str, height: float) -> None:
-    agreed = listen(random_room(0, steps=60))
+    agreed = judge_boxes(random_room(0, steps=60))
     assert agreed is not None
     one = METRES[unit]  # type: ignore[index]
     scaled = replace(agreed.given.consensus, rise=np.array([0.0, 0.0, height / one]))
@@ -243,3 +244,22 @@ def test_a_room_of_seated_people_reaches_a_whole_size_above_and_below_them() -> 
     # middles at 1.0
     assert found.floor == pytest.approx(-0.2)
     assert (found.minimum[2], found.maximum[2]) == pytest.approx((-0.2, 2.2), abs=0.1001)
+
+
+def test_flags_state_what_differs_and_the_form_of_boxes_once() -> None:
+    given = Reading()
+
+    def flags(**parts: Any) -> list[str]:
+        return [str(one) for one in stating_flags(replace(given, **parts), given, ["a", "b"])]
+
+    assert flags() == []
+    assert flags(layout="xyxy") == ["--boxes xyxy"]
+    assert flags(parts=1) == ["--boxes ltwh-normalised"]
+    assert flags(layout="xyxy", parts=1) == ["--boxes xyxy-normalised"]
+    assert flags(direction="camera-to-world", order=(1, 0)) == [
+        "--pose camera-to-world",
+        "--swap a=b",
+    ]
+    both = replace(given, layout="xyxy", parts=1)
+    found = stating_flags(both, replace(both, layout="cxcywh"), ["a", "b"])
+    assert list(map(str, found)) == ["--boxes xyxy"]

@@ -13,7 +13,7 @@ from tests.random_rooms import random_room
 from tracker.geometry.camera import Camera
 from tracker.geometry.consistency.standing import ends, sides, turn_of
 from tracker.io.checks import check
-from tracker.io.checks.boxes import listen
+from tracker.io.checks.boxes import judge_boxes
 from tracker.sequences.sequence import Detections, Sequence, View
 
 
@@ -66,7 +66,7 @@ def rolled_room(seed: int, degrees: float) -> Sequence:
 def test_rolled_cameras_raise_no_alarm(seed: int, degrees: float) -> None:
     room = rolled_room(seed, degrees)
     assert [str(each) for each in check(room) if each.status == "warning"] == []
-    told = listen(room)
+    told = judge_boxes(room)
     assert told is not None
     assert told.given.consensus.height == pytest.approx(1.7, rel=0.03)
 

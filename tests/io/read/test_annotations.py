@@ -131,6 +131,45 @@ def test_shapes_of_vgg_image_annotator_and_what_is_wrong_with_one(tmp_path: Path
         read(path)
 
 
+@pytest.mark.parametrize(
+    ("text", "field"),
+    [
+        ('{"images": [], "annotations": {"id": 1}}', "annotations"),
+        ('{"version": "5", "flags": {}, "shapes": {"id": 1}}', "shapes"),
+        ('{"people": {"id": 1}, "pose_keypoints_2d": 0}', "people"),
+        ('{"bodies": {"id": 1}, "joints19": 0}', "bodies"),
+        ('{"personID": 1, "positionID": 1, "views": 1}', ""),
+        ('{"0": {"object id": 1, "3d location": 1, "2d bounding box visible": 1}}', "frame 0"),
+        (
+            '{"timestamp": "2014-09-08T04:00:00Z", "objects": {"person": "bounding_box_px"}}\n'
+            '{"timestamp": "2014-09-08T04:00:01Z", "objects": {"person": "bounding_box_px"}}',
+            "line 1 objects",
+        ),
+    ],
+)
+def test_what_is_no_list_of_tables_is_named_by_file_and_field(
+    tmp_path: Path, text: str, field: str
+) -> None:
+    path = tmp_path / "cam1.json"
+    path.write_text(text)
+    where = f"cam1.json, {field}" if field else "cam1.json"
+    with pytest.raises(FormatError) as told:
+        read(path)
+    assert str(told.value).startswith(f"{where}: expected a list of tables, found ")
+    assert str(told.value).endswith("get the file again")
+
+
+@pytest.mark.parametrize("sides", [(0, 480), (1e9, 480), ("wide", 480), (None, 480), (640.5, 480)])
+def test_a_size_of_no_picture_is_not_known(tmp_path: Path, sides: tuple[object, object]) -> None:
+    shape = {"label": "person", "shape_type": "rectangle", "points": [[1, 2], [30, 80]]}
+    label = {"flags": {}, "shapes": [shape], "imageWidth": sides[0], "imageHeight": sides[1]}
+    path = tmp_path / "frame_7.json"
+    path.write_text(json.dumps(label))
+    assert _piece(path).image_size is None
+    path.write_text(json.dumps({**label, "imageWidth": 640}))
+    assert _piece(path).image_size == (640, 480)
+
+
 def _percent(box: list[float]) -> dict[str, float]:
     # from the corner of the first pixel
     parts = np.add(box, [0.5, 0.5, 0.0, 0.0]) / (*SIZE, *SIZE)

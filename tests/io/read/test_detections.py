@@ -15,6 +15,7 @@ from numpy import ndarray
 from tests.io.read.rig import SIZE, boxes, cameras, read, walks
 from tracker.io.conventions.reading import read_boxes
 from tracker.io.importing.finding.times import on_one_clock
+from tracker.io.read.columns import people
 from tracker.io.read.pieces import DetectionPiece, FormatError, TruthPiece
 from tracker.io.read.registry import recognise
 from tracker.io.read.source import SourceFile
@@ -699,3 +700,28 @@ def test_lists_of_something_else_are_no_boxes(tmp_path: Path, content: object) -
     path.write_text(json.dumps(content))
     found, _, _ = recognise(SourceFile(path))
     assert found is None or found.KIND != "detections"
+
+
+def test_a_number_that_is_none_is_named_by_its_row(tmp_path: Path) -> None:
+    path = tmp_path / "cam1.txt"
+    path.write_text("1,-1,1,2,3,4,1\n2,-1,1e300,2,3,4,1\n")
+    with pytest.raises(FormatError) as told:
+        read(path)
+    assert str(told.value).startswith("cam1.txt, row 2: expected finite numbers, found ")
+    assert "1e300" in str(told.value)
+    assert str(told.value).endswith("; correct or remove the row")
+
+
+def test_a_column_of_boxes_may_have_any_of_their_names(tmp_path: Path) -> None:
+    path = tmp_path / "boxes.csv"
+    path.write_text('frame,camera,score,xyxy\n0,a,0.9,"[1, 2, 30, 40]"\n4,a,0.8,"[2, 2, 30, 40]"\n')
+    (piece,) = read(path)[1]
+    assert isinstance(piece, DetectionPiece)
+    np.testing.assert_array_equal(piece.boxes, [[1, 2, 30, 40], [2, 2, 30, 40]])
+    np.testing.assert_array_equal(piece.frames, [0, 4])
+
+
+def test_every_name_of_people_counts_in_every_table() -> None:
+    assert people(["player", "ball", "Woman "]).tolist() == [True, False, True]
+    assert people(["1", "0", "2"]).tolist() == [False, True, False]
+    assert people(["1", "2"]).tolist() == [True, False]

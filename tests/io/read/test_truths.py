@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.io.read.rig import read
-from tracker.io.read.pieces import DetectionPiece, TruthPiece
+from tracker.io.read.pieces import DetectionPiece, TruthPiece, unit_named
 
 
 def _truth(path: Path, *series: Path) -> TruthPiece:
@@ -116,3 +116,11 @@ def test_two_corners_are_no_people(tmp_path: Path) -> None:
     path = tmp_path / "cam1.csv"
     path.write_text("frame,x1,y1,x2,y2\n0,3,1,20,40\n2,3,5,20,60\n")
     assert isinstance(read(path)[1][0], DetectionPiece)
+
+
+@pytest.mark.parametrize(
+    ("word", "unit"),
+    [("mm", "mm"), ("Millimeters", "mm"), ("centimetres", "cm"), ("meters", "m"), ("inches", None)],
+)
+def test_a_unit_is_known_by_its_sign_and_its_name(word: str, unit: str | None) -> None:
+    assert unit_named(word) == unit

@@ -10,11 +10,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from tracker.io.checks.boxes import check_boxes, listen
+from tracker.io.checks.boxes import check_boxes, judge_boxes
 from tracker.io.checks.cameras import check_lenses, check_places
 from tracker.io.checks.timing import check_counting, check_time
 from tracker.io.checks.truth import check_truth
-from tracker.io.conventions.readings import EVERY_ORDER
+from tracker.io.conventions.judge import EVERY_ORDER
 from tracker.sequences.finding import Check, Remedy, Status, absent
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Detections, Sequence
@@ -43,18 +43,18 @@ def check(
     """
     truth = check_truth(sequence)
     sequence = _surest(sequence)
-    told = listen(sequence, exchanges=not quick or len(sequence.views) <= EVERY_ORDER)
-    found = [*check_boxes(sequence, told)]
+    judged = judge_boxes(sequence, exchanges=not quick or len(sequence.views) <= EVERY_ORDER)
+    found = [*check_boxes(sequence, judged)]
     lenses = check_lenses(sequence.cameras)
-    if told is not None and told.mistaken:
+    if judged is not None and judged.mistaken:
         return [*found, lenses, check_counting(sequence, places=False)]
     found += [lenses, *check_places(sequence.cameras, sequence.room)]
-    if told is not None and told.verdict.moved:
+    if judged is not None and judged.verdict.moved:
         found.append(absent("cameras show the same moments", "a camera that was moved comes first"))
     elif not quick and (sequence.has_detections or pictures):
-        verdict = None if told is None else told.verdict
+        verdict = None if judged is None else judged.verdict
         found += check_time(sequence, reader, verdict=verdict)
-    if told is not None:
+    if judged is not None:
         found.append(check_counting(sequence))
     found.append(truth)
     return found

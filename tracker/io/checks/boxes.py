@@ -12,15 +12,7 @@ from numpy import ndarray
 from tracker.geometry.consistency.consensus import Consensus
 from tracker.geometry.consistency.observed import pose_of
 from tracker.geometry.consistency.suggestion import LEAST_AGREEING, Suggestion, stands, suggest
-from tracker.io.conventions.level import confirmed, upwards
-from tracker.io.conventions.questions import (
-    LAYOUTS,
-    PARTS,
-    describe_moved,
-    describe_unconfirmed,
-)
-from tracker.io.conventions.reading import Reading, exchanged, exchanges
-from tracker.io.conventions.readings import (
+from tracker.io.conventions.judge import (
     LEAST_SHARE,
     Judge,
     Judged,
@@ -28,6 +20,15 @@ from tracker.io.conventions.readings import (
     Seen,
     compared,
 )
+from tracker.io.conventions.level import confirmed, upwards
+from tracker.io.conventions.questions import (
+    LAYOUTS,
+    PARTS,
+    describe_moved,
+    describe_unconfirmed,
+    stating_flags,
+)
+from tracker.io.conventions.reading import Reading, exchanged
 from tracker.io.conventions.search import Verdict, as_meant, find_reading
 from tracker.io.conventions.sizes import likely_unit
 from tracker.io.read.pieces import METRES, RawCamera
@@ -50,22 +51,22 @@ _LEAST_EXPECTED = 50
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class BoxesTell:
-    """What the boxes of a sequence say of it."""
+class JudgedBoxes:
+    """The interpretation of a sequence that its boxes support, and that of its file."""
 
     given: Judged
-    """With the calibration and the boxes as the file has them."""
+    """How well the boxes meet with the calibration and the boxes as the file has them."""
     reading: Reading
-    """The one that is likelier than all others, with unit and way up; that of the file where
-    none is."""
+    """The interpretation that is likelier than all others, with unit and way up; that of the file
+    where none is."""
     chosen: Judged
-    """With this reading."""
+    """How well the boxes meet with this interpretation."""
     mistaken: bool
-    """Whether this is another reading than that of the file."""
+    """Whether it is another interpretation than that of the file."""
     verdict: Verdict
-    """What the search over all readings tells."""
+    """The result of the search over all interpretations."""
     suggestion: Suggestion | None
-    """Room and size, where the file is read rightly."""
+    """The room and the size of people, where the file is read rightly."""
 
 
 def raw_cameras(sequence: Sequence) -> tuple[RawCamera, ...]:
@@ -97,7 +98,7 @@ def seen_boxes(sequence: Sequence) -> list[Seen | None]:
     return seen
 
 
-def listen(sequence: Sequence, *, exchanges: bool = True) -> BoxesTell | None:
+def judge_boxes(sequence: Sequence, *, exchanges: bool = True) -> JudgedBoxes | None:
     """Judge all usual readings of a sequence; None where fewer than two cameras have boxes.
 
     Args:
@@ -126,22 +127,22 @@ def listen(sequence: Sequence, *, exchanges: bool = True) -> BoxesTell | None:
     agreed = mistaken or chosen.consensus.agreeing >= LEAST_AGREEING
     right = reading == AS_GIVEN and agreed
     suggestion = suggest(sequence.cameras, given.consensus) if right else None
-    return BoxesTell(given, reading, chosen, agreed and reading != AS_GIVEN, verdict, suggestion)
+    return JudgedBoxes(given, reading, chosen, agreed and reading != AS_GIVEN, verdict, suggestion)
 
 
 def _fits(height: float, known: float) -> bool:
     return _SMALLER * known < height < _TALLER * known
 
 
-def check_boxes(sequence: Sequence, told: BoxesTell | None) -> Iterator[Check]:
+def check_boxes(sequence: Sequence, judged: JudgedBoxes | None) -> Iterator[Check]:
     """Do boxes meet, as the file is read, and are people of a plausible size where they should be.
 
     Args:
-        sequence: Whose boxes.
-        told: As :func:`listen` has it.
+        sequence: The sequence with the boxes.
+        judged: The result of :func:`judge_boxes`.
     """
     name = "boxes meet in 3D"
-    if told is None:
+    if judged is None:
         few = sum(view.detections is not None for view in sequence.views)
         why = "no camera has boxes" if not few else "fewer than two cameras have boxes at a step"
         yield absent(
@@ -150,12 +151,12 @@ def check_boxes(sequence: Sequence, told: BoxesTell | None) -> Iterator[Check]:
             "unit and axes against people, nor their size",
         )
         return
-    if told.mistaken:
-        yield _mistake(sequence, told)
+    if judged.mistaken:
+        yield _mistake(sequence, judged)
         return
-    agreed = told.given.consensus
+    agreed = judged.given.consensus
     if agreed.agreeing < LEAST_AGREEING or agreed.share < LEAST_SHARE:
-        yield _nothing_meets(told)
+        yield _nothing_meets(judged)
         return
     gap = float(np.median(agreed.gaps)) * agreed.height
     pixels = _pixels(sequence, gap / agreed.height)
@@ -167,41 +168,34 @@ def check_boxes(sequence: Sequence, told: BoxesTell | None) -> Iterator[Check]:
         metres=gap,
         pixels=pixels,
     )
-    yield _tilt(sequence, told)
-    yield from _stray_cameras(sequence, told)
-    yield from _moved_cameras(sequence, told)
-    yield _size(sequence, told)
-    yield _inside(sequence, told)
+    yield _tilt(sequence, judged)
+    yield from _stray_cameras(sequence, judged)
+    yield from _moved_cameras(sequence, judged)
+    yield _size(sequence, judged)
+    yield _inside(sequence, judged)
 
 
-def _mistake(sequence: Sequence, told: BoxesTell) -> Check:
+def _mistake(sequence: Sequence, judged: JudgedBoxes) -> Check:
     """The one reading that lets boxes meet, and how far that of the file is off."""
-    reading, agreed = told.reading, told.chosen.consensus
+    reading, agreed = judged.reading, judged.chosen.consensus
     names = [camera.name for camera in sequence.cameras]
     words: list[str] = []
-    remedies: list[Remedy] = []
+    remedies = stating_flags(reading, AS_GIVEN, names)
     if reading.direction != "world-to-camera":
         words.append("the poses inverted")
-        remedies.append(Remedy("--pose", reading.direction))
     if reading.axes != "opencv":
         words.append("OpenGL's camera axes (y up, z back)")
-        remedies.append(Remedy("--axes", reading.axes))
     if reading.layout != "ltwh":
         words.append(f"boxes read as {LAYOUTS[reading.layout]}")
-        remedies.append(Remedy("--boxes", reading.layout))
     if reading.parts:
         words.append(f"boxes read as {PARTS[reading.parts]}")
-    if reading.parts == 1:
-        remedies.append(Remedy("--boxes", f"{reading.layout}-normalised"))
     if reading.order is not None:
-        pairs = exchanged(reading.order, names)
-        words.append(f"the calibrations exchanged ({pairs})")
-        remedies += [Remedy("--swap", f"{a}={b}") for a, b in exchanges(reading.order, names)]
+        words.append(f"the calibrations exchanged ({exchanged(reading.order, names)})")
     if reading.mirrored:
         words.append("a left-handed world")
     if reading.flipped:
         words.append("left and right of the pictures exchanged")
-    shared = told.given.consensus.share
+    shared = judged.given.consensus.share
     if words:
         sentence = (
             f"with {' and '.join(words)} {percent(agreed.share)} of the boxes of several cameras "
@@ -230,10 +224,10 @@ def _mistake(sequence: Sequence, told: BoxesTell) -> Check:
     )
 
 
-def _nothing_meets(told: BoxesTell) -> Check:
-    agreed = told.given.consensus
+def _nothing_meets(judged: JudgedBoxes) -> Check:
+    agreed = judged.given.consensus
     few = agreed.possible < 3 * LEAST_AGREEING
-    if few or told.verdict.kind in ("open", "unproven"):
+    if few or judged.verdict.kind in ("open", "unproven"):
         return absent(
             "boxes meet in 3D", "too few boxes meet to tell how calibration and boxes are meant"
         )
@@ -252,11 +246,11 @@ def _pixels(sequence: Sequence, share: float) -> float:
     return share * float(np.median(np.concatenate(heights)))
 
 
-def _tilt(sequence: Sequence, told: BoxesTell) -> Check:
+def _tilt(sequence: Sequence, judged: JudgedBoxes) -> Check:
     """Boxes alone do not tell: they lean in cameras that are rolled."""
-    agreed = told.given.consensus
+    agreed = judged.given.consensus
     poses = [pose_of(camera) for camera in sequence.cameras]
-    up = confirmed(agreed, told.given.pictured, poses, told.given.turns)
+    up = confirmed(agreed, judged.given.pictured, poses, judged.given.turns)
     tilt = 0.0 if up is None else float(np.arccos(np.clip(up[2], -1.0, 1.0)))
     degrees = float(np.degrees(tilt))
     if tilt > _TILT:
@@ -268,8 +262,8 @@ def _tilt(sequence: Sequence, told: BoxesTell) -> Check:
     return good("people stand upright", "people stand along the z axis", degrees=degrees)
 
 
-def _size(sequence: Sequence, told: BoxesTell) -> Check:
-    height = told.given.consensus.height
+def _size(sequence: Sequence, judged: JudgedBoxes) -> Check:
+    height = judged.given.consensus.height
     known = 2.0 * float(sequence.target_half_extents[2])
     if height < _SMALLEST:
         return warning(
@@ -284,7 +278,7 @@ def _size(sequence: Sequence, told: BoxesTell) -> Check:
             f"boxes are {height:.2f} m tall in the room, the target is {known:.2f} m",
             height=height,
         )
-    own = suggest(sequence.cameras, told.given.consensus)
+    own = suggest(sequence.cameras, judged.given.consensus)
     remedy = (
         ()
         if own is None
@@ -298,16 +292,16 @@ def _size(sequence: Sequence, told: BoxesTell) -> Check:
     )
 
 
-def _inside(sequence: Sequence, told: BoxesTell) -> Check:
+def _inside(sequence: Sequence, judged: JudgedBoxes) -> Check:
     """Cameras whose boxes agree with no other's show nobody whose place is known."""
-    agreed, room = told.given.consensus, sequence.room
+    agreed, room = judged.given.consensus, sequence.room
     names = [camera.name for camera in sequence.cameras]
-    without = describe_unconfirmed(told.verdict, names, sequence.fps).without
+    without = describe_unconfirmed(judged.verdict, names, sequence.fps).without
     known = [name for name in names if name not in without]
     people = f"the people whom the boxes{f' of {listed(known)}' if without else ''} show"
     middles = agreed.feet + agreed.rises / 2.0
     inside = float(room.contains(middles, 0.5).mean())
-    own = told.suggestion
+    own = judged.suggestion
     if inside < _LEAST_INSIDE and own is not None:
         low, high = (
             str([round(float(value), 1) for value in corner])
@@ -336,19 +330,19 @@ def _inside(sequence: Sequence, told: BoxesTell) -> Check:
     )
 
 
-def _stray_cameras(sequence: Sequence, told: BoxesTell) -> Iterator[Check]:
+def _stray_cameras(sequence: Sequence, judged: JudgedBoxes) -> Iterator[Check]:
     """A camera whose boxes agree with no other's, or that has none where others see somebody: its
     own pose or clock is off."""
     name_of_check = "every camera agrees with another"
     names = [camera.name for camera in sequence.cameras]
-    doubtful = describe_unconfirmed(told.verdict, names, sequence.fps)
+    doubtful = describe_unconfirmed(judged.verdict, names, sequence.fps)
     if doubtful.alone:
         yield warning(name_of_check, doubtful.alone, cameras=doubtful.without)
     if len(sequence.views) < 3 or doubtful.alone:
         return
     shares: dict[str, float] = {}
     for index, view in enumerate(sequence.views):
-        hits = _found_where_expected(view, index, told.given.consensus)
+        hits = _found_where_expected(view, index, judged.given.consensus)
         if len(hits) >= _LEAST_EXPECTED:
             shares[view.camera.name] = float(hits.mean())
     for name, share in shares.items():
@@ -367,9 +361,9 @@ def _stray_cameras(sequence: Sequence, told: BoxesTell) -> Iterator[Check]:
         yield good(name_of_check, f"{whose}each one's boxes meet others'")
 
 
-def _moved_cameras(sequence: Sequence, told: BoxesTell) -> Iterator[Check]:
+def _moved_cameras(sequence: Sequence, judged: JudgedBoxes) -> Iterator[Check]:
     """A camera whose boxes meet the others' better once it is turned."""
-    moved = told.verdict.moved
+    moved = judged.verdict.moved
     sentences = describe_moved(moved, [camera.name for camera in sequence.cameras])
     if sentences:
         yield warning(

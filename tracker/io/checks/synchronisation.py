@@ -15,7 +15,7 @@ from tracker.geometry.consistency.sliding import LinkedBoxes, agreement_by_offse
 from tracker.geometry.consistency.suggestion import LEAST_AGREEING, consensus_of_cameras
 from tracker.io.checks.motion import MOST_STEPS, motion_pairings
 from tracker.io.checks.offsets import Curve, Offset, Pairing, solve
-from tracker.io.conventions.readings import compared
+from tracker.io.conventions.judge import compared
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Detections, Sequence
 

@@ -18,8 +18,8 @@ from numpy import ndarray
 from tracker.geometry.consistency.consensus import LARGEST_GAP, SPREAD
 from tracker.geometry.consistency.likelihood import Moments, at_moments
 from tracker.geometry.consistency.observed import in_world, rays_of
+from tracker.io.conventions.judge import Judge, Seen
 from tracker.io.conventions.reading import Reading, boxes_by, pose
-from tracker.io.conventions.readings import Judge, Seen
 from tracker.kernels import consistency as kernels
 
 MOST_CAMERAS = 8

@@ -167,21 +167,33 @@ def _open(best: Reading, rival: Reading, odds: float, names: Sequence[str]) -> Q
     )
 
 
-def _flags(wanted: Reading, other: Reading, names: Sequence[str]) -> tuple[Remedy, ...]:
-    """The flags that state what one reading has and the other has not."""
+def stating_flags(wanted: Reading, other: Reading, names: Sequence[str]) -> list[Remedy]:
+    """The flags of an import that state what one interpretation has and the other has not.
+
+    Args:
+        wanted: The interpretation to state.
+        other: The interpretation that it is told from.
+        names: The names of the cameras.
+    """
     flags = []
     if wanted.direction != other.direction:
         flags.append(Remedy("--pose", wanted.direction))
     if wanted.axes != other.axes:
         flags.append(Remedy("--axes", wanted.axes))
-    if wanted.layout != other.layout:
-        flags.append(Remedy("--boxes", wanted.layout))
+    normalised = "-normalised" if wanted.parts == 1 != other.parts else ""
+    if wanted.layout != other.layout or normalised:
+        flags.append(Remedy("--boxes", f"{wanted.layout}{normalised}"))
     if wanted.turns != other.turns:
         flags.append(Remedy("--euler", wanted.turns.split(" in ")[0]))
     if wanted.order != other.order and wanted.order is not None:
         pairs = exchanges(wanted.order, names)
         flags += [Remedy("--swap", f"{first}={second}") for first, second in pairs]
-    return tuple(flags) or (Remedy(ACCEPT, ""),)
+    return flags
+
+
+def _flags(wanted: Reading, other: Reading, names: Sequence[str]) -> tuple[Remedy, ...]:
+    """The flags that decide for an interpretation; the one that accepts it where none states it."""
+    return tuple(stating_flags(wanted, other, names)) or (Remedy(ACCEPT, ""),)
 
 
 def in_words(reading: Reading, names: Sequence[str], parts: Sequence[str] = ()) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
+from tracker.geometry.calibration import size_around
 from tracker.geometry.camera import Camera
 from tracker.geometry.consistency.observed import Pose
 from tracker.io.read.pieces import IN_DEGREES, METRES, Axes, Direction, Layout, RawCamera, Unit, Up
@@ -226,9 +227,7 @@ def likely_size(camera: RawCamera) -> tuple[int, int]:
     """The picture's size where only the lens is known: the principal point is near its middle."""
     if camera.image_size is not None:
         return camera.image_size
-    middle = lens_of(camera, (1, 1)).intrinsics[:2, 2]
-    width, height = (max(2, round(2.0 * float(value) + 1.0)) for value in middle)
-    return width, height
+    return size_around(lens_of(camera, (1, 1)).intrinsics[:2, 2])
 
 
 def exchanged(order: Many[int], names: Many[str]) -> str:

@@ -32,10 +32,10 @@ from tracker.geometry.consistency.likelihood import (
 )
 from tracker.geometry.consistency.observed import Pose, Rays, rays_of
 from tracker.geometry.consistency.odds import DECISIVE, log_odds
+from tracker.io.conventions.judge import EVERY_ORDER, Judge, Judged, Open, Seen, restricted
 from tracker.io.conventions.level import upwards
 from tracker.io.conventions.orders import MOST_CAMERAS, likely_orders
 from tracker.io.conventions.reading import Reading, boxes_by, turns_of
-from tracker.io.conventions.readings import EVERY_ORDER, Judge, Judged, Open, Seen, restricted
 from tracker.io.read.pieces import RawCamera, Unit, Up
 
 MOST_MOMENTS = 120

@@ -7,14 +7,13 @@ they were read.
 
 from __future__ import annotations
 
-import os
 import stat
 import struct
 import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
-from tracker.io.importing.gathering import MOST_DEPTH, MOST_FILES, ParsedFiles, gather
+from tracker.io.importing.gathering import MOST_FILES, ParsedFiles, gather, walk
 from tracker.io.read.pieces import FormatError
 
 FRESH_SECONDS = 2.0
@@ -52,13 +51,8 @@ def _files(sources: Sequence[Path]) -> Iterator[Path]:
         if not source.is_dir():
             yield source
             continue
-        for folder, folders, names in os.walk(source):
-            here = Path(folder)
-            deep = len(here.relative_to(source).parts) >= MOST_DEPTH
-            folders[:] = [] if deep else [name for name in folders if not name.startswith(".")]
-            for name in names:
-                if not name.startswith("."):
-                    yield here / name
+        for here, names, _ in walk(source):
+            yield from (here / name for name in names)
             count += len(names)
             if count > MOST_FILES:
                 return  # who gathers them says so

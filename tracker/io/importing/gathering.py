@@ -145,6 +145,18 @@ class _Crowd:
         return ParsedFiles(label, "", Certainty.NO, complaint=complaint, unopened=self.passed)
 
 
+def walk(source: Path) -> Iterator[tuple[Path, list[str], list[str]]]:
+    """Yield each folder in a folder, with the names of the files and of the folders in it.
+
+    What is hidden, and what lies deeper than :data:`MOST_DEPTH`, is left out.
+    """
+    for folder, folders, names in os.walk(source):
+        here = Path(folder)
+        deep = len(here.relative_to(source).parts) >= MOST_DEPTH
+        folders[:] = [] if deep else sorted(name for name in folders if not name.startswith("."))
+        yield here, sorted(name for name in names if not name.startswith(".")), folders
+
+
 def _walk(source: Path, root: Path) -> tuple[list[Path], list[ParsedFiles]]:
     """Ordinary files, and what leads out of the folder."""
     if source.is_file():
@@ -152,16 +164,9 @@ def _walk(source: Path, root: Path) -> tuple[list[Path], list[ParsedFiles]]:
     home = root.resolve()
     files: list[Path] = []
     strays: list[ParsedFiles] = []
-    for folder, folders, names in os.walk(source):
-        here = Path(folder)
-        depth = len(here.relative_to(source).parts)
-        folders[:] = (
-            sorted(f for f in folders if not f.startswith(".")) if depth < MOST_DEPTH else []
-        )
+    for here, names, folders in walk(source):
         for name in sorted([*names, *(f for f in folders if (here / f).is_symlink())]):
             path = here / name
-            if name.startswith("."):
-                continue
             if path.is_symlink() and not _stays(path, home):
                 strays.append(_stray(path, root, "a symbolic link leads out of the folder"))
             elif path.is_file():
@@ -226,8 +231,13 @@ def _read(series: tuple[Path, ...], root: Path) -> Iterator[ParsedFiles]:
             taken = ParsedFiles(own.where, "", Certainty.NO, complaint=complaint, files=(path,))
         yield taken if taken.pieces else _without_spoilt_rows(own, taken)
     if found is None and len(series) >= _LOOKED_AT:
-        label = f"{SourceFile(series[0], root).where} … ({len(series)})"
+        label = _label(series, root)
         yield ParsedFiles(label, "", Certainty.NO, complaint=complaint, files=series)
+
+
+def _label(series: Sequence[Path], root: Path) -> str:
+    """What a series is called: its first file, and how many there are."""
+    return f"{SourceFile(series[0], root).where} … ({len(series)})"
 
 
 def _without_spoilt_rows(file: SourceFile, taken: ParsedFiles) -> ParsedFiles:
@@ -283,7 +293,7 @@ def _series_pieces(
     Where these are more than half of the files, the rest is not used either.
     """
     series = file.series
-    label = f"{SourceFile(series[0], root).where} … ({len(series)})"
+    label = _label(series, root)
     taken = _pieces(found, certainty, file, label)
     if not taken.complaint:
         yield taken
@@ -300,20 +310,18 @@ def _series_pieces(
     spoilt = [one for one in tried if not one.pieces]
     if mended and len(spoilt) <= len(whole) + len(mended):
         yield from (*mended, *spoilt)
-        if whole:
-            label = f"{SourceFile(whole[0], root).where} … ({len(whole)})"
-            yield _pieces(found, certainty, SourceFile(whole[0], root, whole), label)
-        return
-    if not whole or not 0 < len(spoilt) <= _LOOKED_AT:
+    elif not whole or not 0 < len(spoilt) <= _LOOKED_AT:
         yield taken
         return
-    if len(spoilt) > len(whole):
+    elif len(spoilt) > len(whole):
         share = f"{len(spoilt)} of {len(series)} files cannot be read, so the others are not used"
         yield replace(taken, complaint=f"{label}: {share}; {spoilt[0].complaint}")
         return
-    yield from spoilt
-    label = f"{SourceFile(whole[0], root).where} … ({len(whole)})"
-    yield _pieces(found, certainty, SourceFile(whole[0], root, whole), label)
+    else:
+        yield from spoilt
+    if whole:
+        file = SourceFile(whole[0], root, whole)
+        yield _pieces(found, certainty, file, _label(whole, root))
 
 
 def _pieces(found: Format, certainty: Certainty, file: SourceFile, label: str) -> ParsedFiles:

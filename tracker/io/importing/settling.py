@@ -20,6 +20,7 @@ from tracker.geometry.consistency.suggestion import (
     consensus_of_cameras,
     suggest,
 )
+from tracker.io.conventions.judge import Open, Seen, compared
 from tracker.io.conventions.level import lean_of
 from tracker.io.conventions.orders import MOST_CAMERAS
 from tracker.io.conventions.questions import (
@@ -37,7 +38,6 @@ from tracker.io.conventions.questions import (
     rearranged,
 )
 from tracker.io.conventions.reading import Reading, read_boxes, to_camera
-from tracker.io.conventions.readings import Open, Seen, compared
 from tracker.io.conventions.search import ClockFit, Verdict, as_meant, find_reading
 from tracker.io.importing.arriving import short_videos
 from tracker.io.importing.finding.angles import check_turns, chosen_turns, turns_in_words

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tracker.files.text import shown
-from tracker.io.read.columns import decimal_points
+from tracker.io.read.columns import decimal_points, delimiter_of
 from tracker.io.read.source import MOST_TREE_BYTES, SourceFile
 
 _FEWEST = 10
@@ -91,7 +91,7 @@ def is_table(file: SourceFile) -> bool:
 
 def _cells(line: str) -> list[str]:
     line = decimal_points(line)
-    delimiter = max(",;\t", key=line.count)
+    delimiter = delimiter_of(line)
     return [cell.strip() for cell in (line.split(delimiter) if delimiter in line else line.split())]
 
 

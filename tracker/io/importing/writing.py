@@ -15,9 +15,8 @@ from tracker.io.conventions.questions import ACCEPT
 from tracker.io.importing.bringing import Told, bring, bring_images, free_place
 from tracker.io.importing.settling import ImportPlan, PlannedView, plain_name
 from tracker.io.read.pieces import FormatError
+from tracker.sequences.reader import FILE
 from tracker.sequences.writing.csv_files import steps_without_boxes, write_boxes, write_truth
-
-FILE = "sequence.toml"
 
 
 def write(

@@ -20,7 +20,7 @@ from numpy import ndarray
 
 from tracker.files.text import shown
 from tracker.io.read.picture_names import camera_of, number_in
-from tracker.io.read.pieces import DetectionPiece, Layout, Piece, TruthPiece, Unit
+from tracker.io.read.pieces import DetectionPiece, Layout, Piece, TruthPiece, unit_named
 from tracker.io.read.source import SourceFile
 from tracker.io.read.values import plain
 
@@ -58,8 +58,11 @@ WORDS: dict[str, tuple[str, ...]] = {
 }  # fmt: skip
 """Names, without case, blanks and underscores, of each meaning; the first that is there counts."""
 
-PEOPLE = ("person", "pedestrian", "people", "human", "1", "0")
-"""Classes that are people: by name, or the first of COCO (1) and of YOLO (0)."""
+PEOPLE = ("person", "people", "pedestrian", "human", "man", "woman", "player")
+"""Names of classes that are people."""
+
+_FIRST_CLASSES = ("0", "1")
+"""The numbers of people among the classes of YOLO and of COCO."""
 
 _LISTED = 4
 """Classes that a sentence names."""
@@ -94,6 +97,11 @@ Column = Sequence[Any]
 def decimal_point(cell: str) -> str:
     """A number with a decimal comma as one with a point; any other cell as it is."""
     return cell.replace(",", ".") if _DECIMAL_COMMA.fullmatch(cell.strip()) else cell
+
+
+def delimiter_of(line: str) -> str:
+    """The sign between the cells of a row: of comma, semicolon and tab the most frequent one."""
+    return max(",;\t", key=line.count)
 
 
 def decimal_points(line: str) -> str:
@@ -141,13 +149,8 @@ def is_table(names: Sequence[str]) -> bool:
     found = meanings(names)
     when = "frame" in found or "time" in found
     placed = "place" in found or ("x" in found and "y" in found)
-    return layout_of(found) is not None or (when and "id" in found and placed)
-
-
-def has_boxes(names: Sequence[str]) -> bool:
-    """Whether there are frames or times, and a column with all numbers of a box."""
-    found = meanings(names)
-    return "box" in found and not found.keys().isdisjoint(("frame", "time"))
+    has_boxes = "box" in found or layout_of(found) is not None
+    return has_boxes or (when and "id" in found and placed)
 
 
 def singular(name: str) -> str:
@@ -211,7 +214,7 @@ def _pieces(
 ) -> Iterator[DetectionPiece | TruthPiece]:
     found = meanings(list(columns))
     rows = len(next(iter(columns.values()), ()))
-    when = Times()
+    when = RowTimes()
     if frame is None and "frame" not in found and "time" in found:
         column = found["time"]
         times = _numbers(file, column, [_seconds(cell) for cell in columns[column]])
@@ -271,7 +274,7 @@ def _detections(
     frames: Int[ndarray, " D"],
     boxes: Float[ndarray, "D 4"],
     layout: Layout | None,
-    when: Times,
+    when: RowTimes,
 ) -> Iterator[DetectionPiece]:
     scores = np.ones(len(frames))
     if "score" in found:
@@ -372,7 +375,7 @@ def people(classes: Sequence[str]) -> Bool[ndarray, " D"]:
     A single class other than those is taken for people whatever it is called.
     """
     words = [re.sub(r"\.0$", "", word.strip().lower()) for word in classes]
-    for group in (PEOPLE[:4], ("0",), ("1",)):
+    for group in (PEOPLE, *((number,) for number in _FIRST_CLASSES)):
         is_one = np.array([word in group for word in words], dtype=bool)
         if is_one.any():
             return is_one
@@ -385,7 +388,7 @@ def _truth(
     columns: Mapping[str, Column],
     found: Mapping[str, str],
     frames: Int[ndarray, " G"],
-    when: Times,
+    when: RowTimes,
 ) -> TruthPiece:
     axes = [axis for axis in "xyz" if axis in found]
     places = np.full((len(frames), 3), np.nan)
@@ -395,10 +398,6 @@ def _truth(
     valid = None
     if "valid" in found:
         valid = _numbers(file, found["valid"], columns[found["valid"]]) > 0.5
-    unit: Unit | None = None
-    ending = plain(found["x"])[-2:]
-    if ending in ("mm", "cm"):
-        unit = "mm" if ending == "mm" else "cm"
     good = np.isfinite(places[:, :2]).all(axis=1)
     return TruthPiece(
         source=file.path,
@@ -406,7 +405,7 @@ def _truth(
         frames=frames[good],
         ids=ids[good],
         positions=places[good],
-        unit=unit,
+        unit=unit_named(plain(found["x"])[-2:]),
         valid=None if valid is None else valid[good],
         fps=when.fps,
         begins=when.begins,
@@ -465,7 +464,7 @@ def _number_of(cell: Any) -> float:
     return np.nan if number is None else float(number)
 
 
-class Times(NamedTuple):
+class RowTimes(NamedTuple):
     """What a column of times says of frames."""
 
     fps: float | None = None
@@ -476,7 +475,7 @@ class Times(NamedTuple):
 
 def frames_of_times(
     times: Float[ndarray, " D"], milliseconds: bool = False
-) -> tuple[Int[ndarray, " D"], Times]:
+) -> tuple[Int[ndarray, " D"], RowTimes]:
     """Frames that are as far apart as the times, counted from time 0 or the first of dates.
 
     Times are seconds, or milliseconds where whole numbers would be :data:`_SELDOM` apart; since the
@@ -509,7 +508,7 @@ def frames_of_times(
     steps = np.round(apart / np.median(apart))
     fps = float(round(steps.sum() / apart[steps > 0].sum(), 3))
     begins = None if parts is None else first / parts
-    return np.round(seconds * fps).astype(np.int64), Times(fps, begins)
+    return np.round(seconds * fps).astype(np.int64), RowTimes(fps, begins)
 
 
 def parts_of_date(time: float) -> float | None:

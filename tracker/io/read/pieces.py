@@ -11,7 +11,7 @@ pixel's corner subtract half a pixel.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Literal
@@ -40,6 +40,19 @@ IN_DEGREES = " in degrees"
 
 METRES: dict[Unit, float] = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 """Metres in one of each unit."""
+
+
+_UNIT_WORDS: dict[Unit, tuple[str, ...]] = {
+    "m": ("m", "meter", "metre"),
+    "cm": ("cm", "centimeter", "centimetre"),
+    "mm": ("mm", "millimeter", "millimetre"),
+}
+
+
+def unit_named(word: str) -> Unit | None:
+    """Return the unit that a file names, short or in full; None for any other word."""
+    name = word.strip().lower().removesuffix("s")
+    return next((unit for unit, words in _UNIT_WORDS.items() if name in words), None)
 
 
 class FormatError(ValueError):
@@ -84,6 +97,26 @@ class RawCamera:
     projection: Float[ndarray, "3 4"] | None = None
     """The projection from world coordinates (in the convention's unit) to pixels, up to scale."""
 
+    @property
+    def has_pose(self) -> bool:
+        """Whether the file states the camera's pose."""
+        return self.projection is not None or self.rotation is not None
+
+    @property
+    def has_lens(self) -> bool:
+        """Whether the file states the camera's lens."""
+        return self.projection is not None or self.intrinsics is not None
+
+    def with_lens_of(self, other: RawCamera) -> RawCamera:
+        """Return the camera with the lens of another entry, and its size of pictures."""
+        return replace(
+            self,
+            image_size=other.image_size,
+            intrinsics=other.intrinsics,
+            distortion=other.distortion,
+            lens=other.lens,
+        )
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CalibrationPiece:
@@ -122,8 +155,6 @@ class DetectionPiece:
     """The time of frame 0 since the beginning of 1970, if the file has dates, seconds."""
     keypoints: Float[ndarray, "D J 3"] | None = None
     """x, y in pixels and confidence of J joints; NaN for a joint that is not seen."""
-    classes: tuple[str, ...] | None = None
-    """The class of each row."""
     image_size: tuple[int, int] | None = None
     """Width and height of the pictures, if the file states them, pixels."""
     left_out: str = ""

@@ -7,8 +7,9 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from tracker.files.text import shown
+from tracker.io.read.columns import delimiter_of
 from tracker.io.read.pieces import FormatError
-from tracker.io.read.source import SourceFile
+from tracker.io.read.source import NPY, ZIP, SourceFile
 
 
 class _Refused(NamedTuple):
@@ -31,7 +32,7 @@ def _is_pickle(file: SourceFile) -> bool:
 
 
 def _is_array_of_objects(file: SourceFile) -> bool:
-    return file.head.startswith(b"\x93NUMPY") and b"'|O'" in file.head[:256]
+    return file.head.startswith(NPY) and b"'|O'" in file.head[:256]
 
 
 def _is_motive(file: SourceFile) -> bool:
@@ -52,7 +53,7 @@ _KNOWN: tuple[_Refused, ...] = (
     _Refused("a NumPy array of Python objects (a pickle)", _is_array_of_objects, _ITSELF),
     _Refused(
         "a NumPy array of another shape than cameras or boxes have",
-        _starts(b"\x93NUMPY"),
+        _starts(NPY),
         "save rows of frame, left, top, width, height, columns by name (frame, id, x, y) as .npz, "
         "or K, R and t of a camera together as .npz",
     ),
@@ -121,7 +122,7 @@ _KNOWN: tuple[_Refused, ...] = (
 
 _ARCHIVE = _Refused(
     "an archive (ZIP, gzip, 7z, RAR or Excel's .xlsx; or a spoilt .npz)",
-    _starts(b"PK\x03\x04", b"PK\x05\x06", b"\x1f\x8b", b"7z\xbc\xaf\x27\x1c", b"Rar!\x1a"),
+    _starts(ZIP, b"PK\x05\x06", b"\x1f\x8b", b"7z\xbc\xaf\x27\x1c", b"Rar!\x1a"),
     "unpack it and name the folder; save a table as CSV",
 )
 
@@ -150,7 +151,7 @@ def refusal(file: SourceFile, complaint: FormatError | None = None) -> FormatErr
 def _header(file: SourceFile) -> tuple[str, ...]:
     """The names of the columns of a table of numbers; none of another file."""
     lines = file.head_text.splitlines()[:2]
-    delimiter = max(",;\t", key=lines[0].count) if len(lines) == 2 else ","
+    delimiter = delimiter_of(lines[0]) if lines else ","
     names, cells = (
         [cell.strip() for cell in line.split(delimiter)] for line in (lines + [""] * 2)[:2]
     )

@@ -8,20 +8,24 @@ from __future__ import annotations
 
 import io
 import json
+import math
 import os
 import re
 import tomllib
 import xml.etree.ElementTree as ElementTree
 import zipfile
 import zlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
+import numpy as np
 import yaml
+from numpy import ndarray
 
 from tracker.files.text import not_utf_8
+from tracker.io.read.picture_names import number_in
 from tracker.io.read.pieces import FormatError
 
 HEAD_BYTES = 65536
@@ -107,6 +111,13 @@ class SourceFile:
         member = SourceFile(path, self._root)
         member.companions = self.companions
         return member
+
+    def frames(self) -> Iterator[tuple[int, SourceFile]]:
+        """Yield each file of a series of one file a frame, after its frame: the number in its name,
+        else its place in the series."""
+        for place, path in enumerate(self.series):
+            number = number_in(path.name)
+            yield place if number is None else number, self.member(path)
 
     @property
     def label(self) -> str:
@@ -231,7 +242,10 @@ class SourceFile:
             except RecursionError:
                 raise self._too_deep() from None
             except ValueError:
-                raise self.error(f"line {number}: is not valid JSON, expected a record") from None
+                raise self.error(
+                    f"line {number}: is not valid JSON, expected a record; "
+                    "it may be cut short: get the file again"
+                ) from None
         return values
 
     @cached_property
@@ -267,7 +281,7 @@ class SourceFile:
                 "it may be cut short: get the file again"
             ) from None
         if root is None:
-            raise self.error("is not valid XML: it is empty")
+            raise self.error("is not valid XML: it is empty; get the file again")
         return root
 
     @cached_property
@@ -302,7 +316,9 @@ class SourceFile:
         try:
             return tomllib.loads(self.text(MOST_CONFIGURATION_BYTES))
         except tomllib.TOMLDecodeError as error:
-            raise self.error(f"is not valid TOML ({error})") from None
+            raise self.error(
+                f"is not valid TOML ({error}); it may be cut short: get the file again"
+            ) from None
         except RecursionError:
             raise self._too_deep() from None
         except ValueError:
@@ -398,7 +414,36 @@ for _kind in ("opencv-matrix", "opencv-nd-matrix"):
     _Loader.add_constructor(f"tag:yaml.org,2002:{_kind}", _matrix)
 
 
-def npz_members(data: bytes, most: int) -> dict[str, bytes] | None:
+NPY, ZIP = b"\x93NUMPY", b"PK\x03\x04"
+"""The first bytes of a NumPy array, and of an archive such as one of several arrays."""
+
+
+def npy_header(stream: IO[bytes]) -> tuple[tuple[int, ...], np.dtype[Any]]:
+    """Read the shape and the kind of numbers of a NumPy array; its numbers follow in the stream.
+
+    Raises:
+        ValueError: If it is no header of an array.
+    """
+    old = np.lib.format.read_magic(stream) == (1, 0)
+    read = np.lib.format.read_array_header_1_0 if old else np.lib.format.read_array_header_2_0
+    shape, _, kind = read(stream)
+    return shape, kind
+
+
+def read_npy(data: bytes) -> ndarray:
+    """Read a NumPy array, for which no more memory is taken than its bytes.
+
+    Raises:
+        ValueError: If it is cut short or has Python's objects.
+    """
+    stream = io.BytesIO(data)
+    shape, kind = npy_header(stream)
+    if kind.hasobject or math.prod(shape) * kind.itemsize != len(data) - stream.tell():
+        raise ValueError("the header says another size")
+    return np.asarray(np.load(io.BytesIO(data), allow_pickle=False))
+
+
+def read_npz(data: bytes, most: int) -> dict[str, ndarray] | None:
     """Unpack the arrays of an ``.npz``, of which a few bytes may stand for gigabytes.
 
     Args:
@@ -406,17 +451,19 @@ def npz_members(data: bytes, most: int) -> dict[str, bytes] | None:
         most: Largest size of all arrays together, bytes.
 
     Returns:
-        The content of each ``.npy`` by its name; None if together they are larger.
+        The arrays by their names; None if together they are larger.
 
     Raises:
-        ValueError: If it is no archive, or a damaged one.
+        ValueError: If it is no archive, or a damaged one, or an array is not valid.
     """
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             members = [one for one in archive.infolist() if one.filename.endswith(".npy")]
             if sum(one.file_size for one in members) > most:
                 return None
-            return {one.filename.removesuffix(".npy"): archive.read(one) for one in members}
+            return {
+                one.filename.removesuffix(".npy"): read_npy(archive.read(one)) for one in members
+            }
     except (zipfile.BadZipFile, EOFError, NotImplementedError, zlib.error) as error:
         raise ValueError(f"is no intact archive ({error})") from None
 

@@ -59,9 +59,7 @@ class TableFormat:
         table: dict[str, list[Any]] = {name: [] for name in self.columns if name not in _UNREAD}
         if self.SERIES:
             table["frame"] = []
-        for place, path in enumerate(file.series):
-            member = file.member(path)
-            number = number_in(path.name)
+        for frame, member in file.frames():
             for line, text in enumerate(member.lines(), 1):
                 if not text.strip():
                     continue
@@ -76,7 +74,7 @@ class TableFormat:
                     if name not in _UNREAD:
                         table[name].append(cell.strip('"'))
                 if self.SERIES:
-                    table["frame"].append(place if number is None else number)
+                    table["frame"].append(frame)
         yield from self._pieces(file, table)
 
     def _pieces(self, file: SourceFile, table: dict[str, list[Any]]) -> Iterator[Piece]:

@@ -172,6 +172,14 @@ def image_size(file: SourceFile, field: str, value: Any) -> tuple[int, int]:
     return _checked(file, field, geometry.checked_size, found)
 
 
+def stated_size(width: Any, height: Any) -> tuple[int, int] | None:
+    """Width and height beside boxes, pixels; None where they are missing or those of no picture."""
+    try:
+        return geometry.checked_size(np.array([width, height], dtype=float))
+    except (ValueError, TypeError, OverflowError):
+        return None
+
+
 def number(file: SourceFile, field: str, value: Any) -> float:
     """One finite number.
 
@@ -195,5 +203,26 @@ def need(file: SourceFile, table: Any, names: Iterable[str], where: str = "") ->
 
 
 def is_list_of_tables(value: Any) -> bool:
-    """Whether it is a list that begins with a table (or is empty)."""
+    """Whether it is a list of tables (or an empty one), by its first hundred items."""
     return isinstance(value, list) and all(isinstance(item, dict) for item in value[:100])
+
+
+def tables(file: SourceFile, field: str, value: Any) -> list[dict[str, Any]]:
+    """The tables of a list.
+
+    Raises:
+        FormatError: If it is anything else.
+    """
+    if not is_list_of_tables(value):
+        raise file.error(
+            f"expected a list of tables, found {shown(value)}; it may be spoilt: get the file "
+            "again",
+            field,
+        )
+    found: list[dict[str, Any]] = value
+    return found
+
+
+def field_of(value: Any, name: str) -> Any:
+    """What a table has in a field; None where there is none, or no table."""
+    return value.get(name) if isinstance(value, Mapping) else None

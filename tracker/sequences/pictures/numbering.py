@@ -58,7 +58,7 @@ def whole_row(images: Sequence[Path]) -> tuple[tuple[Path, ...], Bool[ndarray, "
 
 def by_number(text: str) -> list[str | int]:
     """Return a sort key that orders numbers in names by value."""
-    return [int(part) if part.isdigit() else part for part in _DIGITS.split(text)]
+    return [int(part) if k % 2 else part for k, part in enumerate(_DIGITS.split(text))]
 
 
 def _place(parts: Sequence[Sequence[str]]) -> int | None:

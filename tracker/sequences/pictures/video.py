@@ -22,6 +22,7 @@ from jaxtyping import Int, UInt8
 from numpy import ndarray
 
 from tracker.files.atomic import size_of
+from tracker.sequences.fields import LARGEST_COUNT
 from tracker.sequences.pictures.containers import MOST_PIXELS, VideoError, open_video
 
 __all__ = ["VideoDecoder", "VideoError", "VideoIndex", "index_video", "read_image"]
@@ -38,9 +39,6 @@ Right after a jump frames can be out of order by as many as a codec may reorder,
 
 LARGEST_IMAGE = 2**28
 """Largest size of an image file, more than cameras' pictures have with any compression, bytes."""
-
-MOST_FRAMES = 10_000_000
-"""Most frames of a video: four days at 25 frames per second."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -142,8 +140,8 @@ def _scan(path: Path) -> tuple[Int[ndarray, " F"], ndarray]:
                 "make them smaller"
             )
         while capture.grab():
-            if len(stamps) >= MOST_FRAMES:
-                raise VideoError(f"expected at most {MOST_FRAMES:,} frames, found more; cut it")
+            if len(stamps) >= LARGEST_COUNT:
+                raise VideoError(f"expected at most {LARGEST_COUNT:,} frames, found more; cut it")
             stamps.append(_time(capture))
             keys.append(capture.get(cv2.CAP_PROP_LRF_HAS_KEY_FRAME) > 0.0)
     finally:

@@ -31,12 +31,12 @@ class CameraSet:
     @property
     def posed(self) -> bool:
         """Whether every camera has a pose."""
-        return all(c.projection is not None or c.rotation is not None for c in self.cameras)
+        return all(camera.has_pose for camera in self.cameras)
 
     @property
     def lensed(self) -> bool:
         """Whether every camera has a lens."""
-        return all(c.projection is not None or c.intrinsics is not None for c in self.cameras)
+        return all(camera.has_lens for camera in self.cameras)
 
 
 def camera_sets(taken: Sequence[ParsedFiles]) -> tuple[list[CameraSet], list[str]]:
@@ -92,11 +92,7 @@ def camera_sets(taken: Sequence[ParsedFiles]) -> tuple[list[CameraSet], list[str
 
 def _whole(one: CameraSet) -> CameraSet | None:
     """The cameras of a set that have a lens and a pose, where these are at least two."""
-    whole = tuple(
-        c
-        for c in one.cameras
-        if c.projection is not None or (c.rotation is not None and c.intrinsics is not None)
-    )
+    whole = tuple(c for c in one.cameras if c.has_pose and c.has_lens)
     incomplete = tuple(c.name for c in one.cameras if c not in whole)
     return replace(one, cameras=whole, incomplete=incomplete) if len(whole) > 1 else None
 
@@ -106,7 +102,7 @@ def _lacking(one: CameraSet, whole: CameraSet) -> list[str]:
     lacking: dict[str, list[str]] = {}
     for camera in one.cameras:
         if camera not in whole.cameras:
-            posed, lensed = camera.rotation is not None, camera.intrinsics is not None
+            posed, lensed = camera.has_pose, camera.has_lens
             what = "no pose" if lensed else "no lens" if posed else "neither lens nor pose"
             lacking.setdefault(what, []).append(camera.name)
     return [
@@ -118,16 +114,14 @@ def _lacking(one: CameraSet, whole: CameraSet) -> list[str]:
 
 def _mixed(one: CameraSet) -> str:
     """Why a set of which some cameras have but a lens, and others but a pose, is of no use."""
-    posed = Counter(
-        c.name for c in one.cameras if c.rotation is not None or c.projection is not None
-    )
+    posed = Counter(camera.name for camera in one.cameras if camera.has_pose)
     name, count = posed.most_common(1)[0] if posed else ("", 0)
     if count > 1:
         return (
             f'{one.label}: has {count} poses of "{name}", expected one of each camera; '
             "leave those of other recordings out"
         )
-    lacking = [c.name for c in one.cameras if c.intrinsics is None and c.projection is None]
+    lacking = [camera.name for camera in one.cameras if not camera.has_lens]
     return f"{one.label}: some cameras have no lens, others no pose ({', '.join(lacking[:3])} …)"
 
 
@@ -150,8 +144,7 @@ def _sets(taken: Sequence[ParsedFiles]) -> list[CameraSet]:
                 sets.append(CameraSet(one.label, piece.format, piece.cameras, own))
                 continue
             camera = piece.cameras[0]
-            has_pose = camera.rotation is not None or camera.projection is not None
-            key = (_place(piece.source, beside), piece.format, has_pose)
+            key = (_place(piece.source, beside), piece.format, camera.has_pose)
             single.setdefault(key, []).append((one.label, piece.source, camera))
     for (_, format_, _), rows in single.items():
         labels = [label.rsplit(".", 1)[0] for label, _, _ in rows]
@@ -197,14 +190,7 @@ def _join(pose: CameraSet, lens: CameraSet) -> CameraSet | None:
     if found is None or len(found[0]) < len(pose.cameras):
         return None
     cameras = tuple(
-        replace(
-            camera,
-            image_size=lens.cameras[found[0][n]].image_size,
-            intrinsics=lens.cameras[found[0][n]].intrinsics,
-            distortion=lens.cameras[found[0][n]].distortion,
-            lens=lens.cameras[found[0][n]].lens,
-        )
-        for n, camera in enumerate(pose.cameras)
+        camera.with_lens_of(lens.cameras[found[0][n]]) for n, camera in enumerate(pose.cameras)
     )
     sources = pose.sources | lens.sources
     return CameraSet(f"{pose.label} with {lens.label}", pose.format, cameras, sources)

@@ -6,13 +6,9 @@ import re
 from collections.abc import Callable, Sequence
 from typing import Literal
 
+from tracker.sequences.pictures.numbering import by_number
+
 How = Literal["name", "number", "order"]
-
-
-def natural(text: str) -> list[tuple[int, str]]:
-    """Sorting key that takes digits as numbers."""
-    parts = re.split(r"(\d+)", text.lower())
-    return [(int(part), "") if part.isdigit() else (-1, part) for part in parts]
 
 
 def words_of(text: str) -> list[str]:
@@ -75,8 +71,8 @@ def match(
     if best is not None and len(best[0]) > 1:
         return best
     if by_order and len(names) == len(labels):
-        cameras = sorted(range(len(names)), key=lambda n: natural(names[n]))
-        files = sorted(range(len(labels)), key=lambda n: natural(labels[n]))
+        cameras = sorted(range(len(names)), key=lambda n: by_number(names[n].lower()))
+        files = sorted(range(len(labels)), key=lambda n: by_number(labels[n].lower()))
         return dict(zip(files, cameras, strict=True)), "order"
     return best
 

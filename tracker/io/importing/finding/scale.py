@@ -13,8 +13,8 @@ from tracker.io.conventions.sizes import USUAL_HEIGHTS
 from tracker.io.importing.finding.people import rays_of_all
 from tracker.sequences.sequence import Detections
 
-PERSON = 1.70
-"""Metres: the usual stature."""
+PERSON = USUAL_HEIGHTS[0]
+"""Metres: the usual stature of people who stand."""
 
 AS_STANDING = (
     f"as if people stood, {PERSON} m tall; where they sit, or boxes show a part of them, give the "

@@ -17,14 +17,13 @@ from tracker.io.read.columns import frames_of_times, parts_of_date
 from tracker.io.read.picture_names import number_in
 from tracker.io.read.pieces import DetectionPiece, FormatError, TruthPiece, VideoPiece
 from tracker.sequences.clock import Clock, Timing
+from tracker.sequences.fields import LARGEST_COUNT
 
 USUAL_RATE = 25.0
 """Steps a second where no file says."""
 
 SAME_RATE = 0.002
 """By how much rates may differ that are the same: 29.97 and 30 are not within ten minutes."""
-
-MOST_FRAMES = 10_000_000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -220,9 +219,9 @@ def settle_times(
         ]
         frames = max(lasts, default=-1) + 1
         found.append(("frames", f"{frames}, up to the last that the boxes name"))
-    if not 0 < frames <= MOST_FRAMES:
+    if not 0 < frames <= LARGEST_COUNT:
         raise FormatError(
-            f"expected 1 to {MOST_FRAMES:,} steps in videos, pictures or boxes, found {frames}"
+            f"expected 1 to {LARGEST_COUNT:,} steps in videos, pictures or boxes, found {frames}"
         )
     own = tuple(
         CameraTime(timing, timing.clock(fps, frames, beginning if timing.stamps else 0.0))

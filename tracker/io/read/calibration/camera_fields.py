@@ -35,8 +35,6 @@ from tracker.io.read.values import (
 _POSES = ("RT", "inverse", "matrix_world", "pose")
 """Parts that are a whole pose, a 3×4 or a 4×4 matrix."""
 
-_LENS_PARTS = ("image_size", "intrinsics", "distortion", "lens")
-
 
 def by_camera(table: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     """The fields of every camera that the names of a flat table tell apart."""
@@ -249,19 +247,15 @@ def _width_first(size: tuple[int, int], k: Float[ndarray, "3 3"]) -> tuple[int, 
 def cameras(file: SourceFile, values: Any, convention: Convention) -> Iterator[RawCamera]:
     """Every camera of a tree of tables and lists: flat with suffixes, or a table a camera."""
     found = [camera(file, name, fields, convention) for name, fields in _tables(values, "", 0)]
-    lenses = {one.name: one for one in found if one.rotation is None and one.projection is None}
+    lenses = {one.name: one for one in found if not one.has_pose}
     # Multical calls the pose of a camera by the one it leads from, too: "cam2_to_cam1"
     poses = {
-        one.name.partition("_to_")[0]: one
-        for one in found
-        if one.rotation is not None and one.intrinsics is None
+        one.name.partition("_to_")[0]: one for one in found if one.has_pose and not one.has_lens
     }
     if lenses.keys() == poses.keys() and len(lenses) + len(poses) == len(found):
         # one table of the lenses and one of the poses
-        yield from (
-            replace(pose, name=name, **{part: getattr(lenses[name], part) for part in _LENS_PARTS})
-            for name, pose in poses.items()
-        )
+        for name, pose in poses.items():
+            yield replace(pose, name=name).with_lens_of(lenses[name])
     else:
         yield from found
 

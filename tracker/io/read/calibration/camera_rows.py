@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from tracker.io.read.calibration.camera_fields import by_camera, camera
+from tracker.io.read.columns import delimiter_of
 from tracker.io.read.pieces import CalibrationPiece, Convention, Piece
 from tracker.io.read.protocol import Certainty, Kind
 from tracker.io.read.source import SourceFile
@@ -49,7 +50,7 @@ def read(file: SourceFile) -> Iterator[Piece]:
 def _rows(text: str) -> Iterator[dict[str, Any]]:
     """Rows with their cells as numbers, where they are."""
     first = text.split("\n", 1)[0]
-    delimiter = max(",;\t", key=first.count)
+    delimiter = delimiter_of(first)
     for row in csv.DictReader(io.StringIO(text), delimiter=delimiter, skipinitialspace=True):
         yield {name.strip(): _cell(cell) for name, cell in row.items() if name and cell is not None}
 

@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from tracker.io.read.calibration.euler import KINDS, ORDERS
+from tracker.io.read.calibration.euler import FULL_TURN, KINDS, ORDERS
 from tracker.io.read.values import numbers_in, plain
 
 MEANINGS: dict[str, tuple[str, ...]] = {
@@ -115,9 +115,6 @@ _LONGEST_NAME = 200
 _WIDEST = 4.0
 """Width of a picture in focal lengths from which none is in pixels: an angle of 127 degrees."""
 
-_FULL_TURN = 2.0 * math.pi * 1.01
-"""Radians; a rotation vector that is longer is one in degrees."""
-
 
 def split(key: str) -> tuple[str, str] | None:
     """What a field's name means, and the camera it names: ``K_cam1`` → ``("K", "cam1")``."""
@@ -198,7 +195,7 @@ def _settle_rotation(fields: dict[str, Any]) -> None:
         return
     if count(vector) == 3:
         turned = _numbers(vector)
-        if np.linalg.norm(turned) > _FULL_TURN:
+        if np.linalg.norm(turned) > FULL_TURN:
             vector = np.radians(turned).tolist()
     fields["R"] = vector
 

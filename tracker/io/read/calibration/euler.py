@@ -41,8 +41,8 @@ vector; that they are Euler's; and the conventions with a name."""
 NAMED_AXES = ("blender", "opk")
 """Of these the camera's y points up, and R leads out of the camera."""
 
-_FULL_TURN = 2.0 * math.pi * 1.01
-"""Radians; larger angles are degrees."""
+FULL_TURN = 2.0 * math.pi * 1.01
+"""Radians, with room for rounding; larger angles, or a longer rotation vector, are in degrees."""
 
 _BODIES = {
     "flu": np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]),
@@ -74,7 +74,7 @@ def turns(file: SourceFile, field: str, fields: Mapping[str, Any], *, inverse: b
         return {}
     three = vector(file, field, fields[kind], 3, "three angles")
     found: _Turns = {}
-    units = ["", IN_DEGREES] if np.abs(three).max() <= _FULL_TURN else [IN_DEGREES]
+    units = ["", IN_DEGREES] if np.abs(three).max() <= FULL_TURN else [IN_DEGREES]
     for unit in units:
         angles = np.radians(three) if unit else three
         for name, turned in _products(kind, angles):
@@ -82,7 +82,7 @@ def turns(file: SourceFile, field: str, fields: Mapping[str, Any], *, inverse: b
             if inverse and kind not in NAMED_AXES:
                 found[name + INVERSE + unit] = turned.T
     if kind == "rxyz":
-        long = float(np.linalg.norm(three)) > _FULL_TURN
+        long = float(np.linalg.norm(three)) > FULL_TURN
         as_vector = rotation(file, field, np.radians(three) if long else three)
         return {"": as_vector, **found}
     return found

@@ -19,7 +19,7 @@ import numpy as np
 
 from tracker.files.text import shown
 from tracker.io.read.calibration.camera_fields import camera, cameras, has_cameras
-from tracker.io.read.pieces import CalibrationPiece, Convention, Piece, RawCamera, Unit
+from tracker.io.read.pieces import CalibrationPiece, Convention, Piece, RawCamera, unit_named
 from tracker.io.read.protocol import Certainty, Kind
 from tracker.io.read.source import SourceFile
 from tracker.io.read.values import focal_and_centre, matrix, need, numbers, vector
@@ -35,10 +35,6 @@ _FROM_1 = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 1.0], [0.0, 0.0, 0.0]])
 
 MOST_BYTES = 16 * 2**20
 MOST_UNPACKED_BYTES = 64 * 2**20
-
-_UNITS: dict[str, Unit] = {
-    "mm": "mm", "millimeters": "mm", "cm": "cm", "centimeters": "cm", "m": "m", "meters": "m",
-}  # fmt: skip
 
 
 def recognise(file: SourceFile) -> Certainty:
@@ -116,7 +112,7 @@ def _find(values: Any, name: str, depth: int = 0) -> dict[str, Any] | None:
 def _stereo(file: SourceFile, values: dict[str, Any]) -> Iterator[RawCamera]:
     """The world is camera 1; x₂ = x₁ R + t in rows, so R is transposed, t in WorldUnits."""
     both = [values["CameraParameters1"], values["CameraParameters2"]]
-    unit = _UNITS.get(str(values.get("WorldUnits") or both[0].get("WorldUnits", "")).lower())
+    unit = unit_named(str(values.get("WorldUnits") or both[0].get("WorldUnits", "")))
     convention = Convention(unit=unit, direction="world-to-camera", axes="opencv")
     pose = values.get("PoseCamera2")
     if isinstance(pose, dict):

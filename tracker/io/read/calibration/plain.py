@@ -5,26 +5,20 @@ Arrays of an ``.npz`` may have the cameras as their first axis: K (C, 3, 3), t (
 
 from __future__ import annotations
 
-import io
 from typing import Any
-
-import numpy as np
-from numpy import ndarray
 
 from tracker.io.read.calibration.named_format import NamedFormat
 from tracker.io.read.pieces import FormatError
-from tracker.io.read.source import SourceFile, npz_members
+from tracker.io.read.source import ZIP, SourceFile, read_npz
 
 MOST_BYTES = 16 * 2**20
 """Of an archive of arrays, packed and unpacked: a few bytes may stand for gigabytes."""
-
-_ZIP = b"PK\x03\x04"
 
 
 def _may_be(file: SourceFile) -> bool:
     """An archive of arrays, or the beginning of JSON or YAML that can be parsed."""
     head = file.head_text.lstrip()
-    if file.head.startswith(_ZIP) or head[:1] in ("{", "["):
+    if file.head.startswith(ZIP) or head[:1] in ("{", "["):
         return True
     try:
         return ":" in head and "\n" in head and head[:1] != "<" and file.yaml is not None
@@ -33,21 +27,17 @@ def _may_be(file: SourceFile) -> bool:
 
 
 def _values(file: SourceFile) -> Any:
-    return _arrays(file) if file.head.startswith(_ZIP) else file.tree
+    return _arrays(file) if file.head.startswith(ZIP) else file.tree
 
 
 def _arrays(file: SourceFile) -> dict[str, Any]:
     """The arrays of an archive by their names, or a table of them a camera."""
     data = file.bytes(MOST_BYTES)
     try:
-        members = npz_members(data, MOST_BYTES)
-        arrays: dict[str, ndarray] = {
-            name: np.load(io.BytesIO(own), allow_pickle=False)
-            for name, own in (members or {}).items()
-        }
-    except (ValueError, EOFError):
+        arrays = read_npz(data, MOST_BYTES)
+    except ValueError:
         return {}  # some other archive
-    if members is None:
+    if arrays is None:
         raise file.error(
             f"unpacks to more than {MOST_BYTES / 2**20:.0f} MB, expected a calibration"
         )

@@ -18,10 +18,11 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
+from tracker.files.text import shown
 from tracker.geometry.calibration import is_rotation
 from tracker.io.read.pieces import CalibrationPiece, Convention, Piece, RawCamera
 from tracker.io.read.protocol import Certainty, Kind
-from tracker.io.read.source import SourceFile
+from tracker.io.read.source import NPY, SourceFile, npy_header, read_npy
 from tracker.io.read.values import NUMBER, intrinsics
 
 NAME = "matrices P, [R | t] or K"
@@ -37,7 +38,6 @@ _MOVED = re.compile(r"(?<![A-Za-z])(t|trans|translation|tvec)$", re.IGNORECASE)
 _SHORT = 2000
 """Bytes that up to nine numbers take."""
 
-_NPY = b"\x93NUMPY"
 _ROW = re.compile(
     rf"\s*(?:([A-Za-z_]\w*)\s*[:=,\s]\s*)?[\[(\s]*({NUMBER}(?:[\s,;]+{NUMBER})*)[\])\s,;]*"
 )
@@ -45,7 +45,7 @@ _ROW = re.compile(
 
 def recognise(file: SourceFile) -> Certainty:
     """A NumPy array of 3×4, 4×4 or K matrices, or a text of nothing but rows of them."""
-    if file.head.startswith(_NPY):
+    if file.head.startswith(NPY):
         return Certainty.LIKELY if _shape(file) else Certainty.NO
     if file.size > 2**20 or not file.is_text:
         return Certainty.NO
@@ -55,8 +55,8 @@ def recognise(file: SourceFile) -> Certainty:
 
 def read(file: SourceFile) -> Iterator[Piece]:
     """One piece with every camera."""
-    if file.head.startswith(_NPY):
-        array = np.load(io.BytesIO(file.bytes(2**20)), allow_pickle=False).astype(float)
+    if file.head.startswith(NPY):
+        array = read_npy(file.bytes(2**20)).astype(float)
         array = array.reshape(-1, *array.shape[-2:])[:, :3]
         found = [("" if len(array) == 1 else str(n), matrix) for n, matrix in enumerate(array)]
     elif (halves := _halves(file)) is not None:
@@ -71,7 +71,10 @@ def read(file: SourceFile) -> Iterator[Piece]:
 
 def _camera(file: SourceFile, name: str, matrix: Float[ndarray, "3 n"]) -> RawCamera:
     if not np.isfinite(matrix).all():
-        raise file.error("expected finite numbers", f"camera {name}")
+        raise file.error(
+            f"expected finite numbers, found {shown(matrix.tolist())}; calibrate again",
+            f"camera {name}".strip(),
+        )
     if matrix.shape == (3, 3) and is_rotation(matrix):
         raise file.error(
             "is a rotation alone, expected [R | t] or a lens; save K, R and t of a camera "
@@ -129,15 +132,8 @@ def _is_lens(matrix: Float[ndarray, "3 3"]) -> bool:
 
 def _shape(file: SourceFile) -> tuple[int, ...] | None:
     """The shape of an array of matrices, from its header alone."""
-    stream = io.BytesIO(file.head)
     try:
-        version = np.lib.format.read_magic(stream)
-        reader = (
-            np.lib.format.read_array_header_1_0
-            if version == (1, 0)
-            else np.lib.format.read_array_header_2_0
-        )
-        shape, _, kind = reader(stream)
+        shape, kind = npy_header(io.BytesIO(file.head))
     except ValueError:
         return None
     fits = len(shape) in (2, 3) and shape[-2:] in ((3, 3), (3, 4), (4, 4)) and kind.kind in "fiu"

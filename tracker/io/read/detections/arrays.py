@@ -9,19 +9,17 @@ Source: NumPy, "numpy.lib.format".
 
 from __future__ import annotations
 
-import io
-import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
 from numpy import ndarray
 
-from tracker.io.read.columns import Column, has_boxes, is_table, read_table, singular
+from tracker.io.read.columns import Column, is_table, read_table, singular
 from tracker.io.read.detections import numbers
 from tracker.io.read.pieces import Piece
 from tracker.io.read.protocol import Certainty, Kind
-from tracker.io.read.source import SourceFile, npz_members
+from tracker.io.read.source import NPY, ZIP, SourceFile, read_npy, read_npz
 
 NAME = "NumPy arrays of boxes or places"
 KIND: Kind = "detections"
@@ -30,13 +28,11 @@ SERIES = False
 MOST_BYTES = 64 * 2**20
 """Of a file, packed and unpacked: a few bytes may stand for gigabytes."""
 
-_ARRAY, _ARCHIVE = b"\x93NUMPY", b"PK\x03\x04"
-
 
 def recognise(file: SourceFile) -> Certainty:
     """Judge whether columns are named as those of boxes or places, or rows have a frame and a
     box."""
-    known = file.head.startswith((_ARRAY, _ARCHIVE)) and any(True for _ in _tables(file))
+    known = file.head.startswith((NPY, ZIP)) and any(True for _ in _tables(file))
     return Certainty.POSSIBLE if known else Certainty.NO
 
 
@@ -50,23 +46,19 @@ def _tables(file: SourceFile) -> Iterator[tuple[str, Mapping[str, Column]]]:
     """The columns of each table by their names, after what it is called."""
     arrays = _arrays(file)
     together = {singular(name): _cells(own) for name, own in arrays.items() if own.ndim}
-    if len({len(cells) for cells in together.values()}) == 1 and _is_table(together):
+    if len({len(cells) for cells in together.values()}) == 1 and is_table([*together]):
         yield NAME, together
         return
     for name, own in arrays.items():
         if own.dtype.names:
             columns: dict[str, Column] = {one: _cells(own[one]) for one in own.dtype.names}
-            if _is_table(columns):
+            if is_table([*columns]):
                 yield NAME, columns
         elif own.ndim == 2 and np.issubdtype(own.dtype, np.number):
             found = numbers.table_of(own.astype(float))
             if found is not None:
                 where, columns = found
                 yield f"{NAME} ({where})", {**columns, "camera": [name] * len(own)}
-
-
-def _is_table(columns: Mapping[str, Column]) -> bool:
-    return is_table([*columns]) or has_boxes([*columns])
 
 
 def _cells(own: ndarray) -> Column:
@@ -80,24 +72,8 @@ def _arrays(file: SourceFile) -> dict[str, ndarray]:
         return {}
     data = file.bytes(MOST_BYTES)
     try:
-        if data.startswith(_ARRAY):
-            return {"": _array(data)}
-        members = npz_members(data, MOST_BYTES) or {}
-        return {name: _array(own) for name, own in members.items()}
+        if data.startswith(NPY):
+            return {"": read_npy(data)}
+        return read_npz(data, MOST_BYTES) or {}
     except (ValueError, EOFError):
         return {}  # other arrays, or some other archive
-
-
-def _array(data: bytes) -> ndarray:
-    """One array, for which no more memory is taken than its bytes.
-
-    Raises:
-        ValueError: If it is cut short or has Python's objects.
-    """
-    stream = io.BytesIO(data)
-    old = np.lib.format.read_magic(stream) == (1, 0)
-    header = np.lib.format.read_array_header_1_0 if old else np.lib.format.read_array_header_2_0
-    shape, _, kind = header(stream)
-    if kind.hasobject or math.prod(shape) * kind.itemsize != len(data) - stream.tell():
-        raise ValueError("the header says another size")
-    return np.asarray(np.load(io.BytesIO(data), allow_pickle=False))

@@ -97,8 +97,11 @@ def read_people(file: SourceFile, poses: Sequence[Any]) -> People | None:
         return None
     count = len(flat[0])
     if count % 3 or any(len(pose) != count for pose in flat):
+        counts = ", ".join(map(str, sorted({len(pose) for pose in flat})))
         raise file.error(
-            "expected x, y and confidence of the same count of joints for every person", "keypoints"
+            "expected x, y and confidence of the same count of joints for every person, found "
+            f"{counts} numbers; export one model's joints alone",
+            "keypoints",
         )
     joints = np.full((len(poses), count // 3, 3), np.nan)
     rows = [n for n, pose in enumerate(poses) if pose is not None and len(pose)]

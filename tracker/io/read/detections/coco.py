@@ -22,7 +22,7 @@ from tracker.io.read.picture_names import camera_of, number_in
 from tracker.io.read.pieces import DetectionPiece, Piece
 from tracker.io.read.protocol import Certainty, Kind
 from tracker.io.read.source import SourceFile
-from tracker.io.read.values import is_list_of_tables, numbers
+from tracker.io.read.values import numbers, stated_size, tables
 
 NAME = "COCO results or annotations JSON"
 KIND: Kind = "detections"
@@ -46,17 +46,12 @@ def read(file: SourceFile) -> Iterator[Piece]:
     images: dict[Any, Any] = {}
     classes: dict[Any, str] = {}
     if isinstance(values, dict):
-        for part in ("images", "annotations"):
-            if not is_list_of_tables(values[part]):
-                raise file.error(f"expected a list of tables, found {shown(values[part])}", part)
-        images = {image.get("id"): image for image in values["images"]}
+        images = {one.get("id"): one for one in tables(file, "images", values["images"])}
         categories = values.get("categories", [])
         classes = {c.get("id"): str(c.get("name")) for c in categories if isinstance(c, dict)}
-        records = values["annotations"]
+        records = tables(file, "annotations", values["annotations"])
     else:
-        records = values
-    if not is_list_of_tables(records):
-        raise file.error(f"expected a list of tables, found {shown(records)}")
+        records = tables(file, "", values)
     unknown = [r for r in records if r.get("image_id") not in images] if images else []
     left_out = ""
     if 2 * len(unknown) > len(records):
@@ -112,8 +107,6 @@ def _piece(
     # AlphaPose's score is a sum over box and joints, and above 1
     scores = to_unit(np.minimum(scores, 1.0) if keypoints is not None else scores)
     image = rows[0][1] if rows else {}
-    size: tuple[Any, Any] = (image.get("width"), image.get("height"))
-    known = all(isinstance(side, int) and 0 < side < 65536 for side in size)
     piece = DetectionPiece(
         source=file.path,
         format="AlphaPose JSON" if keypoints is not None else NAME,
@@ -124,6 +117,6 @@ def _piece(
         layout="ltwh",
         keypoints=None if keypoints is None else keypoints.joints,
         last_frame=int(frames.max()) if len(frames) else None,
-        image_size=(int(size[0]), int(size[1])) if known else None,
+        image_size=stated_size(image.get("width"), image.get("height")),
     )
     return only_people(file, piece, kinds)

@@ -17,7 +17,8 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from tracker.io.read.columns import decimal_points, no_people, to_unit
+from tracker.files.text import shown
+from tracker.io.read.columns import PEOPLE, decimal_points, no_people, to_unit
 from tracker.io.read.pieces import DetectionPiece, Piece, TruthPiece
 from tracker.io.read.protocol import Certainty, Kind
 from tracker.io.read.source import SourceFile
@@ -26,7 +27,7 @@ NAME = "MOTChallenge text"
 KIND: Kind = "detections"
 SERIES = False
 
-PEOPLE = (1, 2, 7)
+_PEOPLE_NUMBERS = (1, 2, 7)
 """Classes of the ground truth: pedestrian, person on a vehicle, static person."""
 
 LABELS = "labels.txt"
@@ -39,7 +40,6 @@ GROUND_PLANE = "-ground-plane"
 """The end of the name of a sequence whose boxes are outlines on the floor in metres, as this
 program exports them."""
 
-_PEOPLE_WORDS = ("person", "people", "pedestrian", "human", "man", "woman", "player")
 _MOST_LABELS = 2**16  # bytes
 
 
@@ -87,8 +87,8 @@ def read(file: SourceFile) -> Iterator[Piece]:
     left_out = ""
     if is_truth:
         labels = _labels(file)
-        named = [n for n, name in labels.items() if name.lower() in _PEOPLE_WORDS]
-        of_people = np.isin(table[:, 7], named or PEOPLE)
+        named = [n for n, name in labels.items() if name.lower() in PEOPLE]
+        of_people = np.isin(table[:, 7], named or _PEOPLE_NUMBERS)
         keep = (table[:, 6] == 1.0) & of_people
         others = [
             "with 0 in column 7, not to count"
@@ -150,6 +150,11 @@ def _table(file: SourceFile) -> Float[ndarray, "N C"]:
         table = np.loadtxt(lines, ndmin=2, comments=None)
     except ValueError as error:
         raise file.error(f"expected rows of the same count of numbers ({error})") from None
-    if not np.isfinite(table).all() or (np.abs(table) > 2**53).any():
-        raise file.error("expected finite numbers")
+    odd = ~(np.abs(table) <= 2.0**53)
+    if odd.any():
+        row = int(np.argmax(odd.any(axis=1)))
+        raise file.error(
+            f"expected finite numbers, found {shown(lines[row])}; correct or remove the row",
+            f"row {row + 1}",
+        )
     return table

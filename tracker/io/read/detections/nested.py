@@ -140,7 +140,10 @@ def _records(
         depth = len(next(row.path for row in rows if not row.empty))
         rows = [row for row in rows if len(row.path) == depth]
     else:
-        raise file.error("expected every box as many levels deep as the others")
+        raise file.error(
+            "expected every box as many levels deep as the others, found some deeper; write them "
+            "all as cameras, frames and boxes"
+        )
     at = levels.frame
     several = at is not None and len({camera_of(str(row.path[at])) for row in rows}) > 1
     # of a file a frame it is how long the detector took, or when the file was written
@@ -163,7 +166,7 @@ def _records(
             if own is None:
                 raise file.error(
                     f"{' › '.join(map(str, row.path)) or 'its boxes'}: expected the number of a "
-                    "frame"
+                    'frame, found none; give each box a field "frame"'
                 )
             fields["frame"] = own
             looked_at.append((str(fields.get("camera", "")), own, levels.frame is None))

@@ -13,11 +13,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from tracker.files.text import shown
 from tracker.io.read.columns import people, read_table
 from tracker.io.read.pieces import DetectionPiece, Piece, TruthPiece
 from tracker.io.read.protocol import Certainty, Kind
 from tracker.io.read.source import SourceFile
-from tracker.io.read.values import is_list_of_tables, number, vector
+from tracker.io.read.values import number, tables, vector
 
 NAME = "NVIDIA ground truth (AI City JSON)"
 KIND: Kind = "detections"
@@ -42,9 +43,9 @@ def read(file: SourceFile) -> Iterator[Piece]:
     places: list[tuple[float, ...]] = []
     kinds: list[str] = []
     for frame, objects in file.json.items():
-        if not str(frame).isdigit() or not is_list_of_tables(objects):
-            raise file.error("expected the number of a frame with a list of objects", str(frame))
-        for one in objects:
+        if not str(frame).isdigit():
+            raise file.error(f"expected the numbers of frames, found {shown(frame)}")
+        for one in tables(file, f"frame {frame}", objects):
             own = {key.replace("_", " "): value for key, value in one.items()}
             where = f"frame {frame}, object {own.get('object id')}"
             kinds.append(str(own.get("object type", "person")))

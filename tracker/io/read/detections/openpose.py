@@ -21,7 +21,7 @@ from tracker.io.read.picture_names import number_in
 from tracker.io.read.pieces import DetectionPiece, Piece
 from tracker.io.read.protocol import Certainty, Kind
 from tracker.io.read.source import SourceFile
-from tracker.io.read.values import is_list_of_tables
+from tracker.io.read.values import field_of, tables
 
 NAME = "OpenPose key points JSON"
 KIND: Kind = "detections"
@@ -81,12 +81,10 @@ def _people(file: SourceFile, place: int) -> Iterator[tuple[int, list[Any]]]:
     named = isinstance(values, dict) and not any(people in values for people, _ in FIELDS)
     by_frame: dict[Any, Any] = values if named else {file.path.name: values}
     for at, (name, one) in enumerate(by_frame.items(), place):
-        known = [f for f in FIELDS if isinstance(one, dict) and is_list_of_tables(one.get(f[0]))]
-        if not known:
-            raise file.error('expected a list "people" of tables')
-        people, joints = known[0]
+        people, joints = next((f for f in FIELDS if field_of(one, f[0]) is not None), FIELDS[0])
+        poses = [person.get(joints) for person in tables(file, people, field_of(one, people))]
         frame = _frame(Path(name))
-        yield at if frame is None else frame, [person.get(joints) for person in one[people]]
+        yield at if frame is None else frame, poses
 
 
 def _frame(path: Path) -> int | None:

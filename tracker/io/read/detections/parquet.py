@@ -47,7 +47,7 @@ def read(file: SourceFile) -> Iterator[Piece]:
     except (pa.ArrowException, OSError, EOFError) as error:
         reason = str(error).splitlines()[0]
         raise file.error(f"cannot be read as Parquet ({reason}); get the file again") from None
-    if not is_table([*names, "x1", "y1", "x2", "y2"] if {"box", "bbox"} & {*names} else names):
+    if not is_table(names):
         raise file.error(
             f"expected columns of boxes or of places with frame and id, found {', '.join(names)}"
         )

@@ -1,71 +1,100 @@
-"""Boxes of a series of files, one a picture, whose names tell the frames."""
+"""Boxes that people drew in pictures, gathered picture by picture: a piece a camera."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal
 
 import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
 from tracker.io.read.columns import only_people
-from tracker.io.read.picture_names import number_in
-from tracker.io.read.pieces import DetectionPiece
+from tracker.io.read.pieces import DetectionPiece, Layout
 from tracker.io.read.source import SourceFile
+from tracker.io.read.values import stated_size
 
-_MOST_PIXELS = 65536
-"""No picture is as wide or as high."""
+Box = Sequence[float] | Float[ndarray, " 4"]
+"""The four numbers of a box."""
+
+
+@dataclass(slots=True)
+class _Camera:
+    """The boxes of one camera so far."""
+
+    looked_at: list[int] = field(default_factory=list)
+    frames: list[int] = field(default_factory=list)
+    boxes: list[Box] = field(default_factory=list)
+    labels: list[str] = field(default_factory=list)
+    size: tuple[int, int] | None = None
+    first_index: Literal[0, 1] | None = None
 
 
 class PicturedBoxes:
-    """The boxes of one camera, gathered picture by picture."""
+    """The boxes of a file, or of a series of a file a picture."""
 
-    def __init__(self, file: SourceFile) -> None:
+    def __init__(
+        self, file: SourceFile, format_name: str, layout: Layout = "xyxy", *, parts: bool = False
+    ) -> None:
         """Nothing is gathered yet.
 
         Args:
-            file: The first of the series.
+            file: The file, or the first of the series.
+            format_name: The format, as it is shown.
+            layout: What the four numbers of a box are.
+            parts: Whether they are parts of the picture's size rather than pixels.
         """
         self._file = file
-        self._looked_at: list[int] = []
-        self._frames: list[int] = []
-        self._corners: list[ndarray] = []
-        self._labels: list[str] = []
-        self._size: tuple[int, int] | None = None
+        self._format = format_name
+        self._layout: Layout = layout
+        self._parts = parts
+        self._cameras: dict[str, _Camera] = {}
+        self._own = _Camera()
+
+    def look_at(self, camera: str, frame: int, first_index: Literal[0, 1] | None = None) -> None:
+        """Turn to a picture: what is added from now on is of its camera and frame.
+
+        Args:
+            camera: The camera; empty where the file's name has to tell it.
+            frame: The frame.
+            first_index: The number of the camera's first frame, where it is known.
+        """
+        self._own = self._cameras.setdefault(camera, _Camera())
+        self._own.looked_at.append(frame)
+        if first_index is not None or (frame == 0 and self._own.first_index is None):
+            self._own.first_index = first_index or 0
 
     def pictures(self) -> Iterator[SourceFile]:
-        """The file of each picture in turn; what is added meanwhile is of its frame.
+        """Yield the file of each picture of a series in turn, looking at its frame."""
+        for frame, member in self._file.frames():
+            self.look_at("", frame)
+            yield member
 
-        A frame is the number in the file's name, else the file's place in the series.
-        """
-        for place, path in enumerate(self._file.series):
-            number = number_in(path.name)
-            self._looked_at.append(place if number is None else number)
-            yield self._file.member(path)
+    def sized(self, width: Any, height: Any) -> None:
+        """State the pictures' size in pixels, which counts where it can be one."""
+        self._own.size = stated_size(width, height) or self._own.size
 
-    def sized(self, width: int, height: int) -> None:
-        """The pictures' size in pixels, where it can be one."""
-        if 0 < width < _MOST_PIXELS and 0 < height < _MOST_PIXELS:
-            self._size = (width, height)
+    def add(self, box: Box, label: str) -> None:
+        """Add a box of the picture at hand, and what it is of."""
+        self._own.frames.append(self._own.looked_at[-1])
+        self._own.boxes.append(box)
+        self._own.labels.append(label)
 
-    def add(self, corners: Float[ndarray, " 4"], label: str) -> None:
-        """A box in the picture at hand: left, top, right and bottom, and what it is of."""
-        self._frames.append(self._looked_at[-1])
-        self._corners.append(corners)
-        self._labels.append(label)
-
-    def piece(self, format_name: str) -> DetectionPiece:
-        """All that are people."""
-        piece = DetectionPiece(
-            source=self._file.path,
-            format=format_name,
-            camera="",
-            frames=np.array(self._frames, dtype=np.int64),
-            boxes=np.array(self._corners).reshape(-1, 4),
-            scores=np.ones(len(self._frames)),
-            layout="xyxy",
-            first_index=0 if 0 in self._looked_at else None,
-            last_frame=max([0, *self._looked_at]),
-            image_size=self._size,
-        )
-        return only_people(self._file, piece, self._labels)
+    def pieces(self) -> Iterator[DetectionPiece]:
+        """Yield the boxes that are people's, a piece a camera."""
+        for camera, own in self._cameras.items():
+            piece = DetectionPiece(
+                source=self._file.path,
+                format=self._format,
+                camera=camera,
+                frames=np.array(own.frames, dtype=np.int64),
+                boxes=np.array(own.boxes, dtype=float).reshape(-1, 4),
+                scores=np.ones(len(own.frames)),
+                layout=self._layout,
+                normalised=self._parts,
+                first_index=own.first_index,
+                last_frame=max(own.looked_at),
+                image_size=own.size,
+            )
+            yield only_people(self._file, piece, own.labels)

@@ -15,12 +15,11 @@ from typing import Any
 
 import numpy as np
 
-from tracker.files.text import shown
 from tracker.io.read.columns import people, read_table
 from tracker.io.read.pieces import DetectionPiece, Piece, TruthPiece
 from tracker.io.read.protocol import Certainty, Kind
 from tracker.io.read.source import SourceFile
-from tracker.io.read.values import is_list_of_tables, need, number, vector
+from tracker.io.read.values import need, number, tables, vector
 
 NAME = "SceneScape JSON lines"
 KIND: Kind = "detections"
@@ -75,9 +74,7 @@ def read(file: SourceFile) -> Iterator[Piece]:
 def _objects(file: SourceFile, where: str, objects: Any) -> Iterator[dict[str, Any]]:
     """The objects of a line, in one list or in a list a category."""
     for own in objects.values() if isinstance(objects, dict) else (objects,):
-        if not is_list_of_tables(own):
-            raise file.error(f"expected lists of objects, found {shown(own)}", where)
-        yield from own
+        yield from tables(file, f"{where} objects", own)
 
 
 def _rate(file: SourceFile, lines: list[Any]) -> float | None:

@@ -18,7 +18,15 @@ from typing import Any
 
 import numpy as np
 
-from tracker.io.read.columns import Column, decimal_point, is_table, layout_of, meanings, read_table
+from tracker.io.read.columns import (
+    Column,
+    decimal_point,
+    delimiter_of,
+    is_table,
+    layout_of,
+    meanings,
+    read_table,
+)
 from tracker.io.read.picture_names import is_camera_number, number_in
 from tracker.io.read.pieces import FormatError, Piece
 from tracker.io.read.protocol import Certainty, Kind
@@ -53,11 +61,10 @@ def recognise(file: SourceFile) -> Certainty:
         names = list(flat(records[0][1])) if records else []
         if not _LENS.isdisjoint(map(plain, names)):
             return Certainty.NO
-        has_box = "box" in meanings(names) or layout_of(meanings(names)) is not None
-        return Certainty.LIKELY if has_box or is_table(names) else Certainty.NO
+        return Certainty.LIKELY if is_table(names) else Certainty.NO
     lines = _data_lines(file.head_text)
-    names = _cells(lines[0], _delimiter(lines[0])) if lines else []
-    known = len(names) > 3 and (is_table(_flat_names(names)) or bool(_people_of(names)))
+    names = _cells(lines[0], delimiter_of(lines[0])) if lines else []
+    known = len(names) > 3 and (is_table(names) or bool(_people_of(names)))
     return Certainty.LIKELY if known else Certainty.NO
 
 
@@ -113,7 +120,7 @@ def _columns(file: SourceFile) -> tuple[dict[str, Column], list[int] | None]:
     lines = _data_lines(file.text())
     if not lines:
         return {}, None
-    delimiter = _delimiter(lines[0])
+    delimiter = delimiter_of(lines[0])
     try:
         rows = list(csv.reader(io.StringIO("\n".join(lines)), delimiter=delimiter))
     except csv.Error as error:
@@ -234,10 +241,6 @@ def flat(record: Mapping[str, Any]) -> dict[str, Any]:
     return flat
 
 
-def _flat_names(names: list[str]) -> list[str]:
-    return [*names, "x1", "y1", "x2", "y2"] if "box" in names or "bbox" in names else names
-
-
 def _data_lines(text: str) -> list[str]:
     """The header and the rows; a header may be a comment, and blanks may stand for commas."""
     lines = [line for line in text.splitlines() if line.strip()]
@@ -249,10 +252,6 @@ def _data_lines(text: str) -> list[str]:
     if lines and not any(sign in lines[0] for sign in ",;\t"):
         lines = [",".join(line.split()) for line in lines]
     return lines
-
-
-def _delimiter(line: str) -> str:
-    return max(",;\t", key=line.count)
 
 
 def _cells(line: str, delimiter: str) -> list[str]:

@@ -15,7 +15,6 @@ from collections.abc import Iterator
 import numpy as np
 
 from tracker.io.read.columns import decimal_points, only_people
-from tracker.io.read.picture_names import number_in
 from tracker.io.read.pieces import DetectionPiece, Piece
 from tracker.io.read.protocol import Certainty, Kind
 from tracker.io.read.source import SourceFile
@@ -45,9 +44,7 @@ def read(file: SourceFile) -> Iterator[Piece]:
     frames: list[int] = []
     rows: list[tuple[float, float, float, float, float]] = []
     classes: list[str] = []
-    for place, path in enumerate(file.series):
-        member = file.member(path)
-        frame = number_in(path.name)
+    for frame, member in file.frames():
         for line, text in enumerate(member.lines(), 1):
             if not text.strip():
                 continue
@@ -60,7 +57,7 @@ def read(file: SourceFile) -> Iterator[Piece]:
                     f"line {line}: expected class, x, y, width and height, found {len(values)} "
                     "numbers"
                 )
-            frames.append(place if frame is None else frame)
+            frames.append(frame)
             classes.append(f"{values[0]:g}")
             rows.append(_row(values))
     table = np.array(rows).reshape(-1, 5)

@@ -17,18 +17,17 @@ import numpy as np
 from tracker.io.read.pieces import Piece, TimesPiece
 from tracker.io.read.protocol import Certainty, Kind
 from tracker.io.read.source import SourceFile
+from tracker.sequences.clock import CAMERAS, STAMP
 
 NAME = "Caliscope time stamps"
 KIND: Kind = "time"
 SERIES = False
 
-TIME, CAMERAS = "frame_time", ("cam_id", "port")
-
 
 def recognise(file: SourceFile) -> Certainty:
     """A header with ``frame_time``."""
     names = file.head_text.partition("\n")[0].strip().split(",")
-    return Certainty.SURE if TIME in [name.strip() for name in names] else Certainty.NO
+    return Certainty.SURE if STAMP in [name.strip() for name in names] else Certainty.NO
 
 
 def read(file: SourceFile) -> Iterator[Piece]:
@@ -37,13 +36,15 @@ def read(file: SourceFile) -> Iterator[Piece]:
     own = next((name for name in CAMERAS if name in (rows.fieldnames or ())), None)
     times: dict[str, list[float]] = {}
     for row in rows:
-        field = f"line {rows.line_num}, {TIME}"
         try:
-            time = float(row[TIME] or "")
+            time = float(row[STAMP] or "")
         except ValueError:
-            raise file.error(f"expected seconds, found {row[TIME]!r}", field) from None
+            time = np.nan
         if not np.isfinite(time):
-            raise file.error(f"expected seconds, found {row[TIME]!r}", field)
+            raise file.error(
+                f"expected seconds, found {row[STAMP]!r}; correct or remove the row",
+                f"line {rows.line_num}, {STAMP}",
+            )
         times.setdefault("" if own is None else str(row[own]).strip(), []).append(time)
     for camera, found in times.items():
         yield TimesPiece(file.path, camera, np.sort(np.array(found)))

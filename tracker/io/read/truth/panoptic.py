@@ -11,11 +11,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from tracker.io.read.picture_names import number_in
 from tracker.io.read.pieces import Piece, TruthPiece
 from tracker.io.read.protocol import Certainty, Kind
 from tracker.io.read.source import SourceFile
-from tracker.io.read.values import is_list_of_tables, numbers
+from tracker.io.read.values import field_of, numbers, tables
 
 NAME = "Panoptic Studio 3D skeletons"
 KIND: Kind = "truth"
@@ -37,20 +36,18 @@ def read(file: SourceFile) -> Iterator[Piece]:
     """One piece with the places of everybody in all frames of the series."""
     rows: list[tuple[int, int]] = []
     places: list[np.ndarray] = []
-    for count, path in enumerate(file.series):
-        member = file.member(path)
-        number = number_in(path.name)
-        bodies = member.json.get("bodies") if isinstance(member.json, dict) else None
-        if not is_list_of_tables(bodies):
-            raise member.error('expected a list "bodies" of tables')
-        assert isinstance(bodies, list)
-        for body in bodies:
+    for frame, member in file.frames():
+        for body in tables(member, "bodies", field_of(member.json, "bodies")):
             given = next((body[name] for name in JOINTS if name in body), None)
             joints = numbers(member, "joints", [] if given is None else given)
             if len(joints) % 4 or len(joints) <= 4 * BODY_CENTRE:
-                raise member.error("expected x, y, z and confidence of 15 or 19 joints", "joints")
+                raise member.error(
+                    "expected x, y, z and confidence of 15 or 19 joints, found "
+                    f"{len(joints)} numbers; get the file again",
+                    "joints",
+                )
             if joints.reshape(-1, 4)[BODY_CENTRE, 3] > 0.0:
-                rows.append((count if number is None else number, int(body.get("id", 0))))
+                rows.append((frame, int(body.get("id", 0))))
                 places.append(joints.reshape(-1, 4)[BODY_CENTRE, :3])
     table = np.array(rows, dtype=np.int64).reshape(-1, 2)
     yield TruthPiece(

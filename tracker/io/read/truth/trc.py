@@ -14,7 +14,8 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from tracker.io.read.pieces import Piece, TruthPiece, Unit
+from tracker.files.text import shown
+from tracker.io.read.pieces import Piece, TruthPiece, unit_named
 from tracker.io.read.protocol import Certainty, Kind
 from tracker.io.read.source import SourceFile
 
@@ -29,8 +30,6 @@ _PERSON = re.compile(r"(?:person|people|player|id|track|target|p)[\W_]*(\d{1,9})
 
 _MOST_FRAMES = 1e9
 """Of one file: a year at 30 a second."""
-
-_UNITS: dict[str, Unit] = {"m": "m", "cm": "cm", "mm": "mm"}
 
 
 def recognise(file: SourceFile) -> Certainty:
@@ -57,7 +56,7 @@ def read(file: SourceFile) -> Iterator[Piece]:
         try:
             values = [float(cell) if cell.strip() else np.nan for cell in row[:width]]
         except ValueError:
-            raise file.error(f"row {place + 1}: expected numbers") from None
+            raise file.error(f"expected numbers, found {shown(row)}", f"row {place + 1}") from None
         table[place, : len(values)] = values
     joints = table[:, 2:].reshape(len(rows), len(names), 3)
     names = [name.strip().lower() for name in names]
@@ -81,7 +80,7 @@ def read(file: SourceFile) -> Iterator[Piece]:
         frames=frames,
         ids=ids[good],
         positions=place_of[good],
-        unit=_UNITS.get(facts.get("Units", "").strip().lower()),
+        unit=unit_named(facts.get("Units", "")),
         up="y",
         fps=rate if np.isfinite(rate) and rate > 0.0 else None,
         first_index=1 if len(frames) == 0 or frames.min() > 0 else 0,

@@ -20,7 +20,7 @@ from tracker.io.read.picture_names import number_in
 from tracker.io.read.pieces import GRIDS, DetectionPiece, Piece, TruthPiece
 from tracker.io.read.protocol import Certainty, Kind
 from tracker.io.read.source import SourceFile
-from tracker.io.read.values import is_list_of_tables, need, vector
+from tracker.io.read.values import need, tables, vector
 
 NAME = "WILDTRACK annotations"
 KIND: Kind = "truth"
@@ -49,9 +49,7 @@ def read(file: SourceFile) -> Iterator[Piece]:
         member = file.member(path)
         number = numbers[place]
         frame = place if number is None else (number - known[0]) // stride
-        if not is_list_of_tables(member.json):
-            raise member.error("expected a list of people")
-        for person in member.json:
+        for person in tables(member, "", member.json):
             need(member, person, ("personID", "positionID", "views"))
             who, cell = vector(
                 member, "personID and positionID", [person["personID"], person["positionID"]], 2, ""

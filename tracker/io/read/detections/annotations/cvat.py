@@ -15,7 +15,7 @@ from tracker.io.read.columns import only_people
 from tracker.io.read.pieces import DetectionPiece, Piece
 from tracker.io.read.protocol import Certainty, Kind
 from tracker.io.read.source import SourceFile
-from tracker.io.read.values import numbers
+from tracker.io.read.values import numbers, stated_size
 
 NAME = "CVAT XML"
 KIND: Kind = "detections"
@@ -55,9 +55,7 @@ def read(file: SourceFile) -> Iterator[Piece]:
     for image in root.findall("image"):
         for box in image.findall("box"):
             add(image.get("id"), box, box.get("label", ""))
-    size = root.find(".//original_size")
-    found = [None if size is None else size.findtext(side) for side in ("width", "height")]
-    known = all(side is not None and side.strip().isdigit() for side in found)
+    sides = (root.findtext(f".//original_size/{side}") for side in ("width", "height"))
     last = root.findtext(".//task/stop_frame") or root.findtext(".//task/size")
     piece = DetectionPiece(
         source=file.path,
@@ -69,6 +67,6 @@ def read(file: SourceFile) -> Iterator[Piece]:
         layout="xyxy",
         first_index=0,
         last_frame=int(last) if last is not None and last.strip().isdigit() else None,
-        image_size=(int(str(found[0])), int(str(found[1]))) if known else None,
+        image_size=stated_size(*sides),
     )
     yield only_people(file, piece, labels)

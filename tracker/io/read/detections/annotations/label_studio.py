@@ -10,17 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
-import numpy as np
-
-from tracker.files.text import shown
-from tracker.io.read.columns import only_people
+from tracker.io.read.detections.pictured import PicturedBoxes
 from tracker.io.read.picture_names import camera_of, number_in
-from tracker.io.read.pieces import DetectionPiece, Piece
+from tracker.io.read.pieces import Piece
 from tracker.io.read.protocol import Certainty, Kind
 from tracker.io.read.source import SourceFile
-from tracker.io.read.values import is_list_of_tables, numbers
+from tracker.io.read.values import is_list_of_tables, numbers, tables
 
 NAME = "Label Studio JSON"
 KIND: Kind = "detections"
@@ -50,43 +47,21 @@ def recognise(file: SourceFile) -> Certainty:
 
 def read(file: SourceFile) -> Iterator[Piece]:
     """A piece a camera, which is what the names of pictures begin with, or a video."""
-    if not is_list_of_tables(file.json):
-        raise file.error(f"expected a list of tasks, found {shown(file.json)}")
-    by_camera: dict[str, list[_Box]] = {}
-    frames: dict[str, list[int]] = {}
-    sizes: dict[str, tuple[int, int]] = {}
-    videos = set()
-    for place, task in enumerate(file.json):
+    found = PicturedBoxes(file, NAME, "ltwh", parts=True)
+    for place, task in enumerate(tables(file, "", file.json)):
         name = _source(task)
         results = list(_results(task))
         is_video = any("sequence" in _value(one) for one in results)
         camera = name.rsplit("/", 1)[-1].rsplit(".", 1)[0] if is_video else camera_of(name)
         frame = place if (number := number_in(name)) is None else number
-        boxes = by_camera.setdefault(camera, [])
-        videos |= {camera} if is_video else set()
-        frames.setdefault(camera, []).append(0 if is_video else frame)
+        first: Literal[1] | None = 1 if is_video else None
+        found.look_at(camera, first or frame, first)
         for n, one in enumerate(results):
-            boxes += _boxes(file, f"task {place} result {n}", one, frame)
-            size = (one.get("original_width"), one.get("original_height"))
-            if all(isinstance(side, int) and 0 < side < 65536 for side in size):
-                sizes[camera] = (int(str(size[0])), int(str(size[1])))
-    for camera, boxes in by_camera.items():
-        numbered = np.array([box.frame for box in boxes], dtype=np.int64)
-        own = frames[camera] if camera not in videos else [1, *numbered.tolist()]
-        piece = DetectionPiece(
-            source=file.path,
-            format=NAME,
-            camera=camera,
-            frames=numbered,
-            boxes=np.array([box.sides for box in boxes]).reshape(-1, 4) / 100.0,
-            scores=np.ones(len(boxes)),
-            layout="ltwh",
-            normalised=True,
-            first_index=1 if camera in videos else 0 if 0 in own else None,
-            last_frame=max(own),
-            image_size=sizes.get(camera),
-        )
-        yield only_people(file, piece, [box.label for box in boxes])
+            found.sized(one.get("original_width"), one.get("original_height"))
+            for box in _boxes(file, f"task {place} result {n}", one, frame):
+                found.look_at(camera, box.frame, first)
+                found.add([side / 100.0 for side in box.sides], box.label)
+    yield from found.pieces()
 
 
 def _source(task: dict[str, Any]) -> str:
@@ -126,9 +101,7 @@ def _boxes(file: SourceFile, where: str, result: dict[str, Any], frame: int) -> 
     value = _value(result)
     label = next((str(value[name][0]) for name in _LABELS if value.get(name)), "")
     if "sequence" in value:
-        keys = value["sequence"]
-        if not is_list_of_tables(keys):
-            raise file.error("expected a list of tables", f"{where} sequence")
+        keys = tables(file, f"{where} sequence", value["sequence"])
         rows = [numbers(file, f"{where} key frame", [k.get(n) for n in ("frame", *_SIDES)])
                 for k in keys]  # fmt: skip
         order = sorted(range(len(rows)), key=lambda n: rows[n][0])

@@ -13,7 +13,7 @@ from tracker.io.read.detections.pictured import PicturedBoxes
 from tracker.io.read.pieces import Piece
 from tracker.io.read.protocol import Certainty, Kind
 from tracker.io.read.source import SourceFile
-from tracker.io.read.values import is_list_of_tables, numbers
+from tracker.io.read.values import field_of, numbers, tables
 
 NAME = "LabelMe JSON"
 KIND: Kind = "detections"
@@ -33,15 +33,10 @@ def recognise(file: SourceFile) -> Certainty:
 
 def read(file: SourceFile) -> Iterator[Piece]:
     """One piece with the boxes of all pictures of the series."""
-    found = PicturedBoxes(file)
+    found = PicturedBoxes(file, NAME)
     for member in found.pictures():
-        shapes = member.json.get("shapes") if isinstance(member.json, dict) else None
-        if not is_list_of_tables(shapes):
-            raise member.error('expected a list "shapes" of tables')
-        assert isinstance(shapes, list)
-        width, height = (member.json.get(f"image{side}") for side in ("Width", "Height"))
-        if isinstance(width, int) and isinstance(height, int):
-            found.sized(width, height)
+        shapes = tables(member, "shapes", field_of(member.json, "shapes"))
+        found.sized(member.json.get("imageWidth"), member.json.get("imageHeight"))
         for n, shape in enumerate(shapes):
             if shape.get("shape_type", "polygon") in _BOXED:
                 points = numbers(member, f"shapes {n} points", shape.get("points", []))
@@ -50,4 +45,4 @@ def read(file: SourceFile) -> Iterator[Piece]:
                 table = points.reshape(-1, 2)
                 corners = np.concatenate([table.min(axis=0), table.max(axis=0)])
                 found.add(corners, str(shape.get("label", "")))
-    yield found.piece(NAME)
+    yield from found.pieces()

@@ -13,12 +13,10 @@ import json
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-import numpy as np
-
 from tracker.files.text import shown
-from tracker.io.read.columns import only_people
+from tracker.io.read.detections.pictured import PicturedBoxes
 from tracker.io.read.picture_names import camera_of, number_in
-from tracker.io.read.pieces import DetectionPiece, Piece
+from tracker.io.read.pieces import Piece
 from tracker.io.read.protocol import Certainty, Kind
 from tracker.io.read.source import SourceFile
 from tracker.io.read.values import number, numbers
@@ -46,28 +44,16 @@ def recognise(file: SourceFile) -> Certainty:
 def read(file: SourceFile) -> Iterator[Piece]:
     """A piece a folder of the pictures' names, or beginning of theirs, which is a camera."""
     is_json = file.head_text.lstrip()[:1] == "{"
-    by_camera: dict[str, list[tuple[int, list[float] | None, str]]] = {}
+    found = PicturedBoxes(file, NAME)
     for picture, shape, told in _of_json(file) if is_json else _of_csv(file):
         frame = number_in(picture)
         if frame is None:
             raise file.error(f"expected a name with the frame's number, found {shown(picture)}")
-        row = (frame, _corners(file, picture, shape), _label(told))
-        by_camera.setdefault(camera_of(picture), []).append(row)
-    for camera, rows in by_camera.items():
-        boxed = [(frame, corners, label) for frame, corners, label in rows if corners is not None]
-        looked_at = [frame for frame, *_ in rows]
-        piece = DetectionPiece(
-            source=file.path,
-            format=NAME,
-            camera=camera,
-            frames=np.array([frame for frame, *_ in boxed], dtype=np.int64),
-            boxes=np.array([corners for _, corners, _ in boxed]).reshape(-1, 4),
-            scores=np.ones(len(boxed)),
-            layout="xyxy",
-            first_index=0 if 0 in looked_at else None,
-            last_frame=max(looked_at),
-        )
-        yield only_people(file, piece, [label for *_, label in boxed])
+        found.look_at(camera_of(picture), frame)
+        corners = _corners(file, picture, shape)
+        if corners is not None:
+            found.add(corners, _label(told))
+    yield from found.pieces()
 
 
 def _of_json(file: SourceFile) -> Iterator[_Row]:

@@ -30,14 +30,12 @@ def recognise(file: SourceFile) -> Certainty:
 
 def read(file: SourceFile) -> Iterator[Piece]:
     """One piece with the boxes of all pictures of the series."""
-    found = PicturedBoxes(file)
+    found = PicturedBoxes(file, NAME)
     for member in found.pictures():
-        width, height = (member.xml.findtext(f"size/{side}", "") for side in ("width", "height"))
-        if width.strip().isdigit() and height.strip().isdigit():
-            found.sized(int(width), int(height))
+        found.sized(member.xml.findtext("size/width"), member.xml.findtext("size/height"))
         for n, one in enumerate(member.xml.iter("object")):
             given = [one.findtext(f"bndbox/{corner}") for corner in _CORNERS]
             if None in given:
                 raise member.error(f"expected a bndbox with {', '.join(_CORNERS)}", f"object {n}")
             found.add(numbers(member, f"object {n} bndbox", given), one.findtext("name", ""))
-    yield found.piece(NAME)
+    yield from found.pieces()
