@@ -141,8 +141,6 @@ REMOVED: Mapping[str, str] = {
     "pictures.target_height": "pictures are reduced until the median target is 160 pixels high",
     "pictures.least_height": "no picture is reduced until the median target is below 40 pixels",
     "pictures.level_from": "pictures of cameras that are rolled by more than 0.15 rad are turned",
-    "association_matrix.reach": "an object moves by its own size in a step at most",
-    "association_matrix.overlap_area": "objects that share more than 30 pixels are one",
     "association_matrix.interrupted_steps": "a track ends without an object for over 25 steps",
     "association_matrix.return_similarity": "an object continues a track from a similarity of 0.6",
     "association_matrix.mild_share": "mild: the merged object is above 0.8 of both",

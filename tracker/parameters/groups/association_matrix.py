@@ -24,7 +24,9 @@ class AssociationMatrixParams(Params):
     the random rooms that the table of ``tests.papers.rooms.ablations`` lists.
     """
 
-    reach: ClassVar[float] = 1.0
+    reach: Annotated[
+        float, Field(ge=0.1, le=10.0), ui("T_d", "Motion", unit="object sizes", step=0.1)
+    ] = 1.0
     """While the number of objects stays the same: largest distance that one moves in a step, in
     roots of half width × half height."""
 
@@ -32,7 +34,7 @@ class AssociationMatrixParams(Params):
     """Where the number of objects changes: whether the pixels that two objects share count, or
     those of their boxes."""
 
-    overlap_area: ClassVar[int] = 30
+    overlap_area: Annotated[int, Field(ge=0, le=5000), ui("T_s", unit="px", step=1)] = 30
     """Where the number of objects changes: objects of two steps that share more than this are
     one."""
 

