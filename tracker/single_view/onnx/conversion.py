@@ -15,6 +15,7 @@ from __future__ import annotations
 import base64
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from graphlib import CycleError, TopologicalSorter
 from typing import Any
 
 import numpy as np
@@ -138,19 +139,11 @@ def _constants(model: Mapping[str, Any], weights: bytes) -> dict[str, ndarray]:
 def _in_order(nodes: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
     """Sort nodes so that each comes after its inputs."""
     by_name = {node["name"]: node for node in nodes}
-    done: dict[str, Mapping[str, Any]] = {}
-    waiting = [node["name"] for node in reversed(nodes)]
-    while waiting:
-        name = waiting[-1]
-        missing = [i for i in map(_source, by_name[name].get("input", [])) if i not in done]
-        if name in done or not missing:
-            waiting.pop()
-            done.setdefault(name, by_name[name])
-        elif len(waiting) > 2 * len(nodes) + len(missing):
-            raise ValueError("the graph has a circle")
-        else:
-            waiting += missing
-    return list(done.values())
+    inputs = {name: [*map(_source, node.get("input", []))] for name, node in by_name.items()}
+    try:
+        return [by_name[name] for name in TopologicalSorter(inputs).static_order()]
+    except CycleError as error:
+        raise ValueError("the graph has a circle") from error
 
 
 def _source(name: str) -> str:
