@@ -13,6 +13,7 @@ from numpy import ndarray
 from numpy.testing import assert_allclose, assert_array_equal
 
 from tests import world
+from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.kernels.pictures.channels import ORIENTATIONS, gradients
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
@@ -278,3 +279,34 @@ def test_a_candidate_falls_at_the_first_gate_that_it_does_not_pass() -> None:
     scene.mask = None  # without foreground none is asked for
     boxes, *_ = PeakFinder._accept(finder, scene, None, candidates)
     assert {60.0, 90.0} <= set(boxes[:, 0].tolist())
+
+
+def test_samples_are_drawn_on_the_foreground_as_far_as_it_is_trusted() -> None:
+    """Of 100 boxes 0.6 are drawn anywhere, all while nobody is expected; the rest at people."""
+    drawn: dict[str, int] = {}
+
+    def draw(where: str, count: int) -> ndarray:
+        drawn[where] = count
+        return np.full((count, 4), 5.0)
+
+    finder: Any = SimpleNamespace(
+        _parameters=SimpleNamespace(samples=100, foreground_samples=0.6),
+        _appearance=SimpleNamespace(
+            trust=np.array([1.0, 0.5]), within=lambda boxes: boxes,
+            draw_on_foreground=lambda count, *_: draw("foreground", count),
+            draw_anywhere=lambda count, *_: draw("anywhere", count),
+        ),
+    )  # fmt: skip
+    scene: Any = None
+    one = GaussianMixture(np.array([0.2, 0.6]), np.array([[50.0, 40.0, 4.0, 6.0], [9.0] * 4]),
+                          np.tile(1e-12 * np.eye(4), (2, 1, 1)), np.array([1, 2]))  # fmt: skip
+    boxes = PeakFinder._sample(finder, one, scene, np.random.default_rng(0))
+    assert drawn == {"foreground": 45, "anywhere": 15}
+    assert len(boxes) == 100
+    near = np.abs(boxes[60:, None] - one.means).max(axis=2) < 1e-3
+    assert near.any(axis=1).all()
+    assert 0 < near[:, 0].sum() < near[:, 1].sum(), "by weight"
+    nobody = GaussianMixture.empty(4)
+    boxes = PeakFinder._sample(finder, nobody, scene, np.random.default_rng(0))
+    assert drawn == {"foreground": 75, "anywhere": 25}
+    assert len(boxes) == 100
