@@ -148,7 +148,6 @@ REMOVED: Mapping[str, str] = {
     "association_matrix.histogram_rate": "each step's colours are a tenth of a track's",
     "association_matrix.straying": "an interrupted object strays by a tenth of its reach a step",
     "colour_phd.same_person_distance": "peaks of one person's colours are 1.5 half sizes apart",
-    "colour_phd.pruning_threshold": "components lighter than 0.0001 are dropped",
     "colour_phd.max_components": "the 30 heaviest components are kept",
     "colour_phd.gate_probability": "a person's own peak lies in the gate by 0.9999",
     "jpda.vanish_steps": "a target without measurement at 3 steps in a row has vanished",

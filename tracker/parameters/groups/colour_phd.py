@@ -189,7 +189,9 @@ class ColourPhdParams(ColourPeakParams):
     ] = 1.0
     """Expected number of false peaks, uniform over the picture and the sizes."""
 
-    pruning_threshold: ClassVar[float] = 0.0001
+    pruning_threshold: Annotated[float, Field(ge=1e-8, le=0.1), ui("T", "Extraction", log=True)] = (
+        1e-4
+    )
     """Components lighter than this are dropped."""
 
     merging_threshold: Annotated[float, Field(ge=0.0, le=50.0), ui("U", "Extraction", step=0.5)] = (
