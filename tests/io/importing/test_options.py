@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 import pytest
@@ -22,7 +22,8 @@ from tracker.io.importing.options import ImportOptions
 from tracker.io.importing.preview import as_sequence
 from tracker.io.importing.remedies import for_import
 from tracker.io.importing.writing import write
-from tracker.io.read.pieces import FormatError, Unit
+from tracker.io.read.pieces import FormatError, Unit, Up
+from tracker.sequences.finding import Remedy
 from tracker.sequences.reader import read_sequence
 
 
@@ -52,6 +53,13 @@ def test_every_flag_of_import_states_its_option() -> None:
     none = parse(["import", "x", "--dry-run"])
     assert isinstance(none, Import)
     assert options_of(none) == ImportOptions()
+
+
+@pytest.mark.parametrize("up", get_args(Up))
+def test_the_axis_that_a_check_names_can_be_typed_as_it_is_printed(up: Up) -> None:
+    command = parse(["import", "x", "--dry-run", *str(Remedy("--up", up)).split()])
+    assert isinstance(command, Import)
+    assert options_of(command) == ImportOptions(up=up)
 
 
 def test_boxes_as_parts_of_the_picture_are_read_where_it_is_told(tmp_path: Path) -> None:
