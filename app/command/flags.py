@@ -12,14 +12,21 @@ import sys
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field, make_dataclass
 from pathlib import Path
-from typing import Annotated, Any, get_args, get_type_hints
+from typing import Annotated, Any, Literal, get_args, get_type_hints
 
 import tyro
 from tyro.conf import FlagCreatePairsOff, Positional, UseAppendAction, arg, subcommand
 
 from app.command.arguments.corrections import Corrections, LogFile
 from app.command.arguments.detector import Detector
-from app.command.arguments.importing import Check, ExportCalibration, Formats, Import
+from app.command.arguments.importing import (
+    IMPORT_FLAGS,
+    PAIRS,
+    Check,
+    ExportCalibration,
+    Formats,
+    Import,
+)
 from app.command.arguments.library import Bundle, FormatName, LibraryCommand, LibraryFile, Runs
 from app.command.arguments.listing import Benchmark, Parameters, Sequences
 from app.command.arguments.studies import Batch, Study, Tune
@@ -324,6 +331,39 @@ def _evaluate_with_flags() -> Any:
     return with_flags
 
 
+def _import_with_flags() -> Any:
+    """``Import`` with a flag for every option of an import that a word can state."""
+    from tracker.io.importing.options import ImportOptions
+
+    flags: list[tuple[str, Any, Any]] = []
+    for option, name in IMPORT_FLAGS.items():
+        schema = ImportOptions.model_json_schema()["properties"][option]
+        kinds = [one for one in schema.get("anyOf", [schema]) if one["type"] != "null"]
+        choices = tuple(kinds[0].get("enum", ()))
+        words: dict[str, Any] = {"help_behavior_hint": "(default: found out)"}
+        kind: Any = {"string": str, "number": float}.get(kinds[0]["type"])
+        if len(kinds) > 1:
+            kind, words["metavar"] = str, "|".join((*choices, "FLOAT"))
+        elif option == "boxes":  # the one flag of two options
+            kind = Literal[*choices, *(f"{one}-normalised" for one in choices)]
+        elif choices:
+            kind = Literal[choices]
+        elif option in PAIRS:
+            kind = UseAppendAction[tuple[str, ...]]
+            words = {"metavar": PAIRS[option], "help_behavior_hint": "(repeatable)"}
+        elif kinds[0]["type"] == "boolean":
+            kind, words = FlagCreatePairsOff[bool], {}
+        default = schema["default"]
+        if default is None:
+            kind = kind | None
+        text = schema["description"].replace("\n", " ")
+        flag = Annotated[kind, arg(help=text, **words)]
+        flags.append((name, flag, field(default=() if default == [] else default)))
+    with_flags = make_dataclass("ImportWithFlags", flags, bases=(Import,))
+    with_flags.__doc__ = Import.__doc__
+    return with_flags
+
+
 Arguments = (
     Serve
     | Track
@@ -375,7 +415,7 @@ def parse(arguments: list[str] | None = None) -> Arguments:
         ParameterError: If there is no such command, or it is one that only a checkout has.
     """
     track: Any = _track_with_flags()
-    # its settings come with the engine, which only who evaluates has to wait for
+    # their settings come with the engine, which only who evaluates or imports has to wait for
     asked = _with_current_flags(sys.argv[1:] if arguments is None else arguments)
     if asked[:1] and asked[0] in ONLY_IN_A_CHECKOUT:
         raise ParameterError(
@@ -384,6 +424,7 @@ def parse(arguments: list[str] | None = None) -> Arguments:
             "checkout",
         )
     evaluate: Any = _evaluate_with_flags() if asked[:1] == ["evaluate"] else Evaluate
+    importing: Any = _import_with_flags() if asked[:1] == ["import"] else Import
     if asked[:1] == ["study"] and asked[1:2] and asked[1].endswith(".toml"):
         asked = ["study", "run", *asked[1:]]  # `study STUDY.toml` runs it
     named: dict[str, Any] = {
@@ -393,7 +434,7 @@ def parse(arguments: list[str] | None = None) -> Arguments:
         "detector": Detector,
         "evaluate": evaluate,
         "benchmark": Benchmark,
-        "import": Import,
+        "import": importing,
         "check": Check,
         "formats": Formats,
         "export-calibration": ExportCalibration,

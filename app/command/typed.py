@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import types
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal, Union, get_args, get_origin
 
 from tyro.constructors import ConstructorRegistry, PrimitiveConstructorSpec, PrimitiveTypeInfo
@@ -48,10 +48,9 @@ def _rule(info: PrimitiveTypeInfo) -> PrimitiveConstructorSpec[Any] | None:
     if kind is str and info.type is not str:
         return _spec("STR", str, lambda value: isinstance(value, str))
     if get_origin(kind) is Literal:
-        choices = get_args(kind)
-        if all(isinstance(one, str) for one in choices):
-            metavar = "{" + ",".join(choices) + "}"
-            return _spec(metavar, _choice(choices), lambda value: value in choices)
+        choices = {str(one): one for one in get_args(kind)}
+        metavar = "{" + ",".join(choices) + "}"
+        return _spec(metavar, _choice(choices), lambda value: value in choices.values())
     return None
 
 
@@ -85,13 +84,13 @@ def _number(kind: type) -> Callable[[str], Any]:
     return read
 
 
-def _choice(choices: tuple[str, ...]) -> Callable[[str], str]:
-    def read(text: str) -> str:
+def _choice(choices: Mapping[str, Any]) -> Callable[[str], Any]:
+    def read(text: str) -> Any:
         if text not in choices:
             from tracker.sequences.fields import did_you_mean  # brings NumPy
 
             near = did_you_mean(text, choices)
             raise WrongValue(f"one of {', '.join(choices)}", text, near)
-        return text
+        return choices[text]
 
     return read

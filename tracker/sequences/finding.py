@@ -25,7 +25,9 @@ class Remedy:
 
     def __str__(self) -> str:
         if self.flag.startswith("-"):
-            return f"{self.flag} {self.value}".rstrip()
+            # "--up -z" would be two flags
+            mark = "=" if self.value.startswith("-") else " "
+            return f"{self.flag}{mark}{self.value}".rstrip()
         return f"{self.flag} = {self.value}"
 
 

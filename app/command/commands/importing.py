@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from app.command.arguments.importing import Check, ExportCalibration, Formats, Import
+from app.command.arguments.importing import (
+    IMPORT_FLAGS,
+    PAIRS,
+    Check,
+    ExportCalibration,
+    Formats,
+    Import,
+)
 from app.command.terminal import ASKED, FAILURE, REFUSED, CommandError, print_table, say
 from tracker.parameters.values import ParameterError
 
 if TYPE_CHECKING:
     from tracker.io.conventions.questions import Question
     from tracker.io.importing.gathering import ParsedFiles
+    from tracker.io.importing.options import ImportOptions
 
 MOST_UNKNOWN = 30
 """Files that nobody knows, named one by one."""
@@ -43,7 +52,7 @@ def _import(command: Import) -> int:
         raise ParameterError("--output", "expected the folder to write (-o FOLDER), or --dry-run")
     if not command.sources:
         raise ParameterError("SOURCE", "expected files or a folder to import, got none")
-    options = _options(command)
+    options = options_of(command)
     from tracker.io.conventions.questions import Undecided, Unexplained
     from tracker.io.importing.arriving import gather_whole
     from tracker.io.importing.remedies import for_import, unsaid
@@ -144,42 +153,31 @@ def _not_inside(files: Any, sources: Sequence[Path]) -> list[Path]:
     ]
 
 
-def _options(command: Import) -> Any:
+def options_of(command: Import) -> ImportOptions:
+    """Return what the flags state.
+
+    Raises:
+        ParameterError: With the flag, what it takes and what was given.
+    """
     from pydantic import ValidationError
 
     from tracker.io.importing.options import ImportOptions
 
-    layout, _, normalised = (command.boxes or "").partition("-")
-    values = {
-        "unit": command.unit,
-        "up": command.up,
-        "pose": command.pose,
-        "axes": command.axes,
-        "turns": command.euler,
-        "boxes": layout or None,
-        "normalised": True if normalised else None,
-        "first_index": command.first_index,
-        "fps": command.fps,
-        "accept_best": command.accept_best,
-        "as_named": command.as_named,
-        "cameras": tuple(_pairs("--camera", "NAME=FILE", command.camera)),
-        "swap": tuple(_pairs("--swap", "NAME=NAME", command.swap)),
-    }
+    values = {option: getattr(command, flag) for option, flag in IMPORT_FLAGS.items()}
+    for option, form in PAIRS.items():
+        values[option] = tuple(_pairs(f"--{IMPORT_FLAGS[option]}", form, values[option]))
+    layout, _, normalised = (values["boxes"] or "").partition("-")
+    values |= {"boxes": layout or None, "normalised": True if normalised else None}
     try:
         return ImportOptions.model_validate(values)
     except ValidationError as error:
-        name = str(error.errors()[0]["loc"][0])
-        flag, expected = _EXPECTED[name]
-        raise ParameterError(flag, f"expected {expected}, got {values[name]!r}") from None
-
-
-_EXPECTED = {
-    "unit": ("--unit", "m, cm, mm or metres in one unit"),
-    "turns": ("--euler", "three axes"),
-    "first_index": ("--first-index", "0 or 1"),
-    "fps": ("--fps", "a rate above 0 and up to 1000"),
-}
-"""The flag of each option that takes any text or number, and what it takes."""
+        errors = error.errors()
+    option = str(errors[0]["loc"][0])
+    # pydantic's "Input should be a valid number, unable to parse …", "String should have at most …"
+    words = [one["msg"].split(", unable")[0] for one in errors]
+    expected = " or ".join(re.sub(r"^\w+ should (be|have) ", "", one) for one in words)
+    flag = IMPORT_FLAGS[option].replace("_", "-")
+    raise ParameterError(f"--{flag}", f"expected {expected}, got {values[option]!r}")
 
 
 def _pairs(flag: str, form: str, items: Sequence[str]) -> Iterator[tuple[str, str]]:

@@ -37,7 +37,7 @@ _WHOLE = (
 )
 """What the page says in place of words that name more than a flag."""
 
-_FLAG = re.compile(rf"(?<![\w-])({'|'.join(map(re.escape, FIELDS))})(?![\w-])( = )?")
+_FLAG = re.compile(rf"(?<![\w-])({'|'.join(map(re.escape, FIELDS))})(?![\w-])( = |=)?")
 
 
 def on_page(words: str) -> str:

@@ -605,34 +605,40 @@ declare namespace Server {
 
 	/** What somebody knows better than the files; null and empty: as it was found out. */
 	interface ImportWish {
-		/** Of the calibration; a number is metres in one of its units. */
+		/** Unit of the calibration, or how many metres one of its units has. */
 		unit: "m" | "cm" | "mm" | number | null;
-		/** The world's axis that points up. */
+		/** Axis of the calibration's world that points up. */
 		up: "x" | "y" | "z" | "-x" | "-y" | "-z" | null;
 		/** Where R and t lead. */
 		pose: "world-to-camera" | "camera-to-world" | null;
-		/** Of a camera. */
+		/** Axes of a camera: y down and z ahead, or y up and z back. */
 		axes: "opencv" | "opengl" | null;
-		/** How rotations given by three angles are composed: ``zyx`` is R_z R_y R_x. */
+		/**
+		 * How rotations given by three angles are composed: zyx is R = Rz Ry Rx, zyx-inverse its
+		 * inverse; vector: they are a rotation vector.
+		 */
 		turns: string | null;
-		/** What the four numbers of a box mean. */
+		/**
+		 * What the four numbers of a box are: left, top and size; two corners, x or y first; centre and
+		 * size; in pixels, or normalised: as parts of the picture's width and height.
+		 */
 		boxes: "ltwh" | "xyxy" | "yxyx" | "cxcywh" | null;
 		/** Whether boxes are parts of the picture's size. */
 		normalised: boolean | null;
-		/** The number of the first frame in detections and truth. */
+		/** Number of the first frame in boxes and truth. */
 		first_index: 0 | 1 | null;
-		/** Steps a second. */
+		/** Steps a second; those of the videos, unless stated. */
 		fps: number | null;
 		/**
-		 * Whether the likeliest interpretation is taken where the files leave open how they are meant,
-		 * or where none explains the boxes.
+		 * Take the likeliest interpretation where the files leave open how they are meant, or where
+		 * none explains the boxes.
 		 */
 		accept_best: boolean;
-		/** Two cameras each whose calibrations are exchanged, one exchange after the other. */
+		/** Two cameras whose calibrations are each other's; exchanged in the order given. */
 		swap: [string, string][];
 		/**
-		 * Whether calibrations stay with the cameras of their names, though boxes may meet better with
-		 * some of them exchanged.
+		 * Leave calibrations with the cameras of their names, though boxes may meet better with some of
+		 * them exchanged.
 		 */
 		as_named: boolean;
 		/** Cameras of the calibration that are not wanted. */

@@ -36,6 +36,7 @@ def test_every_flag_that_the_import_names_has_a_field_on_the_page() -> None:
     ("words", "told"),
     [
         ("z, since 9 % meet so; --up", "z, since 9 % meet so; “Up” changes it"),
+        ("the other way up (--up=-z)", "the other way up (“Up” -z)"),
         ("how is not said: --boxes says it", "how is not said: “Boxes” says it"),
         ("boxes as two corners (--boxes xyxy)", "boxes as two corners (“Boxes” xyxy)"),
         ("x: of none; --camera NAME=FILE",

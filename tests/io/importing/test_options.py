@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 import pytest
 
+from app.command.arguments.importing import Import
+from app.command.commands.importing import options_of
+from app.command.flags import parse
 from app.command.main import main
 from tests.conftest import short
 from tests.io.read.recorded import PLACES, detections, settled_of, toml, videos
@@ -19,8 +22,44 @@ from tracker.io.importing.options import ImportOptions
 from tracker.io.importing.preview import as_sequence
 from tracker.io.importing.remedies import for_import
 from tracker.io.importing.writing import write
-from tracker.io.read.pieces import FormatError, Unit
+from tracker.io.read.pieces import FormatError, Unit, Up
+from tracker.sequences.finding import Remedy
 from tracker.sequences.reader import read_sequence
+
+
+def test_every_flag_of_import_states_its_option() -> None:
+    flags = (
+        "--unit 0.5 --up=-z --pose camera-to-world --axes opengl --euler zyx "
+        "--boxes xyxy-normalised --first-index 1 --fps 25 --accept-best --as-named "
+        "--camera a=a.mp4 --swap a=b --swap b=c"
+    )
+    command = parse(["import", "x", "--dry-run", *flags.split()])
+    assert isinstance(command, Import)
+    assert options_of(command) == ImportOptions(
+        unit=0.5,
+        up="-z",
+        pose="camera-to-world",
+        axes="opengl",
+        turns="zyx",
+        boxes="xyxy",
+        normalised=True,
+        first_index=1,
+        fps=25.0,
+        accept_best=True,
+        as_named=True,
+        cameras=(("a", Path("a.mp4")),),
+        swap=(("a", "b"), ("b", "c")),
+    )
+    none = parse(["import", "x", "--dry-run"])
+    assert isinstance(none, Import)
+    assert options_of(none) == ImportOptions()
+
+
+@pytest.mark.parametrize("up", get_args(Up))
+def test_the_axis_that_a_check_names_can_be_typed_as_it_is_printed(up: Up) -> None:
+    command = parse(["import", "x", "--dry-run", *str(Remedy("--up", up)).split()])
+    assert isinstance(command, Import)
+    assert options_of(command) == ImportOptions(up=up)
 
 
 def test_boxes_as_parts_of_the_picture_are_read_where_it_is_told(tmp_path: Path) -> None:

@@ -1,7 +1,7 @@
 """What whoever imports knows better than the files: each overrules one guess.
 
-Defined once: the engine takes :class:`ImportOptions`, the page's wish and the flags of the command
-line are checked by it.
+Defined once: the engine takes :class:`ImportOptions`; the page's wish and the flags of the command
+line, with their help, are made from it.
 """
 
 from __future__ import annotations
@@ -29,31 +29,33 @@ class CommonImportOptions(BaseModel):
     )
 
     unit: Unit | Annotated[float, Field(gt=0.0, lt=1e6)] | None = None
-    """Of the calibration; a number is metres in one of its units."""
+    """Unit of the calibration, or how many metres one of its units has."""
     up: Up | None = None
-    """The world's axis that points up."""
+    """Axis of the calibration's world that points up."""
     pose: Direction | None = None
     """Where R and t lead."""
     axes: Axes | None = None
-    """Of a camera."""
+    """Axes of a camera: y down and z ahead, or y up and z back."""
     turns: Annotated[str, Field(max_length=40)] | None = None
-    """How rotations given by three angles are composed: ``zyx`` is R_z R_y R_x."""
+    """How rotations given by three angles are composed: zyx is R = Rz Ry Rx, zyx-inverse its
+    inverse; vector: they are a rotation vector."""
     boxes: Layout | None = None
-    """What the four numbers of a box mean."""
+    """What the four numbers of a box are: left, top and size; two corners, x or y first; centre and
+    size; in pixels, or normalised: as parts of the picture's width and height."""
     normalised: bool | None = None
     """Whether boxes are parts of the picture's size."""
     first_index: Literal[0, 1] | None = None
-    """The number of the first frame in detections and truth."""
+    """Number of the first frame in boxes and truth."""
     fps: Annotated[float, Field(gt=0.0, le=1000.0)] | None = None
-    """Steps a second."""
+    """Steps a second; those of the videos, unless stated."""
     accept_best: bool = False
-    """Whether the likeliest interpretation is taken where the files leave open how they are meant,
-    or where none explains the boxes."""
+    """Take the likeliest interpretation where the files leave open how they are meant, or where
+    none explains the boxes."""
     swap: tuple[tuple[str, str], ...] = Field(default=(), max_length=MOST)
-    """Two cameras each whose calibrations are exchanged, one exchange after the other."""
+    """Two cameras whose calibrations are each other's; exchanged in the order given."""
     as_named: bool = False
-    """Whether calibrations stay with the cameras of their names, though boxes may meet better with
-    some of them exchanged."""
+    """Leave calibrations with the cameras of their names, though boxes may meet better with some of
+    them exchanged."""
     left_out: tuple[str, ...] = Field(default=(), max_length=MOST)
     """Cameras of the calibration that are not wanted."""
     names: Mapping[str, str] = Field(default={}, max_length=MOST)
@@ -72,4 +74,4 @@ class ImportOptions(CommonImportOptions):
     """What is stated of an import, with files of cameras by their path."""
 
     cameras: tuple[tuple[str, Path], ...] = ()
-    """Video, pictures or boxes that belong to a camera of the calibration: its name, and what."""
+    """Video, folder of pictures or boxes of a camera, where names do not tell."""
