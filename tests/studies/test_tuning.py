@@ -3,6 +3,7 @@ it must."""
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -62,7 +63,8 @@ def test_what_brings_something_is_proposed_without_what_does_not(tmp_path: Path)
     score = next(one for one in found["figures"] if one["key"] == "score")
     assert score["after"] > score["default"]
     page = report_html(store)
-    assert "<h2>Proposed</h2>" in page
+    headings = re.findall("<h2>(.*?)</h2>", page)
+    assert headings == ["Proposed", "Figures", "Best trials", "Repeat the best one", "Definition"]
     assert f"{row['brought']:+.4f}" in page
     assert "trials below" in page  # what failed takes no room from what tells something
 
