@@ -28,7 +28,7 @@ from tracker.review.queue.item import (
     confirm,
     propose,
 )
-from tracker.review.queue.linking import Move, Tracklet
+from tracker.review.queue.moves import Move, Tracklet
 from tracker.review.queue.other_run import OtherRun
 from tracker.review.queue.ranking import (
     IdentityReach,

@@ -16,8 +16,8 @@ from tracker.fusion.trajectories import Trajectories
 from tracker.review.queue import links, lost_people, single_tracks
 from tracker.review.queue.clear_places import ClearPlaces
 from tracker.review.queue.item import Alternative, ReviewItem, TrackRows, propose
-from tracker.review.queue.linking import Move
 from tracker.review.queue.meetings import meetings
+from tracker.review.queue.moves import Move
 from tracker.review.queue.other_run import OtherRun
 from tracker.review.queue.track_ends import track_ends
 from tracker.runs.run import Run

@@ -9,7 +9,7 @@ import numpy as np
 
 from tracker.corrections.kinds import KINDS
 from tracker.review.queue.item import WITHIN, Alternative, ReviewItem, TrackRows, propose
-from tracker.review.queue.linking import Move, Tracklet
+from tracker.review.queue.moves import Move, Tracklet
 from tracker.runs.run import Run
 
 _SHORT = 1.0
