@@ -60,7 +60,7 @@ def why_no_tracks(run: Run) -> str | None:
 
 def _losing_stage(run: Run, n: StageCounts) -> str:
     """Explain which stage of a run without tracks lost all people."""
-    kind = "pictures" if run.costly else "frames of boxes"
+    kind = "pictures" if run.from_pictures else "frames of boxes"
     if not n.frames:
         return f"no tracks: not one of the {kind} could be read; see that the files are there"
     head = f"no tracks: {n.frames} {kind}, {n.found} boxes found"
