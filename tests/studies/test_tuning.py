@@ -124,3 +124,14 @@ def test_the_dozen_are_varied_around_where_somebody_is(tmp_path: Path) -> None:
     assert blind.objectives == ("identity",)
     with pytest.raises(StudyError, match="cannot be read"):
         tuning("t", [str(tmp_path / "nothing")], minutes=5.0, changes={})
+
+
+def test_a_built_in_room_is_tuned_though_a_folder_of_its_name_is_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recording(tmp_path / "room44-3p")
+    monkeypatch.chdir(tmp_path)
+    for name, place in (
+        ("room44-3p", "room44-3p"), ("./room44-3p", str(tmp_path / "room44-3p")),
+    ):  # fmt: skip
+        assert tuning("t", [name], minutes=1.0, changes={}).recordings == (place,)
