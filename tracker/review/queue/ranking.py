@@ -101,7 +101,7 @@ def queue(
     how = "the odds of joining pieces" if _joins(run) else "where tracks end and begin"
     if backwards is not None:
         how += ", and what the recording says seen backwards in time"
-    how += f"; less than {LEAST:.0f} step expected to be wrong is left out"
+    how += f"; moments with less than {LEAST:.0f} expected wrong step are left out"
     return Queue(tuple(items), answered, how)
 
 

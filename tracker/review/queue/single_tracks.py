@@ -1,4 +1,7 @@
-"""Review items and moves that concern a single track: it may be clutter, or follow two people."""
+"""Review items and moves that concern a single track: it may be clutter, or follow two people.
+
+No run depends on the bounds of this module: they decide what a person is asked.
+"""
 
 from __future__ import annotations
 
