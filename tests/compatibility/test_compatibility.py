@@ -37,7 +37,7 @@ from tracker.library.store import Library
 from tracker.parameters.catalogue import REMOVED
 from tracker.parameters.values import removed_notes
 from tracker.sequences.library import open_sequence
-from tracker.studies.jobs import code_version
+from tracker.studies.jobs import figures_version
 from tracker.studies.store import find
 
 HERE = Path(__file__).resolve().parent
@@ -495,7 +495,7 @@ def test_a_study_that_was_stopped_goes_on_with_its_next_trial(home: Home) -> Non
     before = store.trials()
     # only the version that began a study goes on with it: let it be this one
     with closing(sqlite3.connect(store.folder / "results.sqlite3", isolation_level=None)) as file:
-        own = (json.dumps(code_version()),)
+        own = (json.dumps(figures_version()),)
         file.execute("UPDATE told SET value = ? WHERE name = 'code'", own)
     crew = Serial()
     status = run(store, crew, stopped=lambda: len(store.trials()) > len(before))

@@ -169,3 +169,12 @@ def test_an_exchange_of_whom_one_is_not_there_changes_nothing() -> None:
     found, kept = relabel(steps, ids, places, [told], leeway=LEEWAY)
     assert found.tolist() == ids.tolist()
     assert kept.tolist() == list(range(len(ids)))
+
+
+def test_an_exchange_whose_later_places_are_on_one_track_changes_nothing() -> None:
+    steps, ids, places = walkers(2)
+    beside = [20, 0.4, 3.4, 0.9]
+    told = make(kind="exchanged", places=[at(1, 10), at(2, 10), beside, at(1, 20)])
+    result, kept = relabel(steps, ids, places, [told], leeway=LEEWAY)
+    assert result.tolist() == ids.tolist()
+    assert len(kept) == len(ids)

@@ -167,7 +167,7 @@ def test_what_a_person_corrected_is_kept_with_the_run(path: Path) -> None:
         assert [kept.corrected for kept in library.runs()] == [1, 0]
         assert library.result(plain).corrections == ()
         assert remarks_of(library.result(plain)) == ()
-        assert remarks_of(library.result(number)) == ("1 correction of a person obeyed",)
+        assert remarks_of(library.result(number)) == ("1 correction by a person applied",)
 
 
 def test_figures_that_the_page_stored_before_are_provisional_until_they_are_made_anew(

@@ -19,7 +19,8 @@ from tracker.runs.outcome import why_no_tracks
 from tracker.runs.run import Run
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import upright_boxes
-from tracker.single_view.dropped import DROPPED, GATES
+from tracker.single_view.dropped import CANDIDATES, DROPPED, GATES
+from tracker.single_view.protocol import TRUST, UNCERTAINTY, ViewResult
 
 STEPS = 10
 
@@ -145,3 +146,49 @@ def test_what_is_advised_exists() -> None:
     for method, advice in _NO_CANDIDATES.items():
         assert method in METHODS["single_view"]
         assert all(key in PARAMETERS for key in re.findall(r"\w+\.\w+", advice))
+
+
+def reported(folder: Path, *informations: dict[str, float]) -> Run:
+    """A run whose method reported these counts, one picture after another."""
+    run = Run(film(folder, stays=False), RunParameters(), 0, {})
+    for information in informations:
+        run.views.append((replace(ViewResult.of_no_frame(), blind=False, information=information),))
+    return run
+
+
+@pytest.mark.parametrize(("fell", "named"), [(5.0, True), (4.9, False)])
+def test_a_gate_is_named_from_half_of_the_candidates_on(
+    fell: float, named: bool, tmp_path: Path
+) -> None:
+    told = decisive_gate(reported(tmp_path, {CANDIDATES: 10.0, f"{DROPPED}colour": fell}))
+    assert told == ("5.0 of 10.0 candidates a picture fell for colour: " + _SLIDERS[
+        "colour_phd", "colour"
+    ] if named else None)  # fmt: skip
+
+
+@pytest.mark.parametrize(("pictures", "rare"), [(20, False), (21, True)])
+def test_with_less_than_a_candidate_in_twenty_pictures_no_gate_matters(
+    pictures: int, rare: bool, tmp_path: Path
+) -> None:
+    without = [{CANDIDATES: 0.0}] * (pictures - 1)
+    run = reported(tmp_path, {CANDIDATES: 1.0, f"{DROPPED}colour": 1.0}, *without)
+    told = decisive_gate(run)
+    assert told is not None
+    assert told.endswith(_NO_CANDIDATES["colour_phd"]) == rare
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        (TRUST, 0.49, "for their templates lie on it"),
+        (TRUST, 0.5, ""),
+        (UNCERTAINTY, 0.51, "for much that moves never leaves"),
+        (UNCERTAINTY, 0.5, ""),
+    ],
+)
+def test_a_background_is_mistrusted_beyond_one_half(
+    name: str, value: float, words: str, tmp_path: Path
+) -> None:
+    told = notices(reported(tmp_path, {CANDIDATES: 1.0, name: value}))
+    assert any("background" in one for one in told) == bool(words)
+    assert any(words in one for one in told)

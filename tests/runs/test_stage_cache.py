@@ -121,7 +121,7 @@ def test_a_shorter_column_never_replaces_a_longer_one() -> None:
     long, short = stopped(BOXES, 20, whole=WHOLE), stopped(BOXES, 5, whole=WHOLE)
     for run in (long, short):
         cache.keep_fusion(run.keys["fusion"], FusionColumn(run.fused, run.fusion_state))
-        column = ViewColumn(run.views, run.view_states, costly=False)
+        column = ViewColumn(run.views, run.view_states, from_pictures=False)
         cache.keep_views(run.keys["single_view"], column, complete=False)
     fused = cache.fusion(long.keys["fusion"])
     views = cache.views(long.keys["single_view"], frames=STEPS, cameras=3)
@@ -184,16 +184,16 @@ def test_memory_stays_within_its_bytes_and_the_newest_stays() -> None:
 def test_later_stages_push_out_no_stage_1() -> None:
     cache = StageCache(memory_bytes=1_000_000, later_bytes=60_000)
     views = Steps.of([tuple(views_at(WHOLE, 0))] * 20, ViewResult, 3)
-    cache.keep_views("v", ViewColumn(views, None, costly=False), complete=False)
+    cache.keep_views("v", ViewColumn(views, None, from_pictures=False), complete=False)
     alone = cache.used_bytes
     for name in "abcdef":
         cache.keep_fusion(name, column(10, 300))
         assert cache.used_bytes - alone <= 60_000
     assert [name for name in "abcdef" if cache.fusion(name)] == ["e", "f"]
     assert cache.views("v", frames=20, cameras=3) is not None
-    cache.keep_views("w", ViewColumn(views, None, costly=False), complete=False)
+    cache.keep_views("w", ViewColumn(views, None, from_pictures=False), complete=False)
     cache.keep_views(
-        "v", ViewColumn(views.alike([*views, *views]), None, costly=False), complete=False
+        "v", ViewColumn(views.alike([*views, *views]), None, from_pictures=False), complete=False
     )
     assert [name for name in "abcdef" if cache.fusion(name)] == ["e", "f"]
     cache.clear()
@@ -206,7 +206,7 @@ def test_later_stages_push_out_no_stage_1() -> None:
 def test_the_newest_of_each_stage_stays() -> None:
     cache = StageCache(memory_bytes=1)
     views = Steps.of([tuple(views_at(WHOLE, 0))], ViewResult, 3)
-    cache.keep_views("v", ViewColumn(views, None, costly=False), complete=False)
+    cache.keep_views("v", ViewColumn(views, None, from_pictures=False), complete=False)
     for name in "abc":
         cache.keep_fusion(name, column(2, 10))
     assert cache.views("v", frames=9, cameras=3) is not None

@@ -15,6 +15,7 @@ from tracker.library.store import open_library
 from tracker.runs import pipeline
 from tracker.sequences.library import open_sequence
 from tracker.studies.batches import BatchRun, places_of, run_batch
+from tracker.studies.errors import StudyError
 from tracker.studies.worker import tracks_hash
 
 FRAMES = 60
@@ -79,3 +80,34 @@ def test_what_cannot_be_read_keeps_nobody_up(tmp_path: Path) -> None:
     assert [one.run is not None for one in found] == [True, True, False, False, False, False]
     assert all("format" in one.words for one in found[2:4])
     assert all(place_of(spoilt).name in one.words for one in found[4:])
+
+
+def test_a_list_names_folders_patterns_and_lists_beside_it(tmp_path: Path) -> None:
+    for name in ("one", "two", "three"):
+        write_crossing(tmp_path / "lists" / name, frames=5)
+    (tmp_path / "lists" / "inner.txt").write_text("t*\n")
+    (tmp_path / "lists" / "outer.txt").write_text("one\n@inner.txt\nroom44-3p\n")
+    folder = tmp_path / "lists"
+    assert places_of([f"@{folder / 'outer.txt'}"]) == [
+        *(str(folder / name) for name in ("one", "three", "two")), "room44-3p",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"@list.txt\n", "list.txt: expected recordings, found @"),
+        (b"@other.txt\n", "other.txt: expected recordings, found @"),
+        (b"# all\na\xff\n", "list.txt, line 2: expected text in UTF-8, found byte 0xff"),
+        (None, "list.txt: cannot be read (No such file or directory)"),
+    ],
+)
+def test_a_list_that_cannot_be_read_is_refused_by_name(
+    tmp_path: Path, content: bytes | None, words: str
+) -> None:
+    (tmp_path / "other.txt").write_text("@list.txt\n")
+    if content is not None:
+        (tmp_path / "list.txt").write_bytes(content)
+    with pytest.raises(StudyError) as refused:
+        places_of([f"@{tmp_path / 'list.txt'}"])
+    assert words in str(refused.value)

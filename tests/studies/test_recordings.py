@@ -10,7 +10,7 @@ import pytest
 import tracker
 from tests.synthetic import write_sequence
 from tracker.sequences.reader import FILE
-from tracker.studies.jobs import FIGURES, code_version
+from tracker.studies.jobs import FIGURES, figures_version
 from tracker.studies.transfer import files_of
 
 
@@ -31,11 +31,11 @@ def test_other_code_of_a_figure_is_another_version(tmp_path: Path) -> None:
     own = tmp_path / "tracker"
     for package in FIGURES:
         shutil.copytree(Path(tracker.__file__).parent / package, own / package)
-    assert code_version(own) == code_version()
+    assert figures_version(own) == figures_version()
     for path in sorted(own.rglob("*.py")):
         text = path.read_text(encoding="utf-8")
         path.write_text(f"{text}\nCHANGED = True\n", encoding="utf-8")
-        code_version.cache_clear()
+        figures_version.cache_clear()
         of_a_report = path.relative_to(own).as_posix().startswith("evaluation/report")
-        assert (code_version(own) == code_version()) == of_a_report, path
+        assert (figures_version(own) == figures_version()) == of_a_report, path
         path.write_text(text, encoding="utf-8")

@@ -3,6 +3,7 @@ it must."""
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -62,7 +63,8 @@ def test_what_brings_something_is_proposed_without_what_does_not(tmp_path: Path)
     score = next(one for one in found["figures"] if one["key"] == "score")
     assert score["after"] > score["default"]
     page = report_html(store)
-    assert "<h2>Proposed</h2>" in page
+    headings = re.findall("<h2>(.*?)</h2>", page)
+    assert headings == ["Proposed", "Figures", "Best trials", "Repeat the best one", "Definition"]
     assert f"{row['brought']:+.4f}" in page
     assert "trials below" in page  # what failed takes no room from what tells something
 
@@ -122,3 +124,14 @@ def test_the_dozen_are_varied_around_where_somebody_is(tmp_path: Path) -> None:
     assert blind.objectives == ("identity",)
     with pytest.raises(StudyError, match="cannot be read"):
         tuning("t", [str(tmp_path / "nothing")], minutes=5.0, changes={})
+
+
+def test_a_built_in_room_is_tuned_though_a_folder_of_its_name_is_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recording(tmp_path / "room44-3p")
+    monkeypatch.chdir(tmp_path)
+    for name, place in (
+        ("room44-3p", "room44-3p"), ("./room44-3p", str(tmp_path / "room44-3p")),
+    ):  # fmt: skip
+        assert tuning("t", [name], minutes=1.0, changes={}).recordings == (place,)

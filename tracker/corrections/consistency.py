@@ -208,7 +208,7 @@ def _check_empty_place(one: Correction, corrections: list[Correction]) -> None:
         if where is None:
             continue
         if np.hypot(where[0] - place.x, where[1] - place.y) <= min(one.accuracy or 0.0, NEAR):
-            raise _Contradiction(f"somebody is at {place.words} and nobody is", other, one)
+            raise _Contradiction(f"a person is at {place.words}, and nobody is", other, one)
 
 
 def along(places: Many[Place], step: int) -> tuple[float, float] | None:

@@ -98,8 +98,11 @@ def _earlier_if_alone(folder: Path) -> Path:
 
 
 def remark_on(folder: Path) -> str | None:
-    """The remark that a recording's log is of an earlier rendering, or that there is another one in
-    the settings, which was written before; None where neither is so."""
+    """The remark on a recording's log; None where there is nothing to remark.
+
+    Either the log was made on an earlier rendering of a built-in room, or the settings have a
+    second log, from when the folder could not be written to.
+    """
     earlier, place, own = earlier_key(folder), place_of(folder), own_place(folder)
     if earlier is not None and place == _settings_path(earlier):
         return f"The corrections were {EARLIER}."

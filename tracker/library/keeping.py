@@ -214,7 +214,7 @@ def remarks_of(result: Result) -> tuple[str, ...]:
     missing, corrected = result.figures.get(MISSING), result.run.corrected
     pictures = (f"{missing} pictures were missing",) if missing else ()
     words = "1 correction" if corrected == 1 else f"{corrected} corrections"
-    return pictures + ((f"{words} of a person obeyed",) if corrected else ())
+    return pictures + ((f"{words} by a person applied",) if corrected else ())
 
 
 def run_for_export(sequence: Sequence, result: Result, back: str = "") -> ExportedRun:

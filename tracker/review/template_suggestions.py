@@ -1,6 +1,7 @@
 """Suggested templates: boxes of people on whose places several cameras agree.
 
-No function of this module changes a run: the user accepts or rejects each suggestion.
+No function of this module changes a run, and no run depends on its bounds: the user accepts or
+rejects each suggestion.
 """
 
 from __future__ import annotations

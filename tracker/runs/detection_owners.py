@@ -18,8 +18,13 @@ from tracker.runs.run import Run
 from tracker.single_view.protocol import ViewResult
 
 SAME = 0.5
-"""Intersection over union from which a detection and a box passed to the fusion are of one person.
+"""Intersection over union from which a detection and a box passed to the fusion are of one person:
+the threshold of PASCAL VOC (Everingham et al., IJCV 88(2), 2010), which MOTChallenge uses as well.
 """
+
+_SIGMA_SHARE = 0.1
+"""Standard deviation of a box as a share of its half sizes, where the camera passed on no box whose
+deviations could be taken. An estimate: it scales the displayed distances alone."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -141,10 +146,10 @@ def _distances(
 def _as_boxes(view: ViewResult, rows: Int[ndarray, " F"]) -> ViewResult:
     """Select detections as boxes with the mean noise of the camera's boxes at this step.
 
-    Where the camera passed on none, a tenth of their half sizes is taken.
+    Where the camera passed on none, :data:`_SIGMA_SHARE` of their half sizes is taken.
     """
     boxes = view.measurements[rows]
-    sigmas = boxes[:, [2, 3, 2, 3]] * 0.1
+    sigmas = boxes[:, [2, 3, 2, 3]] * _SIGMA_SHARE
     if len(view.sigmas):
         sigmas = np.repeat(view.sigmas.mean(axis=0, keepdims=True), len(boxes), axis=0)
     return ViewResult.of_boxes(boxes, view.measurement_scores[rows], sigmas)

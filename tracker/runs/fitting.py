@@ -15,8 +15,8 @@ networks' classes are of whole people; a head alone is none."""
 
 _LEAST_PIXELS = 100.0
 """Least height of the median target in each camera's picture for the fetched network to be the
-default, pixels. Its input is about half of a picture of 800 x 600; of rendered people who were 90
-pixels high there it had 80 %, and by shape more were found."""
+default, pixels. The network reduces a picture of 800 x 600 to about half. It detected 80 % of
+rendered people who were 90 pixels high in such a picture, and the method "shapes" more."""
 
 
 def default_parameters(sequence: Sequence) -> RunParameters:

@@ -17,7 +17,6 @@ _HALF = 0.5
 """Trust in the foreground below which people are not detected by it; uncertainty of the
 background above which a notice is given."""
 
-
 _SLIDERS = {
     ("colour_phd", "colour"): "raise colour_phd.acceptance_distance, or add a template",
     ("colour_phd", "foreground"): "lower colour_phd.acceptance_foreground",

@@ -9,6 +9,10 @@ import numpy as np
 from tracker.runs.gates import decisive_gate
 from tracker.runs.run import Run
 
+_NEARLY_NONE = 0.02
+"""Share of the boxes passed on to the fusion below which their size and place are named as the
+reason. An estimate: it chooses between two sentences, and no result depends on it."""
+
 
 @dataclass(frozen=True, slots=True)
 class StageCounts:
@@ -60,7 +64,7 @@ def why_no_tracks(run: Run) -> str | None:
 
 def _losing_stage(run: Run, n: StageCounts) -> str:
     """Explain which stage of a run without tracks lost all people."""
-    kind = "pictures" if run.costly else "frames of boxes"
+    kind = "pictures" if run.from_pictures else "frames of boxes"
     if not n.frames:
         return f"no tracks: not one of the {kind} could be read; see that the files are there"
     head = f"no tracks: {n.frames} {kind}, {n.found} boxes found"
@@ -72,24 +76,28 @@ def _losing_stage(run: Run, n: StageCounts) -> str:
             )
         return f"{head}; lower what a box must have to count, or teach what people look like"
     head += f", {n.passed} of them passed on to the fusion"
-    if n.passed < 0.02 * n.found:
+    if n.passed < _NEARLY_NONE * n.found:
         return (
             f"{head}: nearly none can stand in [room] by its size and place; "
             "multiview-phd check tells whether calibration, unit, room or size are wrong"
         )
-    head += f", {n.together} steps with boxes of two cameras"
-    if not n.together and len(run.sequence.views) > 1:
+    alone = len(run.sequence.views) == 1
+    if not alone:
+        head += f", {n.together} steps with boxes of two cameras"
+    if not alone and not n.together:
         return f"{head}: a track begins where boxes of two cameras meet; see the cameras' clocks"
     head += f", {n.begun} tracks begun"
     if not n.begun:
+        where = "the boxes are" if alone else "boxes of different cameras meet"
+        late = "" if alone else ", or which camera is late"
         return (
-            f"{head}: boxes of different cameras meet nowhere in [room]; multiview-phd check tells "
-            "how the calibration is meant, or which camera is late"
+            f"{head}: {where} nowhere in [room]; multiview-phd check tells how the calibration is "
+            f"meant{late}"
         )
     if len(run.filtered):
         return (
-            f"{head}: the smoothing took all that the filter reported for nobody; choose "
-            "the smoothing none to see it"
+            f"{head}: the smoothing removed all tracks of the filter as clutter; choose the "
+            "smoothing none to see them"
         )
     return (
         f"{head}, the surest with existence {n.surest:.2f}, below the extraction threshold or "

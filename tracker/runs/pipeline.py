@@ -100,7 +100,7 @@ def compute(
     try:
         _fuse(run, total, reader, reporter, cancelled, thread_begins)
         # a file may have changed while it was read: nothing computed from it may be cached yet
-        known = None if run.costly and len(run.views) > reused else cache
+        known = None if run.from_pictures and len(run.views) > reused else cache
         _smooth(run, total, reporter, cancelled, known)
         _correct(run, reporter)
         run.finished = run.complete
@@ -110,7 +110,7 @@ def compute(
         raise
     finally:
         if cache is not None:
-            _keep(run, cache, fused=sound, read=run.costly and len(run.views) > reused)
+            _keep(run, cache, fused=sound, read=run.from_pictures and len(run.views) > reused)
     return run
 
 
@@ -308,7 +308,7 @@ def _adopt(run: Run, previous: Run | None) -> None:
         return
     if previous.keys["single_view"] == run.keys["single_view"]:
         run.views, run.view_states = previous.views.shared(), previous.view_states
-        run.costly = previous.costly
+        run.from_pictures = previous.from_pictures
     if previous.keys["fusion"] == run.keys["fusion"]:
         run.fused, run.fusion_state = previous.fused.shared(), previous.fusion_state
     if previous.keys["smoothing"] == run.keys["smoothing"] and previous.complete:
@@ -321,7 +321,7 @@ def _take(run: Run, cache: StageCache) -> None:
     views = cache.views(run.keys["single_view"], frames=frames, cameras=cameras)
     if views is not None and len(views.steps) > len(run.views):
         run.views, run.view_states = views.steps.shared(), views.states
-        run.costly = views.costly
+        run.from_pictures = views.from_pictures
     fused = cache.fusion(run.keys["fusion"])
     if fused is not None and len(fused.steps) > len(run.fused):
         run.fused, run.fusion_state = fused.steps.shared(), fused.state
@@ -347,7 +347,7 @@ def _keep(run: Run, cache: StageCache, *, fused: bool, read: bool) -> None:
     if place == "nowhere":
         return
     if run.views:
-        column = ViewColumn(run.views, run.view_states, run.costly)
+        column = ViewColumn(run.views, run.view_states, run.from_pictures)
         complete = len(run.views) == run.sequence.frames and place == "everywhere"
         cache.keep_views(run.keys["single_view"], column, complete=complete)
     if fused and run.fused:

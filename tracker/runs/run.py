@@ -100,7 +100,7 @@ class Run:
     view_states: tuple[Any, ...] | None = None
     """The state of stage 1 of each camera after the last step of :attr:`views`; None if that is
     the last of the sequence."""
-    costly: bool = False
+    from_pictures: bool = False
     """Whether stage 1 decoded pictures."""
     fusion_state: Any = None
     """The state of stage 2 after the last step of :attr:`fused`."""

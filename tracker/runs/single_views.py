@@ -100,7 +100,7 @@ class SingleViews:
             run.parameters,
             self._rectified.reader,
         )
-        run.costly = run.costly or _uses_pictures(run)
+        run.from_pictures = run.from_pictures or _uses_pictures(run)
         state = run.view_states[camera] if run.view_states is not None else method.start()
         return _CameraWorker(method, state, camera, run, self._rectified, self._is_stopped)
 

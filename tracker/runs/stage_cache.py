@@ -41,7 +41,7 @@ class ViewColumn:
     states: tuple[Any, ...] | None
     """The state of each camera's method after the last step, from which the stage can be
     continued; None where the column is complete."""
-    costly: bool
+    from_pictures: bool
     """Whether pictures were decoded, so that the column is worth a file."""
 
 
@@ -142,7 +142,7 @@ class StageCache:
         if self._files is not None and (column is None or len(column.steps) < frames):
             steps = self._files.read(key, frames=frames, cameras=cameras)
             if steps is not None:
-                column = ViewColumn(steps, None, costly=True)
+                column = ViewColumn(steps, None, from_pictures=True)
                 self._put("single_view", key, column)
         return column
 
@@ -170,7 +170,7 @@ class StageCache:
         before: ViewColumn | None = self._get("single_view", key)
         if before is None or len(before.steps) < len(column.steps):
             self._put("single_view", key, column)
-            if complete and column.costly and self._files is not None:
+            if complete and column.from_pictures and self._files is not None:
                 files, steps = self._files, column.steps
                 self._start(lambda: files.write(key, steps))
 

@@ -6,12 +6,15 @@ as in a single run.
 
 from __future__ import annotations
 
+import glob
+import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from tracker.corrections.log import place_of, read_log
+from tracker.files.text import not_utf_8
 from tracker.library.keeping import record_of_recording
 from tracker.library.records import KeptRun
 from tracker.library.store import Library
@@ -59,26 +62,48 @@ def places_of(names: Sequence[str]) -> list[str]:
     return definition.places_of(_without_lists(names), Path.cwd())
 
 
-def _without_lists(names: Sequence[str]) -> Iterator[str]:
-    """Yield names, and those in files that are named by ``@FILE``."""
+def _without_lists(names: Sequence[str], files: tuple[Path, ...] = ()) -> Iterator[str]:
+    """Yield names, and those in files that are named by ``@FILE``.
+
+    Args:
+        names: The names.
+        files: The file that has the names, and those that name it.
+    """
     for name in names:
-        if name.startswith("@"):
-            yield from _without_lists(_listed(Path(name[1:])))
-        else:
+        if not name.startswith("@"):
             yield name
+            continue
+        file = Path(name[1:]).absolute()
+        if file in files:
+            raise StudyError(
+                f"{files[0]}: expected recordings, found {name}, which names this file; take it out"
+            )
+        yield from _without_lists(_listed(file), (file, *files))
 
 
 def _listed(file: Path) -> list[str]:
-    """Return the names in a file, without empty lines and comments; relative folders refer to the
-    folder of the file."""
+    """Return the names in a file, without empty lines and comments.
+
+    Relative folders, patterns and files refer to the folder of the file; if there are none, to the
+    working folder.
+    """
     try:
         lines = file.read_text(encoding="utf-8").splitlines()
+    except UnicodeDecodeError as error:
+        raise StudyError(f"{file}, {not_utf_8(error)}") from None
     except OSError as error:
-        raise StudyError(f"@{file}: cannot be read ({error.strerror})") from None
+        raise StudyError(
+            f"{file}: cannot be read ({error.strerror}); name a file with a recording a line"
+        ) from None
     words = [line.strip() for line in lines]
-    names = [word for word in words if word and not word.startswith("#")]
-    folder = file.absolute().parent
-    return [str(folder / name) if (folder / name).exists() else name for name in names]
+    return [_beside(file.parent, word) for word in words if word and not word.startswith("#")]
+
+
+def _beside(folder: Path, name: str) -> str:
+    """Return a name as a path in a folder if there is such a path; else the name."""
+    at = "@" if name.startswith("@") else ""
+    path = str(folder / name.removeprefix("@"))
+    return at + path if os.path.exists(path) or glob.glob(path) else name
 
 
 def run_batch(

@@ -50,7 +50,6 @@ _QUIET = {
 """Settings that reduce what Dask collects for its dashboard, which is not used here; with many
 workers it would take much of the scheduler's time."""
 
-
 MOST_A_CORE = 4
 """Largest number of processes for each core; more would wait for each other, and each takes up to
 1 GB of memory."""

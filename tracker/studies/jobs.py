@@ -21,7 +21,6 @@ from tracker.sequences.sequence import Sequence
 FORMAT = 1
 """Version of the outcomes; if it changes, all jobs are computed again."""
 
-
 _TRACKER = Path(evaluation.__file__).parents[1]
 
 FIGURES = ("evaluation", "review/self_consistency")
@@ -29,7 +28,7 @@ FIGURES = ("evaluation", "review/self_consistency")
 
 
 @cache
-def code_version(tracker: Path = _TRACKER) -> str:
+def figures_version(tracker: Path = _TRACKER) -> str:
     """Return a hash of the code that may change a figure of a run.
 
     It covers the code of the tracks and that of the figures, without the reports on them.
@@ -62,7 +61,7 @@ class Job:
     seed: int
     """The seed of the random numbers."""
     code: str
-    """The version of the code, see :func:`code_version`."""
+    """The version of the code, see :func:`figures_version`."""
     truth: bool
     """Whether the run is evaluated against ground truth."""
     agreement: bool
@@ -145,7 +144,7 @@ def job_of(
     """
     own = replace(sequence, digest=content)
     run = stage_keys(own, parameters, seed, corrections)["tracks"]
-    code = code_version()
+    code = figures_version()
     # ``timed`` is left out, since it does not change the run
     asked = [run, code, truth, agreement]
     key = hashlib.sha256(json.dumps(asked).encode()).hexdigest()[:24]

@@ -16,7 +16,7 @@ from tracker.sequences.sequence import Sequence
 from tracker.studies import objectives
 from tracker.studies.definition import StudyDefinition
 from tracker.studies.errors import StudyError
-from tracker.studies.jobs import Job, code_version, job_of
+from tracker.studies.jobs import Job, figures_version, job_of
 from tracker.studies.objectives import Objective
 from tracker.studies.store import JobRow, Store, Writer
 from tracker.studies.transfer import content_of
@@ -162,7 +162,7 @@ def check_same(store: Store, writer: Writer, recordings: Recordings) -> None:
     now, before = [one.to_json() for one in recordings.every], store.fact("recordings")
     if before is None:
         writer.put_fact("recordings", now)
-        writer.put_fact("code", code_version())
+        writer.put_fact("code", figures_version())
         writer.put_fact("objectives", [asdict(one) for one in recordings.objectives])
         return
     for one, other in zip(before, now, strict=True):
@@ -171,7 +171,7 @@ def check_same(store: Store, writer: Writer, recordings: Recordings) -> None:
                 f"{other['place']} has changed since the study {store.name} began; its trials "
                 "cannot be set beside new ones: give the study a new name"
             )
-    if store.fact("code") != code_version():
+    if store.fact("code") != figures_version():
         raise StudyError(
             f"the study {store.name} was begun by another version of the program; its trials "
             "cannot be set beside new ones: give the study a new name"

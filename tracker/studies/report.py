@@ -163,7 +163,7 @@ def report_html(store: Store) -> str:
             f'<div class="wide">{_trials(summary)}</div>',
             "<h2>Repeat the best one</h2>",
             f'<pre class="command">{escaped(_commands(summary))}</pre>',
-            "<h2>StudyDefinition</h2>",
+            "<h2>Definition</h2>",
             "<details><summary>As a file that starts it again</summary>",
             f"<pre>{escaped(definition.to_toml())}</pre></details>",
             "</body></html>",

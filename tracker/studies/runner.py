@@ -15,12 +15,12 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from tracker.studies.cluster import Crew, WorkerState
-from tracker.studies.confirm import SEARCH_SHARE, Proposer
 from tracker.studies.definition import StudyDefinition
 from tracker.studies.errors import StudyError
 from tracker.studies.importance import ImportanceEstimator
 from tracker.studies.jobs import Job, Outcome
 from tracker.studies.judging import Judge
+from tracker.studies.proposal import SEARCH_SHARE, Proposer
 from tracker.studies.recordings import Recordings, check_same, open_recordings
 from tracker.studies.sampling import Sampler
 from tracker.studies.store import JobRow, Status, Store, Trial, Writer, turn

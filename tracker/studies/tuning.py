@@ -11,7 +11,7 @@ from tracker.parameters.values import changed_values, shown_keys, value_of, with
 from tracker.runs.fitting import default_parameters
 from tracker.sequences.errors import SequenceError
 from tracker.sequences.library import open_sequence
-from tracker.studies.definition import MOST_TRIALS, StudyDefinition
+from tracker.studies.definition import MOST_TRIALS, StudyDefinition, places_of
 from tracker.studies.errors import StudyError
 from tracker.studies.space import around
 
@@ -66,7 +66,7 @@ def tuning(
     own = changed_values(now[0], defaults)
     return StudyDefinition(
         name=name,
-        recordings=tuple(_place(one) for one in recordings),
+        recordings=tuple(places_of(recordings, Path.cwd())),
         varied=tuple(varied),
         trials=MOST_TRIALS,
         minutes=minutes,
@@ -76,11 +76,6 @@ def tuning(
         values={key: value for key, value in own.items() if key not in keys},
         start={key: value for key, value in own.items() if key in keys},
     )
-
-
-def _place(name: str) -> str:
-    """Return the absolute path of a folder, or the name of a built-in recording."""
-    return str(Path(name).absolute()) if Path(name).exists() else name
 
 
 def _is_varied(key: str, now: RunParameters, minutes: float) -> bool:

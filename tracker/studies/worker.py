@@ -34,7 +34,7 @@ from tracker.sequences.errors import SequenceError
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 from tracker.studies import transfer
-from tracker.studies.jobs import Job, Outcome, code_version
+from tracker.studies.jobs import Job, Outcome, figures_version
 from tracker.studies.objectives import OBJECTIVES
 
 CACHE_BYTES = 128 << 20
@@ -115,8 +115,8 @@ def work(job: Job, tell: Tell = lambda words: None, worker: str = "") -> Outcome
         worker: The name of the worker.
     """
     begin = time.perf_counter()
-    if job.code != code_version():
-        return Outcome(job.key, "version", code_version(), worker=worker, machine=machine())
+    if job.code != figures_version():
+        return Outcome(job.key, "version", figures_version(), worker=worker, machine=machine())
     prepare(tell)
     assert _process is not None
     with _process.lock:  # one job at a time, since processor time is measured for the process
@@ -243,7 +243,9 @@ def _write_seconds(key: str, seconds: float, run: Run) -> None:
     known[key] = seconds
     while len(known) > KNOWN_TIMES:
         known.popitem(last=False)
-    if run.costly:  # the results of stage 1 are on disk, so that other processes need the time
+    if (
+        run.from_pictures
+    ):  # the results of stage 1 are on disk, so that other processes need the time
         place = cache_folder() / "stage-seconds"
         try:
             place.mkdir(parents=True, exist_ok=True)

@@ -28,7 +28,7 @@ from tracker.review.queue.item import (
     confirm,
     propose,
 )
-from tracker.review.queue.linking import Move, Tracklet
+from tracker.review.queue.moves import Move, Tracklet
 from tracker.review.queue.other_run import OtherRun
 from tracker.review.queue.ranking import (
     IdentityReach,
@@ -556,7 +556,7 @@ def test_so_many_are_asked_and_all_that_are_answered_are_counted(
     assert len(whole.items) > 2
     assert whole.answered == 0
     assert whole.how == (
-        "where tracks end and begin; less than 1 step expected to be wrong is left out"
+        "where tracks end and begin; moments with less than 1 expected wrong step are left out"
     )
     first = whole.items[0]
     rest = queue(run, corrections=first.alternatives[0].corrections)

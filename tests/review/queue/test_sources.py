@@ -20,10 +20,10 @@ from tracker.parameters.catalogue import RunParameters
 from tracker.review.queue import queue, single_tracks, track_ends
 from tracker.review.queue.clear_places import ClearPlaces
 from tracker.review.queue.item import TrackRows, confirm
-from tracker.review.queue.linking import Tracklet
 from tracker.review.queue.links import moves_of_links, tracklets_of
 from tracker.review.queue.lost_people import joins_of_lost_people, leaving_probability
 from tracker.review.queue.meetings import ambiguous_shares, meetings
+from tracker.review.queue.moves import Tracklet
 from tracker.review.queue.ranking import is_answered
 from tracker.review.queue.unclaimed import Unclaimed, _chains, find_unclaimed
 from tracker.runs.run import Run

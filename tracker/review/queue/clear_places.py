@@ -9,7 +9,7 @@ from numpy import ndarray
 from tracker.corrections import Place
 from tracker.corrections.kinds import REACH
 from tracker.review.queue.item import TrackRows
-from tracker.review.queue.linking import Move, Tracklet
+from tracker.review.queue.moves import Move, Tracklet
 
 _WIDTHS = 4.0
 """Least distance of a clear place from the nearest other track, in target widths: a correction

@@ -8,7 +8,7 @@ import numpy as np
 
 from tracker.corrections import Place
 from tracker.review.queue.item import TrackRows
-from tracker.review.queue.linking import Move, Tracklet
+from tracker.review.queue.moves import Move, Tracklet
 from tracker.runs.run import Run
 from tracker.smoothing import names_of
 from tracker.smoothing.result import LinkedTracklets

@@ -8,8 +8,8 @@ import numpy as np
 
 from tracker.corrections import Place
 from tracker.review.queue.item import TrackRows
-from tracker.review.queue.linking import Move
 from tracker.review.queue.links import LEAST_LOG_ODDS, whole_track
+from tracker.review.queue.moves import Move
 from tracker.runs.run import Run
 
 _LONGEST = 20.0

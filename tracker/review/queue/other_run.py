@@ -14,7 +14,7 @@ from tracker.corrections import Place
 from tracker.fusion.trajectories import Trajectories
 from tracker.geometry.assignment import pairs_within
 from tracker.review.queue.item import TrackRows
-from tracker.review.queue.linking import Move, Tracklet
+from tracker.review.queue.moves import Move, Tracklet
 
 _REACH = 0.7
 """Largest distance at which two tracks of the two runs may follow one person, metres on the

@@ -16,8 +16,8 @@ from tracker.fusion.trajectories import Trajectories
 from tracker.review.queue import links, lost_people, single_tracks
 from tracker.review.queue.clear_places import ClearPlaces
 from tracker.review.queue.item import Alternative, ReviewItem, TrackRows, propose
-from tracker.review.queue.linking import Move
 from tracker.review.queue.meetings import meetings
+from tracker.review.queue.moves import Move
 from tracker.review.queue.other_run import OtherRun
 from tracker.review.queue.track_ends import track_ends
 from tracker.runs.run import Run
@@ -101,7 +101,7 @@ def queue(
     how = "the odds of joining pieces" if _joins(run) else "where tracks end and begin"
     if backwards is not None:
         how += ", and what the recording says seen backwards in time"
-    how += f"; less than {LEAST:.0f} step expected to be wrong is left out"
+    how += f"; moments with less than {LEAST:.0f} expected wrong step are left out"
     return Queue(tuple(items), answered, how)
 
 

@@ -1,4 +1,7 @@
-"""Review items and moves that concern a single track: it may be clutter, or follow two people."""
+"""Review items and moves that concern a single track: it may be clutter, or follow two people.
+
+No run depends on the bounds of this module: they decide what a person is asked.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,7 @@ import numpy as np
 
 from tracker.corrections.kinds import KINDS
 from tracker.review.queue.item import WITHIN, Alternative, ReviewItem, TrackRows, propose
-from tracker.review.queue.linking import Move, Tracklet
+from tracker.review.queue.moves import Move, Tracklet
 from tracker.runs.run import Run
 
 _SHORT = 1.0

@@ -1,4 +1,7 @@
-"""Review items of tracks that begin or end inside the room, and of people without a track."""
+"""Review items of tracks that begin or end inside the room, and of people without a track.
+
+No run depends on the bounds of this module: they decide what a person is asked.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Unclaimed boxes: boxes of several cameras that agree on a place where there is no track."""
+"""Unclaimed boxes: boxes of several cameras that agree on a place where there is no track.
+
+No run depends on the bounds of this module: they decide what a person is asked.
+"""
 
 from __future__ import annotations
 

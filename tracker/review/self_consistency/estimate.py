@@ -15,6 +15,7 @@ from numpy import ndarray
 
 from tracker.fusion.trajectories import Trajectories
 from tracker.geometry.assignment import linear_sum_assignment
+from tracker.geometry.boxes import Boxes, box_overlaps
 from tracker.geometry.camera import Camera
 from tracker.parameters.catalogue import RunParameters
 from tracker.review.self_consistency.agreement import (
@@ -259,12 +260,7 @@ def overlap(
         count += len(boxes) + len(drawn)
         if not len(boxes) or not len(drawn):
             continue
-        low, high = drawn[:, None, :2], drawn[:, None, :2] + drawn[:, None, 2:]
-        own_low, own_high = boxes[:, :2] - boxes[:, 2:], boxes[:, :2] + boxes[:, 2:]
-        sides = np.minimum(high, own_high) - np.maximum(low, own_low)
-        both = np.maximum(sides, 0.0).prod(axis=2)
-        union = drawn[:, None, 2:].prod(axis=2) + 4.0 * boxes[:, 2:].prod(axis=1) - both
-        shares = both / np.maximum(union, 1e-9)
+        shares = box_overlaps(drawn, Boxes(boxes).left_top)
         rows, columns = linear_sum_assignment(shares, maximize=True)
         total += 2.0 * float(shares[rows, columns].sum())
     return total / count if count else None
