@@ -197,7 +197,7 @@ def test_two_that_cannot_both_be_true_are_refused(told: list[tuple], refused: bo
 def test_nobody_reaches_no_farther_than_it_says(reach: float, apart: float, refused: bool) -> None:
     here = make(kind="here", places=[at(3, apart)])
     if refused:
-        with pytest.raises(CorrectionError, match=r"somebody is at \(0.10, 0.00\) at step 3"):
+        with pytest.raises(CorrectionError, match=r"a person is at \(0.10, 0.00\) at step 3"):
             refuse_contradiction([here], nobody(1, 5, reach))
     else:
         refuse_contradiction([here], nobody(1, 5, reach))
