@@ -49,6 +49,29 @@ def test_every_link_leads_to_a_function_on_the_page_of_its_package() -> None:
         assert target.split(".")[1] == page
 
 
+def called_by(kernel: Any) -> set[Any]:
+    """The functions of the engine that a kernel calls, directly or through others."""
+    found: set[Any] = set()
+    waiting = [kernel]
+    while waiting:
+        function = getattr(waiting.pop(), "py_func", None)
+        if function is None or function in found:
+            continue
+        found.add(function)
+        waiting += [function.__globals__.get(name) for name in function.__code__.co_names]
+    return found
+
+
+def test_the_kernels_of_the_path_are_called_by_the_first() -> None:
+    """They are compiled, so no profile sees their calls."""
+    kernels = [resolved(target) for _, page, target in linked() if page == "kernels"]
+    assert len(kernels) >= 3
+    reached = called_by(kernels[0])
+    assert {kernel.py_func for kernel in kernels} <= reached
+    other = resolved("tracker.kernels.labelled.marginals.share_boxes")
+    assert other.py_func not in reached, "the filter of intensities has its own"
+
+
 def test_a_box_takes_that_path(tmp_path: Path) -> None:
     """Every function of the path is called, but the kernels and the method of pictures."""
     called = set()
