@@ -224,7 +224,7 @@ class Edits:
         now, own = self._workbench.snapshot().sequence, self._sequence
         if self._unsubscribe is None or now is None:
             return True
-        return own is not None and own.views is now.views
+        return own is not None and own.views is now.views and not self._left
 
     def _restore(self, edit: Edit, side: Literal[0, 1]) -> None:
         values = {part: pair[side] for part, pair in edit.parts.items()}
@@ -326,6 +326,9 @@ class Edits:
             self._workbench.set_parameters(left, "opened")
         except ParameterError as error:
             logger.warning("the parameters that were left cannot be set: %s", error)
+        with self._lock:
+            self._left = {}
+            self._opened.notify_all()
 
     def _open(self, now: Snapshot) -> None:
         """Leave the recording that was open, and take up the edits of another."""
