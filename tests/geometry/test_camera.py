@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import cv2
@@ -17,7 +18,13 @@ from tests.world import HEAD, PERSON
 from tests.world import SMALL_CAMERAS as CAMERAS
 from tests.world import SMALL_ROOM as ROOM
 from tests.world import surveillance as look_at
-from tracker.geometry.calibration import LARGEST_SIDE, checked_size
+from tracker.geometry.calibration import (
+    LARGEST_ENTRY,
+    LARGEST_SIDE,
+    LEAST_FOCAL,
+    check_focal_lengths,
+    checked_size,
+)
 from tracker.geometry.camera import NEAREST_DEPTH, Camera, stacked
 from tracker.kernels import lens
 
@@ -340,3 +347,19 @@ def test_a_picture_has_a_whole_number_of_pixels_from_one_to_the_largest() -> Non
         for size in ([wrong, 9.0], [9.0, wrong]):
             with pytest.raises(ValueError, match="expected two whole numbers of pixels"):
                 checked_size(np.array(size))
+
+
+@pytest.mark.parametrize(
+    ("fx", "cx", "accepted"),
+    [(LEAST_FOCAL, 0.0, True), (LARGEST_ENTRY, -LARGEST_ENTRY, True), (0.09, 0.0, False),
+     (-500.0, 0.0, False), (500.0, -1.1e6, False), (1.1e6, 0.0, False), (math.nan, 0.0, False)],
+)  # fmt: skip
+def test_a_matrix_k_has_plausible_focal_lengths_and_nothing_larger(
+    fx: float, cx: float, accepted: bool
+) -> None:
+    matrix = np.array([[fx, 0.0, cx], [0.0, 700.0, 240.0], [0.0, 0.0, 1.0]])
+    if accepted:
+        check_focal_lengths(matrix)
+    else:
+        with pytest.raises(ValueError, match="expected focal lengths fx and fy from"):
+            check_focal_lengths(matrix)

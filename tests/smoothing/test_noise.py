@@ -227,6 +227,11 @@ def test_a_path_of_a_single_row_tells_nothing_of_the_noise() -> None:
     rows = choose_rows(standing(*spans), np.full(63, 2))
     assert rows is not None
     assert rows.tolist() == [*range(60), 61, 62]
+    # nor where no window is seen by two cameras in half of its rows
+    seen = np.where(np.arange(181) % WINDOW < 25, 2, 1)
+    rows = choose_rows(standing((1, 0, 179, 0.0), (2, 3, 3, 2.0)), seen)
+    assert rows is not None
+    assert rows.tolist() == [*range(180)]
 
 
 def test_what_does_not_average_is_considered() -> None:
