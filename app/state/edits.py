@@ -25,7 +25,7 @@ from app.state.workbench import Workbench
 from tracker.corrections import Correction, CorrectionError
 from tracker.files.validated import read_as, write_json
 from tracker.parameters.catalogue import PARAMETERS, RunParameters
-from tracker.parameters.values import ParameterError, changed_values, label_of, value_of
+from tracker.parameters.values import changed_values, label_of, value_of
 from tracker.sequences.built_in import key_of
 from tracker.sequences.sequence import Sequence
 from tracker.sequences.writing.teaching import Values, changes, taught_values
@@ -224,7 +224,7 @@ class Edits:
         now, own = self._workbench.snapshot().sequence, self._sequence
         if self._unsubscribe is None or now is None:
             return True
-        return own is not None and own.views is now.views and not self._left
+        return own is not None and own.views is now.views
 
     def _restore(self, edit: Edit, side: Literal[0, 1]) -> None:
         values = {part: pair[side] for part, pair in edit.parts.items()}
@@ -296,7 +296,6 @@ class Edits:
             before, values = self._sequence, self._parameters
             if before is None or before.views is not now.sequence.views:
                 self._open(now)
-                left = self._left
                 self._opened.notify_all()
             else:
                 self._sequence, self._parameters = now.sequence, now.parameters
@@ -308,27 +307,11 @@ class Edits:
                     edit = _edit_of(before, values, now)
                 if edit is None:
                     return
-                earlier, self._left = self._left, {}
-                if earlier and changed_values(now.parameters, now.defaults) == earlier:
+                left, self._left = self._left, {}
+                if left and changed_values(now.parameters, now.defaults) == left:
                     return
                 self._add(edit, now.parameters_origin)
-                left = {}
         self._show_words()
-        if left:
-            self._return_to(left)
-
-    def _return_to(self, left: Mapping[str, Any]) -> None:
-        """Set the parameters that the edits of the recording led to: an undo takes back from them.
-
-        They equal what was left, so that this is no edit.
-        """
-        try:
-            self._workbench.set_parameters(left, "opened")
-        except ParameterError as error:
-            logger.warning("the parameters that were left cannot be set: %s", error)
-        with self._lock:
-            self._left = {}
-            self._opened.notify_all()
 
     def _open(self, now: Snapshot) -> None:
         """Leave the recording that was open, and take up the edits of another."""

@@ -271,26 +271,6 @@ def test_edits_are_taken_up_after_a_start_where_they_still_fit(
     edits.close()
 
 
-def test_parameters_come_back_with_the_edits_that_led_to_them(
-    crossing: Path, tmp_path: Path
-) -> None:
-    bench = opened(crossing)
-    edits = followed(bench, tmp_path)
-    bench.set_parameters({P_D: 0.6}, "one")
-    edits.close()
-    again = Workbench()
-    edits = Edits(again, tmp_path)
-    edits.follow()
-    before = bench.snapshot()
-    again.open(before.sequence, "key", None, before.defaults)
-    assert values(again)[0] == 0.6
-    assert [edit.words for edit in edits._done] == ["Detection probability 0.95 → 0.6"]
-    edits.undo()
-    assert values(again)[0] == 0.95
-    assert again.snapshot().undo_words is None
-    edits.close()
-
-
 def test_an_undo_right_after_the_opening_is_of_the_recording(
     crossing: Path, tmp_path: Path
 ) -> None:
