@@ -336,8 +336,9 @@ def _import_with_flags() -> Any:
     from tracker.io.importing.options import ImportOptions
 
     flags: list[tuple[str, Any, Any]] = []
+    options = ImportOptions.model_json_schema()["properties"]
     for option, name in IMPORT_FLAGS.items():
-        schema = ImportOptions.model_json_schema()["properties"][option]
+        schema = options[option]
         kinds = [one for one in schema.get("anyOf", [schema]) if one["type"] != "null"]
         choices = tuple(kinds[0].get("enum", ()))
         words: dict[str, Any] = {"help_behavior_hint": "(default: found out)"}

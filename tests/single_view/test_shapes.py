@@ -282,7 +282,8 @@ def test_a_candidate_falls_at_the_first_gate_that_it_does_not_pass() -> None:
 
 
 def test_samples_are_drawn_on_the_foreground_as_far_as_it_is_trusted() -> None:
-    """Of 100 boxes 0.6 are drawn anywhere, all while nobody is expected; the rest at people."""
+    """A share of 0.6 of the boxes is drawn anywhere, all while nobody is expected; the rest lie at
+    people."""
     drawn: dict[str, int] = {}
 
     def draw(where: str, count: int) -> ndarray:

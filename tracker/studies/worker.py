@@ -243,9 +243,8 @@ def _write_seconds(key: str, seconds: float, run: Run) -> None:
     known[key] = seconds
     while len(known) > KNOWN_TIMES:
         known.popitem(last=False)
-    if (
-        run.from_pictures
-    ):  # the results of stage 1 are on disk, so that other processes need the time
+    # the results of stage 1 are on disk, so that other processes need the time
+    if run.from_pictures:
         place = cache_folder() / "stage-seconds"
         try:
             place.mkdir(parents=True, exist_ok=True)

@@ -17,7 +17,7 @@ class ShapesParams(Params):
     """People by the shape of head and trunk, without templates ([DTPB09]).
 
     They are followed in the picture by ``jpda`` with its default parameters: halved and doubled,
-    none of those and not the constant changed a bit of any track in twelve random rooms
+    none of those and not the constant changed a bit of any track in six random rooms
     (``tests.papers.rooms.ablations``), since all people by shape go to the fusion.
     """
 
