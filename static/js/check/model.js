@@ -53,7 +53,7 @@ function createCheck({ store, actions, playback }) {
 
 	/** @param {Server.DoubtQueue} told */
 	function receiveQueue(told) {
-		const { chosen } = state.get();
+		const { chosen, placing } = state.get();
 		const doubts = told.doubts.filter(({ id }) => gone.get(id) !== told.run || !gone.has(id));
 		const queue = { ...told, doubts };
 		const same =
@@ -69,11 +69,12 @@ function createCheck({ store, actions, playback }) {
 			// What is done makes room for the next; while a run goes on the shown one stays. Who has
 			// sought elsewhere meanwhile is not called back, nor who is placing people.
 			const { place, step } = store.get();
-			const away = !answered && chosen && (placed || step < chosen.first || step > chosen.last);
+			const elsewhere = chosen && (step < chosen.first || step > chosen.last);
+			const away = placing || (!answered && (placed || elsewhere));
 			answered = placed = false;
 			const next = doubts[Math.min(at, doubts.length - 1)] ?? null;
 			if (place === "check" && !away) choose(next);
-			else state.set({ ...hide(), chosen: null });
+			else state.set({ ...hide(), chosen: null, placing });
 		}
 	}
 

@@ -231,6 +231,7 @@ def test_the_menu_of_a_lane_works_in_tune_too(
 
 def test_somebody_is_placed_by_a_click(check: Page, server: Server) -> None:
     check.keyboard.press("Home")
+    until(check, lambda: readout(check) == "0", "the first step is shown")
     check.locator(".lane").first.click()
     check.keyboard.press("Shift+H")
     expect(check.get_by_text("Click where")).to_be_visible()
@@ -240,6 +241,19 @@ def test_somebody_is_placed_by_a_click(check: Page, server: Server) -> None:
     until(check, lambda: len(corrections(server)["corrections"]) == 1, "it is said")
     told = corrections(server)["corrections"][0]
     assert (told["kind"], told["first"]) == ("here", 0)
+
+
+def test_who_places_somebody_goes_on_when_the_chosen_place_is_answered_elsewhere(
+    check: Page, server: Server
+) -> None:
+    (chosen, *_) = server.get("/api/corrections/queue").json()["doubts"]
+    check.keyboard.press("Shift+H")
+    expect(check.locator(".why")).to_contain_text("Click where")
+    server.command("answer", doubt=chosen["id"], alternative=0)
+    without_a_place = check.locator(".blank").get_by_text("Click where")
+    expect(without_a_place).to_be_visible()
+    check.keyboard.press("Escape")
+    expect(without_a_place).to_have_count(0)
 
 
 def test_somebody_is_placed_by_keys_at_the_step_that_is_shown(check: Page, server: Server) -> None:

@@ -114,7 +114,7 @@ def test_recordings_are_listed_before_their_runs_and_a_plan_holds_its_entrances(
         return left < edge.left || right > edge.right || top < edge.top || bottom > edge.bottom;
       }); }"""
     plan = library.get_by_role("img", name="Ways from above")
-    assert plan.locator("ellipse").count() > 0
+    expect(plan.locator("ellipse").first).to_be_attached()
     assert not plan.evaluate(cut)
     library.route("**/api/library/recordings/*/runs", lambda route: None)  # it never comes
     library.reload()
