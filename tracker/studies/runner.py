@@ -10,9 +10,9 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import nullcontext
+from contextlib import ExitStack, closing, nullcontext
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 from tracker.studies.cluster import Crew, WorkerState
 from tracker.studies.definition import StudyDefinition
@@ -60,86 +60,169 @@ def run_study(
     Raises:
         StudyError: If the study cannot continue; the status has the same message.
     """
-    study = _Running(store, writer, on_status, stopped)
-    try:
-        study.prepare()
-        with nullcontext(True) if beside else turn(store.name, study.waits) as mine:
+    report = _Report(store, writer, on_status)
+
+    def waits(words: str) -> bool:
+        report.restart(words)
+        return not (stopped() or store.asked_to_stop())
+
+    with ExitStack() as held:
+        try:
+            opened = _open(store, writer, report)
+            mine = held.enter_context(nullcontext(True) if beside else turn(store.name, waits))
             if mine:
-                study.crew = crew(study.wait_for)
-                study.work()
+                at_work = crew(report.wait_for)
+                session = _Session(store, writer, report, opened, at_work, stopped)
+                held.enter_context(closing(session)).work()
             else:
-                study.end_early()
-            study.write_status()
-    except StudyError as error:
-        study.state, study.words = "failed", str(error)
-        study.write_status()
-        raise
-    except BaseException:
-        study.state, study.words = "stopped", "interrupted; nothing that ended before is lost"
-        study.write_status()
-        raise
-    finally:
-        study.close()
-    return study.status
+                report.stop()
+            report.write()
+        except StudyError as error:
+            report.end("failed", str(error))
+            raise
+        except BaseException:
+            report.end("stopped", "interrupted; nothing that ended before is lost")
+            raise
+    return report.status
 
 
-class _Running:
+class _Report:
+    """The status of one session of a study, which is written from its start on."""
+
+    def __init__(self, store: Store, writer: Writer, on_status: Callable[[Status], None]) -> None:
+        """Start the clock of the session; the arguments are those of :func:`run_study`."""
+        self._writer, self._on_status = writer, on_status
+        self._spent = float(store.fact("spent") or 0.0)
+        self._begin = time.monotonic()
+        self.state: Any = "running"
+        self.words = ""
+        self.details: Callable[[], dict[str, Any]] = dict
+        """A function that returns the other fields of the status."""
+        self.status = Status("running")
+        """As it was written last."""
+
+    @property
+    def seconds(self) -> float:
+        """The duration of this session, seconds."""
+        return time.monotonic() - self._begin
+
+    @property
+    def all_seconds(self) -> float:
+        """The duration of all sessions together, seconds."""
+        return self._spent + self.seconds
+
+    def restart(self, words: str = "") -> None:
+        """Restart the session's clock, and write what the study waits for."""
+        self._begin = time.monotonic()
+        self.wait_for(words)
+
+    def wait_for(self, words: str) -> None:
+        """Write a status that says what the study waits for."""
+        self.words = words
+        self.write()
+
+    def stop(self) -> None:
+        """Set the state to ``stopped``."""
+        self.state = "stopped"
+        self.words = "stopped; nothing that ended before is lost"
+
+    def end(self, state: str, words: str) -> None:
+        """Write how the session ended, and why."""
+        self.state, self.words = state, words
+        self.write()
+
+    def write(self) -> None:
+        """Write the current status."""
+        self.status = Status(
+            self.state,
+            self.words,
+            seconds=self.seconds,
+            all_runs=self._writer.runs,
+            all_seconds=self.all_seconds,
+            process=os.getpid(),
+            written=time.time(),
+            **self.details(),
+        )
+        self._writer.write_status(self.status)
+        self._on_status(self.status)
+
+
+class _Opened(NamedTuple):
+    """A study as earlier sessions left it."""
+
+    recordings: Recordings
+    judge: Judge
+    sampler: Sampler
+    ended: set[int]
+    """The numbers of the trials that have ended."""
+    running: dict[int, dict[str, Any]]
+    """The values by key of the trials under way, by number."""
+
+
+def _open(store: Store, writer: Writer, report: _Report) -> _Opened:
+    """Open the recordings and the sampler, and read the results of earlier sessions."""
+    definition = store.definition()
+    report.details = lambda: {"trials": definition.trials}
+    report.wait_for("opening the recordings")
+    recordings = open_recordings(definition, report.wait_for)
+    check_same(store, writer, recordings)
+    trials, running = store.trials(), store.running_trials()
+    judge = Judge(recordings.objectives, trials, writer.outcome)
+    sampler = Sampler(definition, recordings.objectives, recordings.bases, trials, running)
+    ended = {trial.number for trial in trials}
+    report.details = lambda: {"done": len(ended), "trials": sampler.trials}
+    return _Opened(recordings, judge, sampler, ended, running)
+
+
+class _Session:
     """One session of a study: the time from a start to the next end or interruption."""
-
-    crew: Crew
 
     def __init__(
         self,
         store: Store,
         writer: Writer,
-        on_status: Callable[[Status], None],
+        report: _Report,
+        opened: _Opened,
+        crew: Crew,
         stopped: Callable[[], bool],
     ) -> None:
-        self._store, self._writer = store, writer
-        self._on_status, self._stopped = on_status, stopped
+        """Go on with a study whose workers have started.
+
+        Args:
+            store: The folder of the study.
+            writer: The writer of its results.
+            report: The status.
+            opened: The study as it was left.
+            crew: The workers.
+            stopped: A callback that returns whether to stop.
+        """
+        self._store, self._writer, self._report = store, writer, report
+        self._crew, self._stopped = crew, stopped
         self._definition: StudyDefinition = store.definition()
+        self._recordings, self._judge, self._sampler, self._ended, running = opened
         self._active: dict[int, Active] = {}
         self._waiting: dict[str, list[Active]] = {}
-        self._begin = time.monotonic()
-        self._spent = float(store.fact("spent") or 0.0)
         self._pace = Pace()
+        self._slots = crew.slots
         self._last_status = 0.0
-        self._slots = 1
-        self.state: Any = "running"
-        self.words = ""
-        self.status = Status("running")
-
-    def prepare(self) -> None:
-        """Open the recordings and the sampler, and read the results of earlier sessions."""
-        self.wait_for("opening the recordings")
-        definition = self._definition
-        self._recordings: Recordings = open_recordings(definition, self.wait_for)
-        check_same(self._store, self._writer, self._recordings)
-        ended, running = self._store.trials(), self._store.running_trials()
-        self._judge = Judge(self._recordings.objectives, ended, self._writer.outcome)
-        self._ended = {trial.number for trial in ended}
-        self._sampler = Sampler(
-            definition, self._recordings.objectives, self._recordings.bases, ended, running
-        )
         for number, values in running.items():
             self._activate(number, values)
-        known = self._store.fact("importance") or {"trials": 0}
+        known = store.fact("importance") or {"trials": 0}
         self._estimator = ImportanceEstimator(
-            definition.varied, self._sampler.defaults, known["trials"]
+            self._definition.varied, self._sampler.defaults, known["trials"]
         )
+        report.details = self._details
 
     def close(self) -> None:
-        """End the thread that estimates the importance."""
-        if hasattr(self, "_estimator"):
-            self._estimator.close()
+        """Store the time that was spent, and end the thread that estimates the importance."""
+        self._estimator.close()
+        self._writer.put_fact("spent", self._report.all_seconds)
 
     # the loop
 
     def work(self) -> None:
         """Run trials until all have ended, the time is over, or the study is stopped."""
-        self._slots = self.crew.slots
-        self.words = ""
-        self._begin = time.monotonic()
+        self._report.restart()
         for active in list(self._active.values()):
             self._send(active)
         while not self._is_stopped():
@@ -149,16 +232,11 @@ class _Running:
                 self._update_importance(last=True)
                 if self._definition.propose and not self._propose():
                     break
-                self.state, self.words = "done", words
+                self._report.state, self._report.words = "done", words
                 return
-            self._receive(self.crew.finished(SECONDS_BETWEEN))
+            self._receive(self._crew.finished(SECONDS_BETWEEN))
             self._at_intervals()
-        self.end_early()
-
-    def end_early(self) -> None:
-        """Set the state to ``stopped``."""
-        self.state = "stopped"
-        self.words = "stopped; nothing that ended before is lost"
+        self._report.stop()
 
     def _fill(self) -> None:
         """Ask the sampler for trials until enough runs are queued for all workers."""
@@ -186,11 +264,7 @@ class _Running:
             return float("inf")
         if share is None:
             share = SEARCH_SHARE if self._definition.propose else 1.0
-        return share * self._definition.minutes - (self._spent + self._seconds()) / 60.0
-
-    def _seconds(self) -> float:
-        """Return the duration of this session, seconds."""
-        return time.monotonic() - self._begin
+        return share * self._definition.minutes - (self._report.all_seconds) / 60.0
 
     def _activate(self, number: int, values: dict[str, Any]) -> Active:
         """Return an open trial with a number and values, which is active from now on."""
@@ -211,7 +285,7 @@ class _Running:
                 self._waiting[job.key].append(active)
             else:
                 self._waiting[job.key] = [active]
-                self.crew.submit(job, -active.number)
+                self._crew.submit(job, -active.number)
         active.sent = upto
         active.wanted = len({row.key for row, _ in active.jobs[:upto]})
 
@@ -229,7 +303,7 @@ class _Running:
             range(first, first + definition.propose),
             self._measure,
         )
-        self.words = "measuring the best again on other seeds"
+        self._report.words = "measuring the best again on other seeds"
         found = proposer.propose()
         if self._is_stopped():
             return False
@@ -246,13 +320,13 @@ class _Running:
                 found[key] = kept
             elif self._minutes_left(1.0) > 0.0:
                 self._waiting[key] = []
-                self.crew.submit(job)
+                self._crew.submit(job)
         while self._waiting and not self._is_stopped():
-            for outcome in self.crew.finished(SECONDS_BETWEEN):
+            for outcome in self._crew.finished(SECONDS_BETWEEN):
                 self._record_outcome(outcome)
                 found[outcome.key] = outcome
             if time.monotonic() - self._last_status >= SECONDS_BETWEEN:
-                self.write_status()
+                self._write_status()
         return found
 
     def _is_stopped(self) -> bool:
@@ -334,67 +408,40 @@ class _Running:
 
     # the status
 
-    def wait_for(self, words: str) -> None:
-        """Write a status that says what the study waits for."""
-        self.words = words
-        self.write_status()
-
-    def waits(self, words: str) -> bool:
-        """Write what the study waits for, and restart the session's clock; False if it is
-        stopped."""
-        self._begin = time.monotonic()
-        self.wait_for(words)
-        return not self._is_stopped()
-
     def _at_intervals(self) -> None:
         """Write the status and the importance, if the last status is old enough."""
         if time.monotonic() - self._last_status >= SECONDS_BETWEEN:
-            self._slots = self.crew.slots
-            self.words = "" if self.crew.workers() else "waits for a worker"
+            self._slots = self._crew.slots
+            self._report.words = "" if self._crew.workers() else "waits for a worker"
             self._update_importance()
-            self.write_status()
+            self._write_status()
 
-    def write_status(self) -> None:
-        """Write the current status."""
-        seconds = self._seconds()
-        done = len(getattr(self, "_ended", ()))
-        at_it = self.state == "running" and hasattr(self, "crew")
-        self.status = Status(
-            self.state,
-            self.words,
-            done=done,
-            trials=self._trials,
-            runs=self._pace.runs,
-            seconds=seconds,
-            seconds_left=self._seconds_left(done),
-            busy=self._pace.busy(self._slots),
-            workers=worker_rows(self.crew.workers(), self._waiting) if at_it else [],
-            all_runs=self._writer.runs,
-            all_seconds=self._spent + seconds,
-            process=os.getpid(),
-            written=time.time(),
-        )
-        self._writer.write_status(self.status)
-        if hasattr(self, "_sampler"):
-            self._writer.put_fact("spent", self._spent + seconds)
-        self._on_status(self.status)
+    def _write_status(self) -> None:
+        """Write the status, and store the time that was spent."""
+        self._report.write()
+        self._writer.put_fact("spent", self._report.all_seconds)
         self._last_status = time.monotonic()
 
-    @property
-    def _trials(self) -> int:
-        """The number of trials that the study has."""
-        return self._sampler.trials if hasattr(self, "_sampler") else self._definition.trials
+    def _details(self) -> dict[str, Any]:
+        """Return the fields of the status that this session knows."""
+        done, running = len(self._ended), self._report.state == "running"
+        return {
+            "done": done,
+            "trials": self._sampler.trials,
+            "runs": self._pace.runs,
+            "seconds_left": self._seconds_left(done) if running else None,
+            "busy": self._pace.busy(self._slots),
+            "workers": worker_rows(self._crew.workers(), self._waiting) if running else [],
+        }
 
     def _seconds_left(self, done: int) -> float | None:
         """Return the estimated time to the end, seconds; None if it is not known."""
-        if self.state != "running" or not hasattr(self, "_sampler"):
-            return None
-        left = self._pace.seconds_left(done, self._trials)
+        left = self._pace.seconds_left(done, self._sampler.trials)
         return None if left is None else max(0.0, min(left, 60.0 * self._minutes_left()))
 
     def _why_done(self) -> str:
         """Return why there are no more trials, in words; empty if all have ended."""
-        if len(self._ended) >= self._trials or self._definition.minutes is None:
+        if len(self._ended) >= self._sampler.trials or self._definition.minutes is None:
             return ""
         return f"the {self._definition.minutes:g} minutes are over"
 
