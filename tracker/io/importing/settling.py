@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple, get_args
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
 from tracker.geometry.camera import Camera
@@ -38,7 +38,7 @@ from tracker.io.conventions.questions import (
     rearranged,
 )
 from tracker.io.conventions.reading import Reading, read_boxes, to_camera
-from tracker.io.conventions.search import ClockFit, Verdict, as_meant, find_reading
+from tracker.io.conventions.search import Verdict, as_meant, find_reading
 from tracker.io.importing.arriving import short_videos
 from tracker.io.importing.finding.angles import check_turns, chosen_turns, turns_in_words
 from tracker.io.importing.finding.calibrations import camera_sets
@@ -62,7 +62,6 @@ from tracker.io.importing.finding.pictures import (
 from tracker.io.importing.finding.scale import AS_STANDING, PERSON, paced, resized
 from tracker.io.importing.finding.times import (
     CameraTime,
-    Times,
     check_common,
     counted_alike,
     first_index,
@@ -73,7 +72,7 @@ from tracker.io.importing.finding.times import (
 from tracker.io.importing.finding.truths import in_gaps, settle_truth
 from tracker.io.importing.gathering import ParsedFiles
 from tracker.io.importing.options import ImportOptions
-from tracker.io.read.pieces import FormatError, Layout, RawCamera
+from tracker.io.read.pieces import DetectionPiece, FormatError, Layout, RawCamera
 from tracker.sequences.sequence import Detections, Entrance, GroundTruth
 from tracker.sequences.tables import regular_gap
 
@@ -85,6 +84,9 @@ FARTHEST = 1e6
 
 _ALONG_AXIS = 0.9999
 """Cosine from which people stand along an axis of the world."""
+
+_MOST_OUTSIDE = 0.5
+"""Share of all boxes that may be of frames which the recording does not have."""
 
 _WITHOUT_UNIT = ("COLMAP", "nerfstudio", "Metashape", "OpenMVG", "MVSNet", "Middlebury")
 """Formats whose unit is arbitrary."""
@@ -139,103 +141,518 @@ def settle(taken: Sequence[ParsedFiles], options: ImportOptions | None = None) -
         Undecided, Unexplained: If the boxes leave open how the files are meant, and the likeliest
             interpretation is not to be accepted.
     """
-    options = options or ImportOptions()
-    sets, told = camera_sets(taken)
-    matched = match_all(taken, sets, options, told)
-    told += matched.told + short_videos(taken)
-    found: list[tuple[str, str]] = []
-    if options.first_index is None:
-        matched = counted_alike(matched, options.fps, found)
-    cameras = matched.cameras
-    for way in sorted({how for camera in cameras for how in camera.how.values()} - {"name"}):
-        found.append(("matching", f"pictures and boxes go to the cameras by {way}"))
-    exchange_by_shape(cameras, found)
-    sizes = picture_sizes(cameras, found)
-    check_lenses([camera.raw for camera in cameras + matched.spare], matched.format)
-    plain = [scaled(camera.raw, size) for camera, size in zip(cameras, sizes, strict=True)]
-    raws = [_told(raw, options) for raw in plain]
-    unused = _spare(matched)
-    spare = [_told(camera.raw, options) for camera in unused]
-    if not any(c.video or c.images or c.detections is not None for c in cameras):
-        raise nothing_of(cameras, taken, told)
-    times = settle_times(cameras, matched.truths, options, found)
-    boxes = _boxes(cameras, sizes, times, options, found, told)
-    arbitrary = matched.format.startswith(_WITHOUT_UNIT)
-    open_: list[Undecided | Unexplained] = []
-    reading, raws, boxes, factor, verdict = _read(
-        raws, plain, spare, cameras, boxes, times, arbitrary, options, found, told, open_
-    )
-    names = [raw.name for raw in raws]
-    _exchange_found([*cameras, *unused], verdict)
-    late = {} if verdict is None else _late(verdict.clocks, names, options)
-    if late:
-        shifted = _shifted(options, late, times.fps)
-        times = settle_times(cameras, matched.truths, shifted, [])
-    sizes = [raw.image_size or size for raw, size in zip(raws, sizes, strict=True)]
-    settled = [to_camera(raw, reading, size) for raw, size in zip(raws, sizes, strict=True)]
-    check_places(settled, matched.format)
-    detections = [_detections(own) for own in boxes]
-    at_steps = _at_steps(detections, times)
-    if factor is not None and options.half_extents is not None:
-        height = 2.0 * options.half_extents[2]
-        found.append(("unit", f"scaled by {factor:.4g}, so that people are {height:g} m; --unit"))
-    elif factor is not None:
-        more, why = paced(settled, at_steps, times.fps) if times.stated else (1.0, AS_STANDING)
-        settled = resized(settled, more)
-        found.append(("unit", f"scaled by {more * factor:.4g}, {why}: --unit"))
-    if not times.stated:
-        fps, why = rate_of(settled, at_steps)
-        found.append(("fps", f"{fps:g}, {why}, since no file says it; --fps"))
-        if verdict is not None:
-            verdict = verdict.at_rate(fps)
-            late = _late(verdict.clocks, names, options)
-        shifted = _shifted(options, late, fps).model_copy(update={"fps": fps})
-        times = settle_times(cameras, matched.truths, shifted, [])
-        at_steps = _at_steps(detections, times)
+    draft = _PlanDraft(taken, options or ImportOptions())
+    verdict = draft.judge()
+    meaning = draft.read_poses() if verdict is None else draft.read_boxes(verdict)
+    draft.adopt(meaning)
     if verdict is not None:
-        unconfirmed = describe_unconfirmed(verdict, names, times.fps)
-        told += filter(None, (unconfirmed.alone, unconfirmed.others))
-        told += describe_clocks(verdict.clocks, names, times.fps)
-    for name, steps in late.items():
-        how = f"{steps / times.fps:.2f} s late ({steps} steps, within 1)"
-        found.append((f"{name} clock", f"{how}, since boxes meet so"))
-    looked_at = _looked_at(detections, [camera.name for camera in settled], found)
-    suggested = _room(settled, at_steps, found)
-    room = _as_told(suggested, options)
-    truth = settle_truth(
-        [piece for _, piece in matched.truths],
-        settled,
-        at_steps,
-        [None if c.detections is None else c.detections.camera for c in cameras],
-        reading,
-        times.frames,
-        room.floor,
-        float(room.half_extents[2]) + room.floor,
-        options.first_index,
-        found,
-    )
-    named = _renamed(settled, options, found)
-    views = tuple(
-        PlannedView(camera, own, boxes_, time, at)
-        for camera, own, boxes_, time, at in zip(
-            named, cameras, detections, times.cameras, looked_at, strict=True
+        draft.set_clocks(verdict)
+    cameras = draft.place_cameras(meaning)
+    if not draft.times.stated:
+        verdict = draft.find_rate(cameras, verdict)
+    draft.describe_clocks(verdict)
+    return draft.plan(cameras, meaning.of_poses)
+
+
+class _Boxes(NamedTuple):
+    """The boxes of one camera."""
+
+    detections: Detections
+    """In pixels, and left, top, width, height if the layout is known; else as in the file."""
+    layout: Layout | None
+    scale: tuple[int, int] | None = None
+    """The picture's size, pixels, where numbers of an unknown layout are parts of it."""
+
+
+class _Meaning(NamedTuple):
+    """How calibration and boxes are meant."""
+
+    reading: Reading
+    why: str
+    """By what it is known, in words."""
+    height: float | None = None
+    """Of people, in the calibration's unit; None where the boxes do not tell."""
+    wider: float = 1.0
+    """Width of the pictures that the boxes are of, in that of the pictures that there are."""
+
+    @property
+    def of_poses(self) -> Reading:
+        """The reading once it is applied to the boxes and to whose calibration is whose."""
+        return replace(self.reading, layout="ltwh", parts=0, order=None, pixels=1.0)
+
+
+class _PlanDraft:
+    """An import that is being settled: the matched files, and what is known of them so far."""
+
+    def __init__(self, taken: Sequence[ParsedFiles], options: ImportOptions) -> None:
+        """Match the files, and read what needs no comparison of the cameras' boxes.
+
+        Args:
+            taken: All files.
+            options: What is stated.
+        """
+        sets, self.sentences = camera_sets(taken)
+        """What is not used or odd."""
+        self.notes: list[tuple[str, str]] = []
+        """What was not in the files or had to be chosen, and why it is so."""
+        self.accepted: Undecided | Unexplained | None = None
+        """What is left open though the likeliest interpretation was accepted."""
+        self.options = options
+        matched = match_all(taken, sets, options, self.sentences)
+        self.sentences += matched.told + short_videos(taken)
+        if options.first_index is None:
+            matched = counted_alike(matched, options.fps, self.notes)
+        self.matched = matched
+        """The files by camera."""
+        for way in sorted({how for own in matched.cameras for how in own.how.values()} - {"name"}):
+            self._note("matching", f"pictures and boxes go to the cameras by {way}")
+        exchange_by_shape(matched.cameras, self.notes)
+        self.sizes = picture_sizes(matched.cameras, self.notes)
+        """Of each camera's pictures, pixels."""
+        check_lenses([camera.raw for camera in matched.cameras + matched.spare], matched.format)
+        self.given = [
+            scaled(camera.raw, size)
+            for camera, size in zip(matched.cameras, self.sizes, strict=True)
+        ]
+        """Each camera's calibration for these pictures, as its file states it."""
+        self.raws = [_with_stated(raw, options) for raw in self.given]
+        """The same with what the options state in its place."""
+        self.convention = self.raws[0].convention
+        """What is stated of the poses."""
+        self.unused = _unused(matched)
+        """Cameras without files, whose calibration may be that of another one's boxes."""
+        self.spare = [_with_stated(camera.raw, options) for camera in self.unused]
+        """The calibrations of these."""
+        if not any(c.video or c.images or c.detections is not None for c in matched.cameras):
+            raise nothing_of(matched.cameras, taken, self.sentences)
+        self.times = settle_times(matched.cameras, matched.truths, options, self.notes)
+        self.late: dict[str, int] = {}
+        """Steps by which cameras are late, by their names."""
+        self.boxes = self._boxes_in_pixels()
+        """Of each camera, None where it has none."""
+
+    def _note(self, what: str, why: str) -> None:
+        """Note what was chosen, and why it is so."""
+        self.notes.append((what, why))
+
+    @property
+    def names(self) -> list[str]:
+        """What the cameras are called in the calibration."""
+        return [raw.name for raw in self.raws]
+
+    @property
+    def detections(self) -> list[Detections | None]:
+        """The boxes of each camera, by frames of its own file."""
+        return [None if own is None else own.detections for own in self.boxes]
+
+    @property
+    def at_steps(self) -> list[Detections | None]:
+        """The boxes of each camera, by step."""
+        return [
+            None if own is None else at_steps_of(own, time)
+            for own, time in zip(self.detections, self.times.cameras, strict=True)
+        ]
+
+    @property
+    def _unit_is_arbitrary(self) -> bool:
+        """Whether the calibration has a unit of its own, and none is stated."""
+        return self.convention.unit is None and self.matched.format.startswith(_WITHOUT_UNIT)
+
+    # the boxes as their files have them
+
+    def _boxes_in_pixels(self) -> list[_Boxes | None]:
+        """Read the boxes, those of a known layout as left, top, width, height."""
+        first = self._first_index()
+        boxes: list[_Boxes | None] = []
+        outside, rows, example = 0, 0, ""
+        for camera, size, time in zip(
+            self.matched.cameras, self.sizes, self.times.cameras, strict=True
+        ):
+            piece = camera.detections
+            if piece is None:
+                boxes.append(None)
+                continue
+            within = frames_of(camera, time, self.times.frames)
+            there = (piece.frames >= first) & (piece.frames < first + within)
+            boxes.append(self._in_pixels(piece, size, first, there))
+            if piece.left_out:
+                self.sentences.append(piece.left_out)
+            if beyond := told_beyond(piece, first, within):
+                self.sentences.append(beyond)
+                example = beyond
+            outside += int((~there).sum())
+            rows += len(there)
+        if outside > _MOST_OUTSIDE * rows and not self.options.accept_best:
+            raise FormatError(
+                f"{outside} of {rows} boxes are of frames outside the {self.times.frames} of the "
+                f"recording ({example}); name boxes and pictures of the same frames, or {ACCEPT} "
+                "imports the others alone"
+            )
+        return boxes
+
+    def _first_index(self) -> int:
+        """Return the number of the first frame in the files of boxes."""
+        pieces = [camera.detections for camera in self.matched.cameras if camera.detections]
+        # all cameras were written by the same program: one that begins at 0 speaks for all
+        first = min((first_index(p, self.options, self.times.frames) for p in pieces), default=0)
+        if first and any(piece.first_index is None for piece in pieces):
+            self._note("first index", "1, since no frame is called 0; --first-index")
+        return first
+
+    def _in_pixels(
+        self,
+        piece: DetectionPiece,
+        size: tuple[int, int],
+        first: int,
+        there: Bool[ndarray, " N"],
+    ) -> _Boxes:
+        """Read the boxes of one camera, without those that lie far outside its pictures.
+
+        Args:
+            piece: The N boxes of the file.
+            size: Of the pictures, pixels.
+            first: The number of the first frame.
+            there: Whether the recording has a box's frame.
+        """
+        layout = self.options.boxes or piece.layout
+        stated = self.options.normalised
+        scale = size if (piece.normalised if stated is None else stated) else None
+        four = piece.boxes if layout is None else read_boxes(piece.boxes, layout, scale)
+        near = (np.abs(four) < FARTHEST).all(axis=1)
+        if not near.all():
+            self.sentences.append(
+                f"{piece.source.name}: {int((~near).sum())} of {len(near)} boxes lie farther than "
+                f"{FARTHEST:,.0f} pixels away; they are left out"
+            )
+        rows = there & near
+        scores = np.clip(piece.scores, 0.0, 1.0)
+        own = Detections(piece.frames[rows] - first, four[rows], scores[rows])
+        return _Boxes(own, layout, scale if layout is None else None)
+
+    # how calibration and boxes are meant
+
+    def judge(self) -> Verdict | None:
+        """Return what the boxes tell of how the files are meant; None where they tell nothing.
+
+        Raises:
+            Undecided, Unexplained: If they leave it open, and nothing is to be accepted.
+        """
+        seen = self._seen()
+        find = partial(
+            find_reading,
+            seen=[*seen, *[None] * len(self.spare)],
+            fps=self.times.fps,
+            tried=self._open(),
+            names=matched_by(self.matched.cameras),
+            pixels=_other_pixels(self.matched.cameras, self.raws, seen),
         )
-    )
-    return ImportPlan(
-        views,
-        times.fps,
-        times.frames,
-        room,
-        suggested,
-        _entrances(options),
-        truth,
-        matched.format,
-        reading,
-        tuple(found),
-        tuple(_summed_up(told)),
-        _sources(matched),
-        open_[0] if open_ else None,
-    )
+        verdict = find([*self.raws, *self.spare])
+        question = None
+        if verdict is not None:
+            stated = _stated_of_poses(self.options) if verdict.kind == "none" else ""
+            otherwise = find([*self.given, *self.spare]) if stated else None
+            if otherwise is not None and otherwise.kind not in ("decided", "open"):
+                otherwise = None
+            question = check_verdict(verdict, [*self.raws, *self.spare], stated, otherwise)
+        if question is not None or verdict is None or verdict.kind == "unproven":
+            self._accept(question, seen)
+        if sum(own is not None for own in seen) == 1:
+            self.sentences.append(OF_ONE)
+        if verdict is not None and verdict.kind == "unproven":
+            self.sentences.append(UNPROVEN)
+        return None if verdict is None or verdict.kind in ("none", "unproven") else verdict
+
+    def _seen(self) -> list[Seen | None]:
+        """Return the boxes of each camera that are compared with those of the others."""
+        return [
+            None if own is None else _compared(own.detections, time)
+            for own, time in zip(self.boxes, self.times.cameras, strict=True)
+        ]
+
+    def _open(self) -> Open:
+        """Return what neither files nor options state."""
+        unknown = [own for own in self.boxes if own is not None and own.layout is None]
+        in_parts = {own.scale is not None for own in unknown if len(own.detections.frames)}
+        if len(in_parts) > 1:
+            raise FormatError(
+                "some cameras' boxes are pixels and others parts of the picture, and how their "
+                "numbers are meant is not said: --boxes says it"
+            )
+        layouts: tuple[Layout, ...] = get_args(Layout) if unknown else ("ltwh",)
+        own = self.options
+        orders = not own.swap and not own.cameras and not own.as_named
+        return Open(layouts=layouts, parts=(int(True in in_parts),), orders=orders)
+
+    def _accept(
+        self, question: Undecided | Unexplained | None, seen: Sequence[Seen | None]
+    ) -> None:
+        """Accept that the boxes decide nothing, or that they leave a question open.
+
+        Raises:
+            FormatError: If they are of different steps.
+            Undecided, Unexplained: The question.
+        """
+        if not self.options.accept_best:
+            pairs = zip(self.names, seen, strict=True)
+            check_common({name: own.frames for name, own in pairs if own is not None})
+            if question is not None:
+                raise question
+        elif question is not None:
+            self.accepted = question
+            self._note("accepted", f"by {ACCEPT}: {question}")
+
+    def read_poses(self) -> _Meaning:
+        """Return how the files are meant by where the cameras look."""
+        check_turns(self.raws)
+        reading = read_poses(self.raws, boxes=any(own is not None for own in self.boxes))
+        return _Meaning(reading, "from where the cameras look; the boxes do not tell")
+
+    def read_boxes(self, verdict: Verdict) -> _Meaning:
+        """Return how the files are meant by the boxes, and give each camera its calibration."""
+        up = self.convention.up
+        best, reading = as_meant(verdict, up, up, self.convention.unit)
+        reading = replace(reading, flipped=False)
+        # boxes lean in rolled cameras; where people along an axis are likelier, the world is level
+        rise = verdict.best.scene.rise
+        along = float(np.abs(rise).max() / np.linalg.norm(rise))
+        if up is None and along < _ALONG_AXIS:
+            poses = verdict.judge.poses(reading)
+            lean = lean_of(best.consensus, best.pictured, poses, best.turns, reading.up)
+            reading = replace(reading, lean=lean)
+        why = f"since {100.0 * best.consensus.share:.0f} % of the boxes meet so"
+        if any(own is not None and own.layout is None for own in self.boxes):
+            self._note("boxes", f"{reading.layout}, {why}; --boxes")
+        wider = 1.0
+        if any(camera.picture_size is not None for camera in self.matched.cameras):
+            wider, reading = reading.pixels, replace(reading, pixels=1.0)
+        if wider != 1.0:
+            how = f"of pictures {wider:.4g} times as wide, as the calibration's"
+            self._note("boxes", f"{how}, {why}")
+        self._rearrange(reading, verdict.best.reading.order)
+        if len(verdict.confirmed) == 2 and verdict.kind == "decided":
+            self.sentences.append(OF_TWO)
+        self.sentences += describe_moved(verdict.moved, self.names)
+        return _Meaning(reading, why, best.consensus.height, wider)
+
+    def _rearrange(self, reading: Reading, order: tuple[int, ...] | None) -> None:
+        """Give each camera the calibration that is its own by the boxes.
+
+        Args:
+            reading: The reading.
+            order: Whose calibration each camera has by it; None if they are as named.
+        """
+        every, notes = rearranged([*self.raws, *self.spare], reading)
+        self.raws = every[: len(self.raws)]
+        self.notes += notes
+        if order is not None:
+            cameras = [*self.matched.cameras, *self.unused]
+            owners = [camera.calibration_of for camera in cameras]
+            for camera, own in zip(cameras, order, strict=True):
+                camera.calibration_of = owners[own]
+
+    def adopt(self, meaning: _Meaning) -> None:
+        """Note what was open, and read the boxes as they are meant."""
+        self._note_open(meaning)
+        pairs = zip(self.boxes, self.raws, strict=True)
+        self.boxes = [None if own is None else _as_meant(own, raw, meaning) for own, raw in pairs]
+
+    def _note_open(self, meaning: _Meaning) -> None:
+        """Note what of the reading was not stated."""
+        reading, why = meaning.reading, meaning.why
+        if any(raw.turns for raw in self.raws):
+            self._note("angles", f"{turns_in_words(reading.turns)}, {why}; --euler")
+        if reading.lean != (0.0, 0.0):
+            degrees = np.degrees(np.arcsin(np.hypot(*reading.lean)))
+            how = f"the world is turned by {degrees:.0f}° so that people stand"
+            self._note("level", how)
+        convention, by_boxes = self.convention, meaning.height is not None
+        for name, known, flag in (
+            ("direction", convention.direction, "pose"),
+            ("axes", convention.axes, "axes"),
+            ("up", convention.up, "up"),
+            ("unit", convention.unit, "unit"),
+        ):
+            by_height = name == "unit" and by_boxes
+            if known is None and not (by_height and self._unit_is_arbitrary):
+                how = "by the height of people" if by_height else why
+                self._note(name, f"{getattr(reading, name)}, {how}; --{flag}")
+        if reading.parts > 1:
+            self._note("boxes", f"{PARTS[reading.parts]}, {why}")
+
+    # cameras and clocks
+
+    def place_cameras(self, meaning: _Meaning) -> list[Camera]:
+        """Return the cameras in metres, z up."""
+        raws, factor, stated = self.raws, None, self.options.half_extents
+        if meaning.height is not None and self._unit_is_arbitrary:
+            factor = (PERSON if stated is None else 2.0 * stated[2]) / meaning.height
+            raws = [_resized(raw, factor) for raw in raws]
+        cameras = [
+            to_camera(raw, meaning.of_poses, raw.image_size or size)
+            for raw, size in zip(raws, self.sizes, strict=True)
+        ]
+        check_places(cameras, self.matched.format)
+        if factor is None:
+            return cameras
+        if stated is not None:
+            how = f"scaled by {factor:.4g}, so that people are {2.0 * stated[2]:g} m; --unit"
+            self._note("unit", how)
+            return cameras
+        more, why = 1.0, AS_STANDING
+        if self.times.stated:
+            more, why = paced(cameras, self.at_steps, self.times.fps)
+        self._note("unit", f"scaled by {more * factor:.4g}, {why}: --unit")
+        return resized(cameras, more)
+
+    def set_clocks(self, verdict: Verdict | None, fps: float | None = None) -> None:
+        """Turn back the clocks of cameras that are late by the boxes; what is stated is kept.
+
+        Args:
+            verdict: What the boxes tell, if they tell anything.
+            fps: Steps a second, where no file states it; None for those of the files.
+        """
+        clocks = {} if verdict is None else verdict.clocks
+        late = {self.names[camera]: clock.late for camera, clock in clocks.items() if clock.late}
+        stated = self.options.offsets
+        self.late = {name: steps for name, steps in late.items() if name not in stated}
+        rate = self.times.fps if fps is None else fps
+        offsets = {name: -steps / rate for name, steps in self.late.items()} | {**stated}
+        changes = {"offsets": offsets} if fps is None else {"offsets": offsets, "fps": fps}
+        options = self.options.model_copy(update=changes)
+        self.times = settle_times(self.matched.cameras, self.matched.truths, options, [])
+
+    def find_rate(self, cameras: Sequence[Camera], verdict: Verdict | None) -> Verdict | None:
+        """Settle the rate by how fast people go, and return the verdict at this rate."""
+        fps, why = rate_of(cameras, self.at_steps)
+        self._note("fps", f"{fps:g}, {why}, since no file says it; --fps")
+        verdict = None if verdict is None else verdict.at_rate(fps)
+        self.set_clocks(verdict, fps)
+        return verdict
+
+    def describe_clocks(self, verdict: Verdict | None) -> None:
+        """Say which cameras are late, and of which nothing confirms their moments."""
+        fps = self.times.fps
+        if verdict is not None:
+            unconfirmed = describe_unconfirmed(verdict, self.names, fps)
+            self.sentences += filter(None, (unconfirmed.alone, unconfirmed.others))
+            self.sentences += describe_clocks(verdict.clocks, self.names, fps)
+        for name, steps in self.late.items():
+            how = f"{steps / fps:.2f} s late ({steps} steps, within 1), since boxes meet so"
+            self._note(f"{name} clock", how)
+
+    # the plan
+
+    def plan(self, cameras: Sequence[Camera], reading: Reading) -> ImportPlan:
+        """Return the plan, with room, truth and names.
+
+        Args:
+            cameras: In metres, z up.
+            reading: How their calibration is meant.
+        """
+        matched, options = self.matched, self.options
+        looked_at = self._looked_at()
+        suggested = self._suggest_room(cameras)
+        room = _with_stated_room(suggested, options)
+        truth = settle_truth(
+            [piece for _, piece in matched.truths],
+            cameras,
+            self.at_steps,
+            [None if c.detections is None else c.detections.camera for c in matched.cameras],
+            reading,
+            self.times.frames,
+            room.floor,
+            float(room.half_extents[2]) + room.floor,
+            options.first_index,
+            self.notes,
+        )
+        views = map(
+            PlannedView,
+            self._renamed(cameras),
+            matched.cameras,
+            self.detections,
+            self.times.cameras,
+            looked_at,
+        )
+        return ImportPlan(
+            tuple(views),
+            self.times.fps,
+            self.times.frames,
+            room,
+            suggested,
+            _entrances(options),
+            truth,
+            matched.format,
+            reading,
+            tuple(self.notes),
+            tuple(_summed_up(self.sentences)),
+            _sources(matched),
+            self.accepted,
+        )
+
+    def _looked_at(self) -> list[Int[ndarray, " K"] | None]:
+        """Return the frames at which detectors ran, where these are every second, third … one."""
+        result: list[Int[ndarray, " K"] | None] = []
+        gaps: dict[int, list[str]] = {}
+        every_camera = [own.frames for own in self.detections if own is not None]
+        for name, own in zip(self.names, self.detections, strict=True):
+            others = [frames for frames in every_camera if own is None or frames is not own.frames]
+            gap = 1 if own is None else regular_gap(own.frames, *others)
+            first, last = (0, 0) if own is None or gap == 1 else (own.frames[0], own.frames[-1])
+            result.append(None if gap == 1 else np.arange(first % gap, last + 1, gap))
+            if gap > 1:
+                gaps.setdefault(gap, []).append(name)
+        for gap, names in gaps.items():
+            how = f"ran at {in_gaps(gap)} of {', '.join(names)}; others were not looked at"
+            self._note("detector", how)
+        return result
+
+    def _suggest_room(self, cameras: Sequence[Camera]) -> Suggestion:
+        """Suggest where people are, and how large they are: from the boxes, else from the views."""
+        agreed = None
+        if any(own is not None for own in self.boxes):
+            agreed = consensus_of_cameras(cameras, rays_of_all(cameras, self.at_steps))
+        room = suggest(cameras, agreed)
+        if room is None:
+            centres = np.array([camera.centre for camera in cameras])
+            low, high = centres.min(axis=0) - 3.0, centres.max(axis=0) + 3.0
+            room = Suggestion(
+                np.array([low[0], low[1], 0.0]), np.array([high[0], high[1], 2.0]), STANDING, 0.0, 0
+            )
+            self._note("room", "around the cameras: neither boxes nor views meet; correct it")
+            return room
+        margin = np.array([ROOM_MARGIN, ROOM_MARGIN, 0.0])
+        room = replace(room, minimum=room.minimum - margin, maximum=room.maximum + margin)
+        pairs = f"from {room.people} pairs of boxes that meet"
+        how = pairs if room.people else "where views overlap"
+        sides = " × ".join(f"{side:.1f}" for side in _sides(room))
+        self._note("room", f"{sides} m, {how}")
+        size = " × ".join(f"{2.0 * side:.2f}" for side in room.half_extents)
+        how = "from the boxes" if room.people else "a standing person"
+        self._note("target", f"{size} m, {how}")
+        return room
+
+    def _renamed(self, cameras: Sequence[Camera]) -> list[Camera]:
+        """Return the cameras under the names that are wished, and that can be written."""
+        renamed: list[Camera] = []
+        for camera in cameras:
+            wished = self.options.names.get(camera.name, camera.name).strip()
+            name = plain_name(wished) if wished else ""
+            if name != wished and camera.name in self.options.names:
+                raise FormatError(
+                    f"name of {camera.name}: expected one without blanks, commas, quotes and #, "
+                    f'since it heads columns of tables, found "{wished}"; "{name}" would do'
+                )
+            if name != wished:
+                self._note("name", f'"{camera.name}" is called {name}: names head columns of CSV')
+            renamed.append(replace(camera, name=name))
+        names = [camera.name for camera in renamed]
+        for name in names:
+            if not name or names.count(name) > 1:
+                raise FormatError(
+                    f'expected a name of its own for each camera, found "{name}"'
+                    f"{' twice' if name else ''}; choose another"
+                )
+        return renamed
 
 
 def _summed_up(told: Sequence[str]) -> list[str]:
@@ -257,71 +674,11 @@ def _sources(matched: Matched) -> frozenset[Path]:
     return matched.sources | found
 
 
-def _exchange_found(cameras: Sequence[MatchedCamera], verdict: Verdict | None) -> None:
-    """Note whose calibration each camera has by the boxes.
-
-    Args:
-        cameras: Those that were judged, in their order.
-        verdict: What the boxes tell, where they tell anything.
-    """
-    order = None if verdict is None else verdict.best.reading.order
-    if order is not None:
-        owners = [camera.calibration_of for camera in cameras]
-        for camera, own in zip(cameras, order, strict=True):
-            camera.calibration_of = owners[own]
-
-
-def _spare(matched: Matched) -> list[MatchedCamera]:
+def _unused(matched: Matched) -> list[MatchedCamera]:
     """Calibrations without files that may be those of boxes which no name gave to a camera."""
     known = [camera for camera in matched.spare if camera.raw.image_size is not None]
     few = len(matched.cameras) + len(known) <= MOST_CAMERAS
     return known if few and matched_by(matched.cameras) != "name" else []
-
-
-def _late(
-    clocks: Mapping[int, ClockFit], names: Sequence[str], options: ImportOptions
-) -> dict[str, int]:
-    """Steps by which cameras are late; what is stated is not questioned."""
-    return {
-        names[camera]: clock.late
-        for camera, clock in clocks.items()
-        if clock.late and names[camera] not in options.offsets
-    }
-
-
-def _shifted(options: ImportOptions, late: Mapping[str, int], fps: float) -> ImportOptions:
-    """With the offsets of cameras that are late by so many steps; what is stated is kept."""
-    found = {name: -steps / fps for name, steps in late.items() if name not in options.offsets}
-    return options.model_copy(update={"offsets": {**found, **options.offsets}})
-
-
-def _looked_at(
-    detections: Sequence[Detections | None], names: Sequence[str], found: list[tuple[str, str]]
-) -> list[Int[ndarray, " K"] | None]:
-    """The frames at which detectors ran, where these are every second, third … one."""
-    result: list[Int[ndarray, " K"] | None] = []
-    gaps: dict[int, list[str]] = {}
-    every_camera = [own.frames for own in detections if own is not None]
-    for name, own in zip(names, detections, strict=True):
-        others = [frames for frames in every_camera if own is None or frames is not own.frames]
-        gap = 1 if own is None else regular_gap(own.frames, *others)
-        first, last = (0, 0) if own is None or gap == 1 else (own.frames[0], own.frames[-1])
-        result.append(None if gap == 1 else np.arange(first % gap, last + 1, gap))
-        if gap > 1:
-            gaps.setdefault(gap, []).append(name)
-    for gap, own_names in gaps.items():
-        every = in_gaps(gap)
-        found.append(
-            ("detector", f"ran at {every} of {', '.join(own_names)}; others were not looked at")
-        )
-    return result
-
-
-def _at_steps(detections: Sequence[Detections | None], times: Times) -> list[Detections | None]:
-    return [
-        None if own is None else at_steps_of(own, time)
-        for own, time in zip(detections, times.cameras, strict=True)
-    ]
 
 
 def at_steps_of(own: Detections, time: CameraTime) -> Detections:
@@ -339,33 +696,7 @@ def plain_name(name: str) -> str:
     return re.sub(r'[,"#\s]+', "_", name).strip("_") or "camera"
 
 
-def _renamed(
-    cameras: Sequence[Camera], options: ImportOptions, found: list[tuple[str, str]]
-) -> list[Camera]:
-    """Cameras under the names that are wished, and that can be written."""
-    renamed: list[Camera] = []
-    for camera in cameras:
-        wished = options.names.get(camera.name, camera.name).strip()
-        name = plain_name(wished) if wished else ""
-        if name != wished and camera.name in options.names:
-            raise FormatError(
-                f"name of {camera.name}: expected one without blanks, commas, quotes and #, since "
-                f'it heads columns of tables, found "{wished}"; "{name}" would do'
-            )
-        if name != wished:
-            found.append(("name", f'"{camera.name}" is called {name}: names head columns of CSV'))
-        renamed.append(replace(camera, name=name))
-    names = [camera.name for camera in renamed]
-    for name in names:
-        if not name or names.count(name) > 1:
-            raise FormatError(
-                f'expected a name of its own for each camera, found "{name}"'
-                f"{' twice' if name else ''}; choose another"
-            )
-    return renamed
-
-
-def _as_told(room: Suggestion, options: ImportOptions) -> Suggestion:
+def _with_stated_room(room: Suggestion, options: ImportOptions) -> Suggestion:
     """The room and the size of people as they are stated."""
     if options.half_extents is not None:
         room = replace(room, half_extents=np.array(options.half_extents))
@@ -391,7 +722,7 @@ def _entrances(options: ImportOptions) -> tuple[Entrance, ...]:
     return tuple(Entrance(np.array(place), np.array(sigma)) for place, sigma in options.entrances)
 
 
-def _told(raw: RawCamera, options: ImportOptions) -> RawCamera:
+def _with_stated(raw: RawCamera, options: ImportOptions) -> RawCamera:
     """With what the flags say in place of what the format says."""
     convention = replace(
         raw.convention,
@@ -415,209 +746,25 @@ def _resized(raw: RawCamera, factor: float) -> RawCamera:
     return replace(raw, translation=raw.translation * factor)
 
 
-class _Boxes(NamedTuple):
-    """The boxes of one camera."""
-
-    detections: Detections
-    """In pixels, and left, top, width, height if the layout is known; else as in the file."""
-    layout: Layout | None
-    scale: tuple[int, int] | None = None
-    """The picture's size, pixels, where numbers of an unknown layout are parts of it."""
-
-
-_MOST_OUTSIDE = 0.5
-"""Share of all boxes that may be of frames which the recording does not have."""
-
-
-def _boxes(
-    cameras: Sequence[MatchedCamera],
-    sizes: Sequence[tuple[int, int]],
-    times: Times,
-    options: ImportOptions,
-    found: list[tuple[str, str]],
-    told: list[str],
-) -> list[_Boxes | None]:
-    """Boxes in pixels, those of a known layout as left, top, width, height."""
-    pieces = [camera.detections for camera in cameras]
-    firsts = {first_index(p, options, times.frames) for p in pieces if p is not None}
-    # all cameras were written by the same program: one that begins at 0 speaks for all
-    first = min(firsts, default=0)
-    if first and any(p is not None and p.first_index is None for p in pieces):
-        found.append(("first index", "1, since no frame is called 0; --first-index"))
-    result: list[_Boxes | None] = []
-    outside, rows, example = 0, 0, ""
-    for camera, size, time in zip(cameras, sizes, times.cameras, strict=True):
-        piece = camera.detections
-        if piece is None:
-            result.append(None)
-            continue
-        layout = options.boxes or piece.layout
-        normalised = piece.normalised if options.normalised is None else options.normalised
-        scale = size if normalised else None
-        four = piece.boxes if layout is None else read_boxes(piece.boxes, layout, scale)
-        steps = piece.frames - first
-        within = frames_of(camera, time, times.frames)
-        there = (steps >= 0) & (steps < within)
-        sane = (np.abs(four) < FARTHEST).all(axis=1)
-        if not sane.all():
-            told.append(
-                f"{piece.source.name}: {int((~sane).sum())} of {len(sane)} boxes lie farther than "
-                f"{FARTHEST:,.0f} pixels away; they are left out"
-            )
-        if piece.left_out:
-            told.append(piece.left_out)
-        if beyond := told_beyond(piece, first, within):
-            told.append(beyond)
-            example = beyond
-        scores = np.clip(piece.scores, 0.0, 1.0)
-        outside += int((~there).sum())
-        rows += len(there)
-        there &= sane
-        own = Detections(steps[there], four[there], scores[there])
-        result.append(_Boxes(own, layout, scale if layout is None else None))
-    if outside > _MOST_OUTSIDE * rows and not options.accept_best:
-        raise FormatError(
-            f"{outside} of {rows} boxes are of frames outside the {times.frames} of the recording "
-            f"({example}); name boxes and pictures of the same frames, or {ACCEPT} imports the "
-            "others alone"
-        )
-    return result
-
-
-def _read(
-    raws: list[RawCamera],
-    plain: Sequence[RawCamera],
-    spare: Sequence[RawCamera],
-    cameras: Sequence[MatchedCamera],
-    boxes: list[_Boxes | None],
-    times: Times,
-    arbitrary: bool,
-    options: ImportOptions,
-    found: list[tuple[str, str]],
-    told: list[str],
-    open_: list[Undecided | Unexplained],
-) -> tuple[Reading, list[RawCamera], list[_Boxes | None], float | None, Verdict | None]:
-    """How poses and boxes are meant: by flags, formats, the boxes and the poses, in this order.
-
-    Returns:
-        The reading; cameras and boxes as they are by it; by how much the cameras' unit was made
-        larger so that people are as tall as they are said to be, or as people who stand; and what
-        the boxes tell, where they tell anything.
-    """
-    seen = [
-        None if own is None else _seen(own.detections, time)
-        for own, time in zip(boxes, times.cameras, strict=True)
-    ]
-    open_boxes = [own for own in boxes if own is not None and own.layout is None]
-    in_parts = {own.scale is not None for own in open_boxes if len(own.detections.frames)}
-    if len(in_parts) > 1:
-        raise FormatError(
-            "some cameras' boxes are pixels and others parts of the picture, and how their numbers "
-            "are meant is not said: --boxes says it"
-        )
-    layouts: tuple[Layout, ...] = get_args(Layout) if open_boxes else ("ltwh",)
-    convention = raws[0].convention
-    free = not options.swap and not options.cameras and not options.as_named
-    find = partial(
-        find_reading,
-        seen=[*seen, *[None] * len(spare)],
-        fps=times.fps,
-        tried=Open(layouts=layouts, parts=(int(True in in_parts),), orders=free),
-        names=matched_by(cameras),
-        pixels=_other_pixels(cameras, raws, seen),
-    )
-    verdict = find([*raws, *spare])
-    question = None
-    if verdict is not None:
-        stated = _stated(options) if verdict.kind == "none" else ""
-        otherwise = find([*plain, *spare]) if stated else None
-        if otherwise is not None and otherwise.kind not in ("decided", "open"):
-            otherwise = None
-        question = check_verdict(verdict, [*raws, *spare], stated, otherwise)
-    if not options.accept_best:
-        if question is not None or verdict is None or verdict.kind == "unproven":
-            pairs = zip(raws, seen, strict=True)
-            check_common({raw.name: own.frames for raw, own in pairs if own is not None})
-        if question is not None:
-            raise question
-    elif question is not None:
-        open_.append(question)
-        found.append(("accepted", f"by {ACCEPT}: {question}"))
-    if sum(own is not None for own in seen) == 1:
-        told.append(OF_ONE)
-    larger = 1.0
-    enough = verdict is not None and verdict.kind in ("decided", "open")
-    if verdict is None or not enough:
-        check_turns(raws)
-        reading = read_poses(raws, boxes=any(own is not None for own in boxes))
-        why = "from where the cameras look; the boxes do not tell"
-        best = None
-        if verdict is not None and verdict.kind == "unproven":
-            told.append(UNPROVEN)
-    else:
-        best, reading = as_meant(verdict, convention.up, convention.up, convention.unit)
-        reading = replace(reading, flipped=False)
-        # boxes lean in rolled cameras; where people along an axis are likelier, the world is level
-        rise = verdict.best.scene.rise
-        along = float(np.abs(rise).max() / np.linalg.norm(rise))
-        if convention.up is None and along < _ALONG_AXIS:
-            poses = verdict.judge.poses(reading)
-            lean = lean_of(best.consensus, best.pictured, poses, best.turns, reading.up)
-            reading = replace(reading, lean=lean)
-        share = 100.0 * best.consensus.share
-        why = f"since {share:.0f} % of the boxes meet so"
-        if open_boxes:
-            found.append(("boxes", f"{reading.layout}, {why}; --boxes"))
-        if any(camera.picture_size is not None for camera in cameras):
-            larger, reading = reading.pixels, replace(reading, pixels=1.0)
-            if larger != 1.0:
-                how = f"of pictures {larger:.4g} times as wide, as the calibration's"
-                found.append(("boxes", f"{how}, {why}"))
-        every, told_ = rearranged([*raws, *spare], reading)
-        raws = every[: len(raws)]
-        found += told_
-        if len(verdict.confirmed) == 2 and verdict.kind == "decided":
-            told.append(OF_TWO)
-        told += describe_moved(verdict.moved, [raw.name for raw in raws])
-    if any(raw.turns for raw in raws):
-        found.append(("angles", f"{turns_in_words(reading.turns)}, {why}; --euler"))
-    if reading.lean != (0.0, 0.0):
-        degrees = np.degrees(np.arcsin(np.hypot(*reading.lean)))
-        found.append(("level", f"the world is turned by {degrees:.0f}° so that people stand"))
-    for name, known, flag in (
-        ("direction", convention.direction, "pose"),
-        ("axes", convention.axes, "axes"),
-        ("up", convention.up, "up"),
-        ("unit", convention.unit, "unit"),
-    ):
-        if known is None and not (name == "unit" and enough and arbitrary):
-            how = "by the height of people" if name == "unit" and enough else why
-            found.append((name, f"{getattr(reading, name)}, {how}; --{flag}"))
-    factor: float | None = None
-    changed: list[_Boxes | None] = []
+def _as_meant(own: _Boxes, raw: RawCamera, meaning: _Meaning) -> _Boxes:
+    """Return a camera's boxes as they are meant, sorted by step, without those without size."""
+    reading = meaning.reading
     finer = reading.parts if reading.parts > 1 else 0
-    if finer:
-        found.append(("boxes", f"{PARTS[finer]}, {why}"))
-    for own, raw in zip(boxes, raws, strict=True):
-        if own is not None and (own.layout is None or finer):
-            scale = raw.image_size if finer else own.scale
-            layout = reading.layout if own.layout is None else "ltwh"
-            four = read_boxes(own.detections.boxes, layout, scale, max(finer, 1))
-            own = _Boxes(replace(own.detections, boxes=four), reading.layout)
-        if own is not None and larger != 1.0:
-            corners = (own.detections.boxes[:, :2] + 0.5) / larger - 0.5
-            four = np.column_stack([corners, own.detections.boxes[:, 2:] / larger])
-            own = own._replace(detections=replace(own.detections, boxes=four))
-        changed.append(own)
-    if best is not None and arbitrary and convention.unit is None:
-        size = options.half_extents
-        factor = (PERSON if size is None else 2.0 * size[2]) / best.consensus.height
-        raws = [_resized(raw, factor) for raw in raws]
-    reading = replace(reading, layout="ltwh", parts=0, order=None, pixels=1.0)
-    return reading, raws, changed, factor, verdict if enough else None
+    boxes = own.detections
+    four = boxes.boxes
+    if own.layout is None or finer:
+        scale = raw.image_size if finer else own.scale
+        layout = reading.layout if own.layout is None else "ltwh"
+        four = read_boxes(four, layout, scale, max(finer, 1))
+    if meaning.wider != 1.0:
+        corners = (four[:, :2] + 0.5) / meaning.wider - 0.5
+        four = np.column_stack([corners, four[:, 2:] / meaning.wider])
+    order = np.argsort(boxes.frames, kind="stable")
+    order = order[(four[order, 2:] > 0.0).all(axis=1)]
+    return _Boxes(Detections(boxes.frames[order], four[order], boxes.scores[order]), reading.layout)
 
 
-def _stated(options: ImportOptions) -> str:
+def _stated_of_poses(options: ImportOptions) -> str:
     """The flags that state how poses are meant."""
     flags = (("pose", options.pose), ("axes", options.axes), ("euler", options.turns))
     return " ".join(f"--{name} {value}" for name, value in flags if value is not None)
@@ -656,50 +803,11 @@ def _pixels(raws: Sequence[RawCamera], seen: Sequence[Seen | None]) -> tuple[flo
     return tuple(dict.fromkeys(round(own, 6) for own in (0.5, 2.0, *known) if abs(own - 1) > 0.05))
 
 
-def _seen(own: Detections, time: CameraTime) -> Seen:
+def _compared(own: Detections, time: CameraTime) -> Seen:
+    """Return the boxes by step that are compared with other cameras'."""
     steps = time.steps_of(own.frames)
     kept = (steps >= 0) & compared(own.scores)
     return Seen(steps[kept], own.boxes[kept])
-
-
-def _detections(own: _Boxes | None) -> Detections | None:
-    """Sorted by step, without boxes that have no size."""
-    if own is None:
-        return None
-    boxes = own.detections
-    order = np.argsort(boxes.frames, kind="stable")
-    order = order[(boxes.boxes[order, 2:] > 0.0).all(axis=1)]
-    return Detections(boxes.frames[order], boxes.boxes[order], boxes.scores[order])
-
-
-def _room(
-    cameras: Sequence[Camera],
-    detections: Sequence[Detections | None],
-    found: list[tuple[str, str]],
-) -> Suggestion:
-    """Where people are, and how large they are: from the boxes, else from the views."""
-    agreed = None
-    if any(own is not None for own in detections):
-        agreed = consensus_of_cameras(cameras, rays_of_all(cameras, detections))
-    room = suggest(cameras, agreed)
-    if room is None:
-        centres = np.array([camera.centre for camera in cameras])
-        low, high = centres.min(axis=0) - 3.0, centres.max(axis=0) + 3.0
-        room = Suggestion(
-            np.array([low[0], low[1], 0.0]), np.array([high[0], high[1], 2.0]), STANDING, 0.0, 0
-        )
-        found.append(("room", "around the cameras: neither boxes nor views meet; correct it"))
-        return room
-    margin = np.array([ROOM_MARGIN, ROOM_MARGIN, 0.0])
-    room = replace(room, minimum=room.minimum - margin, maximum=room.maximum + margin)
-    how = f"from {room.people} pairs of boxes that meet" if room.people else "where views overlap"
-    sides = " × ".join(f"{side:.1f}" for side in _sides(room))
-    found.append(("room", f"{sides} m, {how}"))
-    size = " × ".join(f"{2.0 * side:.2f}" for side in room.half_extents)
-    found.append(
-        ("target", f"{size} m, {'from the boxes' if room.people else 'a standing person'}")
-    )
-    return room
 
 
 def _sides(room: Suggestion) -> Float[ndarray, " 3"]:

@@ -40,7 +40,7 @@ class CameraTime:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Times:
+class CommonTimes:
     """The steps, and the clock of every camera."""
 
     fps: float
@@ -182,7 +182,7 @@ def settle_times(
     truths: Sequence[tuple[str, TruthPiece]],
     options: ImportOptions,
     found: list[tuple[str, str]],
-) -> Times:
+) -> CommonTimes:
     """Steps and rate: those of the pictures, else those of the boxes.
 
     Args:
@@ -227,7 +227,7 @@ def settle_times(
         CameraTime(timing, timing.clock(fps, frames, beginning if timing.stamps else 0.0))
         for timing in timings
     )
-    return Times(fps, stated is not None, frames, own)
+    return CommonTimes(fps, stated is not None, frames, own)
 
 
 def _pictures(camera: MatchedCamera) -> int | None:
