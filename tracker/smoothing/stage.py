@@ -28,6 +28,7 @@ from tracker.smoothing.recording import CameraBoxes
 from tracker.smoothing.result import Decision, LinkedTracklets, Smoothed
 from tracker.smoothing.smoother import BoxAssociations, Fitted, Smoother
 from tracker.smoothing.tracklets import linking
+from tracker.smoothing.tracklets.linking import LinkedTracks
 from tracker.smoothing.tracklets.people import Appearances
 from tracker.smoothing.tracklets.splitting import Tracked
 from tracker.steps import Steps
@@ -131,90 +132,79 @@ class PositionSmoothing:
         tracks = trajectories.extract(results, cameras=cameras, extraction_threshold=CONFIRMED)
         if not len(tracks):
             return Smoothed.empty(dimension, cameras)
-        begin = _read_filter(smoother, results, tracks)
+        refinement = _Refinement(smoother, p, check, results, tracks)
         del tracks
         check()
-        learnt, decided = self._resolve(smoother, begin, seen, check, corrections, earlier)
-        known: Smoothed | None = earlier.get(f"smoothed-{decided.key}") if decided.key else None
-        if known is not None:
-            return known
-        turns = p.iterations if learnt is None else 1  # resolved tracks are near their boxes
-        found = _finish(smoother, begin, p, learnt, check, turns, decided)
-        if decided.key:
-            earlier.put(f"smoothed-{decided.key}", found)
-        return found
+        return self._refine(refinement, seen, corrections, earlier)
 
-    def _resolve(
+    def _refine(
         self,
-        smoother: Smoother,
-        begin: _InitialTracks,
+        tracks: _Refinement,
         views: Steps[tuple[ViewResult, ...]],
-        check: Callable[[], None],
         corrections: Many[Correction],
         earlier: ResultStore,
-    ) -> tuple[Calibration | None, _Resolution]:
-        """Resolve the identities in ``begin``; here the filter's own tracks remain.
-
-        Returns:
-            The self-calibration, if there is one yet, and the decisions.
-        """
-        return None, _Resolution([])
+    ) -> Smoothed:
+        """Smooth the filter's tracks; here they keep their identities."""
+        return tracks.finish(self._parameters.smoothing.iterations, _Resolution([]))
 
 
 class IdentitySmoothing(PositionSmoothing):
     """Tracks smoothed with their identities resolved: split where ambiguous, and linked at once."""
 
-    def _resolve(
+    def _refine(
         self,
-        smoother: Smoother,
-        begin: _InitialTracks,
+        tracks: _Refinement,
         views: Steps[tuple[ViewResult, ...]],
-        check: Callable[[], None],
         corrections: Many[Correction],
         earlier: ResultStore,
-    ) -> tuple[Calibration | None, _Resolution]:
-        """Split the tracks in ``begin`` into tracklets, and replace them by linked ones."""
+    ) -> Smoothed:
+        """Split the filter's tracks into tracklets, and smooth the linked ones."""
+        decided = self._resolve(tracks, views, corrections, earlier)
+        known: Smoothed | None = earlier.get(f"smoothed-{decided.key}")
+        if known is not None:
+            return known
+        found = tracks.finish(1, decided)  # resolved tracks are near their boxes
+        earlier.put(f"smoothed-{decided.key}", found)
+        return found
+
+    def _resolve(
+        self,
+        tracks: _Refinement,
+        views: Steps[tuple[ViewResult, ...]],
+        corrections: Many[Correction],
+        earlier: ResultStore,
+    ) -> _Resolution:
+        """Replace the filter's tracks by linked tracklets."""
         p = self._parameters.smoothing
         seen = Appearances.of(views) if p.appearance > 0.0 else Appearances()
         start: _LastRoundInput | None = earlier.get("start")
         if start is None:
-            start = self._before_last_round(smoother, begin, seen, check)
+            start = self._before_last_round(tracks, seen)
             earlier.put("start", start)
         tracked = Tracked(
-            smoother, start.fitted, start.shared, start.contested, start.had, start.names
+            tracks.smoother, start.fitted, start.shared, start.contested, start.had, start.names
         )
-        learnt, first = start.learnt, start.first
+        tracks.learnt, first = start.learnt, start.first
         del start
         found, key = linking.resolve_identities(tracked, p, seen, corrections, earlier)
-        check()
-        begin.replace(found.paths, np.where(found.had, 1.0, lifetimes.UNSURE), found.links)
+        tracks.check()
+        tracks.adopt(found)
         gone = np.flatnonzero(~np.isin(first.paths.labels, found.names)).tolist()
-        removed = []
-        if gone:
-            removed = [_removal(first.paths, path, first.odds[path]) for path in gone]
-        decided = _Resolution([*found.decisions, *removed], found.joined, found.limits, key)
-        return learnt.of_people(found.origins), decided
+        removed = [_removal(first.paths, path, first.odds[path]) for path in gone]
+        return _Resolution([*found.decisions, *removed], found.joined, found.limits, key)
 
-    def _before_last_round(
-        self,
-        smoother: Smoother,
-        begin: _InitialTracks,
-        seen: Appearances,
-        check: Callable[[], None],
-    ) -> _LastRoundInput:
+    def _before_last_round(self, tracks: _Refinement, seen: Appearances) -> _LastRoundInput:
         """Run all rounds but the last resolution, the only one with corrections of identity.
 
         Args:
-            smoother: The models and the boxes.
-            begin: The filter's tracks, which are taken.
+            tracks: The filter's tracks, which are taken.
             seen: Appearance of the boxes.
-            check: A function that is called in every round and raises an exception to stop.
         """
-        p = self._parameters.smoothing
-        contested = contested_shares(begin.paths, begin.links)
-        had = begin.existences == 1.0
-        names = np.where(had, begin.paths.labels[begin.paths.owners], -1)
-        fitted, shared, learnt = _fit_and_share(smoother, begin, p, None, check, p.iterations)
+        p, smoother = self._parameters.smoothing, tracks.smoother
+        contested = contested_shares(tracks.paths, tracks.links)
+        had = tracks.existences == 1.0
+        names = np.where(had, tracks.paths.labels[tracks.paths.owners], -1)
+        fitted, shared = tracks.fit_and_share(p.iterations)
         _, odds = lifetimes.estimate_lifetimes(smoother, fitted.paths, shared, p)
         first = _FilterTracks(fitted.paths.without_states(), odds)
         for _ in range(p.rounds - 1):
@@ -222,166 +212,154 @@ class IdentitySmoothing(PositionSmoothing):
             del fitted, shared
             found, _key = linking.resolve_identities(tracked, p, seen)
             del tracked
-            check()
+            tracks.check()
             had, names = found.had, found.names
-            learnt = learnt.of_people(found.origins)
-            begin.replace(found.paths, np.where(had, 1.0, lifetimes.UNSURE), found.links)
+            tracks.adopt(found)
             del found
             # resolved identities improve the association of boxes, and the association identities
-            fitted, shared, learnt = _fit_and_share(smoother, begin, p, learnt, check, 1)
+            fitted, shared = tracks.fit_and_share(1)
             contested = contested_shares(fitted.paths, shared.links)
-        return _LastRoundInput(fitted, shared, learnt, contested, had, names, first)
+        return _LastRoundInput(fitted, shared, tracks.learnt, contested, had, names, first)
 
 
-class _InitialTracks:
-    """Tracks to be fitted to their boxes, with N rows.
+class _Refinement:
+    """Tracks with N rows that are fitted to their boxes and associated with them again.
 
-    They are given away once, so that nothing holds the states while the fit replaces them.
+    The tracks are given away once in every turn, so that nothing holds the states while the fit
+    replaces them.
     """
 
-    def __init__(self, paths: Paths, existences: Float[ndarray, " N"], links: Links) -> None:
-        """Begin with some tracks, with the arguments of :meth:`replace`."""
-        self.replace(paths, existences, links)
-
-    def replace(self, paths: Paths, existences: Float[ndarray, " N"], links: Links) -> None:
-        """Begin with other tracks.
+    def __init__(
+        self,
+        smoother: Smoother,
+        parameters: SmoothingParams,
+        check: Callable[[], None],
+        results: Steps[FusionResult],
+        tracks: Trajectories,
+    ) -> None:
+        """Begin with the filter's tracks, as they are reported.
 
         Args:
-            paths: The tracks.
-            existences: Prior existence probability of each row.
-            links: Association probabilities of rows and boxes.
+            smoother: The models and the boxes.
+            parameters: The parameters of the smoothing.
+            check: A function that is called in every turn and raises an exception to stop.
+            results: The result of stage 2 for each step.
+            tracks: The tracks extracted from these.
         """
-        self.paths, self.existences, self.links = paths, existences, links
+        self.smoother, self.check = smoother, check
+        self._parameters = parameters
+        self.paths, had = read_paths(results, tracks, smoother.model.motion.dimension)
+        self.links = read_links(results, self.paths, smoother.cameras)
+        """Association probabilities of rows and boxes."""
+        self.existences = np.where(had, 1.0, lifetimes.UNSURE)
+        """Prior existence probability of each row."""
+        self.learnt = smoother.uncalibrated(self.paths)
+        """The self-calibration of the boxes so far."""
 
-    def take_paths(self) -> Paths:
-        """The tracks, whose states are forgotten."""
+    def adopt(self, found: LinkedTracks) -> None:
+        """Go on with linked tracklets in place of the tracks."""
+        self.learnt = self.learnt.of_people(found.origins)
+        existences = np.where(found.had, 1.0, lifetimes.UNSURE)
+        self.paths, self.existences, self.links = found.paths, existences, found.links
+
+    def _take_paths(self) -> Paths:
+        """The tracks, whose states are forgotten here."""
         found, self.paths = self.paths, self.paths.without_states()
         return found
 
-    def take_links(self) -> Links:
-        """The links, which are forgotten."""
+    def _take_links(self) -> Links:
+        """The links, which are forgotten here."""
         found, self.links = self.links, Links.concatenate([])
         return found
 
+    def _fit(self, turns: int) -> Fitted:
+        """Fit the tracks to their boxes in some turns."""
+        return self.smoother.fit(self._take_paths(), self._take_links(), turns, self.learnt)
 
-def _read_filter(
-    smoother: Smoother, results: Steps[FusionResult], tracks: Trajectories
-) -> _InitialTracks:
-    """The filter's tracks, as they are reported."""
-    paths, had = read_paths(results, tracks, smoother.model.motion.dimension)
-    links = read_links(results, paths, smoother.cameras)
-    return _InitialTracks(paths, np.where(had, 1.0, lifetimes.UNSURE), links)
+    def fit_and_share(self, turns: int) -> tuple[Fitted, BoxAssociations]:
+        """Alternate fitting tracks to their boxes and associating boxes with the tracks.
 
+        Args:
+            turns: Number of turns.
+        """
+        smoother, p = self.smoother, self._parameters
+        fitted = self._fit(2)
+        shared = smoother.associate(fitted.paths, self.existences, self.learnt)
+        for _ in range(turns):
+            self.check()
+            self.paths = fitted.paths
+            del fitted
+            self.existences, _ = lifetimes.estimate_lifetimes(smoother, self.paths, shared, p)
+            if p.learning:
+                self.learnt = smoother.learn(self.paths, shared.links, self.learnt)
+            self.links = shared.links
+            del shared
+            fitted = self._fit(1)
+            shared = smoother.associate(fitted.paths, self.existences, self.learnt)
+        return fitted, shared
 
-def _fit_and_share(
-    smoother: Smoother,
-    begin: _InitialTracks,
-    p: SmoothingParams,
-    learnt: Calibration | None,
-    check: Callable[[], None],
-    turns: int,
-) -> tuple[Fitted, BoxAssociations, Calibration]:
-    """Alternate fitting tracks to their boxes and associating boxes with the tracks.
+    def finish(self, turns: int, decided: _Resolution) -> Smoothed:
+        """Fit tracks with settled identities, estimate their ends, and remove false tracks.
 
-    Args:
-        smoother: The models and the boxes.
-        begin: The tracks and their links at the start, which are taken.
-        p: The parameters of the smoothing.
-        learnt: The self-calibration so far, None for none.
-        check: A function that is called in every turn and raises an exception to stop.
-        turns: Number of turns.
-    """
-    existences = begin.existences
-    learnt = learnt or smoother.uncalibrated(begin.paths)
-    fitted = smoother.fit(begin.take_paths(), begin.take_links(), 2, learnt)
-    shared = smoother.associate(fitted.paths, existences, learnt)
-    for _ in range(turns):
-        check()
-        paths = fitted.paths
+        Args:
+            turns: Number of turns of fitting and associating.
+            decided: The resolution of identities.
+        """
+        p, smoother = self._parameters, self.smoother
+        fitted, shared = self.fit_and_share(turns)
+        del shared
+        longer, existences = lifetimes.extend_paths(
+            smoother, fitted.paths, round(REACH / smoother.model.step_time)
+        )
         del fitted
-        existences, _ = lifetimes.estimate_lifetimes(smoother, paths, shared, p)
+        away = _outside_spans(longer, decided.limits)
+        existences = np.where(away, 0.0, existences)
+        shared = smoother.associate(longer, existences, self.learnt)
+        self.paths, self.links = longer, shared.links
+        del longer
+        fitted = self._fit(1).without_predictions()
         if p.learning:
-            learnt = smoother.learn(paths, shared.links, learnt)
-        begin.replace(paths, existences, shared.links)
-        del paths, shared
-        fitted = smoother.fit(begin.take_paths(), begin.take_links(), 1, learnt)
-        shared = smoother.associate(fitted.paths, existences, learnt)
-    return fitted, shared, learnt
-
-
-def _finish(
-    smoother: Smoother,
-    begin: _InitialTracks,
-    p: SmoothingParams,
-    learnt: Calibration | None,
-    check: Callable[[], None],
-    turns: int,
-    decided: _Resolution,
-) -> Smoothed:
-    """Fit tracks with settled identities, estimate their ends, and remove false tracks.
-
-    Args:
-        smoother: The models and the boxes.
-        begin: The tracks and their links at the start, which are taken.
-        p: The parameters of the smoothing.
-        learnt: The self-calibration so far, None for none.
-        check: A function that is called in every turn and raises an exception to stop.
-        turns: Number of turns of fitting and associating.
-        decided: The resolution of identities.
-    """
-    fitted, shared, learnt = _fit_and_share(smoother, begin, p, learnt, check, turns)
-    del shared
-    longer, existences = lifetimes.extend_paths(
-        smoother, fitted.paths, round(REACH / smoother.model.step_time)
-    )
-    del fitted
-    away = _outside_spans(longer, decided.limits)
-    existences = np.where(away, 0.0, existences)
-    shared = smoother.associate(longer, existences, learnt)
-    begin.replace(longer, existences, shared.links)
-    del longer
-    fitted = smoother.fit(begin.take_paths(), shared.links, 1, learnt).without_predictions()
-    if p.learning:
-        learnt = smoother.with_shifts(fitted.paths, learnt)
-        if learnt.shifts.any():
-            fitted = smoother.fit(fitted.paths, shared.links, 1, learnt).without_predictions()
-    del shared
-    shared = smoother.associate(fitted.paths, existences, learnt)
-    reported = smoother.reported(fitted, shared.links, learnt) if p.learning else None
-    there, odds = lifetimes.estimate_lifetimes(smoother, fitted.paths, shared, p)
-    there[away] = 0.0
-    paths = fitted.places.lead(fitted.paths, smoother.model.step_time)
-    noise = None if reported is None else reported.noise
-    covariances = paths.covariances if reported is None else reported.covariances
-    owners = paths.owners
-    heights = np.full((2, len(paths.labels)), np.nan)
-    if reported is not None:
-        certain = paths.with_states(paths.states, covariances)
-        heights[:] = smoother.heights(certain, shared.links, reported.learnt, reported.noise)
-    present = odds > 0.0
-    removed = [_removal(paths, path, odds[path]) for path in np.flatnonzero(~present).tolist()]
-    links = shared.links
-    seen = np.zeros((len(there), len(smoother.cameras)), dtype=bool)
-    sure = links.shares > _SEEN
-    seen[links.rows[sure], links.cameras[sure]] = True
-    rows = np.flatnonzero(present[owners])
-    rows = rows[np.lexsort((paths.labels[owners[rows]], paths.steps[rows]))]
-    return Smoothed(
-        paths.steps[rows],
-        paths.labels[owners[rows]],
-        paths.states[rows],
-        covariances[rows],
-        there[rows],
-        seen[rows],
-        tuple(sorted([*decided.decisions, *removed], key=lambda one: (one.step, one.label))),
-        learnt,
-        decided.joined,
-        noise,
-        0.0 if reported is None else reported.common,
-        heights=heights[0, owners[rows]],
-        sigma_heights=heights[1, owners[rows]],
-        cameras=None if reported is None else reported.cameras,
-    )
+            self.learnt = smoother.with_shifts(fitted.paths, self.learnt)
+            if self.learnt.shifts.any():
+                fitted = smoother.fit(fitted.paths, shared.links, 1, self.learnt)
+                fitted = fitted.without_predictions()
+        del shared
+        shared = smoother.associate(fitted.paths, existences, self.learnt)
+        reported = smoother.reported(fitted, shared.links, self.learnt) if p.learning else None
+        there, odds = lifetimes.estimate_lifetimes(smoother, fitted.paths, shared, p)
+        there[away] = 0.0
+        paths = fitted.places.lead(fitted.paths, smoother.model.step_time)
+        noise = None if reported is None else reported.noise
+        covariances = paths.covariances if reported is None else reported.covariances
+        owners = paths.owners
+        heights = np.full((2, len(paths.labels)), np.nan)
+        if reported is not None:
+            certain = paths.with_states(paths.states, covariances)
+            heights[:] = smoother.heights(certain, shared.links, reported.learnt, reported.noise)
+        present = odds > 0.0
+        removed = [_removal(paths, path, odds[path]) for path in np.flatnonzero(~present).tolist()]
+        links = shared.links
+        seen = np.zeros((len(there), len(smoother.cameras)), dtype=bool)
+        sure = links.shares > _SEEN
+        seen[links.rows[sure], links.cameras[sure]] = True
+        rows = np.flatnonzero(present[owners])
+        rows = rows[np.lexsort((paths.labels[owners[rows]], paths.steps[rows]))]
+        return Smoothed(
+            paths.steps[rows],
+            paths.labels[owners[rows]],
+            paths.states[rows],
+            covariances[rows],
+            there[rows],
+            seen[rows],
+            tuple(sorted([*decided.decisions, *removed], key=lambda one: (one.step, one.label))),
+            self.learnt,
+            decided.joined,
+            noise,
+            0.0 if reported is None else reported.common,
+            heights=heights[0, owners[rows]],
+            sigma_heights=heights[1, owners[rows]],
+            cameras=None if reported is None else reported.cameras,
+        )
 
 
 def _removal(paths: Paths, path: int, odds: float) -> Decision:
