@@ -90,7 +90,7 @@ class SequentialPhd:
     The plain recursion takes targets as Poisson: a miss multiplies every weight by 1 − p_D
     whatever the cameras before detected, one component may explain two boxes, and two labels
     may share one target. With ``misses`` at ``per_person`` a label is one target instead, which
-    exists with the sum of its components' weights; see :func:`share_boxes`.
+    exists with the sum of its components' weights; see :func:`associate_labels`.
     """
 
     def __init__(self, sequence: Sequence, parameters: RunParameters) -> None:
@@ -181,7 +181,7 @@ class SequentialPhd:
         )
         owners = None
         if p.misses == "per_person":
-            updated = share_boxes(
+            updated = associate_labels(
                 mixture,
                 updated,
                 seen.detection_probabilities,
@@ -306,7 +306,7 @@ def _one_person_a_label(
     return labels, next_label
 
 
-def share_boxes(
+def associate_labels(
     predicted: GaussianMixture,
     updated: PhdUpdate,
     detection_probability: Float[ndarray, " J"],

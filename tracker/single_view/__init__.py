@@ -51,9 +51,9 @@ def maker(method: Method) -> Callable[..., SingleViewMethod]:
 
             return DetectionPhd
         case "none":
-            from tracker.single_view.none import DetectionBoxes
+            from tracker.single_view.none import UnfilteredBoxes
 
-            return DetectionBoxes
+            return UnfilteredBoxes
     return method.load()
 
 

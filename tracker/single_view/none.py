@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from tracker.sequences.pictures.frames import Pictures
 
 
-class DetectionBoxes:
+class UnfilteredBoxes:
     """The boxes of the sequence's ``detections``, with the noise of the parameters.
 
     Boxes that contradict the room remain among the measurements and are not passed on.

@@ -53,7 +53,7 @@ def shared(
     clutter: float = CLUTTER,
 ) -> PhdUpdate:
     """The same with one person a label."""
-    return sequential_phd.share_boxes(
+    return sequential_phd.associate_labels(
         before,
         plain(before, boxes, p_d, clutter),
         np.full(before.size, p_d),
