@@ -23,7 +23,8 @@ from tracker.smoothing.noise import NoiseModel
 from tracker.smoothing.paths import Paths
 
 _BOX_SIGMA = 0.1
-"""Standard deviation of an edge of one box, half heights."""
+"""Standard deviation of an edge of one box, half heights; only its square times :data:`_ALIKE`
+counts, so that the bounds there are the same as 0.05 to 0.2 here."""
 
 _ALIKE = 20.0
 """Number of boxes of neighbouring steps and cameras that count as one, since their errors

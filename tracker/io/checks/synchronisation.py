@@ -26,10 +26,13 @@ LEAST_STEPS = 1.5
 """An offset of fewer steps is not worth telling: people hardly move in between."""
 
 LEAST_GAIN = 4.0
-"""Standard deviations by which an offset must be better than none to be told."""
+"""Standard deviations by which an offset must be better than none to be told. In the random rooms
+of seeds 1120 … 1159 a camera with the boxes of other people has at most 2.8, and 32 of 33 cameras
+that are 2.5 to 30 steps late have at least 4."""
 
 LEAST_SHARPNESS = 3.5
-"""Deviations by which the peak must stand above the curve."""
+"""Deviations by which the peak must stand above the curve. In these rooms every camera of the
+same people has more than 10, and one with the boxes of other people at most 5."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
