@@ -348,7 +348,9 @@ class Edits:
 
     def _path(self, recording: Path) -> Path | None:
         """The file of a recording's edits."""
-        return self._folder and self._folder / f"{key_of(recording)}.recording.json"
+        if self._folder is None:
+            return None
+        return self._folder / f"{key_of(recording)}.recording.json"
 
     def _written_soon(self) -> None:
         if self._folder is not None and self._timer is None:
@@ -363,7 +365,8 @@ class Edits:
             self._timer.cancel()
             self._timer = None
             self._write_those(self._folder / "everywhere.json", everywhere=True)
-            path = self._sequence and self._path(self._sequence.folder)
+            own = self._sequence
+            path = None if own is None else self._path(own.folder)
             if path is not None:
                 self._write_those(path, everywhere=False)
 
