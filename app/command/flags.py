@@ -15,7 +15,14 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, get_args, get_type_hints
 
 import tyro
-from tyro.conf import FlagCreatePairsOff, Positional, UseAppendAction, arg, subcommand
+from tyro.conf import (
+    FlagCreatePairsOff,
+    OmitArgPrefixes,
+    Positional,
+    UseAppendAction,
+    arg,
+    subcommand,
+)
 
 from app.command.arguments.corrections import Corrections, LogFile
 from app.command.arguments.detector import Detector
@@ -32,7 +39,7 @@ from app.command.arguments.listing import Benchmark, Parameters, Sequences
 from app.command.arguments.studies import Batch, Study, Tune
 from app.command.arguments.templates import Templates
 from app.command.terminal import say
-from app.command.typed import WrongValue, registry
+from app.command.typed import WrongValue, flag_of, registry
 from tracker import __version__
 from tracker.library import KEEP
 from tracker.parameters.catalogue import (
@@ -257,11 +264,6 @@ class Evaluate:
     html: Annotated[Path | None, arg(metavar="REPORT.html", help_behavior_hint="(optional)")] = None
     """Write a report as well: one file with figures, plots, paths and tracks."""
 
-    def changes(self) -> dict[str, str]:
-        """The settings asked for, by name."""
-        own = {"sequence", "tracks", "truth", "json", "html"}
-        return {k: v for k, v in vars(self).items() if k not in own and v is not None}
-
 
 def describe_range(parameter: Parameter) -> str:
     """What a parameter may be, in words and without its unit: a range or its choices."""
@@ -308,27 +310,15 @@ def _track_with_flags() -> Any:
     return with_flags
 
 
-def _evaluate_with_flags() -> Any:
+def _evaluate_with_settings() -> Any:
     """``Evaluate`` with a flag for every setting of the evaluation: ``--gate`` and so on."""
     from tracker.evaluation import EvaluationSettings
 
-    flags: list[tuple[str, Any, Any]] = []
-    for name, schema in EvaluationSettings.model_json_schema()["properties"].items():
-        ui = schema["x-ui"]
-        choices = "|".join(schema.get("enum", ()))
-        bounds = "" if choices else f", {schema['minimum']:g} … {schema['maximum']:g} {ui['unit']}"
-        annotation = Annotated[
-            str | None,
-            arg(
-                metavar=choices or {"number": "FLOAT", "integer": "INT"}[schema["type"]],
-                help=f"{schema['description']} {ui['symbol']}{bounds.rstrip()}.",
-                help_behavior_hint=f"(default: {show(schema['default'])})",
-            ),
-        ]
-        flags.append((name, annotation, field(default=None)))
-    with_flags = make_dataclass("EvaluateWithFlags", flags, bases=(Evaluate,))
-    with_flags.__doc__ = Evaluate.__doc__
-    return with_flags
+    settings = OmitArgPrefixes[EvaluationSettings]
+    fields = [("settings", settings, field(default_factory=EvaluationSettings))]
+    with_settings = make_dataclass("EvaluateWithSettings", fields, bases=(Evaluate,))
+    with_settings.__doc__ = Evaluate.__doc__
+    return with_settings
 
 
 def _import_with_flags() -> Any:
@@ -336,30 +326,21 @@ def _import_with_flags() -> Any:
     from tracker.io.importing.options import ImportOptions
 
     flags: list[tuple[str, Any, Any]] = []
-    options = ImportOptions.model_json_schema()["properties"]
     for option, name in IMPORT_FLAGS.items():
-        schema = options[option]
-        kinds = [one for one in schema.get("anyOf", [schema]) if one["type"] != "null"]
-        choices = tuple(kinds[0].get("enum", ()))
-        words: dict[str, Any] = {"help_behavior_hint": "(default: found out)"}
-        kind: Any = {"string": str, "number": float}.get(kinds[0]["type"])
-        if len(kinds) > 1:
-            kind, words["metavar"] = str, "|".join((*choices, "FLOAT"))
+        own = ImportOptions.model_fields[option]
+        words = " ".join((own.description or "").split())
+        if option in PAIRS:
+            text = arg(help=words, metavar=PAIRS[option], help_behavior_hint="(repeatable)")
+            kind: Any = Annotated[UseAppendAction[tuple[str, ...]], text]
+        elif own.annotation is bool:
+            kind = Annotated[FlagCreatePairsOff[bool], arg(help=words)]
         elif option == "boxes":  # the one flag of two options
-            kind = Literal[*choices, *(f"{one}-normalised" for one in choices)]
-        elif choices:
-            kind = Literal[choices]
-        elif option in PAIRS:
-            kind = UseAppendAction[tuple[str, ...]]
-            words = {"metavar": PAIRS[option], "help_behavior_hint": "(repeatable)"}
-        elif kinds[0]["type"] == "boolean":
-            kind, words = FlagCreatePairsOff[bool], {}
-        default = schema["default"]
-        if default is None:
-            kind = kind | None
-        text = schema["description"].replace("\n", " ")
-        flag = Annotated[kind, arg(help=text, **words)]
-        flags.append((name, flag, field(default=() if default == [] else default)))
+            layouts = get_args(get_args(own.annotation)[0])
+            choices: Any = Literal[*layouts, *(f"{one}-normalised" for one in layouts)] | None
+            kind = Annotated[choices, arg(help=words, help_behavior_hint="(default: found out)")]
+        else:
+            kind, _ = flag_of(ImportOptions, option, "default: found out")
+        flags.append((name, kind, field(default=own.default)))
     with_flags = make_dataclass("ImportWithFlags", flags, bases=(Import,))
     with_flags.__doc__ = Import.__doc__
     return with_flags
@@ -424,7 +405,7 @@ def parse(arguments: list[str] | None = None) -> Arguments:
             f"the program no longer has this command; run `{ONLY_IN_A_CHECKOUT[asked[0]]}` in a "
             "checkout",
         )
-    evaluate: Any = _evaluate_with_flags() if asked[:1] == ["evaluate"] else Evaluate
+    evaluate: Any = _evaluate_with_settings() if asked[:1] == ["evaluate"] else Evaluate
     importing: Any = _import_with_flags() if asked[:1] == ["import"] else Import
     if asked[:1] == ["study"] and asked[1:2] and asked[1].endswith(".toml"):
         asked = ["study", "run", *asked[1:]]  # `study STUDY.toml` runs it

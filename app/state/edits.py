@@ -127,9 +127,6 @@ class Edits:
         self._teach: Callable[[Values, Mapping[str, Any]], object] = lambda *_: None
         self._sequence: Sequence | None = None
         self._parameters = self._defaults = RunParameters()
-        self._left: dict[str, Any] = {}
-        """What differed from the defaults when the recording was left: a page that comes back to
-        it after a start of the program edits nothing."""
         self._origin, self._at, self._edited_at = "", 0.0, 0.0
         self._restoring = 0
         """The thread that puts an edit back: its changes are none of their own."""
@@ -307,9 +304,6 @@ class Edits:
                     edit = _edit_of(before, values, now)
                 if edit is None:
                     return
-                left, self._left = self._left, {}
-                if left and changed_values(now.parameters, now.defaults) == left:
-                    return
                 self._add(edit, now.parameters_origin)
         self._show_words()
 
@@ -319,10 +313,10 @@ class Edits:
         self._write()
         self._done = [edit for edit in self._done if _is_everywhere(edit)]
         self._undone = [edit for edit in self._undone if _is_everywhere(edit)]
-        self._sequence, self._left = now.sequence, {}
+        self._sequence = now.sequence
         self._parameters, self._defaults = now.parameters, now.defaults
         self._at = 0.0
-        path = self._path()
+        path = self._path(now.sequence.folder)
         if path is None:
             return
         name = f"{key_of(now.sequence.folder)}.history.json"
@@ -339,11 +333,24 @@ class Edits:
 
     # over a start
 
-    def _path(self) -> Path | None:
-        """The file of the open recording's edits."""
-        if self._folder is None or self._sequence is None:
+    def parameters_of(self, recording: Path) -> dict[str, Any]:
+        """Return the parameters that a recording was left with, by key: those its edits led to,
+        as far as they were not its defaults.
+
+        Args:
+            recording: Its folder.
+        """
+        self._write()
+        path = self._path(recording)
+        with suppress(OSError, ValueError):  # of a file that cannot be read, its edits tell
+            return {} if path is None else read_as(path, _Stored).parameters
+        return {}
+
+    def _path(self, recording: Path) -> Path | None:
+        """The file of a recording's edits."""
+        if self._folder is None:
             return None
-        return self._folder / f"{key_of(self._sequence.folder)}.recording.json"
+        return self._folder / f"{key_of(recording)}.recording.json"
 
     def _written_soon(self) -> None:
         if self._folder is not None and self._timer is None:
@@ -358,7 +365,8 @@ class Edits:
             self._timer.cancel()
             self._timer = None
             self._write_those(self._folder / "everywhere.json", everywhere=True)
-            path = self._path()
+            own = self._sequence
+            path = None if own is None else self._path(own.folder)
             if path is not None:
                 self._write_those(path, everywhere=False)
 
@@ -381,7 +389,7 @@ class Edits:
             return
         left: dict[str, Any] = {}
         if not everywhere:
-            left = self._left or dict(changed_values(self._parameters, self._defaults))
+            left = changed_values(self._parameters, self._defaults)
         value = {"done": done, "undone": undone, "corrections": known, "parameters": left}
         try:
             write_json(path, value)
@@ -403,7 +411,6 @@ class Edits:
         except (OSError, ValueError, LookupError) as error:
             logger.warning("%s cannot be read; what it has cannot be undone: %s", path, error)
             return
-        self._left = stored.parameters
         self._done = sorted([*self._done, *done], key=lambda edit: edit.time)
         self._undone = sorted([*self._undone, *undone], key=lambda edit: -edit.time)
 

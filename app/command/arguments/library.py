@@ -6,7 +6,17 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Literal
 
-from tyro.conf import FlagCreatePairsOff, OmitSubcommandPrefixes, Positional, arg, subcommand
+from tyro.conf import (
+    FlagCreatePairsOff,
+    OmitArgPrefixes,
+    OmitSubcommandPrefixes,
+    Positional,
+    arg,
+    subcommand,
+)
+
+from app.command.typed import reader_of
+from app.wishes import Marks, VideoPart
 
 LibraryFile = Annotated[
     Path | None,
@@ -75,12 +85,7 @@ class ExportRun(OfLibrary):
     """The file to write, of motchallenge the folder. It appears when it is complete."""
     format: FormatName = None
     """Its form."""
-    first: int = 0
-    """Of a video the first step."""
-    last: Annotated[int | None, arg(metavar="INT", help_behavior_hint="(default: the end)")] = None
-    """Of a video the last step."""
-    speed: float = 1.0
-    """Of a video: 0.5 is half as fast as it was."""
+    video: OmitArgPrefixes[VideoPart] = field(default_factory=VideoPart)
 
 
 @dataclass
@@ -88,7 +93,11 @@ class RenameRun(OfLibrary):
     """Give a run a name, which keeps it for ever; an empty one takes it away."""
 
     run: Annotated[Positional[str], _RUN]
-    name: Annotated[Positional[str], arg(metavar="NAME", help="What it is called from now on.")]
+    name: Annotated[
+        Positional[str],
+        reader_of(Marks, "title"),
+        arg(metavar="NAME", help="What it is called from now on."),
+    ]
 
 
 @dataclass

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import sys
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
-
-from pydantic import ValidationError
+from typing import TYPE_CHECKING
 
 from app.command.computing import compute
 from app.command.flags import Evaluate
@@ -16,7 +14,6 @@ from tracker.evaluation import Evaluation, EvaluationSettings, evaluate_sequence
 from tracker.evaluation.figures import number
 from tracker.export.reading import read_tracks
 from tracker.export.tracks_csv import TrackFile
-from tracker.parameters.values import ParameterError
 from tracker.sequences import library
 from tracker.sequences.sequence import Sequence
 from tracker.sequences.tables import truth_of
@@ -31,7 +28,6 @@ def evaluate(command: Evaluate) -> None:
     Without a track file the sequence is tracked in several ways, and how far they agree is said.
 
     Raises:
-        ParameterError: If a setting is not as it must be.
         CommandError: If the tracks are not of the sequence, or it has no truth.
         ValueError: If a file cannot be read.
         OSError: If the report cannot be written.
@@ -39,7 +35,7 @@ def evaluate(command: Evaluate) -> None:
     if command.tracks is None:
         estimate_without_truth(command)
         return
-    settings = settings_from(command.changes())
+    settings = _settings_of(command)
     if command.html is not None:
         if command.html.is_dir():
             raise CommandError(f"--html {command.html}: expected a file to write, found a folder")
@@ -83,15 +79,19 @@ def evaluate(command: Evaluate) -> None:
         say(f"the report is in {command.html}")
 
 
+def _settings_of(command: Evaluate) -> EvaluationSettings:
+    settings: EvaluationSettings = vars(command)["settings"]  # its flags come with the engine
+    return settings
+
+
 def estimate_without_truth(command: Evaluate) -> None:
     """Track a sequence with its default parameters, in several ways, and say how far they agree.
 
     Raises:
         CommandError: If something is asked for that needs a track file.
     """
-    given = [
-        name for name in ("html", "truth", *command.changes()) if getattr(command, name) is not None
-    ]
+    given = [name for name in ("html", "truth") if getattr(command, name) is not None]
+    given += _settings_of(command).model_dump(exclude_defaults=True)
     if given:
         flags = ", ".join(f"--{name.replace('_', '-')}" for name in given)
         raise CommandError(f"{flags}: expected a track file as well; name it after the sequence")
@@ -151,27 +151,6 @@ def _print_estimate(found: Estimate, names: list[str]) -> None:
             (">step", "doubtful"),
             [(str(doubt.step), doubt.why) for doubt in found.disagreements[:_SHOWN_DOUBTS]],
         )
-
-
-def settings_from(changes: dict[str, Any]) -> EvaluationSettings:
-    """The settings with some values given as text.
-
-    Raises:
-        ParameterError: With the flag, its range and what was given.
-    """
-    try:
-        return EvaluationSettings.model_validate(changes)
-    except ValidationError as error:
-        first = error.errors()[0]
-        name = str(first["loc"][0])
-    schema = EvaluationSettings.model_json_schema()["properties"][name]
-    given, unit = changes[name], schema["x-ui"]["unit"]
-    expected = "a whole number" if schema["type"] == "integer" else "a number"
-    if "enum" in schema:
-        expected = f"one of {', '.join(schema['enum'])}"
-    elif "parsing" not in first["type"] and "finite" not in first["type"]:
-        expected = f"{schema['minimum']:g} … {schema['maximum']:g} {unit}".rstrip()
-    raise ParameterError(f"--{name.replace('_', '-')}", f"expected {expected}, got {given!r}")
 
 
 def check_fit(sequence: Sequence, tracks: TrackFile, name: str) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -157,10 +156,8 @@ def options_of(command: Import) -> ImportOptions:
     """Return what the flags state.
 
     Raises:
-        ParameterError: With the flag, what it takes and what was given.
+        ParameterError: If a pair is none.
     """
-    from pydantic import ValidationError
-
     from tracker.io.importing.options import ImportOptions
 
     values = {option: getattr(command, flag) for option, flag in IMPORT_FLAGS.items()}
@@ -168,16 +165,7 @@ def options_of(command: Import) -> ImportOptions:
         values[option] = tuple(_pairs(f"--{IMPORT_FLAGS[option]}", form, values[option]))
     layout, _, normalised = (values["boxes"] or "").partition("-")
     values |= {"boxes": layout or None, "normalised": True if normalised else None}
-    try:
-        return ImportOptions.model_validate(values)
-    except ValidationError as error:
-        errors = error.errors()
-    option = str(errors[0]["loc"][0])
-    # pydantic's "Input should be a valid number, unable to parse …", "String should have at most …"
-    words = [one["msg"].split(", unable")[0] for one in errors]
-    expected = " or ".join(re.sub(r"^\w+ should (be|have) ", "", one) for one in words)
-    flag = IMPORT_FLAGS[option].replace("_", "-")
-    raise ParameterError(f"--{flag}", f"expected {expected}, got {values[option]!r}")
+    return ImportOptions.model_validate(values)
 
 
 def _pairs(flag: str, form: str, items: Sequence[str]) -> Iterator[tuple[str, str]]:

@@ -225,7 +225,7 @@ def _export(library: Library, command: ExportRun) -> None:
     result = library.result(library.find(command.run).id)
     written = run_for_export(sequences.open_sequence(result.place), result)
     with Bar("writing", "step") as writing:
-        options = Options(command.first, command.last, command.speed, writing.at)
+        options = Options(**dict(command.video), progress=writing.at)
         save(command.output, form, written, options)
     if command.json:
         print_json({"run": result.run.id, "format": form.name, "file": str(command.output)})

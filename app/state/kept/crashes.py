@@ -3,8 +3,8 @@
 A native crash (a fault in compiled code) ends the whole process. What was taught and not saved is
 taken up again at the next start, and would crash that as well; so would the same run. So a start
 notes what it computes, the interpreter writes where a crash happened, and the next start puts the
-draft aside and leaves the run out. An end by a signal from outside leaves no such report, and its
-draft is taken up as always.
+draft aside and leaves the run out, as all later ones do until it is asked for again. An end by a
+signal from outside leaves no such report, and its draft is taken up as always.
 """
 
 from __future__ import annotations
@@ -22,10 +22,13 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, TextIO
 
-from tracker.files.validated import read_as, set_aside
+from tracker.files.validated import read_as, set_aside, write_json
 
 LAST = "last-crash.txt"
 """What is known of the last crash: for whoever reports it."""
+
+LEFT_OUT = "left-out.json"
+"""The runs with which the program crashed."""
 
 REPORT_LETTERS = 6000
 """Of what the interpreter wrote: its beginning tells of the thread that crashed."""
@@ -71,6 +74,12 @@ class Crashes:
         self._folder = folder
         self._report: TextIO | None = None
         self._note = Note()
+        self.left_out: dict[str, dict[str, Any] | None] = {}
+        """The runs with which the program crashed, by key, of this start and all before it: the
+        parameters of the last run before each that was done."""
+        if folder is not None:
+            with contextlib.suppress(OSError, ValueError):
+                self.left_out = read_as(folder / LEFT_OUT, dict[str, dict[str, Any] | None])
 
     def watch(self) -> None:
         """Have the interpreter write where this process crashes, if it does."""
@@ -124,6 +133,17 @@ class Crashes:
             if not self._note.opening:  # else another recording is on its way
                 self._write(Note(self._note.place, good=good, values=dict(values or {})))
 
+    def ask_again(self, run: str) -> None:
+        """Leave out a run no more."""
+        if run in self.left_out:
+            del self.left_out[run]
+            self._write_left_out()
+
+    def _write_left_out(self) -> None:
+        if self._folder is not None:
+            with contextlib.suppress(OSError):  # they are left out by this start alone
+                write_json(self._folder / LEFT_OUT, self.left_out)
+
     def _write(self, note: Note) -> None:
         self._note = note
         if self._report is not None:
@@ -152,6 +172,10 @@ class Crashes:
                     found.append(self._of_crash(report, by))
             for left in (report, report.with_suffix(".json")):
                 left.unlink(missing_ok=True)
+        crashed = {one.note.run: one.note.good for one in found if one.note.run}
+        if crashed:
+            self.left_out |= crashed
+            self._write_left_out()
         return found
 
     def _of_crash(self, report: Path, by: int | None) -> Crash:

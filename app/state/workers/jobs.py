@@ -21,14 +21,14 @@ from app.state.kept.crashes import Crashes, Note
 from app.state.snapshot import Change, RunState, Snapshot
 from app.state.workbench import Workbench
 from app.state.workers.compiling import Compiling
-from app.state.workers.opening import Opener
+from app.state.workers.opening import Corrections, Opener
 from app.state.workers.threads import CLOSING_SECONDS, be_nice
 from app.state.workers.watchdog import Watchdog
 from tracker.fusion.trajectories import Trajectories, apply_corrections
 from tracker.library.keeping import run_for_display
 from tracker.library.records import Result
 from tracker.parameters.catalogue import RunParameters
-from tracker.parameters.values import changed_values, with_values
+from tracker.parameters.values import ParameterError, changed_values, with_values
 from tracker.runs import gaps, pipeline
 from tracker.runs.camera_notes import camera_notes
 from tracker.runs.gates import notices
@@ -37,11 +37,17 @@ from tracker.runs.pipeline import Cancelled, Progress, Run
 from tracker.runs.stage_cache import StageCache
 from tracker.runs.warm_up import COMPILING
 from tracker.sequences.pictures.frames import CACHE_BYTES, FrameReader
+from tracker.sequences.sequence import Sequence
 
 logger = logging.getLogger("app")
 
 CRASHED = (
     "the program crashed while this run was computed; it is left out until it is asked for again"
+)
+
+LEFT_AT_A_CRASH = (
+    "was left with parameters under which the program crashed; it begins with those of the last "
+    "run that was done"
 )
 
 ENDING = "ending the run before"
@@ -81,6 +87,7 @@ class Jobs:
         picture_bytes: int = CACHE_BYTES,
         crashes: Crashes | None = None,
         draft_of: Callable[[Path], Path | None] = lambda folder: None,
+        left_with: Callable[[Path], Mapping[str, Any]] = lambda folder: {},
     ) -> None:
         """Begin to follow the workbench.
 
@@ -96,6 +103,7 @@ class Jobs:
             picture_bytes: Bound on the memory of decoded pictures.
             crashes: Told what is computed with, for the start after a crash.
             draft_of: The file of what was taught of a folder and not saved.
+            left_with: The parameters that a folder was left with, by key.
         """
         self._workbench = workbench
         self._seed = seed
@@ -106,12 +114,13 @@ class Jobs:
         self._compiling = compiling
         self._computes = computes
         self._crashes = crashes or Crashes(None)
-        self._crashed: Note | None = None
         self._draft_of = draft_of
+        self._left_with = left_with
         self._opener = Opener(
             workbench,
             self._crashes,
             self._close_when_unused,
+            self._begin_with,
             data=data,
             detector=detector,
             computes=computes,
@@ -145,8 +154,23 @@ class Jobs:
             nothing: Future[None] = Future()
             nothing.set_result(None)
             return nothing
-        self._crashed = note
         return self.open(note.place, note.values)
+
+    def _begin_with(
+        self, sequence: Sequence, defaults: RunParameters, corrections: Corrections
+    ) -> RunParameters:
+        """The parameters that a recording was left with; where the program crashed under them,
+        those of the last run that was done."""
+        try:
+            parameters = with_values(defaults, self._left_with(sequence.folder))
+        except ParameterError as error:
+            logger.warning("%s begins with its defaults: %s", sequence.name, sentence(error))
+            return defaults
+        key = pipeline.stage_keys(sequence, parameters, self._seed, corrections)["tracks"]
+        if key not in self._crashes.left_out:
+            return parameters
+        self._workbench.notify("warn", f"{sequence.name} {LEFT_AT_A_CRASH}")
+        return with_values(defaults, self._crashes.left_out[key] or {})
 
     def _close_when_unused(self, reader: FrameReader) -> None:
         """Close a reader as soon as the run that may decode from it is over."""
@@ -164,7 +188,7 @@ class Jobs:
 
     def run_again(self) -> None:
         """Go on with a run that was cancelled or failed, or with which the program crashed."""
-        self._crashed = None
+        self._crashes.ask_again(self._workbench.snapshot().run_state.key)
         self._ask(again=True)
 
     def show_kept(self, result: Result) -> None:
@@ -290,9 +314,8 @@ class Jobs:
         try:
             if self._compiling is not None:
                 self._compiling.wait(on_compiling, wanted.cancelled.is_set)
-            crashed = self._crashed
-            if crashed is not None and crashed.run == wanted.key:
-                self._leave_out(wanted, crashed)
+            if wanted.key in self._crashes.left_out:
+                self._leave_out(wanted, self._crashes.left_out[wanted.key])
                 return
             with Watchdog(on_silence) as watchdog:
                 run = self._tracked(wanted, snapshot.parameters, wanted.key, on_progress)
@@ -315,12 +338,12 @@ class Jobs:
             told += camera_notes(run)
             workbench.run_ends(wanted.key, "done", warnings=told)
 
-    def _leave_out(self, wanted: _Wanted, crashed: Note) -> None:
+    def _leave_out(self, wanted: _Wanted, good: Mapping[str, Any] | None) -> None:
         """Say that a run crashed the program; the last one that went well is shown in its place."""
         snapshot, workbench = wanted.snapshot, self._workbench
-        if crashed.good is not None and workbench.snapshot().run is None:
+        if good is not None and workbench.snapshot().run is None:
             assert snapshot.sequence is not None
-            parameters = with_values(snapshot.defaults, crashed.good)
+            parameters = with_values(snapshot.defaults, good)
             key = pipeline.stage_keys(
                 snapshot.sequence, parameters, self._seed, snapshot.corrections
             )["tracks"]

@@ -14,6 +14,7 @@ from app.state.kept.crashes import Crashes
 from app.state.snapshot import Opening
 from app.state.workbench import Workbench
 from app.state.workers.threads import be_nice
+from tracker.corrections import Correction
 from tracker.corrections.log import open_log
 from tracker.parameters.catalogue import RunParameters
 from tracker.parameters.values import changed_values, with_values
@@ -21,8 +22,11 @@ from tracker.runs import pipeline
 from tracker.runs.pipeline import Cancelled
 from tracker.sequences import library
 from tracker.sequences.pictures.frames import FrameReader
+from tracker.sequences.sequence import Sequence
 
 logger = logging.getLogger("app")
+
+Corrections = tuple[Correction, ...]
 
 
 def locate(name: str, data: Path | None) -> str:
@@ -40,6 +44,7 @@ class Opener:
         workbench: Workbench,
         crashes: Crashes,
         retire: Callable[[FrameReader], None],
+        begin: Callable[[Sequence, RunParameters, Corrections], RunParameters],
         *,
         data: Path | None,
         detector: Path | None,
@@ -52,6 +57,7 @@ class Opener:
             workbench: Where they are shown.
             crashes: Told what is opened, for the start after a crash.
             retire: Closes the pictures of what was open, when nobody reads them any more.
+            begin: The parameters that a recording begins with, given its own.
             data: Its folders are sequences by name.
             detector: A network that may be run on the pictures of all of them.
             computes: Whether runs will be computed, which need pictures or boxes.
@@ -60,6 +66,7 @@ class Opener:
         self._workbench = workbench
         self._crashes = crashes
         self._retire = retire
+        self._begin = begin
         self._data = data
         self._detector = detector
         self._own_detectors: dict[str, Path | None] = {}
@@ -82,7 +89,8 @@ class Opener:
 
         Args:
             name: Of it.
-            values: Parameters that are not its own; they begin at its own, where none are given.
+            values: The parameters that are not at its defaults; None for those that it was left
+                with.
 
         Returns:
             Done when it is shown; its exception says why it is not. Whatever was
@@ -104,7 +112,7 @@ class Opener:
             self._newest = cancelled
             thread = threading.Thread(
                 target=self._open,
-                args=(name, values or {}, cancelled, future),
+                args=(name, values, cancelled, future),
                 name="opening",
                 daemon=True,
             )
@@ -133,7 +141,7 @@ class Opener:
     def _open(
         self,
         name: str,
-        values: Mapping[str, Any],
+        values: Mapping[str, Any] | None,
         cancelled: threading.Event,
         future: Future[None],
     ) -> None:
@@ -148,7 +156,11 @@ class Opener:
                     parameters = pipeline.default_parameters(sequence)
                 reader = FrameReader(sequence, cache_bytes=self._picture_bytes)
             key = sequence.digest[:16]
-            log = open_log(sequence.folder)
+            corrections = open_log(sequence.folder).corrections
+            if values is None:
+                chosen = self._begin(sequence, parameters, corrections)
+            else:
+                chosen = with_values(parameters, values)
             with self._showing:
                 with self._lock:
                     if cancelled.is_set():
@@ -156,8 +168,7 @@ class Opener:
                         raise Cancelled
                     self._newest = None
                 before = self._workbench.open(
-                    sequence, key, reader, parameters, name, log.corrections,
-                    with_values(parameters, values),
+                    sequence, key, reader, parameters, name, corrections, chosen
                 )  # fmt: skip
         except Exception as error:
             if cancelled.is_set():

@@ -8,23 +8,20 @@ from pydantic import Field
 
 from app.models.base import Model, RowNumber
 from app.web.commands.command import Command, Owners
+from app.wishes import Marks
 
 
-class MarkRun(Command):
+class MarkRun(Marks, Command):
     """Name, star, note and tag a stored run; what is null stays."""
 
     name: Literal["mark_run"]
     run: RowNumber
-    title: str | None = Field(default=None, max_length=200)
-    """The run's name."""
-    star: bool | None = None
-    note: str | None = Field(default=None, max_length=10_000)
-    tags: list[str] | None = Field(default=None, max_length=50)
 
     def apply(self, owners: Owners) -> None:
-        said = {"name": self.title, "star": self.star, "note": self.note, "tags": self.tags}
-        marks = {key: value for key, value in said.items() if value is not None}
-        owners.marking.mark(self.run, marks)
+        own = set(Marks.model_fields)
+        owners.marking.mark(
+            self.run, self.model_dump(include=own, exclude_none=True, by_alias=True)
+        )
 
 
 class Deleted(Model):

@@ -7,7 +7,6 @@ from typing import Annotated, Literal
 
 from fastapi import APIRouter, Depends, Request
 from fastapi.responses import FileResponse
-from pydantic import Field
 
 from app.errors import ApiError, sentence
 from app.models import Model
@@ -16,6 +15,7 @@ from app.state.workers.exporter import Exporter
 from app.web.dependencies import ERRORS, Bench, not_finished
 from app.web.library.routes import Kept
 from app.web.views.link import address_of
+from app.wishes import VideoPart
 from tracker.export.exported_run import ExportedRun, Options
 from tracker.export.registry import FORMATS
 from tracker.library.keeping import run_for_export
@@ -43,16 +43,12 @@ class FormatList(Model):
     formats: list[FormatInfo]
 
 
-class ExportRequest(Model):
+class ExportRequest(VideoPart, Model):
     """What is wanted."""
 
     format: str
     run: RowNumber | None = None
     """Its number in the library; null for the one that is shown."""
-    first: int = Field(default=0, ge=0)
-    """Of a video."""
-    last: int | None = Field(default=None, ge=0)
-    speed: float = Field(default=1.0, gt=0)
 
 
 class ExportInfo(Model):
@@ -107,7 +103,7 @@ def begin(
             field="format",
         )
     form = FORMATS[wish.format]
-    options = Options(wish.first, wish.last, wish.speed)
+    options = Options(**wish.model_dump(include=set(VideoPart.model_fields)))
     now, base = bench.snapshot(), str(request.base_url)
     if wish.run is None:
         run, sequence = now.run, now.sequence

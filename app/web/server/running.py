@@ -74,6 +74,7 @@ async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         picture_bytes=budget.pictures,
         crashes=crashes,
         draft_of=lambda folder: teaching.draft_of(folder),
+        left_with=lambda folder: edits.parameters_of(folder),
         compiling=Compiling(settings.say) if kept and not looked_at else None,
         computes=not looked_at,
     )

@@ -199,12 +199,17 @@ def test_a_mistyped_command_is_told_the_nearest(run: Runs) -> None:
         ("library chek", "library: expected one of check, got 'chek'; did you mean \"check\"?"),
         ("import x --fps abc", "--fps: expected a number, got 'abc'"),
         ("import x --fps=abc", "--fps: expected a number, got 'abc'"),
-        ("import x --dry-run --fps 0", "--fps: expected greater than 0, got 0.0"),
+        ("import x --dry-run --fps 0", "--fps: expected greater than 0, got '0'"),
         (
             "import x --dry-run --unit kg",
             "--unit: expected 'm', 'cm' or 'mm' or a valid number, got 'kg'",
         ),
         ("import x --dry-run --swap one", "--swap: expected NAME=NAME, got 'one'"),
+        ("import x --fps nan", "--fps: expected a number, got 'nan'"),
+        ("serve --disk nan", "--disk: expected a number, got 'nan'"),
+        ("runs export 1 -o a.mp4 --speed 0", "--speed: expected 0.01 … 100, got '0'"),
+        ("runs export 1 -o a.mp4 --last -1", "--last: expected 0 or more, got '-1'"),
+        (f"runs rename 1 {'x' * 201}", "runs: expected at most 200 characters, got 'xxx"),
         ("import x --first-index 1.5", "--first-index: expected one of 0, 1, got '1.5'"),
         ("import x --axes opengl_", "got 'opengl_'; did you mean \"opengl\"?"),
         ("import x --up None", "--up: expected one of x, y, z, -x, -y, -z, got 'None'"),
@@ -450,7 +455,7 @@ def test_a_port_that_cannot_be_is_wrong_usage(run: Runs, port: str) -> None:
     assert f"--port: expected 0 (any that is free) to 65535, got {port}" in stderr
 
 
-@pytest.mark.parametrize("size", ["-0.1", "65537", "nan"])
+@pytest.mark.parametrize("size", ["-0.1", "65537"])
 def test_a_limit_of_the_cache_that_cannot_be_is_wrong_usage(run: Runs, size: str) -> None:
     status, stdout, stderr = run("serve", f"--disk={size}")
     assert (status, stdout) == (2, "")

@@ -76,6 +76,15 @@ def test_a_crash_in_a_run_ends_that_run_and_nothing_else(server: Server) -> None
     assert f"ended by signal {int(signal.SIGSEGV)}" in report
     assert "fusion.clutter_rate" in report
     assert "Fatal Python error: Segmentation fault" in report
+    # a start of somebody begins with what went well; the run stays left out until it is asked for
+    server.stop()
+    server.start()
+    begun = server.wait(lambda state: state["run"]["state"] in ("done", "failed"))
+    assert (begun["run"]["state"], begun["run"]["key"]) == ("done", good["run"]["key"])
+    assert begun["parameters"]["fusion.clutter_rate"] == 2.5
+    change(server, {"fusion.clutter_rate": rate})
+    left_out = server.wait(lambda state: state["run"]["state"] == "failed")
+    assert "crashed while this run was computed" in left_out["run"]["error"]
     post(server, "run")
     again = server.wait_for_run()
     assert again["parameters"]["fusion.clutter_rate"] == rate

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -20,8 +21,8 @@ from app.state.edits import EditError, Edits
 from app.state.snapshot import Change, Event, Notice
 from app.state.workbench import Workbench
 from app.web.server import Settings, create_app
-from tests.app.conftest import ADDRESS, command, wait_until
-from tracker.parameters.values import value_of
+from tests.app.conftest import ADDRESS, command, run_is, wait_until
+from tracker.parameters.values import value_of, with_values
 from tracker.runs import pipeline
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.reader import read_sequence
@@ -29,10 +30,12 @@ from tracker.sequences.reader import read_sequence
 P_D, P_S = "fusion.detection_probability", "fusion.survival_probability"
 
 
-def opened(crossing: Path) -> Workbench:
+def opened(crossing: Path, values: Mapping[str, Any] = MappingProxyType({})) -> Workbench:
     workbench = Workbench()
     sequence = read_sequence(crossing)
-    workbench.open(sequence, "key", FrameReader(sequence), pipeline.default_parameters(sequence))
+    defaults = pipeline.default_parameters(sequence)
+    chosen = with_values(defaults, values)
+    workbench.open(sequence, "key", FrameReader(sequence), defaults, chosen=chosen)
     return workbench
 
 
@@ -250,8 +253,10 @@ def test_edits_are_taken_up_after_a_start_where_they_still_fit(
     bench.set_parameters({P_D: 0.5}, "one")
     bench.set_parameters({P_D: 0.6}, "two")
     edits.done("a preset", "presets", {"mine": None}, {"mine": {}})
+    assert edits.parameters_of(crossing) == {P_D: 0.6}
     edits.close()
-    again = opened(crossing)
+    assert Edits(Workbench(), tmp_path).parameters_of(crossing) == {P_D: 0.6}
+    again = opened(crossing, {P_D: 0.6})
     edits = followed(again, tmp_path)
     shown = []
     edits.own("presets", shown.append)
@@ -269,6 +274,31 @@ def test_edits_are_taken_up_after_a_start_where_they_still_fit(
     edits = followed(opened(crossing), tmp_path)
     assert edits._done[-1].words == "Detection probability 0.95 → 0.5"
     edits.close()
+
+
+@pytest.mark.full
+def test_a_start_without_a_page_goes_on_where_the_last_one_was(
+    data: Path, tmp_path: Path, own_cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MULTIVIEW_PHD_SETTINGS", str(tmp_path / "settings"))
+    settings = Settings(sequence="crossing", data=data, with_viser=False, keep_on_disk=True)
+    with TestClient(create_app(settings), base_url=ADDRESS) as client:
+        wait_until(run_is(client, "done"))
+        command(client, "set_parameters", changes={P_D: 0.7})
+        wait_until(run_is(client, "done"))
+        left = client.get("/api/state").json()
+    with TestClient(create_app(settings), base_url=ADDRESS) as client:
+        wait_until(run_is(client, "done"))
+        now = client.get("/api/state").json()
+        assert now["run"]["key"] == left["run"]["key"]
+        assert now["parameters"][P_D] == 0.7
+        assert len(client.get("/api/runs").json()["runs"]) == 1
+        client.post("/api/sequence", json={"name": "numbers"})
+        wait_until(lambda: client.get("/api/state").json()["sequence"]["name"] == "numbers")
+        assert client.get("/api/state").json()["changed"] == []
+        client.post("/api/sequence", json={"name": "crossing"})
+        wait_until(lambda: client.get("/api/state").json()["sequence"]["name"] == "crossing")
+        assert command(client, "undo").json()["parameters"][P_D] != 0.7
 
 
 def test_an_undo_right_after_the_opening_is_of_the_recording(

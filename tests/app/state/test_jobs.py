@@ -6,18 +6,22 @@ import concurrent.futures
 import threading
 import time
 from collections.abc import Iterator
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from app.state.snapshot import Event, Notice, Snapshot
+from app.state.kept.crashes import Crashes, Note
+from app.state.snapshot import Change, Event, Notice, Snapshot
 from app.state.workbench import Workbench
 from app.state.workers.jobs import Jobs
 from tests.app.conftest import wait_until
 from tests.app.folders import write_crossing
 from tests.synthetic import write_sequence
+from tracker.files.validated import write_json
+from tracker.parameters.values import value_of
 from tracker.runs import pipeline
 from tracker.runs.pipeline import Cancelled, Run
 from tracker.sequences.errors import SequenceError
@@ -29,11 +33,19 @@ P_D = "fusion.detection_probability"
 class Desk:
     """A workbench with its jobs."""
 
-    def __init__(self, data: Path) -> None:
+    def __init__(self, data: Path, **others: Any) -> None:
         self.bench = Workbench()
-        self.jobs = Jobs(self.bench, data=data)
+        self.jobs = Jobs(self.bench, data=data, **others)
         self.notices: list[Notice] = []
         self.bench.subscribe_events(self._hear)
+        self.runs: list[str] = []
+        """The keys of those that began."""
+        self.bench.subscribe(self._count)
+
+    def _count(self, change: Change) -> None:
+        key = self.now.run_state.key
+        if change == "run" and key not in self.runs[-1:]:
+            self.runs.append(key)
 
     def _hear(self, event: Event) -> None:
         if isinstance(event, Notice):
@@ -338,6 +350,62 @@ def test_another_sequence_starts_from_its_own_defaults(desk: Desk, tmp_path: Pat
     assert (now.playhead, now.selection) == (0, None)
     assert now.parameters == now.defaults
     assert now.run_state.total == 30
+
+
+def value_at_the_start(desk: Desk) -> Any:
+    return value_of(desk.now.parameters, P_D)
+
+
+def test_a_recording_begins_with_the_parameters_it_was_left_with(data: Path) -> None:
+    desk = Desk(data, left_with=lambda folder: {P_D: 0.7} if folder.name == "crossing" else {})
+    desk.open()
+    assert value_at_the_start(desk) == 0.7
+    assert desk.runs == [engine(desk).key]
+    desk.jobs.open("crossing", {}).result(30.0)
+    assert desk.now.parameters == desk.now.defaults  # who says which gets those
+    desk.jobs.close()
+
+
+def test_parameters_that_no_longer_fit_are_left(data: Path) -> None:
+    desk = Desk(data, left_with=lambda folder: {P_D: 7.0})
+    desk.open()
+    assert desk.now.parameters == desk.now.defaults
+    desk.jobs.close()
+
+
+@pytest.mark.parametrize(("good", "begins"), [({P_D: 0.8}, 0.8), (None, 0.95)])
+def test_what_crashed_comes_back_with_no_start(
+    data: Path, tmp_path: Path, good: dict[str, Any] | None, begins: float
+) -> None:
+    first = Desk(data, left_with=lambda folder: {P_D: 0.7})
+    first.open()
+    key = first.now.run_state.key
+    first.jobs.close()
+    note = Note("crossing", run=key, values={P_D: 0.7}, good=good)
+    write_json(tmp_path / "start-999999999.json", asdict(note))
+    (tmp_path / "start-999999999.txt").write_text("Fatal Python error")
+    assert len(Crashes(tmp_path).tidy()) == 1
+    for _ in range(2):  # at all later ones too, which know of no crash
+        crashes = Crashes(tmp_path)
+        assert crashes.tidy() == []
+        desk = Desk(data, left_with=lambda folder: {P_D: 0.7}, crashes=crashes)
+        desk.open()
+        assert value_at_the_start(desk) == begins
+        assert desk.runs == [engine(desk).key]
+        assert "under which the program crashed" in desk.notices[0].message
+        desk.bench.set_parameters({P_D: 0.7}, "api")
+        desk.wait("failed")
+        assert "left out until it is asked for again" in str(desk.now.run_state.error)
+        desk.jobs.close()
+    desk = Desk(data, left_with=lambda folder: {P_D: 0.7}, crashes=Crashes(tmp_path))
+    desk.open()
+    desk.bench.set_parameters({P_D: 0.7}, "api")
+    desk.wait("failed")
+    desk.jobs.run_again()
+    desk.wait("done")
+    assert desk.now.run_state.key == key
+    desk.jobs.close()
+    assert Crashes(tmp_path).left_out == {}
 
 
 def test_closing_stops_a_run_midway(data: Path, slow: dict[str, int]) -> None:
