@@ -58,7 +58,9 @@ class Palette:
 
     tracks: UInt8[ndarray, "24 3"]
     canvas: Rgb
-    """viser's background, into which faded colours are blended."""
+    """viser's background, into which faded colours are blended; also behind its labels."""
+    ink: Rgb
+    """Of the words of labels."""
     grid_minor: Rgb
     grid_major: Rgb
     line: Rgb
@@ -107,6 +109,7 @@ PALETTES: dict[Theme, Palette] = {
     "dark": Palette(
         tracks=_tracks(TRACK_HEX),
         canvas=from_hex("#141414"),
+        ink=from_hex("#ededed"),
         grid_minor=from_hex("#262626"),
         grid_major=from_hex("#383838"),
         line=from_hex("#8b8b8b"),
@@ -120,6 +123,7 @@ PALETTES: dict[Theme, Palette] = {
     "light": Palette(
         tracks=_tracks(LIGHT_HEX),
         canvas=from_hex("#ffffff"),
+        ink=from_hex("#1b1b1b"),
         grid_minor=from_hex("#ececea"),
         grid_major=from_hex("#d9d9d6"),
         line=from_hex("#6e6e6e"),

@@ -263,8 +263,8 @@ def crowded(count: int) -> float:
 class Tags:
     """A pool of labels that face the viewer; it grows to the most that was needed.
 
-    viser writes them black on white, above everything else. The disc behind one is a line
-    without length, which viser's client draws as round as it is thick.
+    They are drawn above everything else, on a plate of the theme's ground. The disc behind one
+    is a line without length, which viser's client draws as round as it is thick.
     """
 
     def __init__(self, server: viser.ViserServer, name: str, size: int, scale: float) -> None:

@@ -331,5 +331,5 @@ def status_html(snapshot: Snapshot, run: Run | None) -> str:
     return (
         f'<div style="{STATUS_STYLE}" data-step="{step}" data-state="{state}">'
         f"{step} / {sequence.frames - 1} · {step / sequence.fps:.2f} s · {words}<br>"
-        f"grid {geometry.grid_cell(sequence.room):g} m · {size} m · ellipsoids {mass} %</div>"
+        f"grid {geometry.grid_cell(sequence.room):g} m · {size} m · ellipsoids {mass}\u00a0%</div>"
     )

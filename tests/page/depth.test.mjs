@@ -1,4 +1,4 @@
-/** What viser's page is told before its client starts: which meshes write depth. */
+/** What viser's page is told before its client starts: which meshes write depth, how labels look. */
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { test } from "node:test";
@@ -43,4 +43,47 @@ test("backs that one sees through write no depth, all else as it was asked", () 
         masks.push(drawn);
       }
   assert.deepEqual(masks, [false, false, true, false, true, false, true, false]);
+});
+
+const [, labels] = /LABELS_WEAR_THE_THEME = b"""<script>([\s\S]*?)<\/script>"""/.exec(gateway);
+
+test("labels are drawn in the ink and on the ground of the theme, all else as it was asked", () => {
+  const page = { documentElement: { dataset: {} } };
+  class WebGL2RenderingContext {
+    set = {};
+    shaderSource(shader, text) {
+      shader.text = text;
+    }
+    useProgram() {}
+    getUniformLocation({ text }, name) {
+      return text.includes(`uniform vec3 ${name};`) ? name : null;
+    }
+    uniform3fv(place, colour) {
+      this.set[place] = colour;
+    }
+  }
+  const themes = {
+    dark: { ink: [0.9, 0.9, 0.9], ground: [0.1, 0.1, 0.1] },
+    light: { ink: [0, 0, 0], ground: [1, 1, 1] },
+  };
+  new Function("WebGL2RenderingContext", "document", labels.replace("{}", JSON.stringify(themes)))(
+    WebGL2RenderingContext,
+    page,
+  );
+  const gl = new WebGL2RenderingContext();
+  const shader = (colour, varies = "varying float vAlpha;") => {
+    const made = {};
+    gl.shaderSource(made, `${varies}\nvoid main() {\n  gl_FragColor = ${colour};\n}`);
+    return made;
+  };
+  const letter = shader("vec4(0.0, 0.0, 0.0, a)");
+  const plate = shader("vec4(1.0, 1.0, 1.0, 0.85 * vAlpha)");
+  assert.ok(letter.text.includes("gl_FragColor = vec4(ink, a);"));
+  assert.ok(plate.text.includes("gl_FragColor = vec4(ground, 0.85 * vAlpha);"));
+  assert.ok(!shader("vec4(0.0, 0.0, 0.0, a)", "").text.includes("ink"));
+  for (const theme of ["dark", "light"]) {
+    page.documentElement.dataset.mantineColorScheme = theme;
+    for (const program of [letter, plate, null]) gl.useProgram(program);
+    assert.deepEqual(gl.set, themes[theme]);
+  }
 });

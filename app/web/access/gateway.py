@@ -10,6 +10,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import hashlib
+import json
 import secrets
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,6 +18,7 @@ from typing import TYPE_CHECKING
 from fastapi import APIRouter, Request, WebSocket, WebSocketDisconnect
 from fastapi.responses import RedirectResponse, Response
 
+from app.colours import PALETTES
 from app.errors import ApiError
 from app.web.access.viewer import Entrance
 
@@ -77,6 +79,51 @@ gl.drawElementsInstanced = function (...what) {
 to: a body would hide whatever ellipsoid is behind it. Those of which the backs alone are drawn, as
 bodies are, do not so here."""
 
+LABELS_WEAR_THE_THEME = b"""<script>{
+const gl = WebGL2RenderingContext.prototype;
+const { shaderSource, useProgram } = gl;
+const THEMES = {};
+const PAINTED = [
+  ["ink", "gl_FragColor = vec4(0.0, 0.0, 0.0, "],
+  ["ground", "gl_FragColor = vec4(1.0, 1.0, 1.0, "],
+];
+gl.shaderSource = function (shader, text) {
+  if (text.includes("varying float vAlpha;"))
+    for (const [name, paints] of PAINTED)
+      if (text.includes(paints))
+        text = text
+          .replace("void main", `uniform vec3 ${name};\nvoid main`)
+          .replace(paints, `gl_FragColor = vec4(${name}, `);
+  shaderSource.call(this, shader, text);
+};
+const places = new WeakMap();
+gl.useProgram = function (program) {
+  useProgram.call(this, program);
+  if (!program) return;
+  if (!places.has(program))
+    places.set(program, PAINTED.map(([name]) => [name, this.getUniformLocation(program, name)])
+      .filter(([, place]) => place));
+  const theme = document.documentElement.dataset.mantineColorScheme;
+  for (const [name, place] of places.get(program))
+    this.uniform3fv(place, (THEMES[theme] ?? THEMES.dark)[name]);
+};
+}</script>""".replace(
+    b"{};",
+    json.dumps(
+        {
+            theme: {
+                name: [round(value / 255.0, 4) for value in colour]
+                for name, colour in (("ink", palette.ink), ("ground", palette.canvas))
+            }
+            for theme, palette in PALETTES.items()
+        }
+    ).encode()
+    + b";",
+    1,
+)
+"""viser writes its labels black on white in both themes, which glares on a dark ground: here their
+two shaders take ink and ground of the theme."""
+
 INSIDE = b'e.type="module";'
 """Where viser's client, which travels packed, puts itself into its page as a script."""
 
@@ -106,7 +153,10 @@ class Gateway:
 
         page = Path(viser.__file__).parent / "client" / "build" / "index.html"
         head, mark, rest = page.read_bytes().partition(b"<head>")
-        whole = head + mark + HAS_FOCUS + RENDERER_IS_TOLD_OUTSIDE + BACKS_WRITE_NO_DEPTH + rest
+        scripts = (
+            HAS_FOCUS + RENDERER_IS_TOLD_OUTSIDE + BACKS_WRITE_NO_DEPTH + LABELS_WEAR_THE_THEME
+        )
+        whole = head + mark + scripts + rest
         nonce = secrets.token_urlsafe(16)
         said = f'nonce="{nonce}"'.encode()
         self._page = whole.replace(b"<script", b"<script " + said).replace(

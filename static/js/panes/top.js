@@ -176,7 +176,7 @@ export function mountTop(root, { store, actions }) {
 		bar.hidden = link === "lost" || !(opening || run?.state === "computing");
 		cancel.hidden = link !== "open" || run?.state !== "computing" || Boolean(opening);
 		again.hidden = link !== "open" || run?.state !== "cancelled" || Boolean(opening);
-		number.hidden = left.hidden = rate.hidden = link === "lost" || !(opening || run?.total);
+		left.hidden = rate.hidden = link === "lost" || !(opening || run?.total);
 		const [kind, text] =
 			link === "lost"
 				? ["bad", "not connected"]
@@ -195,8 +195,16 @@ export function mountTop(root, { store, actions }) {
 		bar.style.setProperty("--part", String(total > 0 ? done / total : 0));
 		bar.ariaValueMax = String(total);
 		bar.ariaValueNow = endless ? null : String(done);
+		// Then its steps are no measure of how far it is.
+		number.hidden = left.hidden || (endless && run?.state === "computing");
 		fill(number, total > 0 && [h("b", {}, done), `/${total}`]);
-		write(left, opening ? "reading" : run ? leftText(run) : "");
+		const time = run ? timeText(run) : "";
+		const words = opening ? "reading" : time || run?.message || "";
+		write(left, words);
+		// Words may be cut, a time may not.
+		left.classList.toggle("words", !time);
+		if (time || !words) delete left.dataset.tip;
+		else left.dataset.tip = words;
 		write(rate, !opening && run ? rateText(run) : "");
 	}
 
@@ -235,9 +243,9 @@ const WORDS = {
 	idle: ["", "ready"],
 };
 
-/** @param {Server.RunInfo} run  @returns {string} the time left, or the stage where that is unknown */
-function leftText({ state, message, done, total, steps_per_second: speed, seconds_left: left }) {
-	if (state !== "computing" || !speed || left === null || done === total) return message;
+/** @param {Server.RunInfo} run  @returns {string} the time left, empty where it is unknown */
+function timeText({ state, done, total, steps_per_second: speed, seconds_left: left }) {
+	if (state !== "computing" || !speed || left === null || done === total) return "";
 	return left < 60
 		? `${left.toFixed(left < 10 ? 1 : 0)} s left`
 		: `${Math.floor(left / 60)} min ${Math.round(left % 60)} s left`;

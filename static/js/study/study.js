@@ -5,7 +5,7 @@ import { bestTrials } from "./best.js";
 import { overview } from "./figures.js";
 import { definition } from "./form.js";
 import { placeOf } from "./where.js";
-import { lasting, lineOf, nameOf } from "./words.js";
+import { lasting, lineOf, nameOf, roughly } from "./words.js";
 
 /* ---------- How far a study is, and what each worker does. ---------- */
 
@@ -266,7 +266,7 @@ export function mountStudy(root, { store, actions }) {
 								{},
 								cost.seconds === null
 									? "known after the first trial"
-									: `about ${lasting(cost.seconds)}`,
+									: `about ${roughly(cost.seconds)}`,
 							),
 						),
 						h("div", {}, h("dt", {}, "disk"), h("dd", {}, `${(cost.bytes / 1e6).toFixed(1)} MB`)),

@@ -164,7 +164,9 @@ def test_drawn_boxes_leave_a_mark_in_their_colour() -> None:
 
 def test_the_colours_are_those_of_the_page() -> None:
     themes = TOKENS.read_text(encoding="utf-8").split('[data-theme="light"]')
-    for theme, texts in zip(themes, (colours.TRACK_HEX, colours.LIGHT_HEX), strict=True):
+    sets = (colours.TRACK_HEX, colours.LIGHT_HEX)
+    for theme, texts, palette in zip(themes, sets, colours.PALETTES.values(), strict=True):
+        assert f"--ink-1: #{bytes(palette.ink).hex()};" in theme
         tokens = dict(re.findall(r"--((?:id|on)-\d+): (#\w+);", theme))
         for index, text in enumerate(texts, 1):
             assert tokens[f"id-{index}"] == text
