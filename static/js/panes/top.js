@@ -197,6 +197,7 @@ export function mountTop(root, { store, actions }) {
 		bar.ariaValueNow = endless ? null : String(done);
 		fill(number, total > 0 && [h("b", {}, done), `/${total}`]);
 		write(left, opening ? "reading" : run ? leftText(run) : "");
+		left.title = left.textContent ?? "";
 		write(rate, !opening && run ? rateText(run) : "");
 	}
 
