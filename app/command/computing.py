@@ -55,7 +55,7 @@ def compute(
         between_steps() as interrupted,
     ):
         bar.at(0, sequence.frames)
-        compiling.wait(lambda done, total: None, interrupted)
+        compiling.wait(lambda words: None, interrupted)
         return pipeline.compute(
             sequence,
             parameters or pipeline.default_parameters(sequence),

@@ -12,6 +12,9 @@ from pydantic import Field
 from app.web.server import ROUTERS
 from tests.manual.places import PAGES, ROOT
 from tests.manual.records import sweeps
+from tracker.evaluation import DEFINITIONS, Definition, clear, evaluation
+from tracker.evaluation.clear import Clear
+from tracker.evaluation.matching import Comparison
 from tracker.io.read.protocol import Format
 from tracker.io.read.registry import FORMATS
 from tracker.parameters import method as module
@@ -54,8 +57,10 @@ def test_every_module_that_is_run_is_there() -> None:
 
 
 def test_every_name_is_there() -> None:
-    for name in ("BUILT_IN", "FORMATS", "ROUTERS", "Params", "Method"):
+    for name in ("BUILT_IN", "FORMATS", "ROUTERS", "Params", "Method", "DEFINITIONS", "_score"):
         assert f"`{name}`" in PAGE
+    assert DEFINITIONS
+    assert evaluation._score
     assert BUILT_IN
     assert FORMATS
     assert ROUTERS
@@ -63,7 +68,9 @@ def test_every_name_is_there() -> None:
     assert ENTRY_POINTS["single_view"] == "multiview_phd.single_view"
     asked = set(Format.__annotations__) | {"recognise", "read"}
     assert all(f"`{name}`" in PAGE for name in asked)
-    for kind in (SingleViewMethod, ViewResult, module.Method, Format):
+    for kind in (
+        SingleViewMethod, ViewResult, module.Method, Format, Definition, Clear, Comparison,
+    ):  # fmt: skip
         assert f"{kind.__module__}.{kind.__name__}" in PAGE
 
 
@@ -88,6 +95,28 @@ def test_the_example_of_a_description_is_one() -> None:
     assert method.made_by is None
     with pytest.raises(ValueError, match="my_tracker: made_by names nothing"):
         maker(method)
+
+
+def test_the_names_of_the_page_are_there() -> None:
+    scripts = ROOT / "static" / "js"
+    for name, script in (
+        ("PLACES", "state/address.js"),
+        ("TABS", "state/address.js"),
+        ("TABLES", "inspector/tables.js"),
+    ):
+        assert f"`{name}`" in PAGE
+        assert f"`static/js/{script}`" in PAGE
+        assert f"const {name} =" in (scripts / script).read_text(encoding="utf-8")
+
+
+def test_the_example_of_a_metric_is_one() -> None:
+    found = re.search(r"```text\n    (Definition\(.*?\n)    ```", PAGE, flags=re.S)
+    assert found is not None
+    (metric,) = eval(f"({found.group(1)})", vars(clear).copy())
+    first = clear.CLEAR[0]
+    assert type(metric) is type(first)
+    assert (metric.group, metric.settings) == (first.group, first.settings)
+    assert metric.key not in {definition.key for definition in DEFINITIONS}
 
 
 def test_sweeps_are_chosen_by_group_and_by_key() -> None:

@@ -2,6 +2,7 @@
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import { test } from "node:test";
+import { TABS } from "../../static/js/state/address.js";
 import {
   COMMANDS,
   commandFor,
@@ -58,6 +59,17 @@ test("every button of the page names a command that there is", () => {
   );
   for (const name of named) assert.ok(commandOf(name));
   assert.ok(named.has("play") && named.has("help"));
+});
+
+test("every tab of the side panel has a button and a panel, and a command that shows it", () => {
+  const html = read("index.html");
+  const names = (pattern) => [...html.matchAll(pattern)].map((match) => match[1]).sort();
+  const tabs = [...TABS].sort();
+  assert.deepEqual(names(/\bid="tab-(\w+)"/g), tabs);
+  assert.deepEqual(names(/\bid="panel-(\w+)"/g), tabs);
+  const shown = COMMANDS.filter(({ action }) => action === "showTab").map(({ value }) => value);
+  // that of Check is there with its place alone
+  assert.deepEqual([...shown, "place"].sort(), tabs);
 });
 
 test("the palette finds commands by their words, those that begin with them first", () => {

@@ -155,7 +155,7 @@ def test_what_is_not_shown_changes_no_result(choice: dict[str, Any], recording: 
     other = with_values(parameters, hidden)
     assert set(shown_keys(other)) == shown
     first, second = pipeline.compute(some, parameters), pipeline.compute(some, other)
-    assert any(len(view.boxes) for views in first.views for view in views)
+    assert any(len(view.boxes) for views in first.views for view in views), "no box on two people"
     for a, b in zip(numbers(first), numbers(second), strict=True):
         np.testing.assert_array_equal(a, b)
 

@@ -43,18 +43,26 @@ class Compiling:
             self._ready.set()
         self._thread.start()
 
-    def wait(self, told: Callable[[int, int], None], cancelled: Callable[[], bool]) -> None:
+    @property
+    def words(self) -> str:
+        """What is said while kernels are compiled, with their number; empty once all are there."""
+        if not self._thread.is_alive():
+            return ""
+        done, total = self._counts
+        return f"{COMPILING}, {done} of {total}" if total else COMPILING
+
+    def wait(self, told: Callable[[str], None], cancelled: Callable[[], bool]) -> None:
         """Until a run can begin.
 
         Args:
-            told: Called now and then with the number of kernels that are ready and of all.
+            told: Called now and then with :attr:`words`.
             cancelled: Asked as often.
         """
         while not cancelled() and not self._ready.wait(_LOOKS_SECONDS):
             if not self._waited_for:
                 self._waited_for = True
                 self._say(COMPILING)
-            told(*self._counts)
+            told(self.words)
 
     def stop(self) -> None:
         """End the processes; what was compiled stays.

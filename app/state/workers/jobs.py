@@ -35,7 +35,6 @@ from tracker.runs.gates import notices
 from tracker.runs.outcome import why_no_tracks
 from tracker.runs.pipeline import Cancelled, Progress, Run
 from tracker.runs.stage_cache import StageCache
-from tracker.runs.warm_up import COMPILING
 from tracker.sequences.pictures.frames import CACHE_BYTES, FrameReader
 from tracker.sequences.sequence import Sequence
 
@@ -303,13 +302,13 @@ class Jobs:
 
         def on_silence(seconds: float) -> None:
             if not wanted.cancelled.is_set():
-                words = silence(workbench.snapshot().run_state, seconds)
+                compiling = "" if self._compiling is None else self._compiling.words
+                words = silence(workbench.snapshot().run_state, seconds, compiling)
                 workbench.run_waits(wanted.key, words)
 
-        def on_compiling(done: int, total: int) -> None:
+        def on_compiling(words: str) -> None:
             if not wanted.cancelled.is_set():
-                count = f", {done} of {total}" if total else ""
-                workbench.run_waits(wanted.key, f"{COMPILING}{count}")
+                workbench.run_waits(wanted.key, words)
 
         try:
             if self._compiling is not None:
@@ -399,12 +398,18 @@ class Jobs:
             reader.close()
 
 
-def silence(now: RunState, seconds: float) -> str:
+def silence(now: RunState, seconds: float, compiling: str = "") -> str:
     """What is said of a run of which nothing was heard for so long: after its last step the tracks
     are smoothed.
+
+    Args:
+        now: The state of the run.
+        seconds: The time since something was heard.
+        compiling: What is said of kernels that are being compiled, for one of which the run may
+            wait; empty if none are.
     """
     what = "smoothing" if 0 < now.total == now.done else "no new step"
-    return f"{what} for {seconds:.0f} s"
+    return f"{what} for {seconds:.0f} s{compiling and '; '}{compiling}"
 
 
 def _beyond_the_end(run: Run, result: Result) -> tuple[str, ...]:

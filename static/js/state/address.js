@@ -53,7 +53,17 @@ export const isBench = (place) => PLACES.some(({ name, bench }) => bench && name
    Nothing here touches the page. */
 
 const EVENTS = ["birth", "death", "switch", "long miss", "joined", "cut", "removed", "doubt"];
-const TABS = ["tracks", "step", "events", "teach", "parameters", "compare", "runs", "place"];
+/** The tabs of the side panel; each has a button and a panel in the markup. */
+export const TABS = /** @type {const} */ ([
+	"tracks",
+	"step",
+	"events",
+	"teach",
+	"parameters",
+	"compare",
+	"runs",
+	"place",
+]);
 
 /** @param {Record<string, boolean>} all @param {string} text  those that are on */
 const readLayers = (all, text) =>
@@ -87,8 +97,9 @@ const KEYS = {
 		// That of Check is there alone.
 		write: ({ tab, place }) => (tab === "place" && place !== "check" ? "tracks" : tab),
 		read(text) {
-			const tab = text === "changes" ? "parameters" : text; // its name in earlier addresses
-			return TABS.includes(tab) ? { tab: /** @type {PageState["tab"]} */ (tab) } : null;
+			const wanted = text === "changes" ? "parameters" : text; // its name in earlier addresses
+			const tab = TABS.find((name) => name === wanted);
+			return tab ? { tab } : null;
 		},
 	},
 	zoom: {

@@ -136,7 +136,7 @@ interface PageState {
 	bookmarks: Bookmark[];
 	/** The camera that is shown large; null: all alike. */
 	large: number | null;
-	tab: "tracks" | "step" | "events" | "place" | "teach" | "parameters" | "compare" | "runs";
+	tab: (typeof import("../state/address.js").TABS)[number];
 	/** Words of the parameters that are listed; all where empty. */
 	sought: string;
 	/** The events that are listed and gone to; all where empty. */

@@ -104,10 +104,12 @@ def test_who_need_not_wait_is_not_told_of_compiling(
     monkeypatch.setattr(compilation, "are_pixels_compiled", lambda: True)
     said: list[str] = []
     worker = Compiling(said.append)
-    wait_until(lambda: len(processes) == 2)
-    worker.wait(lambda done, total: said.append("waits"), lambda: False)
+    wait_until(lambda: worker.words == f"{COMPILING}, 20 of 50")
+    worker.wait(said.append, lambda: False)
     worker.close()
     assert said == []
+    assert worker.words == ""
+    assert len(processes) == 2
 
 
 def test_that_the_loops_over_pixels_are_there_is_remembered_by_the_next_command(
@@ -120,11 +122,11 @@ def test_that_the_loops_over_pixels_are_there_is_remembered_by_the_next_command(
     instead(monkeypatch, SLOW.replace("SEEN", repr(str(seen))))
     said: list[str] = []
     first = Compiling(said.append)
-    first.wait(lambda done, total: None, lambda: False)
+    first.wait(lambda words: None, lambda: False)
     first.close()
     said.clear()
     again = Compiling(said.append)
-    again.wait(lambda done, total: said.append("waits"), lambda: False)
+    again.wait(said.append, lambda: False)
     again.close()
     assert said == []
 
@@ -140,6 +142,7 @@ def test_where_everything_is_compiled_nothing_starts(monkeypatch: pytest.MonkeyP
     worker.wait(never, lambda: False)
     worker.close()
     assert said == []
+    assert worker.words == ""
 
 
 @pytest.mark.parametrize("code", ["raise SystemExit(3)", "import os; os.abort()"])
@@ -151,7 +154,7 @@ def test_nobody_waits_for_a_process_that_failed(
 ) -> None:
     instead(monkeypatch, code)
     worker = Compiling()
-    worker.wait(lambda done, total: None, lambda: False)
+    worker.wait(lambda words: None, lambda: False)
     wait_until(lambda: "compiling ended with status" in caplog.text)
 
 
@@ -162,7 +165,7 @@ def test_nobody_waits_for_the_other_process_where_the_first_one_failed(
         monkeypatch, "import sys, time; time.sleep(300 if sys.argv[-1] != 'first' else 0); 1 / 0"
     )
     worker = Compiling()
-    worker.wait(lambda done, total: None, lambda: False)
+    worker.wait(lambda words: None, lambda: False)
     assert any(process.poll() is None for process in processes)
     worker.close()
 
@@ -174,7 +177,7 @@ def test_nobody_waits_where_no_process_can_be_started(
         raise OSError("no more processes")
 
     monkeypatch.setattr(warm_up.subprocess, "Popen", refuse)
-    Compiling().wait(lambda done, total: None, lambda: False)
+    Compiling().wait(lambda words: None, lambda: False)
 
 
 def test_who_does_not_want_the_sequence_any_more_does_not_wait(
@@ -183,7 +186,7 @@ def test_who_does_not_want_the_sequence_any_more_does_not_wait(
     processes = instead(monkeypatch, "import time; time.sleep(300)")
     worker = Compiling()
     reported = threading.Event()
-    worker.wait(lambda done, total: reported.set(), reported.is_set)
+    worker.wait(lambda words: reported.set(), reported.is_set)
     wait_until(lambda: len(processes) == 2)
     assert all(process.poll() is None for process in processes)
     worker.close()

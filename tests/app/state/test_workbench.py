@@ -243,6 +243,7 @@ def test_a_run_that_is_silent_has_no_speed_and_says_what_it_does(bench: Workbenc
         bench.run_waits(run.key, silence(bench.snapshot().run_state, 7.2))
         state = bench.snapshot().run_state
         assert (state.message, state.steps_per_second, state.seconds_left) == (words, 0.0, None)
+        assert silence(state, 7.2, "compiling, 2 of 9") == f"{words}; compiling, 2 of 9"
 
 
 def test_a_failure_shows_the_last_good_run_again(bench: Workbench) -> None:
