@@ -240,8 +240,8 @@ def main() -> int:
     # at once for all processes that the tests start
     kernels = Check("kernels", ((PYTHON, "-m", "tracker.runs.warm_up"),))
     benchmarks = Check("benchmarks", ((PYTHON, "-m", "tests.benchmarks", "--short"),))
-    mutants = Check("mutants", ((PYTHON, "-m", "tests.mutate"),))
-    # these two go side by side with the benchmarks, which keep one core busy
+    # these three go side by side with the benchmarks, which keep one core busy
+    mutants = Check("mutants", ((PYTHON, "-m", "tests.mutate", "--workers", "1"),))
     always = ("--seed", "20261122")  # the same cases; --fuzz draws others each time
     fuzz = Check("fuzz", (fuzzing(1.4, *always, "--imports", workers=1),))
     bounds = Check("bounds", (fuzzing(0.7, *always, "--bounds", workers=1),))
@@ -296,10 +296,9 @@ def main() -> int:
         if arguments.all:
             failed += [] if full_tests.run(shown=True) else [full_tests.name]
             with ThreadPoolExecutor(1) as lane:
-                checking = lane.submit(in_order, [bounds, fuzz])
+                checking = lane.submit(in_order, [bounds, fuzz, mutants])
                 failed += [] if benchmarks.run(shown=True) else [benchmarks.name]
                 failed += checking.result()
-            failed += in_order([mutants])
     if failed:
         print(f"failed: {', '.join(dict.fromkeys(failed))}", file=sys.stderr)
     return 1 if failed else 0

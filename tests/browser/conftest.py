@@ -51,6 +51,17 @@ def flat_page(browser: Browser, server: Server) -> Iterator[Page]:
         yield page
 
 
+COARSE_3D = """
+if (location.pathname.startsWith("/viser/")) {
+  const coarse = new URL(location.href);
+  coarse.searchParams.set("fixedDpr", "0.5");
+  history.replaceState(null, "", coarse);
+}
+"""
+"""For every page of a context: 3D has half of the pixels each way too, which viser does not take
+from the scale of the window, where that is below one."""
+
+
 @contextmanager
 def opened(browser: Browser, server: Server, *, flat: bool = False) -> Iterator[Page]:
     """The page of the server in a window of its own, with a finished run."""
@@ -62,6 +73,8 @@ def opened(browser: Browser, server: Server, *, flat: bool = False) -> Iterator[
     )
     if flat:
         context.route("**/viser/**", lambda route: route.abort())
+    else:
+        context.add_init_script(COARSE_3D)
     # what is said once to a new person lies over the 3D view
     context.add_init_script(
         "try { localStorage.page ??= JSON.stringify({ dismissed: ['tour'] }) } catch {}"

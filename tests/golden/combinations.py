@@ -11,6 +11,7 @@ from tracker.parameters.groups.colour_phd import ColourBoxParams
 from tracker.parameters.values import with_values
 from tracker.runs import pipeline
 from tracker.runs.pipeline import Run
+from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 
 _BOXES = ("none", "detection_phd")
@@ -150,14 +151,20 @@ def _asking(group: str) -> tuple[str, ...]:
 def runs(
     sequence: Sequence, steps: int, chosen: list[Combination]
 ) -> Iterator[tuple[Combination, Run]]:
-    """Run them all over the first steps; those that share stage 1 compute it once."""
+    """Run them all over the first steps; those that share stage 1 compute it once.
+
+    As in the workbench one reader serves all of them, and what depends on the pictures alone, such
+    as the background, is made once.
+    """
     previous: Mapping[str, Run] = {}
-    for combination in chosen:
-        run = pipeline.compute(
-            sequence,
-            combination.parameters,
-            steps=steps,
-            previous=previous.get(combination.view_name),
-        )
-        previous = {combination.view_name: run}
-        yield combination, run
+    with FrameReader(sequence) as reader:
+        for combination in chosen:
+            run = pipeline.compute(
+                sequence,
+                combination.parameters,
+                steps=steps,
+                reader=reader,
+                previous=previous.get(combination.view_name),
+            )
+            previous = {combination.view_name: run}
+            yield combination, run

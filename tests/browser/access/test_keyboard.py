@@ -123,9 +123,9 @@ def test_single_keys_can_be_switched_off(flat_page: Page) -> None:
     expect(truth).to_have_attribute("aria-pressed", before)
 
 
-def test_the_palette_does_what_its_words_say(page: Page) -> None:
+def test_the_palette_does_what_its_words_say(flat_page: Page) -> None:
+    page = flat_page
     expect(page.locator(".lane").first).to_be_visible()  # whoever presses keys sees the page
-    page.frame_locator("section.view iframe").locator("canvas").first.wait_for()
     by_palette(page, "cameras alone")
     expect(page.locator(".app")).to_have_attribute("data-max", "cams")
     expect(page.locator("section.view")).to_be_hidden()

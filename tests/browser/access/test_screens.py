@@ -12,6 +12,7 @@ import cv2
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
+from tests.browser.conftest import COARSE_3D
 from tests.browser.looking import as_at_first, ask, by_palette, readout, until, viser
 from tests.browser.serving import Server
 
@@ -53,6 +54,21 @@ IN_SIGHT = """row => {
 """Whether a row is wholly in sight."""
 
 
+STANDS = """(width) => new Promise((done) => {
+  // ten frames of this window in which nothing moves: what is laid out anew is
+  let before = '', same = 0;
+  const look = () => {
+    const now = [...document.querySelectorAll('.pane, .cam, .plot, .chip, .status')]
+      .map((e) => Object.values(e.getBoundingClientRect().toJSON()).join()).join();
+    same = innerWidth === width && now === before ? same + 1 : 0;
+    before = now;
+    if (same < 10) requestAnimationFrame(look);
+    else done();
+  };
+  look();
+})"""
+
+
 def keep(page: Page, folder: Path | None, name: str, tmp_path: Path) -> None:
     """Check that all is in the window, and make a picture of it."""
     assert page.evaluate(OUTSIDE) == [], name
@@ -79,6 +95,8 @@ def test_everything_is_inside_the_window(
     )
     if size == "wide":  # the software renderer takes long for so many pixels
         context.route("**/viser/**", lambda route: route.abort())
+    if screenshots is None:
+        context.add_init_script(COARSE_3D)
     page = context.new_page()
     page.goto(server.address)
     until(page, lambda: readout(page) == "45", "the step")
@@ -156,12 +174,14 @@ def test_every_layout_fits_every_width(flat_page: Page, server: Server, layout: 
     by_palette(page, f"layout {layout}")
     for width, height in ((1100, 720), (1280, 720), (1600, 1000), (1920, 1080), (2560, 1440)):
         page.set_viewport_size({"width": width, "height": height})
-        page.wait_for_timeout(300)
-        assert page.evaluate(OUTSIDE) == [], f"{layout} at {width}"
+        page.evaluate(STANDS, width)
+        until(page, lambda: page.evaluate(OUTSIDE) == [], f"{layout} fits at {width}", 20.0)
         # below 576 pixels the panel of the 3D view would lie over the room
-        assert page.locator(".view").evaluate("e => e.clientWidth") > 576, f"{layout} at {width}"
-        said = page.locator(".status").evaluate("e => e.scrollWidth - e.clientWidth")
-        assert said <= 1, f"the run's state is cut off at {width}"
+        view = page.locator(".view")
+        until(page, lambda: view.evaluate("e => e.clientWidth") > 576, "beside the panel", 20.0)  # noqa: B023
+        status = page.locator(".status")
+        cut = "e => e.scrollWidth - e.clientWidth"
+        until(page, lambda: status.evaluate(cut) <= 1, "the run's state is whole", 20.0)  # noqa: B023
     page.evaluate("localStorage.removeItem('page')")
 
 

@@ -148,7 +148,8 @@ def test_others_stay_away_whatever_is_told_before_the_answer(
     ask(server, "PATCH", "trail", {"seconds": 4})
 
 
-def test_shift_and_a_click_look_through_the_camera(page: Page, server: Server) -> None:
+def test_shift_and_a_click_look_through_the_camera(flat_page: Page, server: Server) -> None:
+    page = flat_page
     as_at_first(server)
     page.locator(".cam").nth(1).click(position={"x": 4, "y": 4}, modifiers=["Shift"])
     assert server.wait(lambda state: state["view"] == 1)["view"] == 1
