@@ -38,6 +38,8 @@ class Options:
     """A callback that gets the number of steps (or tracks) written, and the number of all."""
     stopped: Callable[[], bool] = lambda: False
     """A callback that returns whether to cancel; it is called before each step (or track)."""
+    name: str = ""
+    """The name that the file has once it is complete; until then it is written under another."""
 
     def at(self, done: int, total: int) -> None:
         """Report progress, or raise an exception if the caller cancelled.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 import tempfile
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from tracker.export import gltf, json_file, motchallenge, parquet, rerun_file, tracks_csv, trc
@@ -186,7 +186,7 @@ def save(
         OSError: If the file cannot be written; the message says why.
         Stopped: If the caller cancelled the export.
     """
-    options = options or Options()
+    options = replace(options or Options(), name=path.name)
     form.check(run.sequence)
     if not form.folder:
         with replacing(path) as temporary:

@@ -27,7 +27,7 @@ def write(path: Path, run: ExportedRun, options: Options) -> None:
         "Units": "m", "OrigDataRate": fps, "OrigDataStartFrame": 1, "OrigNumFrames": steps,
     }  # fmt: skip
     with path.open("w", encoding="ascii", errors="replace", newline="\n") as file:
-        file.write(f"PathFileType\t4\t(X/Y/Z)\t{path.name.split('.', 2)[-1]}\n")
+        file.write(f"PathFileType\t4\t(X/Y/Z)\t{options.name}\n")
         file.write("\t".join(facts) + "\n" + "\t".join(map(str, facts.values())) + "\n")
         file.write("Frame#\tTime\t" + "".join(f"person{number}\t\t\t" for number in ids) + "\n")
         axes = (f"{axis}{k + 1}" for k in range(len(ids)) for axis in "XYZ")
