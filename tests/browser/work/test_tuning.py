@@ -122,8 +122,7 @@ def test_presets_of_ones_own_by_keyboard(flat_page: Page, server: Server) -> Non
     preset = page.get_by_role("combobox", name="Preset")
     expect(preset).to_have_value("")  # own values
     page.set_viewport_size({"width": 1280, "height": 720})
-    page.get_by_role("button", name="Save as").focus()
-    page.keyboard.press("Enter")
+    page.get_by_role("button", name="Save as").press("Enter")
     name = still(page.get_by_role("textbox", name="Name of the preset"))
     assert name["width"] > 100.0, "there is room for a name"
     assert name["x"] + name["width"] < 1280.0
