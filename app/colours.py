@@ -60,7 +60,7 @@ class Palette:
     canvas: Rgb
     """viser's background, into which faded colours are blended; also behind its labels."""
     ink: Rgb
-    """Of the words of labels."""
+    """The colour of the words of labels."""
     grid_minor: Rgb
     grid_major: Rgb
     line: Rgb

@@ -11,7 +11,7 @@ class Marks(Described):
     """What a person says of a stored run; null leaves a mark as it is."""
 
     title: str | None = Field(default=None, max_length=200, serialization_alias="name")
-    """Its name, which keeps it for ever; an empty one takes it away."""
+    """The name of the run, which keeps it for ever; an empty one takes it away."""
     star: bool | None = None
     """Whether it has a star, which keeps it for ever."""
     note: str | None = Field(default=None, max_length=10_000)

@@ -338,7 +338,7 @@ class Edits:
         as far as they were not its defaults.
 
         Args:
-            recording: Its folder.
+            recording: The folder of the recording.
         """
         self._write()
         path = self._path(recording)

@@ -171,7 +171,7 @@ class _Meaning(NamedTuple):
     why: str
     """By what it is known, in words."""
     height: float | None = None
-    """Of people, in the calibration's unit; None where the boxes do not tell."""
+    """The height of people, in the calibration's unit; None where the boxes do not tell."""
     wider: float = 1.0
     """Width of the pictures that the boxes are of, in that of the pictures that there are."""
 
@@ -208,7 +208,7 @@ class _PlanDraft:
             self._note("matching", f"pictures and boxes go to the cameras by {way}")
         exchange_by_shape(matched.cameras, self.notes)
         self.sizes = picture_sizes(matched.cameras, self.notes)
-        """Of each camera's pictures, pixels."""
+        """The size of each camera's pictures, pixels."""
         check_lenses([camera.raw for camera in matched.cameras + matched.spare], matched.format)
         self.given = [
             scaled(camera.raw, size)
@@ -229,7 +229,7 @@ class _PlanDraft:
         self.late: dict[str, int] = {}
         """Steps by which cameras are late, by their names."""
         self.boxes = self._boxes_in_pixels()
-        """Of each camera, None where it has none."""
+        """The boxes of each camera, None where it has none."""
 
     def _note(self, what: str, why: str) -> None:
         """Note what was chosen, and why it is so."""
@@ -310,7 +310,7 @@ class _PlanDraft:
 
         Args:
             piece: The N boxes of the file.
-            size: Of the pictures, pixels.
+            size: The size of the pictures, pixels.
             first: The number of the first frame.
             there: Whether the recording has a box's frame.
         """
@@ -439,7 +439,7 @@ class _PlanDraft:
 
         Args:
             reading: The reading.
-            order: Whose calibration each camera has by it; None if they are as named.
+            order: The camera whose calibration each camera has; None if they are as named.
         """
         every, notes = rearranged([*self.raws, *self.spare], reading)
         self.raws = every[: len(self.raws)]
