@@ -16,6 +16,7 @@ import pytest
 from app.command import main as cli
 from app.command.commands import listing
 from app.command.flags import Track, parse
+from app.command.terminal import rate
 from tests.app.conftest import Runs
 from tests.app.folders import write_crossing
 from tracker import __version__
@@ -36,6 +37,12 @@ def engine_csv(crossing: Path, path: Path, changes: dict[str, Any], seed: int = 
     computed = pipeline.compute(sequence, wanted, seed=seed)
     tracks_csv.save_tracks_csv(path, sequence, computed.tracks, wanted, seed)
     return path.read_text(encoding="utf-8")
+
+
+def test_a_rate_below_one_is_not_told_as_none() -> None:
+    assert [rate(value) for value in (123.4, 9.96, 4.24, 0.43, 0.0432)] == [
+        "123", "10", "4.2", "0.43", "0.043",
+    ]  # fmt: skip
 
 
 @pytest.mark.full
