@@ -29,11 +29,20 @@ def commands() -> Iterator[str]:
                     yield found[1]
 
 
+def answer_to(arguments: str) -> tuple[object, str]:
+    """The status at which the arguments are refused, 0 where they are taken, and what is said."""
+    with (
+        contextlib.redirect_stdout(io.StringIO()),
+        contextlib.redirect_stderr(io.StringIO()) as said,
+    ):
+        try:
+            parse(shlex.split(arguments, comments=True))
+        except SystemExit as ended:
+            return ended.code, said.getvalue()
+    return 0, ""
+
+
 @pytest.mark.parametrize("arguments", sorted(set(commands())))
 def test_the_program_takes_it(arguments: str) -> None:
-    printed = io.StringIO()
-    try:
-        with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed):
-            parse(shlex.split(arguments, comments=True))
-    except SystemExit as ended:
-        assert ended.code == 0, printed.getvalue()
+    status, said = answer_to(arguments)
+    assert status == 0, said
