@@ -110,7 +110,7 @@ function mountTour(root, { store }) {
 				"p",
 				{ class: "seen" },
 				`${cameras} one room. A coloured body is a person the filter believes in, the line on `,
-				"the floor where it came from; dashed in the pictures is the truth.",
+				"the floor where it came from; a dashed box is where this camera did not see them.",
 			),
 			THINGS.map(({ word, key: name, text }, index) =>
 				h(
