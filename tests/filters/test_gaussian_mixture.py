@@ -20,8 +20,7 @@ from tests.filters.mixtures import (
 )
 from tracker.filters import gaussian_mixture as gm
 from tracker.filters.gaussian_mixture import GaussianMixture
-from tracker.kernels.intensity import merging as merging_kernels
-from tracker.kernels.intensity import mixture as mixture_kernels
+from tracker.kernels import mixtures as mixture_kernels
 
 thresholds = st.sampled_from((0.0, 0.5, 4.0, 50.0, 1e6))
 
@@ -59,7 +58,7 @@ def test_leaders_are_the_heaviest_of_their_groups(
 ) -> None:
     order = np.argsort(-mixture.weights, kind="stable")
     nobody = np.full(mixture.size, -1)
-    group, leaders = merging_kernels.merge_groups(
+    group, leaders = mixture_kernels.merge_groups(
         mixture.means, mixture.covariances, order, nobody, threshold
     )
     _, reference_leaders, members = reference_merge(mixture, threshold)
@@ -85,7 +84,7 @@ def test_all_within_the_threshold_merge_however_far_they_reach_along_an_axis(
         side, beyond, axis = (-1.0) ** i, 1.0 if i % 4 < 2 else -1.0, (i - 1) // 4
         means[i] += side * (1.0 + 1e-6 * beyond) * farthest[i, :, axis]
     order, nobody = np.arange(len(means)), np.full(len(means), -1)
-    group, _ = merging_kernels.merge_groups(means, covariances, order, nobody, threshold)
+    group, _ = mixture_kernels.merge_groups(means, covariances, order, nobody, threshold)
     assert_array_equal(group == 0, (order == 0) | (order % 4 >= 2))
 
 

@@ -23,10 +23,9 @@ from tests.filters.mixtures import (
 )
 from tracker.filters import gaussian_mixture, phd
 from tracker.filters.gaussian_mixture import GaussianMixture
-from tracker.kernels import gating
+from tracker.kernels import kalman
 from tracker.kernels import kalman as update_kernels
-from tracker.kernels.gating import Measurements
-from tracker.kernels.kalman import Expected
+from tracker.kernels.kalman import Expected, Measurements
 
 seeds = st.integers(0, 2**32 - 1)
 DIMENSIONS = (1, 2, 4, 6)
@@ -122,7 +121,7 @@ def test_the_gate_bounds_the_squared_mahalanobis_distance(
     on_gate = np.linalg.cholesky(own[0] + noise[0]) @ direction / np.linalg.norm(direction)
     factors = np.sqrt(gate * np.array([1.0 - 1e-6, 1.0 + 1e-6]))
     expected = rng.normal(size=(1, size))
-    pairs = gating.gated_pairs(
+    pairs = kalman.gated_pairs(
         expected,
         Measurements(
             expected + factors[:, None] * on_gate, noise if shared else noise.repeat(2, 0)

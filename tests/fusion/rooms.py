@@ -15,7 +15,7 @@ from tracker.fusion.protocol import FusionResult
 from tracker.fusion.sequential_phd import SequentialPhd
 from tracker.fusion.target_model import MeasurementKind, TargetModel
 from tracker.geometry.camera import Camera
-from tracker.kernels.gating import Measurements
+from tracker.kernels.kalman import Measurements
 from tracker.parameters.catalogue import RunParameters
 from tracker.parameters.groups.fusion import FusionParams
 from tracker.sequences.sequence import Room, Sequence
@@ -90,7 +90,7 @@ def evidence(
 ) -> Evidence:
     """The boxes are equally unexplained."""
     seen, model = all_boxes(views), TargetModel(HALF_EXTENTS, kind)
-    values, noises = model.measured_boxes(seen.boxes, seen.sigmas, 1.0)
+    values, noises = model.measured(seen.boxes, seen.sigmas, 1.0)
     share = np.full(len(seen.boxes), unexplained)
     return Evidence(
         seen.boxes[:, :2], Measurements(values, noises), share, seen.starts, seen.clutter_factors

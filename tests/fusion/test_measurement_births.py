@@ -64,7 +64,7 @@ def test_the_odds_are_the_integral_over_the_room(
         if not len(view.boxes):
             log_terms += np.log(1.0 - P_D)
             continue
-        (value,), (noise,) = model.measured(view, 1.0)
+        (value,), (noise,) = model.measured(view.boxes, view.sigmas, 1.0)
         residuals = model.expected(camera, places).values - value
         density = multivariate_normal(np.zeros(len(value)), noise).logpdf(residuals)
         log_terms += np.log(P_D) + density - np.log(1e-8 if kind != "centre" else 1e-6)

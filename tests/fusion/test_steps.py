@@ -87,7 +87,7 @@ def test_a_labelled_step_is_bayes_over_all_ways_to_share_the_boxes() -> None:
     before = model.motion.predict(tracks, p.survival_probability)
     seen = model.expected(0, before)
     chances = model.detection_probabilities(0, seen, before)
-    z, noise = model.target.measured(view, 1.0)
+    z, noise = model.target.measured(view.boxes, view.sigmas, 1.0)
     odds, updates = np.zeros((3, 3)), {}
     for i, j in itertools.product(range(3), range(3)):
         h, covariance = seen.jacobians[i], before.covariances[i]

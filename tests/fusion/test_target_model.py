@@ -14,7 +14,7 @@ from tests.world import BARREL, look_at
 from tracker.fusion.target_model import SIZES, MeasurementKind, TargetModel, UpdateKind
 from tracker.geometry.camera import Camera
 from tracker.kernels import kalman
-from tracker.kernels.gating import Measurements
+from tracker.kernels.kalman import Measurements
 from tracker.single_view.protocol import ViewResult
 
 KINDS: tuple[MeasurementKind, ...] = ("centre", "box", "box_and_width")
@@ -131,7 +131,7 @@ def test_boxes_become_measurements_with_their_noise(kind: MeasurementKind) -> No
     boxes = np.array([[100.0, 80.0, 10.0, 30.0], [50.0, 60.0, 7.0, 20.0]])
     sigmas = np.array([[1.0, 2.0, 3.0, 4.0], [0.5, 0.6, 0.7, 0.8]])
     view = ViewResult.of_boxes(boxes, np.ones(2), sigmas)
-    values, noises = TargetModel(HALF_EXTENTS, kind).measured(view, 2.0)
+    values, noises = TargetModel(HALF_EXTENTS, kind).measured(view.boxes, view.sigmas, 2.0)
     rows = {
         "centre": [100.0, 80.0],
         "box": [100.0, 50.0, 110.0],
@@ -141,10 +141,10 @@ def test_boxes_become_measurements_with_their_noise(kind: MeasurementKind) -> No
     # by drawing: the same linear map of noisy boxes
     draws = np.random.default_rng(0).normal(size=(200_000, 4)) * 2.0 * sigmas[0] + boxes[0]
     many = ViewResult.of_boxes(draws, np.ones(len(draws)), np.ones_like(draws))
-    drawn, _ = TargetModel(HALF_EXTENTS, kind).measured(many, 1.0)
+    drawn, _ = TargetModel(HALF_EXTENTS, kind).measured(many.boxes, many.sigmas, 1.0)
     assert_allclose(noises[0], np.cov(drawn.T), rtol=0.03, atol=1.0)
     empty = ViewResult.of_boxes(np.zeros((0, 4)), np.zeros(0), np.zeros((0, 4)))
-    values, noises = TargetModel(HALF_EXTENTS, kind).measured(empty, 1.0)
+    values, noises = TargetModel(HALF_EXTENTS, kind).measured(empty.boxes, empty.sigmas, 1.0)
     assert values.shape == (0, SIZES[kind])
     assert noises.shape == (0, SIZES[kind], SIZES[kind])
 

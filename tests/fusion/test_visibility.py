@@ -13,9 +13,11 @@ from scipy.stats import norm
 from tests.fusion.rooms import CAMERAS, HALF_EXTENTS
 from tests.world import look_at
 from tracker.filters.gaussian_mixture import GaussianMixture
-from tracker.fusion.target_model import ExpectedBoxes, TargetModel
-from tracker.fusion.visibility import Visibility, inside_probability, visibility
+from tracker.fusion.target_model import TargetModel
+from tracker.fusion.visibility import inside_probability, visibility
 from tracker.geometry.camera import Camera
+from tracker.kernels.boxes import Hidden
+from tracker.kernels.measurement import ExpectedBoxes
 
 MODEL = TargetModel(HALF_EXTENTS, "box")
 FRONT = look_at("front", (0.0, -5.0, 1.2), (0.0, 0.0, 0.9), focal=600.0, image_size=(800, 600))
@@ -30,7 +32,7 @@ def people(places: ndarray, sigma: float = 0.05) -> GaussianMixture:
 
 def hide(
     mixture: GaussianMixture, strength: float = 0.8, near: float = 0.3, camera: Camera = FRONT
-) -> Visibility:
+) -> Hidden:
     """Everybody may hide everybody, from p_D = 0.9."""
     return visibility(
         np.full(mixture.size, 0.9),

@@ -9,9 +9,13 @@ from numpy import ndarray
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.optimize import linear_sum_assignment
 
-from tracker.kernels.association.belief_propagation import Convergence, belief_propagation
-from tracker.kernels.association.disjoint import disjoint_matchings
-from tracker.kernels.association.matchings import assign, augment
+from tracker.kernels.association import (
+    Convergence,
+    assign,
+    augment,
+    belief_propagation,
+    disjoint_matchings,
+)
 
 seeds = st.integers(0, 2**32 - 1)
 

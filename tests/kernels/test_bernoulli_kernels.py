@@ -12,12 +12,10 @@ from tracker.filters import phd, pmb
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion.target_model import TargetModel
 from tracker.fusion.visibility import inside_probability, visibility
-from tracker.kernels import linear_algebra
-from tracker.kernels.association.belief_propagation import Convergence
-from tracker.kernels.gating import Measurements
-from tracker.kernels.kalman import Expected
-from tracker.kernels.labelled import camera_update, marginals
-from tracker.kernels.labelled.camera_update import CameraRule, Tracks
+from tracker.kernels import bernoulli, labelled, linear_algebra
+from tracker.kernels.association import Convergence
+from tracker.kernels.kalman import Expected, Measurements
+from tracker.kernels.labelled import CameraRule, Tracks
 from tracker.kernels.measurement import ExpectedBoxes
 
 CAMERA = ring(1)[0]
@@ -52,12 +50,12 @@ def test_one_call_is_all_its_parts(
         np.concatenate([undetected.means, known.means]),
         np.concatenate([undetected.covariances, known.covariances]),
     )
-    updated_at_once = camera_update.update_by_camera(
+    updated_at_once = labelled.update_by_camera(
         undetected.gaussians,
         Tracks(known.weights, known.means, known.covariances, known.labels),
         occluding,
         Measurements(boxes, noises),
-        ExpectedBoxes(expected.expected, expected.boxes, expected.depths, expected.valid),
+        expected,
         camera.calibration.image_size,
         np.full(len(boxes), CLUTTER),
         np.ones((0, len(boxes))),
@@ -142,13 +140,13 @@ def by_hand(
     clutter: float = 0.05,
     occluding: float = 0.9,
     **rule: float,
-) -> camera_update.CameraUpdate:
+) -> labelled.CameraUpdate:
     """Two people in one place of the picture, the second nearer, and boxes so far aside."""
     places = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     mixture = gaussians(places, weights=np.array(existences), speed_sigma=None)
     undetected = gaussians(np.zeros((1, 3)), weights=unseen, speed_sigma=None)
     slope = np.tile(np.eye(2, 3), (3, 1, 1))
-    found: camera_update.CameraUpdate = camera_update.update_by_camera(
+    found: labelled.CameraUpdate = labelled.update_by_camera(
         undetected.gaussians,
         Tracks(mixture.weights, mixture.means, mixture.covariances, np.array([4, 6])),
         np.array([0.0, occluding]),
@@ -210,7 +208,7 @@ def test_a_box_that_nothing_else_explains_leaves_next_to_nothing_for_clutter() -
 
 def test_a_track_that_must_have_been_seen_and_was_not_keeps_a_faint_existence() -> None:
     mixture = gaussians(np.zeros((1, 3)), weights=1.0, speed_sigma=None)
-    found = marginals.bernoulli_update(
+    found = bernoulli.bernoulli_update(
         mixture.gaussians, Expected.of(np.zeros((1, 2)), np.eye(2, 3)[None]),
         Measurements(np.zeros((0, 2)), np.eye(2)[None]), np.ones(1), np.zeros(0),
         np.ones((0, 0)), 9.0, Convergence(1e-6, 9),

@@ -13,10 +13,8 @@ from tests.benchmarks.plane import scenario as scene
 from tests.filters.mixtures import random_covariances, random_mixture
 from tracker.filters import gaussian_mixture, phd
 from tracker.filters.gaussian_mixture import GaussianMixture
-from tracker.kernels import kalman
-from tracker.kernels.gating import Measurements
-from tracker.kernels.intensity import merging
-from tracker.kernels.kalman import Expected
+from tracker.kernels import kalman, mixtures
+from tracker.kernels.kalman import Expected, Measurements
 
 
 def crowd(seed: int, size: int, dimension: int) -> GaussianMixture:
@@ -63,7 +61,7 @@ def test_merging_groups_as_if_all_pairs_were_looked_at(
     owners = np.random.default_rng(seed).integers(-1, 3, size)
     order = np.argsort(-mixture.weights, kind="stable")
     for whose in (np.full(size, -1), owners):
-        group, leaders = merging.merge_groups(
+        group, leaders = mixtures.merge_groups(
             mixture.means, mixture.covariances, order, whose, threshold
         )
         expected, first = groups_of_all(mixture, threshold, whose)
@@ -121,7 +119,7 @@ def test_a_few_very_wide_components_are_found_among_many_small_ones() -> None:
     both = gaussian_mixture.concatenate([mixture, wide])
     order = np.argsort(-both.weights, kind="stable")
     nobody = np.full(both.size, -1)
-    found = merging.merge_groups(both.means, both.covariances, order, nobody, 4.0)
+    found = mixtures.merge_groups(both.means, both.covariances, order, nobody, 4.0)
     expected = groups_of_all(both, 4.0, nobody)
     assert_array_equal(found[0], expected[0])
 

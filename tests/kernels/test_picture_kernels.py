@@ -11,10 +11,9 @@ from hypothesis import strategies as st
 from numpy import ndarray
 from numpy.testing import assert_allclose, assert_array_equal
 
-from tracker.kernels import particles
 from tracker.kernels.pictures import channels, foreground, images, silhouettes
 from tracker.kernels.pictures.channels import COLUMNS, ORIENTATIONS, ROWS
-from tracker.kernels.pictures.following import follow_colours
+from tracker.kernels.pictures.images import follow_colours
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -143,7 +142,7 @@ def test_particles_climb_to_the_mean_of_their_group_within_reach(
     rng = np.random.default_rng(seed)
     boxes, counts = grid_boxes(rng, 9), rng.integers(0, 3, 9).astype(float)
     groups = rng.integers(0, 2, 9)
-    found = particles.epanechnikov_climb(boxes, counts, groups, 2.0, most, least)
+    found = images.epanechnikov_climb(boxes, counts, groups, 2.0, most, least)
     for k, place in enumerate(boxes):
         density = 0.0
         for _ in range(most if counts[k] else 0):
@@ -162,7 +161,7 @@ def test_particles_climb_to_the_mean_of_their_group_within_reach(
 def test_a_particle_from_which_all_others_shrank_away_stays_where_it_is() -> None:
     # the mean is small, and nobody within reach of it
     boxes = np.array([[0.0, 0.0, 9.0, 9.0], [8.0, 0.0, 0.1, 0.1], [0.0, 8.0, 0.1, 0.1]])
-    found = particles.epanechnikov_climb(
+    found = images.epanechnikov_climb(
         boxes, np.array([1.0, 10.0, 10.0]), np.zeros(3, dtype=np.int64), 1.0, 9, 0.0
     )
     assert_allclose(found.points[0], np.array([80.0, 80.0, 11.0, 11.0]) / 21.0)
@@ -181,7 +180,7 @@ def test_modes_are_led_by_their_densest_point(seed: int, distance: float) -> Non
         ]
         owners[i] = near[0] if near else len(leaders)
         leaders += [] if near else [i]
-    found = particles.join_modes(points, counts, order, distance)
+    found = images.join_modes(points, counts, order, distance)
     assert_array_equal(found.owners, owners)
     assert found.leaders.tolist() == leaders
 
@@ -192,15 +191,11 @@ def test_boxes_keep_apart_from_those_before(seed: int, most: int, distance: floa
     boxes = grid_boxes(rng, 12)
     weights = rng.integers(0, 4, 12).astype(float)
     order = np.argsort(-weights, kind="stable")
-    taken: list[int] = []
     kept: list[int] = []
     for i in order[weights[order] > 0.0].tolist():
-        if len(taken) < most and all(squares(boxes[[i]], boxes[j])[0] >= 1.0 for j in taken):
-            taken.append(i)
-        if all(squares(boxes[[i]], boxes[j])[0] >= distance**2 for j in kept):
+        if len(kept) < most and all(squares(boxes[[i]], boxes[j])[0] >= distance**2 for j in kept):
             kept.append(i)
-    assert images.spread_starts(boxes, weights, order, most).tolist() == taken
-    assert images.keep_apart(boxes, weights, order, distance).tolist() == kept
+    assert images.keep_apart(boxes, weights, order, distance, most).tolist() == kept
 
 
 @given(seeds)

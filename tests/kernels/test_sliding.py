@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from tracker.kernels.sliding import slide
+from tracker.kernels.consistency import slide
 
 SIGMA, DEPTH_SIGMA = 0.1, 0.2
 FRAMES = [2, 1, 0, 2, 1]  # boxes of each frame

@@ -14,13 +14,11 @@ from numpy.testing import assert_allclose, assert_array_equal
 from tests.filters.mixtures import random_covariances
 from tests.world import PERSON, ring
 from tracker.fusion.target_model import TargetModel
-from tracker.kernels.association.belief_propagation import Convergence, belief_propagation
+from tracker.kernels.association import Convergence, belief_propagation
 from tracker.kernels.boxes import Occlusion, hide, inside_probability
-from tracker.kernels.gating import Measurements
-from tracker.kernels.kalman import Expected
-from tracker.kernels.labelled.camera_update import CameraRule
-from tracker.kernels.measurement import ExpectedBoxes
-from tracker.kernels.smoothing import evidence, passes, presence
+from tracker.kernels.kalman import Expected, Measurements
+from tracker.kernels.labelled import CameraRule
+from tracker.kernels.smoothing import evidence, passes
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -175,7 +173,7 @@ def score(states: tuple[int, ...], votes: ndarray, at_start: bool, at_end: bool)
     return total + (0.0 if last == len(states) - 1 and at_end else transitions.enter)
 
 
-TRANSITIONS = presence.ExistenceTransitions(stay=-0.1, enter=-1.3, change=-0.9)
+TRANSITIONS = passes.ExistenceTransitions(stay=-0.1, enter=-1.3, change=-0.9)
 
 
 @given(seeds, st.integers(1, 5), st.sampled_from((-2, 0, 1)), st.integers(-1, 1))
@@ -184,7 +182,7 @@ def test_presence_is_the_best_of_all_sequences(
 ) -> None:
     votes = np.random.default_rng(seed).normal(0.0, 2.0, count + 1)
     end = first + count - 1 + beyond
-    found = presence.presence(
+    found = passes.presence(
         np.array([0, count, count + 1]), np.array([first, 99]), votes, TRANSITIONS, end
     )
     best = {}
@@ -205,7 +203,7 @@ def test_presence_is_the_best_of_all_sequences(
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_however_sure_the_votes_a_probability_is_a_number(sign: float) -> None:
-    found = presence.presence(
+    found = passes.presence(
         np.array([0, 2]), np.array([0]), np.full(2, sign * 3000.0), TRANSITIONS, 1
     ).probabilities
     assert_allclose(found, 1.0 / (1.0 + np.exp(-sign * 500.0)), rtol=1e-9)
@@ -251,7 +249,7 @@ class Scene:
                 self.step_starts,
             ),
             evidence.CameraSteps(self.starts, np.array(blind), self.measurements, self.clutter),
-            ExpectedBoxes(s.expected, s.boxes, s.depths, s.valid),
+            s,
             CAMERA.calibration.image_size,
             rule,
         )  # fmt: skip

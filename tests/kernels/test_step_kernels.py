@@ -15,11 +15,9 @@ from tracker.filters import gaussian_mixture
 from tracker.filters.gaussian_mixture import GaussianMixture, concatenate
 from tracker.fusion.target_model import TargetModel
 from tracker.geometry.camera import stacked
-from tracker.kernels import linear_algebra
-from tracker.kernels.gating import Measurements
-from tracker.kernels.labelled import camera_update, step
-from tracker.kernels.labelled.camera_update import CameraRule, Tracks
-from tracker.kernels.measurement import ExpectedBoxes
+from tracker.kernels import labelled, linear_algebra
+from tracker.kernels.kalman import Measurements
+from tracker.kernels.labelled import CameraRule, Tracks
 
 CAMERAS = ring(3)
 CLUTTER = np.array([1e-6, 3e-6, 2e-6])
@@ -82,12 +80,12 @@ def one_by_one(
             np.concatenate([unseen.means, tracks.means]),
             np.concatenate([unseen.covariances, tracks.covariances]),
         )
-        found = camera_update.update_by_camera(
+        found = labelled.update_by_camera(
             unseen.gaussians,
             Tracks(tracks.weights, tracks.means, tracks.covariances, tracks.labels),
             occluding,
             Measurements(values, noises),
-            ExpectedBoxes(expected.expected, expected.boxes, expected.depths, expected.valid),
+            expected,
             camera.calibration.image_size,
             np.full(len(values), CLUTTER[c]),
             np.ones((0, len(values))),
@@ -148,18 +146,18 @@ def test_one_call_is_all_cameras(
     boxes, sigmas = seen(model, places, rng)
     starts = np.cumsum([0, *(len(one) for one in boxes)])
     transform, products = model.transforms
-    found = step.predict_and_update(
+    found = labelled.predict_and_update(
         Tracks(known.weights, known.means, known.covariances, known.labels),
         20,
         undetected.gaussians,
-        step.CameraBoxes(
+        labelled.CameraBoxes(
             np.concatenate(boxes),
             np.concatenate(sigmas),
             starts,
             np.ones(starts[-1]),
             np.ones((0, starts[-1])),
         ),
-        step.StepModel(
+        labelled.StepModel(
             transition=TRANSITION,
             motion_noise=NOISE[None],
             survival_probability=P_S,
@@ -212,20 +210,20 @@ def one_step(
     least: float = LEAST,
     survival: float = 1.0,
     **rule: float,
-) -> step.StepResult:
+) -> labelled.StepResult:
     """A step of people who stand still, with somebody never yet detected in their midst."""
     model = TargetModel(PERSON, "box")
     transform, products = model.transforms
     whole = np.concatenate(boxes)
     undetected = gaussians(tracks.means[:1, :3], weights=unseen)
-    found: step.StepResult = step.predict_and_update(
+    found: labelled.StepResult = labelled.predict_and_update(
         Tracks(tracks.weights, tracks.means, tracks.covariances, tracks.labels), 50,
         undetected.gaussians,
-        step.CameraBoxes(
+        labelled.CameraBoxes(
             whole, np.full(whole.shape, 9.0), np.cumsum([0, *(len(one) for one in boxes)]),
             np.ones(len(whole)), np.ones((0, len(whole))),
         ),
-        step.StepModel(
+        labelled.StepModel(
             transition=np.eye(6), motion_noise=1e-6 * np.eye(6)[None],
             survival_probability=survival, birth_weights=np.zeros(0),
             birth_means=np.zeros((0, 6)), birth_covariances=np.zeros((0, 6, 6)),
@@ -308,11 +306,11 @@ def test_the_kept_are_neither_faint_nor_strayed_nor_duplicates_nor_too_many() ->
             means[order], existences[order], labels[order],
             np.ascontiguousarray(sources[:, order]), 0.8, 1.5, CONFIRMED,
         )  # fmt: skip
-        found = step.kept_tracks(
+        found = labelled.kept_tracks(
             existences,
             means,
             labels,
             sources,
-            step.KeepingRule(0.2, low, high, 5, 0.8, 1.5, CONFIRMED),
+            labelled.KeepingRule(0.2, low, high, 5, 0.8, 1.5, CONFIRMED),
         )
         assert found.tolist() == order[~duplicate].tolist()

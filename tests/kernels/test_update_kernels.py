@@ -15,10 +15,10 @@ from tests.world import PERSON, boxes, ring, views
 from tracker.filters import association
 from tracker.fusion.target_model import MeasurementKind, TargetModel
 from tracker.geometry.camera import stacked
+from tracker.kernels import bernoulli as marginal_kernels
 from tracker.kernels import births as birth_kernels
-from tracker.kernels.gating import Measurements
-from tracker.kernels.labelled import marginals as marginal_kernels
-from tracker.kernels.labelled.marginals import LabelledWeights, PairOdds
+from tracker.kernels.bernoulli import LabelledWeights, PairOdds
+from tracker.kernels.kalman import Measurements
 
 seeds = st.integers(0, 10_000)
 
@@ -219,7 +219,7 @@ def test_places_are_fitted_as_by_numpy(
     )
     measured = []
     for c, view in enumerate(views(seen, 4.0)[0]):
-        values, noises = model.measured(view, 1.0)
+        values, noises = model.measured(view.boxes, view.sigmas, 1.0)
         noises = noises * rng.uniform(0.5, 2.0, (len(values), 1, 1))
         chosen = np.zeros(len(values)) if c == NOTHING else rng.random(len(values))
         measured.append((values, noises, chosen > 0.2))

@@ -68,7 +68,7 @@ def test_the_kernels_of_the_path_are_called_by_the_first() -> None:
     assert len(kernels) >= 3
     reached = called_by(kernels[0])
     assert {kernel.py_func for kernel in kernels} <= reached
-    other = resolved("tracker.kernels.labelled.marginals.share_boxes")
+    other = resolved("tracker.kernels.bernoulli.share_boxes")
     assert other.py_func not in reached, "the filter of intensities has its own"
 
 

@@ -19,8 +19,7 @@ from tracker.runs.outcome import why_no_tracks
 from tracker.runs.run import Run
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import upright_boxes
-from tracker.single_view.dropped import CANDIDATES, DROPPED, GATES
-from tracker.single_view.protocol import TRUST, UNCERTAINTY, ViewResult
+from tracker.single_view.protocol import CANDIDATES, DROPPED, GATES, TRUST, UNCERTAINTY, ViewResult
 
 STEPS = 10
 

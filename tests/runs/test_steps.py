@@ -21,8 +21,7 @@ from numpy import ndarray
 from tests.engine.synthetic import crossing, sequence, views_at
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion.protocol import Associations, FusionResult
-from tracker.single_view.dropped import Dropped
-from tracker.single_view.protocol import ViewEvent, ViewResult, pack_samples
+from tracker.single_view.protocol import Dropped, ViewEvent, ViewResult, pack_samples
 from tracker.steps import ROWS_SECOND, Steps, steps
 
 

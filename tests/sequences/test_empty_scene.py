@@ -20,7 +20,8 @@ from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.reader import read_sequence
 from tracker.sequences.sequence import Sequence
 from tracker.sequences.writing.by_step import write_by_step
-from tracker.single_view.pictures.foreground import BackgroundModel, learn, learn_background
+from tracker.single_view.pictures.background import BackgroundModel
+from tracker.single_view.pictures.foreground import learn, learn_background
 from tracker.single_view.rectification.sequence import RectifiedSequence
 
 _Made = TypeVar("_Made")

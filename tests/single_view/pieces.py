@@ -8,9 +8,11 @@ import numpy as np
 from numpy import ndarray
 
 from tracker.parameters.groups.association_matrix import AssociationMatrixParams
-from tracker.single_view.association_matrix.following import object_histograms
-from tracker.single_view.association_matrix.moving_objects import Situation
-from tracker.single_view.association_matrix.track_transfer import advance
+from tracker.single_view.association_matrix.track_transfer import (
+    Situation,
+    advance,
+    object_histograms,
+)
 from tracker.single_view.pictures.blobs import Blobs, blobs
 from tracker.single_view.protocol import ViewEvent
 

@@ -12,19 +12,16 @@ from numpy.testing import assert_array_equal
 from tests import world
 from tests.single_view.pieces import PUBLISHED, draw, person, play
 from tracker.parameters.groups.jpda import JpdaParams
-from tracker.single_view.association_matrix import decision_matrices
-from tracker.single_view.association_matrix.track_transfer import decide
-from tracker.single_view.dropped import GATES, Dropped
+from tracker.single_view.association_matrix.track_transfer import decide, decide_by_distance
 from tracker.single_view.jpda.cases import determine_cases, exclude_outside_boxes, search_components
 from tracker.single_view.jpda.measurements import Measured
-from tracker.single_view.jpda.targets import Targets
-from tracker.single_view.jpda.track_management import Managed
-from tracker.single_view.jpda.track_management import manage as manage_jpda
+from tracker.single_view.jpda.targets import Managed, Targets
+from tracker.single_view.jpda.targets import manage as manage_jpda
+from tracker.single_view.protocol import GATES, Dropped
 from tracker.single_view.pseudo_particle import hypotheses, track_management
 from tracker.single_view.pseudo_particle.track_management import Departed, Tracks
 from tracker.single_view.rectification.stabilisation import LARGEST, LEAST_CORNERS, consensus_shift
-from tracker.single_view.shape.finder import strongest
-from tracker.single_view.shape.windows import Windows
+from tracker.single_view.shape.finder import Windows, strongest
 
 JPDA = JpdaParams(confirmation_steps=5)  # vanished after 3, returned within 5
 
@@ -244,7 +241,7 @@ def test_a_newcomer_at_the_separation_itself_stands_apart(separation: float, sta
 
 @pytest.mark.parametrize(("reach", "near"), [(20.0, True), (np.nextafter(20.0, 0.0), False)])
 def test_an_object_at_its_reach_is_reached(reach: float, near: bool) -> None:
-    found = decision_matrices.decide_by_distance(np.array([[20.0]]), np.array([reach]))
+    found = decide_by_distance(np.array([[20.0]]), np.array([reach]))
     assert found.tolist() == [[near]]
 
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 from numpy import ndarray
 
-from tracker.single_view.association_matrix import decision_matrices as matrices
+from tracker.single_view.association_matrix import track_transfer as matrices
 
 decisions = arrays.arrays(np.bool_, st.tuples(st.integers(0, 6), st.integers(0, 6)))
 

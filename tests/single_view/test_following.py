@@ -9,7 +9,11 @@ from hypothesis import strategies as st
 from numpy import ndarray
 
 from tests.single_view.pieces import COLOURS, draw, person
-from tracker.single_view.association_matrix.following import coefficients, follow, object_histograms
+from tracker.single_view.association_matrix.track_transfer import (
+    coefficients,
+    follow,
+    object_histograms,
+)
 
 RED, BLUE = 1, 2
 

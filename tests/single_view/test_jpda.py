@@ -11,7 +11,7 @@ from scipy.stats import chi2
 from tests.single_view.detected import detected, run
 from tracker.parameters.catalogue import PRESETS, RunParameters
 from tracker.parameters.values import stage_values, with_values
-from tracker.single_view.jpda import association, method
+from tracker.single_view.jpda import method
 from tracker.single_view.jpda.targets import Innovations
 from tracker.single_view.protocol import ViewResult
 
@@ -115,11 +115,12 @@ def test_measurements_can_go_on_instead_of_estimates() -> None:
 
 def test_the_gate_is_the_quantile_of_its_probability(monkeypatch: pytest.MonkeyPatch) -> None:
     squared, inside = [np.zeros(0)], [np.zeros(0, dtype=bool)]
+    original = method.associate
 
     def associate(found: Innovations, possible: Any, *rest: Any) -> Any:
         squared.append(found.squared.ravel())
         inside.append(possible.ravel())
-        return association.associate(found, possible, *rest)
+        return original(found, possible, *rest)
 
     monkeypatch.setattr(method, "associate", associate)
     steps: list = [[place] for place in walking(15)]

@@ -11,7 +11,7 @@ from numpy import ndarray
 from numpy.testing import assert_allclose, assert_array_equal
 
 from tracker.parameters.groups.jpda import JpdaParams
-from tracker.single_view.jpda.association import associate
+from tracker.single_view.jpda.method import associate
 from tracker.single_view.jpda.targets import Innovations, Targets, innovations
 
 AREA = 90.0 * 60.0

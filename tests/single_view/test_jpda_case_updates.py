@@ -10,8 +10,7 @@ from numpy import ndarray
 from numpy.testing import assert_allclose, assert_array_equal
 
 from tracker.parameters.groups.jpda import JpdaParams
-from tracker.single_view.jpda.case_updates import CaseUpdates, _left_over, update_by_case
-from tracker.single_view.jpda.cases import Cases
+from tracker.single_view.jpda.cases import Cases, CaseUpdates, _left_over, update_by_case
 from tracker.single_view.jpda.measurements import Measured
 from tracker.single_view.jpda.targets import Targets, innovations
 

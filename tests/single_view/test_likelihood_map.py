@@ -8,8 +8,7 @@ import pytest
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import BoxSizes
-from tracker.single_view.colour.likelihood_map import likelihood_map
-from tracker.single_view.colour.templates import read_templates
+from tracker.single_view.colour.templates import likelihood_map, read_templates
 from tracker.single_view.pictures import colour
 
 SIGMA = 0.25

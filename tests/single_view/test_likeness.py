@@ -14,8 +14,7 @@ from tracker.parameters.groups.colour_phd import ColourPhdParams
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.colour import templates
-from tracker.single_view.colour.likeness import Likeness, appearance_of
-from tracker.single_view.colour.templates import read_templates
+from tracker.single_view.colour.templates import Likeness, appearance_of, read_templates
 from tracker.single_view.pictures import colour
 
 

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from tests.single_view.pieces import PUBLISHED, Rectangle, labels_by_place, person, play
 from tracker.single_view.association_matrix.method import _apart, _estimates, _labels_of_fits
-from tracker.single_view.association_matrix.moving_objects import MovingObject, Situation, Track
 from tracker.single_view.association_matrix.silhouettes import Fits
+from tracker.single_view.association_matrix.track_transfer import MovingObject, Situation, Track
 from tracker.single_view.protocol import ViewEvent
 
 RED, BLUE, GREEN = 1, 2, 3

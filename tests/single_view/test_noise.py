@@ -22,7 +22,7 @@ from tracker.single_view.colour.peaks import PeakFinder
 from tracker.single_view.detector_boxes import detector_sigmas
 from tracker.single_view.jpda.measurements import source_of
 from tracker.single_view.pseudo_particle.particles import ColourParticles
-from tracker.single_view.shape.evidence import log_ratios, shape_sigmas
+from tracker.single_view.shape.finder import log_ratios, shape_sigmas
 
 BOXES = np.array([[40.0, 30.0, 4.0, 10.0], [9.0, 8.0, 100.0, 240.0], [5.0, 5.0, 0.0, 0.1]])
 """One of them is large, and one is smaller than a pixel."""

@@ -23,9 +23,8 @@ from tracker.parameters.values import with_values
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence, Template, View
 from tracker.single_view.box_sizes import upright_boxes
-from tracker.single_view.dropped import Dropped
-from tracker.single_view.pictures.foreground import pack, unpack
-from tracker.single_view.protocol import ViewResult, pack_samples, unpack_samples
+from tracker.single_view.pictures.background import pack, unpack
+from tracker.single_view.protocol import Dropped, ViewResult, pack_samples, unpack_samples
 from tracker.single_view.rectification.sequence import RectifiedSequence
 from tracker.single_view.rectification.view import RectifiedView, rectified_view
 

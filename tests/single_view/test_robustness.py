@@ -26,7 +26,7 @@ from tracker.parameters.values import with_values
 from tracker.runs import pipeline
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence, View
-from tracker.single_view.pictures.foreground import unpack
+from tracker.single_view.pictures.background import unpack
 from tracker.single_view.protocol import unpack_samples
 
 

@@ -25,7 +25,7 @@ from tracker.sequences.pictures.frames import FrameReader, Picture
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.colour import peaks
 from tracker.single_view.colour.trust import shapes_of_templates
-from tracker.single_view.pictures.foreground import unpack
+from tracker.single_view.pictures.background import unpack
 from tracker.single_view.protocol import ViewResult, unpack_samples
 
 KEPT = Path(__file__).with_name("scenes.json")

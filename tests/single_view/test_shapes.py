@@ -20,12 +20,23 @@ from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import upright_boxes
 from tracker.single_view.colour.peaks import PeakFinder, _discount, colour_ratios
 from tracker.single_view.colour.trust import templates_suffice
-from tracker.single_view.dropped import GATES
-from tracker.single_view.pictures.foreground import BackgroundModel, tone_curve
-from tracker.single_view.pictures.foreground.exposure import square_roots
+from tracker.single_view.pictures.background import (
+    BackgroundModel,
+    square_roots,
+    tone_curve,
+)
+from tracker.single_view.protocol import GATES
 from tracker.single_view.shape.channels import Channels
-from tracker.single_view.shape.finder import ShapeFinder, Shapes, strongest
-from tracker.single_view.shape.windows import ABOVE, BELOW, CROWNS, WIDTH, Windows
+from tracker.single_view.shape.finder import (
+    ABOVE,
+    BELOW,
+    CROWNS,
+    WIDTH,
+    ShapeFinder,
+    Shapes,
+    Windows,
+    strongest,
+)
 
 CAMERA = world.look_at("cam", (0.4, -3.4, 2.2), (0.0, 0.0, 1.0), image_size=(640, 400), focal=320.0)
 ROOM = world.volume(1.6, 2.2)

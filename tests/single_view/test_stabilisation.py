@@ -16,8 +16,7 @@ from tracker.runs import pipeline
 from tracker.runs.gates import notices
 from tracker.sequences.library import open_sequence
 from tracker.sequences.pictures.frames import FrameReader, Picture
-from tracker.single_view.rectification.sequence import RectifiedSequence
-from tracker.single_view.rectification.shake_check import check_shake
+from tracker.single_view.rectification.sequence import RectifiedSequence, check_shake
 from tracker.single_view.rectification.stabilisation import StaticScene, _normalise, consensus_shift
 
 

@@ -15,8 +15,7 @@ from tracker.parameters.catalogue import RunParameters
 from tracker.parameters.values import with_values
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult
-from tracker.smoothing.paths import Links, Paths
-from tracker.smoothing.recording import CameraBoxes
+from tracker.smoothing.paths import CameraBoxes, Links, Paths
 from tracker.smoothing.smoother import Smoother
 
 CAMERAS = world.ring(3)

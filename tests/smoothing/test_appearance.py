@@ -15,9 +15,8 @@ from scipy.stats import multivariate_normal
 
 from tests.smoothing.test_boundaries import standing
 from tracker.kernels import boxes as box_kernels
-from tracker.kernels.gating import Measurements
-from tracker.smoothing.paths import Links, Paths
-from tracker.smoothing.recording import CameraBoxes
+from tracker.kernels.kalman import Measurements
+from tracker.smoothing.paths import CameraBoxes, Links, Paths
 from tracker.smoothing.tracklets.appearance import (
     AppearanceModel,
     Means,

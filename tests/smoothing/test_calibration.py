@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose
 
 from tests import world
 from tests.smoothing.known import CAMERAS, Known, given, known
-from tracker.kernels.gating import Measurements
+from tracker.kernels.kalman import Measurements
 from tracker.smoothing.calibration import (
     FEWEST,
     NARROWEST,

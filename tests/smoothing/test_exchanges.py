@@ -9,7 +9,7 @@ from scipy.stats import multivariate_normal
 
 from tests.smoothing.measured import STEP, fitted_to, measured
 from tracker.smoothing.smoother import Fitted
-from tracker.smoothing.tracklets.exchanges import exchange_breaks, exchange_log_odds, find_exchange
+from tracker.smoothing.tracklets.motion import exchange_breaks, exchange_log_odds, find_exchange
 
 SIGMA = 0.05
 

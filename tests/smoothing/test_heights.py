@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 from tests.random_rooms import random_room
 from tests.smoothing.known import given, known
 from tracker.runs.pipeline import compute, default_parameters
-from tracker.smoothing.heights import BoxTops, standing_heights
+from tracker.smoothing.bodies import BoxTops, standing_heights
 from tracker.smoothing.noise import NoiseModel
 from tracker.smoothing.paths import Paths
 

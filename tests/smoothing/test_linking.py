@@ -9,7 +9,7 @@ import pytest
 from numpy import ndarray
 from numpy.testing import assert_allclose
 
-from tracker.kernels.smoothing.presence import ExistenceTransitions, presence
+from tracker.kernels.smoothing.passes import ExistenceTransitions, presence
 from tracker.smoothing.paths import Links, Paths, contested_shares, join_chains, split_paths
 from tracker.smoothing.tracklets.solver import TrackletGraph, link_tracklets
 

@@ -10,12 +10,11 @@ import numpy as np
 import pytest
 from numpy import ndarray
 
-from tracker.kernels.gating import Measurements
+from tracker.kernels.kalman import Measurements
 from tracker.single_view.protocol import ViewResult
-from tracker.smoothing.paths import Links, Paths
-from tracker.smoothing.recording import CameraBoxes
+from tracker.smoothing.paths import CameraBoxes, Links, Paths
 from tracker.smoothing.smoother import Smoother
-from tracker.smoothing.tracklets.people import Appearances, sum_by_chain, template_log_odds
+from tracker.smoothing.tracklets.appearance import Appearances, sum_by_chain, template_log_odds
 from tracker.steps import Steps
 
 STEP = 0.2

@@ -14,9 +14,8 @@ from tests.smoothing.known import known
 from tracker.fusion import trajectories
 from tracker.fusion.protocol import Associations, FusionResult
 from tracker.fusion.trajectories import Bounds
-from tracker.smoothing.result import Smoothed
+from tracker.smoothing.protocol import Smoothed, names_of, tracks_of
 from tracker.smoothing.stage import read_links, read_paths
-from tracker.smoothing.tracks import names_of, tracks_of
 from tracker.steps import Steps
 
 ROOM = world.volume()

@@ -21,7 +21,7 @@ from tracker.parameters.catalogue import RunParameters
 from tracker.parameters.values import with_values
 from tracker.runs import pipeline
 from tracker.smoothing import create
-from tracker.smoothing.result import Smoothed
+from tracker.smoothing.protocol import Smoothed
 from tracker.smoothing.stage import _outside_spans, _removal
 
 SETTLED = with_values(PLAIN, {"smoothing_method": "identities", "smoothing.learning": True})

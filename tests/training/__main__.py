@@ -9,7 +9,7 @@ import numpy as np
 
 from tests.rooms import render_random
 from tests.training import boosting, samples
-from tracker.single_view.shape.trees import FILE, Trees
+from tracker.single_view.shape.finder import FILE, Trees
 
 SEEDS = tuple(range(41, 100))
 """Of the rooms that are learnt from; those below are for looking at what was learnt."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy import ndarray
 
-from tracker.single_view.shape.trees import Trees
+from tracker.single_view.shape.finder import Trees
 
 ROUNDS, RATE, MOST = 200, 0.2, 160_000
 GIVEN_UP = 0.002

@@ -20,9 +20,7 @@ from tracker.sequences.sequence import Sequence
 from tracker.single_view.pictures.foreground import learn_background
 from tracker.single_view.rectification.sequence import RectifiedSequence
 from tracker.single_view.shape.channels import Channels
-from tracker.single_view.shape.finder import PIXELS_PER_METRE
-from tracker.single_view.shape.trees import Trees
-from tracker.single_view.shape.windows import Windows
+from tracker.single_view.shape.finder import PIXELS_PER_METRE, Trees, Windows
 
 CAMERAS, STEPS = 3, 9
 """Looked at in each room, at most."""

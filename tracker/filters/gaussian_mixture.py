@@ -15,8 +15,7 @@ from jaxtyping import Float, Int
 from numpy import ndarray
 
 from tracker.kernels import linear_algebra
-from tracker.kernels.intensity import merging
-from tracker.kernels.intensity import mixture as mixture_kernels
+from tracker.kernels import mixtures as mixture_kernels
 from tracker.kernels.linear_algebra import Gaussians
 
 _NO_OWNERS = np.zeros(0, dtype=np.int64)
@@ -201,7 +200,7 @@ def merge(
     if mixture.size == 0:
         return mixture, np.zeros(0, dtype=np.int64)
     order = mixture_kernels.heaviest_first(mixture.weights)
-    groups = merging.merge_groups(
+    groups = mixture_kernels.merge_groups(
         mixture.means,
         mixture.covariances,
         order,
@@ -241,7 +240,7 @@ def reduce(
         of the one that absorbed the others.
     """
     _check(merging_threshold)
-    reduced = merging.reduce_mixture(
+    reduced = mixture_kernels.reduce_mixture(
         mixture.weights,
         mixture.means,
         mixture.covariances,

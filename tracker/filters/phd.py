@@ -17,10 +17,9 @@ from jaxtyping import Float, Int
 from numpy import ndarray
 
 from tracker.filters.gaussian_mixture import GaussianMixture
-from tracker.kernels.gating import Measurements
-from tracker.kernels.intensity import extraction, phd
-from tracker.kernels.intensity import mixture as mixture_kernels
-from tracker.kernels.kalman import Expected
+from tracker.kernels import mixtures as mixture_kernels
+from tracker.kernels import phd as phd_kernels
+from tracker.kernels.kalman import Expected, Measurements
 
 SPARE = 0.25
 """Expected number of targets by which the targets that a component explains may exceed its
@@ -79,7 +78,7 @@ def update(
         numpy.linalg.LinAlgError: If H P Hᵀ + R is not positive definite.
     """
     size, count = predicted.size, len(measurements)
-    updated = phd.phd_update(
+    updated = phd_kernels.phd_update(
         predicted.gaussians,
         expected,
         Measurements(
@@ -135,9 +134,9 @@ def extract_measured(
         pair, then missed components above the threshold.
     """
     posterior = updated.posterior
-    found = extraction.report(
+    found = phd_kernels.report(
         predicted.weights,
-        phd.UpdatedIntensity(
+        phd_kernels.UpdatedIntensity(
             posterior.weights,
             posterior.means,
             posterior.covariances,

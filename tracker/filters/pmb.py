@@ -16,9 +16,8 @@ from numpy import ndarray
 from tracker.filters import association
 from tracker.filters.association import Marginals
 from tracker.filters.gaussian_mixture import GaussianMixture
-from tracker.kernels.gating import Measurements
-from tracker.kernels.kalman import Expected
-from tracker.kernels.labelled import marginals as marginal_kernels
+from tracker.kernels import bernoulli as marginal_kernels
+from tracker.kernels.kalman import Expected, Measurements
 
 
 @dataclass(frozen=True, slots=True, eq=False)

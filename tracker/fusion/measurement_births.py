@@ -12,7 +12,7 @@ from tracker.fusion.target_model import TargetModel
 from tracker.geometry.camera import Camera, stacked
 from tracker.kernels import births
 from tracker.kernels.births import Refinement
-from tracker.kernels.gating import Measurements
+from tracker.kernels.kalman import Measurements
 from tracker.sequences.sequence import Room
 
 UNEXPLAINED = 0.5

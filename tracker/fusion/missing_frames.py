@@ -16,8 +16,8 @@ from numpy import ndarray
 
 from tracker.fusion.measurement_births import UNEXPLAINED, Evidence, Newborns
 from tracker.fusion.record import Record
-from tracker.kernels.gating import Measurements
-from tracker.kernels.labelled.step import CameraBoxes
+from tracker.kernels.kalman import Measurements
+from tracker.kernels.labelled import CameraBoxes
 from tracker.single_view.protocol import ViewResult
 
 LONGEST = 0.2

@@ -14,11 +14,11 @@ from tracker.fusion import missing_frames, visibility
 from tracker.fusion.heights import HeightBounds
 from tracker.fusion.measurement_births import BirthModel, Evidence, MeasurementBirths, Newborns
 from tracker.fusion.missing_frames import Recent, StepEvidence
-from tracker.fusion.target_model import ExpectedBoxes, TargetModel
-from tracker.fusion.visibility import Visibility
+from tracker.fusion.target_model import TargetModel
 from tracker.kernels import linear_algebra
-from tracker.kernels.labelled.camera_update import CameraRule
-from tracker.kernels.labelled.step import CameraBoxes
+from tracker.kernels.boxes import Hidden
+from tracker.kernels.labelled import CameraBoxes, CameraRule
+from tracker.kernels.measurement import ExpectedBoxes
 from tracker.parameters.groups.fusion import FusionParams
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult
@@ -120,7 +120,7 @@ class FusionModel:
         expected: ExpectedBoxes,
         mixture: GaussianMixture,
         occluders: Float[ndarray, " J"],
-    ) -> Visibility:
+    ) -> Hidden:
         """Compute p_D of every component in one camera, with occlusion.
 
         Args:

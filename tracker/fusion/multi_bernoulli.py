@@ -28,10 +28,9 @@ from tracker.fusion.protocol import FusionResult
 from tracker.fusion.record import REPORTING_THRESHOLD, Record, sum_associations
 from tracker.fusion.reidentification import IdentityBeliefs
 from tracker.geometry.camera import stacked
-from tracker.kernels.gating import Measurements
-from tracker.kernels.labelled import step as step_kernels
-from tracker.kernels.labelled.camera_update import Tracks
-from tracker.kernels.labelled.step import KeepingRule, StepModel
+from tracker.kernels import labelled as step_kernels
+from tracker.kernels.kalman import Measurements
+from tracker.kernels.labelled import KeepingRule, StepModel, Tracks
 from tracker.kernels.lens import Calibrations
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult

@@ -26,11 +26,10 @@ from tracker.fusion.model import CONFIRMED, FusionModel, all_boxes
 from tracker.fusion.place_constraints import PlaceConstraints
 from tracker.fusion.protocol import FusionResult
 from tracker.fusion.record import Ledger, Record
-from tracker.kernels import linear_algebra
-from tracker.kernels.gating import Measurements
-from tracker.kernels.intensity import mixture as mixture_kernels
-from tracker.kernels.labelled import marginals
-from tracker.kernels.labelled.marginals import LabelledWeights, PairOdds
+from tracker.kernels import bernoulli, linear_algebra
+from tracker.kernels import mixtures as mixture_kernels
+from tracker.kernels.bernoulli import LabelledWeights, PairOdds
+from tracker.kernels.kalman import Measurements
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult
 
@@ -163,7 +162,7 @@ class SequentialPhd:
     def _update(self, work: _Work, index: int, view: ViewResult) -> None:
         """Update by the boxes of one camera, and reduce the mixture."""
         p, model, mixture = self._parameters, self._model, work.mixture
-        measurements = model.target.measured(view, p.measurement_sigma)
+        measurements = model.target.measured(view.boxes, view.sigmas, p.measurement_sigma)
         if view.blind:
             work.measured.append(measurements)
             work.unexplained.append(np.zeros(0))
@@ -341,7 +340,7 @@ def associate_labels(
     """
     size, boxes = predicted.size, len(updated.measurement_weights)
     owner, box = updated.parents[size:], updated.measurements[size:]
-    shared = marginals.share_boxes(
+    shared = bernoulli.share_boxes(
         LabelledWeights(predicted.weights, predicted.labels, detection_probability),
         births.start,
         births.stop,

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 from numpy import ndarray
 
 from tracker.geometry.camera import Camera
 from tracker.kernels import boxes, measurement
-from tracker.kernels.gating import Measurements
-from tracker.kernels.kalman import Expected
-from tracker.kernels.measurement import Target
+from tracker.kernels.kalman import Measurements
+from tracker.kernels.measurement import ExpectedBoxes, Target
 from tracker.parameters.groups.fusion import FusionParams
-from tracker.single_view.protocol import ViewResult
 
 MeasurementKind = Literal["centre", "box", "box_and_width"]
 UpdateKind = Literal["extended", "unscented"]
@@ -34,38 +31,6 @@ _FROM_BOX: dict[MeasurementKind, Float[ndarray, "m 4"]] = {
 
 _DEFAULTS = FusionParams()
 _NO_COVARIANCES = np.zeros((0, 3, 3))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class ExpectedBoxes:
-    """The predicted measurements of J states in one camera."""
-
-    expected: Expected
-    """The values are centre (x, y), or horizontal centre, top, bottom (and width), in pixels; the
-    Jacobians are pixels per metre, and zero for velocities; the spreads are the noise added by the
-    nonlinearity of the projection, squared pixels, one for each state or none. The same is given
-    for the second posture, lying or bent, where it is modelled."""
-    boxes: Float[ndarray, "J 4"]
-    """left, top, right, bottom in pixels, not clipped."""
-    depths: Float[ndarray, " J"]
-    """Distance from the lens, metres."""
-    valid: Bool[ndarray, " J"]
-    """Whether middle, head and foot lie in front of the lens."""
-
-    @property
-    def values(self) -> Float[ndarray, "J m"]:
-        """Predicted measurement of each upright target, pixels."""
-        return self.expected.values
-
-    @property
-    def jacobians(self) -> Float[ndarray, "J m d"]:
-        """Derivative of the values by the state, of each upright target, pixels per metre."""
-        return self.expected.jacobians
-
-    @property
-    def spreads(self) -> Float[ndarray, "K m m"]:
-        """Noise added by the nonlinearity, of upright targets, squared pixels; K is J or 0."""
-        return self.expected.spreads
 
 
 class TargetModel:
@@ -171,13 +136,13 @@ class TargetModel:
         target = self.target(states.shape[1])
         if covariances is None:
             target, covariances = target._replace(unscented=False), _NO_COVARIANCES
-        found = measurement.expected_measurements(
+        found: ExpectedBoxes = measurement.expected_measurements(
             np.ascontiguousarray(states, dtype=float),
             np.ascontiguousarray(covariances),
             target,
             camera.calibration,
         )
-        return ExpectedBoxes(found.expected, found.boxes, found.depths, found.valid)
+        return found
 
     def body_shifts(
         self, camera: Camera, states: Float[ndarray, "J d"], radius: float
@@ -197,16 +162,7 @@ class TargetModel:
         )
         return np.asarray(found)
 
-    def measured(self, view: ViewResult, factor: float) -> Measurements:
-        """Convert the boxes of a camera to measurements z with noise R in squared pixels.
-
-        Args:
-            view: Boxes and their standard deviations, pixels.
-            factor: Factor on the standard deviations.
-        """
-        return self.measured_boxes(view.boxes, view.sigmas, factor)
-
-    def measured_boxes(
+    def measured(
         self, boxes: Float[ndarray, "M 4"], sigmas: Float[ndarray, "M 4"], factor: float
     ) -> Measurements:
         """Convert M boxes to measurements z with noise R in squared pixels.

@@ -19,7 +19,7 @@ from tracker.filters import gaussian_mixture
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion.protocol import FusionResult
 from tracker.kernels import linear_algebra
-from tracker.kernels.intensity import mixture as mixture_kernels
+from tracker.kernels import mixtures as mixture_kernels
 from tracker.sequences.sequence import Room
 
 Rule = Literal["components", "boxes"]

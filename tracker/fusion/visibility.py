@@ -2,31 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Float, Int
 from numpy import ndarray
 
 from tracker.filters.gaussian_mixture import GaussianMixture
-from tracker.fusion.target_model import ExpectedBoxes
 from tracker.geometry.camera import Camera
 from tracker.kernels import boxes as box_kernels
-from tracker.kernels.boxes import Occlusion
+from tracker.kernels.boxes import Hidden, Occlusion
+from tracker.kernels.measurement import ExpectedBoxes
 
 REPORTING_SHARE = 0.2
 """Share of a target's box that must be covered for its occluder to be reported. It has no effect
 on the tracks."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Visibility:
-    """Detection probabilities of one camera for J targets, and their occluders."""
-
-    detection_probabilities: Float[ndarray, " J"]
-    """p_D of each target, 0 … 1."""
-    hidden_by: Int[ndarray, " J"]
-    """Label of the occluder that covers most of each target, -1 for none."""
 
 
 def inside_probability(
@@ -68,7 +56,7 @@ def visibility(
     weights: Float[ndarray, " L"],
     strength: float,
     near: float,
-) -> Visibility:
+) -> Hidden:
     """Lower each p_D where other targets stand in front.
 
         p_j ← p_j Π_l (1 − ρ w_l a(j, l))
@@ -89,8 +77,8 @@ def visibility(
     """
     if strength == 0.0 or not len(occluders):
         unoccluded = np.full(len(detection_probabilities), -1, dtype=np.int64)
-        return Visibility(detection_probabilities, unoccluded)
-    found = box_kernels.hide(
+        return Hidden(detection_probabilities, unoccluded)
+    found: Hidden = box_kernels.hide(
         detection_probabilities,
         expected.boxes,
         expected.depths,
@@ -100,4 +88,4 @@ def visibility(
         weights,
         Occlusion(near, strength, REPORTING_SHARE),
     )
-    return Visibility(found.detection_probabilities, found.hidden_by)
+    return found

@@ -10,7 +10,7 @@ from numpy import ndarray
 
 from tracker.kernels.boxes import expected_boxes
 from tracker.kernels.compilation import kernel
-from tracker.kernels.gating import Measurements
+from tracker.kernels.kalman import Measurements
 from tracker.kernels.lens import Calibrations, one_camera
 from tracker.kernels.linear_algebra import factorise, solve, squared_length
 from tracker.kernels.measurement import Target

@@ -9,8 +9,7 @@ from numpy import ndarray
 
 from tracker.kernels.boxes import expected_boxes
 from tracker.kernels.compilation import kernel
-from tracker.kernels.gating import Measurements
-from tracker.kernels.kalman import Expected
+from tracker.kernels.kalman import Expected, Measurements
 from tracker.kernels.lens import Calibration
 from tracker.kernels.linear_algebra import factorise, solve
 
@@ -49,13 +48,32 @@ class ExpectedBoxes(NamedTuple):
     """The predicted measurements of J targets in a camera."""
 
     expected: Expected
-    """Measurements of the upright targets, infinite where invalid, and in the other posture."""
+    """The values are centre (x, y), or horizontal centre, top, bottom (and width), in pixels,
+    infinite in the other posture where invalid; the Jacobians are pixels per metre, and zero for
+    velocities; the spreads are the noise added by the nonlinearity of the projection, squared
+    pixels, one for each state or none. The same is given for the second posture, lying or bent,
+    where it is modelled."""
     boxes: ndarray
     """(J, 4) left, top, right, bottom of the upright targets, not clipped, pixels."""
     depths: ndarray
     """(J,), distance from the lens, metres."""
     valid: ndarray
-    """(J,), whether the target lies in front of the lens."""
+    """(J,), whether middle, head and foot lie in front of the lens."""
+
+    @property
+    def values(self) -> ndarray:
+        """Predicted measurement of each upright target (J, m), pixels."""
+        return self.expected.values
+
+    @property
+    def jacobians(self) -> ndarray:
+        """Derivative of the values by the state (J, m, d), pixels per metre."""
+        return self.expected.jacobians
+
+    @property
+    def spreads(self) -> ndarray:
+        """Noise added by the nonlinearity (K, m, m), squared pixels; K is J or 0."""
+        return self.expected.spreads
 
 
 class _SigmaPoints(NamedTuple):

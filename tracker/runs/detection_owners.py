@@ -125,7 +125,7 @@ def _distances(
     covariances = posterior.covariances
     seen = target.expected(camera, posterior.means, covariances)
     expected = seen.expected
-    measured = target.measured(view, p.measurement_sigma)
+    measured = target.measured(view.boxes, view.sigmas, p.measurement_sigma)
     postures = [(expected.values, expected.jacobians, expected.spreads, covariances)]
     if len(expected.posture_values):
         drifted = covariances + expected.posture_drift

@@ -10,8 +10,7 @@ from collections import Counter
 from dataclasses import dataclass
 
 from tracker.runs.run import Run
-from tracker.single_view.dropped import CANDIDATES, DROPPED
-from tracker.single_view.protocol import SHAKE, TRUST, UNCERTAINTY
+from tracker.single_view.protocol import CANDIDATES, DROPPED, SHAKE, TRUST, UNCERTAINTY
 
 _HALF = 0.5
 """Trust in the foreground below which people are not detected by it; uncertainty of the

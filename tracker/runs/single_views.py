@@ -13,7 +13,7 @@ import numpy as np
 from tracker import single_view
 from tracker.runs.run import Cancelled, Run
 from tracker.sequences.pictures.frames import Picture, Pictures
-from tracker.single_view.colour.likeness import Likeness, appearance_of
+from tracker.single_view.colour.templates import Likeness, appearance_of
 from tracker.single_view.protocol import SHAKE, SingleViewMethod, ViewResult
 from tracker.single_view.rectification.sequence import RectifiedSequence
 

@@ -31,7 +31,7 @@ def maker(method: Method) -> Callable[..., SingleViewMethod]:
 
             return ShapesInCamera
         case "jpda":
-            from tracker.single_view.jpda import Jpda
+            from tracker.single_view.jpda.method import Jpda
 
             return Jpda
         case "pseudo_particle":
@@ -51,7 +51,7 @@ def maker(method: Method) -> Callable[..., SingleViewMethod]:
 
             return DetectionPhd
         case "none":
-            from tracker.single_view.none import UnfilteredBoxes
+            from tracker.single_view.detector_boxes import UnfilteredBoxes
 
             return UnfilteredBoxes
     return method.load()
@@ -65,13 +65,6 @@ def create(
     reader: Pictures,
 ) -> SingleViewMethod:
     """Create a single-view method for one camera of a sequence.
-
-    Args:
-        name: Name of the method.
-        sequence: The sequence.
-        camera_index: Index of the camera.
-        parameters: The parameters of the run.
-        reader: Reader of the images.
 
     Raises:
         ValueError: If there is no such method, or the sequence lacks data that it needs.

@@ -1,7 +1,7 @@
 """Possible sizes of a target's box at each place of an image, from the calibrated camera.
 
 The way is from the room to the image: positions in the volume are projected. Three others differ:
-the windows of :mod:`~tracker.single_view.shape.windows` hang from crowns above the floor, around
+the windows of :mod:`~tracker.single_view.shape.finder` hang from crowns above the floor, around
 head and trunk, as those of the training set; :mod:`~tracker.single_view.colour.carrying` goes from
 one drawn box to the room, along the ray of its centre, since a target may be a head without feet;
 and :mod:`~tracker.single_view.detector_boxes` by both ends of a box.
@@ -348,3 +348,36 @@ def entrance_boxes(
         covariances=np.array(covariances).reshape(-1, 4, 4),
         labels=np.zeros(len(means), dtype=np.int64),
     )
+
+
+_LEAST = 0.5
+"""Least half size for which noise is computed, pixels."""
+
+
+def box_sigmas(
+    boxes: Float[ndarray, "N 4"],
+    centre: float,
+    size: float,
+    *,
+    pixels: float = 0.0,
+    extents: float | Float[ndarray, " 2"] = 1.0,
+    largest: float = np.inf,
+) -> Float[ndarray, "N 4"]:
+    """Compute the measurement noise of boxes, proportional to their size, plus some pixels.
+
+    With half sizes h in pixels, of the width and the height,
+
+        σ_centre = √((s_c h / e)² + σ_px²),  σ_size = s_h h
+
+    Args:
+        boxes: Centre and half sizes of N boxes, pixels.
+        centre: s_c, a share of the half size, or metres where ``extents`` are given.
+        size: s_h, a share of the half size.
+        pixels: σ_px, pixels.
+        extents: e, half width and half height of the target, metres; 1 for a share.
+        largest: Half height, pixels, above which the noise of a box increases no further.
+    """
+    half_sizes = np.maximum(boxes[:, 2:], _LEAST)
+    half_sizes = half_sizes * np.minimum(1.0, largest / half_sizes[:, 1:])
+    centres = np.hypot(centre * half_sizes / extents, pixels)
+    return np.concatenate([centres, size * half_sizes], axis=1)

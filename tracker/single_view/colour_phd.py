@@ -23,9 +23,8 @@ from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_phd import BoxPhd, BoxPhdState
 from tracker.single_view.box_sizes import entrance_boxes
 from tracker.single_view.colour.peaks import PeakFinder, Peaks
-from tracker.single_view.dropped import Dropped
-from tracker.single_view.pictures.foreground import pack
-from tracker.single_view.protocol import ViewResult, pack_samples
+from tracker.single_view.pictures.background import pack
+from tracker.single_view.protocol import Dropped, ViewResult, pack_samples
 
 if TYPE_CHECKING:
     from tracker.parameters.catalogue import RunParameters

@@ -7,6 +7,7 @@ A detector gives the ends of an upright target, which determine its place in the
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import Bool, Float, Float16, Int
@@ -16,7 +17,12 @@ from tracker.geometry.boxes import Boxes
 from tracker.geometry.camera import Camera
 from tracker.parameters.groups.detections import DetectionBoxParams
 from tracker.sequences.sequence import Room, Sequence
-from tracker.single_view.dropped import Dropped
+from tracker.single_view.protocol import Dropped, ViewResult
+
+if TYPE_CHECKING:
+    from tracker.parameters.catalogue import RunParameters
+    from tracker.sequences.pictures.frames import Pictures
+
 
 _AT_ONCE = 4096
 """Number of boxes whose places in the room are in memory at a time."""
@@ -54,6 +60,20 @@ class Detected:
     def dropped(self) -> Dropped:
         """The boxes that contradict the room."""
         return Dropped.of(self.boxes, {"a place outside the room": ~self.plausible})
+
+    @property
+    def result(self) -> ViewResult:
+        """The result of a method that passes the boxes on: those that contradict the room remain
+        among the measurements alone."""
+        good, dropped = self.plausible, self.dropped
+        return replace(
+            ViewResult.of_boxes(self.boxes[good], self.scores[good], self.sigmas[good]),
+            embeddings=self.embeddings_of(good),
+            measurements=self.boxes,
+            measurement_scores=self.scores,
+            information=dropped.information(int(good.sum())),
+            dropped=dropped,
+        )
 
     def embeddings_of(
         self, chosen: slice | Bool[ndarray, " N"] | Int[ndarray, " K"]
@@ -232,3 +252,33 @@ def meets_room(
     leave = np.where(still, 1.0, np.maximum(first, second))
     entered = np.maximum(enter.max(axis=1), 0.0)
     return np.asarray(entered <= np.minimum(leave.min(axis=1), 1.0))
+
+
+class UnfilteredBoxes:
+    """The boxes of the sequence's ``detections``, with the noise of the parameters.
+
+    Boxes that contradict the room remain among the measurements and are not passed on.
+    """
+
+    def __init__(
+        self,
+        sequence: Sequence,
+        camera_index: int,
+        parameters: RunParameters,
+        reader: Pictures | None = None,
+    ) -> None:
+        """Prepare the boxes of one camera.
+
+        Raises:
+            ValueError: If the camera has no detections.
+        """
+        self._boxes = DetectorBoxes(sequence, camera_index, parameters.of(DetectionBoxParams))
+
+    def start(self) -> None:
+        """The method has no state."""
+
+    def step(
+        self, state: None, frame: int, picture: ndarray | None, rng: np.random.Generator
+    ) -> tuple[None, ViewResult]:
+        """Return the boxes of one step with a sufficient score and a possible place."""
+        return None, self._boxes.at(frame).result

@@ -1,19 +1,74 @@
 """The interface of every single-view method: from an image or detections to weighted boxes.
 
+A method also reports the candidates that it rejected, with the gates that rejected them.
+
 [ZW21] Zhu, Wang, "3D target position tracking based on probability hypothesis
 density filtering", 2021.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal, Protocol
 
 import numpy as np
-from jaxtyping import Float, Float16, Int, Int16, UInt8
+from jaxtyping import Bool, Float, Float16, Float32, Int, Int8, Int16, UInt8
 from numpy import ndarray
 
-from tracker.single_view.dropped import Dropped
+CANDIDATES, DROPPED = "candidates", "dropped for "
+"""Names in a result's information: the number of candidates, and, followed by the name of a gate,
+the number that it rejected."""
+
+GATES = (
+    "colour", "foreground", "surroundings", "shape", "another at its place", "another's shoulders",
+    "outline", "a place outside the room",
+)  # fmt: skip
+"""All gates that methods may have, by number."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Dropped:
+    """The D rejected candidates of one image."""
+
+    boxes: Float32[ndarray, "D 4"]
+    """``centre_x, centre_y, half_width, half_height`` in pixels."""
+    gates: Int8[ndarray, " D"]
+    """Index into :data:`GATES` of the gate that rejected each."""
+
+    @staticmethod
+    def none() -> Dropped:
+        """No rejected candidate, as for a method without gates."""
+        return Dropped(np.zeros((0, 4), np.float32), np.zeros(0, np.int8))
+
+    @staticmethod
+    def of(candidates: Float[ndarray, "M 4"], gates: Mapping[str, Bool[ndarray, " M"]]) -> Dropped:
+        """Select the rejected ones of M candidates.
+
+        Args:
+            candidates: Boxes of the candidates, pixels.
+            gates: Which of them each gate rejected; at most one gate for each.
+        """
+        numbers = np.full(len(candidates), -1, np.int8)
+        for gate, rejected in gates.items():
+            numbers[rejected] = GATES.index(gate)
+        gone = numbers >= 0
+        return Dropped(candidates[gone].astype(np.float32), numbers[gone])
+
+    def information(self, passed: int) -> dict[str, float]:
+        """The number of candidates and of those that each gate rejected, by name.
+
+        Args:
+            passed: Number of candidates that no gate rejected.
+        """
+        counts = np.bincount(self.gates, minlength=len(GATES))
+        total = {CANDIDATES: float(passed + len(self.gates))}
+        return total | {
+            DROPPED + gate: float(count)
+            for gate, count in zip(GATES, counts.tolist(), strict=True)
+            if count
+        }
+
 
 TRUST, UNCERTAINTY = "trust in the foreground", "doubt in the background"
 """Names in a result's information: the trust in the foreground at people with templates, and the
@@ -73,12 +128,12 @@ class ViewResult:
     """Ellipses of the gates of the method's targets: centre x and y in pixels, and
     xx, xy, yy of the matrix C with (z − c)ᵀ C⁻¹ (z − c) = 1 on the border, pixels squared."""
     foreground: UInt8[ndarray, " bytes"] | None = None
-    """The foreground mask, packed by ``tracker.single_view.pictures.foreground.pack``; None where
+    """The foreground mask, packed by ``tracker.single_view.pictures.background.pack``; None where
     the method has none or there was no image."""
     likenesses: Float[ndarray, "N P"] = field(default_factory=lambda: np.zeros((0, 0)))
     """Probability that the colours of each box are those of each of P people with templates, given
     that it shows one of them; (0, 0) where there was no image, or fewer than two have templates.
-    It is filled in after the method by :mod:`tracker.single_view.colour.likeness`."""
+    It is filled in after the method by :mod:`tracker.single_view.colour.templates`."""
     embeddings: Float16[ndarray, "N A"] = field(
         default_factory=lambda: np.zeros((0, 0), np.float16)
     )
@@ -133,8 +188,23 @@ class ViewResult:
     @staticmethod
     def of_no_frame() -> ViewResult:
         """The result of a step at which the camera had no frame."""
-        nothing = ViewResult.of_boxes(np.zeros((0, 4)), np.zeros(0), np.zeros((0, 4)))
-        return replace(nothing, blind=True)
+        return replace(
+            ViewResult.of_boxes(np.zeros((0, 4)), np.zeros(0), np.zeros((0, 4))), blind=True
+        )
+
+    @staticmethod
+    def of_estimates(
+        boxes: Float[ndarray, "E 4"], weights: Float[ndarray, " E"], labels: Int[ndarray, " E"]
+    ) -> ViewResult:
+        """Make a result without boxes for the fusion, as at a step without an image.
+
+        Args:
+            boxes: Centre and half sizes of E estimates, pixels.
+            weights: Weight or existence probability of each estimate.
+            labels: Id of each estimate within this camera, -1 for none.
+        """
+        none = ViewResult.of_boxes(np.zeros((0, 4)), np.zeros(0), np.zeros((0, 4)))
+        return replace(none, estimates=boxes, estimate_weights=weights, estimate_labels=labels)
 
 
 _FRACTION = 4.0

@@ -9,9 +9,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from tracker.smoothing.protocol import NoSmoothing, SmoothingMethod
-from tracker.smoothing.result import Decision, DecisionKind, Smoothed
-from tracker.smoothing.tracks import names_of, tracks_of
+from tracker.smoothing.protocol import (
+    Decision,
+    DecisionKind,
+    NoSmoothing,
+    Smoothed,
+    SmoothingMethod,
+    names_of,
+    tracks_of,
+)
 
 if TYPE_CHECKING:
     from tracker.parameters import Method

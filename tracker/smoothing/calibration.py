@@ -14,10 +14,10 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
-from tracker.fusion.target_model import ExpectedBoxes
 from tracker.geometry.boxes import Boxes
 from tracker.geometry.camera import Camera
-from tracker.kernels.gating import Measurements
+from tracker.kernels.kalman import Measurements
+from tracker.kernels.measurement import ExpectedBoxes
 from tracker.sequences.sequence import Sequence
 from tracker.smoothing.noise import NoiseModel
 from tracker.smoothing.paths import Paths

@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
 from tracker.geometry.boxes import Boxes, paired_overlaps
-from tracker.kernels.smoothing.presence import ExistenceTransitions, presence
+from tracker.kernels.smoothing.passes import ExistenceTransitions, presence
 from tracker.parameters.groups.smoothing import SmoothingParams
 from tracker.smoothing.paths import Paths
 from tracker.smoothing.smoother import BoxAssociations, Smoother

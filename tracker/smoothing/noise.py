@@ -247,12 +247,7 @@ def estimate_noise(sample: NoiseSample) -> NoiseModel:
 
 
 def box_errors(noise: NoiseModel, step_time: float) -> BoxErrors:
-    """Convert a noise model to that of one step, as the likelihood takes it.
-
-    Args:
-        noise: The noise.
-        step_time: Time between two steps, seconds.
-    """
+    """Convert a noise model to that of one step, as the likelihood takes it."""
     kept = float(np.exp(-step_time / noise.time))
     return BoxErrors(noise.white, noise.pixels, noise.persistent, kept, noise.process)
 

@@ -23,15 +23,21 @@ from numpy import ndarray
 from tracker.corrections import Correction
 from tracker.corrections.lookup import TrackIndex
 from tracker.fusion.model import FusionModel
-from tracker.fusion.target_model import ExpectedBoxes
-from tracker.kernels.gating import Measurements
-from tracker.kernels.measurement import ExpectedBoxes as SeenBoxes
+from tracker.kernels.kalman import Measurements
+from tracker.kernels.measurement import ExpectedBoxes
 from tracker.kernels.smoothing import evidence, passes
 from tracker.kernels.smoothing.passes import SmoothedRows, drives, sums_around
 from tracker.parameters.groups.fusion import FusionParams
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult
-from tracker.smoothing.bodies import MOST_ROWS, BodyPriors, RowBoxes, estimate_bodies
+from tracker.smoothing.bodies import (
+    MOST_ROWS,
+    BodyPriors,
+    BoxTops,
+    RowBoxes,
+    estimate_bodies,
+    standing_heights,
+)
 from tracker.smoothing.calibration import (
     FEWEST,
     NARROWEST,
@@ -49,7 +55,6 @@ from tracker.smoothing.calibration import (
     upright,
 )
 from tracker.smoothing.camera_errors import CameraErrors, estimate_camera_errors
-from tracker.smoothing.heights import BoxTops, standing_heights
 from tracker.smoothing.noise import (
     LEAST_ROWS,
     NoiseModel,
@@ -60,9 +65,8 @@ from tracker.smoothing.noise import (
     common_variance,
     estimate_noise,
 )
-from tracker.smoothing.paths import Links, Paths
+from tracker.smoothing.paths import CameraBoxes, Links, Paths
 from tracker.smoothing.place_constraints import PlaceMeasurements
-from tracker.smoothing.recording import CameraBoxes
 from tracker.steps import Steps
 
 _T = TypeVar("_T")
@@ -533,7 +537,7 @@ class Smoother:
         covariances: ndarray,
         people: ndarray,
         learnt: Calibration,
-    ) -> SeenBoxes:
+    ) -> ExpectedBoxes:
         """Predict the boxes of states in one camera, with the calibration of each person.
 
         Args:
@@ -545,9 +549,7 @@ class Smoother:
         """
         found = self.model.target.expected(self.model.cameras[camera], states, covariances)
         values = found.expected.values + self._shift(learnt, camera, states, people, found)
-        return SeenBoxes(
-            found.expected._replace(values=values), found.boxes, found.depths, found.valid
-        )
+        return found._replace(expected=found.expected._replace(values=values))
 
     def _shift(
         self,
@@ -749,7 +751,7 @@ class Smoother:
 
         An offset of the boxes of all cameras cannot be distinguished from people's heights: only
         the differences between cameras are subtracted. See
-        :func:`tracker.smoothing.heights.standing_heights`.
+        :func:`tracker.smoothing.bodies.standing_heights`.
 
         Args:
             paths: n paths with the covariances that are reported.

@@ -22,14 +22,12 @@ from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult
 from tracker.smoothing import lifetimes
 from tracker.smoothing.calibration import Calibration
-from tracker.smoothing.paths import Links, Paths, contested_shares
-from tracker.smoothing.protocol import EmptyStore, ResultStore
-from tracker.smoothing.recording import CameraBoxes
-from tracker.smoothing.result import Decision, LinkedTracklets, Smoothed
+from tracker.smoothing.paths import CameraBoxes, Links, Paths, contested_shares
+from tracker.smoothing.protocol import Decision, EmptyStore, LinkedTracklets, ResultStore, Smoothed
 from tracker.smoothing.smoother import BoxAssociations, Fitted, Smoother
 from tracker.smoothing.tracklets import linking
+from tracker.smoothing.tracklets.appearance import Appearances
 from tracker.smoothing.tracklets.linking import LinkedTracks
-from tracker.smoothing.tracklets.people import Appearances
 from tracker.smoothing.tracklets.splitting import Tracked
 from tracker.steps import Steps
 

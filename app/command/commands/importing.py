@@ -185,7 +185,7 @@ def _check(command: Check) -> int:
 
 def _checks(sequence: Any) -> list[Any]:
     from tracker.io.checks import check
-    from tracker.single_view.rectification.shake_check import check_shake
+    from tracker.single_view.rectification.sequence import check_shake
 
     return [*check(sequence), *check_shake(sequence)]
 

@@ -26,7 +26,7 @@ from tracker.runs.fitting import default_parameters, unfit_methods
 from tracker.runs.pipeline import Cancelled, compute
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
-from tracker.single_view.rectification.shake_check import check_shake
+from tracker.single_view.rectification.sequence import check_shake
 
 MOST_STEPS = 200
 """Of which pictures are compared; boxes are compared at all steps."""

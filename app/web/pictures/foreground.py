@@ -11,7 +11,7 @@ from numpy import ndarray
 from app.state.snapshot import Snapshot
 from app.web.dependencies import ERRORS, Bench
 from app.web.pictures.address import Kept, checked, missing, png
-from tracker.single_view.pictures.foreground import unpack
+from tracker.single_view.pictures.background import unpack
 
 TINT = (214, 100, 244)
 """Blue, green, red: a magenta that neither rooms nor the ids' colours have."""

@@ -17,8 +17,7 @@ from tracker.parameters.groups.colour_phd import ColourPhdParams
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import BoxSizes
-from tracker.single_view.colour.likelihood_map import likelihood_map
-from tracker.single_view.colour.templates import read_templates
+from tracker.single_view.colour.templates import likelihood_map, read_templates
 from tracker.single_view.pictures.colour import ColourModel
 
 LOW, HIGH = (200, 84, 26), (150, 255, 190)

@@ -16,8 +16,7 @@ from tracker.parameters.groups.colour_phd import ColourPhdParams
 from tracker.runs.detection_owners import detection_owners
 from tracker.runs.pipeline import Run
 from tracker.sequences.sequence import Sequence
-from tracker.single_view.dropped import GATES
-from tracker.single_view.protocol import ViewResult, unpack_samples
+from tracker.single_view.protocol import GATES, ViewResult, unpack_samples
 
 WORTH_A_REASON = 0.9
 """Below this share of the chosen p_D, a camera's p_D for a track is explained."""

@@ -11,7 +11,8 @@ from tests.benchmarks.measure import Measurement, ratio, seconds
 from tests.filters.mixtures import random_mixture, reference_merge, reference_update
 from tracker.filters import gaussian_mixture, phd
 from tracker.kernels.kalman import Expected
-from tracker.single_view.pictures import colour, particles
+from tracker.single_view.pictures import colour
+from tracker.single_view.pseudo_particle import particles
 
 
 def reference_climb(boxes: ndarray, counts: ndarray, start: ndarray, bandwidth: float) -> ndarray:

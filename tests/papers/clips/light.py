@@ -15,7 +15,7 @@ from tracker.evaluation.figures import number
 from tracker.parameters.groups.foreground import ForegroundParams
 from tracker.runs.pipeline import Cancelled
 from tracker.runs.processes import WorkerControl
-from tracker.single_view.pictures.foreground import AdaptiveForeground, first_background
+from tracker.single_view.pictures.adaptive import AdaptiveForeground, first_background
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

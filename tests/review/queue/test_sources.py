@@ -29,7 +29,7 @@ from tracker.review.queue.unclaimed import Unclaimed, _chains, find_unclaimed
 from tracker.runs.run import Run
 from tracker.sequences.sequence import Room
 from tracker.single_view.protocol import ViewResult
-from tracker.smoothing.result import LinkedTracklets
+from tracker.smoothing.protocol import LinkedTracklets
 from tracker.steps.steps import Ragged, Steps
 
 

@@ -19,12 +19,13 @@ from tests.single_view.pictures.furnished import (
 )
 from tracker.kernels.pictures.foreground import above
 from tracker.parameters.groups.foreground import ForegroundParams
-from tracker.single_view.pictures.foreground import AdaptiveForeground, first_background
-from tracker.single_view.pictures.foreground.adaptive import (
+from tracker.single_view.pictures.adaptive import (
+    AdaptiveForeground,
     AdaptiveState,
     choose_iteration,
     clean,
     cluster,
+    first_background,
 )
 
 PUBLISHED = ForegroundParams(

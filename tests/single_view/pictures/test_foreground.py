@@ -20,8 +20,14 @@ from tests.single_view.pictures.furnished import (
 )
 from tracker.kernels.pictures.foreground import foreground_mask
 from tracker.parameters.groups.foreground import ForegroundParams
-from tracker.single_view.pictures import foreground
-from tracker.single_view.pictures.foreground import BackgroundModel, LearntForeground, tone_curve
+from tracker.single_view.pictures.background import (
+    BackgroundModel,
+    LearntForeground,
+    pack,
+    tone_curve,
+    unpack,
+)
+from tracker.single_view.pictures.foreground import box_shares, integral
 
 PLAIN = ForegroundParams(threshold=24.0)
 
@@ -84,12 +90,12 @@ def test_shares_of_boxes_agree_with_counting() -> None:
     mask = (rng.random((30, 40)) < 0.4).astype(np.uint8)
     corners = rng.uniform(-10, 50, (200, 2, 2))
     edges = np.concatenate([corners.min(axis=1), corners.max(axis=1)], axis=1)
-    shares = foreground.box_shares(foreground.integral(mask), edges)
+    shares = box_shares(integral(mask), edges)
     y, x = np.mgrid[:30, :40]
     for (left, top, right, bottom), share in zip(edges, shares, strict=True):
         inside = (x >= left) & (x <= right) & (y >= top) & (y <= bottom)
         assert share == pytest.approx(mask[inside].mean() if inside.any() else 0.0)
-    assert len(foreground.box_shares(foreground.integral(mask), np.zeros((0, 4)))) == 0
+    assert len(box_shares(integral(mask), np.zeros((0, 4)))) == 0
 
 
 def test_the_mask_agrees_with_numpy() -> None:
@@ -128,23 +134,23 @@ def test_the_learnt_model_has_the_face_of_all_models() -> None:
     )
 )
 def test_a_packed_mask_comes_back(mask: ndarray) -> None:
-    packed = foreground.pack(mask)
+    packed = pack(mask)
     assert packed.dtype == np.uint8
     assert packed.ndim == 1
-    np.testing.assert_array_equal(foreground.unpack(packed), mask)
+    np.testing.assert_array_equal(unpack(packed), mask)
 
 
 def test_a_mask_of_people_is_packed_into_little() -> None:
     mask = np.zeros((288, 360), dtype=np.uint8)
     for x in (60, 150, 260):
         cv2.ellipse(mask, (x, 150), (25, 90), 0, 0, 360, 1, -1)
-    assert foreground.pack(mask).nbytes < 1500
+    assert pack(mask).nbytes < 1500
 
 
 @pytest.mark.parametrize("size", [0, 5, 8, 60])
 def test_what_is_no_packed_mask_is_refused(size: int) -> None:
     with pytest.raises(ValueError, match=f"expected a packed mask, got {size} bytes"):
-        foreground.unpack(np.full(size, 7, dtype=np.uint8))
+        unpack(np.full(size, 7, dtype=np.uint8))
 
 
 def test_whoever_is_to_stop_stops_while_a_background_is_learnt() -> None:

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy import ndarray
 
-from tracker.single_view.pictures import mean_shift
+from tracker.single_view.colour import peaks
 
 CENTRES = np.array([[60.0, 50.0, 10.0, 15.0], [110.0, 52.0, 12.0, 16.0], [62.0, 140.0, 8.0, 12.0]])
 
@@ -25,8 +25,8 @@ def boxes_around(centres: ndarray, counts: list[int], seed: int = 0) -> ndarray:
 
 
 def climb(boxes: ndarray, weights: ndarray, most: int = 20) -> tuple[ndarray, ndarray]:
-    starts = mean_shift.starts(boxes, weights, most, spread=True)
-    return mean_shift.modes(boxes, weights, boxes[starts], bandwidth=0.6, merge_distance=1.0)
+    starts = peaks.heaviest_samples(boxes, weights, most, spread=True)
+    return peaks.modes(boxes, weights, boxes[starts], bandwidth=0.6, merge_distance=1.0)
 
 
 def test_the_modes_of_a_mixture_are_found_densest_first() -> None:
@@ -61,15 +61,15 @@ def test_a_mode_is_where_the_weighted_mean_of_its_neighbours_is() -> None:
         offsets = (boxes - mode) / (0.6 * mode[[2, 3, 2, 3]])
         kernel = weights * np.exp(-0.5 * (offsets**2).sum(axis=1))
         step = (kernel @ boxes / kernel.sum() - mode) / mode[[2, 3, 2, 3]]
-        assert np.linalg.norm(step) < 2 * mean_shift.TOLERANCE
+        assert np.linalg.norm(step) < 2 * peaks.TOLERANCE
         assert density == pytest.approx(kernel.sum(), rel=0.03)
 
 
 def test_spread_starts_reach_the_weak_person_beside_the_strong_one() -> None:
     boxes = boxes_around(CENTRES[:2], [300, 100])
     weights = np.repeat([1.0, 0.01], [300, 100])
-    spread = mean_shift.starts(boxes, weights, 20, spread=True)
-    heaviest = mean_shift.starts(boxes, weights, 20, spread=False)
+    spread = peaks.heaviest_samples(boxes, weights, 20, spread=True)
+    heaviest = peaks.heaviest_samples(boxes, weights, 20, spread=False)
     assert (spread >= 300).any()
     assert (heaviest < 300).all()
     assert len(heaviest) == 20
@@ -77,9 +77,9 @@ def test_spread_starts_reach_the_weak_person_beside_the_strong_one() -> None:
 
 def test_an_empty_sample_has_no_modes() -> None:
     nothing = np.zeros((0, 4))
-    assert len(mean_shift.starts(nothing, np.zeros(0), 20, spread=True)) == 0
+    assert len(peaks.heaviest_samples(nothing, np.zeros(0), 20, spread=True)) == 0
     for starts in (nothing, CENTRES):
-        modes, densities = mean_shift.modes(
+        modes, densities = peaks.modes(
             nothing, np.zeros(0), starts, bandwidth=0.5, merge_distance=1.0
         )
         assert modes.shape == (0, 4)
@@ -88,6 +88,6 @@ def test_an_empty_sample_has_no_modes() -> None:
 
 def test_samples_without_weight_have_no_modes() -> None:
     boxes = boxes_around(CENTRES, [10, 10, 10])
-    assert len(mean_shift.starts(boxes, np.zeros(30), 20, spread=False)) == 0
-    modes, _ = mean_shift.modes(boxes, np.zeros(30), CENTRES, bandwidth=0.5, merge_distance=1.0)
+    assert len(peaks.heaviest_samples(boxes, np.zeros(30), 20, spread=False)) == 0
+    modes, _ = peaks.modes(boxes, np.zeros(30), CENTRES, bandwidth=0.5, merge_distance=1.0)
     assert len(modes) == 0

@@ -8,7 +8,8 @@ from numpy import ndarray
 from numpy.testing import assert_array_equal
 
 from tracker.parameters.groups.foreground import ForegroundParams
-from tracker.single_view.pictures.foreground import BackgroundModel, MovingForeground, spread_steps
+from tracker.single_view.pictures.background import BackgroundModel, MovingForeground
+from tracker.single_view.pictures.foreground import spread_steps
 
 
 def plain(level: int = 100) -> ndarray:

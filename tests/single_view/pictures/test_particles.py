@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy import ndarray
 
-from tracker.kernels import particles as particle_kernels
-from tracker.single_view.pictures import particles
-from tracker.single_view.pictures.particles import Clusters, clusters
+from tracker.kernels.pictures import images
+from tracker.single_view.pseudo_particle import particles
+from tracker.single_view.pseudo_particle.particles import Clusters, clusters
 
 CENTRES = np.array([[60.0, 50.0, 10.0, 15.0], [110.0, 52.0, 12.0, 16.0], [62.0, 140.0, 8.0, 12.0]])
 
@@ -115,7 +115,7 @@ def test_a_climb_never_goes_down() -> None:
         offsets = (boxes[None, :, :2] - points[:, None, :2]) / [10.0, 14.0]
         return (counts * np.maximum(1.0 - (offsets**2).sum(axis=2), 0.0)).sum(axis=1)
 
-    points, _ = particle_kernels.epanechnikov_climb(boxes, counts, one_group(boxes), 1.0, 30, 0.0)
+    points, _ = images.epanechnikov_climb(boxes, counts, one_group(boxes), 1.0, 30, 0.0)
     assert np.all(density(points) >= density(boxes) - 1e-9)
 
 

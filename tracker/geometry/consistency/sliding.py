@@ -12,7 +12,7 @@ from numpy import ndarray
 from tracker.geometry.camera import Camera
 from tracker.geometry.consistency.likelihood import HEIGHT_SIGMA, SIGMA
 from tracker.geometry.consistency.observed import Rays
-from tracker.kernels import sliding
+from tracker.kernels import consistency
 
 DEPTH_SIGMA = float(np.sqrt(HEIGHT_SIGMA**2 + 2.0 * SIGMA**2))
 """σ_λ: standard deviation of the logarithm of the distance that is estimated from a box's size, by
@@ -88,7 +88,7 @@ def agreement_by_offset(
 
     The size of a box in camera ``one`` gives the person's distance, and so predicts the box in the
     other camera: across the epipolar line up to the noise, along it up to the error of that
-    distance. :mod:`tracker.kernels.sliding` has the equation.
+    distance. :mod:`tracker.kernels.consistency` has the equation.
 
     Args:
         one: The boxes by which positions are predicted.
@@ -110,7 +110,7 @@ def agreement_by_offset(
     )
     starts = np.concatenate([[0], np.cumsum(counts[steps])])
     expected, tangents = _predicted_boxes(other.camera, one, rows, height)
-    fits: tuple[ndarray, ndarray] = sliding.slide(
+    fits: tuple[ndarray, ndarray] = consistency.slide(
         expected, tangents, starts, steps, other.ends, other.following, other.starts,
         np.asarray(offsets, dtype=float), SIGMA, DEPTH_SIGMA,
     )  # fmt: skip

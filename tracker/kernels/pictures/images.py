@@ -2,6 +2,8 @@
 
 Boxes are rows of ``centre_x, centre_y, half_width, half_height`` in pixels. Every
 kernel must agree with a NumPy counterpart in the tests.
+
+[CRM03] Comaniciu, Ramesh, Meer, "Kernel-based object tracking", IEEE TPAMI 25(5), 2003.
 """
 
 from __future__ import annotations
@@ -208,41 +210,6 @@ def box_means(integral: ndarray, edges: ndarray) -> ndarray:
 
 
 @pixel_kernel
-def spread_starts(samples: ndarray, weights: ndarray, order: ndarray, most: int) -> ndarray:
-    """Select the heaviest samples that are a box's size apart from each other.
-
-    Args:
-        samples: (S, 4), centre x, centre y, half width, half height.
-        weights: (S,), weights; samples of weight 0 are never selected.
-        order: (S,) indices, heaviest first.
-        most: Largest number of samples.
-
-    Returns:
-        Indices of the selected samples.
-    """
-    chosen = np.empty(most, dtype=np.int64)
-    count = 0
-    for rank in range(len(order)):
-        if count == most:
-            break
-        i = order[rank]
-        if not weights[i] > 0.0:
-            break
-        apart = True
-        for k in range(count):
-            j = chosen[k]
-            u = (samples[i, 0] - samples[j, 0]) / samples[j, 2]
-            v = (samples[i, 1] - samples[j, 1]) / samples[j, 3]
-            if u * u + v * v < 1.0:
-                apart = False
-                break
-        if apart:
-            chosen[count] = i
-            count += 1
-    return chosen[:count].copy()
-
-
-@pixel_kernel
 def mean_shift(
     samples: ndarray,
     weights: ndarray,
@@ -307,7 +274,9 @@ def mean_shift(
 
 
 @pixel_kernel
-def keep_apart(boxes: ndarray, densities: ndarray, order: ndarray, distance: float) -> ndarray:
+def keep_apart(
+    boxes: ndarray, densities: ndarray, order: ndarray, distance: float, most: int
+) -> ndarray:
     """Select boxes in the given order, none with a centre near one that is selected already.
 
     Args:
@@ -315,6 +284,7 @@ def keep_apart(boxes: ndarray, densities: ndarray, order: ndarray, distance: flo
         densities: (N,) densities; the first that is not positive ends the selection.
         order: (N,) indices.
         distance: Least distance, in half sizes of the box that is selected already.
+        most: Largest number of boxes.
 
     Returns:
         Indices of the selected boxes.
@@ -322,7 +292,7 @@ def keep_apart(boxes: ndarray, densities: ndarray, order: ndarray, distance: flo
     kept = np.empty(len(order), dtype=np.int64)
     count = 0
     for i in order:
-        if not densities[i] > 0.0:
+        if count == most or not densities[i] > 0.0:
             break
         apart = True
         for k in range(count):
@@ -336,3 +306,176 @@ def keep_apart(boxes: ndarray, densities: ndarray, order: ndarray, distance: flo
             kept[count] = i
             count += 1
     return kept[:count].copy()
+
+
+@pixel_kernel
+def follow_colours(
+    bins: ndarray,
+    moving: ndarray,
+    box: ndarray,
+    histogram: ndarray,
+    iterations: int,
+    tolerance: float,
+) -> ndarray:
+    """The centre at which the climb from a box ends ([CRM03]_), or that of the box.
+
+    The equation is in :func:`tracker.single_view.association_matrix.track_transfer.follow`.
+
+    Args:
+        bins: (h, w), the histogram bin of each pixel.
+        moving: (h, w), whether a pixel is in the foreground.
+        box: (4,), box of the target before, centre and half sizes, pixels.
+        histogram: (bins,), q, the target's histogram.
+        iterations: Largest number of shifts.
+        tolerance: Length of a shift below which the climb ends, pixels.
+
+    Returns:
+        (2,), x and y, pixels.
+    """
+    height, width = bins.shape
+    x, y = box[0], box[1]
+    half_x, half_y = max(box[2], 0.5), max(box[3], 0.5)
+    here = np.zeros(len(histogram))
+    for _ in range(iterations):
+        first_x, last_x = max(math.ceil(x - half_x), 0), min(math.floor(x + half_x), width - 1)
+        first_y, last_y = max(math.ceil(y - half_y), 0), min(math.floor(y + half_y), height - 1)
+        here[:] = 0.0
+        total = 0.0
+        for row in range(first_y, last_y + 1):
+            v = (row - y) / half_y
+            for column in range(first_x, last_x + 1):
+                u = (column - x) / half_x
+                weight = 1.0 - u * u - v * v
+                if moving[row, column] and weight > 0.0:
+                    here[bins[row, column]] += weight
+                    total += weight
+        if total == 0.0:
+            break
+        sum_x, sum_y, mass = 0.0, 0.0, 0.0
+        for row in range(first_y, last_y + 1):
+            v = (row - y) / half_y
+            for column in range(first_x, last_x + 1):
+                u = (column - x) / half_x
+                if moving[row, column] and u * u + v * v < 1.0:
+                    b = bins[row, column]
+                    weight = math.sqrt(histogram[b] * total / here[b])
+                    sum_x += weight * column
+                    sum_y += weight * row
+                    mass += weight
+        if mass == 0.0:
+            break
+        shift = math.hypot(sum_x / mass - x, sum_y / mass - y)
+        x, y = sum_x / mass, sum_y / mass
+        if shift < tolerance:
+            break
+    return np.array([x, y])
+
+
+class FixedPoints(NamedTuple):
+    """The ends of S climbs."""
+
+    points: ndarray
+    """(S, 4), centre x, centre y, half width, half height, pixels."""
+    densities: ndarray
+    """(S,), density at each end."""
+
+
+class JoinedModes(NamedTuple):
+    """M modes of S fixed points."""
+
+    owners: ndarray
+    """(S,), index of the mode of each point, -1 for none."""
+    leaders: ndarray
+    """(M,), index of the densest point of each mode."""
+
+
+@pixel_kernel
+def epanechnikov_climb(
+    boxes: ndarray,
+    counts: ndarray,
+    groups: ndarray,
+    bandwidth: float,
+    iterations: int,
+    tolerance: float,
+) -> FixedPoints:
+    """Climb from every box to a fixed point of the mean shift with the Epanechnikov kernel.
+
+    The density is Σ_i c_i max(0, 1 - r_i²), r_i the distance between the centres in units of
+    bandwidth × half size of the current box. Its gradient points to the mean of the boxes
+    with r_i < 1, which is where each step goes.
+
+    Args:
+        boxes: (S, 4), centre x, centre y, half width, half height.
+        counts: (S,), number of particles at each box; boxes of 0 are ignored.
+        groups: (S,), group of each box; boxes of other groups are ignored.
+        bandwidth: Bandwidth, in half sizes.
+        iterations: Largest number of steps.
+        tolerance: Length of a step, in half sizes, below which the climb stops.
+    """
+    size = len(boxes)
+    points = boxes.copy()
+    densities = np.zeros(size)
+    shifted = np.empty(4)
+    for k in range(size):
+        if not counts[k] > 0.0:
+            continue
+        for _ in range(iterations):
+            scale_x = 1.0 / (bandwidth * points[k, 2])
+            scale_y = 1.0 / (bandwidth * points[k, 3])
+            shifted[:] = 0.0
+            total, density = 0.0, 0.0
+            for i in range(size):
+                if groups[i] != groups[k] or not counts[i] > 0.0:
+                    continue
+                u = (boxes[i, 0] - points[k, 0]) * scale_x
+                v = (boxes[i, 1] - points[k, 1]) * scale_y
+                distance = u * u + v * v
+                if distance >= 1.0:
+                    continue
+                total += counts[i]
+                density += counts[i] * (1.0 - distance)
+                for a in range(4):
+                    shifted[a] += counts[i] * boxes[i, a]
+            densities[k] = density
+            if not total > 0.0:
+                break  # the kernel has shrunk and contains no box: this is no mode
+            for a in range(4):
+                shifted[a] /= total
+            u = (shifted[0] - points[k, 0]) / points[k, 2]
+            v = (shifted[1] - points[k, 1]) / points[k, 3]
+            points[k] = shifted
+            if u * u + v * v < tolerance * tolerance:
+                break
+    return FixedPoints(points, densities)
+
+
+@pixel_kernel
+def join_modes(points: ndarray, counts: ndarray, order: ndarray, distance: float) -> JoinedModes:
+    """Assign fixed points that lie close to a denser one to its mode.
+
+    Args:
+        points: (S, 4), fixed points.
+        counts: (S,), number of particles that climbed to each; points of 0 have no mode.
+        order: (S,) indices, densest first.
+        distance: Distance between the centres, in half sizes of the denser one.
+    """
+    size = len(points)
+    owners = np.full(size, -1, dtype=np.int64)
+    leaders = np.empty(size, dtype=np.int64)
+    modes = 0
+    for rank in range(size):
+        i = order[rank]
+        if not counts[i] > 0.0:
+            continue
+        for m in range(modes):
+            leader = leaders[m]
+            u = (points[i, 0] - points[leader, 0]) / points[leader, 2]
+            v = (points[i, 1] - points[leader, 1]) / points[leader, 3]
+            if u * u + v * v < distance * distance:
+                owners[i] = m
+                break
+        if owners[i] < 0:
+            owners[i] = modes
+            leaders[modes] = i
+            modes += 1
+    return JoinedModes(owners, leaders[:modes].copy())

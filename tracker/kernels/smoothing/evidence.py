@@ -8,12 +8,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy import ndarray
 
-from tracker.kernels.association.belief_propagation import Convergence, belief_propagation
+from tracker.kernels.association import Convergence, belief_propagation
 from tracker.kernels.boxes import Occlusion, hide, inside_probability
 from tracker.kernels.compilation import kernel
-from tracker.kernels.gating import Measurements
-from tracker.kernels.kalman import Expected
-from tracker.kernels.labelled.camera_update import CameraRule
+from tracker.kernels.kalman import Expected, Measurements
+from tracker.kernels.labelled import CameraRule
 from tracker.kernels.linear_algebra import factorise, whiten
 from tracker.kernels.measurement import ExpectedBoxes
 

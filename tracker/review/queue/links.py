@@ -11,7 +11,7 @@ from tracker.review.queue.item import TrackRows
 from tracker.review.queue.moves import Move, Tracklet
 from tracker.runs.run import Run
 from tracker.smoothing import names_of
-from tracker.smoothing.result import LinkedTracklets
+from tracker.smoothing.protocol import LinkedTracklets
 
 _TEMPERED = 3.0
 """Divisor of the log odds of the association, whose model takes dependent boxes as independent and

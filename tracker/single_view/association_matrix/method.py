@@ -18,17 +18,21 @@ from tracker.geometry.boxes import Boxes
 from tracker.parameters.groups.association_matrix import AssociationMatrixParams
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
-from tracker.single_view.association_matrix.following import follow, object_histograms
-from tracker.single_view.association_matrix.moving_objects import MovingObject, Situation
 from tracker.single_view.association_matrix.silhouettes import Fits, Silhouettes
-from tracker.single_view.association_matrix.track_transfer import advance
-from tracker.single_view.dropped import Dropped
-from tracker.single_view.noise import box_sigmas
+from tracker.single_view.association_matrix.track_transfer import (
+    MovingObject,
+    Situation,
+    advance,
+    follow,
+    object_histograms,
+)
+from tracker.single_view.box_sizes import box_sigmas
 from tracker.single_view.pictures import colour
+from tracker.single_view.pictures.background import ForegroundModel, pack
 from tracker.single_view.pictures.blobs import Blobs, blobs
 from tracker.single_view.pictures.colour import BINS
-from tracker.single_view.pictures.foreground import ForegroundModel, learn, pack
-from tracker.single_view.protocol import ViewEvent, ViewResult
+from tracker.single_view.pictures.foreground import learn
+from tracker.single_view.protocol import Dropped, ViewEvent, ViewResult
 
 if TYPE_CHECKING:
     from tracker.parameters.catalogue import RunParameters
@@ -186,13 +190,7 @@ class AssociationMatrix:
     def _nothing(self, situation: Situation) -> ViewResult:
         """The result without an image."""
         estimates, labels = _estimates(situation, self._parameters.confirmation_steps)
-        none = ViewResult.of_boxes(np.zeros((0, 4)), np.zeros(0), np.zeros((0, 4)))
-        return replace(
-            none,
-            estimates=estimates,
-            estimate_weights=np.ones(len(labels)),
-            estimate_labels=labels,
-        )
+        return ViewResult.of_estimates(estimates, np.ones(len(labels)), labels)
 
     def _sigmas(self, boxes: Float[ndarray, "N 4"]) -> Float[ndarray, "N 4"]:
         p = self._parameters

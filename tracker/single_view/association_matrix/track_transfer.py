@@ -2,28 +2,246 @@
 
 An object of this method may have several tracks, which it passes on as objects merge and split
 ([CMQ07]); in the other trackers of one camera a target is one track
-(:mod:`tracker.single_view.jpda.track_management`).
+(:mod:`tracker.single_view.jpda.targets`). Objects and tracks are immutable values. In a decision
+matrix, by distance or by overlap, rows are the objects of the step before, columns those of this
+one.
 
 [CMQ07] Chang, Ma, Qiao, "Human oriented multi-target tracking algorithm in video
 sequence", Control and Decision 22(4), 2007.
+[CRM03] Comaniciu, Ramesh, Meer, "Kernel-based object tracking", IEEE TPAMI 25(5), 2003.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int, UInt16
 from numpy import ndarray
+from scipy.sparse.csgraph import connected_components
 
 from tracker.geometry.assignment import linear_sum_assignment
+from tracker.kernels.pictures.images import follow_colours
 from tracker.parameters.groups.association_matrix import AssociationMatrixParams
-from tracker.single_view.association_matrix import decision_matrices
-from tracker.single_view.association_matrix.following import coefficients
-from tracker.single_view.association_matrix.moving_objects import MovingObject, Situation, Track
 from tracker.single_view.pictures.blobs import Blobs
 from tracker.single_view.protocol import ViewEvent
+
+
+def distances(before: Float[ndarray, "I 2"], now: Float[ndarray, "J 2"]) -> Float[ndarray, "I J"]:
+    """Compute the distances of predicted and present centres, pixels.
+
+    Args:
+        before: Predicted centres of the I objects of the step before, pixels.
+        now: Centres of this step's J objects, pixels.
+    """
+    return np.asarray(np.linalg.norm(before[:, None] - now[None, :], axis=2))
+
+
+def decide_by_distance(
+    apart: Float[ndarray, "I J"], reach: Float[ndarray, " I"]
+) -> Bool[ndarray, "I J"]:
+    """Decide R for an equal number of objects: mutual nearest neighbours within reach.
+
+    Args:
+        apart: Distances, pixels.
+        reach: Largest distance of each object of the step before, pixels.
+    """
+    if apart.size == 0:
+        return np.zeros(apart.shape, dtype=bool)
+    rows, columns = np.indices(apart.shape)
+    mutual = (apart.argmin(axis=1)[:, None] == columns) & (apart.argmin(axis=0)[None, :] == rows)
+    return np.asarray(mutual & (apart <= reach[:, None]))
+
+
+def box_overlaps(
+    before: Float[ndarray, "I 4"], now: Float[ndarray, "J 4"]
+) -> Float[ndarray, "I J"]:
+    """Compute the area that the boxes of two objects share, square pixels.
+
+    Args:
+        before: Boxes of the objects of the step before: centre and half sizes, pixels.
+        now: Boxes of this step's objects.
+    """
+    low = np.maximum((before[:, :2] - before[:, 2:])[:, None], (now[:, :2] - now[:, 2:])[None, :])
+    high = np.minimum((before[:, :2] + before[:, 2:])[:, None], (now[:, :2] + now[:, 2:])[None, :])
+    return np.asarray(np.prod(np.clip(high - low, 0.0, None), axis=2))
+
+
+def pixel_overlaps(
+    before: Int[ndarray, "h w"], now: Int[ndarray, "h w"], rows: int, columns: int
+) -> Int[ndarray, "I J"]:
+    """Count the pixels that two objects share.
+
+    Args:
+        before: Object of each pixel at the step before, -1 for none.
+        now: Object of each pixel at this step, -1 for none.
+        rows: Number of objects before.
+        columns: Number of objects now.
+    """
+    both = (before >= 0) & (now >= 0)
+    pairs = before[both].astype(np.int64) * columns + now[both]
+    return np.bincount(pairs, minlength=rows * columns).reshape(rows, columns)
+
+
+def is_one_to_one(decision: Bool[ndarray, "I J"]) -> bool:
+    """Whether every object of either step has exactly one of the other."""
+    return bool((decision.sum(axis=0) == 1).all() and (decision.sum(axis=1) == 1).all())
+
+
+def families(decision: Bool[ndarray, "I J"]) -> list[tuple[list[int], list[int]]]:
+    """Find the connected components of R; each object is in exactly one family.
+
+    A family of one row and one column continues; without a row it is new; without a column it is
+    interrupted; with several rows it merges, with several columns it splits, or both at once.
+    """
+    rows, columns = decision.shape
+    graph = np.zeros((rows + columns, rows + columns), dtype=bool)
+    graph[:rows, rows:] = decision
+    count, owners = connected_components(graph, directed=False)
+    return [
+        (
+            np.flatnonzero(owners[:rows] == family).tolist(),
+            np.flatnonzero(owners[rows:] == family).tolist(),
+        )
+        for family in range(count)
+    ]
+
+
+ITERATIONS = 20
+"""Largest number of mean-shift iterations."""
+
+TOLERANCE = 0.1
+"""Length of a shift below which the mean shift ends, pixels."""
+
+
+def object_histograms(
+    bins: UInt16[ndarray, "h w"], owners: Int[ndarray, "h w"], count: int, size: int
+) -> Float[ndarray, "N bins"]:
+    """Compute the colour histogram of each object, with sum 1.
+
+    Args:
+        bins: The histogram bin of each pixel.
+        owners: Object of each pixel, -1 for none.
+        count: Number of objects.
+        size: Number of bins.
+    """
+    inside = owners >= 0
+    pairs = owners[inside].astype(np.int64) * size + bins[inside]
+    counted = np.bincount(pairs, minlength=count * size).reshape(count, size)
+    totals = np.maximum(counted.sum(axis=1, keepdims=True), 1)
+    return np.asarray(counted / totals)
+
+
+def coefficients(
+    first: Float[ndarray, "I bins"], second: Float[ndarray, "J bins"]
+) -> Float[ndarray, "I J"]:
+    """Compute Bhattacharyya coefficients Σ_u sqrt(p(u) q(u)) of all pairs of histograms ([CRM03]).
+
+    They are 1 for equal, 0 for disjoint histograms, each of which has the sum 1.
+    """
+    return np.asarray(np.sqrt(first) @ np.sqrt(second).T)
+
+
+def follow(
+    bins: UInt16[ndarray, "h w"],
+    moving: Bool[ndarray, "h w"],
+    box: Float[ndarray, " 4"],
+    histogram: Float[ndarray, " bins"],
+) -> Float[ndarray, " 2"]:
+    """Track a colour histogram by mean shift over the moving pixels, [CRM03].
+
+        y ← Σ_i w_i x_i / Σ_i w_i,  w_i = sqrt(q(u_i) / p_y(u_i))
+
+    over the moving pixels x_i in the ellipse inscribed in the box at y, u_i being
+    their bins; q is the target's histogram, p_y that of the moving pixels there
+    under the Epanechnikov kernel.
+
+    Args:
+        bins: The histogram bin of each pixel.
+        moving: Whether each pixel is in the foreground.
+        box: Box of the target before, centre and half sizes, pixels.
+        histogram: q, of the last step at which the target was alone.
+
+    Returns:
+        The centre, pixels; that of the box if no pixel has the target's colours.
+    """
+    centre: ndarray = follow_colours(
+        bins, moving, np.asarray(box, dtype=float), histogram, ITERATIONS, TOLERANCE
+    )
+    return centre
+
+
+_LONGEST_PREDICTION = 3
+"""Number of steps for which an interrupted object is predicted to move on; then it is sought where
+it would be, in a circle that grows (``straying``)."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Track:
+    """The track of a person, with the appearance when last alone in a foreground component."""
+
+    label: int
+    """Id of the track."""
+    box: Float[ndarray, " 4"]
+    """Present box, that of the object or of the mean shift: centre and half sizes, pixels."""
+    area: float
+    """Smoothed area of the object while the track was alone in it, square pixels."""
+    histogram: Float[ndarray, " bins"]
+    """Smoothed colour histogram of the object while the track was alone in it, with sum 1."""
+    age: int = 1
+    """Number of steps alone in an object."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MovingObject:
+    """A foreground component and its tracks."""
+
+    labels: tuple[int, ...]
+    """Labels of the object's tracks, ascending; several where people merged."""
+    box: Float[ndarray, " 4"]
+    """Centre and half sizes of the component's box, pixels."""
+    area: int
+    """Number of pixels of the component."""
+    velocity: Float[ndarray, " 2"]
+    """Displacement of the centre, pixels per step: the mean of the last one and of this number a
+    step before."""
+    missing: int = 0
+    """Number of steps since the object was interrupted."""
+    followed: bool = False
+    """Whether the two tracks of the object are tracked separately by mean shift."""
+
+    @property
+    def size(self) -> float:
+        """The root of half width times half height, pixels."""
+        return float(np.sqrt(np.prod(self.box[2:])))
+
+    @property
+    def expected(self) -> Float[ndarray, " 2"]:
+        """The predicted centre one step later, pixels."""
+        steps = 1 + min(self.missing, _LONGEST_PREDICTION)
+        return np.asarray(self.box[:2] + self.velocity * steps)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Situation:
+    """Objects and tracks after a step."""
+
+    tracks: dict[int, Track]
+    """Tracks by label; never changed in place."""
+    objects: tuple[MovingObject, ...]
+    """Objects in the order of the step's components."""
+    lost: tuple[MovingObject, ...]
+    """Objects that are interrupted and have not ended."""
+    owners: Int[ndarray, "h w"] | None
+    """Object of each pixel, -1 for none; None before the first image."""
+    next_label: int
+    """The first label that is free."""
+
+    @staticmethod
+    def start() -> Situation:
+        """The situation without objects."""
+        return Situation({}, (), (), None, 1)
 
 
 def decide(
@@ -45,18 +263,16 @@ def decide(
     objects, p = situation.objects, parameters
     before = np.array([one.box for one in objects]).reshape(-1, 4)
     if p.overlap == "boxes" or situation.owners is None:
-        shared = decision_matrices.box_overlaps(before, seen.boxes)
+        shared = box_overlaps(before, seen.boxes)
     else:
-        shared = decision_matrices.pixel_overlaps(
-            situation.owners, seen.owners, len(objects), seen.size
-        ).astype(float)
+        shared = pixel_overlaps(situation.owners, seen.owners, len(objects), seen.size).astype(
+            float
+        )
     if len(objects) == seen.size:
         expected = np.array([one.expected for one in objects]).reshape(-1, 2)
         reach = p.reach * np.array([one.size for one in objects])
-        near = decision_matrices.decide_by_distance(
-            decision_matrices.distances(expected, seen.boxes[:, :2]), reach
-        )
-        if decision_matrices.is_one_to_one(near):
+        near = decide_by_distance(distances(expected, seen.boxes[:, :2]), reach)
+        if is_one_to_one(near):
             return near, shared
     return shared > p.overlap_area, shared
 
@@ -80,7 +296,7 @@ def advance(
         at their places before; and the events.
     """
     work = _Step(situation, seen, histograms, parameters)
-    for rows, columns in decision_matrices.families(work.decision):
+    for rows, columns in families(work.decision):
         if not columns:
             work.lost += [situation.objects[row] for row in rows]
         elif not rows:
@@ -176,7 +392,7 @@ class _Step:
                 for one in self.lost
             ]
         )
-        apart = decision_matrices.distances(
+        apart = distances(
             np.array([one.expected for one in self.lost]), self.seen.boxes[self.unknown, :2]
         )
         reach = [p.reach * one.size * (1.0 + p.straying * one.missing) for one in self.lost]

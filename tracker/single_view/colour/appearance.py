@@ -20,8 +20,9 @@ from tracker.single_view.colour.carrying import with_carried
 from tracker.single_view.colour.templates import read_templates
 from tracker.single_view.colour.trust import template_trust
 from tracker.single_view.pictures import colour
+from tracker.single_view.pictures.background import ForegroundModel
 from tracker.single_view.pictures.colour import ColourSpaceName, KernelName
-from tracker.single_view.pictures.foreground import ForegroundModel, integral, learn, shape_scores
+from tracker.single_view.pictures.foreground import integral, learn, shape_scores
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -118,18 +119,6 @@ class Appearance:
             return state, Scene(bins, None, None)
         state, found = self._foreground.step(state, picture)
         return state, Scene(bins, found.mask, integral(found.mask))
-
-    def distances(self, scene: Scene, boxes: Float[ndarray, "N 4"]) -> Float[ndarray, "N G"]:
-        """Compute the Bhattacharyya distance D of each box to each person's nearest template.
-
-        Args:
-            scene: The image.
-            boxes: Centre and half sizes of N boxes, pixels.
-
-        Returns:
-            D, 0 … 1, of each box and each of the G people of :attr:`model`.
-        """
-        return self.model.distances(scene.bins, boxes)
 
     def shape_scores(
         self,

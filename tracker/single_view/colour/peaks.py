@@ -1,7 +1,13 @@
 """Peaks of the colour likelihood in an image, as measurements of people with templates.
 
+They are modes of a weighted sample of boxes ``centre_x, centre_y, half_width, half_height`` in
+pixels, by mean shift; distances are in half sizes of the current box, so that the result does not
+depend on scale.
+
 [ZW21] Zhu, Wang, "3D target position tracking based on probability hypothesis
 density filtering", 2021, §2.2.
+[CM02] Comaniciu, Meer, "Mean shift: a robust approach toward feature space analysis",
+IEEE TPAMI 24(5), 2002.
 """
 
 from __future__ import annotations
@@ -15,21 +21,90 @@ from numpy import ndarray
 from scipy.special import expit
 
 from tracker.filters.gaussian_mixture import GaussianMixture
+from tracker.kernels.pictures import images
 from tracker.parameters.groups.colour_phd import ColourPeakParams
 from tracker.parameters.groups.foreground import ForegroundParams
 from tracker.parameters.groups.shapes import ShapesParams
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
-from tracker.single_view.box_sizes import BoxSizes
+from tracker.single_view.box_sizes import BoxSizes, box_sigmas
 from tracker.single_view.colour.appearance import Appearance, Scene
 from tracker.single_view.colour.trust import shapes_of_templates, template_trust, templates_suffice
-from tracker.single_view.dropped import Dropped
-from tracker.single_view.noise import box_sigmas
-from tracker.single_view.pictures import mean_shift
-from tracker.single_view.pictures.foreground.shares import LEAST_SHARE
-from tracker.single_view.protocol import TRUST
-from tracker.single_view.shape.evidence import log_ratios, shape_sigmas
-from tracker.single_view.shape.finder import SAME_PERSON, ShapeFinder, Shapes
+from tracker.single_view.pictures.foreground import LEAST_SHARE
+from tracker.single_view.protocol import TRUST, Dropped
+from tracker.single_view.shape.finder import (
+    SAME_PERSON,
+    ShapeFinder,
+    Shapes,
+    log_ratios,
+    shape_sigmas,
+)
+
+ITERATIONS = 30
+"""Largest number of steps of a climb; most converge well before."""
+
+TOLERANCE = 0.01
+"""Length of a step in half sizes below which a climb ends: far below any peak's deviation."""
+
+
+def heaviest_samples(
+    boxes: Float[ndarray, "S 4"], weights: Float[ndarray, " S"], most: int, *, spread: bool
+) -> Int[ndarray, " K"]:
+    """Select the indices of the heaviest samples as starts, at most ``most``.
+
+    Args:
+        boxes: Samples, pixels.
+        weights: Weights, not negative; samples of weight 0 are never selected.
+        most: Largest number of starts.
+        spread: Whether a start is at least half a box away from heavier ones. Without,
+            all starts may be at the one target that fits best.
+    """
+    order = np.argsort(-weights, kind="stable")
+    if not spread:
+        chosen = order[:most]
+        return chosen[weights[chosen] > 0.0]
+    indices: ndarray = images.keep_apart(boxes, weights, order, 1.0, most)
+    return indices
+
+
+def modes(
+    boxes: Float[ndarray, "S 4"],
+    weights: Float[ndarray, " S"],
+    start_boxes: Float[ndarray, "K 4"],
+    *,
+    bandwidth: float,
+    merge_distance: float,
+) -> tuple[Float[ndarray, "M 4"], Float[ndarray, " M"]]:
+    """Climb from each start to a mode of the density Σ_i w_i k(x - x_i), [CM02].
+
+    The kernel is Gaussian, with a bandwidth of ``bandwidth`` half sizes of the current
+    box, in the centre and in the half sizes alike.
+
+    Args:
+        boxes: Samples x_i, pixels.
+        weights: w_i, not negative.
+        start_boxes: Boxes at which the climbs start; there may be none.
+        bandwidth: Bandwidth in half sizes.
+        merge_distance: Distance of centres, in half sizes, below which modes are merged to the
+            denser one.
+
+    Returns:
+        The modes, densest first, and their densities. An empty sample has none, and neither has
+        a start without any sample near it.
+    """
+    climbed = images.mean_shift(
+        np.ascontiguousarray(boxes, dtype=float),
+        np.ascontiguousarray(weights, dtype=float),
+        np.ascontiguousarray(start_boxes, dtype=float),
+        bandwidth,
+        ITERATIONS,
+        TOLERANCE,
+    )
+    found, densities = climbed.boxes, climbed.densities
+    order = np.argsort(-densities, kind="stable")
+    kept = images.keep_apart(found, densities, order, merge_distance, len(order))
+    return found.take(kept, 0), densities.take(kept)
+
 
 SUFFICIENT_TRUST = 0.9
 """Trust in the foreground at a person below which shapes are used as well."""
@@ -283,7 +358,7 @@ class PeakFinder:
         """The distance of each box to the nearest template, D."""
         if not len(boxes):
             return np.zeros(0)
-        return np.asarray(self._appearance.distances(scene, boxes).min(axis=1))
+        return np.asarray(self._appearance.model.distances(scene.bins, boxes).min(axis=1))
 
     def _likelihood(self, distances: Float[ndarray, " N"]) -> Float[ndarray, " N"]:
         return np.asarray(np.exp(-0.5 * (distances / self._parameters.likelihood_sigma) ** 2))
@@ -331,7 +406,7 @@ class PeakFinder:
         a ln(P + ε), with the probability P of a person by shape, in place of the share inside.
         """
         p = self._parameters
-        distances = self._appearance.distances(scene, boxes)
+        distances = self._appearance.model.distances(scene.bins, boxes)
         trust, instead = self._appearance.trust[None, :], self._instead[None, :]
         if not p.peaks_per_person:
             trust, instead = (each.min(axis=1, keepdims=True) for each in (trust, instead))
@@ -364,10 +439,8 @@ class PeakFinder:
         found = [np.zeros((0, 4))]
         for person in range(scores.shape[1] if len(samples) else 0):
             weights = np.exp(scores[:, person] - scores[:, person].max())
-            starts = mean_shift.starts(
-                samples, weights, p.mean_shift_starts, spread=p.spread_starts
-            )
-            peaks, _ = mean_shift.modes(
+            starts = heaviest_samples(samples, weights, p.mean_shift_starts, spread=p.spread_starts)
+            peaks, _ = modes(
                 samples,
                 weights,
                 samples[starts],

@@ -20,20 +20,14 @@ from tracker.parameters.groups.foreground import ForegroundParams
 from tracker.parameters.groups.jpda import JpdaParams
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
+from tracker.single_view.box_sizes import box_sigmas
 from tracker.single_view.colour.peaks import PeakFinder
 from tracker.single_view.detector_boxes import DetectorBoxes, detector_sigmas
-from tracker.single_view.dropped import Dropped
 from tracker.single_view.jpda.crowns import TargetSizes, crowns
-from tracker.single_view.noise import box_sigmas
+from tracker.single_view.pictures.background import ForegroundModel, MovingForeground
 from tracker.single_view.pictures.blobs import blobs
-from tracker.single_view.pictures.foreground import (
-    ForegroundModel,
-    MovingForeground,
-    box_shares,
-    integral,
-    learn,
-)
-from tracker.single_view.protocol import UNCERTAINTY
+from tracker.single_view.pictures.foreground import box_shares, integral, learn
+from tracker.single_view.protocol import UNCERTAINTY, Dropped
 
 if TYPE_CHECKING:
     from tracker.parameters.catalogue import RunParameters

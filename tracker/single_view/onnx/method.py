@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -79,13 +78,4 @@ class OnnxDetector:
         found = judge_boxes(
             self._sequence, self._camera, seen.boxes, seen.scores, self._box_parameters
         )
-        good = found.plausible
-        result = ViewResult.of_boxes(found.boxes[good], found.scores[good], found.sigmas[good])
-        dropped = found.dropped
-        return None, replace(
-            result,
-            measurements=found.boxes,
-            measurement_scores=found.scores,
-            information=dropped.information(int(good.sum())),
-            dropped=dropped,
-        )
+        return None, found.result

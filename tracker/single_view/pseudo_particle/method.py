@@ -18,10 +18,10 @@ from tracker.parameters.groups.pseudo_particle import PseudoParticleParams
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.colour.appearance import Scene
-from tracker.single_view.pictures import particles as particle_set
-from tracker.single_view.pictures.foreground import pack
+from tracker.single_view.pictures.background import pack
 from tracker.single_view.protocol import ViewEvent, ViewResult, pack_samples
 from tracker.single_view.pseudo_particle import hypotheses
+from tracker.single_view.pseudo_particle import particles as particle_set
 from tracker.single_view.pseudo_particle.particles import ColourParticles
 from tracker.single_view.pseudo_particle.track_management import (
     UNCONFIRMED,
@@ -90,7 +90,7 @@ class PseudoParticle:
 
     def start(self) -> PseudoParticleState:
         """The state without targets, before the first step."""
-        return PseudoParticleState(np.zeros((0, 4)), Tracks.empty(), self._model.start())
+        return PseudoParticleState(np.zeros((0, 4)), Tracks.empty(), self._model.appearance.start())
 
     def step(
         self,
@@ -103,7 +103,7 @@ class PseudoParticle:
         moved = self._model.move(state.particles, rng)
         if picture is None:
             return replace(state, particles=moved), self._unseen(state)
-        foreground, scene = self._model.prepare(state.foreground, picture)
+        foreground, scene = self._model.appearance.prepare(state.foreground, picture)
         if self._parameters.filter == "classical":
             particles, result = self._classical(moved, scene, rng)
             after = PseudoParticleState(particles, state.tracks, foreground)
@@ -122,6 +122,7 @@ class PseudoParticle:
     ) -> tuple[Float[ndarray, "S 4"], Tracks, ViewResult]:
         """Clusters, hypothesis matrix, and new particles: particles, targets and result."""
         p, count = self._parameters, self._colours.samples
+        colours = self._model.appearance.model
         samples = np.concatenate([moved, self._model.draw_new(count - len(moved), scene, rng)])
         expected = tracks.targets.moved(p.velocity_share)
         scores, persons = self._model.scores(scene, samples)
@@ -139,12 +140,12 @@ class PseudoParticle:
             merge_distance=p.merge_distance,
         )
         modes = found.modes[found.shares >= p.smallest_cluster]
-        distances = self._model.distances(scene, modes)
+        distances = colours.distances(scene.bins, modes)
         evidence, inside = self._model.evidence(scene, modes)
         good = inside >= self._colours.acceptance_foreground
         modes, distances, evidence = modes[good], distances[good], evidence[good]
 
-        vacant = hypotheses.vacancies(expected, self._model.persons, p.targets_per_person)
+        vacant = hypotheses.vacancies(expected, len(colours.names), p.targets_per_person)
         matrix = hypotheses.hypothesis_matrix(
             modes,
             distances,
@@ -299,11 +300,5 @@ class PseudoParticle:
 
     def _unseen(self, state: PseudoParticleState) -> ViewResult:
         """The result without an image: the targets of the step before, and no boxes."""
-        none = np.zeros(0)
         confirmed = state.tracks.targets.take(state.tracks.targets.confirmed)
-        return replace(
-            ViewResult.of_boxes(np.zeros((0, 4)), none, np.zeros((0, 4))),
-            estimates=confirmed.boxes,
-            estimate_weights=confirmed.existences,
-            estimate_labels=confirmed.labels,
-        )
+        return ViewResult.of_estimates(confirmed.boxes, confirmed.existences, confirmed.labels)

@@ -2,7 +2,7 @@
 
 The hypothesis matrix ([SG08]) has assigned the modes to targets, to new targets or to the
 background. A target returns as the last vanished one with the colours of the same person, wherever
-it is; by place, as in :mod:`~tracker.single_view.jpda.track_management`, one that comes in
+it is; by place, as in :mod:`~tracker.single_view.jpda.targets`, one that comes in
 elsewhere would be new.
 
 [SG08] Sun, Guo, "Multiple object tracking with a pseudo particle filter", 2008.

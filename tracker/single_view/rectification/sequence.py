@@ -1,4 +1,4 @@
-"""Conversion of a recording for stage 1, and of its results to the camera's own pixels."""
+"""Conversion of a recording for stage 1, and of its results; check for cameras that shake."""
 
 from __future__ import annotations
 
@@ -9,15 +9,19 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 
 from tracker.geometry.boxes import Boxes
-from tracker.sequences.pictures.frames import Picture, Pictures
+from tracker.parameters.catalogue import RunParameters
+from tracker.parameters.values import with_values
+from tracker.sequences.finding import Check, absent, good, warning
+from tracker.sequences.pictures.frames import FrameReader, Picture, Pictures
 from tracker.sequences.sequence import Sequence
-from tracker.single_view.pictures.foreground import pack, unpack
+from tracker.single_view.pictures.background import pack, unpack
 from tracker.single_view.protocol import ViewResult, pack_samples, unpack_samples
 from tracker.single_view.rectification.stabilisation import StabilisedReader
 from tracker.single_view.rectification.view import RectifiedView, rectified_view
 
 if TYPE_CHECKING:
     from tracker.parameters.catalogue import RunParameters
+
 
 _Made = TypeVar("_Made")
 
@@ -146,3 +150,42 @@ class _RectifiedReader:
     def _rectify(self, camera: int, picture: Picture | None) -> Picture | None:
         view = self._views[camera]
         return picture if view is None or picture is None else view.picture(picture)
+
+
+_NAME = "cameras hold still"
+
+
+def check_shake(sequence: Sequence, reader: Pictures | None = None) -> list[Check]:
+    """Find the cameras that shake by more than a run tolerates, ``pictures.steady_from``.
+
+    Args:
+        sequence: The sequence.
+        reader: Reader of its images; None to open one.
+
+    Returns:
+        A warning for each camera that shakes; one check without any, or if it is unknown.
+
+    Raises:
+        OSError: If an image file cannot be read.
+    """
+    if not sequence.has_pictures:
+        return [absent(_NAME, "it needs pictures of every camera")]
+    if reader is None:
+        with FrameReader(sequence) as opened:
+            return check_shake(sequence, opened)
+    parameters = with_values(RunParameters(), {"single_view": "shapes"})  # it needs no templates
+    rectified = RectifiedSequence.of(sequence, parameters, reader)
+    found = []
+    for number, camera in enumerate(sequence.cameras):
+        shake = rectified.shake(number)
+        if shake > 0.0:
+            found.append(
+                warning(
+                    _NAME,
+                    f'camera "{camera.name}" shakes by {shake:.1f} pixels; a run holds its '
+                    "pictures still, but places are the less exact the more it turns: mount it "
+                    "firmly",
+                    shake=shake,
+                )
+            )
+    return found or [good(_NAME, "no camera is seen to shake")]

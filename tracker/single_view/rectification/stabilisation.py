@@ -22,8 +22,8 @@ from numpy import ndarray
 
 from tracker.sequences.pictures.frames import Picture, Pictures
 from tracker.sequences.sequence import Sequence
+from tracker.single_view.pictures.background import median
 from tracker.single_view.pictures.foreground import spread_steps
-from tracker.single_view.pictures.foreground.exposure import median
 from tracker.single_view.rectification.view import RectifiedView
 
 _Made = TypeVar("_Made")

@@ -13,14 +13,18 @@ from jaxtyping import Float32, Int32, UInt8
 from numpy import ndarray
 
 from tracker.kernels.pictures.channels import channel_sums, gradients
-from tracker.single_view.pictures.foreground import BackgroundModel, tone_curve
-from tracker.single_view.pictures.foreground.exposure import largest_channel, square_roots
-from tracker.single_view.pictures.foreground.motion import BLUR
+from tracker.single_view.pictures.background import (
+    BLUR,
+    BackgroundModel,
+    largest_channel,
+    square_roots,
+    tone_curve,
+)
 
 LAG = 0.12
 """Time between two images that are compared, seconds: a moving hand leaves its place. The trees
 are trained on it, so that it is not the one of
-:class:`~tracker.single_view.pictures.foreground.MovingForeground`."""
+:class:`~tracker.single_view.pictures.background.MovingForeground`."""
 
 MEMORY = 2.0
 """Time constant of the fading mean of motion, seconds."""

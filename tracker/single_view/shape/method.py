@@ -18,21 +18,18 @@ from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.parameters.groups.shapes import ShapesParams
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
-from tracker.single_view.dropped import Dropped
-from tracker.single_view.jpda import Jpda
 from tracker.single_view.jpda.measurements import Measured
-from tracker.single_view.jpda.method import JpdaState
-from tracker.single_view.protocol import ViewResult
+from tracker.single_view.jpda.method import Jpda, JpdaState
+from tracker.single_view.protocol import Dropped, ViewResult
 from tracker.single_view.shape.channels import ChannelState
-from tracker.single_view.shape.evidence import log_ratios, shape_sigmas
-from tracker.single_view.shape.finder import ShapeFinder
+from tracker.single_view.shape.finder import ShapeFinder, log_ratios, shape_sigmas
 
 if TYPE_CHECKING:
     from tracker.parameters.catalogue import RunParameters
 
 
 class ShapesInCamera:
-    """The tracker :class:`~tracker.single_view.jpda.Jpda` on people by shape.
+    """The tracker :class:`~tracker.single_view.jpda.method.Jpda` on people by shape.
 
     Everything that is slightly similar to a person is passed to the fusion, with the log
     likelihood ratio of its shape ([LBS93]_),
@@ -138,5 +135,5 @@ class ShapeSource:
         )
 
     def sigmas(self, boxes: Float[ndarray, "N 4"]) -> Float[ndarray, "N 4"]:
-        """Measurement noise: see :func:`~tracker.single_view.shape.evidence.shape_sigmas`."""
+        """Measurement noise: see :func:`~tracker.single_view.shape.finder.shape_sigmas`."""
         return shape_sigmas(boxes, self._half_extents, self._parameters)

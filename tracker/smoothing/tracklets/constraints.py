@@ -16,7 +16,7 @@ from tracker.corrections.constraints import Constraints
 from tracker.corrections.lookup import TrackIndex, mostly_inside
 from tracker.smoothing.paths import Paths
 from tracker.smoothing.smoother import Fitted
-from tracker.smoothing.tracklets.exchanges import find_exchange
+from tracker.smoothing.tracklets.motion import find_exchange
 
 _EVER = int(np.iinfo(np.int64).max)
 

@@ -31,10 +31,10 @@ from tracker.smoothing.paths import (
     same_label,
     select_rows,
 )
-from tracker.smoothing.protocol import ResultStore
-from tracker.smoothing.result import Decision, LinkedTracklets, Smoothed
+from tracker.smoothing.protocol import Decision, LinkedTracklets, ResultStore, Smoothed
 from tracker.smoothing.smoother import BoxAssociations
 from tracker.smoothing.tracklets import costs, splitting
+from tracker.smoothing.tracklets.appearance import Appearances, sum_by_chain, template_log_odds
 from tracker.smoothing.tracklets.constraints import (
     ConstraintResolver,
     constraints_on_chains,
@@ -42,7 +42,6 @@ from tracker.smoothing.tracklets.constraints import (
     split_by_gap,
 )
 from tracker.smoothing.tracklets.motion import Ends, Pairs
-from tracker.smoothing.tracklets.people import Appearances, sum_by_chain, template_log_odds
 from tracker.smoothing.tracklets.solver import TrackletGraph, link_tracklets
 from tracker.smoothing.tracklets.splitting import Tracked
 

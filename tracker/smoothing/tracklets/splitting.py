@@ -14,8 +14,7 @@ from tracker.smoothing.paths import Paths, split_paths
 from tracker.smoothing.smoother import BoxAssociations, Fitted, Smoother
 from tracker.smoothing.tracklets.constraints import ConstraintResolver
 from tracker.smoothing.tracklets.costs import FASTEST, Rates
-from tracker.smoothing.tracklets.exchanges import exchange_breaks
-from tracker.smoothing.tracklets.motion import SLACK
+from tracker.smoothing.tracklets.motion import SLACK, exchange_breaks
 
 GAP = 1.0
 """Time without a detection from which a track is split, seconds. From 0.3 to 4 s, no figure of the

@@ -16,7 +16,7 @@ from tests.app.conftest import ADDRESS, run_is, wait_until
 from tracker.runs import pipeline
 from tracker.runs.pipeline import Run
 from tracker.sequences.reader import read_sequence
-from tracker.single_view.pictures.foreground import unpack
+from tracker.single_view.pictures.background import unpack
 
 
 @pytest.fixture(scope="module")

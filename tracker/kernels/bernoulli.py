@@ -8,10 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy import ndarray
 
-from tracker.kernels.association.belief_propagation import Convergence, belief_propagation
+from tracker.kernels.association import Convergence, belief_propagation
 from tracker.kernels.compilation import kernel
-from tracker.kernels.gating import Measurements
-from tracker.kernels.kalman import Expected, kalman_pairs
+from tracker.kernels.kalman import Expected, Measurements, kalman_pairs
 from tracker.kernels.linear_algebra import Gaussians, group_labels, merge_moments
 
 

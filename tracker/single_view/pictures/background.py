@@ -1,25 +1,80 @@
-"""A background learnt once from the clip, with exposure compensation and shadow removal.
+"""A background learnt once from the clip, and memory of motion; the interface of such models.
 
 The background is the median of images spread over the clip, so no empty image
 is needed; a person who stands in one place for more than half of the clip becomes part
 of it. Cameras with automatic exposure change the whole image: each frame's
 tone curve is estimated against the background, and the background is mapped to the
 frame's exposure, never the frame to the background, which would change its colours.
+
+People who never leave are learnt as background, however they move their arms. Then many of
+the pixels that change at all differ from their median for much of the time, while pixels of a
+passage do so seldom. This frequency gives the uncertainty of the median; where it is large, a
+memory of recent changes shows people moving in place.
 """
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from typing import Any, Protocol
 
 import cv2
 import numpy as np
-from jaxtyping import UInt8
+from jaxtyping import Float, UInt8
 from numpy import ndarray
 
 from tracker.kernels.pictures.foreground import foreground_mask, level_medians, upper_medians
 from tracker.parameters.groups.foreground import ForegroundParams
-from tracker.single_view.pictures.foreground.segmentation import Segmentation
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Segmentation:
+    """The segmentation of one image."""
+
+    mask: UInt8[ndarray, "h w"]
+    """1 on the foreground, 0 elsewhere."""
+    thresholds: Float[ndarray, " 3"]
+    """The thresholds in blue, green and red, in the model's own units."""
+
+
+class ForegroundModel(Protocol):
+    """A background model that segments images; a state goes from image to image."""
+
+    def start(self) -> Any:
+        """The state before the first image."""
+        ...
+
+    def step(self, state: Any, picture: UInt8[ndarray, "h w 3"]) -> tuple[Any, Segmentation]:
+        """Segment the next image.
+
+        Args:
+            state: The state after the image before.
+            picture: The image, BGR, of the background's size.
+        """
+        ...
+
+
+def pack(mask: UInt8[ndarray, "h w"]) -> UInt8[ndarray, " bytes"]:
+    """Pack a mask into a few hundred bytes: its size, then its bits, compressed."""
+    height, width = mask.shape
+    size = np.array([height, width], dtype="<u4").tobytes()
+    return np.frombuffer(size + zlib.compress(np.packbits(mask).tobytes(), 1), dtype=np.uint8)
+
+
+def unpack(packed: UInt8[ndarray, " bytes"]) -> UInt8[ndarray, "h w"]:
+    """Unpack a mask of :func:`pack`.
+
+    Raises:
+        ValueError: If the bytes are no packed mask.
+    """
+    try:
+        height, width = np.frombuffer(packed[:8].tobytes(), dtype="<u4").tolist()
+        bits = np.frombuffer(zlib.decompress(packed[8:].tobytes()), dtype=np.uint8)
+        return np.unpackbits(bits, count=height * width).reshape(height, width)
+    except (ValueError, zlib.error) as error:
+        raise ValueError(f"expected a packed mask, got {packed.size} bytes: {error}") from None
+
 
 LEVELS = 16
 """Number of levels at which a tone curve is measured; between them it is interpolated."""
@@ -237,3 +292,83 @@ class LearntForeground:
         """Segment an image."""
         mask = self._background.foreground(picture, self._parameters)
         return None, Segmentation(mask, np.full(3, self._parameters.threshold))
+
+
+LAG = 0.1
+"""Time between two images that are compared, seconds: within it a moving hand leaves its place."""
+
+BLUR = 1.0
+"""Standard deviation of the blur against noise and compression, before comparison, pixels."""
+
+BLIND = 0.5
+"""Share of an image above which a simultaneous change is one of light and not of motion: light
+changes in the whole room, and people who fill half of an image leave no background to learn."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MotionState:
+    """The images of the last moment, and the time since each pixel changed."""
+
+    before: tuple[UInt8[ndarray, "h w 3"], ...]
+    """Square-rooted and blurred, the oldest first; empty before the first image."""
+    since: UInt8[ndarray, "h w"] | None
+    """Number of images since the last change, 255 for never or long ago."""
+
+
+class MovingForeground:
+    """A :class:`BackgroundModel` and a memory of motion.
+
+    A pixel is foreground where it differs from the background, or where it changed by more
+    than the threshold within the last moments: |r(t) − r(t − l)| of the square-rooted grey
+    levels r, in the channel with the largest difference.
+    """
+
+    def __init__(
+        self, background: BackgroundModel, parameters: ForegroundParams, step_time: float
+    ) -> None:
+        """Set the background.
+
+        Args:
+            background: The background, whose uncertainty scales the memory.
+            parameters: Thresholds, and the length of the memory.
+            step_time: Time between two images, seconds.
+        """
+        self._background = background
+        self._parameters = parameters
+        self._lag = max(1, round(LAG / step_time))
+        self.uncertainty = background.uncertainty(parameters)
+        """The uncertainty of the background, 0 … 1."""
+        lasting = parameters.motion_memory * self.uncertainty
+        self.memory = min(254, round(lasting / step_time))
+        """Number of images for which a change counts; with 0 this is the background alone."""
+
+    def start(self) -> MotionState:
+        """The state before the first image."""
+        return MotionState((), None)
+
+    def step(
+        self, state: MotionState, picture: UInt8[ndarray, "h w 3"]
+    ) -> tuple[MotionState, Segmentation]:
+        """Segment an image."""
+        p = self._parameters
+        mask = self._background.foreground(picture, p)
+        smooth = cv2.GaussianBlur(square_roots(picture), (0, 0), BLUR)
+        before = (*state.before, smooth)
+        since = state.since
+        if since is None:
+            since = np.full(picture.shape[:2], 255, dtype=np.uint8)
+        changed = self._changed(before[0], smooth)
+        since = np.minimum(since, 254) + np.uint8(1)
+        since[changed > 0] = 0
+        recent = (since < self.memory).astype(np.uint8)
+        after = MotionState(before[-self._lag :], since)
+        return after, Segmentation(cv2.max(mask, recent), np.full(3, p.threshold))
+
+    def _changed(
+        self, old: UInt8[ndarray, "h w 3"], new: UInt8[ndarray, "h w 3"]
+    ) -> UInt8[ndarray, "h w"]:
+        difference = largest_channel(cv2.absdiff(old, new))
+        changed = (difference > self._parameters.motion_threshold).astype(np.uint8)
+        if cv2.countNonZero(changed) > BLIND * changed.size:
+            return np.zeros_like(changed)
+        return np.asarray(cv2.medianBlur(changed, 5), dtype=np.uint8)

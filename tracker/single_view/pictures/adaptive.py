@@ -16,8 +16,12 @@ from numpy import ndarray
 
 from tracker.kernels.pictures.foreground import above, clear_shadows, two_classes, update_background
 from tracker.parameters.groups.foreground import ForegroundParams
-from tracker.single_view.pictures.foreground.exposure import BackgroundModel, median, tone_curve
-from tracker.single_view.pictures.foreground.segmentation import Segmentation
+from tracker.single_view.pictures.background import (
+    BackgroundModel,
+    Segmentation,
+    median,
+    tone_curve,
+)
 
 ITERATIONS = 20
 """Largest number of iterations of the c-means; the thresholds usually converge well before."""

@@ -1,1 +1,0 @@
-"""Kernels of data association: matchings, sums over subsets, belief propagation."""

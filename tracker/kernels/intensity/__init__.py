@@ -1,1 +1,0 @@
-"""Kernels over the components of an intensity, for the PHD recursions."""

@@ -1,1 +1,0 @@
-"""Kernels of the labelled fusion: a step, the update by a camera, its association marginals."""
