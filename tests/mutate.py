@@ -55,9 +55,9 @@ PACKAGES = (
 """What a sample is drawn from where no package is named."""
 
 TESTED_BY = {
-    "kernels/pictures": ("kernels", "single_view/pictures"),
+    "kernels/pictures": ("kernels", "single_view"),
     "kernels/smoothing": ("kernels", "smoothing"),
-    "kernels/association": ("kernels", "filters/association"),
+    "kernels/association.py": ("kernels", "filters/test_association.py"),
     "kernels/lens.py": ("kernels", "geometry"),
     "kernels/consistency.py": ("kernels", "geometry"),
     "kernels": ("kernels", "filters"),

@@ -14,7 +14,7 @@ from app.state.kept.presets import OwnPresets
 from app.state.snapshot import Notice
 from app.state.workbench import Workbench
 from tests.app.conftest import command
-from tests.parameters.test_removed import GONE, MEANT, NOTES
+from tests.parameters.test_values import GONE, MEANT, NOTES
 from tracker.files.validated import write_json
 from tracker.parameters.values import changed_values
 

@@ -13,7 +13,7 @@ from app.state.edits import Edits
 from app.state.kept.presets import OwnPresets
 from app.state.workbench import Workbench
 from tests.app.conftest import command
-from tests.parameters.test_renamed import DEFAULTS, MEANT, OTHER
+from tests.parameters.test_values import DEFAULTS, MEANT, OTHER
 from tracker.files.validated import write_json
 from tracker.parameters.catalogue import RENAMED
 from tracker.parameters.values import changed_values, with_values

@@ -1,4 +1,4 @@
-"""The small linear algebra of the kernels against NumPy, and sums over labels against tables."""
+"""Linear algebra, association and the measurement model of the kernels against NumPy."""
 
 from __future__ import annotations
 
@@ -8,9 +8,21 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy import ndarray
 from numpy.testing import assert_allclose, assert_array_equal
+from scipy.optimize import linear_sum_assignment
 
 from tests.filters.mixtures import random_covariances
+from tests.world import PERSON, ring
+from tracker.fusion.target_model import MeasurementKind, TargetModel
+from tracker.kernels import boxes as box_kernels
 from tracker.kernels import linear_algebra as kernels
+from tracker.kernels import measurement
+from tracker.kernels.association import (
+    Convergence,
+    assign,
+    augment,
+    belief_propagation,
+    disjoint_matchings,
+)
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -139,3 +151,194 @@ def test_pairs_are_summed_as_in_a_table(seed: int, count: int, components: int) 
     keys = zip(found.cameras.tolist(), found.components.tolist(), found.boxes.tolist(), strict=True)
     assert list(keys) == sorted(table)
     assert_allclose(found.probabilities, [min(table[k], 1.0) for k in sorted(table)], rtol=1e-6)
+
+
+def messages(
+    missed: ndarray, detected: ndarray, unexplained: ndarray, convergence: Convergence
+) -> tuple[ndarray, ndarray, int]:
+    """Rows (n, 1 + M), columns (M,), and how many rounds it took."""
+    there, totals, rounds = detected > 0.0, unexplained, 0
+    to_target = there / unexplained
+    for _ in range(convergence.iterations):
+        rest = missed[:, None] + (detected * to_target).sum(axis=1)[:, None] - detected * to_target
+        to_measurement = detected / rest
+        totals = unexplained + to_measurement.sum(axis=0)
+        before, to_target = to_target, there / (totals - to_measurement)
+        rounds += 1
+        if (np.abs(to_target - before) * unexplained).max(initial=0.0) < convergence.tolerance:
+            break
+    rows = np.column_stack([missed, detected * to_target])
+    return rows / rows.sum(axis=1)[:, None], unexplained / totals, rounds
+
+
+@given(
+    seeds, st.integers(0, 5), st.integers(0, 5),
+    st.sampled_from((0.3, 0.03, 1e-6)), st.sampled_from((0, 1, 2, 200)),
+)  # fmt: skip
+def test_messages_pass_until_they_settle(
+    seed: int, targets: int, count: int, tolerance: float, most: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    missed, unexplained = rng.uniform(0.02, 1.0, targets), rng.lognormal(-1.0, 2.0, count)
+    detected = rng.lognormal(0.0, 2.0, (targets, count)) * (rng.random((targets, count)) < 0.7)
+    convergence = Convergence(tolerance, most)
+    rows, columns, rounds = messages(missed, detected, unexplained, convergence)
+    found = belief_propagation(missed, detected, unexplained, convergence)
+    assert_allclose(found.rows, rows, rtol=1e-9)
+    assert_allclose(found.unexplained, columns, rtol=1e-9)
+    assert rounds <= most
+
+
+@given(seeds, st.integers(1, 12), st.integers(1, 6), st.sampled_from((0.2, 0.6, 1.0)))
+def test_each_matching_is_the_heaviest_of_what_those_before_left(
+    seed: int, size: int, most: int, share: float
+) -> None:
+    rng = np.random.default_rng(seed)
+    weights = rng.integers(1, 9, (size, size)) * (rng.random((size, size)) < share)
+    found = disjoint_matchings(weights.astype(float), most)
+    left = weights.astype(float)
+    assert 1 <= len(found) <= most
+    for k, columns in enumerate(found):
+        rows = np.flatnonzero(columns >= 0)
+        assert (left[rows, columns[rows]] > 0.0).all()
+        assert len(set(columns[rows].tolist())) == len(rows)
+        best = linear_sum_assignment(left, maximize=True)
+        assert left[rows, columns[rows]].sum() == left[best].sum()
+        left[rows, columns[rows]] = 0.0
+        assert len(rows) > 0 or k == len(found) - 1
+    assert len(found) == most or not left.any()
+
+
+@given(seeds, st.integers(1, 7), st.sampled_from((0.0, 0.4, 0.8)))
+def test_an_assignment_is_the_cheapest_and_its_duals_prove_it(
+    seed: int, size: int, forbidden: float
+) -> None:
+    rng = np.random.default_rng(seed)
+    cost = rng.integers(0, 6, (size, size)).astype(float)
+    cost[rng.random((size, size)) < forbidden] = np.inf
+    rows, columns = np.zeros(size), rng.integers(-2, 3, size).astype(float)
+    column_of, row_of = np.zeros(size, dtype=np.int64), np.zeros(size, dtype=np.int64)
+    try:
+        best = cost[linear_sum_assignment(cost)].sum()
+    except ValueError:  # there is none of finite cost
+        assert not assign(cost, rows, columns, column_of, row_of)
+        return
+    assert assign(cost, rows, columns, column_of, row_of)
+    assert_array_equal(row_of[column_of], np.arange(size))
+    assert cost[np.arange(size), column_of].sum() == best
+    assert (cost - rows[:, None] - columns >= -1e-9).all()
+    assert rows.sum() + columns.sum() == best
+    # a closed column stays with its row
+    closed = np.zeros(size, dtype=np.bool_)
+    closed[column_of[1:]] = rng.random(size - 1) < 0.5
+    kept = [(row_of[j], j) for j in np.flatnonzero(closed)]
+    free, column_of[0] = column_of[0], -1
+    row_of[free] = -1
+    cost[0, free] = np.inf
+    before = column_of.copy(), row_of.copy()
+    if augment(cost, 0, rows, columns, column_of, row_of, closed):
+        assert all(column_of[i] == j for i, j in kept)
+        assert_array_equal(row_of[column_of], np.arange(size))
+        cost[:, closed] = np.inf
+        for i, j in kept:
+            cost[i] = np.where(np.arange(size) == j, 0.0, np.inf)
+        best = cost[linear_sum_assignment(cost)].sum()
+        assert cost[np.arange(size), column_of].sum() == best
+    else:
+        assert_array_equal(column_of, before[0])
+        assert_array_equal(row_of, before[1])
+
+
+CAMERA = ring(1)[0]
+KINDS: tuple[MeasurementKind, ...] = ("centre", "box", "box_and_width")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_box_and_its_noise_are_transformed_alike(kind: MeasurementKind) -> None:
+    rng = np.random.default_rng(0)
+    transform, products = TargetModel(PERSON, kind).transforms
+    boxes, variances = rng.uniform(5.0, 200.0, (7, 4)), rng.uniform(1.0, 30.0, (7, 4))
+    values, noises = measurement.measured_boxes(boxes, variances, transform, products)
+    assert_allclose(values, boxes @ transform.T, rtol=1e-12)
+    assert_allclose(
+        noises, np.einsum("pa,ma,qa->mpq", transform, variances, transform), rtol=1e-12, atol=1e-12
+    )
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_unscented_regression_is_that_of_numpy(kind: MeasurementKind) -> None:
+    """Values, slopes and what is left of six points, each by its defining equation."""
+    rng = np.random.default_rng(1)
+    camera, model = CAMERA, TargetModel(PERSON, kind, "unscented")
+    states = np.concatenate(
+        [rng.uniform(-1.0, 1.0, (5, 2)), np.full((5, 1), 0.84), rng.normal(size=(5, 3))], axis=1
+    )
+    roots = rng.normal(0.0, 0.1, (5, 6, 6))
+    covariances = roots @ roots.transpose(0, 2, 1) + 0.01 * np.eye(6)
+    found = model.expected(camera, states, covariances)
+    for j, (state, covariance) in enumerate(zip(states, covariances, strict=True)):
+        spread = covariance[:3, :3]
+        lower = np.linalg.cholesky(spread)
+        offsets = np.sqrt(3.0) * np.concatenate([lower.T, -lower.T])
+        drawn = box_kernels.expected_boxes(
+            state[:3] + offsets, model.half_height, model.half_width, model.size, camera.calibration
+        )
+        values = drawn.values
+        assert drawn.valid.all()
+        off = values - values.mean(axis=0)
+        slopes = (off.T @ offsets / 6.0) @ np.linalg.inv(spread)
+        assert_allclose(found.values[j], values.mean(axis=0), rtol=1e-12)
+        assert_allclose(found.jacobians[j, :, :3], slopes, rtol=1e-7, atol=1e-7)
+        assert not found.jacobians[j, :, 3:].any()
+        left = off.T @ off / 6.0 - slopes @ spread @ slopes.T
+        assert_allclose(found.spreads[j], left, rtol=1e-6, atol=1e-6)
+        assert np.abs(found.spreads[j]).max() > 1e-3, "the projection bends"
+
+
+def target(size: int, unscented: bool) -> measurement.Target:
+    """A person who may lie, and whose box may then be off in all its numbers together."""
+    noise = np.arange(size * size, dtype=float).reshape(size, size)
+    return measurement.Target(
+        0.85, 0.3, size, unscented, 0.35, 0.6, noise + noise.T, np.eye(6), 0.2
+    )
+
+
+@pytest.mark.parametrize("size", [2, 3, 4])
+def test_in_another_posture_the_box_is_another_and_off_by_its_height(size: int) -> None:
+    # near, far away (half a box is less than a pixel), and with the feet behind the lens
+    ahead = CAMERA.rotation[2]
+    beside = CAMERA.centre + 0.05 * ahead + [0.0, 0.0, 0.6]
+    places = np.array([[0.3, 0.2, 0.85], CAMERA.centre + 900.0 * ahead, beside])
+    states = np.concatenate([places, np.zeros((3, 3))], axis=1)
+    who = target(size, False)
+    found = measurement.expected_measurements(
+        states, np.zeros((3, 6, 6)), who, CAMERA.calibration
+    ).expected
+    upright = box_kernels.expected_boxes(states, 0.85, 0.3, size, CAMERA.calibration)
+    lying = box_kernels.expected_boxes(states, 0.35, 0.6, size, CAMERA.calibration)
+    assert lying.valid.tolist() == [True, True, False]
+    assert_allclose(found.values, upright.values)
+    assert_allclose(found.jacobians, upright.jacobians)
+    assert_allclose(found.posture_values[:2], lying.values[:2])
+    assert np.isposinf(found.posture_values[2]).all()
+    assert_allclose(found.posture_jacobians, lying.jacobians)
+    heights = (upright.boxes[:, 3] - upright.boxes[:, 1]) / 2.0
+    assert heights[0] > 50.0 > 1.0 > heights[1]
+    scales = np.maximum(heights, 1.0) ** 2
+    assert_allclose(found.posture_spreads, scales[:, None, None] * who.posture_noise)
+    assert (found.posture_share, found.spreads.shape) == (0.2, (0, size, size))
+
+
+def test_where_part_of_the_uncertainty_is_behind_the_lens_the_slope_counts() -> None:
+    near = CAMERA.centre + 1.2 * CAMERA.rotation[2] * [1.0, 1.0, 0.0]
+    states = np.concatenate([np.array([near, [0.0, 0.0, 0.85]]), np.zeros((2, 3))], axis=1)
+    covariances = np.tile(0.6 * np.eye(6), (2, 1, 1))
+    found = measurement.expected_measurements(
+        states, covariances, target(3, True), CAMERA.calibration
+    ).expected
+    straight = box_kernels.expected_boxes(states, 0.85, 0.3, 3, CAMERA.calibration)
+    assert straight.valid.all()
+    assert_allclose(found.values[0], straight.values[0])
+    assert_allclose(found.jacobians[0], straight.jacobians[0])
+    assert not found.spreads[0].any()
+    assert found.spreads[1].any()

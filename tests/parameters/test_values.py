@@ -1,4 +1,4 @@
-"""Every parameter has a face, a range and one stage; wrong values are told in a sentence."""
+"""Every parameter has a face, a range and one stage; old names and removed ones are read."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator
 from itertools import product
 from math import inf, nextafter
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -13,22 +14,31 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
+from app.command.flags import set_values
+from tests.library.runs import RECORDING, run
+from tracker.library.store import Library, parameters_of
 from tracker.parameters import Stage
 from tracker.parameters.catalogue import (
     GROUPS,
     METHODS,
     PARAMETERS,
     PRESETS,
+    REMOVED,
+    RENAMED,
     Parameter,
     RunParameters,
 )
 from tracker.parameters.values import (
     ParameterError,
     changed_values,
+    removed_notes,
     stage_values,
     value_of,
+    with_current_keys,
     with_values,
 )
+from tracker.studies.definition import definition_of
+from tracker.studies.errors import StudyError
 
 STAGES: tuple[Stage, ...] = ("single_view", "fusion", "smoothing", "tracks")
 DEFAULTS = RunParameters()
@@ -239,3 +249,128 @@ def test_values_are_never_changed_in_place() -> None:
     assert DEFAULTS.model_dump() == before
     with pytest.raises(ValidationError):
         DEFAULTS.fusion.survival_probability = 0.5
+
+
+OTHER: dict[str, Any] = {old: PARAMETERS[new].maximum for old, new in RENAMED.items()}
+"""A value that is not the default for each renamed parameter, by its old key."""
+
+MEANT = {RENAMED[old]: value for old, value in OTHER.items()}
+
+
+def test_every_old_key_leads_to_a_parameter_and_is_none_itself() -> None:
+    assert set(RENAMED.values()) <= set(PARAMETERS)
+    assert not set(RENAMED) & {*PARAMETERS, *METHODS}
+    for old, new in RENAMED.items():
+        assert old.split(".")[0] == new.split(".")[0], "a group's values are read by group"
+        assert PARAMETERS[new].default != OTHER[old]
+
+
+def test_values_by_old_keys_are_those_of_now() -> None:
+    after = with_values(DEFAULTS, OTHER)
+    assert changed_values(after) == MEANT
+    assert {old: value_of(after, old) for old in OTHER} == OTHER
+
+
+def test_a_wrong_value_is_refused_under_the_name_of_now() -> None:
+    for old, new in RENAMED.items():
+        with pytest.raises(ParameterError, match=rf"^{new}: must be between") as caught:
+            with_values(DEFAULTS, {old: -1})
+        assert caught.value.key == new
+
+
+def test_where_both_names_are_given_the_one_of_now_counts() -> None:
+    both = {**MEANT, **dict.fromkeys(RENAMED, 0.1)}
+    assert with_current_keys(both) == MEANT
+    assert with_current_keys({key: both[key] for key in reversed(both)}) == MEANT
+
+
+def stored(values: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    """Values by key as a library and a bundle store them, by group and name."""
+    groups: dict[str, dict[str, Any]] = {}
+    for key, value in values.items():
+        group, name = key.split(".")
+        groups.setdefault(group, {})[name] = value
+    return groups
+
+
+def test_a_run_of_the_library_lists_its_changes_by_the_keys_of_now(tmp_path: Path) -> None:
+    values = {**RunParameters().model_dump(mode="json"), **stored(OTHER)}
+    with Library(tmp_path / "library.sqlite3") as library:
+        number = library.keep(RECORDING, run(0, changes=OTHER, parameters=values))
+        (row,) = library.runs()
+        assert (row.id, row.changes) == (number, MEANT)
+        assert library.result(number).unknown == ()
+        for key, value in MEANT.items():
+            assert value_of(library.result(number).parameters, key) == value
+
+
+def test_a_run_of_the_library_is_read_whole() -> None:
+    parameters, unknown = parameters_of(stored(OTHER))
+    assert changed_values(parameters) == MEANT
+    assert unknown == ()
+    parameters, unknown = parameters_of({**stored(OTHER), "some": {"thing": 1}})
+    assert changed_values(parameters) == MEANT
+    assert unknown == ("some.thing",)
+
+
+GONE: dict[str, Any] = dict.fromkeys(REMOVED, 7)
+"""A value for each removed parameter."""
+
+MEANT_NOW = {"fusion.clutter_rate": 0.25}
+NOTES = tuple(f"{key} no longer exists: {REMOVED[key]}" for key in REMOVED)
+
+
+def test_a_removed_parameter_is_none_of_now_and_a_note_tells_what_holds() -> None:
+    assert not REMOVED.keys() & {*PARAMETERS, *METHODS, *RENAMED}
+    assert all(words and not words.endswith(".") for words in REMOVED.values())
+    assert removed_notes([*MEANT_NOW, *REMOVED]) == NOTES
+    assert removed_notes([*MEANT_NOW, *RENAMED, "no.such"]) == ()
+
+
+def test_values_beside_those_of_removed_parameters_count() -> None:
+    assert with_current_keys({**GONE, **MEANT_NOW}) == MEANT_NOW
+    assert changed_values(with_values(RunParameters(), {**GONE, **MEANT_NOW})) == MEANT_NOW
+    parameters, unknown = parameters_of(stored({**GONE, **MEANT_NOW}))
+    assert (changed_values(parameters), unknown) == (MEANT_NOW, ())
+
+
+def test_the_command_line_says_what_a_renamed_parameter_is_called(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    old, new = next(iter(RENAMED.items()))
+    assert set_values((f"{old}=0.3", "fusion.clutter_rate=2")) == {
+        new: "0.3",
+        "fusion.clutter_rate": "2",
+    }
+    assert f"{old} is called {new} now" in capsys.readouterr().err
+
+
+def test_a_run_of_the_library_says_which_changes_no_longer_exist(tmp_path: Path) -> None:
+    values = {**RunParameters().model_dump(mode="json"), **stored({**GONE, **MEANT_NOW})}
+    with Library(tmp_path / "library.sqlite3") as library:
+        number = library.keep(RECORDING, run(0, changes={**GONE, **MEANT_NOW}, parameters=values))
+        result = library.result(number)
+    assert (result.run.changes, result.run.removed, result.unknown) == (MEANT_NOW, NOTES, ())
+
+
+def study(**tables: Any) -> dict[str, Any]:
+    return {"name": "old", "recordings": ["room24-2p"], **tables}
+
+
+@pytest.mark.parametrize("flat", [True, False])
+def test_a_study_opens_without_the_removed_and_notes_them(tmp_path: Path, flat: bool) -> None:
+    def written(values: dict[str, Any]) -> dict[str, Any]:
+        return values if flat else stored(values)
+
+    varied = {"fusion.clutter_rate": {"low": 0.1, "high": 1.0}}
+    varied |= {key: {"low": 1, "high": 9} for key in list(REMOVED)[1:]}
+    tables = {"values": written({next(iter(REMOVED)): 7}), "parameters": written(varied)}
+    definition = definition_of(study(**tables), where="old.toml", folder=tmp_path)
+    assert [one.key for one in definition.varied] == ["fusion.clutter_rate"]
+    assert (dict(definition.values), sorted(definition.notes)) == ({}, sorted(NOTES))
+
+
+def test_a_study_of_removed_parameters_alone_says_so(tmp_path: Path) -> None:
+    ranges = {key: {"low": 1, "high": 9} for key in REMOVED}
+    with pytest.raises(StudyError, match=r"found none; foreground\.\w+ no longer exists: "):
+        definition_of(study(parameters=stored(ranges)), where="old.toml", folder=tmp_path)

@@ -1,4 +1,4 @@
-"""At, one below and one above each count and threshold that the methods compare with."""
+"""At, one below and one above each count and threshold of the methods, and of packed samples."""
 
 from __future__ import annotations
 
@@ -6,8 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 from numpy import ndarray
-from numpy.testing import assert_array_equal
+from numpy.testing import assert_allclose, assert_array_equal
 
 from tests import world
 from tests.single_view.pieces import PUBLISHED, draw, person, play
@@ -17,7 +20,7 @@ from tracker.single_view.jpda.cases import determine_cases, exclude_outside_boxe
 from tracker.single_view.jpda.measurements import Measured
 from tracker.single_view.jpda.targets import Managed, Targets
 from tracker.single_view.jpda.targets import manage as manage_jpda
-from tracker.single_view.protocol import GATES, Dropped
+from tracker.single_view.protocol import GATES, Dropped, pack_samples, unpack_samples
 from tracker.single_view.pseudo_particle import hypotheses, track_management
 from tracker.single_view.pseudo_particle.track_management import Departed, Tracks
 from tracker.single_view.rectification.stabilisation import LARGEST, LEAST_CORNERS, consensus_shift
@@ -357,3 +360,26 @@ def test_candidates_are_counted_by_the_gate_where_they_fell() -> None:
         f"dropped for {GATES[4]}": 2.0,
     }
     assert Dropped.none().information(0) == {"candidates": 0.0}
+
+
+FURTHEST = 8191.75
+"""Pixels from the origin that a packed centre can be at."""
+
+
+@given(
+    arrays(float, (7, 4), elements=st.floats(-FURTHEST, FURTHEST)),
+    arrays(float, 7, elements=st.floats(0.0, 1e6)),
+)
+def test_what_is_unpacked_was_packed(boxes: ndarray, weights: ndarray) -> None:
+    centres, shares = unpack_samples(pack_samples(boxes, weights))
+    assert_allclose(centres, boxes[:, :2], atol=0.125)
+    if weights.max() > 1e-6:
+        assert_allclose(shares, weights / weights.max(), atol=0.0005)
+
+
+def test_samples_of_no_weight_and_far_outside_are_kept() -> None:
+    packed = pack_samples(np.array([[1e6, -1e6, 3.0, 4.0], [2.0, 3.0, 1.0, 1.0]]), np.zeros(2))
+    centres, shares = unpack_samples(packed)
+    assert_array_equal(centres, [[FURTHEST, -8192.0], [2.0, 3.0]])
+    assert_array_equal(shares, [0.0, 0.0])
+    assert pack_samples(np.zeros((0, 4)), np.zeros(0)).shape == (0, 3)

@@ -6,7 +6,7 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
-from tests.parameters.test_renamed import MEANT, OTHER
+from tests.parameters.test_values import MEANT, OTHER
 from tests.studies.small import definition
 from tracker.files.validated import parse_json
 from tracker.parameters.catalogue import RENAMED

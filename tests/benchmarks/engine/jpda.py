@@ -9,8 +9,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from tests.benchmarks.measure import Measurement, ratio, seconds
-from tests.filters.association.stone_soup_jpda import Cluster, associators, cluster
-from tests.filters.association.test_association import problem
+from tests.filters.test_association import Cluster, associators, cluster, problem
 from tracker.filters.association import exact_marginals, marginals, simplified_murty
 
 TARGETS = (3, 4, 5, 6, 8, 10, 12, 15)

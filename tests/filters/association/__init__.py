@@ -1,1 +1,0 @@
-"""Association probabilities and joint events."""
