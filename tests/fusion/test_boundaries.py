@@ -32,8 +32,7 @@ from tracker.fusion.memory import Memory, recall
 from tracker.fusion.missing_frames import StepEvidence
 from tracker.fusion.model import FusionModel, all_boxes
 from tracker.fusion.multi_bernoulli import MultiBernoulli, MultiBernoulliState
-from tracker.fusion.place_constraints import PlaceConstraints, constraints_by_step
-from tracker.fusion.protocol import FusionResult
+from tracker.fusion.protocol import FusionResult, PlaceConstraints, constraints_by_step
 from tracker.fusion.record import Ledger, Record, sum_associations
 from tracker.fusion.reidentification import IdentityBeliefs
 from tracker.fusion.sequential_phd import SequentialPhd, SequentialPhdState

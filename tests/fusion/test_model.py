@@ -19,11 +19,17 @@ from tests.random_rooms import looking_camera
 from tests.world import BARREL, look_at
 from tracker.filters import models
 from tracker.filters.gaussian_mixture import GaussianMixture
-from tracker.fusion.heights import HeightBounds
 from tracker.fusion.model import FusionModel
 from tracker.fusion.multi_bernoulli import MultiBernoulli
-from tracker.fusion.target_model import SIZES, MeasurementKind, TargetModel, UpdateKind
-from tracker.fusion.visibility import inside_probability, visibility
+from tracker.fusion.target_model import (
+    SIZES,
+    HeightBounds,
+    MeasurementKind,
+    TargetModel,
+    UpdateKind,
+    inside_probability,
+    visibility,
+)
 from tracker.geometry.camera import Camera
 from tracker.kernels import kalman
 from tracker.kernels.boxes import Hidden

@@ -14,8 +14,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from tests.world import PERSON, boxes, gaussians, ring, views
 from tracker.filters import association, gaussian_mixture, phd, pmb
 from tracker.filters.gaussian_mixture import GaussianMixture, concatenate
-from tracker.fusion.target_model import MeasurementKind, TargetModel
-from tracker.fusion.visibility import inside_probability, visibility
+from tracker.fusion.target_model import MeasurementKind, TargetModel, inside_probability, visibility
 from tracker.geometry.camera import stacked
 from tracker.kernels import bernoulli, labelled, linear_algebra
 from tracker.kernels import bernoulli as marginal_kernels

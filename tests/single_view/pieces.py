@@ -13,7 +13,7 @@ from tracker.single_view.association_matrix.track_transfer import (
     advance,
     object_histograms,
 )
-from tracker.single_view.pictures.blobs import Blobs, blobs
+from tracker.single_view.pictures.foreground import Blobs, blobs
 from tracker.single_view.protocol import ViewEvent
 
 SIZE = (80, 200)

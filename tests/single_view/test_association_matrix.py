@@ -41,7 +41,7 @@ from tracker.single_view.association_matrix.track_transfer import (
     object_histograms,
 )
 from tracker.single_view.box_sizes import upright_boxes
-from tracker.single_view.pictures.blobs import blobs
+from tracker.single_view.pictures.foreground import blobs
 from tracker.single_view.protocol import ViewEvent
 
 decisions = arrays.arrays(np.bool_, st.tuples(st.integers(0, 6), st.integers(0, 6)))

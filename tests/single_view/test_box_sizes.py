@@ -19,11 +19,10 @@ from tracker.geometry.boxes import Boxes
 from tracker.geometry.camera import Camera
 from tracker.parameters.catalogue import RunParameters
 from tracker.parameters.groups.colour_phd import ColourPhdParams
-from tracker.parameters.groups.detections import DetectionBoxParams
+from tracker.parameters.groups.detections import DetectionBoxParams, ShapesParams
 from tracker.parameters.groups.foreground import ForegroundParams
 from tracker.parameters.groups.jpda import JpdaParams
 from tracker.parameters.groups.pseudo_particle import PseudoParticleParams
-from tracker.parameters.groups.shapes import ShapesParams
 from tracker.parameters.values import with_values
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Entrance, Room, Sequence

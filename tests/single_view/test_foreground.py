@@ -37,8 +37,7 @@ from tracker.single_view.pictures.background import (
     tone_curve,
     unpack,
 )
-from tracker.single_view.pictures.blobs import blobs
-from tracker.single_view.pictures.foreground import box_shares, integral, spread_steps
+from tracker.single_view.pictures.foreground import blobs, box_shares, integral, spread_steps
 
 PLAIN = ForegroundParams(threshold=24.0)
 

@@ -20,7 +20,7 @@ from tests.world import PERSON as HALF_EXTENTS
 from tests.world import SMALL_CAMERAS, SMALL_ROOM
 from tracker.geometry.camera import Camera
 from tracker.parameters.catalogue import RunParameters
-from tracker.parameters.groups.pictures import PictureParams
+from tracker.parameters.groups.foreground import PictureParams
 from tracker.parameters.values import with_values
 from tracker.runs import pipeline
 from tracker.runs.gates import notices

@@ -16,7 +16,7 @@ from tests.smoothing.test_appearance import noisy, recording
 from tests.smoothing.test_boundaries import PRIOR, fitted, standing
 from tracker.corrections.kinds import make
 from tracker.filters.models import Motion
-from tracker.fusion.visibility import inside_probability
+from tracker.fusion.target_model import inside_probability
 from tracker.parameters.groups.fusion import FusionParams
 from tracker.parameters.groups.smoothing import SmoothingParams
 from tracker.single_view.protocol import ViewResult

@@ -10,7 +10,7 @@ from tracker.corrections.inflation import inflation
 from tracker.filters import gaussian_mixture, models
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.fusion.model import FusionModel
-from tracker.fusion.place_constraints import PlaceConstraints
+from tracker.fusion.protocol import PlaceConstraints
 from tracker.fusion.record import Record
 
 _EXISTENCE = 0.999

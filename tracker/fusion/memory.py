@@ -93,12 +93,7 @@ def recall(
 
 
 def _first_of_each(labels: Int[ndarray, " J"], among: Int[ndarray, " K"]) -> Int[ndarray, " L"]:
-    """Return the index of the first component of each label, by ascending label.
-
-    Args:
-        labels: Label of each of J components.
-        among: Indices of the K components that are considered.
-    """
+    """Return the index of the first component of each label, by ascending label."""
     first: dict[int, int] = {}
     for index, label in zip(among.tolist(), labels.take(among).tolist(), strict=True):
         first.setdefault(label, index)

@@ -10,11 +10,10 @@ from numpy import ndarray
 
 from tracker.filters import association, gaussian_mixture, models
 from tracker.filters.gaussian_mixture import GaussianMixture
-from tracker.fusion import missing_frames, visibility
-from tracker.fusion.heights import HeightBounds
+from tracker.fusion import missing_frames, target_model
 from tracker.fusion.measurement_births import BirthModel, Evidence, MeasurementBirths, Newborns
 from tracker.fusion.missing_frames import Recent, StepEvidence
-from tracker.fusion.target_model import TargetModel
+from tracker.fusion.target_model import HeightBounds, TargetModel
 from tracker.kernels import linear_algebra
 from tracker.kernels.boxes import Hidden
 from tracker.kernels.labelled import CameraBoxes, CameraRule
@@ -107,7 +106,7 @@ class FusionModel:
             expected: The predicted boxes of the components in that camera.
             mixture: J components.
         """
-        return self.parameters.detection_probability * visibility.inside_probability(
+        return self.parameters.detection_probability * target_model.inside_probability(
             self.cameras[index],
             expected,
             mixture.covariances,
@@ -130,7 +129,7 @@ class FusionModel:
             occluders: Weight of each component that may occlude others, else 0.
         """
         hiding = np.flatnonzero(occluders > CONFIRMED)
-        return visibility.visibility(
+        return target_model.visibility(
             self.detection_probabilities(index, expected, mixture),
             expected,
             mixture,
@@ -154,7 +153,7 @@ class FusionModel:
             confirmed=CONFIRMED,
             near=self.near,
             strength=p.occlusion,
-            reporting_share=visibility.REPORTING_SHARE,
+            reporting_share=target_model.REPORTING_SHARE,
             tolerance=association.TOLERANCE,
             iterations=association.ITERATIONS,
             reporting_threshold=reporting_threshold,

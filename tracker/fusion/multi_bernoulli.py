@@ -23,8 +23,7 @@ from tracker.fusion.measurement_births import Evidence, Newborns
 from tracker.fusion.memory import Memory
 from tracker.fusion.missing_frames import Recent
 from tracker.fusion.model import CONFIRMED, FusionModel, all_boxes
-from tracker.fusion.place_constraints import PlaceConstraints
-from tracker.fusion.protocol import FusionResult
+from tracker.fusion.protocol import FusionResult, PlaceConstraints
 from tracker.fusion.record import REPORTING_THRESHOLD, Record, sum_associations
 from tracker.fusion.reidentification import IdentityBeliefs
 from tracker.geometry.camera import stacked
@@ -67,12 +66,7 @@ class MultiBernoulli:
     """
 
     def __init__(self, sequence: Sequence, parameters: RunParameters) -> None:
-        """Prepare the filter for one sequence.
-
-        Args:
-            sequence: The cameras and the room.
-            parameters: The parameters of the run, of which those of the fusion are used.
-        """
+        """Prepare the filter for one sequence."""
         p, model = parameters.fusion, FusionModel(sequence, parameters.fusion)
         self._parameters, self._model = p, model
         motion, target = model.motion, model.target

@@ -23,8 +23,7 @@ from tracker.fusion.measurement_births import Evidence
 from tracker.fusion.memory import Memory
 from tracker.fusion.missing_frames import Recent
 from tracker.fusion.model import CONFIRMED, FusionModel, all_boxes
-from tracker.fusion.place_constraints import PlaceConstraints
-from tracker.fusion.protocol import FusionResult
+from tracker.fusion.protocol import FusionResult, PlaceConstraints
 from tracker.fusion.record import Ledger, Record
 from tracker.kernels import bernoulli, linear_algebra
 from tracker.kernels import mixtures as mixture_kernels
@@ -93,12 +92,7 @@ class SequentialPhd:
     """
 
     def __init__(self, sequence: Sequence, parameters: RunParameters) -> None:
-        """Prepare the filter for one sequence.
-
-        Args:
-            sequence: The cameras and the room.
-            parameters: The parameters of the run, of which those of the fusion are used.
-        """
+        """Prepare the filter for one sequence."""
         self._parameters = parameters.fusion
         self._model = FusionModel(sequence, parameters.fusion)
 

@@ -1,18 +1,30 @@
-"""The measurement model: the box that a camera gives of an upright target at a position."""
+"""The measurement model: the box that a camera gives of an upright target, and when it gives none.
+
+The detection probability depends on the edge of the image and on occlusion. Heights at which a
+target can be are a prior of tracks that boxes leave uncertain.
+
+[SS10] D. Simon, D. L. Simon, "Constrained Kalman filtering via density function truncation for
+turbofan engine health estimation", International Journal of Systems Science 41(2), 2010.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from numpy import ndarray
 
+from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.geometry.camera import Camera
 from tracker.kernels import boxes, measurement
+from tracker.kernels import boxes as box_kernels
+from tracker.kernels.boxes import Hidden, Occlusion
 from tracker.kernels.kalman import Measurements
 from tracker.kernels.measurement import ExpectedBoxes, Target
 from tracker.parameters.groups.fusion import FusionParams
+from tracker.sequences.sequence import Room
 
 MeasurementKind = Literal["centre", "box", "box_and_width"]
 UpdateKind = Literal["extended", "unscented"]
@@ -177,3 +189,177 @@ class TargetModel:
             np.ascontiguousarray((factor * sigmas) ** 2, dtype=float),
             *self.transforms,
         )
+
+
+_HEIGHT = 2
+"""Index of the height in the state."""
+
+_NEAR = 1.0
+"""Distance from a bound, in standard deviations, from which on a track is truncated. A Gaussian is
+not zero beyond the bound after a truncation; truncated at every step, a track well inside would
+move away from the bound although nothing new is known of it."""
+
+
+@dataclass(frozen=True, slots=True)
+class HeightBounds:
+    """Bounds of a target's centre: at the lower one it lies or crouches on the floor.
+
+    One camera measures a target's distance by the size of its box alone, and boxes that are all
+    a little too small put it below the floor. With two cameras the rays meet, and the bounds have
+    no effect.
+    """
+
+    low: float
+    """Height of a centre on the floor, world metres."""
+    high: float
+    """Height of a centre as far below the ceiling as ``low`` is above the floor, world metres."""
+    outside: float
+    """Density beyond the bounds relative to that between them, 0 … 1."""
+
+    @staticmethod
+    def of(room: Room, half_height: float, outside: float) -> HeightBounds:
+        """The bounds in a room.
+
+        Args:
+            room: The room, from floor to ceiling.
+            half_height: Half height of a target on the floor, metres.
+            outside: Density beyond the bounds relative to that between them, 0 … 1.
+        """
+        low = float(room.minimum[_HEIGHT]) + half_height
+        return HeightBounds(low, max(low, float(room.maximum[_HEIGHT]) - half_height), outside)
+
+    def truncate(self, tracks: GaussianMixture) -> GaussianMixture:
+        """Truncate the tracks whose height is near or beyond a bound ([SS10]_).
+
+        With a = (low − z) / σ and b = (high − z) / σ, the density φ of the standard normal, its
+        distribution Φ, and the weight ε outside, the moments of (1 − ε) φ on [a, b] and ε φ
+        everywhere are
+
+            m_0 = (1 − ε) (Φ(b) − Φ(a)) + ε
+            m_1 = (1 − ε) (φ(a) − φ(b))
+            m_2 = (1 − ε) (Φ(b) − Φ(a) + a φ(a) − b φ(b)) + ε
+
+        The rest of the state follows by regression on the height: with the gain g = P_z / σ the
+        mean moves by g m_1/m_0, and P becomes P − g gᵀ (1 − m_2/m_0 + (m_1/m_0)²).
+
+        Args:
+            tracks: J tracks, positions in world metres.
+
+        Returns:
+            The same tracks; those well between the bounds are not changed.
+        """
+        heights = tracks.means[:, _HEIGHT]
+        sigmas = np.sqrt(tracks.covariances[:, _HEIGHT, _HEIGHT])
+        margins = np.minimum(heights - self.low, self.high - heights)
+        rows = np.flatnonzero((margins < _NEAR * sigmas) & (sigmas > 0.0))
+        if not len(rows):
+            return tracks
+        z, sigma = heights[rows], sigmas[rows]
+        moves, shares = self._moments((self.low - z) / sigma, (self.high - z) / sigma)
+        gains = tracks.covariances[rows][:, :, _HEIGHT] / sigma[:, None]
+        means, covariances = tracks.means.copy(), tracks.covariances.copy()
+        means[rows] += gains * moves[:, None]
+        lost = gains[:, :, None] * gains[:, None, :]
+        covariances[rows] -= lost * (1.0 - shares)[:, None, None]
+        return replace(tracks, means=means, covariances=covariances)
+
+    def _moments(
+        self, a: Float[ndarray, " K"], b: Float[ndarray, " K"]
+    ) -> tuple[Float[ndarray, " K"], Float[ndarray, " K"]]:
+        """Mean and variance of the weighted standard normal, bounds in standard deviations."""
+        from scipy.special import ndtr  # a server starts without it
+
+        rest = 1.0 - self.outside
+        at_a, at_b = (np.exp(-0.5 * x**2) / np.sqrt(2.0 * np.pi) for x in (a, b))
+        between = ndtr(b) - ndtr(a)
+        weight = rest * between + self.outside
+        # with no density outside, one that has none between either stays as it is
+        there = weight > _LEAST
+        weight = np.where(there, weight, 1.0)
+        mean = rest * (at_a - at_b) / weight
+        second = (rest * (between + a * at_a - b * at_b) + self.outside) / weight
+        variance = np.maximum(second - mean**2, _LEAST)
+        return np.where(there, mean, 0.0), np.where(there, variance, 1.0)
+
+
+_LEAST = 1e-6
+"""Probability, and variance relative to σ², below which rounding would decide."""
+
+
+REPORTING_SHARE = 0.2
+"""Share of a target's box that must be covered for its occluder to be reported. It has no effect
+on the tracks."""
+
+
+def inside_probability(
+    camera: Camera,
+    expected: ExpectedBoxes,
+    covariances: Float[ndarray, "J d d"],
+    *,
+    soft: bool = True,
+) -> Float[ndarray, " J"]:
+    """Compute the probability that the centre of each target lies inside the image.
+
+    The predicted position is taken as Gaussian in the image, so the value falls
+    smoothly towards the edge, over the width of its own uncertainty and one pixel more;
+    it is 0 where head or foot is behind the lens.
+
+    Args:
+        camera: The camera, whose image size is used.
+        expected: The predicted boxes of J targets in that camera.
+        covariances: Covariance of each target's state, metres and seconds.
+        soft: False for the published edge: 1 inside, 0 outside.
+    """
+    inside: ndarray = box_kernels.inside_probability(
+        expected.boxes,
+        expected.jacobians,
+        np.ascontiguousarray(covariances),
+        expected.valid,
+        camera.calibration.image_size,
+        soft,
+    )
+    return inside
+
+
+def visibility(
+    detection_probabilities: Float[ndarray, " J"],
+    expected: ExpectedBoxes,
+    mixture: GaussianMixture,
+    *,
+    occluders: Int[ndarray, " L"],
+    weights: Float[ndarray, " L"],
+    strength: float,
+    near: float,
+) -> Hidden:
+    """Lower each p_D where other targets stand in front.
+
+        p_j ← p_j Π_l (1 − ρ w_l a(j, l))
+        a(j, l) = [l is nearer to the lens than j] · area(box_j ∩ box_l) / area(box_j)
+
+    where l runs over the occluders with another label than j. It is the probability that no
+    occluder hides j, if occluders l exist independently with probability w_l.
+
+    Args:
+        detection_probabilities: p_j without occlusion, of J components.
+        expected: The predicted boxes of the components in this camera.
+        mixture: J components, with their labels.
+        occluders: Indices of the components that may occlude others: confirmed ones, one a label.
+        weights: Existence of each occluder; values above 1 count as 1.
+        strength: ρ, 0 for no occlusion, 1 where a covered target is never detected.
+        near: Distance within which an occluder may be a duplicate of the target, metres; a
+            duplicate does not occlude.
+    """
+    if strength == 0.0 or not len(occluders):
+        unoccluded = np.full(len(detection_probabilities), -1, dtype=np.int64)
+        return Hidden(detection_probabilities, unoccluded)
+    found: Hidden = box_kernels.hide(
+        detection_probabilities,
+        expected.boxes,
+        expected.depths,
+        mixture.means,
+        mixture.labels,
+        occluders,
+        weights,
+        Occlusion(near, strength, REPORTING_SHARE),
+    )
+    return found

@@ -29,14 +29,11 @@ from tracker.parameters.groups import (
     detections,
     fusion,
     jpda,
-    onnx_detector,
     pseudo_particle,
-    shapes,
     smoothing,
 )
-from tracker.parameters.groups.foreground import ForegroundParams
+from tracker.parameters.groups.foreground import ForegroundParams, PictureParams
 from tracker.parameters.groups.fusion import FusionParams
-from tracker.parameters.groups.pictures import PictureParams
 from tracker.parameters.groups.smoothing import SmoothingParams
 from tracker.parameters.method import Method, MethodKey
 
@@ -50,11 +47,11 @@ ENTRY_POINTS: dict[MethodKey, str] = {
 BUILT_IN: dict[MethodKey, tuple[Method, ...]] = {
     "single_view": (
         colour_phd.METHOD,
-        shapes.METHOD,
+        detections.BY_SHAPE,
         jpda.METHOD,
         pseudo_particle.METHOD,
         association_matrix.METHOD,
-        onnx_detector.METHOD,
+        detections.DETECTED,
         detections.FILTERED,
         detections.AS_THEY_ARE,
     ),

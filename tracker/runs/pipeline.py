@@ -15,7 +15,7 @@ from tracker.corrections import Correction
 from tracker.corrections.kinds import leeway
 from tracker.corrections.outcomes import outcomes
 from tracker.fusion import trajectories as tracks_stage
-from tracker.fusion.place_constraints import constraints_by_step
+from tracker.fusion.protocol import constraints_by_step
 from tracker.fusion.trajectories import Bounds, GrowingTrajectories, Trajectories, apply_corrections
 from tracker.parameters import Stage
 from tracker.parameters.catalogue import RunParameters

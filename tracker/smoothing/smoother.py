@@ -298,13 +298,7 @@ class Smoother:
         return _enforce_places(paths, found)
 
     def _linearised(self, paths: Paths, by_camera: list[Links], learnt: Calibration) -> _Linearised:
-        """What the boxes and constraints say of paths, linearised at their states.
-
-        Args:
-            paths: n paths, with N rows.
-            by_camera: The links of each camera in the order of their rows.
-            learnt: The self-calibration of the boxes.
-        """
+        """What the boxes and constraints say of paths, linearised at their states."""
         begins = paths.states[paths.starts[:-1]].copy()
         begins[:, 3:] = 0.0
         places = PlaceMeasurements.of(*self.rows_with_places(paths))
@@ -346,13 +340,7 @@ class Smoother:
     def _information(
         self, paths: Paths, by_camera: list[Links], learnt: Calibration
     ) -> evidence.BoxInformation:
-        """Compute the information of all boxes on the rows of paths, some rows at a time.
-
-        Args:
-            paths: The paths, with N rows.
-            by_camera: The links of each camera in the order of their rows.
-            learnt: The self-calibration of the boxes.
-        """
+        """Compute the information of all boxes on the rows of paths, some rows at a time."""
         rows, owners = len(paths.states), paths.owners
         found = evidence.BoxInformation(np.empty((rows, 3, 3)), np.empty((rows, 3)), np.empty(rows))
         bounds = [
@@ -538,15 +526,7 @@ class Smoother:
         people: ndarray,
         learnt: Calibration,
     ) -> ExpectedBoxes:
-        """Predict the boxes of states in one camera, with the calibration of each person.
-
-        Args:
-            camera: Index of the camera.
-            states: (J, d) states.
-            covariances: (J, d, d) covariances.
-            people: Index of the path of each state.
-            learnt: The self-calibration of the boxes.
-        """
+        """Predict the boxes of states in one camera, with the calibration of each person."""
         found = self.model.target.expected(self.model.cameras[camera], states, covariances)
         values = found.expected.values + self._shift(learnt, camera, states, people, found)
         return found._replace(expected=found.expected._replace(values=values))
@@ -559,15 +539,7 @@ class Smoother:
         people: ndarray,
         expected: ExpectedBoxes,
     ) -> Float[ndarray, "L m"]:
-        """The correction that is added to the expected measurements of states, pixels.
-
-        Args:
-            learnt: The self-calibration of the boxes.
-            camera: Index of the camera.
-            states: (L, d) states.
-            people: Index of the path of each state.
-            expected: The expected boxes.
-        """
+        """The correction that is added to the expected measurements of states, pixels."""
         shift = learnt.shift(camera, people, expected)
         if learnt.radius > 0.0:
             edges = self._body_shifts(camera, states, learnt.radius)[:, 1:3]
@@ -622,14 +594,7 @@ class Smoother:
         return Calibration(size_sums / (count + SIZE_RIDGE), offsets, noises, learnt.shifts)
 
     def _residuals(self, camera: int, paths: Paths, own: Links, learnt: Calibration) -> _Residuals:
-        """Compute the residuals of one camera's boxes of people who stand upright.
-
-        Args:
-            camera: Index of the camera.
-            paths: The paths.
-            own: Their links to the camera's boxes.
-            learnt: The calibration before.
-        """
+        """Compute the residuals of one camera's boxes of people who stand upright."""
         parts = []
         for rows, expected, measured, half, plain, rest in self._compared(
             camera, paths, own, learnt

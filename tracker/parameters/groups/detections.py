@@ -1,4 +1,4 @@
-"""Parameters of the single-view methods on an outside detector's boxes."""
+"""Parameters of the single-view methods on a detector's boxes: outside, a network, or shapes."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Field
 
 from tracker.parameters.definition import Params, ui
-from tracker.parameters.method import Method, Reads, Uses
+from tracker.parameters.method import Method, Reads, Uses, Values
 
 
 class DetectionBoxParams(Params):
@@ -120,4 +120,127 @@ FILTERED = Method(
     help="GM-PHD filter on an outside detector's boxes.",
     uses=Uses(detections=True, reads=(Reads("detection_boxes"), Reads("detection_phd"))),
     parameters=DetectionPhdParams,
+)
+
+
+class OnnxDetectorParams(Params):
+    """Single-view boxes of a detection network (ONNX) that is run on the pictures."""
+
+    score_threshold: Annotated[
+        float, Field(ge=0.0, le=1.0), ui("s_min", "Clutter", step=0.01, essential=True)
+    ] = 0.35
+    """Boxes with a lower score are left out."""
+
+    suppression_overlap: Annotated[
+        float, Field(ge=0.05, le=0.99), ui("o_s", step=0.01, essential=True)
+    ] = 0.6
+    """Of two boxes with a larger intersection over union the one with the higher score remains."""
+
+    person_class: Annotated[int, Field(ge=-1, le=1000), ui("c", step=1, advanced=True)] = -1
+    """Which of the network's classes are people, counted from 0; -1: by the kind of network."""
+
+    input_side: Annotated[
+        int, Field(ge=0, le=2048), ui("n_in", unit="px", step=32, advanced=True)
+    ] = 0
+    """Longer side of the network's picture, where its file leaves that open; 0: as the file says,
+    416 for the fetched network, or else 640. The more, the smaller people may be, and the longer it
+    takes."""
+
+    every: Annotated[int, Field(ge=1, le=10), ui("n_e", unit="steps", step=1)] = 1
+    """The network looks at every n-th picture; those between are no evidence for or against
+    people."""
+
+    pixel_values: Annotated[
+        Literal["file", "unit", "imagenet", "signed", "bytes", "imagenet_bgr"],
+        ui("v", advanced=True),
+    ] = "file"
+    """Range of the network's input: as its file says, or else 0 … 1; 0 … 1 (YOLO, RT-DETR),
+    ImageNet's (DETR), −1 … 1, 0 … 255, or ImageNet's with blue first (NanoDet)."""
+
+
+_BOXES = Reads("detection_boxes", without=frozenset({"score_threshold"}))
+"""A network's boxes have the noise of every detector's, and a least score of their own."""
+
+_PICTURES = Reads(
+    "pictures", without=frozenset({"lines", "target_height", "least_height", "steady_from"})
+)
+"""The network's input is scaled from the full picture, and it needs no fixed background."""
+
+
+def _uses(values: Values) -> Uses:
+    return Uses(
+        pictures=True,
+        detector=True,
+        every=values.of(OnnxDetectorParams).every,
+        reads=(Reads("onnx_detector"), _BOXES, _PICTURES),
+    )
+
+
+DETECTED = Method(
+    name="onnx_detector",
+    help="The boxes of a detection network (ONNX), without a filter in the picture.",
+    uses=_uses,
+    parameters=OnnxDetectorParams,
+)
+
+
+class ShapesParams(Params):
+    """People by the shape of head and trunk, without templates ([DTPB09]).
+
+    They are followed in the picture by ``jpda`` with its default parameters: halved and doubled,
+    none of those and not the constant changed a bit of any track in six random rooms
+    (``tests.papers.rooms.ablations``), since all people by shape go to the fusion.
+    """
+
+    least_odds: Annotated[float, Field(ge=-6.0, le=10.0), ui("ln o", step=0.1, essential=True)] = (
+        0.5
+    )
+    """Log odds from which a window of the picture counts as a person in this camera."""
+
+    passed_odds: Annotated[float, Field(ge=-6.0, le=10.0), ui("ln o_2", step=0.1)] = -1.5
+    """Log odds from which a window is passed on to the fusion, where several cameras may agree on
+    it."""
+
+    even_odds: Annotated[float, Field(ge=-6.0, le=10.0), ui("ln o_0", step=0.1, advanced=True)] = (
+        2.3
+    )
+    """Log odds at which a window that was passed on is equally likely a person and clutter."""
+
+    odds_weight: Annotated[float, Field(ge=0.0, le=5.0), ui("a_s", step=0.1, advanced=True)] = 2.0
+    """Factor from the log odds beyond the even ones to the log likelihood ratio of a person."""
+
+    largest_ratio: Annotated[float, Field(ge=0.0, le=20.0), ui("ln Λ", step=0.1, advanced=True)] = (
+        3.0
+    )
+    """Largest log likelihood ratio of a person that a shape alone can give."""
+
+    overlap: Annotated[float, Field(ge=0.05, le=0.9), ui("o_s", step=0.05, advanced=True)] = 0.3
+    """Intersection over union above which two windows are of one person; the better one remains."""
+
+    place_sigma: Annotated[
+        float, Field(ge=0.01, le=1.0), ui("σ_s", unit="m", step=0.01, log=True)
+    ] = 0.08
+    """Standard deviation of the place of a person in the picture, at the person's distance."""
+
+    size_sigma: Annotated[
+        float, Field(ge=0.01, le=3.0), ui("σ_h", unit="half sizes", step=0.01, log=True)
+    ] = 0.2
+    """Standard deviation of the half sizes of a person's box; the smaller, the more precise
+    is the estimated depth."""
+
+    pixel_sigma: Annotated[
+        float, Field(ge=0.0, le=50.0), ui("σ_px", unit="px", step=0.1, advanced=True)
+    ] = 1.5
+    """Part of the noise of a person's place that does not depend on the person's size in the
+    picture."""
+
+    cover: ClassVar[float] = 2.0
+    """An occluded person lies within so many half sizes of the box that hides the person."""
+
+
+BY_SHAPE = Method(
+    name="shapes",
+    help="People by the shape of head and trunk, tracked in the picture by data association.",
+    uses=Uses(pictures=True, reads=(Reads("shapes"), Reads("pictures"))),
+    parameters=ShapesParams,
 )

@@ -29,9 +29,8 @@ from tracker.single_view.association_matrix.track_transfer import (
 from tracker.single_view.box_sizes import box_sigmas
 from tracker.single_view.pictures import colour
 from tracker.single_view.pictures.background import ForegroundModel, pack
-from tracker.single_view.pictures.blobs import Blobs, blobs
 from tracker.single_view.pictures.colour import BINS
-from tracker.single_view.pictures.foreground import learn
+from tracker.single_view.pictures.foreground import Blobs, blobs, learn
 from tracker.single_view.protocol import Dropped, ViewEvent, ViewResult
 
 if TYPE_CHECKING:

@@ -20,8 +20,7 @@ from tracker.kernels.pictures.silhouettes import Acceptance, SizeTable
 from tracker.parameters.groups.association_matrix import AssociationMatrixParams
 from tracker.sequences.sequence import Room
 from tracker.single_view.box_sizes import BoxSizes, outline_share
-from tracker.single_view.pictures.blobs import Blobs
-from tracker.single_view.pictures.foreground import integral, shape_scores
+from tracker.single_view.pictures.foreground import Blobs, integral, shape_scores
 
 SIZES = 6
 """Number of sizes tried at each place; the best are averaged, so few are enough."""

@@ -24,7 +24,7 @@ from scipy.sparse.csgraph import connected_components
 from tracker.geometry.assignment import linear_sum_assignment
 from tracker.kernels.pictures.images import follow_colours
 from tracker.parameters.groups.association_matrix import AssociationMatrixParams
-from tracker.single_view.pictures.blobs import Blobs
+from tracker.single_view.pictures.foreground import Blobs
 from tracker.single_view.protocol import ViewEvent
 
 

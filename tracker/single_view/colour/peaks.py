@@ -23,8 +23,8 @@ from scipy.special import expit
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.kernels.pictures import images
 from tracker.parameters.groups.colour_phd import ColourPeakParams
+from tracker.parameters.groups.detections import ShapesParams
 from tracker.parameters.groups.foreground import ForegroundParams
-from tracker.parameters.groups.shapes import ShapesParams
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.box_sizes import BoxSizes, box_sigmas

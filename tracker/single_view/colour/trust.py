@@ -18,8 +18,8 @@ from numpy import ndarray
 from scipy.special import expit
 
 from tracker.geometry.boxes import Boxes, box_overlaps
+from tracker.parameters.groups.detections import ShapesParams
 from tracker.parameters.groups.foreground import ForegroundParams
-from tracker.parameters.groups.shapes import ShapesParams
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence, Template
 from tracker.single_view.box_sizes import geometry_key

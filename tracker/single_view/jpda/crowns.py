@@ -33,8 +33,7 @@ from tracker.geometry.camera import Camera
 from tracker.parameters.groups.jpda import JpdaParams
 from tracker.sequences.sequence import Room
 from tracker.single_view.box_sizes import BELOW_FLOOR, BoxSizes, outline_share, usual_heights
-from tracker.single_view.pictures.blobs import Blobs, blobs
-from tracker.single_view.pictures.foreground import integral, shape_shares
+from tracker.single_view.pictures.foreground import Blobs, blobs, integral, shape_shares
 from tracker.single_view.protocol import Dropped
 
 

@@ -25,8 +25,7 @@ from tracker.single_view.colour.peaks import PeakFinder
 from tracker.single_view.detector_boxes import DetectorBoxes, detector_sigmas
 from tracker.single_view.jpda.crowns import TargetSizes, crowns
 from tracker.single_view.pictures.background import ForegroundModel, MovingForeground
-from tracker.single_view.pictures.blobs import blobs
-from tracker.single_view.pictures.foreground import box_shares, integral, learn
+from tracker.single_view.pictures.foreground import blobs, box_shares, integral, learn
 from tracker.single_view.protocol import UNCERTAINTY, Dropped
 
 if TYPE_CHECKING:

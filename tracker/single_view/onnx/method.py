@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy import ndarray
 
-from tracker.parameters.groups.detections import DetectionBoxParams
-from tracker.parameters.groups.onnx_detector import OnnxDetectorParams
+from tracker.parameters.groups.detections import DetectionBoxParams, OnnxDetectorParams
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.detector_boxes import judge_boxes
 from tracker.single_view.onnx.network import Network, Settings

@@ -275,12 +275,7 @@ class LearntForeground:
     """A :class:`BackgroundModel` that does not change, with one threshold."""
 
     def __init__(self, background: BackgroundModel, parameters: ForegroundParams) -> None:
-        """Set the background.
-
-        Args:
-            background: The background.
-            parameters: The parameters of :meth:`BackgroundModel.foreground`.
-        """
+        """Set the background."""
         self._background = background
         self._parameters = parameters
 

@@ -11,7 +11,7 @@ from jaxtyping import Float, UInt8
 from numpy import ndarray
 
 from tracker.geometry.camera import Camera
-from tracker.parameters.groups.pictures import PictureParams
+from tracker.parameters.groups.foreground import PictureParams
 from tracker.sequences.sequence import Room
 from tracker.single_view.box_sizes import BoxSizes
 

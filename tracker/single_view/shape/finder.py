@@ -21,7 +21,7 @@ from numpy import ndarray
 
 from tracker.geometry.camera import Camera
 from tracker.kernels.pictures.channels import tree_scores
-from tracker.parameters.groups.shapes import ShapesParams
+from tracker.parameters.groups.detections import ShapesParams
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Room, Sequence
 from tracker.single_view.box_sizes import box_sigmas, geometry_key, upright_boxes
@@ -260,16 +260,10 @@ class Shapes:
 
 
 class ShapeFinder:
-    """A sliding-window detector over the possible windows, with non-maximum suppression."""
+    """A sliding-window detector in an upright camera, with non-maximum suppression."""
 
     def __init__(self, sequence: Sequence, camera_index: int, reader: Pictures) -> None:
-        """Learn the background of one camera.
-
-        Args:
-            sequence: The sequence, with upright cameras.
-            camera_index: Index of the camera.
-            reader: Reader of the images.
-        """
+        """Learn the background of one camera."""
         camera = sequence.cameras[camera_index]
         background = learn_background(sequence, camera_index, reader)
         self._windows = Windows.of(camera, sequence.room, sequence.target_half_extents)
@@ -285,13 +279,7 @@ class ShapeFinder:
 
     @staticmethod
     def of(sequence: Sequence, camera_index: int, reader: Pictures) -> ShapeFinder:
-        """The detector of a camera, created once, since it has no state.
-
-        Args:
-            sequence: The sequence, with upright cameras.
-            camera_index: Index of the camera.
-            reader: Reader of the images.
-        """
+        """The detector of a camera, created once, since it has no state."""
         return reader.once(
             (
                 "shape finder",

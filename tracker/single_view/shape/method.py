@@ -15,7 +15,7 @@ from numpy import ndarray
 from scipy.special import expit, logit
 
 from tracker.filters.gaussian_mixture import GaussianMixture
-from tracker.parameters.groups.shapes import ShapesParams
+from tracker.parameters.groups.detections import ShapesParams
 from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.jpda.measurements import Measured
@@ -89,14 +89,7 @@ class ShapeSource:
     def __init__(
         self, sequence: Sequence, camera_index: int, parameters: ShapesParams, reader: Pictures
     ) -> None:
-        """Learn the background of one camera.
-
-        Args:
-            sequence: The sequence.
-            camera_index: Index of the camera.
-            parameters: The least log odds, and the measurement noise.
-            reader: Reader of the images.
-        """
+        """Learn the background of one camera."""
         self._parameters = parameters
         self._half_extents = sequence.target_half_extents
         self._finder = ShapeFinder.of(sequence, camera_index, reader)

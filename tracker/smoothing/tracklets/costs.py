@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
-from tracker.fusion import visibility
+from tracker.fusion import target_model
 from tracker.kernels.smoothing import evidence
 from tracker.parameters.groups.smoothing import SmoothingParams
 from tracker.smoothing.lifetimes import independent_share, log_miss_likelihoods
@@ -238,15 +238,7 @@ def _finite(
     firsts: Int[ndarray, " n"],
     lasts: Int[ndarray, " n"],
 ) -> Pairs:
-    """List the pairs with finite gains, ordered by the first and then the second.
-
-    Args:
-        earlier: Index of the first of each of P pairs.
-        later: Index of the second.
-        gains: Log odds of the pairs.
-        firsts: First step of each of n tracklets or chains.
-        lasts: Last step of each.
-    """
+    """List the pairs with finite gains, ordered by the first and then the second."""
     order = np.lexsort((later, earlier))
     order = order[np.isfinite(gains[order])]
     earlier, later = earlier[order], later[order]
@@ -286,7 +278,7 @@ def _seen_empty_at(smoother: Smoother, paths: Paths, pairs: Pairs) -> Float[ndar
     model, p = smoother.model, smoother.parameters
     for c, camera in enumerate(smoother.cameras):
         expected = model.target.expected(model.cameras[c], states)
-        chances = p.detection_probability * visibility.inside_probability(
+        chances = p.detection_probability * target_model.inside_probability(
             model.cameras[c], expected, spread, soft=p.edge == "soft"
         )
         chances = np.where(camera.blind[steps], 0.0, chances)
