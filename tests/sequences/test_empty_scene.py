@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 import pytest
 
-from tests.single_view.furnished import empty_room, person_mask, photograph, with_person
+from tests.single_view.scenery import empty_room, person_mask, photograph, with_person
 from tests.synthetic import camera_toml, head_toml, write_sequence
 from tracker.parameters.catalogue import RunParameters
 from tracker.parameters.groups.foreground import ForegroundParams

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 from numpy import ndarray
 
-from tests.single_view.pieces import (
+from tests.single_view.scenery import (
     COLOURS,
     PUBLISHED,
     Rectangle,

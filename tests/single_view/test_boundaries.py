@@ -13,7 +13,7 @@ from numpy import ndarray
 from numpy.testing import assert_allclose, assert_array_equal
 
 from tests import world
-from tests.single_view.pieces import PUBLISHED, draw, person, play
+from tests.single_view.scenery import PUBLISHED, draw, person, play
 from tracker.parameters.groups.jpda import JpdaParams
 from tracker.single_view.association_matrix.track_transfer import decide, decide_by_distance
 from tracker.single_view.jpda.cases import determine_cases, exclude_outside_boxes, search_components

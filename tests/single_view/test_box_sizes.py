@@ -12,7 +12,7 @@ from numpy import ndarray
 from numpy.testing import assert_allclose, assert_array_equal
 
 from tests import world
-from tests.single_view.detected import CAMERA, detected, run
+from tests.single_view.scenery import CAMERA, detected, run
 from tracker import single_view
 from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.geometry.boxes import Boxes

@@ -8,7 +8,7 @@ from numpy import ndarray
 from numpy.testing import assert_allclose, assert_array_equal
 
 from tests import world
-from tests.single_view.detected import ANYWHERE, CAMERA, detected, normal
+from tests.single_view.scenery import ANYWHERE, CAMERA, detected, normal
 from tracker import single_view
 from tracker.filters.gaussian_mixture import GaussianMixture, gate_distance
 from tracker.parameters.catalogue import RunParameters

@@ -21,25 +21,23 @@ import numpy as np
 import pytest
 from numpy import ndarray
 
-from tests.single_view.graph_models import (
-    OUTPUTS,
-    SIDE,
-    GraphModel,
-    answer,
-    detector,
-    ints,
-    numbers,
-    text,
-)
-from tests.single_view.packages import (
+from tests.single_view.networks import (
     GRAPH,
     LICENCE,
+    OUTPUTS,
+    SIDE,
     WEIGHTS,
+    GraphModel,
     Npm,
+    answer,
+    detector,
     files,
     giving,
+    ints,
+    numbers,
     package,
     source_of,
+    text,
 )
 from tracker.sequences.detectors import fetched_detectors, usable_detector
 from tracker.sequences.library import open_sequence

@@ -11,7 +11,7 @@ from hypothesis.extra import numpy as arrays
 from numpy import ndarray
 from numpy.testing import assert_array_equal
 
-from tests.single_view.furnished import (
+from tests.single_view.scenery import (
     SKIN,
     clip,
     empty_room,

@@ -18,7 +18,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.stats import chi2
 
 from tests import world
-from tests.single_view.detected import detected, run
+from tests.single_view.scenery import detected, run
 from tests.world import SMALL_CAMERAS as CAMERAS
 from tests.world import SMALL_ROOM as ROOM
 from tracker.parameters.catalogue import PRESETS, RunParameters

@@ -15,7 +15,7 @@ from numpy import ndarray
 
 from tests import world
 from tests.golden.pieces import cut
-from tests.single_view.shaken import MIDDLE, SIZE, scene, shaken, taken
+from tests.single_view.scenery import MIDDLE, SIZE, scene, shaken, taken
 from tests.world import PERSON as HALF_EXTENTS
 from tests.world import SMALL_CAMERAS, SMALL_ROOM
 from tracker.geometry.camera import Camera

@@ -12,7 +12,7 @@ from numpy import ndarray
 from numpy.testing import assert_allclose
 
 from tests import world
-from tests.single_view.detected import CAMERA, detected, run
+from tests.single_view.scenery import CAMERA, detected, run
 from tracker.single_view.protocol import ViewResult
 
 METHODS: dict[str, dict[str, object]] = {

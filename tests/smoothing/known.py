@@ -1,22 +1,26 @@
-"""Walkers whose boxes are known to be theirs, as a filter without fault would hand them on."""
+"""Walkers whose boxes are known to be theirs, and people measured at some places."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence as Many
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy import ndarray
 
 from tests import world
+from tracker.filters.models import Motion
 from tracker.fusion.protocol import Associations, FusionResult
 from tracker.geometry.camera import Camera
+from tracker.kernels.smoothing import passes
+from tracker.kernels.smoothing.passes import SmoothedRows
 from tracker.parameters.catalogue import RunParameters
 from tracker.parameters.values import with_values
 from tracker.sequences.sequence import Sequence
 from tracker.single_view.protocol import ViewResult
 from tracker.smoothing.paths import CameraBoxes, Links, Paths
-from tracker.smoothing.smoother import Smoother
+from tracker.smoothing.smoother import Fitted, Smoother
 
 CAMERAS = world.ring(3)
 PLAIN = with_values(
@@ -130,3 +134,29 @@ def given(camera: CameraBoxes, boxes: ndarray, measured: ndarray) -> CameraBoxes
     found[boxes, 1] = (measured[:, 1] + measured[:, 2]) / 2.0
     found[boxes, 3] = (measured[:, 2] - measured[:, 1]) / 2.0
     return replace(camera, boxes=found)
+
+
+STEP = 0.5
+PRIOR = np.diag([100.0] * 3 + [0.7**2] * 3)
+
+
+def measured(places: list[ndarray], sigma: float) -> tuple[Paths, partial[SmoothedRows]]:
+    """Paths of people at some places, (T, 3) metres each, and what smooths them by how restless
+    they are at each row."""
+    motion = Motion.of(PLAIN.fusion, STEP)
+    states = [np.hstack([own, np.zeros_like(own)]) for own in places]
+    spread = [np.tile(np.eye(6), (len(own), 1, 1)) for own in places]
+    paths = Paths.of(list(range(1, len(places) + 1)), [0] * len(places), states, spread, 6)
+    matrices = np.tile(np.eye(3) / sigma**2, (len(paths.states), 1, 1))
+    vectors = paths.states[:, :3] / sigma**2
+    begins = paths.states[paths.starts[:-1]].copy()
+    rule = passes.PathMotion(motion.transition, motion.noise, PRIOR)
+    return paths, partial(passes.smooth_paths, paths.starts, begins, matrices, vectors, rule)
+
+
+def fitted_to(paths: Paths, found: SmoothedRows, noise_scales: ndarray) -> Fitted:
+    """Paths with what the kernel gave."""
+    return Fitted(
+        paths.with_states(found.means, found.covariances),
+        found.fits, found.ahead, found.ahead_covariances, found.traces, noise_scales,
+    )  # fmt: skip

@@ -7,7 +7,7 @@ import pytest
 from numpy import ndarray
 from scipy.stats import multivariate_normal
 
-from tests.smoothing.measured import STEP, fitted_to, measured
+from tests.smoothing.known import STEP, fitted_to, measured
 from tracker.smoothing.smoother import Fitted
 from tracker.smoothing.tracklets.motion import exchange_breaks, exchange_log_odds, find_exchange
 

@@ -13,8 +13,7 @@ from scipy.optimize import least_squares
 from scipy.stats import multivariate_normal
 
 from tests import world
-from tests.smoothing.known import PLAIN, Known, backwards, known
-from tests.smoothing.measured import PRIOR, STEP, fitted_to, measured
+from tests.smoothing.known import PLAIN, PRIOR, STEP, Known, backwards, fitted_to, known, measured
 from tracker.filters.models import Motion
 from tracker.kernels.smoothing import passes
 from tracker.smoothing.calibration import FEWEST

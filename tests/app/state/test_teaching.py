@@ -24,8 +24,7 @@ from app.web.server import Settings, create_app
 from app.web.views import results
 from tests.app.conftest import ADDRESS, command, connect, run_is, wait_until
 from tests.browser.walkers import write_walkers
-from tests.single_view.networks import answering, pooling
-from tests.single_view.packages import Npm, files, giving, package, source_of
+from tests.single_view.networks import Npm, answering, files, giving, package, pooling, source_of
 from tracker.runs import pipeline
 from tracker.sequences.library import open_sequence
 from tracker.sequences.pictures.frames import FrameReader
