@@ -3,6 +3,10 @@
 The boxes of stage 1 of a person are a little too high or too low, by the person's clothes, and
 equally in every camera, so that the filter estimates another height of the person above the floor.
 Only a box that was marked by hand shows where the centre is.
+
+Some constants say what halving and doubling them changes in six scenes: two random crowds of ten
+people, 200 steps of ``cmc1``, ``cmc2`` and ``av163-seq45-3p-1111-points``, and 60 steps of
+``wildtrack-points-300``. Means are over the six.
 """
 
 from __future__ import annotations
@@ -32,10 +36,16 @@ correlate. From 5 to 80, recall, false positives and IDF1 change by less than 0.
 six random rooms and of four recordings, and the mean error of positions by at most 1 mm."""
 
 SIZE_SIGMA = 0.1
-"""Standard deviation of people's heights, relative to the target's."""
+"""Standard deviation of people's heights, relative to the target's. The mean heights of nations'
+women and men are between 1.49 and 1.83 m (NCD Risk Factor Collaboration, eLife 5, 2016), which has
+a deviation of 0.06 of their middle; the rest is for the target's height, which a user estimates.
+Halved and doubled, it changes mean recall by at most 0.001, mean IDF1 by 0.005, and the mean error
+of positions by less than 1 mm in every scene."""
 
 OFFSET_SIGMA = 0.03
-"""Standard deviation of the offset of a camera's boxes, half heights."""
+"""Standard deviation of the offset of a camera's boxes, half heights: 2.5 cm of a body of 1.7 m.
+Halved and doubled, it changes mean recall by at most 0.0005, mean IDF1 by 0.002, and the mean error
+of positions by at most 3 mm in every scene."""
 
 SIZE_RIDGE = _ALIKE * (_BOX_SIGMA / SIZE_SIGMA) ** 2
 """Weight of the prior of a person's size, in boxes."""
@@ -44,10 +54,17 @@ OFFSET_RIDGE = _ALIKE * (_BOX_SIGMA / OFFSET_SIGMA) ** 2
 """Weight of the prior of a camera's offset, in boxes."""
 
 NARROWEST, WIDEST = 0.15, 1.0
-"""Bounds of the estimated noise, as factors of the standard deviation that stage 1 gives."""
+"""Bounds of the estimated noise, as factors of the standard deviation that stage 1 gives: the latter
+bounds the gates of the filter, and should not be exceeded. Twice that changes no figure by more
+than 0.001, and positions by 3 mm; half of it is too low for the boxes of a crowd (IDF1 -0.05). The
+lower bound is reached by the boxes of ``wildtrack-points-300``, drawn by hand: doubled, it takes
+0.007 of their recall and adds 11 mm to their error; halved, it changes nothing by 0.001."""
 
 ODD = 0.4
-"""Residual of a box from which the person is not standing upright, half heights."""
+"""Residual of a box from which the person is not standing upright, half heights: less than that of
+somebody who sits, whose crown is 0.6 half heights lower (1.2 m instead of 1.7 m). Doubled, it takes
+0.005 of the recall in ``wildtrack-points-300`` and adds 5 mm to the error there; halved, it changes
+recall in no scene, and positions by at most 2 mm."""
 
 FEWEST = 50
 """Number of boxes of a camera below which its noise is not estimated."""
