@@ -54,11 +54,11 @@ OFFSET_RIDGE = _ALIKE * (_BOX_SIGMA / OFFSET_SIGMA) ** 2
 """Weight of the prior of a camera's offset, in boxes."""
 
 NARROWEST, WIDEST = 0.15, 1.0
-"""Bounds of the estimated noise, as factors of the standard deviation that stage 1 gives: the latter
-bounds the gates of the filter, and should not be exceeded. Twice that changes no figure by more
-than 0.001, and positions by 3 mm; half of it is too low for the boxes of a crowd (IDF1 -0.05). The
-lower bound is reached by the boxes of ``wildtrack-points-300``, drawn by hand: doubled, it takes
-0.007 of their recall and adds 11 mm to their error; halved, it changes nothing by 0.001."""
+"""Bounds of the estimated noise, as factors of the standard deviation that stage 1 gives, for which
+the filter's gates are made. Twice the upper one changes recall and IDF1 in no scene by more than
+0.001, and positions by 3 mm; half of it is too low for the boxes of a crowd (IDF1 -0.05). The lower
+one is reached by the boxes of ``wildtrack-points-300``, drawn by hand: doubled, it takes 0.007 of
+their recall and adds 11 mm to their error; halved, it changes no figure by 0.001."""
 
 ODD = 0.4
 """Residual of a box from which the person is not standing upright, half heights: less than that of
