@@ -357,7 +357,7 @@ class _Refinement:
 
 
 def _removal(paths: Paths, path: int, odds: float) -> Decision:
-    """Make the decision to remove a track, for its log odds or since none of its tracklets is left."""
+    """Make the decision to remove a track, for its log odds or for want of tracklets."""
     absence = float(1.0 / (1.0 + np.exp(np.clip(odds, -600.0, 600.0))))
     reason = (
         "over its whole life it is likelier nobody"
