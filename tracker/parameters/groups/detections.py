@@ -1,4 +1,7 @@
-"""Parameters of the single-view methods on a detector's boxes: outside, a network, or shapes."""
+"""Parameters of the single-view methods on a detector's boxes: outside, a network, or shapes.
+
+[DTPB09] Dollár, Tu, Perona, Belongie, "Integral channel features", BMVC 2009.
+"""
 
 from __future__ import annotations
 
