@@ -21,7 +21,7 @@ from tracker.parameters.groups.fusion import FusionParams
 from tracker.parameters.groups.smoothing import SmoothingParams
 from tracker.single_view.protocol import ViewResult
 from tracker.smoothing.paths import Links, Paths
-from tracker.smoothing.result import Smoothed
+from tracker.smoothing.protocol import Smoothed
 from tracker.smoothing.smoother import BoxAssociations, Smoother
 from tracker.smoothing.tracklets import costs, linking
 from tracker.smoothing.tracklets.appearance import AppearanceModel
