@@ -30,8 +30,8 @@ class Room:
 
     def open(self, entrance: Entrance) -> None:
         """Start viser behind its entrance and build scene and sliders in it."""
+        from app.scene.editing import RoomEditing
         from app.scene.panel import Panel
-        from app.scene.room.editing import RoomEditing
         from app.scene.scene import Scene
 
         server = start_viser(entrance)

@@ -14,12 +14,10 @@ from scipy.spatial.transform import Rotation
 
 from app import colours
 from app.scene import geometry
-from app.scene.framing import overview
 from app.scene.geometry import dashes, ellipsoids, icosphere, mass_radius, quaternions
 from app.scene.nodes import linear
-from app.scene.room.pictures import StraightView
-from app.scene.room.standing import pose_through
-from app.scene.views import between
+from app.scene.standing import StraightView, pose_through
+from app.scene.views import between, overview
 from tests.app.scene import scene_case
 
 TOKENS = Path(__file__).resolve().parents[3] / "static" / "css" / "tokens.css"
