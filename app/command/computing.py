@@ -40,7 +40,7 @@ def compute(
     Raises:
         KeyboardInterrupt: After Ctrl-C, between two steps.
     """
-    from app.state.workers.compiling import Compiling
+    from app.state.compiling import Compiling
     from tracker.runs import pipeline
     from tracker.runs.stage_cache import StageCache
 

@@ -189,7 +189,7 @@ def _serve(command: Serve, run: int | Result | None = None) -> int:
     if command.disk is not None and not 0.0 <= command.disk <= MOST_GB:
         raise ParameterError("--disk", f"expected 0 to {MOST_GB} GB, got {command.disk:g}")
     gc.disable()  # a seventh of the time: nothing that is imported ever goes
-    from app.state.workers.opening import locate
+    from app.state.jobs import locate
     from app.web import server
     from app.web.access.security import is_loopback
     from app.web.access.tokens import PARAMETER, Keys, new_token, own_token

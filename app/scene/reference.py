@@ -1,4 +1,4 @@
-"""What the run is held against in the 3D scene: the true positions, and the pinned run."""
+"""What the run is held against in 3D: the truth, the pinned run, tracks as they would be."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The cameras' pictures as the frusta of the 3D scene carry them: small, straight, with boxes.
+"""What stands still in the 3D scene: floor, volume, entrances, and the cameras with their pictures.
 
 A frustum is drawn as an ideal pinhole with square pixels, looking along its axis.
 So each picture is mapped through the lens model once more before it is shown:

@@ -1,4 +1,4 @@
-"""Where to look from, so that all that is to be seen is in the picture."""
+"""Where each browser looks from: a pose with all in the picture, or through one of the cameras."""
 
 from __future__ import annotations
 

@@ -1,18 +1,19 @@
-"""The HTTP routes; ``/docs`` shows them with their types."""
+"""The routes of what is open and how it is looked at; ``/docs`` shows them with their types."""
 
 from __future__ import annotations
 
 import io
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Query, Request, Response
 
-from app import models
 from app.errors import ApiError
-from app.state.snapshot import Snapshot
-from app.state.workers.sensitivity import Sensitivity, shares
+from app.messages import Model
+from app.state.sensitivity import Sensitivity, shares
+from app.state.snapshot import RunPhase, Snapshot
+from app.web import results, steps
 from app.web.dependencies import (
     ERRORS,
     FOR_EVER,
@@ -20,18 +21,92 @@ from app.web.dependencies import (
     Owned,
     Part,
     Work,
+    begun,
     file_name,
     nothing_open,
+    told_in_the_answer,
 )
-from app.web.opening import begun, told_in_the_answer
-from app.web.pictures.jpegs import Pictures
-from app.web.views import results, steps
-from app.web.views.timeline import Timelines
+from app.web.pictures import Pictures
+from app.web.results import Schema, SequenceEntryInfo, SequenceList, State
+from app.web.steps import Step
+from app.web.stream import (
+    CurveRequest,
+    LayerChanges,
+    OpenRequest,
+    SeekChange,
+    SelectChange,
+    ThemeChange,
+    TrailChanges,
+    ViewChange,
+)
+from app.web.timeline import Timeline, Timelines
 from tracker.export import tracks_csv
 from tracker.parameters.values import changed_values, value_of
 from tracker.runs import gaps
 from tracker.runs.run import given_names, row_corrections
 from tracker.sequences import library
+
+
+class ChangedValue(Model):
+    """A parameter or method that is not at its default."""
+
+    key: str
+    default: Any
+    now: Any
+
+
+class CurveInfo(Model):
+    """What a parameter would change, as far as it is computed."""
+
+    key: str
+    measure: str
+    """MOTA; where there is no truth the number of tracks."""
+    values: list[Any]
+    """Ascending, or the choices."""
+    scores: list[float | None]
+    """One a value; null where the run failed."""
+    whole: bool
+    """Whether there is nothing more to come."""
+    share: float | None
+    """Share of the variance of the measure that the parameter explains alone, among those whose
+    curves are whole, as studies report it; null where there are not two of them."""
+
+
+class Changes(Model):
+    """What differs from the defaults, and what parameters would change."""
+
+    changed: list[ChangedValue]
+    curves: list[CurveInfo]
+    """The curves of the parameters that somebody asked for."""
+
+
+class PastRunInfo(Model):
+    """One run, finished or not."""
+
+    number: int
+    """From 1 on."""
+    key: str
+    at: str
+    """Time of day at which it began, as text."""
+    sequence: str
+    """The sequence's name at that time."""
+    same_recording: bool
+    """Whether it is of the recording that is open, so that its parameters can be used again."""
+    single_view: str
+    fusion_method: str
+    state: RunPhase
+    done: int
+    total: int
+    steps_per_second: float
+    changes: int
+    """How many parameters were not at their defaults."""
+
+
+class PastRuns(Model):
+    """The runs since the server was started, newest first."""
+
+    runs: list[PastRunInfo]
+
 
 router = APIRouter(prefix="/api", responses=ERRORS)
 
@@ -40,24 +115,24 @@ MOST_STEPS = 64
 
 
 @router.get("/state")
-async def state(bench: Bench) -> models.State:
+async def state(bench: Bench) -> State:
     """Everything that all pages share, but for the results themselves."""
     return results.state_of(bench.snapshot())
 
 
 @router.get("/schema")
-async def schema() -> models.Schema:
+async def schema() -> Schema:
     """Every parameter with range, unit and help; the methods; the presets."""
     return results.schema()
 
 
 @router.get("/sequences")
-def sequences(request: Request) -> models.SequenceList:
+def sequences(request: Request) -> SequenceList:
     """The built-in rooms and the folders under the data folder."""
     data: Path | None = request.app.state.settings.data
-    return models.SequenceList(
+    return SequenceList(
         sequences=[
-            models.SequenceEntryInfo(
+            SequenceEntryInfo(
                 name=entry.name,
                 description=entry.description,
                 kind=entry.kind,
@@ -71,7 +146,7 @@ def sequences(request: Request) -> models.SequenceList:
 
 
 @router.post("/sequence")
-async def open_sequence(wish: models.OpenRequest, bench: Bench, jobs: Work) -> models.State:
+async def open_sequence(wish: OpenRequest, bench: Bench, jobs: Work) -> State:
     """Open another sequence, in the background where it takes longer; ``opening`` says so."""
     with told_in_the_answer(
         wish.name,
@@ -83,27 +158,27 @@ async def open_sequence(wish: models.OpenRequest, bench: Bench, jobs: Work) -> m
 
 
 @router.post("/run/cancel")
-async def cancel_run(bench: Bench, jobs: Work) -> models.State:
+async def cancel_run(bench: Bench, jobs: Work) -> State:
     """Stop the run under way; its steps so far stay."""
     jobs.cancel()
     return results.state_of(bench.snapshot())
 
 
 @router.post("/run")
-async def run_again(bench: Bench, jobs: Work) -> models.State:
+async def run_again(bench: Bench, jobs: Work) -> State:
     """Go on with a run that was cancelled, or try a failed one again."""
     jobs.run_again()
     return results.state_of(bench.snapshot())
 
 
 @router.get("/runs")
-def past_runs(owners: Owned, bench: Bench) -> models.PastRuns:
+def past_runs(owners: Owned, bench: Bench) -> PastRuns:
     """The current run and those before it since the server was started."""
     now = bench.snapshot()
     name = now.sequence.name if now.sequence is not None else ""
-    return models.PastRuns(
+    return PastRuns(
         runs=[
-            models.PastRunInfo(
+            PastRunInfo(
                 number=run.number,
                 key=run.state.key,
                 at=run.at,
@@ -123,18 +198,18 @@ def past_runs(owners: Owned, bench: Bench) -> models.PastRuns:
 
 
 @router.get("/changes")
-def changes(request: Request, bench: Bench) -> models.Changes:
+def changes(request: Request, bench: Bench) -> Changes:
     """What differs from the defaults, and what parameters would change."""
     snapshot = bench.snapshot()
     curves = request.app.state.sensitivity.curves()
     explained = shares(curves)
-    return models.Changes(
+    return Changes(
         changed=[
-            models.ChangedValue(key=key, default=value_of(snapshot.defaults, key), now=value)
+            ChangedValue(key=key, default=value_of(snapshot.defaults, key), now=value)
             for key, value in changed_values(snapshot.parameters, snapshot.defaults).items()
         ],
         curves=[
-            models.CurveInfo(
+            CurveInfo(
                 key=key,
                 measure=curve.measure,
                 values=list(curve.values),
@@ -148,7 +223,7 @@ def changes(request: Request, bench: Bench) -> models.Changes:
 
 
 @router.post("/sensitivity")
-async def compute_curves(request: Request, wish: models.CurveRequest, bench: Bench) -> models.State:
+async def compute_curves(request: Request, wish: CurveRequest, bench: Bench) -> State:
     """Compute in the background what some parameters would change, until somebody works.
 
     ``GET /api/changes`` has it, and the tasks of the state how far it is: ``effects``.
@@ -159,42 +234,42 @@ async def compute_curves(request: Request, wish: models.CurveRequest, bench: Ben
 
 
 @router.post("/seek")
-async def seek(wish: models.SeekChange, bench: Bench) -> models.State:
+async def seek(wish: SeekChange, bench: Bench) -> State:
     """Move the playhead, as far as the sequence goes."""
     bench.seek(wish.step, wish.origin)
     return results.state_of(bench.snapshot())
 
 
 @router.post("/select")
-async def select(wish: models.SelectChange, bench: Bench) -> models.State:
+async def select(wish: SelectChange, bench: Bench) -> State:
     """Select a track, or none."""
     bench.select(wish.id)
     return results.state_of(bench.snapshot())
 
 
 @router.patch("/layers")
-async def set_layers(wish: models.LayerChanges, bench: Bench) -> models.State:
+async def set_layers(wish: LayerChanges, bench: Bench) -> State:
     """Switch layers of the 3D view."""
     bench.set_layers(wish.changes)
     return results.state_of(bench.snapshot())
 
 
 @router.patch("/trail")
-async def set_trail(wish: models.TrailChanges, bench: Bench) -> models.State:
+async def set_trail(wish: TrailChanges, bench: Bench) -> State:
     """Draw trails longer or shorter, fading or not."""
     bench.set_trail(wish.seconds, wish.fades)
     return results.state_of(bench.snapshot())
 
 
 @router.post("/view")
-async def view(wish: models.ViewChange, bench: Bench) -> models.State:
+async def view(wish: ViewChange, bench: Bench) -> State:
     """Look through a camera in 3D, from above, or freely again."""
     bench.look(wish.camera)
     return results.state_of(bench.snapshot())
 
 
 @router.post("/theme")
-async def theme(wish: models.ThemeChange, bench: Bench) -> models.State:
+async def theme(wish: ThemeChange, bench: Bench) -> State:
     """Have the 3D view dark or light, as the page is."""
     bench.set_theme(wish.theme)
     return results.state_of(bench.snapshot())
@@ -229,7 +304,7 @@ class StepDetails:
     trails: Annotated[bool, Query(description="With the tracks' ways in the pictures.")] = False
     seconds: Annotated[float, Query(ge=0.5, le=600.0, description="How far back.")] = 4.0
 
-    def of(self, snapshot: Snapshot, step: int) -> models.Step:
+    def of(self, snapshot: Snapshot, step: int) -> Step:
         """The message of one step.
 
         Raises:
@@ -253,7 +328,7 @@ Details = Annotated[StepDetails, Depends()]
 
 
 @router.get("/step/{step}")
-async def step(step: int, bench: Bench, details: Details) -> models.Step:
+async def step(step: int, bench: Bench, details: Details) -> Step:
     """One step of the shown run: what each camera found, the targets, the truth."""
     return details.of(bench.snapshot(), step)
 
@@ -263,14 +338,14 @@ def several_steps(
     step: Annotated[list[int], Query(max_length=MOST_STEPS, description="Once for each step.")],
     bench: Bench,
     details: Details,
-) -> list[models.Step]:
+) -> list[Step]:
     """Several steps of the shown run at once, as ``/api/step/{step}`` has each."""
     snapshot = bench.snapshot()
     return [details.of(snapshot, one) for one in step]
 
 
 @router.get("/timeline")
-def timeline(request: Request, bench: Bench, part: Part) -> models.Timeline:
+def timeline(request: Request, bench: Bench, part: Part) -> Timeline:
     """The shown run over time, as far as it is computed, at the width that it is drawn at."""
     snapshot = bench.snapshot()
     if snapshot.sequence is None:

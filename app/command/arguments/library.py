@@ -16,7 +16,7 @@ from tyro.conf import (
 )
 
 from app.command.typed import reader_of
-from app.wishes import Marks, VideoPart
+from app.messages import Marks, VideoPart
 
 LibraryFile = Annotated[
     Path | None,

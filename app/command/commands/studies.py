@@ -331,7 +331,7 @@ def save_preset(name: str, values: dict[str, Any]) -> None:
     Raises:
         ParameterError: If the name does not do.
     """
-    from app.state.kept.presets import keep_preset
+    from app.state.presets import keep_preset
     from tracker.files.folders import settings_folder
 
     keep_preset(settings_folder() / "presets.json", name, values)

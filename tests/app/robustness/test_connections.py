@@ -27,8 +27,6 @@ from websockets.exceptions import ConnectionClosed
 from websockets.typing import Subprotocol
 
 from app.web import server
-from app.web.access import connections
-from app.web.server import listening
 from tests.app.conftest import wait_until
 
 VISER = Subprotocol(f"viser-v{viser.__version__}")
@@ -81,9 +79,9 @@ class Running:
 @pytest.fixture(scope="module")
 def running(data: Path) -> Iterator[Running]:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(connections, "SECONDS_TO_ASK", SOON)
-        patch.setattr(connections, "SECONDS_TO_READ", SOON)
-        patch.setattr(listening, "_Server", Stoppable)
+        patch.setattr(server, "SECONDS_TO_ASK", SOON)
+        patch.setattr(server, "SECONDS_TO_READ", SOON)
+        patch.setattr(server, "_Server", Stoppable)
         running = Running(server.Settings(sequence="crossing", data=data))
         wait_until(lambda: running.get("/viser/").status_code == 200)
         wait_until(lambda: running.get("/api/state").json()["sequence"] is not None)
@@ -98,7 +96,7 @@ def running(data: Path) -> Iterator[Running]:
             gc.collect()
 
 
-class Stoppable(listening._Server):
+class Stoppable(server._Server):
     """One that another thread can end."""
 
     newest: Stoppable | None = None
@@ -198,8 +196,8 @@ def test_two_hundred_connections_that_ask_nothing_are_dropped(
 def test_more_connections_than_are_meant_are_turned_away(
     running: Running, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(connections, "MOST", 20)
-    monkeypatch.setattr(connections, "SECONDS_TO_ASK", 2.0 * LATER)  # it is not they who give up
+    monkeypatch.setattr(server, "MOST", 20)
+    monkeypatch.setattr(server, "SECONDS_TO_ASK", 2.0 * LATER)  # it is not they who give up
     assert Stoppable.newest is not None
     open_now = Stoppable.newest.server_state.connections
     with ExitStack() as ended:
@@ -239,7 +237,7 @@ def test_a_page_that_is_slow_to_read_the_stream_is_dropped_and_holds_nobody_up(
     open_now = Stoppable.newest.server_state.connections
 
     def readers() -> list[Any]:
-        return [one for one in open_now if isinstance(one, connections.Sockets)]
+        return [one for one in open_now if isinstance(one, server.Sockets)]
 
     with ExitStack() as ended:
         for said in [stream] * 3:

@@ -16,12 +16,11 @@ import pytest
 from starlette.testclient import TestClient
 
 from app.state.edits import Edits
-from app.state.kept.drafts import Drafts
 from app.state.snapshot import Event
-from app.state.teaching.taught import Taught
+from app.state.teaching import Drafts, Taught
 from app.state.workbench import Workbench
+from app.web import results
 from app.web.server import Settings, create_app
-from app.web.views import results
 from tests.app.conftest import ADDRESS, command, connect, run_is, wait_until
 from tests.browser.walkers import write_walkers
 from tests.single_view.networks import answering, pooling

@@ -265,7 +265,7 @@ def test_a_failure_of_our_own_has_the_one_shape_too(
     def fail(*_: Any) -> None:
         raise RuntimeError("a bug")
 
-    monkeypatch.setattr("app.web.views.results.schema", fail)
+    monkeypatch.setattr("app.web.results.schema", fail)
     app = create_app(Settings(data=data, with_viser=False))
     with TestClient(app, base_url=ADDRESS, raise_server_exceptions=False) as client:
         assert_error(client.get("/api/schema"), 500, "internal", "RuntimeError", "a bug")
@@ -333,7 +333,7 @@ def test_pictures_asked_for_at_once_are_decoded_once(
         encoded.append(1)
         return real(*args)
 
-    monkeypatch.setattr("app.web.pictures.jpegs.cv2.imencode", count)
+    monkeypatch.setattr("app.web.pictures.cv2.imencode", count)
     answers: list[bytes] = []
 
     def ask() -> None:

@@ -12,8 +12,8 @@ import av
 import pytest
 from starlette.testclient import TestClient
 
+from app.state.tasks import Exporter
 from app.state.workbench import Workbench
-from app.state.workers.exporter import Exporter
 from app.web.server import Settings, create_app
 from tests.app.conftest import ADDRESS, run_is, wait_until
 from tests.library.written import written
