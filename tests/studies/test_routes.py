@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
-from app.command.commands.studies import _trials as command_words
+from app.command.studies import _trials as command_words
 from app.state.studies import StudyDesk
 from app.web import studies
 from app.web.server import Settings, create_app

@@ -13,8 +13,8 @@ from typing import Any
 
 import pytest
 
+from app.command import listing
 from app.command import main as cli
-from app.command.commands import listing
 from app.command.flags import Track, parse
 from tests.app.conftest import Runs
 from tests.app.folders import write_crossing

@@ -6,16 +6,18 @@ import json
 import os
 import shlex
 import signal
+import statistics
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Any
 
-from app.command.arguments.studies import (
+from app.command.arguments import (
+    Batch,
     BestOfStudy,
     ExportStudy,
     ListStudies,
@@ -25,11 +27,20 @@ from app.command.arguments.studies import (
     ShowStudy,
     StopStudy,
     Study,
+    Tune,
     Where,
 )
-from app.command.terminal import Bar, CommandError, print_table, say
+from app.command.flags import preset_values, set_values
+from app.command.terminal import FAILURE, Bar, CommandError, print_table, say
+from tracker.files.folders import library_file
+from tracker.library.store import open_library
+from tracker.parameters.catalogue import RunParameters
+from tracker.parameters.values import ParameterError, with_values
+from tracker.review.self_consistency.estimate import WARNING
+from tracker.studies.batches import BatchRun, places_of, run_batch
 from tracker.studies.errors import StudyError
 from tracker.studies.store import Status, Store, Trial, create, find, stores, studies_folder
+from tracker.studies.tuning import tuning
 
 if TYPE_CHECKING:
     from tracker.studies.cluster import DaskCrew
@@ -366,3 +377,138 @@ def shown_value(value: Any) -> str:
 
 def _print(value: Any) -> None:
     sys.stdout.write(json.dumps(value, allow_nan=False, ensure_ascii=False) + "\n")
+
+
+_FIGURES = ("mota", "idf1", "hota", "ospa")
+
+
+def batch(command: Batch) -> int:
+    """Track them all; returns the exit status: 1 where one could not be tracked.
+
+    Raises:
+        StudyError: If a name stands for nothing, or the workers cannot work on.
+    """
+    changes = {**preset_values(command.preset), **set_values(command.set)}
+    with_values(RunParameters(), changes)  # wrong usage shows before any work
+    if command.seeds < 1:
+        raise ParameterError("--seeds", f"expected a whole number from 1, got {command.seeds}")
+    if command.keep < 1:
+        raise ParameterError("--keep", f"expected a whole number from 1, got {command.keep}")
+    places = places_of(command.recordings)
+    with (
+        to_be_stopped() as stopped,
+        open_library(command.library or library_file()) as library,
+        crew_of(command) as crew,
+        Bar("tracking", "run") as bar,
+    ):
+        found = run_batch(
+            places, changes, command.seeds, library, command.keep,
+            lambda: crew(say), bar.at, stopped.is_set, corrected=not command.no_corrections,
+        )  # fmt: skip
+    if command.json:
+        sys.stdout.write(json.dumps([_told(one) for one in found], allow_nan=False) + "\n")
+    else:
+        _tell(places, found)
+    if stopped.is_set():
+        say("stopped; what is there is kept: the same command goes on")
+        return INTERRUPTED
+    return FAILURE if any(one.run is None for one in found) else 0
+
+
+def _told(one: BatchRun) -> dict[str, object]:
+    run = None if one.run is None else one.run.to_json()
+    return {
+        "recording": one.recording, "seed": one.seed, "computed": one.computed, "run": run,
+        "error": one.words or None,
+    }  # fmt: skip
+
+
+def _tell(places: Sequence[str], found: Sequence[BatchRun]) -> None:
+    rows = []
+    for place in places:
+        runs = [one.run for one in found if one.recording == place and one.run is not None]
+        why = next((one.words for one in found if one.recording == place and one.words), "")
+        name = runs[0].recording_name if runs else place
+        figures = [_mean([getattr(run, key) for run in runs]) for key in _FIGURES]
+        targets = _mean([float(run.targets) for run in runs], 1)
+        speed = _mean([run.steps_per_second for run in runs], 0)
+        kept = " ".join(str(run.id) for run in runs)
+        rows.append((name, str(len(runs)), *figures, targets, speed, kept, why))
+    print_table(
+        ("recording", ">runs", ">MOTA", ">IDF1", ">HOTA", ">OSPA", ">tracks", ">steps/s",
+         "kept as", ""),
+        rows,
+    )  # fmt: skip
+    computed = sum(one.computed for one in found)
+    say(f"{len(found)} runs, {computed} of them computed now; `multiview-phd runs` lists them")
+
+
+def _mean(values: Sequence[float | None], digits: int = 3) -> str:
+    there = [value for value in values if value is not None]
+    if not there:
+        return "–"
+    about = f" ± {statistics.stdev(there):.{digits}f}" if len(there) > 1 else ""
+    return f"{statistics.fmean(there):.{digits}f}{about}"
+
+
+def tune(command: Tune) -> int:
+    """Seek, measure again, tell and keep; returns the exit status.
+
+    Raises:
+        StudyError: If a recording cannot be read, or the study cannot go on.
+    """
+    if not 0.0 < command.minutes <= 1e4:
+        raise ParameterError("--minutes", f"expected a number above 0, got {command.minutes:g}")
+    if not command.recordings:
+        raise ParameterError("RECORDING …", "expected at least one recording")
+    changes = set_values(command.set)
+    with_values(RunParameters(), changes)  # wrong usage shows before any work
+    name = f"tune {Path(command.recordings[0]).name} {time.strftime('%Y-%m-%d %H.%M.%S')}"
+    definition = tuning(
+        name,
+        command.recordings,
+        minutes=command.minutes,
+        changes=changes,
+        ignore_truth=command.without_truth,
+    )
+    blind = definition.objectives == ("identity",)
+    if blind:
+        say(f"no truth is looked at: the score without truth is what counts. {WARNING}")
+    store = create(definition, command.studies or studies_folder())
+    status = run(store, command, quiet=True)
+    if status == INTERRUPTED:
+        say(f"stopped; `multiview-phd study resume {name!r}` goes on")
+        return status
+    found = store.fact("tuned")
+    if found is None:
+        raise StudyError(f"study {name}: it ended before anything was measured again")
+    if found["better"]:
+        save_preset(
+            command.save_as,
+            {k: v for k, v in {**definition.held(), **found["values"]}.items()},
+        )
+    if command.json:
+        told = {"study": name, "trials": len(store.trials()), **found}
+        sys.stdout.write(json.dumps(told, allow_nan=False, ensure_ascii=False) + "\n")
+        return 0
+    say(f"{len(store.trials())} trials; {found['words']}")
+    if found["rows"]:
+        print_table(
+            ("parameter", ">before", ">default", ">now", ">brings"),
+            [
+                (
+                    row["key"], shown_value(row["before"]), shown_value(row["default"]),
+                    shown_value(row["after"]),
+                    "–" if row["brought"] is None else f"{row['brought']:+.4f}",
+                )
+                for row in found["rows"]
+            ],
+        )  # fmt: skip
+    print_table(
+        ("figure", ">default", ">before", ">now"),
+        [
+            (row["name"], *(shown_value(row[key]) for key in ("default", "before", "after")))
+            for row in found["figures"]
+        ],
+    )
+    return 0

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from app.command.arguments.corrections import (
+from app.command.arguments import (
     CheckCorrections,
     Corrections,
     DiffCorrections,

@@ -6,14 +6,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from app.command.arguments.importing import (
-    IMPORT_FLAGS,
-    PAIRS,
-    Check,
-    ExportCalibration,
-    Formats,
-    Import,
-)
+from app.command.arguments import IMPORT_FLAGS, PAIRS, Check, ExportCalibration, Formats, Import
 from app.command.terminal import ASKED, FAILURE, REFUSED, CommandError, print_table, say
 from tracker.parameters.values import ParameterError
 
@@ -32,21 +25,7 @@ SIGNS = {"good": "ok", "warning": "!", "absent": "–"}
 """Of a check's outcome, in the first column."""
 
 
-def run(command: Import | Check | Formats | ExportCalibration) -> int:
-    """Run one of the commands; returns the exit status."""
-    match command:
-        case Import():
-            return _import(command)
-        case Check():
-            return _check(command)
-        case Formats():
-            _formats()
-        case ExportCalibration():
-            _export(command)
-    return 0
-
-
-def _import(command: Import) -> int:
+def import_files(command: Import) -> int:
     if command.output is None and not command.dry_run:
         raise ParameterError("--output", "expected the folder to write (-o FOLDER), or --dry-run")
     if not command.sources:
@@ -176,7 +155,7 @@ def _pairs(flag: str, form: str, items: Sequence[str]) -> Iterator[tuple[str, st
         yield first, second
 
 
-def _check(command: Check) -> int:
+def check_sequence(command: Check) -> int:
     from tracker.sequences import library
 
     sequence = library.open_sequence(command.sequence)
@@ -198,7 +177,7 @@ def _print_checks(sequence: Any, checks: Sequence[Any]) -> int:
     return FAILURE if any(row[0] == SIGNS["warning"] for row in rows) else 0
 
 
-def _formats() -> None:
+def formats(command: Formats) -> None:
     from tracker.export.calibration import WRITTEN
     from tracker.io.read.registry import all_formats
 
@@ -208,7 +187,7 @@ def _formats() -> None:
     print_table(("read", "format", ""), [*rows, *(("written", name, "") for name in WRITTEN)])
 
 
-def _export(command: ExportCalibration) -> None:
+def export_calibration(command: ExportCalibration) -> None:
     from tracker.export.calibration import save_calibration
     from tracker.sequences import library
 

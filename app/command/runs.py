@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from app.command.arguments.library import (
+from app.command.arguments import (
     Bundle,
     CollectRuns,
     DeleteRuns,
@@ -30,18 +29,14 @@ from tracker.evaluation.settings import EvaluationSettings
 from tracker.files.folders import library_file
 from tracker.files.text import visible
 from tracker.library import KEEP, repair
-from tracker.library.records import HEADLINES, PROVISIONAL, KeptRun, Result
+from tracker.library.records import HEADLINES, PROVISIONAL, KeptRun
 from tracker.library.store import Library, open_library
 
 DAMAGED = 1
 
 
-def runs(command: Runs, serve: Callable[[OpenRun, Result], int]) -> int:
+def runs(command: Runs) -> int:
     """Run one of the commands; returns the exit status.
-
-    Args:
-        command: Which.
-        serve: Starts the workbench with a run.
 
     Raises:
         LibraryError: If the library, or the run, is not as it must be.
@@ -76,7 +71,11 @@ def runs(command: Runs, serve: Callable[[OpenRun, Result], int]) -> int:
                     print_json({"deleted": gone, "freed_bytes": freed})
                 else:
                     say(f"{gone} runs gone, {freed / 1e6:.1f} MB freed")
-    return serve(action, result) if isinstance(action, OpenRun) else 0
+    if not isinstance(action, OpenRun):
+        return 0
+    from app.command.main import serve_run
+
+    return serve_run(action, result)
 
 
 def bundle(command: Bundle) -> None:

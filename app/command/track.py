@@ -32,7 +32,7 @@ def track(command: Track) -> int:
     if not output.parent.is_dir():
         raise CommandError(f"--output {output}: there is no folder {output.parent}; make it first")
 
-    from app.command.commands.correcting import of_run
+    from app.command.correcting import of_run
     from tracker.io.checks import check
     from tracker.runs import gaps, pipeline
     from tracker.runs.camera_notes import camera_notes

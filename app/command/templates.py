@@ -6,12 +6,7 @@ import copy
 from pathlib import Path
 from typing import Any
 
-from app.command.arguments.templates import (
-    ListTemplates,
-    OfferTemplates,
-    RemoveTemplates,
-    Templates,
-)
+from app.command.arguments import ListTemplates, OfferTemplates, RemoveTemplates, Templates
 from app.command.computing import compute
 from app.command.terminal import CommandError, check_seed, print_json, print_table, say
 from tracker.review import template_suggestions
@@ -88,7 +83,7 @@ def _found(
     sequence: Sequence, action: OfferTemplates
 ) -> tuple[template_suggestions.Suggestion, ...]:
     """What a run offers, its pictures written where they are wanted."""
-    from app.command.commands.correcting import of_run
+    from app.command.correcting import of_run
 
     run = compute(sequence, seed=action.seed, corrections=of_run(sequence, None))
     with FrameReader(sequence) as reader:

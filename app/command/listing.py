@@ -8,7 +8,7 @@ import sys
 import textwrap
 from pathlib import Path
 
-from app.command.arguments.listing import Benchmark, Parameters, Sequences
+from app.command.arguments import Benchmark, Parameters, Sequences
 from app.command.flags import describe_range, show
 from app.command.terminal import CommandError, check_data, print_json, print_table
 from tracker.parameters.catalogue import DEFAULT_RULE, METHODS, PARAMETERS, RunParameters
@@ -17,7 +17,7 @@ _INDENT = "    "
 
 
 def benchmark(command: Benchmark) -> int:
-    root = Path(__file__).resolve().parents[3]
+    root = Path(__file__).resolve().parents[2]
     if not (root / "tests" / "benchmarks" / "__main__.py").is_file():
         raise CommandError(
             "the benchmarks belong to the source, not to the installed package: get a checkout, "
