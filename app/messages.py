@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, TypeVar
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, GetJsonSchemaHandler
 from pydantic.json_schema import JsonSchemaValue
@@ -71,6 +71,15 @@ class Model(Described):
         extra="forbid",
         json_schema_serialization_defaults_required=True,  # an answer has all of its fields
     )
+
+
+M = TypeVar("M", bound=Model)
+
+
+def filled(message: type[M], source: object, **own: Any) -> M:
+    """A message with what its source has under the names of its fields, and what is given."""
+    names = [name for name in message.model_fields if name not in own and hasattr(source, name)]
+    return message(**{name: getattr(source, name) for name in names}, **own)
 
 
 Box = tuple[float, float, float, float]

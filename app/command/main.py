@@ -128,6 +128,7 @@ def serve(command: Serve, run: int | Result | None = None) -> int:
     from app.web import server
     from app.web.access.security import is_loopback
     from app.web.access.tokens import PARAMETER, Keys, new_token, own_token
+    from app.web.dependencies import Settings
     from tracker.library.records import Result
     from tracker.sequences import library
     from tracker.sequences.built_in import BUILT_IN
@@ -177,7 +178,7 @@ def serve(command: Serve, run: int | Result | None = None) -> int:
             threading.Thread(target=webbrowser.open, args=(opened,), daemon=True).start()
 
     app = server.create_app(
-        server.Settings(
+        Settings(
             host=command.host,
             keys=keys,
             sequence=command.sequence,

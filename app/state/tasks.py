@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Literal
 
 from app.errors import sentence
+from app.messages import Model
 from app.state.snapshot import Change, Task
 from app.state.threads import CLOSING_SECONDS, be_nice
 from app.state.workbench import Workbench
@@ -27,9 +28,8 @@ logger = logging.getLogger("app")
 Phase = Literal["idle", "writing", "done", "failed", "cancelled"]
 
 
-@dataclass(frozen=True, slots=True)
-class Exporting:
-    """How far it is."""
+class ExportInfo(Model):
+    """How far the newest export is."""
 
     number: int = 0
     """Counts the files that were asked for."""
@@ -39,6 +39,7 @@ class Exporting:
     """Of the file."""
     done: int = 0
     total: int = 0
+    """0 while it is not known."""
     error: str | None = None
 
 
@@ -48,13 +49,13 @@ class Exporter:
     def __init__(self, workbench: Workbench) -> None:
         self._workbench = workbench
         self._lock = threading.Lock()
-        self._now = Exporting()
+        self._now = ExportInfo()
         self._cancelled = threading.Event()
         self._folder: Path | None = None
         self._thread: threading.Thread | None = None
 
     @property
-    def now(self) -> Exporting:
+    def now(self) -> ExportInfo:
         """How far the newest is."""
         return self._now
 
@@ -68,7 +69,7 @@ class Exporter:
 
     def start(
         self, form: Format, make: Callable[[], ExportedRun], name: str, options: Options
-    ) -> Exporting:
+    ) -> ExportInfo:
         """Begin to write, instead of what is under way.
 
         Args:
@@ -85,14 +86,17 @@ class Exporter:
             self._folder = Path(tempfile.mkdtemp(prefix="multiview-phd-export-"))
             plain = re.sub(r"[^A-Za-z0-9_.-]+", "-", name).strip("-.") or "tracks"
             ending = form.suffix or f"-{form.name}.zip"
-            self._now = Exporting(self._now.number + 1, "writing", form.name, f"{plain}{ending}")
+            self._now = ExportInfo(
+                number=self._now.number + 1, state="writing", format=form.name,
+                name=f"{plain}{ending}",
+            )  # fmt: skip
             number, path = self._now.number, self._folder / self._now.name
             self._show()
 
         def tell(**values: object) -> None:
             with self._lock:
                 if self._now.number == number:
-                    self._now = replace(self._now, **values)  # type: ignore[arg-type]
+                    self._now = self._now.model_copy(update=values)
                     self._show()
 
         def work() -> None:

@@ -197,18 +197,32 @@ Check = Callable[[Sequence], None]
 """Raises a :class:`SequenceError` if a sequence will not do."""
 
 
-class Taught:
-    """The values of the open sequence and how they are replaced; any thread may ask."""
+NEW_SIGMA = (0.3, 0.3, 0.15)
+"""Standard deviations of an entrance that somebody adds, metres."""
 
-    def __init__(self, workbench: Workbench, edits: Edits, drafts: Path | None = None) -> None:
+Side = Literal["min", "max"]
+Part = Literal["position", "sigma"]
+
+
+class Teaching:
+    """Edits what the open sequence was taught; any thread may ask."""
+
+    def __init__(
+        self,
+        workbench: Workbench,
+        edits: Edits,
+        data: Path | None = None,
+        drafts: Path | None = None,
+    ) -> None:
         """Follow a workbench.
 
         Args:
             workbench: Whose sequence.
             edits: Where what is taught can be undone.
+            data: Where a copy is offered to be put.
             drafts: Where what is not saved is kept for the next start; None: not beyond this one.
         """
-        self._workbench = workbench
+        self._workbench, self._data = workbench, data
         self._lock = threading.RLock()
         self._opened: Sequence | None = None
         self._drafts = Drafts(drafts)
@@ -279,7 +293,7 @@ class Taught:
         """Write the sequence with what was taught into another folder, and go on in that.
 
         Args:
-            folder: Absolute.
+            folder: Beside the others where it is a name alone.
 
         Raises:
             SequenceError: If it cannot be; nothing is lost then.
@@ -287,7 +301,9 @@ class Taught:
         with self._lock:
             sequence, saved = self.sequence(), self._workbench.snapshot().saved
             assert saved is not None
-            copied = saving.save_copy(sequence, saved, folder)
+            folder = given_folder(folder)
+            place = folder if folder.is_absolute() else self.copies_in() / folder
+            copied = saving.save_copy(sequence, saved, place)
             self._drafts.forget(sequence.folder)
             self._opened = _moved(self._opened or sequence, copied)
             shown = _moved(sequence, copied)
@@ -385,47 +401,6 @@ class Taught:
             f"Changes of {sequence.name} are taken up that were {EARLIER}",
             f"Left out: {'; '.join(left)}." if left else "Save or discard them.",
         )
-
-
-def _moved(sequence: Sequence, copied: Sequence) -> Sequence:
-    """A sequence under the name and in the folder of its copy."""
-    return replace(sequence, name=copied.name, folder=copied.folder)
-
-
-def _defaults(sequence: Sequence) -> RunParameters | None:
-    try:
-        return pipeline.default_parameters(sequence)
-    except ValueError:
-        return None
-
-
-NEW_SIGMA = (0.3, 0.3, 0.15)
-"""Standard deviations of an entrance that somebody adds, metres."""
-
-Side = Literal["min", "max"]
-Part = Literal["position", "sigma"]
-
-
-class Teaching(Taught):
-    """Edits what the open sequence was taught; any thread may ask."""
-
-    def __init__(
-        self,
-        workbench: Workbench,
-        edits: Edits,
-        data: Path | None = None,
-        drafts: Path | None = None,
-    ) -> None:
-        """Follow a workbench.
-
-        Args:
-            workbench: Whose sequence.
-            edits: Where what is taught can be undone.
-            data: Where a copy is offered to be put.
-            drafts: Where what is not saved is kept for the next start; None: not beyond this one.
-        """
-        super().__init__(workbench, edits, drafts)
-        self._data = data
 
     def add_template(
         self,
@@ -598,11 +573,6 @@ class Teaching(Taught):
         if saved is not None:
             self.edit(lambda values: values.update(copy.deepcopy(taught_values(saved))))
 
-    def save_copy(self, folder: Path) -> Path:
-        """As :meth:`Taught.save_copy`, beside the others where a name alone is given."""
-        folder = given_folder(folder)
-        return super().save_copy(folder if folder.is_absolute() else self.copies_in() / folder)
-
     def why_not_in_place(self) -> str | None:
         """Why the sequence can only be saved as a copy; None where it can be saved."""
         return saving.why_not_in_place(self.sequence().folder)
@@ -633,3 +603,15 @@ class Teaching(Taught):
                 f'{sequence.folder.name}/{FILE}, template "{template.name}", frame: camera '
                 f'"{template.camera}" has no picture of step {template.frame}; choose another step'
             )
+
+
+def _moved(sequence: Sequence, copied: Sequence) -> Sequence:
+    """A sequence under the name and in the folder of its copy."""
+    return replace(sequence, name=copied.name, folder=copied.folder)
+
+
+def _defaults(sequence: Sequence) -> RunParameters | None:
+    try:
+        return pipeline.default_parameters(sequence)
+    except ValueError:
+        return None

@@ -52,8 +52,8 @@ from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 
 
-class Store:
-    """A snapshot that is replaced under a lock, and those who are told of it."""
+class Workbench:
+    """A snapshot that is replaced under a lock, and those who are told of it. Thread-safe."""
 
     def __init__(self) -> None:
         self._lock = threading.RLock()
@@ -61,6 +61,8 @@ class Store:
         self._pending: list[Change] = []
         self._subscribers: list[Callable[[Change], None]] = []
         self._listeners: list[Callable[[Event], None]] = []
+        self._last_good: Run | None = None
+        self._running: list[StudyNews] = []
 
     def snapshot(self) -> Snapshot:
         """The state now."""
@@ -109,25 +111,23 @@ class Store:
         self._snapshot = replace(self._snapshot, version=self._snapshot.version + 1, **values)
         self._pending.append(change)
 
+    def _set(self, change: Change, **values: Any) -> None:
+        """Put values, where one of them is another than it was."""
+        with self._edit() as now:
+            if any(getattr(now, name) != value for name, value in values.items()):
+                self._put(change, **values)
+
     def _tell(self, event: Event) -> None:
         with self._lock:
             listeners = list(self._listeners)
         for callback in listeners:
             callback(event)
 
-
-class ShownRun(Store):
-    """The part of the state that those who open, compute and score report to."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self._last_good: Run | None = None
+    # what those who open, compute and score report
 
     def set_opening(self, opening: Opening | None) -> None:
         """How far the opening of a sequence is; None: it is over."""
-        with self._edit() as now:
-            if opening != now.opening:
-                self._put("opening", opening=opening)
+        self._set("opening", opening=opening)
 
     def open(
         self,
@@ -297,13 +297,7 @@ class ShownRun(Store):
             elif pinned is not None and scored.key == pinned.key:
                 self._put("evaluation", scores=now.scores.pin(scored))
 
-
-class Workbench(ShownRun):
-    """Thread-safe; what a person does is here, what is reported of runs in its base."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self._running: list[StudyNews] = []
+    # what a person does
 
     def set_parameters(self, changes: Mapping[str, Any], origin: str) -> RunParameters:
         """Change some values by key, all or none.
@@ -384,9 +378,7 @@ class Workbench(ShownRun):
 
     def select(self, target: int | None) -> None:
         """Select a track by its id, or none."""
-        with self._edit() as now:
-            if target != now.selection:
-                self._put("selection", selection=target)
+        self._set("selection", selection=target)
 
     @property
     def layers(self) -> dict[str, bool]:
@@ -463,9 +455,7 @@ class Workbench(ShownRun):
 
     def set_flies(self, flies: bool) -> None:
         """Have changes of the 3D view animated, or not (reduced motion)."""
-        with self._edit() as now:
-            if flies != now.flies:
-                self._put("view", flies=flies)
+        self._set("view", flies=flies)
 
     def teach(
         self,
@@ -524,9 +514,7 @@ class Workbench(ShownRun):
 
     def show_edits(self, undo: str | None, redo: str | None) -> None:
         """Show what would be undone and redone; None for nothing."""
-        with self._edit() as now:
-            if (undo, redo) != (now.undo_words, now.redo_words):
-                self._put("edits", undo_words=undo, redo_words=redo)
+        self._set("edits", undo_words=undo, redo_words=redo)
 
     def show_task(self, kind: str, task: Task | None) -> None:
         """Show how far some work in the background is, in place of what was shown of its kind.
@@ -548,9 +536,7 @@ class Workbench(ShownRun):
 
     def edit_room(self, on: bool) -> None:
         """Have the 3D view with handles on the room, or without."""
-        with self._edit() as now:
-            if on != now.editing_room:
-                self._put("editing", editing_room=on)
+        self._set("editing", editing_room=on)
 
     def show_ghosts(self, ghosts: Ghosts | None) -> None:
         """Have the 3D view show how tracks would be, or no more."""
@@ -573,15 +559,11 @@ class Workbench(ShownRun):
 
     def show_fetching(self, percentage: int | None) -> None:
         """Show how much of a detection network is fetched; None while none is being fetched."""
-        with self._edit() as now:
-            if percentage != now.fetching:
-                self._put("fetching", fetching=percentage)
+        self._set("fetching", fetching=percentage)
 
     def set_theme(self, theme: Theme) -> None:
         """Have the 3D view dark or light."""
-        with self._edit() as now:
-            if theme != now.theme:
-                self._put("theme", theme=theme)
+        self._set("theme", theme=theme)
 
     def command(self, name: str) -> None:
         """Relay a key that was pressed inside the 3D view to the pages."""

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import io
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Depends, Query, Request, Response
+from fastapi import APIRouter, Depends, Query, Response
 
 from app.errors import ApiError
-from app.messages import Model
+from app.messages import Model, filled
 from app.state.sensitivity import Sensitivity, shares
 from app.state.snapshot import RunPhase, Snapshot
 from app.web import results, steps
@@ -18,12 +17,16 @@ from app.web.dependencies import (
     ERRORS,
     FOR_EVER,
     Bench,
+    Configured,
     Owned,
     Part,
     Work,
+    a_file,
     begun,
+    download,
     file_name,
-    nothing_open,
+    of_app,
+    opened,
     told_in_the_answer,
 )
 from app.web.pictures import Pictures
@@ -45,6 +48,7 @@ from tracker.parameters.values import changed_values, value_of
 from tracker.runs import gaps
 from tracker.runs.run import given_names, row_corrections
 from tracker.sequences import library
+from tracker.sequences.sequence import Sequence
 
 
 class ChangedValue(Model):
@@ -110,6 +114,8 @@ class PastRuns(Model):
 
 router = APIRouter(prefix="/api", responses=ERRORS)
 
+Effects = Annotated[Sensitivity, of_app("sensitivity")]
+
 MOST_STEPS = 64
 """Steps that one request may ask for."""
 
@@ -127,21 +133,10 @@ async def schema() -> Schema:
 
 
 @router.get("/sequences")
-def sequences(request: Request) -> SequenceList:
+def sequences(settings: Configured) -> SequenceList:
     """The built-in rooms and the folders under the data folder."""
-    data: Path | None = request.app.state.settings.data
     return SequenceList(
-        sequences=[
-            SequenceEntryInfo(
-                name=entry.name,
-                description=entry.description,
-                kind=entry.kind,
-                cameras=entry.cameras,
-                frames=entry.frames,
-                error=entry.error,
-            )
-            for entry in library.available(data)
-        ]
+        sequences=[filled(SequenceEntryInfo, entry) for entry in library.available(settings.data)]
     )
 
 
@@ -178,11 +173,10 @@ def past_runs(owners: Owned, bench: Bench) -> PastRuns:
     name = now.sequence.name if now.sequence is not None else ""
     return PastRuns(
         runs=[
-            PastRunInfo(
-                number=run.number,
+            filled(
+                PastRunInfo,
+                run,
                 key=run.state.key,
-                at=run.at,
-                sequence=run.sequence,
                 same_recording=run.sequence == name or run.recording == now.sequence_key,
                 single_view=run.parameters.single_view,
                 fusion_method=run.parameters.fusion_method,
@@ -190,7 +184,6 @@ def past_runs(owners: Owned, bench: Bench) -> PastRuns:
                 done=run.state.done,
                 total=run.state.total,
                 steps_per_second=run.state.steps_per_second,
-                changes=run.changes,
             )
             for run in owners.history.runs
         ]
@@ -198,10 +191,10 @@ def past_runs(owners: Owned, bench: Bench) -> PastRuns:
 
 
 @router.get("/changes")
-def changes(request: Request, bench: Bench) -> Changes:
+def changes(sensitivity: Effects, bench: Bench) -> Changes:
     """What differs from the defaults, and what parameters would change."""
     snapshot = bench.snapshot()
-    curves = request.app.state.sensitivity.curves()
+    curves = sensitivity.curves()
     explained = shares(curves)
     return Changes(
         changed=[
@@ -209,26 +202,17 @@ def changes(request: Request, bench: Bench) -> Changes:
             for key, value in changed_values(snapshot.parameters, snapshot.defaults).items()
         ],
         curves=[
-            CurveInfo(
-                key=key,
-                measure=curve.measure,
-                values=list(curve.values),
-                scores=list(curve.scores),
-                whole=curve.whole,
-                share=explained.get(key),
-            )
-            for key, curve in curves.items()
+            filled(CurveInfo, curve, share=explained.get(key)) for key, curve in curves.items()
         ],
     )
 
 
 @router.post("/sensitivity")
-async def compute_curves(request: Request, wish: CurveRequest, bench: Bench) -> State:
+async def compute_curves(sensitivity: Effects, wish: CurveRequest, bench: Bench) -> State:
     """Compute in the background what some parameters would change, until somebody works.
 
     ``GET /api/changes`` has it, and the tasks of the state how far it is: ``effects``.
     """
-    sensitivity: Sensitivity = request.app.state.sensitivity
     sensitivity.ask(wish.keys)
     return results.state_of(bench.snapshot())
 
@@ -275,13 +259,9 @@ async def theme(wish: ThemeChange, bench: Bench) -> State:
     return results.state_of(bench.snapshot())
 
 
-@router.get(
-    "/picture/{sequence_key}/{camera}/{step}.jpg",
-    response_class=Response,
-    responses={200: {"content": {"image/jpeg": {}}, "description": "The picture."}},
-)
+@router.get("/picture/{sequence_key}/{camera}/{step}.jpg", **a_file("image/jpeg", "The picture."))
 async def picture(
-    request: Request,
+    pictures: Annotated[Pictures, of_app("pictures")],
     sequence_key: str,
     camera: int,
     step: int,
@@ -289,7 +269,6 @@ async def picture(
     nearest: Annotated[bool, Query(description="Else that of the nearest step.")] = False,
 ) -> Response:
     """One camera's picture of one step; ``X-Step`` says which one it is of."""
-    pictures: Pictures = request.app.state.pictures
     found = await pictures.nearest(sequence_key, camera, step) if nearest else step
     jpeg = await pictures.get(sequence_key, camera, found, w)
     headers = {"cache-control": FOR_EVER, "x-step": str(found)}
@@ -304,15 +283,12 @@ class StepDetails:
     trails: Annotated[bool, Query(description="With the tracks' ways in the pictures.")] = False
     seconds: Annotated[float, Query(ge=0.5, le=600.0, description="How far back.")] = 4.0
 
-    def of(self, snapshot: Snapshot, step: int) -> Step:
+    def of(self, snapshot: Snapshot, sequence: Sequence, step: int) -> Step:
         """The message of one step.
 
         Raises:
-            ApiError: If no sequence is open, or it has no such step.
+            ApiError: If the sequence has no such step.
         """
-        sequence = snapshot.sequence
-        if sequence is None:
-            raise nothing_open()
         if not 0 <= step < sequence.frames:
             raise ApiError(
                 404,
@@ -330,7 +306,7 @@ Details = Annotated[StepDetails, Depends()]
 @router.get("/step/{step}")
 async def step(step: int, bench: Bench, details: Details) -> Step:
     """One step of the shown run: what each camera found, the targets, the truth."""
-    return details.of(bench.snapshot(), step)
+    return details.of(*opened(bench), step)
 
 
 @router.get("/steps")
@@ -340,26 +316,18 @@ def several_steps(
     details: Details,
 ) -> list[Step]:
     """Several steps of the shown run at once, as ``/api/step/{step}`` has each."""
-    snapshot = bench.snapshot()
-    return [details.of(snapshot, one) for one in step]
+    snapshot, sequence = opened(bench)
+    return [details.of(snapshot, sequence, one) for one in step]
 
 
 @router.get("/timeline")
-def timeline(request: Request, bench: Bench, part: Part) -> Timeline:
+def timeline(made: Annotated[Timelines, of_app("timelines")], bench: Bench, part: Part) -> Timeline:
     """The shown run over time, as far as it is computed, at the width that it is drawn at."""
-    snapshot = bench.snapshot()
-    if snapshot.sequence is None:
-        raise nothing_open()
-    timelines: Timelines = request.app.state.timelines
-    window = part.window(snapshot.sequence.frames)
-    return timelines.of(snapshot.sequence, snapshot.run, window, snapshot.scores.pinned)
+    snapshot, sequence = opened(bench)
+    return made.of(sequence, snapshot.run, part.window(sequence.frames), snapshot.scores.pinned)
 
 
-@router.get(
-    "/export/tracks.csv",
-    response_class=Response,
-    responses={200: {"content": {"text/csv": {}}, "description": "The track file."}},
-)
+@router.get("/export/tracks.csv", **a_file("text/csv", "The track file."))
 def export_tracks(bench: Bench) -> Response:
     """The tracks of the shown run; ``X-Run-Partial`` says whether steps are missing, or these are
     still the tracks before smoothing."""
@@ -390,14 +358,11 @@ def export_tracks(bench: Bench) -> Response:
         row_corrections=row_corrections(run),
         names=given_names(run),
     )
-    return Response(
+    return download(
         stream.getvalue(),
-        media_type="text/csv; charset=utf-8",
-        headers={
-            "content-disposition": f'attachment; filename="{name}"',
-            "cache-control": "no-store",
-            "x-run-key": run.key,
-            "x-run-partial": "false" if finished else "true",
-            "x-run-steps": f"{done}/{run.sequence.frames}",
-        },
+        name,
+        "text/csv; charset=utf-8",
+        x_run_key=run.key,
+        x_run_partial="false" if finished else "true",
+        x_run_steps=f"{done}/{run.sequence.frames}",
     )

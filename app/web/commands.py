@@ -14,11 +14,10 @@ from pydantic import Field
 from app.errors import COMMANDS, ApiError, as_sentence, sentence
 from app.messages import GivenPath, Marks, Model, RowNumber, Vector
 from app.state.edits import Edit, EditError
-from app.state.snapshot import Snapshot
 from app.state.teaching import Part, Side, Teaching
 from app.web import results
 from app.web.corrections import CorrectionWish, alternative_of, known_item, stated_corrections
-from app.web.dependencies import ERRORS, Owned, Owners, nothing_open
+from app.web.dependencies import ERRORS, Owned, Owners, opened
 from app.web.results import State
 from app.web.studies import no_trial, store_of
 from tracker.parameters.catalogue import METHODS, PARAMETERS, RunParameters
@@ -191,8 +190,7 @@ class _Teach(Command):
 
     def apply(self, owners: Owners) -> None:
         """Do it, where a sequence is open."""
-        if owners.workbench.snapshot().sequence is None:
-            raise nothing_open()
+        opened(owners.workbench)
         with refusing():
             self.teach(owners.teaching)
 
@@ -407,13 +405,6 @@ TeachingCommand = (
 )  # fmt: skip
 
 
-def _open(owners: Owners) -> Snapshot:
-    snapshot = owners.workbench.snapshot()
-    if snapshot.sequence is None:
-        raise nothing_open()
-    return snapshot
-
-
 class Correct(Command):
     """Put some things right, which are undone at once; the run follows."""
 
@@ -422,7 +413,7 @@ class Correct(Command):
     note: str = Field(default="", max_length=1000)
 
     def apply(self, owners: Owners) -> None:
-        snapshot = _open(owners)
+        snapshot, _ = opened(owners.workbench)
         wishes = self.corrections
         owners.correcting.add(
             [one for wish in wishes for one in stated_corrections(wish, snapshot, self.note)]
@@ -436,7 +427,7 @@ class DropCorrection(Command):
     id: str = Field(max_length=200)
 
     def apply(self, owners: Owners) -> None:
-        _open(owners)
+        opened(owners.workbench)
         owners.correcting.remove(self.id)
 
 
@@ -450,7 +441,7 @@ class Answer(Command):
     """0: as it is."""
 
     def apply(self, owners: Owners) -> None:
-        item = known_item(owners.doubting.told(_open(owners), self.doubt), self.doubt)
+        item = known_item(owners.doubting.told(opened(owners.workbench)[0], self.doubt), self.doubt)
         chosen = item.alternatives[alternative_of(item, self.alternative)]
         if not chosen.corrections:
             owners.correcting.skipped.add(item.id)
@@ -466,7 +457,7 @@ class Skip(Command):
     doubt: str = Field(max_length=40)
 
     def apply(self, owners: Owners) -> None:
-        _open(owners)
+        opened(owners.workbench)
         owners.correcting.skipped.add(self.doubt)
 
 
@@ -515,9 +506,7 @@ class _OfStudy(ToState):
     def parameters(self, owners: Owners) -> RunParameters:
         """The values of the trial, what its study holds, and the defaults."""
         values = self._values(owners)
-        snapshot = owners.workbench.snapshot()
-        if snapshot.sequence is None:
-            raise nothing_open()
+        snapshot, _ = opened(owners.workbench)
         return with_values(snapshot.defaults, values)
 
     def _values(self, owners: Owners) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from app.errors import ApiError
 from app.messages import Model, Vector
 from app.state.correcting import Correcting, Doubting
 from app.state.snapshot import Ghosts, Snapshot
-from app.web.dependencies import ERRORS, Bench, Owned, Work, file_name, nothing_open
+from app.web.dependencies import ERRORS, Bench, Owned, Work, download, file_name, opened
 from tracker.corrections import Correction, CorrectionError, Place
 from tracker.corrections.kinds import KINDS, make
 from tracker.corrections.outcomes import Outcome, names_by_track
@@ -556,17 +556,10 @@ SETTLES_SECONDS = 10.0
 router = APIRouter(prefix="/api/corrections", responses=ERRORS)
 
 
-def _open(bench: Bench) -> Snapshot:
-    snapshot = bench.snapshot()
-    if snapshot.sequence is None:
-        raise nothing_open()
-    return snapshot
-
-
 @router.get("")
 def corrections(bench: Bench, owners: Owned) -> Corrections:
     """All of them in their order, with what became of each in the shown run."""
-    _open(bench)
+    opened(bench)
     owners.correcting.refresh()
     return corrections_of(bench.snapshot(), owners.correcting)
 
@@ -574,14 +567,14 @@ def corrections(bench: Bench, owners: Owned) -> Corrections:
 @router.get("/queue")
 def doubtful_places(bench: Bench, owners: Owned) -> DoubtQueue:
     """The doubtful places of the shown run, the most at stake first."""
-    snapshot = _open(bench)
+    snapshot, _ = opened(bench)
     return queue_of(snapshot, owners.doubting.of(snapshot), owners.correcting.skipped)
 
 
 @router.get("/queue/{doubt}/{alternative}")
 def preview(doubt: str, alternative: int, bench: Bench, owners: Owned) -> AlternativePreview:
     """What the tracks would be if an alternative were true: ghosts and changed lanes."""
-    snapshot = _open(bench)
+    snapshot, _ = opened(bench)
     found = _found(owners.doubting, snapshot, doubt)
     return preview_of(snapshot, found, alternative_of(found, alternative))
 
@@ -589,7 +582,7 @@ def preview(doubt: str, alternative: int, bench: Bench, owners: Owned) -> Altern
 @router.post("/ghosts")
 def ghosts(wish: GhostsRequest, bench: Bench, owners: Owned) -> AlternativePreview:
     """Have the 3D view show what the tracks would be, or that no more; what they would be."""
-    snapshot = _open(bench)
+    snapshot, _ = opened(bench)
     if wish.doubt is None:
         bench.show_ghosts(None)
         return AlternativePreview(tracks=[], spans=[])
@@ -603,7 +596,7 @@ def ghosts(wish: GhostsRequest, bench: Bench, owners: Owned) -> AlternativePrevi
 @router.get("/truth.csv", response_class=Response)
 def truth(bench: Bench, work: Work) -> Response:
     """The corrected tracks of the checked steps, as a truth that `evaluate` reads."""
-    _open(bench)
+    opened(bench)
     snapshot = work.settled(SETTLES_SECONDS)
     run = snapshot.run
     if run is None or not run.complete or snapshot.run_state.state == "computing":
@@ -613,8 +606,7 @@ def truth(bench: Bench, work: Work) -> Response:
     text = io.StringIO(newline="")
     write_truth(text, run.tracks, snapshot.corrections)
     name = file_name(run.sequence.name, "truth.csv")
-    head = {"content-disposition": f'attachment; filename="{name}"'}
-    return Response(text.getvalue(), media_type="text/csv", headers=head)
+    return download(text.getvalue(), name, "text/csv")
 
 
 def _found(doubts: Doubting, snapshot: Snapshot, identity: str) -> ReviewItem:

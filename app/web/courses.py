@@ -14,9 +14,9 @@ from numpy import ndarray
 from pydantic import Field
 
 from app.errors import ApiError
-from app.messages import Model
+from app.messages import Model, filled
 from app.state.scores import Scored
-from app.web.dependencies import ERRORS, Bench, Part, nothing_open
+from app.web.dependencies import ERRORS, Bench, Part, opened
 from app.web.evaluation import axis_end
 from app.web.timeline import Window
 from tracker.runs.pipeline import Run
@@ -175,12 +175,7 @@ KINDS: dict[str, Kind] = {
 
 def kinds_told() -> CourseKinds:
     """What can be plotted, for the page's list."""
-    return CourseKinds(
-        kinds=[
-            CourseKind(name=name, word=kind.word, help=kind.help, needs_truth=kind.needs_truth)
-            for name, kind in KINDS.items()
-        ]
-    )
+    return CourseKinds(kinds=[filled(CourseKind, kind, name=name) for name, kind in KINDS.items()])
 
 
 def courses_of(
@@ -258,11 +253,9 @@ def of_track(
     kind: Annotated[list[str] | None, Query(description="Which; all where none is named.")] = None,
 ) -> Courses:
     """Something of one track of the shown run over time, at the width that it is drawn at."""
-    snapshot = bench.snapshot()
-    if snapshot.sequence is None:
-        raise nothing_open()
+    snapshot, sequence = opened(bench)
     if snapshot.run is None:
         raise ApiError(409, "nothing_computed", "There are no tracks yet.")
     names = list(KINDS) if kind is None else kind
-    window = part.window(snapshot.sequence.frames)
+    window = part.window(sequence.frames)
     return courses_of(snapshot.run, snapshot.scores.shown, track, names, window)

@@ -7,16 +7,25 @@ from dataclasses import replace
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from fastapi import APIRouter, Depends, Query, Request, Response
+from fastapi import APIRouter, Query, Request, Response
 from numpy import ndarray
 
 from app.errors import ApiError
-from app.messages import Model
+from app.messages import Model, filled
 from app.state.evaluator import Evaluator
 from app.state.scores import Reference, Scored
-from app.state.snapshot import Snapshot
 from app.web import results
-from app.web.dependencies import ERRORS, Bench, Part, file_name, not_finished, nothing_open
+from app.web.dependencies import (
+    ERRORS,
+    Bench,
+    Part,
+    a_file,
+    download,
+    file_name,
+    not_finished,
+    of_app,
+    opened,
+)
 from app.web.results import State, address_of
 from app.web.timeline import Window
 from tracker.evaluation import Evaluation, compare
@@ -26,6 +35,7 @@ from tracker.evaluation.figures import Direction
 from tracker.evaluation.tables import TrackKind
 from tracker.parameters.values import changed_values, value_of
 from tracker.runs import pipeline
+from tracker.sequences.sequence import Sequence
 
 
 class FigureInfo(Model):
@@ -272,44 +282,34 @@ def evaluation_of(scored: Scored, evaluation: Evaluation) -> EvaluationInfo:
         partial=not scored.final,
         settings=evaluation.settings.model_dump(),
         figures=[
-            FigureInfo(
+            filled(
+                FigureInfo,
+                figure.definition,
                 name=figure.definition.key,
                 label=figure.definition.name,
-                group=figure.definition.group,
                 value=figure.value,
                 unit=figure.unit,
-                digits=figure.definition.digits,
-                direction=figure.definition.direction,
-                help=figure.definition.help,
                 settings=figure.measured_with,
-                source=figure.definition.source,
-                headline=figure.definition.headline,
             )
             for figure in evaluation.figures
         ],
-        per_person=[
-            PersonInfo(mean_error=row.error, **_shared(row, PersonInfo))
-            for row in evaluation.people
-        ],
+        per_person=[filled(PersonInfo, row, mean_error=row.error) for row in evaluation.people],
         per_track=[
-            ScoredTrackInfo(
+            filled(
+                ScoredTrackInfo,
+                row,
                 mean_error=row.error,
                 switches=int((switched == row.id).sum()),
-                **_shared(row, ScoredTrackInfo),
             )
             for row in evaluation.tracks
         ],
         cameras=[
-            CameraScoreInfo(false_per_picture=row.false_per_step, **_shared(row, CameraScoreInfo))
+            filled(CameraScoreInfo, row, false_per_picture=row.false_per_step)
             for row in evaluation.cameras
         ],
         notes=list(evaluation.notes),
         changes=len(changed(scored)),
     )
-
-
-def _shared(row: Any, model: type[Model]) -> dict[str, Any]:
-    return {name: getattr(row, name) for name in model.model_fields if hasattr(row, name)}
 
 
 def series_of(
@@ -450,14 +450,15 @@ def comparison_of(
             for key, value in changed_values(after, before).items()
         ],
         rows=[
-            DifferenceInfo(
+            filled(
+                DifferenceInfo,
+                row,
                 name=row.definition.key,
                 label=row.definition.name,
                 digits=row.definition.digits,
                 direction=row.definition.direction,
                 headline=row.definition.headline,
                 settings=row.measured_with,
-                **_shared(row, DifferenceInfo),
             )
             for row in compared
         ],
@@ -481,22 +482,15 @@ def changed(scored: Scored) -> dict[str, Any]:
 router = APIRouter(prefix="/api", responses=ERRORS)
 
 
-def _evaluator(request: Request) -> Evaluator:
-    evaluator: Evaluator = request.app.state.evaluator
-    return evaluator
+Scorer = Annotated[Evaluator, of_app("evaluator")]
 
 
-Scorer = Annotated[Evaluator, Depends(_evaluator)]
-
-
-def _evaluated(snapshot: Snapshot, scored: Scored | None) -> tuple[Scored, Evaluation]:
-    if snapshot.sequence is None:
-        raise nothing_open()
-    if snapshot.sequence.ground_truth is None:
+def _evaluated(sequence: Sequence, scored: Scored | None) -> tuple[Scored, Evaluation]:
+    if sequence.ground_truth is None:
         raise ApiError(
             409,
             "no_truth",
-            f"{snapshot.sequence.name} has no truth to set the tracks against.",
+            f"{sequence.name} has no truth to set the tracks against.",
             hint="Name its file in [ground_truth] of sequence.toml.",
         )
     if scored is None or scored.evaluation is None:
@@ -512,8 +506,8 @@ def _evaluated(snapshot: Snapshot, scored: Scored | None) -> tuple[Scored, Evalu
 @router.get("/evaluation")
 def evaluation(bench: Bench) -> EvaluationInfo:
     """The run scored last against the truth: figures, people, tracks, cameras."""
-    snapshot = bench.snapshot()
-    return evaluation_of(*_evaluated(snapshot, snapshot.scores.shown))
+    snapshot, sequence = opened(bench)
+    return evaluation_of(*_evaluated(sequence, snapshot.scores.shown))
 
 
 @router.get("/evaluation/series")
@@ -523,12 +517,12 @@ def series(
     of: Annotated[Literal["shown", "pinned", "previous"], Query(description="Whose.")] = "shown",
 ) -> EvaluationSeries:
     """OSPA, GOSPA and their parts, the errors and the identity switches over time."""
-    snapshot = bench.snapshot()
+    snapshot, sequence = opened(bench)
     scores = snapshot.scores
     scored = {"shown": scores.shown, "pinned": scores.pinned, "previous": scores.before}[of]
     if of != "shown" and scored is None:
         raise _nothing_to_compare()
-    run, evaluated = _evaluated(snapshot, scored)
+    run, evaluated = _evaluated(sequence, scored)
     return series_of(run, evaluated, of, part.window(run.sequence.frames))
 
 
@@ -536,8 +530,8 @@ def series(
 def curves(bench: Bench, part: Part) -> Scores:
     """The figures and the series of the run scored last, and the series of the run it is compared
     with, all of the same moment."""
-    snapshot = bench.snapshot()
-    run, evaluated = _evaluated(snapshot, snapshot.scores.shown)
+    snapshot, sequence = opened(bench)
+    run, evaluated = _evaluated(sequence, snapshot.scores.shown)
     window = part.window(run.sequence.frames)
     against, other = snapshot.scores.reference or (None, None)
     reference = None
@@ -557,13 +551,13 @@ def comparison(bench: Bench, evaluator: Scorer) -> Comparison | None:
     While B is under way, both stand as far as B has come, and no figure is called better. Null
     where there is no A: none is pinned, and none was finished before.
     """
-    snapshot = bench.snapshot()
-    b = _evaluated(snapshot, snapshot.scores.shown)
+    snapshot, sequence = opened(bench)
+    b = _evaluated(sequence, snapshot.scores.shown)
     if snapshot.scores.reference is None:
         return None
     against, scored = snapshot.scores.reference
     if against == "pinned":
-        _evaluated(snapshot, scored)
+        _evaluated(sequence, scored)
     a = evaluator.beginning(scored, b[0].steps)
     return comparison_of(against, (scored, a), b)
 
@@ -581,11 +575,9 @@ def _nothing_to_compare() -> ApiError:
 async def pin(bench: Bench) -> State:
     """Pin the finished run that is shown: later runs are compared with it."""
     if not bench.pin():
-        snapshot = bench.snapshot()
-        if snapshot.sequence is None:
-            raise nothing_open()
+        snapshot, sequence = opened(bench)
         done = snapshot.run.done if snapshot.run is not None else 0
-        raise not_finished("can be pinned", done, snapshot.sequence.frames)
+        raise not_finished("can be pinned", done, sequence.frames)
     return results.state_of(bench.snapshot())
 
 
@@ -596,17 +588,13 @@ async def unpin(bench: Bench) -> State:
     return results.state_of(bench.snapshot())
 
 
-@router.get(
-    "/export/report.html",
-    response_class=Response,
-    responses={200: {"content": {"text/html": {}}, "description": "The report."}},
-)
+@router.get("/export/report.html", **a_file("text/html", "The report."))
 def export_report(request: Request, bench: Bench, evaluator: Scorer) -> Response:
     """The finished run against the truth, as one HTML file."""
     from tracker.evaluation.report.page import report_html  # brings plotly
 
-    snapshot = bench.snapshot()
-    scored, evaluated = _evaluated(snapshot, snapshot.scores.shown)
+    snapshot, own = opened(bench)
+    scored, evaluated = _evaluated(own, snapshot.scores.shown)
     if not scored.final:
         raise not_finished("has a report", scored.steps, scored.sequence.frames)
     reference = snapshot.scores.reference
@@ -623,12 +611,4 @@ def export_report(request: Request, bench: Bench, evaluator: Scorer) -> Response
         ),
     )
     name = file_name(sequence.name, "report.html")
-    return Response(
-        text,
-        media_type="text/html; charset=utf-8",
-        headers={
-            "content-disposition": f'attachment; filename="{name}"',
-            "cache-control": "no-store",
-            "x-run-key": scored.key,
-        },
-    )
+    return download(text, name, "text/html; charset=utf-8", x_run_key=scored.key)

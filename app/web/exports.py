@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
-from typing import Annotated, Literal
+from typing import Annotated
 
-from fastapi import APIRouter, Depends, Request
+from fastapi import APIRouter, Request
 from fastapi.responses import FileResponse
 
 from app.errors import ApiError, sentence
-from app.messages import Model, RowNumber, VideoPart
-from app.state.tasks import Exporter
-from app.web.dependencies import ERRORS, Bench, not_finished
+from app.messages import Model, RowNumber, VideoPart, filled
+from app.state.tasks import Exporter, ExportInfo
+from app.web.dependencies import ERRORS, Bench, not_finished, of_app
 from app.web.library import Kept
 from app.web.results import address_of
 from tracker.export.exported_run import ExportedRun, Options
@@ -49,43 +48,21 @@ class ExportRequest(VideoPart, Model):
     """Its number in the library; null for the one that is shown."""
 
 
-class ExportInfo(Model):
-    """How far the newest export is."""
-
-    number: int
-    state: Literal["idle", "writing", "done", "failed", "cancelled"]
-    format: str
-    name: str
-    """Of the file."""
-    done: int
-    total: int
-    """0 while it is not known."""
-    error: str | None
-
-
-def _exporter(request: Request) -> Exporter:
-    exporter: Exporter = request.app.state.exporter
-    return exporter
-
-
-Out = Annotated[Exporter, Depends(_exporter)]
+Out = Annotated[Exporter, of_app("exporter")]
 
 
 @router.get("/formats")
 def formats() -> FormatList:
     """Every form that tracks leave in."""
     return FormatList(
-        formats=[
-            FormatInfo(name=f.name, word=f.word, help=f.help, video=f.needs_pictures)
-            for f in FORMATS.values()
-        ]
+        formats=[filled(FormatInfo, form, video=form.needs_pictures) for form in FORMATS.values()]
     )
 
 
 @router.get("")
 def export(exporter: Out) -> ExportInfo:
     """How far the newest export is."""
-    return ExportInfo(**asdict(exporter.now))
+    return exporter.now
 
 
 @router.post("")
@@ -133,7 +110,7 @@ def begin(
             form.check(sequence)
         except ValueError as error:
             raise ApiError(422, "cannot_export", sentence(error), field="format") from None
-        return ExportInfo(**asdict(exporter.start(form, lambda: written, named.name, options)))
+        return exporter.start(form, lambda: written, named.name, options)
     result = keeper.library().result(wish.run)
 
     def make() -> ExportedRun:
@@ -142,14 +119,14 @@ def begin(
         return run_for_export(sequence, result, back)
 
     name = f"{result.run.recording_name}-{result.run.name or result.run.id}"
-    return ExportInfo(**asdict(exporter.start(form, make, name, options)))
+    return exporter.start(form, make, name, options)
 
 
 @router.delete("")
 def stop(exporter: Out) -> ExportInfo:
     """Stop the export under way; nothing of it is left."""
     exporter.cancel()
-    return ExportInfo(**asdict(exporter.now))
+    return exporter.now
 
 
 MEDIA: dict[str, dict[str, str]] = {form.media: {} for form in FORMATS.values()}

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from fastapi import APIRouter, Depends, Request
+from fastapi import APIRouter
 
 from app.errors import ApiError
-from app.messages import Model
+from app.messages import Model, filled
 from app.state.tasks import Checked, IdentityCheck
-from app.web.dependencies import ERRORS, Bench, nothing_open
+from app.web.dependencies import ERRORS, Bench, of_app, opened
 from tracker.review.self_consistency.estimate import WARNING
 
 router = APIRouter(prefix="/api/identity", responses=ERRORS)
@@ -57,12 +57,7 @@ class IdentityInfo(Model):
     warning: str
 
 
-def _check(request: Request) -> IdentityCheck:
-    check: IdentityCheck = request.app.state.identity_check
-    return check
-
-
-Check = Annotated[IdentityCheck, Depends(_check)]
+Check = Annotated[IdentityCheck, of_app("identity_check")]
 
 
 @router.get("")
@@ -74,9 +69,7 @@ def identity(check: Check, bench: Bench) -> IdentityInfo:
 @router.post("")
 def begin(check: Check, bench: Bench) -> IdentityInfo:
     """Look at the shown run's recording backwards and without each camera."""
-    now = bench.snapshot()
-    if now.sequence is None:
-        raise nothing_open()
+    now, _ = opened(bench)
     try:
         if now.run is None:
             raise ValueError("no step is there")
@@ -101,12 +94,9 @@ def _told(now: Checked, bench: Bench) -> IdentityInfo:
     found, sequence = now.found, bench.snapshot().sequence
     names = [] if sequence is None else [camera.name for camera in sequence.cameras]
     low, high = (None, None) if found is None else found.interval
-    return IdentityInfo(
-        run=now.run,
-        state=now.state,
-        done=now.done,
-        total=now.total,
-        error=now.error,
+    return filled(
+        IdentityInfo,
+        now,
         score=None if found is None else found.score,
         low=low,
         high=high,

@@ -18,7 +18,7 @@ from fastapi import APIRouter, Depends, Query, Request, Response
 from pydantic import Field
 
 from app.errors import ApiError, as_sentence, sentence
-from app.messages import GivenPath, Model, Vector
+from app.messages import GivenPath, Model, Vector, filled
 from app.state.importing import (
     MOST_BYTES,
     Announced,
@@ -33,7 +33,7 @@ from app.state.importing import (
     places,
 )
 from app.state.recents import Recents, thumbnail
-from app.web.dependencies import ERRORS, Bench, Work
+from app.web.dependencies import ERRORS, Bench, Configured, Work, of_app
 from tracker.io.checks import Check, Status
 from tracker.io.checks.synchronisation import CameraOffset
 from tracker.io.conventions.questions import Part
@@ -552,11 +552,10 @@ def _offset(one: CameraOffset) -> ImportedOffset:
         round(float(value), 4) if math.isfinite(value) else None
         for value in one.curve.agreement[::kept]
     ]
-    return ImportedOffset(
-        steps=one.steps,
-        seconds=one.seconds,
+    return filled(
+        ImportedOffset,
+        one,
         sharpness=one.sharpness if math.isfinite(one.sharpness) else 0.0,
-        sure=one.sure,
         offsets=[float(value) for value in one.curve.offsets[::kept]],
         agreement=agreement,
     )
@@ -564,10 +563,9 @@ def _offset(one: CameraOffset) -> ImportedOffset:
 
 def _question(question: Question, wish: ImportWish) -> ImportQuestion:
     wishes = [_changed(wish, mended(wish, own)) for own in question.remedies]
-    return ImportQuestion(
-        code=question.code,
-        interpretations=question.interpretations,
-        difference=question.difference,
+    return filled(
+        ImportQuestion,
+        question,
         chosen=(on_page(question.flags[0]), on_page(question.flags[1])),
         wishes=(wishes[0], wishes[1]),
     )
@@ -589,12 +587,10 @@ def _check(one: Check, known: Known) -> ImportedCheck:
 
 def _pairs(looked: Looked) -> list[ImportedPair]:
     return [
-        ImportedPair(
-            first=pair.first,
-            second=pair.second,
-            share=pair.share,
+        filled(
+            ImportedPair,
+            pair,
             pixels=round(pair.pixels, 2) if math.isfinite(pair.pixels) else None,
-            odd=pair.odd,
         )
         for pair in looked.pairs
     ]
@@ -630,12 +626,8 @@ router = APIRouter(prefix="/api", responses=ERRORS)
 JPEG = {"content": {"image/jpeg": {}}, "description": "The picture."}
 
 
-def _desk(request: Request) -> Desk:
-    desk: Desk = request.app.state.desk
-    return desk
-
-
-AtDesk = Annotated[Desk, Depends(_desk)]
+AtDesk = Annotated[Desk, of_app("desk")]
+Opened = Annotated[Recents, of_app("recents")]
 
 
 def _draft(key: str, desk: AtDesk) -> Draft:
@@ -662,10 +654,8 @@ def _complaining() -> Iterator[None]:
 
 
 @router.get("/recordings")
-def recordings(request: Request, desk: AtDesk, bench: Bench) -> Recordings:
+def recordings(recents: Opened, settings: Configured, desk: AtDesk, bench: Bench) -> Recordings:
     """What was open last, the folders of the data folder, the built-in rooms."""
-    recents: Recents = request.app.state.recents
-    data: Path | None = request.app.state.settings.data
     snapshot = bench.snapshot()
     open_as = [snapshot.opened_as]
     if snapshot.sequence is not None:
@@ -680,7 +670,7 @@ def recordings(request: Request, desk: AtDesk, bench: Bench) -> Recordings:
         for number, one in enumerate(recents.all())
     ]  # fmt: skip
     listed = {card.opens for card in cards}
-    entries = library.available(data)
+    entries = library.available(settings.data)
     cards += [
         RecordingCard(
             name=entry.name, opens=entry.name, kind=entry.kind, description=entry.description,
@@ -706,16 +696,16 @@ def recordings(request: Request, desk: AtDesk, bench: Bench) -> Recordings:
     responses={200: JPEG, 204: {"description": "It has no pictures."}},
 )
 def recording_picture(
-    request: Request,
+    recents: Opened,
+    settings: Configured,
     name: Annotated[str, Query(max_length=4096, description="Of the list.")] = "",
     recent: Annotated[int, Query(ge=-1, description="Place among the recent ones.")] = -1,
 ) -> Response:
     """A small picture of a recording of the list."""
-    recents: Recents = request.app.state.recents
     last = recents.all()
     folder = Path(last[recent].folder) if 0 <= recent < len(last) else None
     if folder is None:
-        entries = library.available(request.app.state.settings.data)
+        entries = library.available(settings.data)
         folder = next((entry.folder for entry in entries if entry.name == name), None)
     if folder is None:
         raise ApiError(404, "no_recording", "There is no such recording in the list.")

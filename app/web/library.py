@@ -6,17 +6,27 @@ import asyncio
 import os
 from concurrent.futures import Future
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
-from fastapi import APIRouter, Depends, Request, Response
+from fastapi import APIRouter, Depends, Response
 from pydantic import Field
 
 from app.errors import ApiError, sentence
-from app.messages import Model, RowNumber
+from app.messages import Model, RowNumber, filled
 from app.state.keeper import Keeper
 from app.web import results
-from app.web.dependencies import ERRORS, Bench, Work, begun, nothing_open, told_in_the_answer
+from app.web.dependencies import (
+    ERRORS,
+    Bench,
+    Configured,
+    Work,
+    a_file,
+    begun,
+    of_app,
+    told_in_the_answer,
+)
+from app.web.dependencies import opened as opened_sequence
 from app.web.results import RoomInfo, State
 from app.web.timeline import TrackLife, Window, lives_of
 from tracker.fusion.trajectories import Trajectories
@@ -163,24 +173,6 @@ class Place(Model):
     place: str = Field(min_length=1, max_length=4096)
 
 
-def run_info(run: KeptRun, changes: list[ChangeInfo], older_code: bool) -> KeptRunInfo:
-    """A row of the library as the page gets it."""
-    told: dict[str, Any] = {
-        name: getattr(run, name)
-        for name in KeptRunInfo.model_fields
-        if name not in ("changes", "older_code", "program", "star", "tags", "steps_per_second")
-    }
-    return KeptRunInfo(
-        **told,
-        changes=changes,
-        older_code=older_code,
-        program=run.version,
-        star=bool(run.star),
-        tags=run.tags,
-        steps_per_second=round(run.steps_per_second, 1),
-    )
-
-
 BUCKETS = 600
 """Values a curve and a lane: as wide as it is drawn."""
 
@@ -216,12 +208,7 @@ def courses(tracks: Trajectories, fps: float) -> list[Course]:
 router = APIRouter(prefix="/api/library", responses=ERRORS)
 
 
-def _keeper(request: Request) -> Keeper:
-    keeper: Keeper = request.app.state.keeper
-    return keeper
-
-
-Kept = Annotated[Keeper, Depends(_keeper)]
+Kept = Annotated[Keeper, of_app("keeper")]
 
 
 def _library(keeper: Kept) -> Library:
@@ -232,9 +219,8 @@ Opened = Annotated[Library, Depends(_library)]
 
 
 @router.get("")
-def library(request: Request, keeper: Kept) -> LibraryInfo:
+def library(settings: Configured, keeper: Kept) -> LibraryInfo:
     """The recordings that were opened or can be, and how much is kept."""
-    data: Path | None = request.app.state.settings.data
     known: list[Recording] = []
     size, error, read_only = 0, None, False
     try:
@@ -244,7 +230,7 @@ def library(request: Request, keeper: Kept) -> LibraryInfo:
         error = sentence(failure)
     told = [_recording(recording) for recording in known]
     places = {recording.place for recording in told}
-    for entry in sequences.available(data):
+    for entry in sequences.available(settings.data):
         place = entry.name if entry.kind == "rendered" else str(entry.folder.absolute())
         if place not in places:
             told.append(
@@ -264,28 +250,17 @@ def _recording(recording: Recording) -> RecordingInfo:
     # of the module, for a method fails at a folder that may not be read any more
     if recording.kind == "folder" and not os.path.isfile(Path(recording.place) / FILE):
         missing = f"there is no {FILE} in {recording.place} any more"
-    return RecordingInfo(
-        id=recording.id,
-        place=recording.place,
-        name=recording.name,
+    return filled(
+        RecordingInfo,
+        recording,
         kind="rendered" if recording.kind == "rendered" else "folder",
-        cameras=recording.cameras,
-        frames=recording.frames,
-        fps=recording.fps,
         boxes_only=not recording.has_pictures,
-        people=recording.people,
-        opened=recording.opened,
-        runs=recording.runs,
         has_thumbnail=bool(recording.has_pictures),
         missing=missing,
     )
 
 
-@router.get(
-    "/thumbnail/{recording}.jpg",
-    response_class=Response,
-    responses={200: {"content": {"image/jpeg": {}}, "description": "The picture."}},
-)
+@router.get("/thumbnail/{recording}.jpg", **a_file("image/jpeg", "The picture."))
 def thumbnail(recording: RowNumber, opened: Opened) -> Response:
     """A recording in one picture."""
     picture = opened.thumbnail(recording)
@@ -365,18 +340,16 @@ async def open_run(number: RowNumber, opened: Opened, bench: Bench, jobs: Work) 
 def pin(number: RowNumber, opened: Opened, bench: Bench) -> State:
     """Pin a kept run of the open recording: others are compared with it."""
     result = opened.result(number)
-    now = bench.snapshot()
-    if now.sequence is None or now.saved is None:
-        raise nothing_open()
-    if record_of_recording(now.saved, now.opened_as).place != result.place:
+    now, sequence = opened_sequence(bench)
+    if record_of_recording(now.saved or sequence, now.opened_as).place != result.place:
         raise ApiError(
             409,
             "another_recording",
-            f"Run {number} is of {result.run.recording_name}, and {now.sequence.name} is open.",
+            f"Run {number} is of {result.run.recording_name}, and {sequence.name} is open.",
             hint="Open one of its recording's runs first.",
         )
     try:
-        bench.pin_kept(run_for_display(now.sequence, result))
+        bench.pin_kept(run_for_display(sequence, result))
     except ValueError as error:
         raise ApiError(422, "cannot_open", sentence(error), field="number") from None
     return results.state_of(bench.snapshot())
@@ -413,7 +386,15 @@ def _info(run: KeptRun) -> KeptRunInfo:
         )
         for key, value in run.changes.items()
     ]
-    return run_info(run, changes, run.code != code_version())
+    return filled(
+        KeptRunInfo,
+        run,
+        changes=changes,
+        older_code=run.code != code_version(),
+        program=run.version,
+        star=bool(run.star),
+        steps_per_second=round(run.steps_per_second, 1),
+    )
 
 
 def _default(key: str) -> object:

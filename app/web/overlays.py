@@ -5,10 +5,11 @@ from __future__ import annotations
 import hashlib
 import threading
 from collections.abc import Iterator
+from typing import Annotated
 
 import cv2
 import numpy as np
-from fastapi import APIRouter, Request, Response
+from fastapi import APIRouter, Response
 from jaxtyping import Float, UInt8
 from numpy import ndarray
 
@@ -16,7 +17,7 @@ from app.errors import sentence
 from app.messages import Model
 from app.scene.geometry import grid_cell
 from app.state.snapshot import Snapshot
-from app.web.dependencies import ERRORS, Bench, nothing_open
+from app.web.dependencies import ERRORS, Bench, a_file, of_app, opened
 from app.web.pictures import Kept, checked, missing, picture_of, png
 from tracker.geometry.camera import Camera
 from tracker.parameters.groups.colour_phd import ColourPhdParams
@@ -128,10 +129,7 @@ router = APIRouter(prefix="/api", responses=ERRORS)
 @router.get("/floor")
 def floor(bench: Bench) -> Floor:
     """A grid of whole metres or half ones on the room's floor, as each camera sees it."""
-    sequence = bench.snapshot().sequence
-    if sequence is None:
-        raise nothing_open()
-    return floor_of(sequence)
+    return floor_of(opened(bench)[1])
 
 
 TINT = (214, 100, 244)
@@ -145,8 +143,7 @@ _no_foreground = missing("no_foreground")
 
 @router.get(
     "/foreground/{sequence_key}/{camera}/{step}.png",
-    response_class=Response,
-    responses={200: {"content": {"image/png": {}}, "description": "The tinted foreground."}},
+    **a_file("image/png", "The tinted foreground."),
 )
 def foreground(
     bench: Bench,
@@ -297,12 +294,10 @@ def heat(values: Float[ndarray, "rows columns"], least: float) -> bytes:
 
 
 @router.get(
-    "/likelihood/{sequence_key}/{camera}/{step}.png",
-    response_class=Response,
-    responses={200: {"content": {"image/png": {}}, "description": "A pixel a cell."}},
+    "/likelihood/{sequence_key}/{camera}/{step}.png", **a_file("image/png", "A pixel a cell.")
 )
 def likelihood(
-    request: Request,
+    maps: Annotated[Likelihoods, of_app("likelihoods")],
     bench: Bench,
     sequence_key: str,
     camera: int,
@@ -317,5 +312,4 @@ def likelihood(
         raise _no_likelihood(
             "The templates or colours are others by now.", "Ask for the step again."
         )
-    maps: Likelihoods = request.app.state.likelihoods
     return png(maps.png(sequence, reader, shown_colours(snapshot), camera, picture), run)

@@ -16,7 +16,7 @@ from numpy import ndarray
 from app.errors import ApiError, sentence
 from app.state.snapshot import Snapshot
 from app.state.workbench import Workbench
-from app.web.dependencies import ERRORS, FOR_EVER
+from app.web.dependencies import ERRORS, FOR_EVER, a_file
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 
@@ -197,11 +197,7 @@ def _encode(reader: FrameReader, camera: int, step: int, width: int | None) -> b
 router = APIRouter(prefix="/api/view", responses=ERRORS)
 
 
-@router.get(
-    "/picture.png",
-    response_class=Response,
-    responses={200: {"content": {"image/png": {}}, "description": "The picture."}},
-)
+@router.get("/picture.png", **a_file("image/png", "The picture."))
 def picture(
     request: Request,
     width: Annotated[int, Query(ge=16, le=8192, description="Pixels.")] = 1280,

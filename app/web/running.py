@@ -8,7 +8,6 @@ import os
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from fastapi import FastAPI
@@ -35,15 +34,12 @@ from app.state.threads import in_background
 from app.state.workbench import Workbench
 from app.web import library as library
 from app.web.access.gateway import Entrance, Gateway, start_viser
-from app.web.access.tokens import Keys
-from app.web.dependencies import Owners
+from app.web.dependencies import Owners, Settings
 from app.web.overlays import Likelihoods
 from app.web.pictures import Pictures
 from app.web.stream import Stream
-from app.web.teaching import Swatches
 from app.web.timeline import Timelines, names_of
 from tracker.files.folders import settings_folder
-from tracker.library import KEEP
 from tracker.library.records import Result
 from tracker.runs.pipeline import Cancelled
 from tracker.runs.stage_cache import MEMORY_BYTES, StageCache
@@ -86,40 +82,6 @@ def machine_memory() -> int:
         return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     except (AttributeError, OSError, ValueError):
         return 8 << 30
-
-
-@dataclass(frozen=True, slots=True)
-class Settings:
-    """What a server is started with."""
-
-    host: str = "127.0.0.1"
-    keys: Keys | None = None
-    """What lets in; None: whoever reaches it."""
-    sequence: str | None = None
-    """Opened at once, in the background."""
-    data: Path | None = None
-    """Its folders are sequences that can be chosen."""
-    detector: Path | None = None
-    """A detection network (ONNX) that may be run on the pictures of each."""
-    seed: int = 0
-    with_viser: bool = True
-    keep_on_disk: bool = False
-    """Whether what was compiled and what the cameras found is kept for the next start."""
-    library: Path | None = None
-    """The file that keeps runs; None: they are not kept."""
-    keep: int = KEEP
-    """How many untouched runs stay in it."""
-    memory: int | None = None
-    """Bytes that may be kept for speed; None for half of the machine, or less."""
-    disk: int | None = None
-    """Bytes on disk that may be kept of earlier runs' stages; None for the usual limit."""
-    run: int | Result | None = None
-    """A run of it that is shown at once, instead of a sequence; or one that lies elsewhere, which
-    is only looked at: nothing is computed, and nothing can be changed."""
-    say: Callable[[str], None] = lambda words: None
-    """Told what somebody in front of the terminal should know."""
-    ended: tuple[int, int] | None = None
-    """Process and signal of the start before this one, where it crashed."""
 
 
 logger = logging.getLogger("app")
@@ -177,21 +139,6 @@ async def lifespan(app: FastAPI) -> AsyncIterator[None]:
     crashes = Crashes(settings_folder() / "starts" if kept else None)
     crashed = crashes.tidy(settings.ended)
     crashes.watch()
-    jobs = app.state.jobs = Jobs(
-        workbench,
-        data=settings.data,
-        detector=settings.detector,
-        seed=settings.seed,
-        cache=StageCache.on_disk(in_background, budget.columns, settings.disk)
-        if kept
-        else StageCache(memory_bytes=budget.columns),
-        picture_bytes=budget.pictures,
-        crashes=crashes,
-        draft_of=lambda folder: teaching.draft_of(folder),
-        left_with=lambda folder: edits.parameters_of(folder),
-        compiling=Compiling(settings.say) if kept and not looked_at else None,
-        computes=not looked_at,
-    )
     pictures = app.state.pictures = Pictures(workbench)
     app.state.timelines = Timelines()
     history = History(workbench)
@@ -203,12 +150,27 @@ async def lifespan(app: FastAPI) -> AsyncIterator[None]:
     own_presets = settings_folder() / "presets.json" if kept else None
     presets = app.state.presets = OwnPresets(workbench, edits, own_presets)
     app.state.likelihoods = Likelihoods()
-    app.state.swatches = Swatches()
     teaching = Teaching(
         workbench, edits, settings.data, settings_folder() / "unsaved" if kept else None
     )
     correcting = Correcting(workbench, edits)
     edits.follow()
+    # after those who take up what was not saved: the first run is of that, and begins once
+    jobs = app.state.jobs = Jobs(
+        workbench,
+        data=settings.data,
+        detector=settings.detector,
+        seed=settings.seed,
+        cache=StageCache.on_disk(in_background, budget.columns, settings.disk)
+        if kept
+        else StageCache(memory_bytes=budget.columns),
+        picture_bytes=budget.pictures,
+        crashes=crashes,
+        draft_of=teaching.draft_of,
+        left_with=edits.parameters_of,
+        compiling=Compiling(settings.say) if kept and not looked_at else None,
+        computes=not looked_at,
+    )
     doubting = Doubting()
     desk = app.state.desk = Desk(workbench, settings.data)
     recents = app.state.recents = Recents(

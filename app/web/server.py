@@ -42,8 +42,9 @@ from app.web.access import gateway
 from app.web.access.gateway import LARGEST_MESSAGE
 from app.web.access.security import CONTENT_POLICY, Guard, OnlyLooking, allowed_hosts, is_loopback
 from app.web.access.tokens import Access
+from app.web.dependencies import Settings
 from app.web.manual import Manual
-from app.web.running import Settings, lifespan
+from app.web.running import lifespan
 from tracker import __version__
 from tracker.library.records import Result
 

@@ -11,10 +11,10 @@ from fastapi import APIRouter, Depends, Query, Response
 from pydantic import Field
 
 from app.errors import ApiError, sentence
-from app.messages import Model
+from app.messages import Model, filled
 from app.state.snapshot import Snapshot
 from app.state.studies import StudyDesk
-from app.web.dependencies import ERRORS, Bench, Owned, file_name, nothing_open
+from app.web.dependencies import ERRORS, Bench, Owned, download, file_name, opened
 from tracker.parameters.catalogue import METHODS, PARAMETERS
 from tracker.parameters.values import changed_values, shown_keys, value_of, with_values
 from tracker.runs.processes import available_cores
@@ -389,11 +389,11 @@ def study_of(desk: StudyDesk, store: Store) -> Study:
             range_of(one, defaults.get(one.key), summary.definition.start.get(one.key))
             for one in summary.definition.varied
         ],
-        status=StudyStatus(
+        status=filled(
+            StudyStatus,
+            status,
             runs=max(status.all_runs, status.runs),  # an older status has those of a start alone
             seconds=max(status.all_seconds, status.seconds),
-            seconds_left=status.seconds_left,
-            busy=status.busy,
             workers=[WorkerInfo(**one) for one in status.workers],
         ),
         best=None if summary.best is None else summary.best.number,
@@ -409,23 +409,16 @@ def study_of(desk: StudyDesk, store: Store) -> Study:
 
 def objective_of(one: Objective) -> ObjectiveInfo:
     """A figure that trials are judged by."""
-    return ObjectiveInfo(
-        key=one.key,
-        name=one.name,
-        help=one.help,
-        higher=one.higher,
-        unit=one.unit,
-        digits=one.digits,
-        of=one.of,
-    )
+    return filled(ObjectiveInfo, one)
 
 
 def range_of(one: Varied, default: Any, now: Any) -> RangeInfo:
     """A varied parameter."""
     parameter = PARAMETERS.get(one.key)
     own = default if default is not None or parameter is None else parameter.default
-    return RangeInfo(
-        key=one.key,
+    return filled(
+        RangeInfo,
+        one,
         label=one.key.replace("_", " ").capitalize() if parameter is None else parameter.label,
         symbol="" if parameter is None else parameter.symbol,
         unit="" if parameter is None else parameter.unit,
@@ -433,9 +426,6 @@ def range_of(one: Varied, default: Any, now: Any) -> RangeInfo:
         kind="choice" if parameter is None else parameter.kind,
         minimum=None if parameter is None else parameter.minimum,
         maximum=None if parameter is None else parameter.maximum,
-        low=one.low,
-        high=one.high,
-        log=one.log,
         choices=list(one.choices),
         default=own,
         now=own if now is None else now,
@@ -459,15 +449,9 @@ def tuned_of(found: dict[str, Any] | None) -> Tuned:
         symbol = "" if parameter is None else parameter.symbol
         unit = "" if parameter is None else parameter.unit
         rows.append(TunedRow(symbol=symbol, unit=unit, **row))
-    return Tuned(
-        done=True,
-        better=found["better"],
-        words=found["words"],
-        trial=found["trial"],
-        seeds=found["seeds"],
-        rows=rows,
-        figures=[TunedFigure(**one) for one in found["figures"]],
-    )
+    figures = [TunedFigure(**one) for one in found["figures"]]
+    facts = {name: found[name] for name in ("better", "words", "trial", "seeds")}
+    return Tuned(done=True, rows=rows, figures=figures, **facts)
 
 
 def ranges_of(snapshot: Snapshot, keys: list[str] | None) -> list[RangeInfo]:
@@ -535,14 +519,12 @@ def draft(
     keys: Annotated[str | None, Query(description="Parameters, with commas between.")] = None,
 ) -> StudyDraft:
     """A study of what is open, its ranges around today's values."""
-    snapshot = bench.snapshot()
-    if snapshot.sequence is None:
-        raise nothing_open()
+    snapshot, sequence = opened(bench)
     wanted = None if keys is None else [key for key in keys.split(",") if key]
-    has_truth = snapshot.sequence.ground_truth is not None
+    has_truth = sequence.ground_truth is not None
     return StudyDraft(
-        name=_free_name(desk, snapshot.sequence.name),
-        recordings=[place_of(snapshot.sequence.folder)],
+        name=_free_name(desk, sequence.name),
+        recordings=[place_of(sequence.folder)],
         has_truth=has_truth,
         parameters=ranges_of(snapshot, wanted),
         objectives=list(WITH_TRUTH if has_truth else SELF_CONSISTENCY),
@@ -573,15 +555,13 @@ def _definition(wish: StudyWish, bench: Bench) -> StudyDefinition:
     Raises:
         StudyError: If something in it does not do.
     """
-    snapshot = bench.snapshot()
-    if snapshot.sequence is None:
-        raise nothing_open()
+    snapshot, sequence = opened(bench)
     own = changed_values(snapshot.parameters, snapshot.defaults)
     ranges = {key: one.model_dump(exclude_none=True) for key, one in wish.parameters.items()}
     return definition_of(
         {
             "name": wish.name,
-            "recordings": wish.recordings or [place_of(snapshot.sequence.folder)],
+            "recordings": wish.recordings or [place_of(sequence.folder)],
             "trials": wish.trials,
             **({} if wish.minutes is None else {"minutes": wish.minutes}),
             "seeds": wish.seeds,
@@ -675,13 +655,11 @@ def scheduler(wish: SchedulerWish) -> SchedulerInfo:
 @router.post("/tune")
 def tune(wish: TuneWish, desk: Desk, bench: Bench) -> Study:
     """Define and start the study that tunes the open recording from today's values."""
-    snapshot = bench.snapshot()
-    if snapshot.sequence is None:
-        raise nothing_open()
+    snapshot, sequence = opened(bench)
     desk.check_place(wish.workers, wish.scheduler)
     definition = tuning(
-        _free_name(desk, f"tune {snapshot.sequence.name}"),
-        [place_of(snapshot.sequence.folder)],
+        _free_name(desk, f"tune {sequence.name}"),
+        [place_of(sequence.folder)],
         minutes=wish.minutes,
         changes=changed_values(snapshot.parameters, snapshot.defaults),
         ignore_truth=wish.without_truth,
@@ -790,11 +768,4 @@ def export(store: Named, file: Literal["report.html", "trials.csv", "study.json"
     except OSError as error:
         raise StudyError(sentence(error)) from error
     name = file_name(store.name, file)
-    return Response(
-        data,
-        media_type=KINDS[file],
-        headers={
-            "content-disposition": f'attachment; filename="{name}"',
-            "cache-control": "no-store",
-        },
-    )
+    return download(data, name, KINDS[file])

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import asyncio
 from pathlib import Path
+from typing import Annotated
 
 import cv2
 import numpy as np
-from fastapi import APIRouter, Request, Response
+from fastapi import APIRouter, Response
 from jaxtyping import Float, UInt8
 from numpy import ndarray
 
@@ -22,8 +23,10 @@ from app.web.dependencies import (
     Bench,
     Owned,
     Work,
+    a_file,
     begun,
-    nothing_open,
+    of_app,
+    opened,
     told_in_the_answer,
 )
 from app.web.pictures import checked, missing, picture_of
@@ -108,42 +111,36 @@ RELOAD = "Load the page again."
 _missing = missing("no_swatch")
 
 
-class Swatches:
-    """Reads boxes of the open sequence's pictures."""
+def crop(snapshot: Snapshot, sequence_key: str, camera: int, step: int, box: str) -> bytes:
+    """The part of the picture as PNG.
 
-    def crop(
-        self, snapshot: Snapshot, sequence_key: str, camera: int, step: int, box: str
-    ) -> bytes:
-        """The part of the picture as PNG.
+    Raises:
+        ApiError: If there is no such picture, or the box lies outside.
+    """
+    picture, (left, top, width, height) = _picture(snapshot, sequence_key, camera, step, box)
+    rows = slice(max(0, round(top)), max(0, round(top + height)))
+    columns = slice(max(0, round(left)), max(0, round(left + width)))
+    part = picture[rows, columns]
+    if part.size == 0:
+        raise _missing(f"The box {box} lies outside the picture.", RELOAD)
+    size = (max(1, round(part.shape[1] * CROP_HEIGHT / part.shape[0])), CROP_HEIGHT)
+    shown = cv2.resize(part, size, interpolation=cv2.INTER_AREA)
+    done, data = cv2.imencode(".png", shown)
+    assert done, "a picture of three channels can be written as PNG"
+    return bytes(data)
 
-        Raises:
-            ApiError: If there is no such picture, or the box lies outside.
-        """
-        picture, (left, top, width, height) = _picture(snapshot, sequence_key, camera, step, box)
-        rows = slice(max(0, round(top)), max(0, round(top + height)))
-        columns = slice(max(0, round(left)), max(0, round(left + width)))
-        part = picture[rows, columns]
-        if part.size == 0:
-            raise _missing(f"The box {box} lies outside the picture.", RELOAD)
-        size = (max(1, round(part.shape[1] * CROP_HEIGHT / part.shape[0])), CROP_HEIGHT)
-        shown = cv2.resize(part, size, interpolation=cv2.INTER_AREA)
-        done, data = cv2.imencode(".png", shown)
-        assert done, "a picture of three channels can be written as PNG"
-        return bytes(data)
 
-    def histogram(
-        self, snapshot: Snapshot, sequence_key: str, camera: int, step: int, box: str
-    ) -> str:
-        """The colour histogram in ``hue_saturation`` bins, summed over the saturation, as SVG.
+def bars_of(snapshot: Snapshot, sequence_key: str, camera: int, step: int, box: str) -> str:
+    """The colour histogram in ``hue_saturation`` bins, summed over the saturation, as SVG.
 
-        Raises:
-            ApiError: If there is no such picture.
-        """
-        picture, left_top = _picture(snapshot, sequence_key, camera, step, box)
-        place = Boxes.from_left_top(np.array([left_top], dtype=float)).centred
-        bins = colour.bin_map(picture, "hue_saturation")
-        found = colour.histograms(bins, place, "hue_saturation", "epanechnikov")[0]
-        return bars(found)
+    Raises:
+        ApiError: If there is no such picture.
+    """
+    picture, left_top = _picture(snapshot, sequence_key, camera, step, box)
+    place = Boxes.from_left_top(np.array([left_top], dtype=float)).centred
+    bins = colour.bin_map(picture, "hue_saturation")
+    found = colour.histograms(bins, place, "hue_saturation", "epanechnikov")[0]
+    return bars(found)
 
 
 def bars(histogram: Float[ndarray, " bins"]) -> str:
@@ -196,14 +193,14 @@ def _picture(
 
 router = APIRouter(prefix="/api/teach", responses=ERRORS)
 
+Fetching = Annotated[DetectorFetching, of_app("detector_fetching")]
+
 
 @router.get("")
 def taught(bench: Bench, owners: Owned) -> Taught:
     """What the open sequence was taught, what its tracks offer, and how it can be saved."""
-    snapshot = bench.snapshot()
-    sequence, saved, parameters = snapshot.sequence, snapshot.saved, snapshot.parameters
-    if sequence is None or saved is None:
-        raise nothing_open()
+    snapshot, sequence = opened(bench)
+    saved, parameters = snapshot.saved or sequence, snapshot.parameters
 
     def looks(method: str) -> bool:
         return method_of("single_view", method).used(parameters).templates != "no"
@@ -249,8 +246,7 @@ def _template(template: Template) -> TemplateInfo:
 @router.put("/detector")
 async def use_detector(wish: DetectorRequest, bench: Bench, jobs: Work) -> State:
     """Find people by a detection network of this machine, or no more; the run follows."""
-    if bench.snapshot().sequence is None:
-        raise nothing_open()
+    opened(bench)
     model = None if wish.model is None else Path(wish.model).expanduser()
     if model is not None:
         from tracker.single_view.onnx.network import Network  # at its first use
@@ -263,44 +259,33 @@ async def use_detector(wish: DetectorRequest, bench: Bench, jobs: Work) -> State
 
 
 @router.post("/detector/fetched")
-def fetch_detector(request: Request, bench: Bench) -> State:
+def fetch_detector(fetching: Fetching, bench: Bench) -> State:
     """Fetch a detection network with npm, in the background, and use it for this recording."""
-    fetching: DetectorFetching = request.app.state.detector_fetching
     fetching.start()
     return results.state_of(bench.snapshot())
 
 
 @router.delete("/detector/fetched")
-def stop_fetching(request: Request, bench: Bench) -> State:
+def stop_fetching(fetching: Fetching, bench: Bench) -> State:
     """Stop fetching a detection network; nothing of it is kept."""
-    fetching: DetectorFetching = request.app.state.detector_fetching
     fetching.cancel()
     return results.state_of(bench.snapshot())
 
 
 @router.get(
-    "/swatch/{sequence_key}/{camera}/{step}/{box}.png",
-    response_class=Response,
-    responses={200: {"content": {"image/png": {}}, "description": "What the box holds."}},
+    "/swatch/{sequence_key}/{camera}/{step}/{box}.png", **a_file("image/png", "What the box holds.")
 )
-def swatch(
-    request: Request, bench: Bench, sequence_key: str, camera: int, step: int, box: str
-) -> Response:
+def swatch(bench: Bench, sequence_key: str, camera: int, step: int, box: str) -> Response:
     """The part of a picture in a box: ``left,top,width,height``."""
-    swatches: Swatches = request.app.state.swatches
-    png = swatches.crop(bench.snapshot(), sequence_key, camera, step, box)
+    png = crop(bench.snapshot(), sequence_key, camera, step, box)
     return Response(png, media_type="image/png", headers={"cache-control": FOR_EVER})
 
 
 @router.get(
     "/histogram/{sequence_key}/{camera}/{step}/{box}.svg",
-    response_class=Response,
-    responses={200: {"content": {"image/svg+xml": {}}, "description": "A bar a colour."}},
+    **a_file("image/svg+xml", "A bar a colour."),
 )
-def histogram(
-    request: Request, bench: Bench, sequence_key: str, camera: int, step: int, box: str
-) -> Response:
+def histogram(bench: Bench, sequence_key: str, camera: int, step: int, box: str) -> Response:
     """The colours in a box, as the colour methods weigh them: hues, then greys by value."""
-    swatches: Swatches = request.app.state.swatches
-    svg = swatches.histogram(bench.snapshot(), sequence_key, camera, step, box)
+    svg = bars_of(bench.snapshot(), sequence_key, camera, step, box)
     return Response(svg, media_type="image/svg+xml", headers={"cache-control": FOR_EVER})

@@ -17,7 +17,8 @@ from starlette.testclient import TestClient
 from app.command.studies import _trials as command_words
 from app.state.studies import StudyDesk
 from app.web import studies
-from app.web.server import Settings, create_app
+from app.web.dependencies import Settings
+from app.web.server import create_app
 from tests.app.conftest import command
 from tests.studies.small import Serial, made_up, recording, run
 from tracker.studies.store import Status, Store, find

@@ -440,6 +440,7 @@ declare namespace Server {
 
 	/** How far the newest export is. */
 	interface ExportInfo {
+		/** Counts the files that were asked for. */
 		number: number;
 		state: "idle" | "writing" | "done" | "failed" | "cancelled";
 		format: string;

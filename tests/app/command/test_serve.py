@@ -24,8 +24,9 @@ from websockets.exceptions import ConnectionClosed
 from websockets.typing import Origin, Subprotocol
 
 from app.command import main as cli
+from app.web.dependencies import Settings
 from app.web.running import say_failure
-from app.web.server import Settings, build_routes, create_app
+from app.web.server import build_routes, create_app
 from tests.app.conftest import wait_until
 from tests.app.folders import write_crossing
 from tracker.runs.pipeline import Cancelled

@@ -27,6 +27,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.typing import Subprotocol
 
 from app.web import server
+from app.web.dependencies import Settings
 from tests.app.conftest import wait_until
 
 VISER = Subprotocol(f"viser-v{viser.__version__}")
@@ -40,7 +41,7 @@ ever, one on a busy machine some seconds."""
 class Running:
     """A server in a thread of its own, on a free port."""
 
-    def __init__(self, settings: server.Settings) -> None:
+    def __init__(self, settings: Settings) -> None:
         self._listener = server.bind("127.0.0.1", 0)
         self.port: int = self._listener.getsockname()[1]
         self.address = f"http://127.0.0.1:{self.port}"
@@ -49,7 +50,7 @@ class Running:
         self._thread.start()
         assert self.ready.wait(60)
 
-    def _serve(self, settings: server.Settings) -> None:
+    def _serve(self, settings: Settings) -> None:
         self.app = server.create_app(settings)
         server.serve(self.app, self._listener, self.ready.set)
 
@@ -82,7 +83,7 @@ def running(data: Path) -> Iterator[Running]:
         patch.setattr(server, "SECONDS_TO_ASK", SOON)
         patch.setattr(server, "SECONDS_TO_READ", SOON)
         patch.setattr(server, "_Server", Stoppable)
-        running = Running(server.Settings(sequence="crossing", data=data))
+        running = Running(Settings(sequence="crossing", data=data))
         wait_until(lambda: running.get("/viser/").status_code == 200)
         wait_until(lambda: running.get("/api/state").json()["sequence"] is not None)
         yield running

@@ -16,7 +16,8 @@ from fastapi.routing import APIRoute
 from starlette.testclient import TestClient
 
 from app.web.access import gateway
-from app.web.server import ROUTERS, Settings, create_app
+from app.web.dependencies import Settings
+from app.web.server import ROUTERS, create_app
 from tests.app.conftest import ADDRESS, command, run_is, wait_until
 from tests.app.folders import FRAMES
 from tests.synthetic import number_in

@@ -15,7 +15,8 @@ import pytest
 from starlette.testclient import TestClient
 
 from app.state.correcting import Doubting
-from app.web.server import Settings, create_app
+from app.web.dependencies import Settings
+from app.web.server import create_app
 from tests.app.conftest import ADDRESS, Runs, command, connect, run_is, wait_until
 from tracker.corrections import Correction
 from tracker.corrections.log import own_place, read_log, write_log

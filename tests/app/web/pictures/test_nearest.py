@@ -10,7 +10,8 @@ import pytest
 from starlette.testclient import TestClient
 
 from app.web import pictures
-from app.web.server import Settings, create_app
+from app.web.dependencies import Settings
+from app.web.server import create_app
 from tests.app.conftest import ADDRESS, run_is, wait_until
 from tests.synthetic import number_in, write_sequence
 
