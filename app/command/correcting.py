@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +14,7 @@ from app.command.arguments import (
     TruthOfCorrections,
 )
 from app.command.computing import compute
-from app.command.terminal import CommandError, print_table, say
+from app.command.terminal import CommandError, print_json, print_table, say
 from tracker.corrections import Correction, CorrectionError
 from tracker.corrections.log import FILE, place_of, read_log, remark_on, write_log
 from tracker.corrections.merging import difference, merge
@@ -104,15 +102,11 @@ def _values(one: Correction) -> dict[str, Any]:
     return one.model_dump(mode="json", exclude_none=True)
 
 
-def _print(document: Any) -> None:
-    sys.stdout.write(json.dumps(document, allow_nan=False) + "\n")
-
-
 def _list(action: ListCorrections) -> None:
     log = _named(action.log)
     found = read_log(log)
     if action.json:
-        _print([_values(one) for one in found])
+        print_json([_values(one) for one in found])
         return
     if not log.is_file():
         say(f"{action.log} has no corrections yet; its log would be {log}")
@@ -148,7 +142,7 @@ def _check(action: CheckCorrections) -> int:
     became = {outcome.id: outcome for outcome in run.outcomes}
     unmet = [one for one in run.outcomes if not one.met]
     if action.json:
-        _print([
+        print_json([
             {**_values(one), "met": became[one.id].met, "why": became[one.id].why} for one in told
         ])  # fmt: skip
     else:
@@ -166,7 +160,7 @@ def _check(action: CheckCorrections) -> int:
 def _diff(action: DiffCorrections) -> int:
     found = difference(read_log(_log(action.first)), read_log(_log(action.second)))
     if action.json:
-        _print({
+        print_json({
             "only_first": [_values(one) for one in found.only_first],
             "only_second": [_values(one) for one in found.only_second],
             "changed": [[_values(one), _values(other)] for one, other in found.changed],

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import shlex
 import signal
@@ -31,7 +30,7 @@ from app.command.arguments import (
     Where,
 )
 from app.command.flags import preset_values, set_values
-from app.command.terminal import FAILURE, Bar, CommandError, print_table, say
+from app.command.terminal import FAILURE, Bar, CommandError, print_json, print_table, say
 from tracker.files.folders import library_file
 from tracker.library.store import open_library
 from tracker.parameters.catalogue import RunParameters
@@ -182,7 +181,7 @@ def run(store: Store, where: Where, *, as_json: bool = False, quiet: bool = Fals
             store, writer, crew, on_status=told, stopped=stopped.is_set, beside=elsewhere
         )
     if as_json:
-        _print({"study": store.name, "state": status.state, "trials": len(store.trials())})
+        print_json({"study": store.name, "state": status.state, "trials": len(store.trials())})
     elif not quiet:
         _tell_end(store, status)
     return INTERRUPTED if status.state == "stopped" and stopped.is_set() else 0
@@ -221,7 +220,7 @@ def _list(found: list[Store], command: ListStudies) -> None:
             }
         )
     if command.json:
-        _print(rows)
+        print_json(rows)
         return
     print_table(
         ("study", "state", ">done", ">trials", "last", ""),
@@ -241,7 +240,7 @@ def _show(command: ShowStudy, folder: Path) -> None:
         if command.command:
             raise CommandError("--command: name a trial by its number, as in `study show 12`")
         if command.json:
-            _print(_everything(store))
+            print_json(_everything(store))
             return
         status = store.status()
         say(
@@ -257,7 +256,7 @@ def _show(command: ShowStudy, folder: Path) -> None:
         sys.stdout.writelines(f"{one}\n" for one in track_commands(store.definition(), trial))
     elif command.json:
         outcomes = [store.outcome(row.key) for row in trial.jobs]
-        _print({**trial.to_json(), "runs": [o.to_json() for o in outcomes if o is not None]})
+        print_json({**trial.to_json(), "runs": [o.to_json() for o in outcomes if o is not None]})
     else:
         _show_trial(store, trial)
 
@@ -323,7 +322,7 @@ def _best(store: Store, command: BestOfStudy) -> None:
     if command.save_as is not None:
         save_preset(command.save_as, {**summary.definition.held(), **changes})
     if command.json:
-        _print({**best.to_json(), "changes": changes, "front": summary.front})
+        print_json({**best.to_json(), "changes": changes, "front": summary.front})
         return
     for sentence in summary.sentences():
         say(sentence)
@@ -375,10 +374,6 @@ def shown_value(value: Any) -> str:
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
-def _print(value: Any) -> None:
-    sys.stdout.write(json.dumps(value, allow_nan=False, ensure_ascii=False) + "\n")
-
-
 _FIGURES = ("mota", "idf1", "hota", "ospa")
 
 
@@ -406,7 +401,7 @@ def batch(command: Batch) -> int:
             lambda: crew(say), bar.at, stopped.is_set, corrected=not command.no_corrections,
         )  # fmt: skip
     if command.json:
-        sys.stdout.write(json.dumps([_told(one) for one in found], allow_nan=False) + "\n")
+        print_json([_told(one) for one in found])
     else:
         _tell(places, found)
     if stopped.is_set():
@@ -489,7 +484,7 @@ def tune(command: Tune) -> int:
         )
     if command.json:
         told = {"study": name, "trials": len(store.trials()), **found}
-        sys.stdout.write(json.dumps(told, allow_nan=False, ensure_ascii=False) + "\n")
+        print_json(told)
         return 0
     say(f"{len(store.trials())} trials; {found['words']}")
     if found["rows"]:

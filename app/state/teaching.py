@@ -435,13 +435,13 @@ class Teaching:
 
         self.edit(add, self._can_be_read)
 
-    def rename_template(self, index: int, name: str) -> None:
+    def rename_template(self, index: int, person: str) -> None:
         """Say whose colours a template models.
 
         Raises:
             SequenceError: If there is no such template, or no name is given.
         """
-        self.edit(lambda values: at(values, "template", index).update(name=name))
+        self.edit(lambda values: at(values, "template", index).update(name=person))
 
     def remove_template(self, index: int) -> None:
         """Take a template away."""

@@ -186,7 +186,10 @@ def refusing(code: str = "cannot_teach") -> Iterator[None]:
 
 
 class _Teach(Command):
-    """A command on what the open sequence is taught; the run follows at once."""
+    """A command on what the open sequence is taught; the run follows at once.
+
+    Where nothing else is said it is the method of :class:`Teaching` of its name, with its fields.
+    """
 
     def apply(self, owners: Owners) -> None:
         """Do it, where a sequence is open."""
@@ -200,7 +203,8 @@ class _Teach(Command):
         Raises:
             ValueError: If it does not fit; nothing is changed then.
         """
-        raise NotImplementedError
+        fields = self.model_dump()
+        getattr(teaching, fields.pop("name"))(**fields)
 
 
 class AddTemplate(_Teach):
@@ -230,9 +234,6 @@ class RenameTemplate(_Teach):
     index: int
     person: str = Field(max_length=200)
 
-    def teach(self, teaching: Teaching) -> None:
-        teaching.rename_template(self.index, self.person)
-
 
 class RemoveTemplate(_Teach):
     """Take a template away."""
@@ -240,17 +241,11 @@ class RemoveTemplate(_Teach):
     name: Literal["remove_template"]
     index: int
 
-    def teach(self, teaching: Teaching) -> None:
-        teaching.remove_template(self.index)
-
 
 class OfferTemplates(_Teach):
     """List the templates that the tracks of the shown run offer; they change nothing yet."""
 
     name: Literal["offer_templates"]
-
-    def teach(self, teaching: Teaching) -> None:
-        teaching.offer_templates()
 
 
 class TakeOffers(_Teach):
@@ -260,17 +255,11 @@ class TakeOffers(_Teach):
     index: int | None = None
     """Of the one; null for all that are offered."""
 
-    def teach(self, teaching: Teaching) -> None:
-        teaching.take_offers(self.index)
-
 
 class ForgetOffers(_Teach):
     """List no offered templates any more."""
 
     name: Literal["forget_offers"]
-
-    def teach(self, teaching: Teaching) -> None:
-        teaching.forget_offers()
 
 
 class SetRoomFace(_Teach):
@@ -291,9 +280,6 @@ class SetTarget(_Teach):
     name: Literal["set_target"]
     half_extents: Vector
     """Half width, depth and height, metres."""
-
-    def teach(self, teaching: Teaching) -> None:
-        teaching.set_target(self.half_extents)
 
 
 class SetTargetSide(_Teach):
@@ -316,17 +302,11 @@ class AddEntrance(_Teach):
     position: Vector | None = None
     """Metres; the middle of the room where none is given."""
 
-    def teach(self, teaching: Teaching) -> None:
-        teaching.add_entrance(self.position)
-
 
 class SuggestEntrances(_Teach):
     """Add the entrances at which the tracks of the shown run begin and end."""
 
     name: Literal["suggest_entrances"]
-
-    def teach(self, teaching: Teaching) -> None:
-        teaching.suggest_entrances()
 
 
 class SetEntrance(_Teach):
@@ -347,9 +327,6 @@ class RemoveEntrance(_Teach):
 
     name: Literal["remove_entrance"]
     index: int
-
-    def teach(self, teaching: Teaching) -> None:
-        teaching.remove_entrance(self.index)
 
 
 class DiscardTaught(_Teach):

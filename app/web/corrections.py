@@ -12,7 +12,7 @@ from fastapi import APIRouter, Response
 from pydantic import Field
 
 from app.errors import ApiError
-from app.messages import Model, Vector
+from app.messages import Model, Vector, filled
 from app.state.correcting import Correcting, Doubting
 from app.state.snapshot import Ghosts, Snapshot
 from app.web.dependencies import ERRORS, Bench, Owned, Work, download, file_name, opened
@@ -266,11 +266,9 @@ def corrections_of(snapshot: Snapshot, correcting: Correcting) -> Corrections:
         if one.kind == "checked":  # it asks nothing of a run
             outcome = Outcome(one.id, True)
         infos.append(
-            CorrectionInfo(
-                id=one.id, kind=one.kind, words=one.words, note=one.note,
-                time=one.time.isoformat(), first=first, last=last,
+            filled(
+                CorrectionInfo, one, time=one.time.isoformat(), first=first, last=last,
                 places=[(p.step, p.x, p.y, p.z) for p in one.places],
-                accuracy=one.accuracy, name=one.name,
                 met=None if outcome is None else outcome.met,
                 why="" if outcome is None else outcome.why,
                 tracks=[] if outcome is None else list(outcome.tracks),
@@ -300,12 +298,11 @@ def queue_of(snapshot: Snapshot, found: Queue, skipped: AbstractSet[str]) -> Dou
 
 
 def _doubt(one: ReviewItem, run: Run | None) -> DoubtInfo:
-    return DoubtInfo(
-        id=one.id, kind=one.kind, title=one.title, why=one.why, first=one.first, last=one.last,
-        tracks=list(one.tracks), places=[(p.step, p.x, p.y, p.z) for p in one.places],
-        doubt=one.probability, stake=one.stake,
+    return filled(
+        DoubtInfo, one, tracks=list(one.tracks),
+        places=[(p.step, p.x, p.y, p.z) for p in one.places], doubt=one.probability,
         alternatives=[
-            AlternativeInfo(words=a.words, probability=a.probability, as_it_is=number == 0)
+            filled(AlternativeInfo, a, as_it_is=number == 0)
             for number, a in enumerate(one.alternatives)
         ],
         sights=[] if one.tracks or run is None else _sights(one, run),

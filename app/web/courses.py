@@ -209,11 +209,10 @@ def _course(name: str, kind: Kind, life: _Life, window: Window) -> TrackCourse:
     values = kind.values(life)
     low = min(0.0, math.floor(float(np.nanmin(values, initial=0.0)) * 10.0) / 10.0)
     cameras = [camera.name for camera in life.run.sequence.cameras] if kind.by_camera else []
-    return TrackCourse(
+    return filled(
+        TrackCourse,
+        kind,
         name=name,
-        word=kind.word,
-        unit=kind.unit,
-        help=kind.help,
         low=low,
         high=kind.top if kind.top is not None else axis_end(values.ravel()),
         values=[_buckets(row, life.frames, window) for row in values],

@@ -8,7 +8,7 @@ from urllib.parse import urlencode
 
 from numpy import ndarray
 
-from app.messages import Model, Vector
+from app.messages import Model, Vector, filled
 from app.state.snapshot import RunPhase, Snapshot
 from app.web import corrections as corrections
 from app.web.corrections import CorrectionsState
@@ -324,16 +324,12 @@ def state_of(snapshot: Snapshot) -> State:
         session=snapshot.session,
         version=snapshot.version,
         sequence=_sequence_of(snapshot),
-        opening=None if snapshot.opening is None else OpeningInfo(**asdict(snapshot.opening)),
+        opening=None if snapshot.opening is None else filled(OpeningInfo, snapshot.opening),
         parameters={key: value_of(parameters, key) for key in PARAMETERS},
         changed=list(changed_values(parameters, snapshot.defaults)),
         shown=shown_keys(parameters),
         command=command_line(snapshot),
-        methods=MethodsInfo(
-            single_view=parameters.single_view,
-            fusion_method=parameters.fusion_method,
-            smoothing_method=parameters.smoothing_method,
-        ),
+        methods=filled(MethodsInfo, parameters),
         unfit={str(key): names for key, names in snapshot.unfit.items()},
         presets=list(snapshot.presets),
         preset=snapshot.preset,
@@ -399,10 +395,7 @@ def schema() -> Schema:
     return Schema(
         groups=[GroupInfo(name=name, help=text) for name, text in GROUPS.items()],
         topics=list(get_args(Topic)),
-        parameters=[
-            ParameterInfo(**{name: getattr(p, name) for name in ParameterInfo.model_fields})
-            for p in PARAMETERS.values()
-        ],
+        parameters=[filled(ParameterInfo, parameter) for parameter in PARAMETERS.values()],
         methods={key: list(choices) for key, choices in METHODS.items()},
         presets=PRESETS,
     )
@@ -412,13 +405,11 @@ def _sequence_of(snapshot: Snapshot) -> SequenceInfo | None:
     sequence = snapshot.sequence
     if sequence is None:
         return None
-    return SequenceInfo(
+    return filled(
+        SequenceInfo,
+        sequence,
         key=snapshot.sequence_key,
-        name=sequence.name,
         opened_as=snapshot.opened_as,
-        description=sequence.description,
-        fps=sequence.fps,
-        frames=sequence.frames,
         has_pictures=any(view.has_pictures for view in sequence.views),
         has_detections=any(view.detections is not None for view in sequence.views),
         has_truth=sequence.ground_truth is not None,
