@@ -16,7 +16,7 @@ from tyro.conf import (
     subcommand,
 )
 
-from app.command.typed import reader_of
+from app.command.typed import limited, reader_of
 from app.messages import Marks, VideoPart
 from tracker.library import KEEP
 
@@ -27,6 +27,10 @@ SequenceName = Annotated[
 SetValues = Annotated[
     UseAppendAction[tuple[str, ...]], arg(metavar="KEY=VALUE", help_behavior_hint="(repeatable)")
 ]
+
+FromZero = Annotated[int, limited(int, "a whole number from 0", 0), arg(metavar="INT")]
+FromOne = Annotated[int, limited(int, "a whole number from 1", 1), arg(metavar="INT")]
+Port = Annotated[int, limited(int, "0 (any that is free) to 65535", 0, 65535)]
 
 LibraryFile = Annotated[
     Path | None,
@@ -75,7 +79,7 @@ class OpenRun(OfLibrary):
     """Start the workbench with a run as it was."""
 
     run: Annotated[Positional[str], _RUN]
-    port: int = 8000
+    port: Port = 8000
     """Port to listen on."""
     open: bool = True
     """Open the page in a browser."""
@@ -332,11 +336,11 @@ class Batch(Where):
     """Named values to start from."""
     set: SetValues = ()
     """One parameter, as in --set fusion.survival_probability=0.98."""
-    seeds: Annotated[int, arg(metavar="INT")] = 1
+    seeds: FromOne = 1
     """Runs of each recording, with the seeds 0, 1, …"""
     library: LibraryFile = None
     """The file that the runs are kept in."""
-    keep: Annotated[int, arg(metavar="INT")] = KEEP
+    keep: FromOne = KEEP
     """Kept runs without star, name, note and tags that stay, the newest ones."""
     no_corrections: FlagCreatePairsOff[bool] = False
     """Do not obey what was put right by hand in the recordings."""
@@ -352,7 +356,7 @@ class Tune(Where, OfStudies):
         Positional[tuple[str, ...]],
         arg(metavar="RECORDING …", help="Built-in rooms, or folders.", help_behavior_hint=""),
     ]
-    minutes: float = 5.0
+    minutes: Annotated[float, limited(float, "a number above 0", 1e-9, 1e4)] = 5.0
     """How long it seeks."""
     set: SetValues = ()
     """One value where you are: what it finds is set against these values, and it tries them too."""
@@ -465,7 +469,7 @@ class OfferTemplates:
     """All of them do."""
     pictures: Annotated[Path | None, arg(metavar="FOLDER", help_behavior_hint="(optional)")] = None
     """A folder that gets a PNG of each box, to look at before anything is added."""
-    seed: int = 0
+    seed: FromZero = 0
     """Seed of the run."""
     json: FlagCreatePairsOff[bool] = False
     """Print everything as JSON."""

@@ -37,11 +37,13 @@ from app.command.arguments import (
     ExportCalibration,
     FormatName,
     Formats,
+    FromZero,
     Import,
     LibraryCommand,
     LibraryFile,
     LogFile,
     Parameters,
+    Port,
     Runs,
     SequenceName,
     Sequences,
@@ -51,8 +53,9 @@ from app.command.arguments import (
     Tune,
 )
 from app.command.terminal import say
-from app.command.typed import WrongValue, flag_of, registry
+from app.command.typed import WrongValue, flag_of, limited, registry
 from tracker import __version__
+from tracker.files.folders import MOST_GB
 from tracker.library import KEEP
 from tracker.parameters.catalogue import (
     DEFAULT_RULE,
@@ -125,7 +128,7 @@ class Serve:
     ] = DEFAULT_SEQUENCE
     host: str = "127.0.0.1"
     """Address to listen on. Anything but this machine's own lets others change what you see."""
-    port: int = 8000
+    port: Port = 8000
     """Port to listen on."""
     token: bool = True
     """Let in only whoever has the token of the printed link; $MULTIVIEW_PHD_TOKEN chooses one."""
@@ -138,12 +141,20 @@ class Serve:
     fetched one."""
     library: LibraryFile = None
     """The file that finished runs are kept in."""
-    keep: Annotated[int, arg(metavar="INT")] = KEEP
+    keep: FromZero = KEEP
     """Kept runs without star, name, note and tags that stay, the newest ones; 0 keeps none."""
-    memory: Annotated[float | None, arg(metavar="GB", help_behavior_hint="(optional)")] = None
+    memory: Annotated[
+        float | None,
+        limited(float, "0.0625 to 65536 GB", 0.0625, 65536.0),
+        arg(metavar="GB", help_behavior_hint="(optional)"),
+    ] = None
     """Memory for what is kept for speed, pictures and columns of runs; half of the machine, and
     no more than 1 GB, where it is not said."""
-    disk: Annotated[float | None, arg(metavar="GB", help_behavior_hint="(optional)")] = None
+    disk: Annotated[
+        float | None,
+        limited(float, f"0 to {MOST_GB} GB", 0.0, MOST_GB),
+        arg(metavar="GB", help_behavior_hint="(optional)"),
+    ] = None
     """Disk space for what cameras found in earlier runs, of which the least recently used goes
     first; $MULTIVIEW_PHD_CACHE_GB, or 2 GB, where it is not said. 0 keeps none."""
 
@@ -186,7 +197,7 @@ class Track:
     """Named values to start from."""
     set: SetValues = ()
     """One parameter, as in --set fusion.survival_probability=0.98; `parameters` lists the keys."""
-    seed: int = 0
+    seed: FromZero = 0
     """Seed of all randomness; the same seed gives the same tracks, but for the last digits on
     processors without fused multiply-add."""
     detector: Annotated[Path | None, arg(metavar="MODEL", help_behavior_hint="(optional)")] = None
@@ -202,7 +213,7 @@ class Track:
     """End with status 1 where a picture was missing; the tracks are written all the same."""
     library: LibraryFile = None
     """The file that finished runs are kept in."""
-    keep: Annotated[int, arg(metavar="INT")] = KEEP
+    keep: FromZero = KEEP
     """Kept runs without star, name, note and tags that stay, the newest ones; 0 keeps none."""
 
     def changes(self) -> dict[str, Any]:

@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Any
 from app.command import supervision
 from app.command.arguments import OpenRun
 from app.command.flags import Serve, parse, run
-from app.command.terminal import FAILURE, CommandError, check_data, check_keep, say
-from tracker.files.folders import MOST_GB, cache_bytes, library_file
+from app.command.terminal import FAILURE, CommandError, check_data, say
+from tracker.files.folders import cache_bytes, library_file
 from tracker.parameters.values import ParameterError
 
 if TYPE_CHECKING:
@@ -113,16 +113,7 @@ def _serve_bundle(command: Serve) -> int:
 def serve(command: Serve, run: int | Result | None = None) -> int:
     if run is None and command.sequence.lower().endswith(".zip"):
         return _serve_bundle(command)
-    if not 0 <= command.port <= 65535:
-        raise ParameterError(
-            "--port", f"expected 0 (any that is free) to 65535, got {command.port}"
-        )
     check_data(command.data)
-    check_keep(command.keep)
-    if command.memory is not None and not 0.0625 <= command.memory <= 65536.0:
-        raise ParameterError("--memory", f"expected 0.0625 to 65536 GB, got {command.memory:g}")
-    if command.disk is not None and not 0.0 <= command.disk <= MOST_GB:
-        raise ParameterError("--disk", f"expected 0 to {MOST_GB} GB, got {command.disk:g}")
     gc.disable()  # a seventh of the time: nothing that is imported ever goes
     from app.state.jobs import locate
     from app.web import server

@@ -385,10 +385,6 @@ def batch(command: Batch) -> int:
     """
     changes = {**preset_values(command.preset), **set_values(command.set)}
     with_values(RunParameters(), changes)  # wrong usage shows before any work
-    if command.seeds < 1:
-        raise ParameterError("--seeds", f"expected a whole number from 1, got {command.seeds}")
-    if command.keep < 1:
-        raise ParameterError("--keep", f"expected a whole number from 1, got {command.keep}")
     places = places_of(command.recordings)
     with (
         to_be_stopped() as stopped,
@@ -452,8 +448,6 @@ def tune(command: Tune) -> int:
     Raises:
         StudyError: If a recording cannot be read, or the study cannot go on.
     """
-    if not 0.0 < command.minutes <= 1e4:
-        raise ParameterError("--minutes", f"expected a number above 0, got {command.minutes:g}")
     if not command.recordings:
         raise ParameterError("RECORDING …", "expected at least one recording")
     changes = set_values(command.set)

@@ -8,7 +8,7 @@ from typing import Any
 
 from app.command.arguments import ListTemplates, OfferTemplates, RemoveTemplates, Templates
 from app.command.computing import compute
-from app.command.terminal import CommandError, check_seed, print_json, print_table, say
+from app.command.terminal import CommandError, print_json, print_table, say
 from tracker.review import template_suggestions
 from tracker.sequences import library
 from tracker.sequences.pictures.frames import FrameReader
@@ -54,7 +54,6 @@ def _row(number: int, one: Template) -> tuple[str, ...]:
 
 
 def _offer(action: OfferTemplates) -> None:
-    check_seed(action.seed)
     if action.add and action.add_all:
         raise CommandError("--add and --add-all: expected one of them")
     sequence = library.open_sequence(action.sequence)

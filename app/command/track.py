@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from app.command.computing import compute
 from app.command.flags import Track
-from app.command.terminal import FAILURE, Bar, CommandError, check_keep, check_seed, say
+from app.command.terminal import FAILURE, Bar, CommandError, say
 from tracker.files.folders import library_file
 from tracker.parameters import Stage
 from tracker.parameters.catalogue import METHODS, RunParameters
@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 def track(command: Track) -> int:
     changes = command.changes()
     with_values(RunParameters(), changes)  # wrong usage shows before any work
-    check_seed(command.seed)
-    check_keep(command.keep)
     output = command.output
     from tracker.export.exported_run import ExportedRun, Options
     from tracker.export.registry import format_of, save
