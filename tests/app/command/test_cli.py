@@ -331,7 +331,7 @@ def test_ctrl_c_inside_a_compiled_kernel(
         except SystemError as error:
             raise SystemError("update: result with an exception") from error
 
-    monkeypatch.setattr(cli, "_run", heard)
+    monkeypatch.setattr(cli, "run", heard)
     assert cli.main(["parameters"]) == 130
     assert capsys.readouterr().err == "multiview-phd: interrupted; nothing was written\n"
 
