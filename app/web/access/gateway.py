@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from viser.infra import WebsockMessageHandler
     from websockets.asyncio.client import ClientConnection
     from websockets.asyncio.server import ServerConnection
-    from websockets.http11 import Request, Response
+    from websockets import http11
 
 SECRET_HEADER = "X-Entrance"
 """Of the request to connect. A browser lets no page add a header to one."""
@@ -85,7 +85,9 @@ class Entrance:
             return await connect(f"ws://127.0.0.1:{self.port}", **options)
         return await unix_connect(self.path, "ws://127.0.0.1", **options)
 
-    def _admit(self, connection: ServerConnection, request: Request) -> Response | None:
+    def _admit(
+        self, connection: ServerConnection, request: http11.Request
+    ) -> http11.Response | None:
         told = request.headers.get_all(SECRET_HEADER)
         # as bytes, also those that are no text
         said = [words.encode(errors="surrogateescape") for words in told]
