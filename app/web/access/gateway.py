@@ -33,9 +33,9 @@ from app.errors import ApiError
 if TYPE_CHECKING:
     import viser
     from viser.infra import WebsockMessageHandler
+    from websockets import http11
     from websockets.asyncio.client import ClientConnection
     from websockets.asyncio.server import ServerConnection
-    from websockets import http11
 
 SECRET_HEADER = "X-Entrance"
 """Of the request to connect. A browser lets no page add a header to one."""
