@@ -13,7 +13,7 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
 
-from app.described import Described
+from app.messages import Described
 from tracker.corrections import CorrectionError
 from tracker.library.errors import LibraryError, NoSuchRun
 from tracker.parameters.catalogue import METHODS, PARAMETERS

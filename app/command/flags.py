@@ -11,6 +11,7 @@ import os
 import sys
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field, make_dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args, get_type_hints
 
@@ -24,23 +25,37 @@ from tyro.conf import (
     subcommand,
 )
 
-from app.command.arguments.corrections import Corrections, LogFile
-from app.command.arguments.detector import Detector
-from app.command.arguments.importing import (
+from app.command.arguments import (
     IMPORT_FLAGS,
     PAIRS,
+    Batch,
+    Benchmark,
+    Bundle,
     Check,
+    Corrections,
+    Detector,
     ExportCalibration,
+    FormatName,
     Formats,
+    FromZero,
     Import,
+    LibraryCommand,
+    LibraryFile,
+    LogFile,
+    Parameters,
+    Port,
+    Runs,
+    SequenceName,
+    Sequences,
+    SetValues,
+    Study,
+    Templates,
+    Tune,
 )
-from app.command.arguments.library import Bundle, FormatName, LibraryCommand, LibraryFile, Runs
-from app.command.arguments.listing import Benchmark, Parameters, Sequences
-from app.command.arguments.studies import Batch, Study, Tune
-from app.command.arguments.templates import Templates
 from app.command.terminal import say
-from app.command.typed import WrongValue, flag_of, registry
+from app.command.typed import WrongValue, flag_of, limited, registry
 from tracker import __version__
+from tracker.files.folders import MOST_GB
 from tracker.library import KEEP
 from tracker.parameters.catalogue import (
     DEFAULT_RULE,
@@ -113,7 +128,7 @@ class Serve:
     ] = DEFAULT_SEQUENCE
     host: str = "127.0.0.1"
     """Address to listen on. Anything but this machine's own lets others change what you see."""
-    port: int = 8000
+    port: Port = 8000
     """Port to listen on."""
     token: bool = True
     """Let in only whoever has the token of the printed link; $MULTIVIEW_PHD_TOKEN chooses one."""
@@ -126,12 +141,20 @@ class Serve:
     fetched one."""
     library: LibraryFile = None
     """The file that finished runs are kept in."""
-    keep: Annotated[int, arg(metavar="INT")] = KEEP
+    keep: FromZero = KEEP
     """Kept runs without star, name, note and tags that stay, the newest ones; 0 keeps none."""
-    memory: Annotated[float | None, arg(metavar="GB", help_behavior_hint="(optional)")] = None
+    memory: Annotated[
+        float | None,
+        limited(float, "0.0625 to 65536 GB", 0.0625, 65536.0),
+        arg(metavar="GB", help_behavior_hint="(optional)"),
+    ] = None
     """Memory for what is kept for speed, pictures and columns of runs; half of the machine, and
     no more than 1 GB, where it is not said."""
-    disk: Annotated[float | None, arg(metavar="GB", help_behavior_hint="(optional)")] = None
+    disk: Annotated[
+        float | None,
+        limited(float, f"0 to {MOST_GB} GB", 0.0, MOST_GB),
+        arg(metavar="GB", help_behavior_hint="(optional)"),
+    ] = None
     """Disk space for what cameras found in earlier runs, of which the least recently used goes
     first; $MULTIVIEW_PHD_CACHE_GB, or 2 GB, where it is not said. 0 keeps none."""
 
@@ -140,9 +163,7 @@ class Serve:
 class Track:
     """Track the people of a sequence and write their tracks, as CSV or in another form."""
 
-    sequence: Annotated[
-        Positional[str], arg(metavar="SEQUENCE", help="A built-in room's name or a folder.")
-    ]
+    sequence: SequenceName
     output: Annotated[Path, arg(aliases=["-o"])]
     """The file to write. It appears when it is complete."""
     format: FormatName = None
@@ -174,12 +195,9 @@ class Track:
         str | None, arg(metavar="|".join(PRESETS), help_behavior_hint="(default: robust)")
     ] = None
     """Named values to start from."""
-    set: Annotated[
-        UseAppendAction[tuple[str, ...]],
-        arg(metavar="KEY=VALUE", help_behavior_hint="(repeatable)"),
-    ] = ()
+    set: SetValues = ()
     """One parameter, as in --set fusion.survival_probability=0.98; `parameters` lists the keys."""
-    seed: int = 0
+    seed: FromZero = 0
     """Seed of all randomness; the same seed gives the same tracks, but for the last digits on
     processors without fused multiply-add."""
     detector: Annotated[Path | None, arg(metavar="MODEL", help_behavior_hint="(optional)")] = None
@@ -195,7 +213,7 @@ class Track:
     """End with status 1 where a picture was missing; the tracks are written all the same."""
     library: LibraryFile = None
     """The file that finished runs are kept in."""
-    keep: Annotated[int, arg(metavar="INT")] = KEEP
+    keep: FromZero = KEEP
     """Kept runs without star, name, note and tags that stay, the newest ones; 0 keeps none."""
 
     def changes(self) -> dict[str, Any]:
@@ -205,38 +223,22 @@ class Track:
             ParameterError: If the preset or a ``--set`` is not as it must be.
         """
         changes: dict[str, Any] = {**preset_values(self.preset), **set_values(self.set)}
-        for key, chosen in (
-            ("single_view", self.single_view),
-            ("fusion_method", self.fusion_method),
-            ("smoothing_method", self.smoothing_method),
-        ):
-            if chosen is not None:
-                changes[key] = chosen
-        for key in PARAMETERS:
-            group, name = key.split(".", 1)
-            value = getattr(getattr(self, group), name)
-            if value is not None:
-                changes[key] = value
-        return changes
+        given = {key: operator.attrgetter(key)(self) for key in (*METHODS, *PARAMETERS)}
+        return changes | {key: value for key, value in given.items() if value is not None}
 
 
 @dataclass
 class Detect:
     """Find people with a detection network (ONNX) and write the boxes of every camera as CSV."""
 
-    sequence: Annotated[
-        Positional[str], arg(metavar="SEQUENCE", help="A built-in room's name or a folder.")
-    ]
+    sequence: SequenceName
     output: Annotated[Path, arg(aliases=["-o"], metavar="FOLDER")]
     """Where `CAMERA.csv` is written for each camera, as `detections` of a sequence.toml."""
     model: Annotated[
         Path | None, arg(metavar="MODEL", help_behavior_hint="(default: the fetched one)")
     ] = None
     """An ONNX file; its layout is found out from the shapes of what it gives."""
-    set: Annotated[
-        UseAppendAction[tuple[str, ...]],
-        arg(metavar="KEY=VALUE", help_behavior_hint="(repeatable)"),
-    ] = ()
+    set: SetValues = ()
     """One parameter, as in --set onnx_detector.score_threshold=0.5; `parameters` lists the keys."""
 
 
@@ -244,9 +246,7 @@ class Detect:
 class Evaluate:
     """Score a track file against the truth, or, without one, estimate how well ids hold."""
 
-    sequence: Annotated[
-        Positional[str], arg(metavar="SEQUENCE", help="A built-in room's name or a folder.")
-    ]
+    sequence: SequenceName
     tracks: Annotated[
         Positional[Path | None],
         arg(
@@ -346,28 +346,38 @@ def _import_with_flags() -> Any:
     return with_flags
 
 
-Arguments = (
-    Serve
-    | Track
-    | Detect
-    | Detector
-    | Evaluate
-    | Benchmark
-    | Import
-    | Check
-    | Formats
-    | ExportCalibration
-    | Sequences
-    | Parameters
-    | Runs
-    | Bundle
-    | LibraryCommand
-    | Study
-    | Batch
-    | Tune
-    | Corrections
-    | Templates
-)
+COMMANDS: dict[str, tuple[Any, str]] = {
+    "serve": (Serve, "main:serve"),
+    "track": (Track, "track:track"),
+    "detect": (Detect, "detector:detect"),
+    "detector": (Detector, "detector:detector"),
+    "evaluate": (Evaluate, "evaluate:evaluate"),
+    "benchmark": (Benchmark, "listing:benchmark"),
+    "import": (Import, "importing:import_files"),
+    "check": (Check, "importing:check_sequence"),
+    "formats": (Formats, "importing:formats"),
+    "export-calibration": (ExportCalibration, "importing:export_calibration"),
+    "sequences": (Sequences, "listing:sequences"),
+    "parameters": (Parameters, "listing:parameters"),
+    "runs": (Runs, "runs:runs"),
+    "bundle": (Bundle, "runs:bundle"),
+    "library": (LibraryCommand, "runs:check"),
+    "study": (Study, "studies:study"),
+    "batch": (Batch, "studies:batch"),
+    "tune": (Tune, "studies:tune"),
+    "corrections": (Corrections, "correcting:corrections"),
+    "templates": (Templates, "templates:templates"),
+}
+"""Each command: its arguments, and the module and function that do it. The module is imported when
+the command is asked for, and the engine with it."""
+
+
+def run(command: Any) -> int:
+    """Do what a parsed command asks for; returns the exit status."""
+    place = next(place for kind, place in COMMANDS.values() if isinstance(command, kind))
+    module, _, name = place.partition(":")
+    status: int | None = getattr(import_module(f"app.command.{module}"), name)(command)
+    return status or 0
 
 
 def _with_current_flags(arguments: Iterable[str]) -> list[str]:
@@ -390,14 +400,12 @@ def _with_current_flags(arguments: Iterable[str]) -> list[str]:
     return found
 
 
-def parse(arguments: list[str] | None = None) -> Arguments:
+def parse(arguments: list[str] | None = None) -> Any:
     """The command and its arguments. Wrong usage ends the program with status 2.
 
     Raises:
         ParameterError: If there is no such command, or it is one that only a checkout has.
     """
-    track: Any = _track_with_flags()
-    # their settings come with the engine, which only who evaluates or imports has to wait for
     asked = _with_current_flags(sys.argv[1:] if arguments is None else arguments)
     if asked[:1] and asked[0] in ONLY_IN_A_CHECKOUT:
         raise ParameterError(
@@ -405,32 +413,15 @@ def parse(arguments: list[str] | None = None) -> Arguments:
             f"the program no longer has this command; run `{ONLY_IN_A_CHECKOUT[asked[0]]}` in a "
             "checkout",
         )
-    evaluate: Any = _evaluate_with_settings() if asked[:1] == ["evaluate"] else Evaluate
-    importing: Any = _import_with_flags() if asked[:1] == ["import"] else Import
     if asked[:1] == ["study"] and asked[1:2] and asked[1].endswith(".toml"):
         asked = ["study", "run", *asked[1:]]  # `study STUDY.toml` runs it
-    named: dict[str, Any] = {
-        "serve": Serve,
-        "track": track,
-        "detect": Detect,
-        "detector": Detector,
-        "evaluate": evaluate,
-        "benchmark": Benchmark,
-        "import": importing,
-        "check": Check,
-        "formats": Formats,
-        "export-calibration": ExportCalibration,
-        "sequences": Sequences,
-        "parameters": Parameters,
-        "runs": Runs,
-        "bundle": Bundle,
-        "library": LibraryCommand,
-        "study": Study,
-        "batch": Batch,
-        "tune": Tune,
-        "corrections": Corrections,
-        "templates": Templates,
-    }
+    named = {name: kind for name, (kind, _) in COMMANDS.items()}
+    named["track"] = _track_with_flags()
+    # their settings come with the engine, which only who evaluates or imports has to wait for
+    if asked[:1] == ["evaluate"]:
+        named["evaluate"] = _evaluate_with_settings()
+    if asked[:1] == ["import"]:
+        named["import"] = _import_with_flags()
     if asked[:1] == ["--version"]:
         sys.stdout.write(f"multiview-phd {__version__}\n")
         raise SystemExit(0)
@@ -441,7 +432,7 @@ def parse(arguments: list[str] | None = None) -> Arguments:
         operator.or_, (Annotated[kind, subcommand(name)] for name, kind in named.items())
     )
     try:
-        parsed: Arguments = tyro.cli(
+        return tyro.cli(
             commands,
             prog="multiview-phd",
             description="Track several people in 3D from calibrated cameras. --version says which "
@@ -451,7 +442,6 @@ def parse(arguments: list[str] | None = None) -> Arguments:
         )
     except WrongValue as wrong:
         raise wrong.of(asked) from None
-    return parsed
 
 
 def _actions(command: Any) -> list[str]:

@@ -1,11 +1,8 @@
-"""The command line: serve, track, evaluate, benchmark, import, check, …
-
-Status 0 for success, 1 for a failure told in one line on standard error, 2 for
-wrong usage, 130 after Ctrl-C. The engine is imported by the command that needs it.
-"""
+"""How the C library's allocator treats large arrays, where it can be told."""
 
 from __future__ import annotations
 
+import ctypes
 import errno
 import gc
 import os
@@ -18,28 +15,37 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from app.command import supervision
-from app.command.allocator import return_large_arrays
-from app.command.arguments.corrections import Corrections
-from app.command.arguments.detector import Detector
-from app.command.arguments.importing import Check, ExportCalibration, Formats, Import
-from app.command.arguments.library import Bundle, LibraryCommand, OpenRun, Runs
-from app.command.arguments.listing import Benchmark, Parameters, Sequences
-from app.command.arguments.studies import Batch, Study, Tune
-from app.command.arguments.templates import Templates
-from app.command.flags import (
-    Arguments,
-    Detect,
-    Evaluate,
-    Serve,
-    Track,
-    parse,
-)
-from app.command.terminal import FAILURE, CommandError, check_data, check_keep, say
-from tracker.files.folders import MOST_GB, cache_bytes, library_file
+from app.command.arguments import OpenRun
+from app.command.flags import Serve, parse, run
+from app.command.terminal import FAILURE, CommandError, check_data, say
+from tracker.files.folders import cache_bytes, library_file
 from tracker.parameters.values import ParameterError
 
 if TYPE_CHECKING:
     from tracker.library.records import Result
+
+_TRIM_THRESHOLD, _MMAP_THRESHOLD = -1, -3
+"""Parameters of glibc's ``mallopt``, as ``malloc.h`` numbers them."""
+
+LARGE = 1 << 20
+"""Bytes from which an array has pages of its own, which are the system's again once it is freed."""
+
+
+def return_large_arrays() -> None:
+    """Let memory that large arrays had go back to the system.
+
+    glibc raises its threshold to the largest array that was freed, up to 32 MB: from then on such
+    arrays lie on the heap, where anything that is allocated behind them keeps their memory. After
+    a long run that is as much as the run itself. A threshold that is set stays. Elsewhere nothing
+    is done.
+    """
+    if sys.platform != "linux":
+        return
+    mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
+    if mallopt is not None:
+        mallopt(_MMAP_THRESHOLD, LARGE)
+        mallopt(_TRIM_THRESHOLD, LARGE)
+
 
 USAGE, INTERRUPTED = 2, 130
 
@@ -53,7 +59,7 @@ def main(arguments: list[str] | None = None) -> int:
         return supervision.keep_up(lambda: main(sys.argv[1:]))
     return_large_arrays()
     try:
-        status = _run(parse(arguments))
+        status = run(parse(arguments))
         sys.stdout.flush()  # a pipe that is closed raises here, where it is caught, not at exit
         return status
     except ParameterError as error:
@@ -70,77 +76,6 @@ def main(arguments: list[str] | None = None) -> int:
             raise
         say(_sentence(error))
         return FAILURE
-
-
-def _run(command: Arguments) -> int:
-    match command:
-        case Serve():
-            return _serve(command)
-        case Track():
-            from app.command.commands.track import track
-
-            return track(command)
-        case Detect():
-            from app.command.commands.detect import detect
-
-            detect(command)
-        case Detector():
-            from app.command.commands.detector import detector
-
-            detector(command)
-        case Evaluate():
-            from app.command.commands.evaluate import evaluate
-
-            evaluate(command)
-        case Benchmark():
-            from app.command.commands.listing import benchmark
-
-            return benchmark(command)
-        case Import() | Check() | Formats() | ExportCalibration():
-            from app.command.commands.importing import run
-
-            return run(command)
-        case Sequences():
-            from app.command.commands.listing import sequences
-
-            sequences(command)
-        case Parameters():
-            from app.command.commands.listing import parameters
-
-            parameters(command)
-        case Runs():
-            from app.command.commands.runs import runs
-
-            return runs(command, _serve_run)
-        case Bundle():
-            from app.command.commands.runs import bundle
-
-            bundle(command)
-        case LibraryCommand():
-            from app.command.commands.runs import check
-
-            return check(command)
-        case Study():
-            from app.command.commands.studies import study
-
-            return study(command)
-        case Batch():
-            from app.command.commands.batch import batch
-
-            return batch(command)
-        case Tune():
-            from app.command.commands.tune import tune
-
-            return tune(command)
-        case Corrections():
-            from app.command.commands.correcting import corrections
-
-            return corrections(command)
-        case Templates():
-            from app.command.commands.templates import templates
-
-            templates(command)
-    return 0
 
 
 def _is_interruption(error: BaseException | None) -> bool:
@@ -162,9 +97,9 @@ def _sentence(error: BaseException) -> str:
 # serve
 
 
-def _serve_run(command: OpenRun, result: Result) -> int:
-    serve = Serve(result.place, port=command.port, open=command.open, library=command.library)
-    return _serve(serve, result.run.id)
+def serve_run(command: OpenRun, result: Result) -> int:
+    asked = Serve(result.place, port=command.port, open=command.open, library=command.library)
+    return serve(asked, result.run.id)
 
 
 def _serve_bundle(command: Serve) -> int:
@@ -172,27 +107,19 @@ def _serve_bundle(command: Serve) -> int:
 
     with tempfile.TemporaryDirectory(prefix="multiview-phd-bundle-") as folder:
         result = unpack_bundle(Path(command.sequence), Path(folder))
-        return _serve(replace(command, sequence=result.place, keep=0), result)
+        return serve(replace(command, sequence=result.place, keep=0), result)
 
 
-def _serve(command: Serve, run: int | Result | None = None) -> int:
+def serve(command: Serve, run: int | Result | None = None) -> int:
     if run is None and command.sequence.lower().endswith(".zip"):
         return _serve_bundle(command)
-    if not 0 <= command.port <= 65535:
-        raise ParameterError(
-            "--port", f"expected 0 (any that is free) to 65535, got {command.port}"
-        )
     check_data(command.data)
-    check_keep(command.keep)
-    if command.memory is not None and not 0.0625 <= command.memory <= 65536.0:
-        raise ParameterError("--memory", f"expected 0.0625 to 65536 GB, got {command.memory:g}")
-    if command.disk is not None and not 0.0 <= command.disk <= MOST_GB:
-        raise ParameterError("--disk", f"expected 0 to {MOST_GB} GB, got {command.disk:g}")
     gc.disable()  # a seventh of the time: nothing that is imported ever goes
-    from app.state.workers.opening import locate
+    from app.state.jobs import locate
     from app.web import server
     from app.web.access.security import is_loopback
     from app.web.access.tokens import PARAMETER, Keys, new_token, own_token
+    from app.web.dependencies import Settings
     from tracker.library.records import Result
     from tracker.sequences import library
     from tracker.sequences.built_in import BUILT_IN
@@ -242,7 +169,7 @@ def _serve(command: Serve, run: int | Result | None = None) -> int:
             threading.Thread(target=webbrowser.open, args=(opened,), daemon=True).start()
 
     app = server.create_app(
-        server.Settings(
+        Settings(
             host=command.host,
             keys=keys,
             sequence=command.sequence,

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 from tracker.files.text import visible
-from tracker.parameters.values import ParameterError
 
 FAILURE = 1
 """The status of a command that could not do what was asked, or found what must not be."""
@@ -109,13 +108,3 @@ def print_json(value: Any) -> None:
     if not text.isprintable():
         text = json.dumps(value, allow_nan=False)
     sys.stdout.write(text + "\n")
-
-
-def check_keep(keep: int) -> None:
-    if keep < 0:
-        raise ParameterError("--keep", f"expected a whole number from 0, got {keep}")
-
-
-def check_seed(seed: int, flag: str = "--seed") -> None:
-    if seed < 0:
-        raise ParameterError(flag, f"expected a whole number from 0, got {seed}")

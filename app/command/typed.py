@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import re
 import types
@@ -29,9 +30,10 @@ class WrongValue(Exception):
     """A text that is not the value that its flag expects; no ``ValueError``, which the parser would
     put into words of its own."""
 
-    def __init__(self, expected: str, found: str, near: str = "") -> None:
+    def __init__(self, expected: str, found: str, near: str = "", shown: str = "") -> None:
         super().__init__(expected, found)
         self.expected, self.found, self.near = expected, found, near
+        self.shown = shown or repr(found)
 
     def of(self, arguments: Sequence[str]) -> ParameterError:
         """Return the error of the flag that the text was given to, or of the command where it
@@ -43,7 +45,7 @@ class WrongValue(Exception):
             at = max(arguments.index(self.found) - 1, 0)
         flag = "" if at is None else arguments[at].partition("=")[0]
         name = flag if flag.startswith("-") else arguments[0]
-        return ParameterError(name, f"expected {self.expected}, got {self.found!r}{self.near}")
+        return ParameterError(name, f"expected {self.expected}, got {self.shown}{self.near}")
 
 
 def registry() -> ConstructorRegistry:
@@ -97,9 +99,32 @@ def reader_of(model: type[BaseModel], name: str) -> PrimitiveConstructorSpec[Any
     return replace(spec, instance_from_str=read)
 
 
+def limited(
+    kind: type[int] | type[float], expected: str, least: float, most: float = math.inf
+) -> PrimitiveConstructorSpec[Any]:
+    """Return what reads the text of a flag as a number within limits, which ``expected`` names."""
+    spec = _spec(kind.__name__.upper(), _number(kind), lambda value: type(value) is kind)
+
+    def read(words: Sequence[str]) -> Any:
+        number = spec.instance_from_str([*words])
+        if not least <= number <= most:
+            raise WrongValue(
+                expected, words[0], shown=f"{number:g}" if kind is float else str(number)
+            )
+        return number
+
+    return replace(spec, instance_from_str=read)
+
+
+@functools.cache
+def _properties(model: type[BaseModel]) -> dict[str, Any]:
+    properties: dict[str, Any] = model.model_json_schema()["properties"]
+    return properties
+
+
 def _schema(model: type[BaseModel], name: str) -> dict[str, Any]:
     """What is said of a field, and of the first thing that it can be."""
-    own: dict[str, Any] = model.model_json_schema()["properties"][name]
+    own: dict[str, Any] = _properties(model)[name]
     return {"x-ui": {"symbol": "", "unit": ""}, **own, **own.get("anyOf", [{}])[0]}
 
 

@@ -50,23 +50,10 @@ def mass_radius(mass: float, dimension: int = 3) -> float:
 
 
 def quaternions(rotations: Float[ndarray, "N 3 3"]) -> Float[ndarray, "N 4"]:
-    """Unit quaternions w, x, y, z of proper rotation matrices.
+    """Unit quaternions w, x, y, z of proper rotation matrices."""
+    from scipy.spatial.transform import Rotation  # once the 3D view is there
 
-    Takes the largest of the four components from the diagonal and the others
-    from it, which keeps the digits whatever the angle.
-    """
-    r = np.asarray(rotations, dtype=float)
-    trace = np.einsum("nii->n", r)
-    diagonal = np.einsum("nii->ni", r)
-    squares = np.concatenate([trace[:, None], 2.0 * diagonal - trace[:, None]], axis=1) + 1.0
-    products = np.empty((len(r), 4, 4))  # 4 q qᵀ
-    products[:, range(4), range(4)] = squares
-    for i, j, k in ((1, 2, 3), (2, 3, 1), (3, 1, 2)):
-        a, b, c = i - 1, j - 1, k - 1
-        products[:, 0, i] = products[:, i, 0] = r[:, c, b] - r[:, b, c]
-        products[:, i, j] = products[:, j, i] = r[:, a, b] + r[:, b, a]
-    rows = products[np.arange(len(r)), np.argmax(squares, axis=1)]
-    return np.asarray(rows / np.linalg.norm(rows, axis=1, keepdims=True))
+    return np.asarray(Rotation.from_matrix(rotations).as_quat(scalar_first=True))
 
 
 def ellipsoids(
@@ -101,59 +88,20 @@ def surfaces(
         wxyzs: Unit quaternions of their turns.
         axes: Half axes.
     """
-    ball = icosphere(1)[0]
-    w, x, y, z = (part[:, None] for part in wxyzs.T)
-    local = ball[None] * axes[:, None]
-    imaginary = np.concatenate([x, y, z], axis=1)[:, None]
-    # v + 2 w (u × v) + 2 u × (u × v), the turn of v by the quaternion (w, u)
-    turned = np.cross(imaginary, local)
-    placed = local + 2.0 * w[..., None] * turned + 2.0 * np.cross(imaginary, turned)
-    return np.asarray(means[:, None] + placed).reshape(-1, 3)
+    from scipy.spatial.transform import Rotation
+
+    turns = Rotation.from_quat(wxyzs, scalar_first=True).as_matrix()
+    local = icosphere(1)[0][None] * axes[:, None]
+    return np.asarray(means[:, None] + np.einsum("nij,nkj->nki", turns, local)).reshape(-1, 3)
 
 
 @cache
 def icosphere(subdivisions: int = 2) -> tuple[Float[ndarray, "V 3"], Int[ndarray, "F 3"]]:
     """Vertices on the unit sphere and triangles, from a divided icosahedron."""
-    golden = (1.0 + 5.0**0.5) / 2.0
-    vertices = [
-        *((s, t * golden, 0.0) for t in (1, -1) for s in (-1, 1)),
-        *((0.0, s, t * golden) for t in (1, -1) for s in (-1, 1)),
-        *((t * golden, 0.0, s) for t in (1, -1) for s in (-1, 1)),
-    ]
-    points = np.array(vertices) / np.linalg.norm(vertices[0])
-    edge = np.linalg.norm(points[:, None] - points[None], axis=2)
-    near = (edge > 0.0) & (edge < edge[edge > 0.0].min() * 1.01)
-    triangles = np.array(
-        [
-            (a, b, c)
-            for a in range(12)
-            for b in range(a + 1, 12)
-            for c in range(b + 1, 12)
-            if near[a, b] and near[b, c] and near[a, c]
-        ]
-    )
-    for _ in range(subdivisions):
-        corners = points[triangles]
-        middles = corners + np.roll(corners, -1, axis=1)
-        middles /= np.linalg.norm(middles, axis=2, keepdims=True)
-        stacked = np.concatenate([points, middles.reshape(-1, 3)])
-        _, first, inverse = np.unique(
-            stacked.round(9), axis=0, return_index=True, return_inverse=True
-        )
-        points, inverse = stacked[first], inverse.reshape(-1)
-        middle = inverse[len(inverse) - middles.size // 3 :].reshape(-1, 3)
-        a, b, c = inverse[triangles].T
-        ab, bc, ca = middle.T
-        triangles = np.concatenate(
-            [np.stack(t, axis=1) for t in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))]
-        )
-    normals = np.cross(
-        points[triangles[:, 1]] - points[triangles[:, 0]],
-        points[triangles[:, 2]] - points[triangles[:, 0]],
-    )
-    inward = np.einsum("fi,fi->f", normals, points[triangles].mean(axis=1)) < 0.0
-    triangles[inward] = triangles[inward][:, ::-1]
-    return points, triangles
+    import trimesh  # a third of a second, once the page is there
+
+    ball = trimesh.creation.icosphere(subdivisions)
+    return np.asarray(ball.vertices), np.asarray(ball.faces)
 
 
 def unit_cube() -> tuple[Float[ndarray, "8 3"], Int[ndarray, "12 3"]]:

@@ -15,13 +15,11 @@ import viser
 from jaxtyping import Float, UInt8
 
 from app.colours import PALETTES, Theme
-from app.scene import framing, geometry
-from app.scene.framing import Pose
-from app.scene.room.standing import FrustumNodes, RoomNodes, entrance_edges, pose_through
-from app.scene.tracks.ghosts import GhostNodes
-from app.scene.tracks.people import PeopleNodes, room_taken
-from app.scene.tracks.reference import ReferenceNodes
-from app.scene.views import Views
+from app.scene import geometry, views
+from app.scene.people import PeopleNodes, room_taken
+from app.scene.reference import GhostNodes, ReferenceNodes
+from app.scene.standing import FrustumNodes, RoomNodes, entrance_edges, pose_through
+from app.scene.views import Pose, Views
 from app.scene.worker import Follower
 from app.state import opening_step
 from app.state.snapshot import Change, Snapshot, View
@@ -221,7 +219,7 @@ class Scene(Follower):
         rims = self._frusta.corners(near)
         seen = [corners, rims, entrance_edges(room), self._people.points, self._walked]
         pictures = self._frusta.pictures(near)
-        return framing.overview(np.concatenate(seen), eyes[near], centre, aspect, pictures=pictures)
+        return views.overview(np.concatenate(seen), eyes[near], centre, aspect, pictures=pictures)
 
     def _frame(self, snapshot: Snapshot, run: Run | None, *, another: bool) -> None:
         """Place anew who has not moved, once there is more to be seen than there was.
@@ -259,7 +257,7 @@ class Scene(Follower):
         if snapshot.view is None:
             return None
         if snapshot.view == "top":
-            return partial(framing.from_above, _margin_around(room))
+            return partial(views.from_above, _margin_around(room))
         view = self._frusta.view(snapshot.view)
         middle = (room.minimum + room.maximum)[None] / 2.0
         distance = max(0.5, float(view.camera.to_camera(middle)[0, 2]))

@@ -1,4 +1,4 @@
-"""What was put right by hand in the open recording, kept as a log."""
+"""Corrections of the open recording, stored as a log, and the moments of its run under review."""
 
 from __future__ import annotations
 
@@ -8,11 +8,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from app.state.edits import Edits
-from app.state.snapshot import Change
+from app.state.snapshot import Change, Snapshot
 from app.state.workbench import Workbench
 from tracker.corrections import Correction, CorrectionError
 from tracker.corrections.consistency import find_repeated, refuse_contradiction
 from tracker.corrections.log import Log, open_log, own_place, remark_on, write_log, writing_place
+from tracker.review.queue import Queue, ReviewItem, queue
 from tracker.sequences.sequence import Sequence as Recording
 
 _MEND = "Mend the file, or move it away; it is read again then."
@@ -177,3 +178,55 @@ class Correcting:
         self._complain()
         if remark := remark_on(recording.folder):
             self._workbench.notify("info", remark)
+
+
+_NOTHING = Queue((), 0, "there is no run yet")
+
+_MOST = 1000
+"""Places that are known of queues before."""
+
+
+class Doubting:
+    """Keeps the queue of the run that was asked for last, and what queues before it had."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._made: tuple[tuple[str, int, bool, tuple[str, ...]], Queue] | None = None
+        self._of = ""
+        self._told: dict[str, ReviewItem] = {}
+
+    def of(self, snapshot: Snapshot) -> Queue:
+        """The doubtful places of what is shown, as far as it is computed."""
+        run = snapshot.run
+        if run is None:
+            return _NOTHING
+        complete = run.complete and snapshot.run_state.state != "computing"
+        # what is answered is known at once, whether a run that obeys it is there or not
+        said = snapshot.corrections
+        key = (run.key, run.done // 50, complete, tuple(one.id for one in said))
+        with self._lock:
+            if self._made is None or self._made[0] != key:
+                self._made = key, queue(run, corrections=said)
+                self._remember(snapshot.sequence_key, self._made[1])
+            return self._made[1]
+
+    def _remember(self, sequence: str, made: Queue) -> None:
+        if sequence != self._of:
+            self._of, self._told = sequence, {}
+        for one in made.items:
+            self._told.pop(one.id, None)
+            self._told[one.id] = one
+        for old in list(self._told)[:-_MOST]:
+            del self._told[old]
+
+    def find(self, snapshot: Snapshot, identity: str) -> ReviewItem | None:
+        """One of them; None where it is not there any more."""
+        return next((one for one in self.of(snapshot).items if one.id == identity), None)
+
+    def told(self, snapshot: Snapshot, identity: str) -> ReviewItem | None:
+        """One of them, or of a run before: what somebody says of steps and places who still has
+        it on the page is as true of the run that came meanwhile."""
+        found = self.find(snapshot, identity)
+        with self._lock:
+            known = self._told if self._of == snapshot.sequence_key else {}
+            return found or known.get(identity)

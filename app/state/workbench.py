@@ -1,28 +1,36 @@
 """The one store: sequence, parameters, playhead, selection, layers and the current run.
 
-Whoever changes something calls a method here; whoever shows something subscribes
-and reads a :class:`~app.state.snapshot.Snapshot`.
+A snapshot is replaced whole, by one at a time. Whoever changes something calls a method here;
+whoever shows something subscribes and reads a :class:`~app.state.snapshot.Snapshot`. Two kinds of
+news: a *change* says that a part of the state is another now (read it again), an *event* is a
+passing request that leaves no trace in the state.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import threading
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import replace
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Literal
 
 from app.colours import Theme
-from app.state.scores import Scored
-from app.state.shown_run import ShownRun
+from app.state.scores import Scored, Scores
 from app.state.snapshot import (
     CLAMPED_ORIGIN,
     LAYERS,
     PRESET_ORIGIN,
+    Change,
     Command,
+    Event,
     Ghosts,
     Level,
     Notice,
+    Opening,
     Presets,
+    RunState,
+    Snapshot,
     StudyNews,
     Task,
     Trail,
@@ -39,16 +47,257 @@ from tracker.parameters.values import (
     with_values,
 )
 from tracker.review.template_suggestions import Suggestion
-from tracker.runs.pipeline import Run
+from tracker.runs.pipeline import Progress, Run
+from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 
 
-class Workbench(ShownRun):
-    """Thread-safe; what a person does is here, what is reported of runs in its base."""
+class Workbench:
+    """A snapshot that is replaced under a lock, and those who are told of it. Thread-safe."""
 
     def __init__(self) -> None:
-        super().__init__()
+        self._lock = threading.RLock()
+        self._snapshot = Snapshot()
+        self._pending: list[Change] = []
+        self._subscribers: list[Callable[[Change], None]] = []
+        self._listeners: list[Callable[[Event], None]] = []
+        self._last_good: Run | None = None
         self._running: list[StudyNews] = []
+
+    def snapshot(self) -> Snapshot:
+        """The state now."""
+        return self._snapshot
+
+    def subscribe(self, callback: Callable[[Change], None]) -> Callable[[], None]:
+        """Be told of changes, from the thread that makes them: the callback must return fast.
+
+        Returns:
+            A function that ends the subscription.
+        """
+        return self._register(self._subscribers, callback)
+
+    def subscribe_events(self, callback: Callable[[Event], None]) -> Callable[[], None]:
+        """Be told of events, from the thread that makes them: the callback must return fast."""
+        return self._register(self._listeners, callback)
+
+    def _register(self, registry: list[Any], callback: Any) -> Callable[[], None]:
+        with self._lock:
+            registry.append(callback)
+
+        def end() -> None:
+            with self._lock:
+                if callback in registry:
+                    registry.remove(callback)
+
+        return end
+
+    @contextmanager
+    def _edit(self) -> Iterator[Snapshot]:
+        """Hold the lock while the state is changed, and tell of it when the lock is free again.
+
+        A subscriber may hold a lock of its own and come back here from another
+        thread; telling under our lock would let the two wait for each other.
+        """
+        pending: list[Change] = []
+        with self._lock:
+            self._pending = pending
+            yield self._snapshot
+            subscribers = list(self._subscribers)
+        for change in pending:
+            for callback in subscribers:
+                callback(change)
+
+    def _put(self, change: Change, **values: Any) -> None:
+        self._snapshot = replace(self._snapshot, version=self._snapshot.version + 1, **values)
+        self._pending.append(change)
+
+    def _set(self, change: Change, **values: Any) -> None:
+        """Put values, where one of them is another than it was."""
+        with self._edit() as now:
+            if any(getattr(now, name) != value for name, value in values.items()):
+                self._put(change, **values)
+
+    def _tell(self, event: Event) -> None:
+        with self._lock:
+            listeners = list(self._listeners)
+        for callback in listeners:
+            callback(event)
+
+    # what those who open, compute and score report
+
+    def set_opening(self, opening: Opening | None) -> None:
+        """How far the opening of a sequence is; None: it is over."""
+        self._set("opening", opening=opening)
+
+    def open(
+        self,
+        sequence: Sequence,
+        key: str,
+        reader: FrameReader,
+        parameters: RunParameters,
+        opened_as: str = "",
+        corrections: tuple[Correction, ...] = (),
+        chosen: RunParameters | None = None,
+    ) -> FrameReader | None:
+        """Show another sequence, from its first step; the reader of the one before, to be closed.
+
+        Args:
+            sequence: It has been read and checked.
+            key: Another for every content.
+            reader: Its pictures.
+            parameters: Its default parameters.
+            opened_as: The name or folder that opens it again; its own name where none is given.
+            corrections: Those of its log.
+            chosen: What its parameters begin with; its defaults, where none are given.
+        """
+        with self._edit() as now:
+            before = now.reader
+            self._last_good = None
+            self._put(
+                "sequence",
+                sequence=sequence,
+                saved=sequence,
+                editing_room=False,
+                opened_as=opened_as or sequence.name,
+                sequence_key=key,
+                reader=reader,
+                opening=None,
+                parameters=chosen or parameters,
+                defaults=parameters,
+                corrections=corrections,
+                parameters_origin="",
+                playhead=0,
+                playhead_origin="",
+                sought=False,
+                selection=None,
+                view=None,
+                run=None,
+                run_state=RunState(total=sequence.frames),
+                scores=Scores(),
+                offers=None,
+            )
+            return before
+
+    def run_begins(self, key: str, message: str = "") -> None:
+        """The parameters ask for the run with this key: from now on only its news count.
+
+        Args:
+            key: The run's.
+            message: What it waits for, where it cannot begin at once.
+        """
+        with self._edit() as now:
+            total = now.sequence.frames if now.sequence is not None else 0
+            state = RunState(key=key, state="computing", total=total, message=message)
+            self._put("run", run_state=state)
+
+    def run_waits(self, key: str, message: str) -> None:
+        """The run with this key comes no further for now, and why: it has no speed meanwhile."""
+        with self._edit() as now:
+            if key == now.run_state.key and message != now.run_state.message:
+                waits = replace(
+                    now.run_state, message=message, steps_per_second=0.0, seconds_left=None
+                )
+                self._put("progress", run_state=waits)
+
+    def run_progresses(self, run: Run, progress: Progress) -> None:
+        """A run has new steps; from its first step on it is the one that is shown."""
+        with self._edit() as now:
+            if run.key != now.run_state.key:  # superseded
+                return
+            state = replace(
+                now.run_state,
+                done=progress.done,
+                total=progress.total,
+                steps_per_second=progress.steps_per_second,
+                seconds_left=progress.seconds_left,
+                message=progress.stage.replace("_", " "),
+            )
+            if now.run is not run and (progress.done or now.run is None):
+                self._put("run", run=run, run_state=state)
+            else:
+                self._put("progress", run_state=state)
+
+    def run_ends(
+        self,
+        key: str,
+        phase: Literal["done", "cancelled", "failed"],
+        error: str | None = None,
+        warnings: Iterable[str] = (),
+    ) -> None:
+        """The run with this key is over; after a failure the last good one is shown again.
+
+        Where none was finished yet, what was shown stays: an unfinished run says more than none.
+
+        Args:
+            key: The run's.
+            phase: How it ended.
+            error: Why it failed, in one sentence.
+            warnings: What its result lacks, a sentence each.
+        """
+        with self._edit() as now:
+            if key != now.run_state.key:  # superseded
+                return
+            run = now.run
+            if phase == "failed":
+                run = self._last_good or run
+            elif phase == "done":
+                self._last_good = run
+            state = replace(
+                now.run_state,
+                state=phase,
+                seconds_left=None,
+                message="",
+                error=error,
+                warnings=tuple(warnings),
+            )
+            self._put("run", run=run, run_state=state)
+
+    def show_instead(self, run: Run) -> None:
+        """Show a run that is done in the place of the one that is asked for."""
+        with self._edit() as now:
+            if now.sequence is run.sequence:
+                self._last_good = run
+                self._put("run", run=run)
+
+    def show_kept(
+        self, run: Run, number: int, stands_for: str = "", warnings: Iterable[str] = ()
+    ) -> None:
+        """Show a run of the library with its parameters, in one change.
+
+        Args:
+            run: Its tracks; of the open recording.
+            number: Its number in the library.
+            stands_for: The key that a computation with its values would have, if another.
+            warnings: What of it cannot be shown, a sentence each.
+        """
+        with self._edit() as now:
+            if now.sequence is None or run.sequence is not now.sequence:
+                return
+            state = RunState(
+                key=run.key,
+                state="done",
+                done=run.done,
+                total=now.sequence.frames,
+                kept=number,
+                stands_for=stands_for,
+                warnings=tuple(warnings),
+            )
+            self._last_good = run
+            self._put("run", run=run, run_state=state, parameters=run.parameters)
+            self._pending.append("parameters")
+
+    def scored(self, scored: Scored) -> None:
+        """A run was scored against the truth."""
+        with self._edit() as now:
+            if now.sequence is None or scored.sequence.views is not now.sequence.views:
+                return
+            pinned = now.scores.pinned
+            if now.run is not None and scored.key == now.run.key:
+                self._put("evaluation", scores=now.scores.add(scored))
+            elif pinned is not None and scored.key == pinned.key:
+                self._put("evaluation", scores=now.scores.pin(scored))
+
+    # what a person does
 
     def set_parameters(self, changes: Mapping[str, Any], origin: str) -> RunParameters:
         """Change some values by key, all or none.
@@ -129,9 +378,7 @@ class Workbench(ShownRun):
 
     def select(self, target: int | None) -> None:
         """Select a track by its id, or none."""
-        with self._edit() as now:
-            if target != now.selection:
-                self._put("selection", selection=target)
+        self._set("selection", selection=target)
 
     @property
     def layers(self) -> dict[str, bool]:
@@ -208,9 +455,7 @@ class Workbench(ShownRun):
 
     def set_flies(self, flies: bool) -> None:
         """Have changes of the 3D view animated, or not (reduced motion)."""
-        with self._edit() as now:
-            if flies != now.flies:
-                self._put("view", flies=flies)
+        self._set("view", flies=flies)
 
     def teach(
         self,
@@ -269,9 +514,7 @@ class Workbench(ShownRun):
 
     def show_edits(self, undo: str | None, redo: str | None) -> None:
         """Show what would be undone and redone; None for nothing."""
-        with self._edit() as now:
-            if (undo, redo) != (now.undo_words, now.redo_words):
-                self._put("edits", undo_words=undo, redo_words=redo)
+        self._set("edits", undo_words=undo, redo_words=redo)
 
     def show_task(self, kind: str, task: Task | None) -> None:
         """Show how far some work in the background is, in place of what was shown of its kind.
@@ -293,9 +536,7 @@ class Workbench(ShownRun):
 
     def edit_room(self, on: bool) -> None:
         """Have the 3D view with handles on the room, or without."""
-        with self._edit() as now:
-            if on != now.editing_room:
-                self._put("editing", editing_room=on)
+        self._set("editing", editing_room=on)
 
     def show_ghosts(self, ghosts: Ghosts | None) -> None:
         """Have the 3D view show how tracks would be, or no more."""
@@ -318,15 +559,11 @@ class Workbench(ShownRun):
 
     def show_fetching(self, percentage: int | None) -> None:
         """Show how much of a detection network is fetched; None while none is being fetched."""
-        with self._edit() as now:
-            if percentage != now.fetching:
-                self._put("fetching", fetching=percentage)
+        self._set("fetching", fetching=percentage)
 
     def set_theme(self, theme: Theme) -> None:
         """Have the 3D view dark or light."""
-        with self._edit() as now:
-            if theme != now.theme:
-                self._put("theme", theme=theme)
+        self._set("theme", theme=theme)
 
     def command(self, name: str) -> None:
         """Relay a key that was pressed inside the 3D view to the pages."""

@@ -1,8 +1,4 @@
-"""The WebSocket to the pages: what has changed, newest first and nothing twice.
-
-Each page has a set of what it has not been told yet. Whoever is slow is told
-less often and then the newest; nothing piles up.
-"""
+"""What a page asks for."""
 
 from __future__ import annotations
 
@@ -12,16 +8,97 @@ import time
 from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import asdict
-from typing import Any
+from typing import Any, Literal
 
 from fastapi import APIRouter, WebSocket, WebSocketDisconnect
-from pydantic import TypeAdapter, ValidationError
+from pydantic import Field, TypeAdapter, ValidationError
 
-from app import models
+from app.messages import GivenPath, Model
 from app.state.scores import Scored
 from app.state.snapshot import Change, Command, Event, Notice, Snapshot, StudyNews
 from app.state.workbench import Workbench
-from app.web.views import results, steps
+from app.web import results, steps
+
+
+class OpenRequest(Model):
+    """Open another sequence."""
+
+    name: GivenPath
+    """A built-in name, a name of the list, or a folder."""
+
+
+class TrailChanges(Model):
+    """How trails are drawn, in 3D and in pictures."""
+
+    seconds: float | None = Field(None, ge=0.5, le=600.0)
+    """How far back they go."""
+    fades: bool | None = None
+    """Whether they are fainter the older they are."""
+
+
+class CurveRequest(Model):
+    """Compute what some parameters would change."""
+
+    keys: list[str] = Field(max_length=40)
+
+
+class LayerChanges(Model):
+    """Layers of the 3D view, by name."""
+
+    changes: dict[str, bool]
+
+
+class ViewChange(Model):
+    """Look through a camera in 3D."""
+
+    camera: int | Literal["top"] | None
+    """Its index; null for the free view."""
+
+
+class ThemeChange(Model):
+    """Have the 3D view dark or light."""
+
+    theme: Literal["dark", "light"]
+
+
+class SelectChange(Model):
+    """Select a track."""
+
+    id: int | None
+
+
+class SeekChange(Model):
+    """Move the playhead."""
+
+    step: int
+    origin: str = Field("", max_length=100)
+
+
+class StreamSeek(SeekChange):
+    """From the page over the socket."""
+
+    type: Literal["seek"]
+
+
+class StreamSelect(SelectChange):
+    """From the page over the socket."""
+
+    type: Literal["select"]
+
+
+class StreamMotion(Model):
+    """From the page over the socket: whether its browser asks for reduced motion."""
+
+    type: Literal["motion"]
+    flies: bool
+    """Whether the 3D view may animate a change of viewpoint; false for reduced motion."""
+
+
+class StreamPing(Model):
+    """From the page over the socket: asks for a ``pong``, which shows that the server answers."""
+
+    type: Literal["ping"]
+
 
 SECONDS_BETWEEN = {"progress": 0.1, "tasks": 0.25, "timeline": 0.25}
 """How often at most a page is told how far the run and other work is, and that the timeline has
@@ -38,9 +115,9 @@ MOST_NOTICES = 20
 
 router = APIRouter()
 
-FromPage = TypeAdapter[
-    models.StreamSeek | models.StreamSelect | models.StreamMotion | models.StreamPing
-](models.StreamSeek | models.StreamSelect | models.StreamMotion | models.StreamPing)
+FromPage = TypeAdapter[StreamSeek | StreamSelect | StreamMotion | StreamPing](
+    StreamSeek | StreamSelect | StreamMotion | StreamPing
+)
 
 
 class _Page:
@@ -164,14 +241,14 @@ class Stream:
             page.wake.set()
             return
         match wish:
-            case models.StreamSeek():
+            case StreamSeek():
                 self._workbench.seek(wish.step, wish.origin)
-            case models.StreamSelect():
+            case StreamSelect():
                 self._workbench.select(wish.id)
-            case models.StreamMotion():
+            case StreamMotion():
                 page.flies = wish.flies
                 self._set_flies()
-            case models.StreamPing():
+            case StreamPing():
                 page.messages = [*page.messages, '{"type":"pong"}'][-MOST_NOTICES:]
                 page.wake.set()
 
@@ -297,7 +374,7 @@ def _shown(snapshot: Snapshot) -> tuple[str, str, int, int]:
     return snapshot.sequence_key, run.key, run.done, run.revision
 
 
-def _with_type(kind: str, message: models.Model) -> str:
+def _with_type(kind: str, message: Model) -> str:
     return f'{{"type":"{kind}",{message.model_dump_json()[1:]}'
 
 

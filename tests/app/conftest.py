@@ -12,7 +12,8 @@ import pytest
 from starlette.testclient import TestClient
 
 from app.command import main as cli
-from app.web.server import Settings, create_app
+from app.web.dependencies import Settings
+from app.web.server import create_app
 from tests.app.folders import write_crossing
 from tests.synthetic import write_sequence
 

@@ -10,7 +10,7 @@ from starlette.testclient import TestClient
 
 from app.command.flags import parse
 from app.state.edits import Edits
-from app.state.kept.presets import OwnPresets
+from app.state.presets import OwnPresets
 from app.state.workbench import Workbench
 from tests.app.conftest import command
 from tests.parameters.test_values import DEFAULTS, MEANT, OTHER

@@ -15,7 +15,7 @@ import numpy as np
 from starlette.testclient import TestClient
 
 from app.state.edits import Edits
-from app.state.kept.presets import OwnPresets
+from app.state.presets import OwnPresets
 from app.state.snapshot import Event, Notice
 from app.state.workbench import Workbench
 from tests.corrections.test_log import LOG

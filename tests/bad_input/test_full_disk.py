@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from app.state.edits import Edits
-from app.state.kept.presets import OwnPresets
+from app.state.presets import OwnPresets
 from app.state.workbench import Workbench
 from tests.bad_input.writes import KINDS
 from tracker.files.validated import read_json, write_json

@@ -124,7 +124,7 @@ def test_a_full_disk_is_said_and_changes_nothing(
 
     own = client.app.state.presets  # type: ignore[attr-defined]
     monkeypatch.setattr(own, "_path", tmp_path / "presets.json")
-    monkeypatch.setattr("app.state.kept.presets.write_json", full)
+    monkeypatch.setattr("app.state.presets.write_json", full)
     answer = command(client, "save_preset", preset="mine")
     assert answer.status_code == 507
     assert answer.json()["code"] == "disk_full"

@@ -15,7 +15,8 @@ from pathlib import Path
 import pytest
 from starlette.testclient import TestClient
 
-from app.web.server import Settings, create_app
+from app.web.dependencies import Settings
+from app.web.server import create_app
 from tests.app.conftest import ADDRESS, Runs
 from tests.app.folders import write_crossing
 from tests.bad_input.damage import OF_A_FILE

@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 
 from app.state.edits import Edits
-from app.state.kept.drafts import Drafts
-from app.state.kept.presets import OwnPresets, keep_preset
+from app.state.presets import OwnPresets, keep_preset
+from app.state.teaching import Drafts
 from app.state.workbench import Workbench
 from tests.engine import synthetic
 from tests.library.runs import RECORDING, run

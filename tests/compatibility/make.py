@@ -66,7 +66,8 @@ def page(work: Path, do: Callable[[Any], None], library: Path | None = None) -> 
     """Do something on the page with ``crossing`` open and computed."""
     from starlette.testclient import TestClient
 
-    from app.web.server import Settings, create_app
+    from app.web.dependencies import Settings
+    from app.web.server import create_app
 
     place = str(work / "recordings" / "crossing")
     settings = Settings(sequence=place, with_viser=False, keep_on_disk=True, library=library)

@@ -27,7 +27,8 @@ import pytest
 from starlette.testclient import TestClient
 
 from app.command.main import main
-from app.web.server import Settings, create_app
+from app.web.dependencies import Settings
+from app.web.server import create_app
 from tests.app import conftest
 from tests.studies.small import Serial, run
 from tracker.export import read_tracks_csv

@@ -17,7 +17,7 @@ import pyarrow.parquet as pq
 import pytest
 import trimesh
 
-from app.command.arguments.library import FormatName
+from app.command.arguments import FormatName
 from tests.library.written import STEPS, written
 from tracker.evaluation import EvaluationSettings, evaluate
 from tracker.export import json_file, tracks_csv

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, get_args
 
 from app.errors import COMMANDS
-from app.web.commands.routes import AnyCommand
+from app.web.commands import AnyCommand
 
 FORMER = {
     "set_parameters": "PATCH /api/parameters",

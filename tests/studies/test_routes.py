@@ -14,10 +14,11 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
-from app.command.commands.studies import _trials as command_words
+from app.command.studies import _trials as command_words
 from app.state.studies import StudyDesk
-from app.web.server import Settings, create_app
-from app.web.studies import routes
+from app.web import studies
+from app.web.dependencies import Settings
+from app.web.server import create_app
 from tests.app.conftest import command
 from tests.studies.small import Serial, made_up, recording, run
 from tracker.studies.store import Status, Store, find
@@ -80,8 +81,8 @@ def test_it_is_told_what_a_study_takes_or_why_it_is_refused(client: TestClient) 
 def test_the_time_goes_by_the_workers_that_are_wanted(
     client: TestClient, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(routes, "available_cores", lambda: 4)
-    monkeypatch.setattr(routes, "FEWEST_STEPS", 1)
+    monkeypatch.setattr(studies, "available_cores", lambda: 4)
+    monkeypatch.setattr(studies, "FEWEST_STEPS", 1)
     # so many runs that a recording of a second takes hours
     wish = {"name": "mine", "parameters": RANGES, "trials": 10**6}
 

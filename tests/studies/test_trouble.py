@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from app.command.arguments.studies import Where
-from app.command.commands.studies import crew_of
+from app.command.arguments import Where
+from app.command.studies import crew_of
 from app.command.terminal import CommandError
 from tests.studies.small import Serial, definition, made_up, run
 from tracker.files.atomic import write_whole

@@ -312,6 +312,35 @@ declare namespace Server {
 		settings: string;
 	}
 
+	/** A moment at which other ways to look disagree. */
+	interface Disagreement {
+		step: number;
+		ids: number[];
+		why: string;
+	}
+
+	/** A doubtful place. */
+	interface DoubtInfo {
+		id: string;
+		kind: "exchange" | "join" | "cut" | "crossing" | "gap" | "short" | "begins" | "ends" | "missing" | "fast";
+		title: string;
+		why: string;
+		first: number;
+		last: number;
+		tracks: number[];
+		places: [number, number, number, number][];
+		/** Probability that the run is wrong there. */
+		doubt: number;
+		/** Steps that depend on it. */
+		stake: number;
+		/** As it is, then the most probable first. */
+		alternatives: AlternativeInfo[];
+		/**
+		 * Of who may be missing, at its places; empty for all others, whose boxes are their tracks'.
+		 */
+		sights: Sight[];
+	}
+
 	/** The doubtful places of the shown run, the most at stake first. */
 	interface DoubtQueue {
 		run: string | null;
@@ -323,7 +352,7 @@ declare namespace Server {
 		answered: number;
 		/** Sentences about cameras whose boxes err more than those of the others. */
 		cameras: string[];
-		doubts: app__models__correcting__DoubtInfo[];
+		doubts: DoubtInfo[];
 	}
 
 	/** What would be undone and redone, in words; null for nothing. */
@@ -411,6 +440,7 @@ declare namespace Server {
 
 	/** How far the newest export is. */
 	interface ExportInfo {
+		/** Counts the files that were asked for. */
 		number: number;
 		state: "idle" | "writing" | "done" | "failed" | "cancelled";
 		format: string;
@@ -508,7 +538,7 @@ declare namespace Server {
 		/** Empty where there is one camera only. */
 		witnesses: Witness[];
 		/** The most doubtful first. */
-		doubts: app__web__evaluation__identity_routes__DoubtInfo[];
+		doubts: Disagreement[];
 		warning: string;
 	}
 
@@ -1661,34 +1691,5 @@ declare namespace Server {
 		seed: number | null;
 		/** Seconds since 1970. */
 		since: number;
-	}
-
-	/** A doubtful place. */
-	interface app__models__correcting__DoubtInfo {
-		id: string;
-		kind: "exchange" | "join" | "cut" | "crossing" | "gap" | "short" | "begins" | "ends" | "missing" | "fast";
-		title: string;
-		why: string;
-		first: number;
-		last: number;
-		tracks: number[];
-		places: [number, number, number, number][];
-		/** Probability that the run is wrong there. */
-		doubt: number;
-		/** Steps that depend on it. */
-		stake: number;
-		/** As it is, then the most probable first. */
-		alternatives: AlternativeInfo[];
-		/**
-		 * Of who may be missing, at its places; empty for all others, whose boxes are their tracks'.
-		 */
-		sights: Sight[];
-	}
-
-	/** A moment at which other ways to look disagree. */
-	interface app__web__evaluation__identity_routes__DoubtInfo {
-		step: number;
-		ids: number[];
-		why: string;
 	}
 }

@@ -14,8 +14,8 @@ from typing import Any
 
 import pytest
 
+from app.command import listing
 from app.command import main as cli
-from app.command.commands import listing
 from app.command.flags import Track, parse
 from app.command.terminal import rate
 from tests.app.conftest import Runs
@@ -339,7 +339,7 @@ def test_ctrl_c_inside_a_compiled_kernel(
         except SystemError as error:
             raise SystemError("update: result with an exception") from error
 
-    monkeypatch.setattr(cli, "_run", heard)
+    monkeypatch.setattr(cli, "run", heard)
     assert cli.main(["parameters"]) == 130
     assert capsys.readouterr().err == "multiview-phd: interrupted; nothing was written\n"
 

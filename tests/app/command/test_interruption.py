@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from app.command.interruption import between_steps
+from app.command.computing import between_steps
 from app.command.main import INTERRUPTED
 from tests.app.conftest import Runs
 from tracker.runs import pipeline

@@ -90,7 +90,7 @@ BROKEN = {
 EVERYWHERE = """
 import json, sys, tempfile
 {first}
-from app.web.views.results import schema
+from app.web.results import schema
 from tracker.runs import pipeline, warm_up
 from tracker.parameters.catalogue import METHODS, RunParameters
 from tracker.parameters.values import changed_values, shown_keys, stage_values, with_values

@@ -24,8 +24,9 @@ from websockets.exceptions import ConnectionClosed
 from websockets.typing import Origin, Subprotocol
 
 from app.command import main as cli
-from app.web.server import Settings, build_routes, create_app
-from app.web.server.running import say_failure
+from app.web.dependencies import Settings
+from app.web.running import say_failure
+from app.web.server import build_routes, create_app
 from tests.app.conftest import wait_until
 from tests.app.folders import write_crossing
 from tracker.runs.pipeline import Cancelled
@@ -154,7 +155,7 @@ def test_no_token_is_for_this_machine_alone(
 def test_visers_public_tunnel_cannot_be_asked_for() -> None:
     from viser import _messages
 
-    from app.web.access.viewer import start_viser
+    from app.web.access.gateway import start_viser
 
     running = start_viser()
     try:

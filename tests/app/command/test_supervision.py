@@ -12,7 +12,7 @@ from pathlib import Path
 import httpx2
 import pytest
 
-from app.state.kept.crashes import LAST
+from app.state.crashes import LAST
 from tests.app.folders import write_crossing
 from tests.browser.serving import Server
 

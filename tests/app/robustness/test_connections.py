@@ -27,8 +27,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.typing import Subprotocol
 
 from app.web import server
-from app.web.access import connections
-from app.web.server import listening
+from app.web.dependencies import Settings
 from tests.app.conftest import wait_until
 
 VISER = Subprotocol(f"viser-v{viser.__version__}")
@@ -42,7 +41,7 @@ ever, one on a busy machine some seconds."""
 class Running:
     """A server in a thread of its own, on a free port."""
 
-    def __init__(self, settings: server.Settings) -> None:
+    def __init__(self, settings: Settings) -> None:
         self._listener = server.bind("127.0.0.1", 0)
         self.port: int = self._listener.getsockname()[1]
         self.address = f"http://127.0.0.1:{self.port}"
@@ -51,7 +50,7 @@ class Running:
         self._thread.start()
         assert self.ready.wait(60)
 
-    def _serve(self, settings: server.Settings) -> None:
+    def _serve(self, settings: Settings) -> None:
         self.app = server.create_app(settings)
         server.serve(self.app, self._listener, self.ready.set)
 
@@ -81,10 +80,10 @@ class Running:
 @pytest.fixture(scope="module")
 def running(data: Path) -> Iterator[Running]:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(connections, "SECONDS_TO_ASK", SOON)
-        patch.setattr(connections, "SECONDS_TO_READ", SOON)
-        patch.setattr(listening, "_Server", Stoppable)
-        running = Running(server.Settings(sequence="crossing", data=data))
+        patch.setattr(server, "SECONDS_TO_ASK", SOON)
+        patch.setattr(server, "SECONDS_TO_READ", SOON)
+        patch.setattr(server, "_Server", Stoppable)
+        running = Running(Settings(sequence="crossing", data=data))
         wait_until(lambda: running.get("/viser/").status_code == 200)
         wait_until(lambda: running.get("/api/state").json()["sequence"] is not None)
         yield running
@@ -98,7 +97,7 @@ def running(data: Path) -> Iterator[Running]:
             gc.collect()
 
 
-class Stoppable(listening._Server):
+class Stoppable(server._Server):
     """One that another thread can end."""
 
     newest: Stoppable | None = None
@@ -198,8 +197,8 @@ def test_two_hundred_connections_that_ask_nothing_are_dropped(
 def test_more_connections_than_are_meant_are_turned_away(
     running: Running, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(connections, "MOST", 20)
-    monkeypatch.setattr(connections, "SECONDS_TO_ASK", 2.0 * LATER)  # it is not they who give up
+    monkeypatch.setattr(server, "MOST", 20)
+    monkeypatch.setattr(server, "SECONDS_TO_ASK", 2.0 * LATER)  # it is not they who give up
     assert Stoppable.newest is not None
     open_now = Stoppable.newest.server_state.connections
     with ExitStack() as ended:
@@ -239,7 +238,7 @@ def test_a_page_that_is_slow_to_read_the_stream_is_dropped_and_holds_nobody_up(
     open_now = Stoppable.newest.server_state.connections
 
     def readers() -> list[Any]:
-        return [one for one in open_now if isinstance(one, connections.Sockets)]
+        return [one for one in open_now if isinstance(one, server.Sockets)]
 
     with ExitStack() as ended:
         for said in [stream] * 3:

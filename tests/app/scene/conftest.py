@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import pytest
 import viser
 
-from app.web.access.viewer import start_viser
+from app.web.access.gateway import start_viser
 
 
 @pytest.fixture(scope="module")

@@ -9,11 +9,10 @@ import pytest
 import viser
 from numpy import ndarray
 
-from app.scene import framing, geometry
-from app.scene.framing import Pose, edge_on, overview
-from app.scene.room.pictures import StraightView
-from app.scene.room.standing import entrance_edges
+from app.scene import geometry, views
 from app.scene.scene import Scene
+from app.scene.standing import StraightView, entrance_edges
+from app.scene.views import Pose, edge_on, overview
 from app.state import opening_step
 from app.state.workbench import Workbench
 from tests.app.scene import scene_case
@@ -41,7 +40,7 @@ def reach(pose: Pose, points: ndarray, aspect: float) -> float:
 @pytest.mark.parametrize("aspect", [0.6, 1.0, 2.2])
 def test_the_view_from_above_has_everything_in_it(aspect: float) -> None:
     points = geometry.box_corners(np.array([-1.0, -4.0, 0.0]), np.array([3.0, 2.0, 2.0]))
-    pose = framing.from_above(points, aspect)
+    pose = views.from_above(points, aspect)
     assert pose.position[:2] == pytest.approx([1.0, -1.0])
     depth = pose.position[2] - points[:, 2]
     tangent = np.tan(pose.fov / 2.0)

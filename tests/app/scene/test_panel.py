@@ -10,8 +10,7 @@ import pytest
 import viser
 
 from app.paths import static_folder
-from app.scene.keys import hotkeys
-from app.scene.panel import ORIGIN, UNFIT, Panel, hint_of
+from app.scene.panel import ORIGIN, UNFIT, Panel, hint_of, hotkeys
 from app.state.workbench import Workbench
 from tests.app.scene import scene_case
 from tracker.parameters.catalogue import METHODS, PARAMETERS, PRESETS

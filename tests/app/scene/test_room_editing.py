@@ -10,7 +10,7 @@ import pytest
 import viser
 from viser import _messages
 
-from app.scene.room.editing import FACES, Face, RoomEditing, dragged, grips
+from app.scene.editing import FACES, Face, RoomEditing, dragged, grips
 from app.state.edits import Edits
 from app.state.teaching import Teaching
 from app.state.workbench import Workbench

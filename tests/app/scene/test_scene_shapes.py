@@ -10,16 +10,13 @@ import pytest
 import viser.transforms as tf
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.spatial.transform import Rotation
 
 from app import colours
 from app.scene import geometry
-from app.scene.framing import overview
-from app.scene.geometry import dashes, ellipsoids, icosphere, mass_radius, quaternions
+from app.scene.geometry import dashes, ellipsoids, mass_radius
 from app.scene.nodes import linear
-from app.scene.room.pictures import StraightView
-from app.scene.room.standing import pose_through
-from app.scene.views import between
+from app.scene.standing import StraightView, pose_through
+from app.scene.views import between, overview
 from tests.app.scene import scene_case
 
 TOKENS = Path(__file__).resolve().parents[3] / "static" / "css" / "tokens.css"
@@ -46,27 +43,6 @@ def test_a_mass_must_be_a_probability(mass: float) -> None:
         mass_radius(mass)
     wxyzs, axes = ellipsoids(np.zeros((0, 3, 3)))  # and none of no component
     assert (wxyzs.shape, axes.shape) == ((0, 4), (0, 3))
-
-
-@given(st.integers(0, 2**32 - 1))
-def test_quaternions_agree_with_scipy(seed: int) -> None:
-    turns = Rotation.random(7, rng=np.random.default_rng(seed))
-    halves = Rotation.from_matrix([2.0 * np.diag(axis) - np.eye(3) for axis in np.eye(3)])
-    rotation = Rotation.concatenate([turns, halves])
-    ours, theirs = quaternions(rotation.as_matrix()), rotation.as_quat()[:, [3, 0, 1, 2]]
-    np.testing.assert_allclose(np.abs((ours * theirs).sum(axis=1)), 1.0, atol=1e-12)
-
-
-@pytest.mark.parametrize("subdivisions", [0, 1, 2])
-def test_the_icosphere_is_a_closed_sphere(subdivisions: int) -> None:
-    points, triangles = icosphere(subdivisions)
-    np.testing.assert_allclose(np.linalg.norm(points, axis=1), 1.0)
-    edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    unique, uses = np.unique(edges, axis=0, return_counts=True)
-    assert (uses == 2).all()
-    assert len(points) - len(unique) + len(triangles) == 2
-    normals = np.cross(*(points[triangles[:, i]] - points[triangles[:, 0]] for i in (1, 2)))
-    assert (np.einsum("fi,fi->f", normals, points[triangles[:, 0]]) > 0.0).all()
 
 
 def test_box_edges_have_the_lengths_of_the_box() -> None:

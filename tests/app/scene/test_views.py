@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from app.scene.framing import Pose
-from app.scene.views import _Follower
+from app.scene.views import Pose, _Follower
 
 
 class Camera:

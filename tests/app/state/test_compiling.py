@@ -10,9 +10,9 @@ from typing import Any
 
 import pytest
 
+from app.state.compiling import Compiling
+from app.state.jobs import Jobs
 from app.state.workbench import Workbench
-from app.state.workers.compiling import Compiling
-from app.state.workers.jobs import Jobs
 from tests.app.conftest import wait_until
 from tracker.files.lock import locked
 from tracker.kernels import compilation

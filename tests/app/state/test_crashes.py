@@ -12,16 +12,16 @@ from queue import SimpleQueue
 
 import pytest
 
-from app.state.kept.crashes import LAST, Crashes, Note
-from app.state.memory import LEAST_BYTES, Budget, machine_memory
-from app.state.workers.watchdog import Watchdog
+from app.state.crashes import LAST, Crashes, Note
+from app.state.jobs import Watchdog
+from app.web.running import LEAST_BYTES, Budget, machine_memory
 from tests.app.conftest import wait_until
 from tracker.files.validated import write_json
 
 START = """
 import os, sys
 from pathlib import Path
-from app.state.kept.crashes import Crashes
+from app.state.crashes import Crashes
 folder, draft, number = Path(sys.argv[1]), sys.argv[2], int(sys.argv[3])
 crashes = Crashes(folder)
 crashes.watch()
@@ -101,7 +101,7 @@ def test_a_budget_is_shared(monkeypatch: pytest.MonkeyPatch) -> None:
     assert Budget.of(0) == Budget(LEAST_BYTES // 4, LEAST_BYTES // 2)
     assert machine_memory() > LEAST_BYTES
     usual = Budget.of()
-    monkeypatch.setattr("app.state.memory.machine_memory", lambda: 512 << 20)
+    monkeypatch.setattr("app.web.running.machine_memory", lambda: 512 << 20)
     small = Budget.of()
     assert small.pictures + small.columns <= 256 << 20
     assert small.pictures <= usual.pictures

@@ -20,7 +20,8 @@ from app.state import edits as module
 from app.state.edits import EditError, Edits
 from app.state.snapshot import Change, Event, Notice
 from app.state.workbench import Workbench
-from app.web.server import Settings, create_app
+from app.web.dependencies import Settings
+from app.web.server import create_app
 from tests.app.conftest import ADDRESS, command, run_is, wait_until
 from tracker.parameters.values import value_of, with_values
 from tracker.runs import pipeline

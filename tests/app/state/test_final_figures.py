@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from app.state.evaluator import Evaluator
+from app.state.keeper import Keeper
 from app.state.opening_step import is_settled
 from app.state.scores import Scored
 from app.state.workbench import Workbench
-from app.state.workers.evaluator import Evaluator
-from app.state.workers.keeper import Keeper
 from app.web.api import export_tracks
 from tests.app.conftest import wait_until
 from tests.app.folders import FRAMES

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from app.state.kept import history
-from app.state.kept.history import History
+from app.state import history
+from app.state.history import History
 from app.state.workbench import Workbench
 from tracker.runs import pipeline
 from tracker.sequences.pictures.frames import FrameReader

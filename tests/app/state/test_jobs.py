@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.state.kept.crashes import Crashes, Note
+from app.state.crashes import Crashes, Note
+from app.state.jobs import Jobs
 from app.state.snapshot import Change, Event, Notice, Snapshot
 from app.state.workbench import Workbench
-from app.state.workers.jobs import Jobs
 from tests.app.conftest import wait_until
 from tests.app.folders import write_crossing
 from tests.synthetic import write_sequence

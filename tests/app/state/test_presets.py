@@ -8,7 +8,7 @@ import pytest
 from starlette.testclient import TestClient
 
 from app.state.edits import Edits
-from app.state.kept.presets import LONGEST_NAME, OwnPresets
+from app.state.presets import LONGEST_NAME, OwnPresets
 from app.state.snapshot import Event, Notice
 from app.state.workbench import Workbench
 from tests.app.conftest import command, run_is, wait_until

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from app.state.kept.recents import Recents
+from app.state.recents import Recents
 from app.state.workbench import Workbench
 from tests.app.scene import scene_case
 from tracker.sequences.library import open_sequence

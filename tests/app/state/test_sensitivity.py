@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 
+from app.state import sensitivity as module
+from app.state.sensitivity import Curve, Sensitivity, shares, values_to_try
 from app.state.workbench import Workbench
-from app.state.workers import sensitivity as module
-from app.state.workers.sensitivity import Curve, Sensitivity, shares, values_to_try
 from tracker.evaluation import evaluate_sequence
 from tracker.parameters.catalogue import PARAMETERS, RunParameters
 from tracker.parameters.values import ParameterError, value_of, with_values

@@ -16,12 +16,12 @@ import pytest
 from starlette.testclient import TestClient
 
 from app.state.edits import Edits
-from app.state.kept.drafts import Drafts
 from app.state.snapshot import Event
-from app.state.teaching.taught import Taught
+from app.state.teaching import Drafts, Teaching
 from app.state.workbench import Workbench
-from app.web.server import Settings, create_app
-from app.web.views import results
+from app.web import results
+from app.web.dependencies import Settings
+from app.web.server import create_app
 from tests.app.conftest import ADDRESS, command, connect, run_is, wait_until
 from tests.browser.walkers import write_walkers
 from tests.single_view.networks import Npm, answering, files, giving, package, pooling, source_of
@@ -348,19 +348,29 @@ def test_discard_is_the_file_again_and_undo_knows_what_was_discarded(client: Tes
     assert command(client, "undo").json()["teaching"]["unsaved"] == 1
 
 
-@pytest.mark.full
 def test_what_is_not_saved_is_there_again_after_another_sequence(
-    client: TestClient, walkers: Path
+    client: TestClient, walkers: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     write_walkers(walkers.parent / "others")
     command(client, "add_template", **BOX)
     client.post("/api/sequence", json={"name": "others"})
     wait_until(lambda: state(client)["opening"] is None)
     assert state(client)["teaching"]["unsaved"] == 0
+    done(client)
+    begun: list[str] = []
+    begins = Workbench.run_begins
+
+    def noted(bench: Workbench, key: str, message: str = "") -> None:
+        begun.append(key)
+        begins(bench, key, message)
+
+    monkeypatch.setattr(Workbench, "run_begins", noted)
     client.post("/api/sequence", json={"name": "walkers"})
     wait_until(lambda: state(client)["teaching"]["unsaved"] == 1)
     assert state(client)["sequence"]["templates"] == 1
-    done(client)
+    assert begun == [done(client)["run"]["key"]], (
+        "the first run is of what was taught, and begins once"
+    )
 
 
 @pytest.mark.full
@@ -427,7 +437,7 @@ def test_what_was_taught_on_a_room_as_it_was_rendered_before_is_taken_up_once(
     def opened() -> tuple[Workbench, list[Event]]:
         bench, heard = Workbench(), list[Event]()
         bench.subscribe_events(heard.append)
-        Taught(bench, Edits(bench), drafts)
+        Teaching(bench, Edits(bench), drafts=drafts)
         bench.open(room, "key", FrameReader(room), pipeline.default_parameters(room))
         return bench, heard
 

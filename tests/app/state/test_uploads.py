@@ -6,9 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from app.state.importing import uploads
-from app.state.importing.desk import Desk
-from app.state.importing.uploads import Announced, Upload, UploadError, safe_path
+from app.state import importing
+from app.state.importing import Announced, Desk, Upload, UploadError, safe_path
 from app.state.workbench import Workbench
 
 
@@ -66,13 +65,13 @@ def test_what_has_no_room_is_refused_before_anything_is_sent(
 ) -> None:
     upload = _upload(tmp_path / "files", a=5)
     with pytest.raises(UploadError, match="at most 64 GB"):
-        upload.announce([Announced("b", uploads.MOST_BYTES)])
+        upload.announce([Announced("b", importing.MOST_BYTES)])
     with pytest.raises(UploadError, match="among the files already"):
         upload.announce([Announced("a", 1)])
-    monkeypatch.setattr(uploads, "SPARED_BYTES", 1 << 62)
+    monkeypatch.setattr(importing, "SPARED_BYTES", 1 << 62)
     with pytest.raises(UploadError, match=r"has room for 0\.0 GB"):
         upload.announce([Announced("b", 1)])
-    monkeypatch.setattr(uploads, "MOST_FILES", 1)
+    monkeypatch.setattr(importing, "MOST_FILES", 1)
     with pytest.raises(UploadError, match="at most 1 files"):
         upload.announce([Announced("b", 0)])
     assert upload.files == 1

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from app.state.jobs import silence
 from app.state.snapshot import LAYERS, Change, Command, Event, Notice, clamp
 from app.state.workbench import Workbench
-from app.state.workers.jobs import silence
 from tracker.parameters.catalogue import PARAMETERS, PRESETS
 from tracker.parameters.values import ParameterError, value_of
 from tracker.runs import pipeline

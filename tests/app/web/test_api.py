@@ -16,7 +16,8 @@ from fastapi.routing import APIRoute
 from starlette.testclient import TestClient
 
 from app.web.access import gateway
-from app.web.server import ROUTERS, Settings, create_app
+from app.web.dependencies import Settings
+from app.web.server import ROUTERS, create_app
 from tests.app.conftest import ADDRESS, command, run_is, wait_until
 from tests.app.folders import FRAMES
 from tests.synthetic import number_in
@@ -265,7 +266,7 @@ def test_a_failure_of_our_own_has_the_one_shape_too(
     def fail(*_: Any) -> None:
         raise RuntimeError("a bug")
 
-    monkeypatch.setattr("app.web.views.results.schema", fail)
+    monkeypatch.setattr("app.web.results.schema", fail)
     app = create_app(Settings(data=data, with_viser=False))
     with TestClient(app, base_url=ADDRESS, raise_server_exceptions=False) as client:
         assert_error(client.get("/api/schema"), 500, "internal", "RuntimeError", "a bug")
@@ -333,7 +334,7 @@ def test_pictures_asked_for_at_once_are_decoded_once(
         encoded.append(1)
         return real(*args)
 
-    monkeypatch.setattr("app.web.pictures.jpegs.cv2.imencode", count)
+    monkeypatch.setattr("app.web.pictures.cv2.imencode", count)
     answers: list[bytes] = []
 
     def ask() -> None:

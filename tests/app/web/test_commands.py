@@ -6,8 +6,8 @@ import pytest
 from starlette.testclient import TestClient
 
 from app.errors import COMMANDS
-from app.models import Model
-from app.web.commands.command import Command
+from app.messages import Model
+from app.web.commands import Command
 from tests.app.conftest import command
 
 

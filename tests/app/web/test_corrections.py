@@ -14,8 +14,9 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
-from app.state.doubting import Doubting
-from app.web.server import Settings, create_app
+from app.state.correcting import Doubting
+from app.web.dependencies import Settings
+from app.web.server import create_app
 from tests.app.conftest import ADDRESS, Runs, command, connect, run_is, wait_until
 from tracker.corrections import Correction
 from tracker.corrections.log import own_place, read_log, write_log
@@ -296,7 +297,9 @@ def test_what_is_answered_of_the_run_before_counts_in_the_one_that_came_meanwhil
     )  # fmt: skip
     queues = iter([Queue((made,), 0, "a test")])
     nothing = Queue((), 0, "a test")
-    monkeypatch.setattr("app.state.doubting.queue", lambda run, corrections: next(queues, nothing))
+    monkeypatch.setattr(
+        "app.state.correcting.queue", lambda run, corrections: next(queues, nothing)
+    )
     command(desk, "set_parameters", changes={"fusion.survival_probability": 0.97})
     settled(desk)
     (shown,) = desk.get(f"{PLACE}/queue").json()["doubts"]

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
-from app.web.views.courses import KINDS, courses_of
-from app.web.views.timeline import Window
+from app.web.courses import KINDS, courses_of
+from app.web.timeline import Window
 from tests.engine.synthetic import crossing, sequence
 from tracker.parameters.catalogue import RunParameters
 from tracker.runs import pipeline

@@ -10,8 +10,9 @@ import pytest
 from numpy import ndarray
 from starlette.testclient import TestClient
 
-from app.web.server import Settings, create_app
-from app.web.views.floor import NEAR, OFF, floor_of
+from app.web.dependencies import Settings
+from app.web.overlays import NEAR, OFF, floor_of
+from app.web.server import create_app
 from tests.app.conftest import ADDRESS
 from tests.app.scene import scene_case
 from tracker.geometry.camera import Camera

@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
+from app.state import tasks
 from app.state.workbench import Workbench
-from app.state.workers import identity_check
 from tests.app.conftest import command, wait_until
 from tracker.review.self_consistency import Estimate
 from tracker.runs import pipeline
@@ -42,7 +42,7 @@ def test_a_finished_run_is_looked_at_in_other_ways(client: TestClient) -> None:
 def test_a_run_that_is_not_finished_is_not_checked(crossing: Path) -> None:
     sequence = open_sequence(str(crossing))
     parameters = pipeline.default_parameters(sequence)
-    check = identity_check.IdentityCheck(Workbench())
+    check = tasks.IdentityCheck(Workbench())
     with pytest.raises(ValueError, match="3 of 120 steps"):
         check.start(pipeline.compute(sequence, parameters, steps=3))
     assert check.now.state == "idle"
@@ -54,9 +54,9 @@ def test_another_run_ends_a_check(own_client: TestClient, monkeypatch: pytest.Mo
     def endless(run: Run, *, cancelled: Callable[[], bool], **_: Any) -> Estimate:
         wait_until(cancelled, 30.0)
         stopped.append(run.key)
-        raise identity_check.Cancelled
+        raise tasks.Cancelled
 
-    monkeypatch.setattr(identity_check, "estimate", endless)
+    monkeypatch.setattr(tasks, "estimate", endless)
     key = own_client.post("/api/identity").json()["run"]
     command(own_client, "set_parameters", changes={"fusion.detection_probability": 0.7})
     wait_until(lambda: own_client.get("/api/identity").json()["state"] == "cancelled")
@@ -76,7 +76,7 @@ def test_who_stops_a_check_does_not_wait_for_its_processes(
         on_progress(1, 1)
         return Estimate(1.0, 1.0, (), (), ())
 
-    monkeypatch.setattr(identity_check, "estimate", slow_to_hear)
+    monkeypatch.setattr(tasks, "estimate", slow_to_hear)
     key = own_client.post("/api/identity").json()["run"]
     assert begins.wait(30.0)
     assert own_client.delete("/api/identity").json()["state"] == "cancelled"

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
-from app.web.importing.words import FIELDS, on_page
+from app.web.importing import FIELDS, on_page
 from tests.app.conftest import wait_until
 from tests.app.web.test_importing import _send, _settled, _wish, client, data, files, toml
 from tests.io.importing.test_strangers import BOXES

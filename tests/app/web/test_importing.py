@@ -11,7 +11,8 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
-from app.web.server import Settings, create_app
+from app.web.dependencies import Settings
+from app.web.server import create_app
 from tests.app.conftest import ADDRESS, run_is, wait_until
 from tests.io.importing.test_angles import lay_out
 from tests.io.read.recorded import PLACES, detections, settled_of, toml, videos

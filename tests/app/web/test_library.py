@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
-from app.state.workers import keeper
-from app.web.server import Settings, create_app, running
+from app.state import keeper
+from app.web import running
+from app.web.dependencies import Settings
+from app.web.server import create_app
 from tests.app.conftest import ADDRESS, command, is_evaluated, run_is, wait_until
 from tests.library.runs import made_by_the_version_before
 from tracker.library.errors import LibraryError

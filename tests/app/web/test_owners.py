@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.web.views.steps import step_of
-from app.web.views.timeline import deviation
+from app.web.steps import step_of
+from app.web.timeline import deviation
 from tracker.filters.gaussian_mixture import gate_distance
 from tracker.fusion.target_model import SIZES
 from tracker.runs import pipeline

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from app.state.snapshot import Snapshot
-from app.web.corrections.views import queue_of
+from app.web.corrections import queue_of
 from tests.random_rooms import random_room
 from tracker.review.queue import Queue
 from tracker.runs.fitting import default_parameters

@@ -14,8 +14,8 @@ from typing import Any
 import httpx2
 from websockets.sync.client import connect
 
+from app.state.jobs import Jobs
 from app.state.workbench import Workbench
-from app.state.workers.jobs import Jobs
 from tests.app.conftest import command
 from tests.benchmarks.engine.pipeline import DATA
 from tests.benchmarks.measure import Measurement

@@ -12,7 +12,7 @@ import pytest
 import viser
 from playwright.sync_api import Browser, Page, expect
 
-from app.web.access.viewer import Entrance, start_viser
+from app.web.access.gateway import Entrance, start_viser
 from tests.browser.conftest import opened
 from tests.browser.looking import viser as room
 from tests.browser.serving import Server

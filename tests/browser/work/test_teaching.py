@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from playwright.sync_api import Page, expect
 
-from app.scene import framing
+from app.scene import views
 from app.scene.scene import _margin_around
 from tests.browser.conftest import Server
 from tests.browser.looking import as_at_first, ask, by_palette, readout, still, until, viser
@@ -346,7 +346,7 @@ def test_a_face_is_dragged_in_3d_saved_and_reopened(page: Page, server: Server) 
     place = canvas.bounding_box()
     assert place is not None
     room = read_sequence(Path(server.folder)).room
-    pose = framing.from_above(_margin_around(room), place["width"] / place["height"])
+    pose = views.from_above(_margin_around(room), place["width"] / place["height"])
     focal = place["height"] / 2.0 / np.tan(pose.fov / 2.0)
 
     def on_screen(point: list[float]) -> tuple[float, float]:

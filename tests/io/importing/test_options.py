@@ -8,9 +8,9 @@ from typing import Literal, get_args
 import numpy as np
 import pytest
 
-from app.command.arguments.importing import Import
-from app.command.commands.importing import options_of
+from app.command.arguments import Import
 from app.command.flags import parse
+from app.command.importing import options_of
 from app.command.main import main
 from tests.conftest import short
 from tests.io.read.recorded import PLACES, detections, settled_of, toml, videos

@@ -13,7 +13,8 @@ from starlette.testclient import TestClient
 from starlette.websockets import WebSocketDisconnect
 
 from app.web.access.tokens import Keys, cookie_name, new_token, own_token
-from app.web.server import Settings, create_app
+from app.web.dependencies import Settings
+from app.web.server import create_app
 from tests.app.conftest import ADDRESS, connect
 
 TOKEN = "a-token-of-my-own_1.~"

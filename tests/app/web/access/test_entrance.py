@@ -20,7 +20,7 @@ from websockets.asyncio.client import connect, unix_connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.typing import Subprotocol
 
-from app.web.access.viewer import LARGEST_MESSAGE, SECRET_HEADER, Entrance, start_viser
+from app.web.access.gateway import LARGEST_MESSAGE, SECRET_HEADER, Entrance, start_viser
 
 T = TypeVar("T")
 VISER = Subprotocol(f"viser-v{viser.__version__}")

@@ -11,7 +11,8 @@ import pytest
 from numpy import ndarray
 from starlette.testclient import TestClient
 
-from app.web.server import Settings, create_app
+from app.web.dependencies import Settings
+from app.web.server import create_app
 from tests.app.conftest import ADDRESS, run_is, wait_until
 from tracker.runs import pipeline
 from tracker.runs.pipeline import Run

@@ -11,8 +11,9 @@ import pytest
 from numpy import ndarray
 from starlette.testclient import TestClient
 
-from app.web.pictures.likelihood import heat
-from app.web.server import Settings, create_app
+from app.web.dependencies import Settings
+from app.web.overlays import heat
+from app.web.server import create_app
 from tests.app.conftest import ADDRESS, run_is, wait_until
 from tracker.single_view.colour.templates import COLUMNS
 

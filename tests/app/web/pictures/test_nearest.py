@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
-from app.web.pictures import jpegs
-from app.web.server import Settings, create_app
+from app.web import pictures
+from app.web.dependencies import Settings
+from app.web.server import create_app
 from tests.app.conftest import ADDRESS, run_is, wait_until
 from tests.synthetic import number_in, write_sequence
 
@@ -52,7 +53,7 @@ def test_nobody_gets_another_picture_unasked(client: TestClient) -> None:
 
 
 def test_it_is_not_sought_for_ever(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(jpegs, "REACH", 1)
+    monkeypatch.setattr(pictures, "REACH", 1)
     answer = client.get(address(client, 5), params={"nearest": True})
     assert answer.status_code == 404
     assert answer.json()["code"] == "no_picture"

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from app.web.views.decisions import decided, words_of
-from app.web.views.timeline import Timelines, Window
+from app.web.timeline import Timelines, Window, decided, words_of
 from tests.engine.synthetic import crossing, sequence
 from tracker.parameters.catalogue import RunParameters
 from tracker.review.queue import queue

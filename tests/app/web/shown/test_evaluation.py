@@ -16,12 +16,13 @@ import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
+from app.state import evaluator as worker
+from app.state.evaluator import Evaluator
 from app.state.scores import Scored, Scores
 from app.state.workbench import Workbench
-from app.state.workers import evaluator as worker
-from app.state.workers.evaluator import Evaluator
-from app.web.evaluation.messages import axis_end, comparison_of
-from app.web.server import Settings, create_app
+from app.web.dependencies import Settings
+from app.web.evaluation import axis_end, comparison_of
+from app.web.server import create_app
 from tests.app.conftest import ADDRESS, command, connect, is_evaluated, run_is, wait_until
 from tests.app.folders import FRAMES
 from tracker.evaluation import DEFINITIONS, compare, evaluate_sequence

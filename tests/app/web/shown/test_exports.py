@@ -12,9 +12,10 @@ import av
 import pytest
 from starlette.testclient import TestClient
 
+from app.state.tasks import Exporter
 from app.state.workbench import Workbench
-from app.state.workers.exporter import Exporter
-from app.web.server import Settings, create_app
+from app.web.dependencies import Settings
+from app.web.server import create_app
 from tests.app.conftest import ADDRESS, run_is, wait_until
 from tests.library.written import written
 from tracker.export.exported_run import ExportedRun, Options

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.web.views.steps import step_of
+from app.web.steps import step_of
 from tracker.runs import pipeline
 from tracker.sequences.reader import read_sequence
 from tracker.single_view.protocol import ViewEvent

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from starlette.testclient import TestClient
 
 from app.state.scores import Scored
-from app.web.views.timeline import MOST_TRACKS, Timelines, Window, counts, numbers
+from app.web.timeline import MOST_TRACKS, Timelines, Window, counts, numbers
 from tests.app.folders import FRAMES
 from tests.engine.synthetic import crossing, sequence
 from tracker.fusion.trajectories import Trajectories

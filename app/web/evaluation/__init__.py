@@ -1,1 +1,0 @@
-"""Tracks against the truth, as the page asks for them."""

@@ -1,1 +1,0 @@
-"""The routes of opening and importing, and what they tell."""

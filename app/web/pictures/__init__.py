@@ -1,1 +1,0 @@
-"""Pictures on the wire: frames, and what a method sees in them."""

@@ -1,1 +1,0 @@
-"""A run as messages: its steps, its timeline, its results."""
