@@ -25,7 +25,7 @@ export function mountLater(context, timeline) {
 /** Its name among what was closed for good. */
 const TOUR = "tour";
 
-const key = (/** @type {string} */ name) => h("kbd", {}, keyLabel(name));
+const key = (/** @type {string} */ name) => h("kbd", keyLabel(name));
 
 /**
  * What can be tried, and how it is seen that somebody has.
@@ -60,7 +60,7 @@ const THINGS = [
 		key: "p",
 		text: () => [
 			"It pins this run as A. Change a value: ",
-			h("b", {}, "Compare"),
+			h("b", "Compare"),
 			" says which is better.",
 		],
 		done: ({ server }) => Boolean(server?.pinned),
@@ -92,13 +92,11 @@ function mountTour(root, { store }) {
 		fill(
 			root,
 			h(
-				"div",
-				{ class: "tour-head" },
-				h("h2", {}, "What you see"),
+				"div.tour-head",
+				h("h2", "What you see"),
 				h(
-					"button",
+					"button.btn.icon",
 					{
-						class: "btn icon",
 						"aria-label": "Close for good; Help shows it again",
 						"data-tip": "Close for good; Help shows it again",
 						onclick: close,
@@ -107,8 +105,7 @@ function mountTour(root, { store }) {
 				),
 			),
 			h(
-				"p",
-				{ class: "seen" },
+				"p.seen",
 				`${cameras} one room. A coloured body is a person the filter believes in, the line on `,
 				"the floor where it came from; dashed in the pictures is the truth.",
 			),
@@ -116,15 +113,9 @@ function mountTour(root, { store }) {
 				h(
 					"div",
 					{ class: `thing${done[index] ? " done" : index === next ? " next" : ""}` },
-					h("span", { class: "step" }, done[index] ? icon("i-tick", "s") : index + 1),
-					h(
-						"h3",
-						{},
-						word,
-						name ? key(name) : "",
-						done[index] && h("span", { class: "vh" }, "done"),
-					),
-					index === next && h("p", {}, ...text(state)),
+					h("span.step", done[index] ? icon("i-tick", "s") : index + 1),
+					h("h3", word, name ? key(name) : "", done[index] && h("span.vh", "done")),
+					index === next && h("p", ...text(state)),
 				),
 			),
 		);

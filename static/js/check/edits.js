@@ -167,7 +167,7 @@ const MOST = 12;
 function mountMenu(context, timeline, does) {
 	const { store, actions } = context;
 	const { state } = checkOf(context);
-	const menu = h("div", { class: "menu corrects", popover: "auto" });
+	const menu = h("div.menu.corrects", { popover: "auto" });
 	one("main").append(menu);
 	/** Whoever is chosen elsewhere while others are offered is taken. @type {((id: number) => void) | null} */
 	let takes = null;
@@ -176,11 +176,7 @@ function mountMenu(context, timeline, does) {
 
 	/** @param {string} label @param {Child[]} head @param {"menu" | "group"} role @param {Child[]} children */
 	function show(label, head, role, ...children) {
-		fill(
-			menu,
-			h("p", { class: "menu-head" }, ...head),
-			h("div", { role, "aria-label": label }, ...children),
-		);
+		fill(menu, h("p.menu-head", ...head), h("div", { role, "aria-label": label }, ...children));
 		if (!menu.matches(":popover-open")) menu.showPopover();
 		const box = menu.getBoundingClientRect();
 		menu.style.left = `${Math.max(4, Math.min(left, innerWidth - box.width - 4))}px`;
@@ -209,8 +205,8 @@ function mountMenu(context, timeline, does) {
 			"button",
 			{ role: "menuitem", onclick: () => (close(), act()) },
 			icon(sign),
-			h("span", {}, ...words),
-			key && h("kbd", {}, key),
+			h("span", ...words),
+			key && h("kbd", key),
 		);
 
 	/** @param {{track: number | null, step: number, click?: Spot}} what */
@@ -228,7 +224,7 @@ function mountMenu(context, timeline, does) {
 			[
 				track === null ? "nobody" : idTag(track),
 				track !== null && told?.names[track],
-				h("span", { class: "sub" }, `step ${step}`),
+				h("span.sub", `step ${step}`),
 			],
 			"menu",
 			...(track === null
@@ -281,8 +277,7 @@ function mountMenu(context, timeline, does) {
 					own &&
 					!ends &&
 					h(
-						"span",
-						{ class: "sub alone" },
+						"span.sub.alone",
 						`nobody comes before step ${own.first} or after step ${own.last}; ` +
 							`of two who are there at once it is said from step ${step} on`,
 					),
@@ -296,7 +291,7 @@ function mountMenu(context, timeline, does) {
 						[
 							idTag(other.id),
 							names[other.id] && ` ${names[other.id]}`,
-							h("span", { class: "sub" }, ` ${whereIs(other, step, own)}`),
+							h("span.sub", ` ${whereIs(other, step, own)}`),
 						],
 						"",
 						() => take(other.id),
@@ -314,8 +309,7 @@ function mountMenu(context, timeline, does) {
 	function name(track) {
 		middle();
 		const given = state.get().told?.names[track] ?? "";
-		const field = h("input", {
-			class: "field",
+		const field = h("input.field", {
 			value: given,
 			maxlength: 80,
 			"aria-label": `Name of track ${track}`,

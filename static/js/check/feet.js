@@ -16,7 +16,7 @@ export function mountFeet({ store, playback }, check) {
 	const { state } = check;
 	const mosaic = one(".mosaic");
 	// Beside the pictures, which are buttons themselves.
-	const layer = h("div", { class: "feet" });
+	const layer = h("div.feet");
 	mosaic.after(layer);
 	/** By camera: a place in a picture, whether somebody said it, and where the run has it.
 	 * @typedef {Spot & {said: boolean, from: [number, number] | null}} Foot
@@ -88,8 +88,7 @@ export function mountFeet({ store, playback }, check) {
 		for (const handle of handles) handle.remove();
 		handles = feet.map((foot) => {
 			const id = placing ? placing.track : selection;
-			const handle = h("button", {
-				class: "foothold",
+			const handle = h("button.foothold", {
 				"aria-label": `Feet of ${id === null ? "somebody" : `track ${id}`} in ${foot.camera}: drag, or arrows and Enter`,
 				onclick: (event) => event.stopPropagation(),
 				ondblclick: (event) => event.stopPropagation(),
@@ -112,7 +111,7 @@ export function mountFeet({ store, playback }, check) {
 				else if (foot.said) void send();
 			});
 			handle.addEventListener("keydown", (event) => keyed(event, foot));
-			handle.append(h("span", { class: "footbox", hidden: true }));
+			handle.append(h("span.footbox", { hidden: true }));
 			layer.append(handle);
 			return handle;
 		});

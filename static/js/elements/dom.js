@@ -1,35 +1,31 @@
 /** Building and filling elements. */
 
 /**
- * An element with attributes and children. `on…` is a listener, `class` and the rest are
- * attributes; `true` sets an empty one, `false` and `null` none; `--x` is a style property.
- * @template {keyof HTMLElementTagNameMap} K
- * @param {K} tag
- * @param {Attributes} [attributes]
- * @param {...(Child | Child[])} children
+ * An element: its tag with classes, `div.a.b`; attributes, if it has any; children. `on…` is a
+ * listener, `class` and the rest are attributes; `true` sets an empty one, `false` and `null` none;
+ * `--x` is a style property.
+ * @type {Maker<HTMLElementTagNameMap>}
  */
-export const h = (tag, attributes, ...children) =>
-	furnish(document.createElement(tag), attributes, children);
+export const h = (/** @type {string} */ tag, /** @type {any[]} */ ...inside) =>
+	furnish(document.createElement(tag.split(".", 1)[0]), tag, inside);
 
-/**
- * The same of a drawing.
- * @template {keyof SVGElementTagNameMap} K
- * @param {K} tag
- * @param {Attributes} [attributes]
- * @param {...(Child | Child[])} children
- */
-export const svg = (tag, attributes, ...children) =>
-	furnish(document.createElementNS("http://www.w3.org/2000/svg", tag), attributes, children);
+/** The same of a drawing. @type {Maker<SVGElementTagNameMap>} */
+export const svg = (/** @type {string} */ tag, /** @type {any[]} */ ...inside) =>
+	furnish(
+		document.createElementNS("http://www.w3.org/2000/svg", tag.split(".", 1)[0]),
+		tag,
+		inside,
+	);
 
-/**
- * @template {HTMLElement | SVGElement} E
- * @param {E} element @param {Attributes} attributes @param {(Child | Child[])[]} children
- */
-function furnish(element, attributes = {}, children) {
+/** @param {any} element @param {string} tag @param {any[]} inside */
+function furnish(element, tag, inside) {
+	const [, ...classes] = tag.split(".");
+	if (classes.length) element.setAttribute("class", classes.join(" "));
+	const [attributes, children] =
+		inside[0]?.constructor === Object ? [inside[0], inside.slice(1)] : [{}, inside];
 	for (const [name, value] of Object.entries(attributes)) {
 		if (value === null || value === undefined || value === false) continue;
-		if (name.startsWith("on"))
-			element.addEventListener(name.slice(2), /** @type {EventListener} */ (value));
+		if (name.startsWith("on")) element.addEventListener(name.slice(2), value);
 		else if (name.startsWith("--")) element.style.setProperty(name, String(value));
 		else element.setAttribute(name, value === true ? "" : String(value));
 	}
@@ -96,7 +92,7 @@ export function allow(control, why) {
  * @param {Element} select @param {...(Child | Child[])} children
  */
 export function refill(select, ...children) {
-	const made = [...h("select", {}, ...children).childNodes];
+	const made = [...h("select", ...children).childNodes];
 	const there = select.childNodes;
 	if (made.length !== there.length || made.some((node, k) => !node.isEqualNode(there[k])))
 		select.replaceChildren(...made);
@@ -125,13 +121,13 @@ export const colourIndex = (id) => ((((id - 1) % 24) + 24) % 24) + 1;
 /** @param {number} id */
 export function idTag(id) {
 	const n = colourIndex(id);
-	return h("span", { class: "id", "--c": `var(--id-${n})`, "--on-id": `var(--on-${n})` }, id);
+	return h("span.id", { "--c": `var(--id-${n})`, "--on-id": `var(--on-${n})` }, id);
 }
 
 /** A symbol with indices set low; a method's key is words. @param {string} symbol  such as p_D or σ_z/σ_x */
 export function symbolParts(symbol) {
 	if (!/^.{1,4}_/.test(symbol)) return [symbol.replaceAll("_", " ")];
-	return symbol.split(/_([^/()+]+)/).map((part, k) => (k % 2 ? h("sub", {}, part) : part));
+	return symbol.split(/_([^/()+]+)/).map((part, k) => (k % 2 ? h("sub", part) : part));
 }
 
 /** @param {string} symbol */

@@ -42,7 +42,7 @@ export function redraw(root, ...children) {
 	const held = all(":focus", root)[0];
 	const stops = `${CONTROLS}, [tabindex]`;
 	const at = all(stops, root).indexOf(held);
-	adapt(root, h("div", {}, ...children));
+	adapt(root, h("div", ...children));
 	if (!held || held.isConnected) return;
 	const now = all(stops, root);
 	const next = now.find((control) => called(control) === called(held)) ?? now[at] ?? now.at(-1);
@@ -54,18 +54,17 @@ export function redraw(root, ...children) {
 
 /** A parameter: its words with its symbol; what it means comes with the pointer. @param {Server.ParameterInfo} of */
 export function parameterName({ label, symbol, help }) {
-	return h("span", { title: help }, `${label} `, h("i", {}, ...symbolParts(symbol)));
+	return h("span", { title: help }, `${label} `, h("i", ...symbolParts(symbol)));
 }
 
 /** Text in a muted colour. @param {...(Child | Child[])} children */
-export const quiet = (...children) => h("span", { class: "q" }, ...children);
+export const quiet = (...children) => h("span.q", ...children);
 
 /** A line of words above or below a table. @param {...(Child | Child[])} children */
-export const line = (...children) => h("p", { class: "words" }, ...children);
+export const line = (...children) => h("p.words", ...children);
 
 /** What stands where there is nothing to list. @param {string} title @param {string} text */
-export const nothing = (title, text) =>
-	h("div", { class: "blank" }, h("h3", {}, title), h("p", {}, text));
+export const nothing = (title, text) => h("div.blank", h("h3", title), h("p", text));
 
 /**
  * A number with fixed digits and a true minus; a dash where there is none.

@@ -53,15 +53,11 @@ export function table(label, columns, { key, by, down, choose, open, attributes 
 		h(
 			"th",
 			{ scope: "col", class: kind, title: help, "data-by": value && word },
-			value
-				? h("button", { onclick: sortBy }, head)
-				: word
-					? head
-					: h("span", { class: "vh" }, "Actions"),
+			value ? h("button", { onclick: sortBy }, head) : word ? head : h("span.vh", "Actions"),
 		),
 	);
 	const body = h("tbody");
-	const element = h("table", { "aria-label": label }, h("thead", {}, h("tr", {}, heads)), body);
+	const element = h("table", { "aria-label": label }, h("thead", h("tr", heads)), body);
 	if (by) sorted.set(label, { word: by, down });
 
 	/** @param {Element} cell  @param {any} value */

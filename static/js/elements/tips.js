@@ -7,7 +7,7 @@ const AFTER = 350;
 const [AWAY, RIM] = [6, 4];
 
 export function mountTips() {
-	const tip = h("div", { class: "tip", popover: "manual", role: "tooltip" });
+	const tip = h("div.tip", { popover: "manual", role: "tooltip" });
 	document.body.append(tip);
 	/** Whose tip is there, or will be. @type {HTMLElement | null} */
 	let over = null;
@@ -25,7 +25,7 @@ export function mountTips() {
 	function show(control) {
 		if (!control.checkVisibility()) return hide();
 		const { tip: words = "", key = "" } = control.dataset;
-		fill(tip, [words, key && h("span", { class: "key" }, key), control.ariaDescription]);
+		fill(tip, [words, key && h("span.key", key), control.ariaDescription]);
 		tip.showPopover();
 		const at = control.getBoundingClientRect();
 		const { width, height } = tip.getBoundingClientRect();

@@ -151,7 +151,7 @@ function mountTracks(root, { store, actions, playback }) {
 			onpointerleave: () => store.set({ hover: null }),
 		}),
 	});
-	const scroller = h("div", { class: "scroll" }, rows.element);
+	const scroller = h("div.scroll", rows.element);
 	root.prepend(scroller);
 	const buttons = KINDS.map(([name, , tip]) =>
 		h("button", { "data-tip": tip, onclick: () => store.set({ listed: name }) }),
@@ -189,7 +189,7 @@ function mountTracks(root, { store, actions, playback }) {
 									"No track was found",
 									"Lower the extraction threshold, or look at the detections in the pictures: without boxes there is nothing to fuse.",
 								];
-			fill(blank, h("h3", {}, title), h("p", {}, text));
+			fill(blank, h("h3", title), h("p", text));
 		}
 		now();
 	}
@@ -215,7 +215,7 @@ function mountTracks(root, { store, actions, playback }) {
 			upcoming,
 			event
 				? [
-						h("b", {}, `${event.kind} of ${event.id}, step ${event.step}`),
+						h("b", `${event.kind} of ${event.id}, step ${event.step}`),
 						` · ${alike.indexOf(event) + 1} of ${alike.length}`,
 					]
 				: "no later event",

@@ -3,7 +3,7 @@
  * them what two panels have of their own: the check of identities, and the steps that somebody
  * marked.
  */
-import { all, allow, choices, one, parts, write, fill, h, icon } from "../elements/dom.js";
+import { all, allow, one, parts, write, fill, h, icon } from "../elements/dom.js";
 import { redraw } from "../elements/drawn.js";
 import { valuesOf } from "../state/actions.js";
 import { fetcher, getJson } from "../state/api.js";
@@ -68,14 +68,9 @@ export function mountBookmarks(root, { store, actions, playback }) {
 			bookmarks.map(({ step, note }) =>
 				h(
 					"li",
-					{},
 					h(
-						"button",
-						{
-							class: "btn box",
-							"aria-label": `Go to step ${step}`,
-							onclick: () => playback.seek(step),
-						},
+						"button.btn.box",
+						{ "aria-label": `Go to step ${step}`, onclick: () => playback.seek(step) },
 						step,
 					),
 					h("input", {
@@ -90,12 +85,8 @@ export function mountBookmarks(root, { store, actions, playback }) {
 							["Enter", "Escape"].includes(key) && /** @type {HTMLElement} */ (target).blur(),
 					}),
 					h(
-						"button",
-						{
-							class: "btn icon",
-							"aria-label": `Forget step ${step}`,
-							onclick: () => put(step, null),
-						},
+						"button.btn.icon",
+						{ "aria-label": `Forget step ${step}`, onclick: () => put(step, null) },
 						icon("i-close", "s"),
 					),
 				),

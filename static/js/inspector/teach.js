@@ -27,7 +27,7 @@ const LEAST = 4;
 function mountFrame(mosaic, store, { keep, tell }) {
 	/** @type {{cell: HTMLElement, index: number, sides: Sides} | null} */
 	let at = null;
-	const frame = h("button", { class: "drawn framed", onkeydown: keyed });
+	const frame = h("button.drawn.framed", { onkeydown: keyed });
 
 	/** In a picture, around the selected person where it is seen there. @param {HTMLElement} cell */
 	function begin(cell) {
@@ -122,8 +122,8 @@ export const NUMBERS = "Template by numbers";
 /** @param {HTMLElement} mosaic  the pictures @param {Context} context */
 export function mountTeach(mosaic, { store, actions }) {
 	const panel = one("#panel-teach");
-	const drawn = h("div", { class: "drawn" });
-	const hint = h("p", { class: "hint", role: "status", hidden: true }, DRAW);
+	const drawn = h("div.drawn");
+	const hint = h("p.hint", { role: "status", hidden: true }, DRAW);
 	mosaic.before(hint);
 	/** Where a drag began.  @type {{cam: HTMLElement, x: number, y: number} | null} */
 	let begun = null;

@@ -15,9 +15,9 @@ import { many, size } from "./words.js";
 export function chosenBar({ store, actions, chosen, none, leave }) {
 	const numbers = () => chosen().map(({ id }) => id);
 	const picked = h("b");
-	const line = h("span", { role: "status", class: "gone-line" });
-	const stop = h("button", { class: "btn" }, "Stop");
-	const side = h("button", { class: "btn box", onclick: compare }, icon("i-swap"), "Compare");
+	const line = h("span.gone-line", { role: "status" });
+	const stop = h("button.btn", "Stop");
+	const side = h("button.btn.box", { onclick: compare }, icon("i-swap"), "Compare");
 	/** @param {string} words @param {() => void} [cancel] */
 	const say = (words, cancel) => {
 		fill(line, words);
@@ -26,24 +26,15 @@ export function chosenBar({ store, actions, chosen, none, leave }) {
 		element.hidden = !words && !chosen().length;
 	};
 	const tools = h(
-		"span",
-		{ class: "picked", role: "toolbar", "aria-label": "Chosen runs" },
+		"span.picked",
+		{ role: "toolbar", "aria-label": "Chosen runs" },
 		picked,
 		side,
 		exportMenu({ store, actions, say, chosen: numbers }),
-		h(
-			"button",
-			{ class: "btn box", onclick: () => void remove(numbers()) },
-			icon("i-trash"),
-			"Delete",
-		),
-		h(
-			"button",
-			{ class: "btn icon", "aria-label": "Choose none", onclick: none },
-			icon("i-close", "s"),
-		),
+		h("button.btn.box", { onclick: () => void remove(numbers()) }, icon("i-trash"), "Delete"),
+		h("button.btn.icon", { "aria-label": "Choose none", onclick: none }, icon("i-close", "s")),
 	);
-	const element = h("div", { class: "undo-line" }, tools, h("span", { class: "grow" }), line, stop);
+	const element = h("div.undo-line", tools, h("span.grow"), line, stop);
 
 	function compare() {
 		const dialog = /** @type {any} */ (one(".compare"));
@@ -52,9 +43,8 @@ export function chosenBar({ store, actions, chosen, none, leave }) {
 			dialog,
 			h(
 				"header",
-				{},
-				h("h2", {}, "Runs side by side"),
-				h("button", { class: "btn icon", "aria-label": "Close", onclick: close }, icon("i-close")),
+				h("h2", "Runs side by side"),
+				h("button.btn.icon", { "aria-label": "Close", onclick: close }, icon("i-close")),
 			),
 			...comparison(chosen(), store.get().schema),
 		);

@@ -14,10 +14,10 @@ const SAVES_MS = 250;
  */
 export function exportMenu({ store, actions, chosen, say }) {
 	const forms = h("div", { role: "menu", "aria-label": "Export as" });
-	const menu = h("div", { class: "menu", popover: "auto" }, forms);
+	const menu = h("div.menu", { popover: "auto" }, forms);
 	const button = h(
-		"button",
-		{ class: "btn box", "aria-haspopup": "menu" },
+		"button.btn.box",
+		{ "aria-haspopup": "menu" },
 		icon("i-export"),
 		"Export",
 		icon("i-down", "s"),
@@ -54,12 +54,7 @@ export function exportMenu({ store, actions, chosen, say }) {
 		[1, 0.5, 0.25, 0.1].map((value) => [value, value === 1 ? "real speed" : `${value}×`]),
 		1,
 	);
-	const part = h(
-		"div",
-		{ class: "video-part" },
-		h("b", {}, "Of a video"),
-		h("span", {}, first, " – ", last, " ", speed),
-	);
+	const part = h("div.video-part", h("b", "Of a video"), h("span", first, " – ", last, " ", speed));
 	let listed = false;
 
 	/** Once the server has told them; asked again when the menu is opened again. */
@@ -67,7 +62,7 @@ export function exportMenu({ store, actions, chosen, say }) {
 		if (listed) return;
 		const told = await getJson("/api/exports/formats").catch((error) => error);
 		if (told instanceof Error) {
-			fill(menu, h("p", { class: "small" }, `What can be written is not known: ${told.message}`));
+			fill(menu, h("p.small", `What can be written is not known: ${told.message}`));
 			return;
 		}
 		listed = true;
@@ -77,12 +72,9 @@ export function exportMenu({ store, actions, chosen, say }) {
 			told.formats.map((/** @type {Server.FormatInfo} */ form) =>
 				h(
 					"button",
-					{
-						role: "menuitem",
-						onclick: () => (menu.hidePopover(), void write(form)),
-					},
-					h("b", {}, form.word),
-					h("span", { class: "small" }, form.help),
+					{ role: "menuitem", onclick: () => (menu.hidePopover(), void write(form)) },
+					h("b", form.word),
+					h("span.small", form.help),
 				),
 			),
 		);

@@ -17,19 +17,18 @@ import { factsOf, has, many, size, titleOf, when, whereabouts } from "./words.js
 function lostRecording({ actions, moved }) {
 	/** @type {Server.RecordingInfo | null} */
 	let now = null;
-	const why = h("span", {});
-	const place = h("input", {
-		class: "field",
+	const why = h("span");
+	const place = h("input.field", {
 		placeholder: "folder where it lies now",
 		"aria-label": "Folder where the recording lies now",
 		onkeydown: (/** @type {KeyboardEvent} */ event) => event.key === "Enter" && void find(),
 	});
 	const element = h(
-		"div",
-		{ class: "lost", role: "status", hidden: true },
+		"div.lost",
+		{ role: "status", hidden: true },
 		why,
 		place,
-		h("button", { class: "btn box", onclick: () => void find() }, "Find…"),
+		h("button.btn.box", { onclick: () => void find() }, "Find…"),
 	);
 
 	async function find() {
@@ -102,21 +101,20 @@ function shelf(on) {
 	const order = h(
 		"select",
 		{ "aria-label": "Sort recordings by", onchange: () => on.find() },
-		Object.keys(ORDERS).map((word) => h("option", {}, word)),
+		Object.keys(ORDERS).map((word) => h("option", word)),
 	);
-	const list = h("div", { class: "scroll list", role: "listbox", "aria-label": "Recordings" });
-	const foot = h("div", { class: "foot" });
+	const list = h("div.scroll.list", { role: "listbox", "aria-label": "Recordings" });
+	const foot = h("div.foot");
 	const element = h(
-		"section",
-		{ class: "pane", "aria-label": "Recordings" },
+		"section.pane",
+		{ "aria-label": "Recordings" },
 		h(
-			"div",
-			{ class: "pane-head" },
-			h("h2", { class: "pane-title" }, "Recordings"),
-			h("span", { class: "grow" }),
-			h("button", { class: "btn", "data-key": "Ctrl O", onclick: on.add }, "Open…"),
+			"div.pane-head",
+			h("h2.pane-title", "Recordings"),
+			h("span.grow"),
+			h("button.btn", { "data-key": "Ctrl O", onclick: on.add }, "Open…"),
 		),
-		h("div", { class: "lib-find" }, icon("i-search", "s"), find, order),
+		h("div.lib-find", icon("i-search", "s"), find, order),
 		list,
 		foot,
 	);
@@ -134,20 +132,14 @@ function shelf(on) {
 				onclick: () => on.choose(one),
 				ondblclick: () => on.open(one),
 			},
-			h("span", { class: "th" }, picture(one)),
+			h("span.th", picture(one)),
 			h(
-				"span",
-				{ class: "tx" },
-				h("b", {}, one.name),
-				where && h("span", { class: "small where" }, where),
+				"span.tx",
+				h("b", one.name),
+				where && h("span.small.where", where),
 				h("span", { class: `small${one.missing ? " missing" : ""}` }, factsOf(one)),
 			),
-			h(
-				"span",
-				{ class: "en" },
-				h("b", {}, one.runs || ""),
-				h("span", { class: "small" }, one.opened ? when(one.opened) : ""),
-			),
+			h("span.en", h("b", one.runs || ""), h("span.small", one.opened ? when(one.opened) : "")),
 		);
 
 	return {
@@ -189,7 +181,7 @@ function shelf(on) {
 								one.kind === kind &&
 								(!text || has(text, [one.name, one.place]) || one.place === recording?.place),
 						);
-					const head = h("div", { class: "cap" }, h("span", {}, word), h("span", {}, "runs"));
+					const head = h("div.cap", h("span", word), h("span", "runs"));
 					const items = found.map((one) =>
 						item(one, one.place === recording?.place, where.get(one.place)),
 					);
@@ -244,11 +236,11 @@ export function mountLibrary(root, { store, actions }) {
 		none: chooseNone,
 		leave,
 	});
-	const title = h("h2", { class: "pane-title" }, "Runs");
-	const sub = h("span", { class: "sub" });
+	const title = h("h2.pane-title", "Runs");
+	const sub = h("span.sub");
 	const only = h(
-		"button",
-		{ class: "btn", "aria-pressed": "false", onclick: () => ((starred = !starred), show()) },
+		"button.btn",
+		{ "aria-pressed": "false", onclick: () => ((starred = !starred), show()) },
 		icon("i-star", "s"),
 		"starred",
 	);
@@ -258,7 +250,7 @@ export function mountLibrary(root, { store, actions }) {
 		star: (run) => void change(run, { star: !run.star }),
 		tick: (run) => tick(run.id),
 	});
-	const empty = h("div", { class: "blank", hidden: true });
+	const empty = h("div.blank", { hidden: true });
 	const gone = lostRecording({
 		moved: (told) => {
 			recording = told;
@@ -270,17 +262,9 @@ export function mountLibrary(root, { store, actions }) {
 		root,
 		recordings.element,
 		h(
-			"section",
-			{ class: "pane runs", "aria-label": "Runs" },
-			h(
-				"div",
-				{ class: "pane-head" },
-				title,
-				sub,
-				h("span", { class: "grow" }),
-				only,
-				table.chooser,
-			),
+			"section.pane.runs",
+			{ "aria-label": "Runs" },
+			h("div.pane-head", title, sub, h("span.grow"), only, table.chooser),
 			gone.element,
 			table.element,
 			empty,
@@ -327,15 +311,14 @@ export function mountLibrary(root, { store, actions }) {
 				empty,
 				h(
 					"h3",
-					{},
 					runs.length ? "No run matches" : isUnderWay() ? "A run is under way" : "Nothing kept yet",
 				),
-				h("p", {}, library.error ?? "Every run is kept here a few seconds after its end."),
+				h("p", library.error ?? "Every run is kept here a few seconds after its end."),
 				// The one that is open is only a tab away.
 				recording.place !== store.get().sequence?.opened_as &&
 					h(
-						"button",
-						{ class: "btn main", onclick: () => recording && openRecording(recording) },
+						"button.btn.main",
+						{ onclick: () => recording && openRecording(recording) },
 						`Open ${recording.name}`,
 					),
 			);
@@ -424,7 +407,7 @@ export function mountLibrary(root, { store, actions }) {
 		const run = focusedRun();
 		const cell = root.querySelector(`tr[data-run="${focused}"] td:nth-child(2)`);
 		if (!run || !cell) return;
-		const field = h("input", { class: "field", value: run.name, "aria-label": "Name of the run" });
+		const field = h("input.field", { value: run.name, "aria-label": "Name of the run" });
 		writing = true;
 		const end = (/** @type {boolean} */ keep) => {
 			if (!writing) return;

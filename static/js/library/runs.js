@@ -26,29 +26,21 @@ const PILLS = 3;
 /** @param {Server.KeptRunInfo} run @param {boolean} taught  whether runs differ in their templates */
 function pills(run, taught) {
 	const changes = run.changes.filter(({ key }) => !isMethod(key));
-	if (!changes.length && !run.corrected && !(taught && run.templates))
-		return h("span", { class: "q" }, "–");
+	if (!changes.length && !run.corrected && !(taught && run.templates)) return h("span.q", "–");
 	const all = changes.map(({ key, value }) => `${key} ${value}`).join("\n");
 	const shown = changes
 		.slice(0, PILLS)
-		.map(({ symbol, value }) =>
-			h("span", { class: "pc" }, symbolOf(symbol, "q"), " ", methodWord(value)),
-		);
+		.map(({ symbol, value }) => h("span.pc", symbolOf(symbol, "q"), " ", methodWord(value)));
 	const more = changes.length - PILLS;
 	return h(
 		"span",
 		{ title: all },
 		taught &&
 			run.templates &&
-			h(
-				"span",
-				{ class: "pc", title: run.templates.join("\n") },
-				many(run.templates.length, "template"),
-			),
+			h("span.pc", { title: run.templates.join("\n") }, many(run.templates.length, "template")),
 		shown,
-		more > 0 && h("span", { class: "pc" }, `+${more}`),
-		run.corrected > 0 &&
-			h("span", { class: "pc" }, icon("i-pin", "s"), `${run.corrected} corrected`),
+		more > 0 && h("span.pc", `+${more}`),
+		run.corrected > 0 && h("span.pc", icon("i-pin", "s"), `${run.corrected} corrected`),
 	);
 }
 
@@ -118,20 +110,15 @@ export function runsTable(on) {
 					},
 					icon("i-star", run.star ? "s full" : "s"),
 				),
-				h("b", {}, run.name || String(run.id)),
-				run.name ? h("span", { class: "q" }, ` ${run.id}`) : null,
+				h("b", run.name || String(run.id)),
+				run.name ? h("span.q", ` ${run.id}`) : null,
 				run.older_code
-					? h(
-							"span",
-							{ class: "q", title: "Another version of the program made it" },
-							" older code",
-						)
+					? h("span.q", { title: "Another version of the program made it" }, " older code")
 					: null,
 				run.provisional
 					? h(
-							"span",
+							"span.q",
 							{
-								class: "q",
 								title:
 									"Its figures were made before it was finished; opening it computes them again",
 							},
@@ -151,7 +138,7 @@ export function runsTable(on) {
 			by: true,
 			cell: (run) => [
 				methodWord(run.single_view),
-				h("span", { class: "q" }, " › "),
+				h("span.q", " › "),
 				methodWord(run.fusion_method),
 			],
 		},
@@ -166,12 +153,12 @@ export function runsTable(on) {
 			kind: "num met",
 			by: (/** @type {Server.KeptRunInfo} */ run) => final(run, key) ?? -Infinity,
 			cell: (/** @type {Server.KeptRunInfo} */ run) => {
-				if (run.provisional) return h("span", { class: "q" }, `(${figure(run[key])})`);
+				if (run.provisional) return h("span.q", `(${figure(run[key])})`);
 				const value = run[key];
 				const share = value === null ? 0 : (value - from) / (to - from);
 				return [
 					h("span", { class: value !== null && value === best[key] ? "top1" : "" }, figure(value)),
-					h("i", { class: "mb", "--v": Math.max(0.02, Math.min(1, share)) }),
+					h("i.mb", { "--v": Math.max(0.02, Math.min(1, share)) }),
 				];
 			},
 		})),
@@ -210,7 +197,7 @@ export function runsTable(on) {
 				cell.hidden = wrong || hidden.has(word);
 			});
 	};
-	const menu = h("div", { class: "menu plots", popover: "auto", "aria-label": "Columns" });
+	const menu = h("div.menu.plots", { popover: "auto", "aria-label": "Columns" });
 	fill(
 		menu,
 		columns
@@ -218,7 +205,6 @@ export function runsTable(on) {
 			.map(({ word }) =>
 				h(
 					"label",
-					{},
 					h("input", {
 						type: "checkbox",
 						checked: !hidden.has(word),
@@ -228,16 +214,11 @@ export function runsTable(on) {
 							hide();
 						},
 					}),
-					h("b", {}, word),
+					h("b", word),
 				),
 			),
 	);
-	const chooser = h(
-		"button",
-		{ class: "btn", "aria-haspopup": "true" },
-		"Columns",
-		icon("i-down", "s"),
-	);
+	const chooser = h("button.btn", { "aria-haspopup": "true" }, "Columns", icon("i-down", "s"));
 	chooser.popoverTargetElement = menu;
 	menu.addEventListener("toggle", () => {
 		const { right, bottom } = chooser.getBoundingClientRect();
@@ -245,7 +226,7 @@ export function runsTable(on) {
 	});
 
 	return {
-		element: h("div", { class: "scroll" }, rows.element),
+		element: h("div.scroll", rows.element),
 		/** What chooses the columns. */
 		chooser: [chooser, menu],
 		/**

@@ -189,9 +189,9 @@ export function mountView3d(root, { store, actions, playback, retry, press }) {
 			fill(
 				blank,
 				icon("i-plug", "l"),
-				h("h3", {}, title),
-				h("p", {}, text),
-				h("button", { class: "btn box", onclick }, "Try now"),
+				h("h3", title),
+				h("p", text),
+				h("button.btn.box", { onclick }, "Try now"),
 			);
 		if (link === "lost")
 			say("3D view lost", "Pictures and results that were loaded can still be looked at.", retry);
@@ -201,7 +201,7 @@ export function mountView3d(root, { store, actions, playback, retry, press }) {
 				"Pictures, timeline and tables still work. It is tried again by itself.",
 				load,
 			);
-		else fill(blank, h("p", {}, server ? "Loading the 3D view" : "Connecting"));
+		else fill(blank, h("p", server ? "Loading the 3D view" : "Connecting"));
 	}
 
 	function header() {
@@ -229,11 +229,7 @@ export function mountView3d(root, { store, actions, playback, retry, press }) {
 				points.map(([name, view, tip, key]) =>
 					h(
 						"button",
-						{
-							"data-tip": tip,
-							"data-key": key,
-							onclick: () => actions.lookThrough(view),
-						},
+						{ "data-tip": tip, "data-key": key, onclick: () => actions.lookThrough(view) },
 						name,
 					),
 				),

@@ -24,7 +24,7 @@ function signOf({ best, front, objectives }, { number, vetoed, state }) {
  * @param {(number: number) => void} on.use
  */
 function trialsTable({ choose, use }) {
-	const element = h("div", { class: "scroll", tabindex: 0, "aria-label": "Trials, best first" });
+	const element = h("div.scroll", { tabindex: 0, "aria-label": "Trials, best first" });
 	/** @type {Server.Study} */
 	let study;
 	/** @type {Server.TrialInfo | undefined} */
@@ -60,12 +60,8 @@ function trialsTable({ choose, use }) {
 				const { number } = trial;
 				const sign = signOf(study, trial);
 				return [
-					h(
-						"button",
-						{ class: "as-text", onclick: () => choose(number) },
-						number ? number : "default",
-					),
-					sign && h("span", { class: "q" }, ` ${sign}`),
+					h("button.as-text", { onclick: () => choose(number) }, number ? number : "default"),
+					sign && h("span.q", ` ${sign}`),
 				];
 			},
 		},
@@ -94,11 +90,10 @@ function trialsTable({ choose, use }) {
 			kind: "act",
 			cell: ({ number }) =>
 				number === 0
-					? h("span", { class: "q" }, "trial 0")
+					? h("span.q", "trial 0")
 					: h(
-							"button",
+							"button.btn",
 							{
-								class: "btn",
 								"aria-label": `Use trial ${number}`,
 								onclick: (event) => (event.stopPropagation(), use(number)),
 							},
@@ -168,34 +163,25 @@ function trialsTable({ choose, use }) {
  */
 export function bestTrials({ store, actions }, { choose, chosen, name, path }) {
 	const rows = trialsTable({ choose, use: (number) => void use(number) });
-	const which = h("span", { class: "sub" });
-	const put = h("button", { class: "btn main", onclick: () => useChosen() }, "Use");
-	const beside = h(
-		"button",
-		{ class: "btn box", onclick: () => void compare() },
-		"Compare with current",
-	);
-	const keep = h("button", { class: "btn box", onclick: askName }, "Save as preset…");
-	const differs = h("span", { class: "sub" });
+	const which = h("span.sub");
+	const put = h("button.btn.main", { onclick: () => useChosen() }, "Use");
+	const beside = h("button.btn.box", { onclick: () => void compare() }, "Compare with current");
+	const keep = h("button.btn.box", { onclick: askName }, "Save as preset…");
+	const differs = h("span.sub");
 	const command = h(
-		"button",
-		{
-			class: "btn",
-			onclick: () => void copyCommand(),
-			title: "The command that gives these tracks again",
-		},
+		"button.btn",
+		{ onclick: () => void copyCommand(), title: "The command that gives these tracks again" },
 		icon("i-copy", "s"),
 		"Command",
 	);
 	const element = h(
-		"section",
-		{ class: "pane tab2", "aria-label": "Best trials" },
+		"section.pane.tab2",
+		{ "aria-label": "Best trials" },
 		h(
-			"div",
-			{ class: "pane-head" },
-			h("h2", { class: "pane-title" }, "Best trials"),
+			"div.pane-head",
+			h("h2.pane-title", "Best trials"),
 			differs,
-			h("span", { class: "grow" }),
+			h("span.grow"),
 			which,
 			put,
 			beside,
@@ -229,8 +215,7 @@ export function bestTrials({ store, actions }, { choose, chosen, name, path }) {
 	/** The name is asked for where the button stands. */
 	function askName() {
 		const number = chosen();
-		const field = h("input", {
-			class: "field",
+		const field = h("input.field", {
 			value: `${name()} ${number}`,
 			"aria-label": "Name of the preset",
 		});

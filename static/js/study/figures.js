@@ -269,11 +269,11 @@ function shares({ importance, varied }) {
 			ends: [rows.length - 0.5, -0.5],
 			ticks: rows.map(({ range, name, share, y }) => {
 				const words = h(
-					"span",
-					{ class: "lab", title: range && `${name}: ${range.help}` },
-					h("span", {}, name),
+					"span.lab",
+					{ title: range && `${name}: ${range.help}` },
+					h("span", name),
 					range && symbolOf(range.symbol),
-					h("b", {}, percent(share)),
+					h("b", percent(share)),
 				);
 				return /** @type {const} */ ([y, words]);
 			}),
@@ -296,55 +296,37 @@ export function overview({ choose, narrow }) {
 	let shown = { study: null, done: [], chosen: null };
 	/** Key of the figure along the other axis. */
 	let across = "";
-	const axes = h("div", { class: "seg", role: "group", "aria-label": "Axes" });
+	const axes = h("div.seg", { role: "group", "aria-label": "Axes" });
 	const pareto = chart();
 	const scat = h(
-		"section",
-		{ class: "pane scat", "aria-label": "Trials" },
-		h(
-			"div",
-			{ class: "pane-head" },
-			h("h2", { class: "pane-title" }, "Trials"),
-			axes,
-			h("span", { class: "grow" }),
-			legend(),
-		),
+		"section.pane.scat",
+		{ "aria-label": "Trials" },
+		h("div.pane-head", h("h2.pane-title", "Trials"), axes, h("span.grow"), legend()),
 		pareto.element,
 	);
 	const bars = chart();
-	const rows = h("div", { class: "ibars" }, bars.element);
-	const aside = h("p", { class: "small ifoot" });
-	const of = h("span", { class: "sub" });
-	const since = h("span", { class: "q" });
+	const rows = h("div.ibars", bars.element);
+	const aside = h("p.small.ifoot");
+	const of = h("span.sub");
+	const since = h("span.q");
 	const sofar = chart();
 	const matters = h(
-		"section",
-		{ class: "pane imp", "aria-label": "What matters" },
-		h(
-			"div",
-			{ class: "pane-head" },
-			h("h2", { class: "pane-title" }, "What matters"),
-			h("span", { class: "grow" }),
-			of,
-		),
+		"section.pane.imp",
+		{ "aria-label": "What matters" },
+		h("div.pane-head", h("h2.pane-title", "What matters"), h("span.grow"), of),
 		rows,
 		aside,
-		h(
-			"div",
-			{ class: "sofar" },
-			h("div", { class: "mh" }, h("span", {}, "Best so far"), h("span", { class: "grow" }), since),
-			sofar.element,
-		),
+		h("div.sofar", h("div.mh", h("span", "Best so far"), h("span.grow"), since), sofar.element),
 	);
-	const each = h("h2", { class: "pane-title" }, "Each parameter");
-	const grid = h("div", { class: "mgrid" });
-	const narrowing = h("span", { class: "sub" });
+	const each = h("h2.pane-title", "Each parameter");
+	const grid = h("div.mgrid");
+	const narrowing = h("span.sub");
 	/** Of each shown parameter by its key: its chart, and the value of the best. */
 	const cells = new Map();
 	const multiples = h(
-		"section",
-		{ class: "pane mult", "aria-label": "Each parameter" },
-		h("div", { class: "pane-head" }, each, h("span", { class: "grow" }), narrowing),
+		"section.pane.mult",
+		{ "aria-label": "Each parameter" },
+		h("div.pane-head", each, h("span.grow"), narrowing),
 		grid,
 	);
 
@@ -416,10 +398,7 @@ export function overview({ choose, narrow }) {
 			others.map(({ of: { key }, name: word }) =>
 				h(
 					"button",
-					{
-						"aria-pressed": String(key === x.of.key),
-						onclick: () => ((across = key), draw()),
-					},
+					{ "aria-pressed": String(key === x.of.key), onclick: () => ((across = key), draw()) },
 					y.name.length > LONG ? `against ${word}` : `${y.name} · ${word}`,
 				),
 			),
@@ -479,14 +458,13 @@ export function overview({ choose, narrow }) {
 		const [figure, best] = [chart(), h("b")];
 		cells.set(key, { figure, best });
 		return h(
-			"div",
-			{ class: "mp" },
+			"div.mp",
 			h(
-				"div",
-				{ class: "mh", title: `${label}: ${help}` },
-				h("span", { class: "lab" }, h("span", {}, label), symbolOf(symbol)),
-				h("span", { class: "grow" }),
-				h("span", { class: "q" }, "best"),
+				"div.mh",
+				{ title: `${label}: ${help}` },
+				h("span.lab", h("span", label), symbolOf(symbol)),
+				h("span.grow"),
+				h("span.q", "best"),
 				best,
 			),
 			figure.element,
@@ -516,8 +494,7 @@ function legend() {
 		["best", "best"],
 	];
 	return h(
-		"div",
-		{ class: "legend" },
-		signs.map(([kind, word]) => h("span", {}, h("i", { class: `sign ${kind}` }), word)),
+		"div.legend",
+		signs.map(([kind, word]) => h("span", h("i", { class: `sign ${kind}` }), word)),
 	);
 }

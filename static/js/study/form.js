@@ -41,13 +41,13 @@ export function numberField(changed, label, value, set, more = {}) {
 /** @param {string} word @param {false | (() => void)} out @param {string} [title] */
 const tag = (word, out, title) =>
 	h(
-		"span",
-		{ class: "pc", title: title ?? word },
+		"span.pc",
+		{ title: title ?? word },
 		word,
 		out &&
 			h(
-				"button",
-				{ class: "btn icon", "aria-label": `Leave out ${word}`, onclick: out },
+				"button.btn.icon",
+				{ "aria-label": `Leave out ${word}`, onclick: out },
 				icon("i-close", "s"),
 			),
 	);
@@ -59,30 +59,21 @@ const tag = (word, out, title) =>
  * @param {string} [last]  what a further column is for
  */
 const rangesBlock = (count, rows, last) => [
+	h("h3.h", "Parameters", h("span.grow"), h("span.small", count)),
 	h(
-		"h3",
-		{ class: "h" },
-		"Parameters",
-		h("span", { class: "grow" }),
-		h("span", { class: "small" }, count),
-	),
-	h(
-		"table",
-		{ class: "pt" },
+		"table.pt",
 		h(
 			"thead",
-			{},
 			h(
 				"tr",
-				{},
-				h("th", {}, "name"),
-				h("th", { class: "num" }, "from"),
-				h("th", { class: "num" }, "to"),
-				h("th", {}, "scale"),
-				last && h("th", {}, h("span", { class: "vh" }, last)),
+				h("th", "name"),
+				h("th.num", "from"),
+				h("th.num", "to"),
+				h("th", "scale"),
+				last && h("th", h("span.vh", last)),
 			),
 		),
-		h("tbody", {}, rows),
+		h("tbody", rows),
 	),
 ];
 
@@ -99,15 +90,9 @@ export const choiceCard = (on, title, choose, can, ...rest) =>
 		"div",
 		{ class: `choice${on ? " on" : ""}` },
 		h(
-			"button",
-			{
-				class: "as-text",
-				role: "radio",
-				"aria-checked": String(on),
-				disabled: !can,
-				onclick: choose,
-			},
-			h("b", {}, title),
+			"button.as-text",
+			{ role: "radio", "aria-checked": String(on), disabled: !can, onclick: choose },
+			h("b", title),
 		),
 		rest,
 	);
@@ -118,45 +103,39 @@ export const choiceCard = (on, title, choose, can, ...rest) =>
 function lockedParts(study) {
 	const { definition: told } = study;
 	/** @param {string} word @param {Child} value */
-	const line = (word, value) =>
-		h("div", { class: "pairline" }, h("span", {}, word), h("span", {}, value));
+	const line = (word, value) => h("div.pairline", h("span", word), h("span", value));
 	const seeds = Array.isArray(told.seeds) ? told.seeds.length : told.seeds;
 	return [
 		h(
-			"div",
-			{ class: "blk" },
-			h("h3", { class: "h" }, "Recordings"),
+			"div.blk",
+			h("h3.h", "Recordings"),
 			h(
-				"div",
-				{ class: "tags" },
+				"div.tags",
 				told.recordings.map((/** @type {string} */ place) => tag(nameOf(place), false, place)),
 			),
 		),
 		h(
-			"div",
-			{ class: "blk" },
+			"div.blk",
 			rangesBlock(
 				study.varied.length,
 				study.varied.map(({ label, symbol, help, low, high, log, choices: all }) =>
 					h(
 						"tr",
-						{},
-						h("td", { title: help }, h("span", { class: "lab" }, label), " ", symbolOf(symbol)),
+						h("td", { title: help }, h("span.lab", label), " ", symbolOf(symbol)),
 						all.length
-							? h("td", { class: "num", colspan: 3 }, all.map(valueOf).join(", "))
+							? h("td.num", { colspan: 3 }, all.map(valueOf).join(", "))
 							: [
-									h("td", { class: "num" }, valueOf(low)),
-									h("td", { class: "num" }, valueOf(high)),
-									h("td", {}, log ? "log" : "linear"),
+									h("td.num", valueOf(low)),
+									h("td.num", valueOf(high)),
+									h("td", log ? "log" : "linear"),
 								],
 					),
 				),
 			),
 		),
 		h(
-			"div",
-			{ class: "blk" },
-			h("h3", { class: "h" }, "Search"),
+			"div.blk",
+			h("h3.h", "Search"),
 			line("trials", study.info.trials ?? "as many as fit"),
 			line("seeds", seeds),
 			line("search", SEARCHES.find(([key]) => key === told.search)?.[1] ?? told.search),
@@ -196,8 +175,7 @@ function objectiveCards(now, figures, { hasTruth, cameras }, { changed, show }) 
 		const free = from.filter(
 			({ key }) => now.objectives[place] === key || !now.objectives.includes(key),
 		);
-		const select = h("select", {
-			class: "field",
+		const select = h("select.field", {
 			"aria-label": word,
 			onchange: () => set(now.objectives.with(place, select.value)),
 		});
@@ -217,7 +195,7 @@ function objectiveCards(now, figures, { hasTruth, cameras }, { changed, show }) 
 			],
 			now.objectives[place] ?? "",
 		);
-		return h("label", {}, h("span", {}, word), select);
+		return h("label", h("span", word), select);
 	};
 
 	/** @param {"truth" | "agreement"} kind @param {string} title @param {string} beside @param {...Child} rest */
@@ -229,7 +207,7 @@ function objectiveCards(now, figures, { hasTruth, cameras }, { changed, show }) 
 			title,
 			() => !on && set([usual(kind)]),
 			on || can,
-			h("span", { class: "small beside" }, beside),
+			h("span.small.beside", beside),
 			...rest,
 		);
 	};
@@ -241,20 +219,19 @@ function objectiveCards(now, figures, { hasTruth, cameras }, { changed, show }) 
 	const [known] = leads.agreement;
 
 	return h(
-		"div",
-		{ class: "blk" },
-		h("h3", { class: "h" }, "Objective"),
+		"div.blk",
+		h("h3.h", "Objective"),
 		h(
-			"div",
-			{ role: "radiogroup", "aria-label": "Objective", class: "stack" },
+			"div.stack",
+			{ role: "radiogroup", "aria-label": "Objective" },
 			card(
 				"truth",
 				"Truth",
 				hasTruth ? "" : "not there",
 				!byAgreement && chooser(0, "best is", leads.truth),
 				h(
-					"span",
-					{ class: "small", title: byAgreement ? null : lead?.help },
+					"span.small",
+					{ title: byAgreement ? null : lead?.help },
 					hasTruth
 						? "mean over recordings and seeds of a figure against the truth"
 						: "no one knows where people were in this recording",
@@ -265,23 +242,21 @@ function objectiveCards(now, figures, { hasTruth, cameras }, { changed, show }) 
 				"Held-out camera",
 				"no truth needed",
 				h(
-					"span",
-					{ class: "small", title: known?.help },
+					"span.small",
+					{ title: known?.help },
 					cameras > 1
 						? "do runs backwards and without each camera find the same people? None is best whose people miss the boxes of a camera that was left out"
 						: "one camera cannot be left out: only the run backwards is held against it",
 				),
 				byAgreement &&
 					h(
-						"span",
-						{ class: "small warn" },
+						"span.small.warn",
 						"a tracker can be consistently wrong: look at the best trial before you use it",
 					),
 			),
 		),
 		h(
-			"div",
-			{ class: "stack" },
+			"div.stack",
 			now.objectives.length > 0 && chooser(1, "against", others),
 			now.objectives.length > 1 && chooser(2, "and", others),
 		),
@@ -310,8 +285,7 @@ const rangeOf = ({ low, high, log, choices: all }) => ({
  */
 function parameterRanges(now, known, all, on) {
 	const rest = all.filter(({ key }) => !(key in now.parameters));
-	const more = h("select", {
-		class: "field",
+	const more = h("select.field", {
 		"aria-label": "Vary another parameter",
 		onchange: () => void on.add(more.value),
 	});
@@ -326,8 +300,7 @@ function parameterRanges(now, known, all, on) {
 		"",
 	);
 	return h(
-		"div",
-		{ class: "blk" },
+		"div.blk",
 		rangesBlock(
 			`${Object.keys(now.parameters).length} of ${all.length}`,
 			Object.entries(now.parameters).map(([key, range]) => parameter(now, known, key, range, on)),
@@ -348,9 +321,8 @@ function parameter(now, known, key, range, { changed, show }) {
 	const found = known.find((one) => one.key === key);
 	const label = found?.label ?? key;
 	const out = h(
-		"button",
+		"button.btn.icon",
 		{
-			class: "btn icon",
 			"aria-label": `Leave out ${label}`,
 			onclick: () => {
 				delete now.parameters[key];
@@ -363,23 +335,21 @@ function parameter(now, known, key, range, { changed, show }) {
 	const name = h(
 		"td",
 		{ title: found?.help ?? "" },
-		h("span", { class: "lab" }, label),
+		h("span.lab", label),
 		" ",
 		found && symbolOf(found.symbol),
 	);
 	if (range.choices)
 		return h(
 			"tr",
-			{},
 			name,
 			h(
-				"td",
-				{ colspan: 3, class: "num" },
+				"td.num",
+				{ colspan: 3 },
 				(found?.choices ?? range.choices).map((one) =>
 					h(
-						"button",
+						"button.btn.one",
 						{
-							class: "btn one",
 							"aria-pressed": String(range.choices?.includes(one)),
 							onclick: () => {
 								const left = range.choices?.includes(one)
@@ -394,30 +364,25 @@ function parameter(now, known, key, range, { changed, show }) {
 					),
 				),
 			),
-			h("td", {}, out),
+			h("td", out),
 		);
 	const ends = { min: found?.minimum, max: found?.maximum };
 	return h(
 		"tr",
-		{},
 		name,
 		h(
-			"td",
-			{ class: "num" },
+			"td.num",
 			numberField(changed, `${label} from`, tidy(range.low), (value) => (range.low = value), ends),
 		),
 		h(
-			"td",
-			{ class: "num" },
+			"td.num",
 			numberField(changed, `${label} to`, tidy(range.high), (value) => (range.high = value), ends),
 		),
 		h(
 			"td",
-			{},
 			h(
-				"button",
+				"button.btn.scale",
 				{
-					class: "btn scale",
 					"aria-label": `Scale of ${label}: ${range.log ? "logarithmic" : "linear"}`,
 					onclick: () => {
 						range.log = !range.log;
@@ -428,7 +393,7 @@ function parameter(now, known, key, range, { changed, show }) {
 				range.log ? "log" : "linear",
 			),
 		),
-		h("td", {}, out),
+		h("td", out),
 	);
 }
 
@@ -458,24 +423,17 @@ const ASKED_MS = 300;
  * @param {() => void} on.copy
  */
 export function definition({ store }, { start, cost: told, copy }) {
-	const body = h("div", { class: "scroll" });
-	const sub = h("span", { class: "sub" });
-	const again = h("button", { class: "btn", onclick: copy }, "Edit a copy");
-	const begin = h("button", { class: "btn main tall2", onclick: () => wish && start(wish, where) });
+	const body = h("div.scroll");
+	const sub = h("span.sub");
+	const again = h("button.btn", { onclick: copy }, "Edit a copy");
+	const begin = h("button.btn.main.tall2", { onclick: () => wish && start(wish, where) });
 	fill(begin, icon("i-play", "s"), "Start");
-	const why = h("p", { class: "small why", role: "status" });
-	const foot = h("div", { class: "def-foot" }, why, begin);
+	const why = h("p.small.why", { role: "status" });
+	const foot = h("div.def-foot", why, begin);
 	const element = h(
-		"section",
-		{ class: "pane def", "aria-label": "Definition" },
-		h(
-			"div",
-			{ class: "pane-head" },
-			h("h2", { class: "pane-title" }, "What is tried"),
-			sub,
-			h("span", { class: "grow" }),
-			again,
-		),
+		"section.pane.def",
+		{ "aria-label": "Definition" },
+		h("div.pane-head", h("h2.pane-title", "What is tried"), sub, h("span.grow"), again),
 		body,
 		foot,
 	);
@@ -571,8 +529,7 @@ export function definition({ store }, { start, cost: told, copy }) {
 
 	/** @param {Wish} now */
 	function named(now) {
-		const field = h("input", {
-			class: "field",
+		const field = h("input.field", {
 			value: now.name,
 			"aria-label": "Name of the study",
 			maxlength: 60,
@@ -581,7 +538,7 @@ export function definition({ store }, { start, cost: told, copy }) {
 				changed();
 			},
 		});
-		return h("div", { class: "blk" }, h("h3", { class: "h" }, "Name"), field);
+		return h("div.blk", h("h3.h", "Name"), field);
 	}
 
 	/** @param {Wish} now */
@@ -592,8 +549,7 @@ export function definition({ store }, { start, cost: told, copy }) {
 				({ name, error }) =>
 					!error && !now.recordings.some((place) => place === name || nameOf(place) === name),
 			);
-		const more = h("select", {
-			class: "field",
+		const more = h("select.field", {
 			"aria-label": "Add a recording",
 			onchange: () => {
 				now.recordings = [...now.recordings, more.value];
@@ -603,12 +559,10 @@ export function definition({ store }, { start, cost: told, copy }) {
 		});
 		choices(more, [["", "add a recording…"], ...others.map(({ name }) => pair(name))], "");
 		return h(
-			"div",
-			{ class: "blk" },
-			h("h3", { class: "h" }, "Recordings"),
+			"div.blk",
+			h("h3.h", "Recordings"),
 			h(
-				"div",
-				{ class: "tags" },
+				"div.tags",
 				now.recordings.map((place) =>
 					tag(
 						nameOf(place),
@@ -627,8 +581,7 @@ export function definition({ store }, { start, cost: told, copy }) {
 
 	/** @param {Wish} now */
 	function numbers(now) {
-		const search = h("select", {
-			class: "field",
+		const search = h("select.field", {
 			"aria-label": "Search",
 			onchange: () => {
 				now.search = search.value;
@@ -637,10 +590,9 @@ export function definition({ store }, { start, cost: told, copy }) {
 		});
 		choices(search, SEARCHES, now.search);
 		/** @param {string} word @param {Element} field */
-		const labelled = (word, field) => h("label", {}, h("span", {}, word), field);
+		const labelled = (word, field) => h("label", h("span", word), field);
 		return h(
-			"div",
-			{ class: "blk four" },
+			"div.blk.four",
 			labelled(
 				"Trials",
 				numberField(changed, "Trials", now.trials, (value) => (now.trials = value ?? 0), {

@@ -11,8 +11,7 @@ export const placeOf = ({ scheduler, workers }) =>
 
 /** @param {Where} where @param {{changed: () => void, show: () => void}} on */
 export function runsOn(where, { changed, show }) {
-	const address = h("input", {
-		class: "field addr",
+	const address = h("input.field.addr", {
 		value: where.scheduler ?? "",
 		placeholder: "tcp://scheduler:8786",
 		"aria-label": "Address of the Dask scheduler",
@@ -21,11 +20,10 @@ export function runsOn(where, { changed, show }) {
 			changed();
 		},
 	});
-	const answer = h("span", { class: "small", role: "status" });
+	const answer = h("span.small", { role: "status" });
 	const test = h(
-		"button",
+		"button.btn.box",
 		{
-			class: "btn box",
 			onclick: async () => {
 				fill(answer, "asking…");
 				const found = await sendJson("POST", "/api/studies/scheduler", {
@@ -62,18 +60,12 @@ export function runsOn(where, { changed, show }) {
 		},
 	);
 	return h(
-		"div",
-		{ class: "blk" },
-		h("h3", { class: "h" }, "Runs on"),
+		"div.blk",
+		h("h3.h", "Runs on"),
 		h(
-			"div",
-			{ role: "radiogroup", "aria-label": "Runs on", class: "stack" },
-			choice(
-				true,
-				"This machine",
-				workers,
-				h("span", { class: "small" }, "workers, behind the page"),
-			),
+			"div.stack",
+			{ role: "radiogroup", "aria-label": "Runs on" },
+			choice(true, "This machine", workers, h("span.small", "workers, behind the page")),
 			choice(false, "Dask scheduler", address, test, answer),
 		),
 	);

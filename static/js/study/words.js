@@ -46,7 +46,7 @@ export const figureOf = (value, { digits }) =>
 export function differenceOf(value, from, { digits, higher }) {
 	if (value === null || value === undefined || from === null || from === undefined) return null;
 	const text = Math.abs(value - from).toFixed(digits);
-	if (!Number(text)) return h("span", { class: "dl" }, text);
+	if (!Number(text)) return h("span.dl", text);
 	const more = value > from;
 	return h(
 		"span",

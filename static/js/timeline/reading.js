@@ -22,7 +22,7 @@ function hintLines(state, step, track) {
 	/** Within which a mark is pointed at, steps. */
 	const reach = Math.max(1, (span ? span[1] - span[0] : frames) / 150);
 	/** @type {(Node | string)[][]} */
-	const lines = [[h("b", {}, `step ${step}`), ` · ${secondsOf(step, fps)} s`]];
+	const lines = [[h("b", `step ${step}`), ` · ${secondsOf(step, fps)} s`]];
 	if (track) {
 		const events = (timeline?.events ?? []).filter(
 			([at, id]) => id === track.id && Math.abs(at - step) <= (timeline?.stride ?? 1),
@@ -59,7 +59,7 @@ function mountHint({ plot, at }, store) {
 		const { step, track } = at(event);
 		return store.get().sequence ? hintLines(store.get(), step, track) : [];
 	};
-	const card = h("div", { class: "card hint-card", hidden: true });
+	const card = h("div.card.hint-card", { hidden: true });
 	plot.append(card);
 	plot.addEventListener("pointermove", (event) => {
 		// A finger or a pen has no other way to ask than to press.
@@ -69,7 +69,7 @@ function mountHint({ plot, at }, store) {
 		if (card.hidden) return;
 		fill(
 			card,
-			lines.map((line) => h("p", {}, ...line)),
+			lines.map((line) => h("p", ...line)),
 		);
 		const box = plot.getBoundingClientRect();
 		const [x, y] = [event.clientX - box.left, event.clientY - box.top];
@@ -212,11 +212,10 @@ export function mountReading({ store, actions }, timeline) {
 	mountFingers(timeline.plot, store);
 	timeline.braid = drawBraid;
 	const gutter = one(".gut");
-	const menu = h("div", { class: "menu plots", popover: "auto", "aria-label": "Plots of a track" });
+	const menu = h("div.menu.plots", { popover: "auto", "aria-label": "Plots of a track" });
 	const button = h(
-		"button",
+		"button.btn",
 		{
-			class: "btn",
 			"data-tip": "Plots of the selected track: height, speed, what each camera makes of it",
 			"aria-haspopup": "true",
 		},
@@ -275,15 +274,14 @@ export function mountReading({ store, actions }, timeline) {
 			offered.map(({ name, word, help }) =>
 				h(
 					"label",
-					{},
 					h("input", {
 						type: "checkbox",
 						id: `plot-${name}`,
 						...(plots.includes(name) ? { checked: true } : {}),
 						onchange: () => toggle(name),
 					}),
-					h("b", {}, word),
-					h("span", { class: "small" }, help),
+					h("b", word),
+					h("span.small", help),
 				),
 			),
 		);
@@ -294,7 +292,7 @@ export function mountReading({ store, actions }, timeline) {
 			const { word, help } = /** @type {Server.CourseKind} */ (
 				offered.find((kind) => kind.name === name)
 			);
-			const [value, sub] = [h("span", { class: "r" }), h("span", { class: "lg" })];
+			const [value, sub] = [h("span.r"), h("span.lg")];
 			const away = h(
 				"button",
 				{ "aria-label": `Take ${word} away`, onclick: () => toggle(name) },
@@ -303,12 +301,12 @@ export function mountReading({ store, actions }, timeline) {
 			const element =
 				rows.get(name)?.element ??
 				h(
-					"div",
-					{ class: "gr strip plot-row", title: help },
-					h("span", { class: "n" }, word),
+					"div.gr.strip.plot-row",
+					{ title: help },
+					h("span.n", word),
 					value,
 					away,
-					h("span", { class: "brk" }),
+					h("span.brk"),
 					sub,
 				);
 			if (!rows.has(name)) rows.set(name, { element, value, sub });

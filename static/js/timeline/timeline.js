@@ -24,15 +24,7 @@ import {
 	parseStep,
 } from "../play/clock.js";
 import { shownDone } from "../play/playback.js";
-import {
-	isAlone,
-	ordered,
-	resultOf,
-	scoresOf,
-	trueCount,
-	decisionsOf,
-	stateAt,
-} from "../state/events.js";
+import { isAlone, ordered, resultOf, scoresOf, trueCount } from "../state/events.js";
 
 /* ---------- Play, step, speed, loop and the readout. ---------- */
 
@@ -343,7 +335,7 @@ export function mountTimeline(root, context) {
 		fill(
 			people,
 			result?.tracks.length ?? "–",
-			result && sequence?.has_truth && h("span", { class: "sub" }, ` of ${trueCount(result)}`),
+			result && sequence?.has_truth && h("span.sub", ` of ${trueCount(result)}`),
 		);
 		if (!scored.hidden) writeScores();
 	}
@@ -359,16 +351,15 @@ export function mountTimeline(root, context) {
 			const label =
 				labels.get(id) ??
 				h(
-					"button",
+					"button.gr.lane",
 					{
-						class: "gr lane",
 						onclick: (event) => (event.altKey ? actions.solo : actions.select)(id),
 						onpointerenter: () => store.set({ hover: { id, camera: -1 } }),
 						onpointerleave: () => store.set({ hover: null }),
 					},
 					idTag(id),
-					h("span", { class: "who" }),
-					h("span", { class: "r" }),
+					h("span.who"),
+					h("span.r"),
 				);
 			labels.set(id, label);
 			label.ariaLabel = `Track ${id}${name ? `, ${name}` : ""}`;

@@ -24,6 +24,19 @@ interface Attributes {
 	[name: string]: unknown;
 }
 
+/** What makes elements of a kind, by tag and classes. */
+interface Maker<Kinds> {
+	<T extends string>(
+		tag: T,
+		attributes: Attributes,
+		...children: (Child | Child[])[]
+	): Kinds[TagOf<T> & keyof Kinds];
+	<T extends string>(tag: T, ...children: (Child | Child[])[]): Kinds[TagOf<T> & keyof Kinds];
+}
+
+/** `button` of `button.btn.box`. */
+type TagOf<T extends string> = T extends `${infer Tag}.${string}` ? Tag : T;
+
 /** How many times, and the middle of what is seen, in shares of the picture. */
 type Magnified = [number, number, number];
 
