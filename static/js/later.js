@@ -1,7 +1,7 @@
 /** What nobody needs before the first picture: read when the page is there. */
 import { mountCorrecting } from "./check/edits.js";
-import { fill, h, icon, one, parts } from "./elements/dom.js";
-import { mountTips } from "./elements/tips.js";
+import { fill, h, icon, one, parts, write } from "./elements/dom.js";
+import { mountTips } from "./elements/over.js";
 import { mountBookmarks, mountIdentity, mountTables } from "./inspector/tables.js";
 import { keyLabel } from "./state/commands.js";
 import { mountReading } from "./timeline/reading.js";
@@ -10,6 +10,7 @@ import { mountReading } from "./timeline/reading.js";
 export function mountLater(context, timeline) {
 	const side = one(".side");
 	mountTips();
+	mountExport(parts(one(".top")), context);
 	mountTour(one(".tour"), context);
 	mountTables(side, context);
 	mountIdentity(context);
@@ -17,6 +18,27 @@ export function mountLater(context, timeline) {
 	mountReading(context, timeline);
 	mountCorrecting(context, timeline);
 	timeline.draw();
+}
+
+/**
+ * The run that is shown leaves in the same forms as those of the library.
+ * @param {Record<string, Part>} top @param {Context} context
+ */
+function mountExport({ leaving, stopLeaving, leave }, { store, actions }) {
+	/** @param {string} words @param {() => void} [cancel] */
+	const say = (words, cancel) => {
+		write(leaving, words);
+		stopLeaving.hidden = !cancel;
+		stopLeaving.onclick = cancel ?? null;
+	};
+	// Read when it is first wanted; from then on the button opens the menu by itself.
+	leave.onclick = async () => {
+		const { exportMenu } = await import("./library/exports.js");
+		leave.onclick = null;
+		const [, menu] = exportMenu({ store, actions, say, chosen: () => [null], button: leave });
+		leave.after(menu);
+		menu.showPopover();
+	};
 }
 
 /* ---------- What is seen, and three things to try: a card in the 3D view, until it is closed or

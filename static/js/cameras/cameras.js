@@ -326,6 +326,9 @@ function mountMagnifier(body, store) {
 	);
 }
 
+/** As wide as this a picture has its words in one line, CSS pixels: as in panes.css. */
+const NARROW = 260;
+
 /** A second click within this time makes it a double click, milliseconds. */
 const DOUBLE_CLICK = 220;
 /** Of the window's height, at most, where there is one camera and nothing to be beside it. */
@@ -549,7 +552,9 @@ export function mountCameras(root, { store, actions, playback }) {
 			words.push(store.get().run?.state === "computing" ? "computing" : "not computed");
 		else if (view && roomy) {
 			if (view.events.length) words.push(`2D: ${viewWords(view.events)}`);
-			if (layers2d.samples) words.push(...gateWords(view.information));
+			// Of a narrower one they would be cut; the tab Step has them.
+			if (layers2d.samples && places[index].width > NARROW)
+				words.push(...gateWords(view.information));
 			/** @type {Record<string, number[]>} */
 			const away = {};
 			for (const { id, visible, reason } of view.tracks)

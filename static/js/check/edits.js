@@ -1,6 +1,6 @@
 /** What can be said to put tracks right: one function for each command, at every place of the bench. */
-import { fill, h, icon, idTag, one } from "../elements/dom.js";
-import { ApiError, request } from "../state/api.js";
+import { all, fill, h, icon, idTag, one, turned } from "../elements/dom.js";
+import { menuOf } from "../elements/over.js";
 import { commandOf, keyLabel, perform } from "../state/commands.js";
 import { resultOf } from "../state/events.js";
 import { lensOf } from "../draw/overlay.js";
@@ -17,23 +17,6 @@ import {
 	joinable,
 	whereIs,
 } from "./words.js";
-
-/* ---------- A file of the server's, saved by the browser. ---------- */
-
-/** @param {Actions} actions @param {string} path @param {string} name */
-async function sendsFile(actions, path, name) {
-	try {
-		const blob = await (await request(path)).blob();
-		const link = document.createElement("a");
-		link.href = URL.createObjectURL(blob);
-		link.download = name;
-		link.click();
-		setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
-	} catch (error) {
-		if (!(error instanceof ApiError)) throw error;
-		actions.note("error", error.message, error.hint ?? "");
-	}
-}
 
 /* ---------- A finger or a pen that is held still asks for what the other button of a mouse asks
    for: not every browser says so by itself. */
@@ -167,7 +150,7 @@ const MOST = 12;
 function mountMenu(context, timeline, does) {
 	const { store, actions } = context;
 	const { state } = checkOf(context);
-	const menu = h("div.menu.corrects", { popover: "auto" });
+	const menu = menuOf({ class: "menu corrects" });
 	one("main").append(menu);
 	/** Whoever is chosen elsewhere while others are offered is taken. @type {((id: number) => void) | null} */
 	let takes = null;
@@ -181,22 +164,11 @@ function mountMenu(context, timeline, does) {
 		const box = menu.getBoundingClientRect();
 		menu.style.left = `${Math.max(4, Math.min(left, innerWidth - box.width - 4))}px`;
 		menu.style.top = `${Math.max(4, Math.min(top, innerHeight - box.height - 4))}px`;
-		/** @type {HTMLElement | null} */ (menu.querySelector("button, input"))?.focus();
+		all("button, input", menu)[0]?.focus();
 	}
 	const close = () => menu.matches(":popover-open") && menu.hidePopover();
 	menu.addEventListener("toggle", (event) => {
 		if (/** @type {ToggleEvent} */ (event).newState !== "open") takes = null;
-	});
-	menu.addEventListener("keydown", (event) => {
-		const turn = { ArrowDown: 1, ArrowUp: -1 }[event.key];
-		if (turn) {
-			const all = [...menu.querySelectorAll("button")];
-			const at = all.indexOf(/** @type {HTMLButtonElement} */ (document.activeElement));
-			all[(at + turn + all.length) % all.length]?.focus();
-			event.preventDefault();
-		}
-		// Its keys are its own: the page's mean something else.
-		if (event.key !== "Escape") event.stopPropagation();
 	});
 
 	/** @param {string} sign @param {Child[]} words @param {string} key @param {() => void} act */
@@ -516,17 +488,8 @@ export function mountCorrecting(context, timeline) {
 		const { queue, chosen: now } = state.get();
 		const doubts = queue?.doubts ?? [];
 		location.hash = "#check";
-		if (!doubts.length) return;
 		const index = doubts.findIndex(({ id }) => id === now?.id);
-		check.choose(
-			doubts[
-				index < 0
-					? direction > 0
-						? 0
-						: doubts.length - 1
-					: (index + direction + doubts.length) % doubts.length
-			],
-		);
+		if (doubts.length) check.choose(turned(doubts, index, direction));
 	}
 
 	/** What one track says of itself here. @param {"came" | "left" | "nobody" | "different"} kind @param {string} words */
@@ -623,7 +586,7 @@ export function mountCorrecting(context, timeline) {
 			const track = who();
 			if (track !== null) menu.open({ track, step: shown() });
 		},
-		truth: () => sendsFile(actions, "/api/corrections/truth.csv", "ground_truth.csv"),
+		truth: () => actions.saveFile("/api/corrections/truth.csv", "ground_truth.csv"),
 	};
 	actions.correct = (what) => EDITS[what]();
 	mountMarks(context, timeline, check);

@@ -5,6 +5,7 @@
  */
 import { clickOf, pixelOf, scaleOf } from "./edits.js";
 import { colourIndex, h, one } from "../elements/dom.js";
+import { ARROWS } from "../elements/drawn.js";
 import { getJson } from "../state/api.js";
 import { shownVersion } from "../state/events.js";
 
@@ -143,9 +144,7 @@ export function mountFeet({ store, playback }, check) {
 	/** @param {KeyboardEvent} event @param {Foot} foot */
 	function keyed(event, foot) {
 		const far = event.shiftKey ? LARGE : SMALL;
-		const way = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[
-			event.key
-		];
+		const way = ARROWS[event.key];
 		if (way) move(foot, foot.x + far * way[0], foot.y + far * way[1]);
 		else if (event.key === "Enter") {
 			// Where the ring lies of somebody who is not known nobody has said yet.

@@ -1,6 +1,7 @@
 /** The inspector's tab Place: one doubtful moment in pictures, what it could be, what to do. */
 import { palette } from "../draw/canvas.js";
-import { all, capital, choices, colourIndex, fill, h, icon, idTag } from "../elements/dom.js";
+import { all, capital, colourIndex, fill, h, icon, idTag } from "../elements/dom.js";
+import { chooser, grow, segment } from "../elements/drawn.js";
 import { commandOf, keyLabel, perform } from "../state/commands.js";
 import { scoresOf, shownVersion } from "../state/events.js";
 import { drawCrop } from "./crops.js";
@@ -212,7 +213,7 @@ export function mountPlace(root, { store, actions, playback }, check, crops) {
 							chosen.first === chosen.last ? chosen.first : `${chosen.first} – ${chosen.last}`,
 						),
 					]),
-			h("span.grow"),
+			grow(),
 			choice(chosen, other),
 		);
 		head
@@ -231,29 +232,21 @@ export function mountPlace(root, { store, actions, playback }, check, crops) {
 		const listed = far.some(([, k]) => k === other);
 		/** @param {Doubt["alternatives"][number]} one */
 		const likely = ({ words, probability }) => `${words}: ${percent(probability)}`;
-		const more = h("select", {
-			class: listed ? "on" : "",
-			"aria-label": "Other alternatives",
-			onchange: () => check.show(Number(more.value)),
-		});
-		choices(
-			more,
-			[
-				["", `${far.length} more`],
-				...far.map(([one, k]) => /** @type {[string, string]} */ ([String(k), likely(one)])),
-			],
-			listed ? String(other) : "",
+		const more = chooser(
+			"Other alternatives",
+			[["", `${far.length} more`], ...far.map(([one, k]) => [k, likely(one)])],
+			listed ? other : "",
+			(value) => check.show(Number(value)),
 		);
+		more.className = listed ? "on" : "";
 		more.options[0].hidden = true;
 		return h(
 			"div.seg",
 			{ role: "group", "aria-label": "Shown" },
-			beside.map(([one, k]) =>
-				h(
-					"button",
-					{ "aria-pressed": String(k === other), title: likely(one), onclick: () => check.show(k) },
-					one.words,
-				),
+			segment(
+				beside.map(([one, k]) => /** @type {const} */ ([k, one.words, likely(one)])),
+				other,
+				check.show,
 			),
 			far.length > 0 && more,
 		);
@@ -298,7 +291,7 @@ export function mountPlace(root, { store, actions, playback }, check, crops) {
 				([name, sign, word]) =>
 					button(name, sign, name === main && name === "check-join" ? "Join" : word, name === main),
 			),
-			h("span.grow"),
+			grow(),
 			main === "check-apply" &&
 				(OF_NOBODY.includes(chosen.kind)
 					? button(main, "i-here", capital(alternative), true)
@@ -392,19 +385,18 @@ export function mountPlace(root, { store, actions, playback }, check, crops) {
 	function numbers(best, now) {
 		const views = store.get().cameras;
 		cameras.hidden = views.length < 2;
+		const rank = (/** @type {number} */ camera) =>
+			camera === best[0] ? ", which sees them best" : camera === best[1] ? ", second best" : "";
+		const words = views.map(
+			({ name }, camera) =>
+				/** @type {const} */ ([camera, `C${camera + 1}`, `${name}${rank(camera)}`]),
+		);
 		fill(
 			cameras,
-			views.map(({ name }, camera) =>
-				h(
-					"button",
-					{
-						"aria-pressed": String(camera === now),
-						title: `${name}${camera === best[0] ? ", which sees them best" : camera === best[1] ? ", second best" : ""}`,
-						onclick: () => ((by = camera), void roll()),
-					},
-					`C${camera + 1}`,
-				),
-			),
+			segment(words, now, (camera) => {
+				by = camera;
+				void roll();
+			}),
 		);
 	}
 

@@ -27,7 +27,7 @@ export function mountQueue(root, { store, actions }, check, crops) {
 		"aria-label": "Places, most doubtful first",
 		tabindex: 0,
 	});
-	const blank = h("div.qblank", { hidden: true });
+	const blank = h("div.blank.qblank", { hidden: true });
 	const cameras = h("p.small.keepnote", { hidden: true });
 	const count = h("span.count");
 	/** @param {"undo" | "redo"} what @param {-1 | 1} direction */

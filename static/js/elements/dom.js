@@ -100,7 +100,7 @@ export function refill(select, ...children) {
 
 /**
  * @param {Element & { value: string }} select
- * @param {[string | number, string][]} choices  values and words
+ * @param {(string | number)[][]} choices  values and words
  * @param {string | number} chosen
  */
 export function choices(select, choices, chosen) {
@@ -140,6 +140,41 @@ export function show(value) {
 	return Math.abs(value) < 1e-3
 		? value.toExponential().replace("e-", "e−")
 		: String(Number(value.toPrecision(5)));
+}
+
+/**
+ * The next one of a list that goes round; of none the first or the last.
+ * @template V
+ * @param {V[]} list @param {number} index  -1: none @param {number} direction  1 or -1
+ */
+export const turned = (list, index, direction) =>
+	list[
+		index < 0 && direction < 0 ? list.length - 1 : (index + direction + list.length) % list.length
+	];
+
+/** What this browser remembers under a name. @param {string} name @param {any} usual  else */
+export function remembered(name, usual) {
+	try {
+		return JSON.parse(localStorage.getItem(name) ?? "null") ?? usual;
+	} catch {
+		return usual;
+	}
+}
+
+/** Have this browser remember; without storage it lasts as long as the page. @param {string} name @param {unknown} value */
+export function remember(name, value) {
+	try {
+		localStorage.setItem(name, JSON.stringify(value));
+	} catch {
+		// Nothing else changes.
+	}
+}
+
+/** Have the browser save a file. @param {Blob} blob @param {string} name */
+export function save(blob, name) {
+	const href = URL.createObjectURL(blob);
+	h("a", { href, download: name }).click();
+	setTimeout(() => URL.revokeObjectURL(href), 10_000);
 }
 
 /** @param {string} words  @returns {string} as a sentence begins */

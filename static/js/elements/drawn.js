@@ -1,5 +1,5 @@
 /** Panels that are drawn anew while somebody works in them, and what they are written with. */
-import { all, h, symbolParts } from "./dom.js";
+import { all, choices, h, icon, symbolParts } from "./dom.js";
 import { table } from "./table.js";
 
 /** Elements that are replaced as a whole where they differ: what they do is made with what they say. */
@@ -51,6 +51,85 @@ export function redraw(root, ...children) {
 	panel.tabIndex = -1;
 	panel.focus();
 }
+
+/**
+ * A list of choices of its own.
+ * @param {string} label
+ * @param {(string | number)[][]} words  values and words
+ * @param {string | number} chosen
+ * @param {(value: string) => void} choose
+ */
+export function chooser(label, words, chosen, choose) {
+	const select = h("select.field", {
+		"aria-label": label,
+		onchange: () => choose(select.value),
+	});
+	choices(select, words, chosen);
+	return select;
+}
+
+/**
+ * Buttons beside each other, one of them pressed.
+ * @template V
+ * @param {readonly (readonly [V, Child, string?])[]} words  values, words and what the pointer says
+ * @param {V} chosen
+ * @param {(value: V) => void} choose
+ */
+export const segment = (words, chosen, choose) =>
+	words.map(([value, word, title]) =>
+		h(
+			"button",
+			{ "aria-pressed": String(value === chosen), title, onclick: () => choose(value) },
+			word,
+		),
+	);
+
+/** What takes the room that is left. */
+export const grow = () => h("span.grow");
+
+/** @param {Child | Node} title  a heading or its words @param {...(Child | Child[])} beside */
+export const paneHead = (title, ...beside) =>
+	h("div.pane-head", title instanceof Element ? title : h("h2.pane-title", title), ...beside);
+
+/**
+ * A button that is a sign alone.
+ * @param {string} sign @param {string} label @param {() => void} onclick @param {Attributes} [more]
+ */
+export const signButton = (sign, label, onclick, more = {}) =>
+	h("button.btn.icon", { "aria-label": label, onclick, ...more }, icon(sign, "s"));
+
+/**
+ * Have a text written in a field: Enter takes it, Escape and leaving the field do not, unless they
+ * are told to.
+ * @param {Attributes & {value: string}} attributes
+ * @param {(text: string | null) => void} done  null where it is not taken
+ * @param {boolean} [leaves]  leaving the field takes it
+ */
+export function asks(attributes, done, leaves = false) {
+	let over = false;
+	const end = (/** @type {boolean} */ taken) => {
+		if (over) return;
+		over = true;
+		done(taken ? field.value : null);
+	};
+	const field = h("input.field", {
+		...attributes,
+		onblur: () => end(leaves),
+		onkeydown: (event) => {
+			event.stopPropagation();
+			if (event.key === "Enter" || event.key === "Escape") end(event.key === "Enter");
+		},
+	});
+	return field;
+}
+
+/** The place of a key among the arrows: what it adds across and down. @type {Record<string, [number, number] | undefined>} */
+export const ARROWS = {
+	ArrowLeft: [-1, 0],
+	ArrowRight: [1, 0],
+	ArrowUp: [0, -1],
+	ArrowDown: [0, 1],
+};
 
 /** A parameter: its words with its symbol; what it means comes with the pointer. @param {Server.ParameterInfo} of */
 export function parameterName({ label, symbol, help }) {

@@ -4,6 +4,7 @@
  */
 import { lensOf } from "../draw/overlay.js";
 import { all, h, one } from "../elements/dom.js";
+import { ARROWS } from "../elements/drawn.js";
 import { resultOf } from "../state/events.js";
 
 /* ---------- A box over a picture without a pointer: arrows move it, with Ctrl they size it,
@@ -61,9 +62,7 @@ function mountFrame(mosaic, store, { keep, tell }) {
 		const { sides, index } = at;
 		const { width: wide, height: high } = store.get().cameras[index];
 		const far = event.shiftKey ? LARGE : SMALL;
-		const way = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[
-			event.key
-		];
+		const way = ARROWS[event.key];
 		const within = (
 			/** @type {number} */ value,
 			/** @type {number} */ least,

@@ -1,5 +1,6 @@
 /** The bar under the runs: what can be done with those that are ticked, and what was just done. */
 import { fill, h, icon, one } from "../elements/dom.js";
+import { grow, signButton } from "../elements/drawn.js";
 import { exportMenu } from "./exports.js";
 import { comparison } from "./small.js";
 import { many, size } from "./words.js";
@@ -32,20 +33,16 @@ export function chosenBar({ store, actions, chosen, none, leave }) {
 		side,
 		exportMenu({ store, actions, say, chosen: numbers }),
 		h("button.btn.box", { onclick: () => void remove(numbers()) }, icon("i-trash"), "Delete"),
-		h("button.btn.icon", { "aria-label": "Choose none", onclick: none }, icon("i-close", "s")),
+		signButton("i-close", "Choose none", none),
 	);
-	const element = h("div.undo-line", tools, h("span.grow"), line, stop);
+	const element = h("div.undo-line", tools, grow(), line, stop);
 
 	function compare() {
 		const dialog = /** @type {any} */ (one(".compare"));
 		const close = () => dialog.close();
 		fill(
 			dialog,
-			h(
-				"header",
-				h("h2", "Runs side by side"),
-				h("button.btn.icon", { "aria-label": "Close", onclick: close }, icon("i-close")),
-			),
+			h("header", h("h2", "Runs side by side"), signButton("i-close", "Close", close)),
 			...comparison(chosen(), store.get().schema),
 		);
 		// beside it; what is in it can be marked and copied

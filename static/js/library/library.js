@@ -1,5 +1,6 @@
 /** The place Library: recordings, the runs of one, and one run in small. */
 import { all, fill, h, icon, write } from "../elements/dom.js";
+import { asks, chooser, grow, paneHead } from "../elements/drawn.js";
 import { getJson } from "../state/api.js";
 import { chosenBar } from "./chosen.js";
 import { preview } from "./preview.js";
@@ -98,20 +99,16 @@ function shelf(on) {
 		"aria-label": "Find",
 		oninput: () => on.find(),
 	});
-	const order = h(
-		"select",
-		{ "aria-label": "Sort recordings by", onchange: () => on.find() },
-		Object.keys(ORDERS).map((word) => h("option", word)),
-	);
+	const orders = Object.keys(ORDERS).map((word) => [word, word]);
+	const order = chooser("Sort recordings by", orders, orders[0][0], on.find);
 	const list = h("div.scroll.list", { role: "listbox", "aria-label": "Recordings" });
 	const foot = h("div.foot");
 	const element = h(
 		"section.pane",
 		{ "aria-label": "Recordings" },
-		h(
-			"div.pane-head",
-			h("h2.pane-title", "Recordings"),
-			h("span.grow"),
+		paneHead(
+			"Recordings",
+			grow(),
 			h("button.btn", { "data-key": "Ctrl O", onclick: on.add }, "Open…"),
 		),
 		h("div.lib-find", icon("i-search", "s"), find, order),
@@ -264,7 +261,7 @@ export function mountLibrary(root, { store, actions }) {
 		h(
 			"section.pane.runs",
 			{ "aria-label": "Runs" },
-			h("div.pane-head", title, sub, h("span.grow"), only, table.chooser),
+			paneHead(title, sub, grow(), only, table.chooser),
 			gone.element,
 			table.element,
 			empty,
@@ -407,19 +404,13 @@ export function mountLibrary(root, { store, actions }) {
 		const run = focusedRun();
 		const cell = root.querySelector(`tr[data-run="${focused}"] td:nth-child(2)`);
 		if (!run || !cell) return;
-		const field = h("input.field", { value: run.name, "aria-label": "Name of the run" });
 		writing = true;
-		const end = (/** @type {boolean} */ keep) => {
-			if (!writing) return;
+		const done = (/** @type {string | null} */ name) => {
 			writing = false;
-			if (keep && field.value !== run.name) void change(run, { name: field.value });
+			if (name !== null && name !== run.name) void change(run, { name });
 			else show();
 		};
-		field.addEventListener("keydown", (event) => {
-			event.stopPropagation();
-			if (event.key === "Enter" || event.key === "Escape") end(event.key === "Enter");
-		});
-		field.addEventListener("blur", () => end(true));
+		const field = asks({ value: run.name, "aria-label": "Name of the run" }, done, true);
 		fill(cell, field);
 		field.select();
 	}

@@ -1,5 +1,6 @@
 /** One run in small, and what can be done with it: opened, pinned, taken as the start of a study. */
 import { fill, h } from "../elements/dom.js";
+import { grow } from "../elements/drawn.js";
 import { getJson } from "../state/api.js";
 import { drawn } from "./small.js";
 import { many, titleOf, when } from "./words.js";
@@ -73,7 +74,7 @@ export function preview({ store, actions }, written) {
 				head,
 				h("h2.pane-title", titleOf(run)),
 				h("span.sub", facts(run)),
-				h("span.grow"),
+				grow(),
 				h("button.btn.main", { onclick: () => void open(run) }, "Open in Tune"),
 				h("button.btn.box", { onclick: () => void pin(run) }, "Pin as A"),
 				h(

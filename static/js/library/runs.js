@@ -1,5 +1,6 @@
 /** The table of a recording's runs. */
-import { fill, h, icon, symbolOf } from "../elements/dom.js";
+import { h, icon, remember, remembered, symbolOf } from "../elements/dom.js";
+import { menuOf, opensMenu } from "../elements/over.js";
 import { table } from "../elements/table.js";
 import { figure, isMethod, livesAMinute, madeWhen, many, methodWord } from "./words.js";
 
@@ -44,25 +45,8 @@ function pills(run, taught) {
 	);
 }
 
+/** Under which this browser remembers the columns that it does not show. */
 const COLUMNS = "library columns";
-
-/** @returns {string[]} columns that this browser does not show */
-function recall() {
-	try {
-		return JSON.parse(localStorage.getItem(COLUMNS) ?? "[]");
-	} catch {
-		return [];
-	}
-}
-
-/** @param {string[]} hidden */
-function keep(hidden) {
-	try {
-		localStorage.setItem(COLUMNS, JSON.stringify(hidden));
-	} catch {
-		// Without storage they come back with the next start.
-	}
-}
 
 /**
  * @param {object} on
@@ -187,7 +171,7 @@ export function runsTable(on) {
 	});
 
 	/** Words of the columns that somebody does not want. @type {Set<string>} */
-	const hidden = new Set(recall());
+	const hidden = new Set(remembered(COLUMNS, []));
 	const hide = () => {
 		for (const row of rows.element.querySelectorAll("tr"))
 			[...row.cells].forEach((cell, k) => {
@@ -197,9 +181,8 @@ export function runsTable(on) {
 				cell.hidden = wrong || hidden.has(word);
 			});
 	};
-	const menu = h("div.menu.plots", { popover: "auto", "aria-label": "Columns" });
-	fill(
-		menu,
+	const menu = menuOf(
+		{ class: "menu plots", "aria-label": "Columns" },
 		columns
 			.filter(({ word }) => word && word !== "Run")
 			.map(({ word }) =>
@@ -210,7 +193,7 @@ export function runsTable(on) {
 						checked: !hidden.has(word),
 						onchange: () => {
 							if (!hidden.delete(word)) hidden.add(word);
-							keep([...hidden]);
+							remember(COLUMNS, [...hidden]);
 							hide();
 						},
 					}),
@@ -219,11 +202,7 @@ export function runsTable(on) {
 			),
 	);
 	const chooser = h("button.btn", { "aria-haspopup": "true" }, "Columns", icon("i-down", "s"));
-	chooser.popoverTargetElement = menu;
-	menu.addEventListener("toggle", () => {
-		const { right, bottom } = chooser.getBoundingClientRect();
-		Object.assign(menu.style, { right: `${innerWidth - right}px`, top: `${bottom + 4}px` });
-	});
+	opensMenu(chooser, menu);
 
 	return {
 		element: h("div.scroll", rows.element),

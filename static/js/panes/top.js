@@ -94,7 +94,7 @@ export function mountTop(root, { store, actions }) {
 		cancel,
 		again,
 		spoken,
-		csv,
+		leave,
 	} = parts(root);
 	const methods = { single_view, fusion_method, smoothing_method };
 	sequence.addEventListener("change", () => actions.open(sequence.value));
@@ -172,7 +172,7 @@ export function mountTop(root, { store, actions }) {
 			write(word, text);
 			write(spoken, text);
 		};
-		allow(csv, link === "open" && run?.done ? "" : "There are no tracks yet.");
+		allow(leave, link === "open" && run?.done ? "" : "There are no tracks yet.");
 		bar.hidden = link === "lost" || !(opening || run?.state === "computing");
 		cancel.hidden = link !== "open" || run?.state !== "computing" || Boolean(opening);
 		again.hidden = link !== "open" || run?.state !== "cancelled" || Boolean(opening);

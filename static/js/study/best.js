@@ -1,5 +1,6 @@
 /** The trials of a study, and what is done with the chosen one: used, compared, kept, repeated. */
 import { all, fill, h, icon, symbolOf } from "../elements/dom.js";
+import { asks, grow, paneHead } from "../elements/drawn.js";
 import { table } from "../elements/table.js";
 import { getJson } from "../state/api.js";
 import { differenceOf, figureOf, titledOf, valueOf } from "./words.js";
@@ -177,17 +178,7 @@ export function bestTrials({ store, actions }, { choose, chosen, name, path }) {
 	const element = h(
 		"section.pane.tab2",
 		{ "aria-label": "Best trials" },
-		h(
-			"div.pane-head",
-			h("h2.pane-title", "Best trials"),
-			differs,
-			h("span.grow"),
-			which,
-			put,
-			beside,
-			keep,
-			command,
-		),
+		paneHead("Best trials", differs, grow(), which, put, beside, keep, command),
 		rows.element,
 	);
 	/** @param {number} number */
@@ -214,35 +205,14 @@ export function bestTrials({ store, actions }, { choose, chosen, name, path }) {
 
 	/** The name is asked for where the button stands. */
 	function askName() {
-		const number = chosen();
-		const field = h("input.field", {
-			value: `${name()} ${number}`,
-			"aria-label": "Name of the preset",
-		});
-		let over = false;
-		const end = async (/** @type {boolean} */ kept) => {
-			if (over) return;
-			over = true;
+		const trial = chosen();
+		const asked = { value: `${name()} ${trial}`, "aria-label": "Name of the preset" };
+		const field = asks(asked, async (text) => {
 			field.replaceWith(keep);
-			if (!kept || !field.value.trim()) return;
-			if (
-				await actions.command("keep_trial", {
-					study: name(),
-					trial: number,
-					preset: field.value.trim(),
-				})
-			)
-				actions.note(
-					"info",
-					`Kept as the preset ${field.value.trim()}`,
-					"It is among the presets in Tune.",
-				);
-		};
-		field.addEventListener("keydown", (event) => {
-			event.stopPropagation();
-			if (event.key === "Enter" || event.key === "Escape") void end(event.key === "Enter");
+			const preset = text?.trim();
+			if (preset && (await actions.command("keep_trial", { study: name(), trial, preset })))
+				actions.note("info", `Kept as the preset ${preset}`, "It is among the presets in Tune.");
 		});
-		field.addEventListener("blur", () => void end(false));
 		keep.replaceWith(field);
 		field.select();
 	}

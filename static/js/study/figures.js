@@ -1,6 +1,7 @@
 /** The figures of a study: its trials, what matters, each parameter; the table says the same. */
 import { chart } from "../elements/chart.js";
 import { fill, h, write, symbolOf } from "../elements/dom.js";
+import { grow, paneHead, segment } from "../elements/drawn.js";
 import { many } from "../library/words.js";
 import { figureOf, titledOf, valueOf } from "./words.js";
 
@@ -301,7 +302,7 @@ export function overview({ choose, narrow }) {
 	const scat = h(
 		"section.pane.scat",
 		{ "aria-label": "Trials" },
-		h("div.pane-head", h("h2.pane-title", "Trials"), axes, h("span.grow"), legend()),
+		paneHead("Trials", axes, grow(), legend()),
 		pareto.element,
 	);
 	const bars = chart();
@@ -313,10 +314,10 @@ export function overview({ choose, narrow }) {
 	const matters = h(
 		"section.pane.imp",
 		{ "aria-label": "What matters" },
-		h("div.pane-head", h("h2.pane-title", "What matters"), h("span.grow"), of),
+		paneHead("What matters", grow(), of),
 		rows,
 		aside,
-		h("div.sofar", h("div.mh", h("span", "Best so far"), h("span.grow"), since), sofar.element),
+		h("div.sofar", h("div.mh", h("span", "Best so far"), grow(), since), sofar.element),
 	);
 	const each = h("h2.pane-title", "Each parameter");
 	const grid = h("div.mgrid");
@@ -326,7 +327,7 @@ export function overview({ choose, narrow }) {
 	const multiples = h(
 		"section.pane.mult",
 		{ "aria-label": "Each parameter" },
-		h("div.pane-head", each, h("span.grow"), narrowing),
+		paneHead(each, grow(), narrowing),
 		grid,
 	);
 
@@ -393,15 +394,19 @@ export function overview({ choose, narrow }) {
 		const y = measure(0);
 		const others = measures();
 		const x = others.find(({ of: { key } }) => key === across) ?? others[0];
+		const words = others.map(
+			({ of: { key }, name: word }) =>
+				/** @type {const} */ ([
+					key,
+					y.name.length > LONG ? `against ${word}` : `${y.name} · ${word}`,
+				]),
+		);
 		fill(
 			axes,
-			others.map(({ of: { key }, name: word }) =>
-				h(
-					"button",
-					{ "aria-pressed": String(key === x.of.key), onclick: () => ((across = key), draw()) },
-					y.name.length > LONG ? `against ${word}` : `${y.name} · ${word}`,
-				),
-			),
+			segment(words, x.of.key, (key) => {
+				across = key;
+				draw();
+			}),
 		);
 		const complete = done.filter(({ state }) => state === "complete");
 		const told = { best: now.best, chosen };
@@ -463,7 +468,7 @@ export function overview({ choose, narrow }) {
 				"div.mh",
 				{ title: `${label}: ${help}` },
 				h("span.lab", h("span", label), symbolOf(symbol)),
-				h("span.grow"),
+				grow(),
 				h("span.q", "best"),
 				best,
 			),

@@ -1,12 +1,12 @@
 /** What a study tries: written down before it starts, locked afterwards. */
-import { choices, fill, h, icon, symbolOf } from "../elements/dom.js";
+import { fill, h, icon, symbolOf } from "../elements/dom.js";
+import { chooser, grow, paneHead, signButton } from "../elements/drawn.js";
 import { getJson, sendJson } from "../state/api.js";
 import { placeOf, runsOn } from "./where.js";
 import { nameOf, valueOf } from "./words.js";
 
 /* ---------- Small pieces of what is written down of a study. ---------- */
 
-/** @type {[string, string][]} */
 const SEARCHES = [
 	["auto", "narrowing"],
 	["tpe", "narrowing, one figure"],
@@ -44,13 +44,11 @@ const tag = (word, out, title) =>
 		"span.pc",
 		{ title: title ?? word },
 		word,
-		out &&
-			h(
-				"button.btn.icon",
-				{ "aria-label": `Leave out ${word}`, onclick: out },
-				icon("i-close", "s"),
-			),
+		out && signButton("i-close", `Leave out ${word}`, out),
 	);
+
+/** @param {string} title @param {...(Child | Child[])} rest */
+const block = (title, ...rest) => h("div.blk", h("h3.h", title), ...rest);
 
 /**
  * Parameters and their ranges, a row each.
@@ -59,7 +57,7 @@ const tag = (word, out, title) =>
  * @param {string} [last]  what a further column is for
  */
 const rangesBlock = (count, rows, last) => [
-	h("h3.h", "Parameters", h("span.grow"), h("span.small", count)),
+	h("h3.h", "Parameters", grow(), h("span.small", count)),
 	h(
 		"table.pt",
 		h(
@@ -155,9 +153,9 @@ function lockedParts(study) {
  * @param {Wish} now
  * @param {Server.ObjectiveInfo[]} figures  all that there are
  * @param {{hasTruth: boolean, cameras: number}} of  the recording that is open
- * @param {{changed: () => void, show: () => void}} on
+ * @param {() => void} edited
  */
-function objectiveCards(now, figures, { hasTruth, cameras }, { changed, show }) {
+function objectiveCards(now, figures, { hasTruth, cameras }, edited) {
 	const leads = {
 		truth: figures.filter(({ of }) => of !== "agreement"),
 		agreement: figures.filter(({ of }) => of === "agreement"),
@@ -166,34 +164,23 @@ function objectiveCards(now, figures, { hasTruth, cameras }, { changed, show }) 
 	/** @param {string[]} next */
 	const set = (next) => {
 		now.objectives = [...new Set(next.filter(Boolean))];
-		show();
-		changed();
+		edited();
 	};
 
 	/** @param {number} place @param {string} word @param {Server.ObjectiveInfo[]} from */
-	const chooser = (place, word, from) => {
+	const objective = (place, word, from) => {
 		const free = from.filter(
 			({ key }) => now.objectives[place] === key || !now.objectives.includes(key),
 		);
-		const select = h("select.field", {
-			"aria-label": word,
-			onchange: () => set(now.objectives.with(place, select.value)),
-		});
-		if (place === now.objectives.length)
-			select.onchange = () => set([...now.objectives, select.value]);
-		choices(
-			select,
-			[
-				...(place ? [/** @type {[string, string]} */ (["", "nothing else"])] : []),
-				...free.map(
-					({ key, name, higher }) =>
-						/** @type {[string, string]} */ ([
-							key,
-							`${name}, ${higher ? "more" : "less"} is better`,
-						]),
-				),
-			],
+		const words = free.map(({ key, name, higher }) => [
+			key,
+			`${name}, ${higher ? "more" : "less"} is better`,
+		]);
+		const select = chooser(
+			word,
+			place ? [["", "nothing else"], ...words] : words,
 			now.objectives[place] ?? "",
+			(key) => set(now.objectives.toSpliced(place, 1, key)),
 		);
 		return h("label", h("span", word), select);
 	};
@@ -218,9 +205,8 @@ function objectiveCards(now, figures, { hasTruth, cameras }, { changed, show }) 
 	const lead = figures.find(({ key }) => key === now.objectives[0]);
 	const [known] = leads.agreement;
 
-	return h(
-		"div.blk",
-		h("h3.h", "Objective"),
+	return block(
+		"Objective",
 		h(
 			"div.stack",
 			{ role: "radiogroup", "aria-label": "Objective" },
@@ -228,7 +214,7 @@ function objectiveCards(now, figures, { hasTruth, cameras }, { changed, show }) 
 				"truth",
 				"Truth",
 				hasTruth ? "" : "not there",
-				!byAgreement && chooser(0, "best is", leads.truth),
+				!byAgreement && objective(0, "best is", leads.truth),
 				h(
 					"span.small",
 					{ title: byAgreement ? null : lead?.help },
@@ -257,8 +243,8 @@ function objectiveCards(now, figures, { hasTruth, cameras }, { changed, show }) 
 		),
 		h(
 			"div.stack",
-			now.objectives.length > 0 && chooser(1, "against", others),
-			now.objectives.length > 1 && chooser(2, "and", others),
+			now.objectives.length > 0 && objective(1, "against", others),
+			now.objectives.length > 1 && objective(2, "and", others),
 		),
 	);
 }
@@ -266,7 +252,7 @@ function objectiveCards(now, figures, { hasTruth, cameras }, { changed, show }) 
 /* ---------- How far each parameter is varied. ---------- */
 
 /** @typedef {{low: number | null, high: number | null, log: boolean, choices: any[] | null}} Range */
-/** @typedef {{changed: () => void, show: () => void, add: (key: string) => Promise<void>}} On */
+/** @typedef {{changed: () => void, edited: () => void, add: (key: string) => Promise<void>}} On */
 
 /** @param {Server.RangeInfo} range @returns {Range} */
 const rangeOf = ({ low, high, log, choices: all }) => ({
@@ -285,20 +271,7 @@ const rangeOf = ({ low, high, log, choices: all }) => ({
  */
 function parameterRanges(now, known, all, on) {
 	const rest = all.filter(({ key }) => !(key in now.parameters));
-	const more = h("select.field", {
-		"aria-label": "Vary another parameter",
-		onchange: () => void on.add(more.value),
-	});
-	choices(
-		more,
-		[
-			["", "vary another…"],
-			...rest.map(
-				({ key, label, group }) => /** @type {[string, string]} */ ([key, `${label} · ${group}`]),
-			),
-		],
-		"",
-	);
+	const others = rest.map(({ key, label, group }) => [key, `${label} · ${group}`]);
 	return h(
 		"div.blk",
 		rangesBlock(
@@ -306,7 +279,9 @@ function parameterRanges(now, known, all, on) {
 			Object.entries(now.parameters).map(([key, range]) => parameter(now, known, key, range, on)),
 			"leave out",
 		),
-		more,
+		chooser("Vary another parameter", [["", "vary another…"], ...others], "", (key) => {
+			void on.add(key);
+		}),
 	);
 }
 
@@ -317,21 +292,13 @@ function parameterRanges(now, known, all, on) {
  * @param {Range} range
  * @param {On} on
  */
-function parameter(now, known, key, range, { changed, show }) {
+function parameter(now, known, key, range, { changed, edited }) {
 	const found = known.find((one) => one.key === key);
 	const label = found?.label ?? key;
-	const out = h(
-		"button.btn.icon",
-		{
-			"aria-label": `Leave out ${label}`,
-			onclick: () => {
-				delete now.parameters[key];
-				show();
-				changed();
-			},
-		},
-		icon("i-close", "s"),
-	);
+	const out = signButton("i-close", `Leave out ${label}`, () => {
+		delete now.parameters[key];
+		edited();
+	});
 	const name = h(
 		"td",
 		{ title: found?.help ?? "" },
@@ -356,8 +323,7 @@ function parameter(now, known, key, range, { changed, show }) {
 									? range.choices.filter((other) => other !== one)
 									: [...(range.choices ?? []), one];
 								range.choices = left;
-								show();
-								changed();
+								edited();
 							},
 						},
 						valueOf(one),
@@ -366,18 +332,17 @@ function parameter(now, known, key, range, { changed, show }) {
 			),
 			h("td", out),
 		);
-	const ends = { min: found?.minimum, max: found?.maximum };
+	const bounds = { min: found?.minimum, max: found?.maximum };
+	/** @param {"low" | "high"} end @param {string} word */
+	const bound = (end, word) => {
+		const set = (/** @type {number | null} */ value) => (range[end] = value);
+		return h("td.num", numberField(changed, `${label} ${word}`, tidy(range[end]), set, bounds));
+	};
 	return h(
 		"tr",
 		name,
-		h(
-			"td.num",
-			numberField(changed, `${label} from`, tidy(range.low), (value) => (range.low = value), ends),
-		),
-		h(
-			"td.num",
-			numberField(changed, `${label} to`, tidy(range.high), (value) => (range.high = value), ends),
-		),
+		bound("low", "from"),
+		bound("high", "to"),
 		h(
 			"td",
 			h(
@@ -386,8 +351,7 @@ function parameter(now, known, key, range, { changed, show }) {
 					"aria-label": `Scale of ${label}: ${range.log ? "logarithmic" : "linear"}`,
 					onclick: () => {
 						range.log = !range.log;
-						show();
-						changed();
+						edited();
 					},
 				},
 				range.log ? "log" : "linear",
@@ -433,7 +397,7 @@ export function definition({ store }, { start, cost: told, copy }) {
 	const element = h(
 		"section.pane.def",
 		{ "aria-label": "Definition" },
-		h("div.pane-head", h("h2.pane-title", "What is tried"), sub, h("span.grow"), again),
+		paneHead("What is tried", sub, grow(), again),
 		body,
 		foot,
 	);
@@ -486,8 +450,7 @@ export function definition({ store }, { start, cost: told, copy }) {
 			objectives: draft.objectives,
 			...from,
 		};
-		show();
-		changed();
+		edited();
 	}
 
 	/** Another parameter is varied. @param {string} key */
@@ -500,6 +463,11 @@ export function definition({ store }, { start, cost: told, copy }) {
 		if (!found) return;
 		known = [...known.filter((range) => range.key !== key), found];
 		wish.parameters[key] = rangeOf(found);
+		edited();
+	}
+
+	/** What can be chosen has changed with what is wished. */
+	function edited() {
 		show();
 		changed();
 	}
@@ -515,15 +483,15 @@ export function definition({ store }, { start, cost: told, copy }) {
 			body,
 			named(now),
 			recordings(now),
-			parameterRanges(now, known, store.get().schema?.parameters ?? [], { changed, show, add }),
+			parameterRanges(now, known, store.get().schema?.parameters ?? [], { changed, edited, add }),
 			numbers(now),
 			objectiveCards(
 				now,
 				figures,
 				{ hasTruth, cameras: store.get().sequence?.cameras.length ?? 2 },
-				{ changed, show },
+				edited,
 			),
-			runsOn(where, { changed, show }),
+			runsOn(where, { changed, edited }),
 		);
 	}
 
@@ -538,7 +506,7 @@ export function definition({ store }, { start, cost: told, copy }) {
 				changed();
 			},
 		});
-		return h("div.blk", h("h3.h", "Name"), field);
+		return block("Name", field);
 	}
 
 	/** @param {Wish} now */
@@ -549,18 +517,13 @@ export function definition({ store }, { start, cost: told, copy }) {
 				({ name, error }) =>
 					!error && !now.recordings.some((place) => place === name || nameOf(place) === name),
 			);
-		const more = h("select.field", {
-			"aria-label": "Add a recording",
-			onchange: () => {
-				now.recordings = [...now.recordings, more.value];
-				show();
-				changed();
-			},
+		const words = [["", "add a recording…"], ...others.map(({ name }) => [name, name])];
+		const more = chooser("Add a recording", words, "", (name) => {
+			now.recordings = [...now.recordings, name];
+			edited();
 		});
-		choices(more, [["", "add a recording…"], ...others.map(({ name }) => pair(name))], "");
-		return h(
-			"div.blk",
-			h("h3.h", "Recordings"),
+		return block(
+			"Recordings",
 			h(
 				"div.tags",
 				now.recordings.map((place) =>
@@ -569,8 +532,7 @@ export function definition({ store }, { start, cost: told, copy }) {
 						now.recordings.length > 1 &&
 							(() => {
 								now.recordings = now.recordings.filter((one) => one !== place);
-								show();
-								changed();
+								edited();
 							}),
 					),
 				),
@@ -581,40 +543,29 @@ export function definition({ store }, { start, cost: told, copy }) {
 
 	/** @param {Wish} now */
 	function numbers(now) {
-		const search = h("select.field", {
-			"aria-label": "Search",
-			onchange: () => {
-				now.search = search.value;
-				changed();
-			},
+		const search = chooser("Search", SEARCHES, now.search, (value) => {
+			now.search = value;
+			changed();
 		});
-		choices(search, SEARCHES, now.search);
 		/** @param {string} word @param {Element} field */
 		const labelled = (word, field) => h("label", h("span", word), field);
+		/** @param {string} word @param {"trials" | "seeds"} key */
+		const count = (word, key) => {
+			const set = (/** @type {number | null} */ value) => (now[key] = value ?? 0);
+			return labelled(word, numberField(changed, word, now[key], set, { min: 1 }));
+		};
+		const minutes = numberField(
+			changed,
+			"At most so many minutes",
+			now.minutes,
+			(value) => (now.minutes = value),
+			{ placeholder: "any" },
+		);
 		return h(
 			"div.blk.four",
-			labelled(
-				"Trials",
-				numberField(changed, "Trials", now.trials, (value) => (now.trials = value ?? 0), {
-					min: 1,
-				}),
-			),
-			labelled(
-				"Seeds",
-				numberField(changed, "Seeds", now.seeds, (value) => (now.seeds = value ?? 0), { min: 1 }),
-			),
-			labelled(
-				"Minutes",
-				numberField(
-					changed,
-					"At most so many minutes",
-					now.minutes,
-					(value) => (now.minutes = value),
-					{
-						placeholder: "any",
-					},
-				),
-			),
+			count("Trials", "trials"),
+			count("Seeds", "seeds"),
+			labelled("Minutes", minutes),
 			labelled("Search", search),
 		);
 	}
@@ -635,6 +586,3 @@ export function definition({ store }, { start, cost: told, copy }) {
 
 	return { element, edit, locked, state, places: () => where };
 }
-
-/** @param {string} name @returns {[string, string]} */
-const pair = (name) => [name, name];

@@ -1,11 +1,11 @@
 /** The place Study: what is tried, how far it is, what it has found. */
-import { choices, fill, h, icon, write } from "../elements/dom.js";
+import { capital, choices, fill, h, icon, write } from "../elements/dom.js";
 import { getJson } from "../state/api.js";
 import { bestTrials } from "./best.js";
 import { overview } from "./figures.js";
 import { definition } from "./form.js";
 import { placeOf } from "./where.js";
-import { lasting, lineOf, nameOf, roughly } from "./words.js";
+import { lasting, lineOf, nameOf } from "./words.js";
 
 /* ---------- How far a study is, and what each worker does. ---------- */
 
@@ -164,14 +164,7 @@ export function mountStudy(root, { store, actions }) {
 
 	async function refreshList() {
 		studies = (await getJson("/api/studies")).studies;
-		choices(
-			list,
-			[
-				[NEW, "a new study"],
-				...studies.map((one) => /** @type {[string, string]} */ ([one.name, lineOf(one)])),
-			],
-			name,
-		);
+		choices(list, [[NEW, "a new study"], ...studies.map((one) => [one.name, lineOf(one)])], name);
 	}
 
 	/** @param {string} wanted */
@@ -239,23 +232,12 @@ export function mountStudy(root, { store, actions }) {
 		fill(
 			blank,
 			h("h3", "What it will take"),
-			cost
-				? h(
-						"dl.cost",
-						h("div", h("dt", "runs"), h("dd", cost.runs)),
-						h(
-							"div",
-							h("dt", "time"),
-							h(
-								"dd",
-								cost.seconds === null
-									? "known after the first trial"
-									: `about ${roughly(cost.seconds)}`,
-							),
-						),
-						h("div", h("dt", "disk"), h("dd", `${(cost.bytes / 1e6).toFixed(1)} MB`)),
-					)
-				: h("p", "See what is said beside Start."),
+			h(
+				"p",
+				cost
+					? `${capital(cost.words)}; ${(cost.bytes / 1e6).toFixed(1)} MB on disk.`
+					: "See what is said beside Start.",
+			),
 			h("h3", "What a study is"),
 			h(
 				"p",

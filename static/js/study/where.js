@@ -9,8 +9,8 @@ import { choiceCard, numberField } from "./form.js";
 export const placeOf = ({ scheduler, workers }) =>
 	scheduler === null ? { workers } : { scheduler };
 
-/** @param {Where} where @param {{changed: () => void, show: () => void}} on */
-export function runsOn(where, { changed, show }) {
+/** @param {Where} where @param {{changed: () => void, edited: () => void}} on */
+export function runsOn(where, { changed, edited }) {
 	const address = h("input.field.addr", {
 		value: where.scheduler ?? "",
 		placeholder: "tcp://scheduler:8786",
@@ -43,8 +43,7 @@ export function runsOn(where, { changed, show }) {
 		const on = here === (where.scheduler === null);
 		const choose = () => {
 			where.scheduler = here ? null : (where.scheduler ?? "");
-			show();
-			changed();
+			edited();
 		};
 		return choiceCard(on, title, choose, true, ...(on ? rest : []));
 	};

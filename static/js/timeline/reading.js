@@ -4,7 +4,8 @@
  */
 import { faded, stroke, trace } from "../draw/canvas.js";
 import { drawGround } from "../draw/rows.js";
-import { all, fill, h, icon, idTag, one, write } from "../elements/dom.js";
+import { fill, h, icon, idTag, one, write } from "../elements/dom.js";
+import { menuOf, opensMenu } from "../elements/over.js";
 import { bucketOf, panned, secondsOf, xOf, zoomed } from "../play/clock.js";
 import { fetcher, getJson } from "../state/api.js";
 import { decisionsOf, scoresOf, shownVersion, stateAt } from "../state/events.js";
@@ -212,7 +213,7 @@ export function mountReading({ store, actions }, timeline) {
 	mountFingers(timeline.plot, store);
 	timeline.braid = drawBraid;
 	const gutter = one(".gut");
-	const menu = h("div.menu.plots", { popover: "auto", "aria-label": "Plots of a track" });
+	const menu = menuOf({ class: "menu plots", "aria-label": "Plots of a track" });
 	const button = h(
 		"button.btn",
 		{
@@ -222,7 +223,7 @@ export function mountReading({ store, actions }, timeline) {
 		"Plots",
 		icon("i-down", "s"),
 	);
-	button.popoverTargetElement = menu;
+	opensMenu(button, menu);
 	one(".trans .grow").before(button, menu);
 	/** @type {Server.CourseKind[]} */
 	let kinds = [];
@@ -361,12 +362,7 @@ export function mountReading({ store, actions }, timeline) {
 		if (name) toggle(name);
 		else menu.togglePopover();
 	};
-	menu.addEventListener("toggle", (event) => {
-		if (/** @type {ToggleEvent} */ (event).newState !== "open") return;
-		const { left, top } = button.getBoundingClientRect();
-		Object.assign(menu.style, { left: `${left}px`, bottom: `${innerHeight - top + 6}px` });
-		all("input", menu)[0]?.focus();
-	});
+
 	async function read() {
 		if (kinds.length) return;
 		const found = await getJson("/api/courses/kinds").catch(() => null);

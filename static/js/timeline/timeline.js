@@ -165,7 +165,20 @@ export function mountTimeline(root, context) {
 	/** Height of what stands over the lanes. */
 	const above = () => token("h-over") + token("h-ruler") + token("h-check");
 
+	/** Alone on the page its strips have the height that the lanes leave. */
+	function share() {
+		const { style } = document.documentElement;
+		style.removeProperty("--h-strip");
+		if (store.get().layout.max !== "time") return;
+		const strips = all(".gr.strip:not([hidden])", root).length;
+		const lanesHeight = shownTracks().length * token("h-lane");
+		const room = plot.clientHeight - above();
+		const each = (room - Math.min(lanesHeight, room / 2)) / Math.max(1, strips);
+		style.setProperty("--h-strip", `${Math.floor(Math.max(token("h-strip"), each))}px`);
+	}
+
 	function resize() {
+		share();
 		view = { ...view, width: Math.max(1, plot.clientWidth - token("pad-end")) };
 		draw();
 		placeHead();
@@ -458,8 +471,7 @@ export function mountTimeline(root, context) {
 	});
 	store.on(["timeline", "run", "basis", "laneOrder", "scores", "measure", "layers3d"], () => {
 		listLanes();
-		draw();
-		placeHead();
+		resize();
 	});
 	store.on(["selection"], () => {
 		listLanes();
@@ -492,7 +504,7 @@ export function mountTimeline(root, context) {
 		}, 200);
 	});
 	listLanes();
-	addEventListener("panes", draw);
+	addEventListener("panes", resize);
 	new ResizeObserver(resize).observe(plot);
 	resize();
 	return seam;

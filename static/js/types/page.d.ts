@@ -246,6 +246,8 @@ interface Actions {
 	go: (place: string) => void;
 	clear: () => void;
 	exportTracks: () => void;
+	/** Save what an address gives, once it is known that it gives it; a name where the answer has none. */
+	saveFile: (path: string, fallback: string) => Promise<void>;
 	/** As the large picture. */
 	chooseCamera: (index: number) => void;
 	/** In 3D; null is the free view. */

@@ -1,5 +1,46 @@
-/** The one tip of the page: what a control does, its key, and why it cannot be pressed. */
-import { fill, h } from "./dom.js";
+/** What lies over the page: menus, and the one tip. */
+import { all, fill, h } from "./dom.js";
+
+/* ---------- Menus: a popover whose lines are walked by arrows, and whose keys are its own. */
+
+/** @param {Attributes} attributes @param {...(Child | Child[])} lines */
+export function menuOf(attributes, ...lines) {
+	const menu = h("div.menu", { popover: "auto", ...attributes }, ...lines);
+	menu.addEventListener("keydown", (event) => {
+		const turn = { ArrowDown: 1, ArrowUp: -1 }[event.key];
+		const stops = all("button, [type=checkbox]", menu);
+		const at = stops.indexOf(/** @type {any} */ (document.activeElement));
+		if (turn && at >= 0) {
+			stops[(at + turn + stops.length) % stops.length].focus();
+			event.preventDefault();
+		}
+		if (event.key !== "Escape") event.stopPropagation();
+	});
+	return menu;
+}
+
+/**
+ * Have a button open a menu beside it, towards the middle of the window, whose edges would cut it.
+ * @param {HTMLElement} button @param {HTMLElement} menu @param {() => void} [opened]
+ */
+export function opensMenu(button, menu, opened) {
+	Object.assign(button, { popoverTargetElement: menu });
+	menu.addEventListener("toggle", (event) => {
+		if (/** @type {ToggleEvent} */ (event).newState !== "open") return;
+		const { left, right, top, bottom } = button.getBoundingClientRect();
+		const [far, low] = [left > innerWidth / 2, top > innerHeight / 2];
+		Object.assign(menu.style, {
+			left: far ? "auto" : `${left}px`,
+			right: far ? `${innerWidth - right}px` : "auto",
+			top: low ? "auto" : `${bottom + 6}px`,
+			bottom: low ? `${innerHeight - top + 6}px` : "auto",
+		});
+		all("button, input", menu)[0]?.focus();
+		opened?.();
+	});
+}
+
+/* ---------- The tip: what a control does, its key, and why it cannot be pressed. */
 
 /** A pointer rests on a control for so long before its tip comes, milliseconds. */
 const AFTER = 350;
