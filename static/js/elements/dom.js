@@ -124,16 +124,6 @@ export function idTag(id) {
 	return h("span.id", { "--c": `var(--id-${n})`, "--on-id": `var(--on-${n})` }, id);
 }
 
-/** A symbol with indices set low; a method's key is words. @param {string} symbol  such as p_D or σ_z/σ_x */
-export function symbolParts(symbol) {
-	if (!/^.{1,4}_/.test(symbol)) return [symbol.replaceAll("_", " ")];
-	return symbol.split(/_([^/()+]+)/).map((part, k) => (k % 2 ? h("sub", part) : part));
-}
-
-/** @param {string} symbol */
-export const symbolOf = (symbol, kind = "sym") =>
-	h("span", { class: kind }, ...symbolParts(symbol));
-
 /** @param {number} value  @returns {string} as short as it stays readable */
 export function show(value) {
 	if (Number.isInteger(value)) return String(value);

@@ -1,5 +1,5 @@
 /** Panels that are drawn anew while somebody works in them, and what they are written with. */
-import { all, choices, h, icon, symbolParts } from "./dom.js";
+import { all, choices, h, icon } from "./dom.js";
 import { table } from "./table.js";
 
 /** Elements that are replaced as a whole where they differ: what they do is made with what they say. */
@@ -130,6 +130,16 @@ export const ARROWS = {
 	ArrowUp: [0, -1],
 	ArrowDown: [0, 1],
 };
+
+/** A symbol with indices set low; a method's key is words. @param {string} symbol  such as p_D or σ_z/σ_x */
+export function symbolParts(symbol) {
+	if (!/^.{1,4}_/.test(symbol)) return [symbol.replaceAll("_", " ")];
+	return symbol.split(/_([^/()+]+)/).map((part, k) => (k % 2 ? h("sub", part) : part));
+}
+
+/** @param {string} symbol */
+export const symbolOf = (symbol, kind = "sym") =>
+	h("span", { class: kind }, ...symbolParts(symbol));
 
 /** A parameter: its words with its symbol; what it means comes with the pointer. @param {Server.ParameterInfo} of */
 export function parameterName({ label, symbol, help }) {

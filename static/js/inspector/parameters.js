@@ -2,8 +2,8 @@
  * The tab Parameters: one table of all of them, by topics, each with slider, number, unit, what it
  * would change, reset and help; below it presets and the same run without a browser.
  */
-import { all, choices, h, icon, parts, show, svg, symbolParts, write } from "../elements/dom.js";
-import { fixed } from "../elements/drawn.js";
+import { all, choices, h, icon, parts, show, svg, write } from "../elements/dom.js";
+import { fixed, symbolParts } from "../elements/drawn.js";
 import { fetcher, getJson } from "../state/api.js";
 
 /** @typedef {Server.ParameterInfo} Parameter */

@@ -1,5 +1,6 @@
 /** The table of a recording's runs. */
-import { h, icon, remember, remembered, symbolOf } from "../elements/dom.js";
+import { h, icon, remember, remembered } from "../elements/dom.js";
+import { symbolOf } from "../elements/drawn.js";
 import { menuOf, opensMenu } from "../elements/over.js";
 import { table } from "../elements/table.js";
 import { figure, isMethod, livesAMinute, madeWhen, many, methodWord } from "./words.js";

@@ -1,7 +1,7 @@
 /** A kept run in small, and runs side by side: what of them is drawn. */
 import { chart, roundTicks } from "../elements/chart.js";
-import { colourIndex, h, idTag, svg, symbolOf } from "../elements/dom.js";
-import { parameterName } from "../elements/drawn.js";
+import { colourIndex, h, idTag, svg } from "../elements/dom.js";
+import { parameterName, symbolOf } from "../elements/drawn.js";
 import { METHODS, figure, isMethod, methodWord, templateWords, titleOf } from "./words.js";
 
 /** Lanes that are drawn: those of the longest tracks. */

@@ -1,5 +1,6 @@
 /** The two dialogs made from the registry of commands: help with its keys, and the palette. */
-import { all, fill, h, one, parts, symbolOf } from "../elements/dom.js";
+import { all, fill, h, one, parts } from "../elements/dom.js";
+import { symbolOf } from "../elements/drawn.js";
 import { COMMANDS, keyLabel, perform, search } from "../state/commands.js";
 import { PLACES } from "../state/address.js";
 

@@ -1,6 +1,6 @@
 /** The trials of a study, and what is done with the chosen one: used, compared, kept, repeated. */
-import { all, fill, h, icon, symbolOf } from "../elements/dom.js";
-import { asks, grow, paneHead } from "../elements/drawn.js";
+import { all, fill, h, icon } from "../elements/dom.js";
+import { asks, grow, paneHead, symbolOf } from "../elements/drawn.js";
 import { table } from "../elements/table.js";
 import { getJson } from "../state/api.js";
 import { differenceOf, figureOf, titledOf, valueOf } from "./words.js";

@@ -1,7 +1,7 @@
 /** The figures of a study: its trials, what matters, each parameter; the table says the same. */
 import { chart } from "../elements/chart.js";
-import { fill, h, write, symbolOf } from "../elements/dom.js";
-import { grow, paneHead, segment } from "../elements/drawn.js";
+import { fill, h, write } from "../elements/dom.js";
+import { grow, paneHead, segment, symbolOf } from "../elements/drawn.js";
 import { many } from "../library/words.js";
 import { figureOf, titledOf, valueOf } from "./words.js";
 

@@ -1,6 +1,6 @@
 /** What a study tries: written down before it starts, locked afterwards. */
-import { fill, h, icon, symbolOf } from "../elements/dom.js";
-import { chooser, grow, paneHead, signButton } from "../elements/drawn.js";
+import { fill, h, icon } from "../elements/dom.js";
+import { chooser, grow, paneHead, signButton, symbolOf } from "../elements/drawn.js";
 import { getJson, sendJson } from "../state/api.js";
 import { placeOf, runsOn } from "./where.js";
 import { nameOf, valueOf } from "./words.js";
