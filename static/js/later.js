@@ -1,6 +1,7 @@
 /** What nobody needs before the first picture: read when the page is there. */
 import { mountCorrecting } from "./check/edits.js";
 import { fill, h, icon, one, parts, write } from "./elements/dom.js";
+import { signButton } from "./elements/drawn.js";
 import { mountTips } from "./elements/over.js";
 import { mountBookmarks, mountIdentity, mountTables } from "./inspector/tables.js";
 import { keyLabel } from "./state/commands.js";
@@ -46,6 +47,7 @@ function mountExport({ leaving, stopLeaving, leave }, { store, actions }) {
 
 /** Its name among what was closed for good. */
 const TOUR = "tour";
+const CLOSE = "Close for good; Help shows it again";
 
 const key = (/** @type {string} */ name) => h("kbd", keyLabel(name));
 
@@ -116,15 +118,7 @@ function mountTour(root, { store }) {
 			h(
 				"div.tour-head",
 				h("h2", "What you see"),
-				h(
-					"button.btn.icon",
-					{
-						"aria-label": "Close for good; Help shows it again",
-						"data-tip": "Close for good; Help shows it again",
-						onclick: close,
-					},
-					icon("i-close"),
-				),
+				signButton("i-close", CLOSE, close, { "data-tip": CLOSE }),
 			),
 			h(
 				"p.seen",

@@ -11,7 +11,7 @@ import {
 	visibleTracks,
 	createFloor,
 } from "../draw/overlay.js";
-import { fill, h, icon, parts, write, idTag, show } from "../elements/dom.js";
+import { capture, fill, h, icon, parts, write, idTag, show } from "../elements/dom.js";
 import { decisionsOf, gateWords, isAlone, viewWords } from "../state/events.js";
 
 /* ---------- Cards beside the boxes of a picture: what a track is made of, and whose a box is. */
@@ -316,14 +316,10 @@ function mountMagnifier(body, store) {
 	});
 	for (const kind of /** @type {const} */ (["pointerup", "pointercancel"]))
 		body.addEventListener(kind, ({ pointerId }) => fingers.delete(pointerId));
-	body.addEventListener(
-		"click",
-		(event) => {
-			if (travelled >= STILL) event.stopPropagation();
-			travelled = 0;
-		},
-		true,
-	);
+	capture(body, "click", (event) => {
+		if (travelled >= STILL) event.stopPropagation();
+		travelled = 0;
+	});
 }
 
 /** As wide as this a picture has its words in one line, CSS pixels: as in panes.css. */

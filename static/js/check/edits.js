@@ -1,5 +1,5 @@
 /** What can be said to put tracks right: one function for each command, at every place of the bench. */
-import { all, fill, h, icon, idTag, one, turned } from "../elements/dom.js";
+import { capture, all, fill, h, icon, idTag, one, turned } from "../elements/dom.js";
 import { menuOf } from "../elements/over.js";
 import { commandOf, keyLabel, perform } from "../state/commands.js";
 import { resultOf } from "../state/events.js";
@@ -39,48 +39,35 @@ function whenHeld(element, act) {
 	/** @type {Timer} */
 	let timer;
 	const end = () => clearTimeout(timer);
-	element.addEventListener(
-		"pointerdown",
-		(event) => {
-			end();
-			held = false;
-			if (event.pointerType === "mouse" || !event.isPrimary || event.button !== 0) return;
-			pressed = event;
-			timer = setTimeout(() => {
-				held = true;
-				act(event);
-			}, HELD_MS);
-		},
-		true,
-	);
-	element.addEventListener(
-		"pointermove",
-		({ clientX, clientY }) => {
-			const far = pressed && Math.hypot(clientX - pressed.clientX, clientY - pressed.clientY);
-			if (far && far > HELD_STILL) end();
-		},
-		true,
-	);
-	for (const kind of ["pointerup", "pointercancel", "contextmenu"])
-		element.addEventListener(kind, end, true);
+	capture(element, "pointerdown", (event) => {
+		end();
+		held = false;
+		if (event.pointerType === "mouse" || !event.isPrimary || event.button !== 0) return;
+		pressed = event;
+		timer = setTimeout(() => {
+			held = true;
+			act(event);
+		}, HELD_MS);
+	});
+	capture(element, "pointermove", ({ clientX, clientY }) => {
+		const far = pressed && Math.hypot(clientX - pressed.clientX, clientY - pressed.clientY);
+		if (far && far > HELD_STILL) end();
+	});
+	for (const kind of ["pointerup", "pointercancel", "contextmenu"]) capture(element, kind, end);
 	element.addEventListener("pointerup", () => {
 		const again = held ? pressed : null;
 		if (again) timer = setTimeout(() => act(again), AFTER_MS);
 	});
 	// What ends it is no click, and closes what opened as one beside it would.
-	element.addEventListener(
-		"click",
-		(event) => {
-			const again = held ? pressed : null;
-			if (!again) return;
-			held = false;
-			event.stopImmediatePropagation();
-			event.preventDefault();
-			end();
-			setTimeout(() => act(again));
-		},
-		true,
-	);
+	capture(element, "click", (event) => {
+		const again = held ? pressed : null;
+		if (!again) return;
+		held = false;
+		event.stopImmediatePropagation();
+		event.preventDefault();
+		end();
+		setTimeout(() => act(again));
+	});
 }
 
 /* ---------- Where in a picture somebody points. */
@@ -348,14 +335,14 @@ function mountMenu(context, timeline, does) {
 		/** @type {[number, number] | null} */
 		let pressed = null;
 		const view = frame.contentDocument?.defaultView;
-		view?.addEventListener(
-			"pointerdown",
-			({ button, clientX, clientY }) => (pressed = button === 2 ? [clientX, clientY] : null),
-			true,
-		);
-		view?.addEventListener(
-			"pointerup",
-			(event) => {
+		if (view)
+			capture(
+				view,
+				"pointerdown",
+				({ button, clientX, clientY }) => (pressed = button === 2 ? [clientX, clientY] : null),
+			);
+		if (view)
+			capture(view, "pointerup", (event) => {
 				if (event.button !== 2 || !pressed || !store.get().sequence) return;
 				const [x, y] = [event.clientX - pressed[0], event.clientY - pressed[1]];
 				if (Math.hypot(x, y) > STILL) return;
@@ -365,9 +352,7 @@ function mountMenu(context, timeline, does) {
 				const edge = frame.getBoundingClientRect();
 				[left, top] = [edge.left + event.clientX + 2, edge.top + event.clientY + 2];
 				open({ track: selection, step: shown() });
-			},
-			true,
-		);
+			});
 	}
 	frame.addEventListener("load", in3d);
 	// It may have been there before this was read.

@@ -4,7 +4,7 @@
  * click.
  */
 import { clickOf, pixelOf, scaleOf } from "./edits.js";
-import { colourIndex, h, one } from "../elements/dom.js";
+import { claim, capture, colourIndex, h, one } from "../elements/dom.js";
 import { ARROWS } from "../elements/drawn.js";
 import { getJson } from "../state/api.js";
 import { shownVersion } from "../state/events.js";
@@ -152,8 +152,7 @@ export function mountFeet({ store, playback }, check) {
 			void send();
 		} else if (event.key === "Escape") cancel();
 		else return;
-		event.preventDefault();
-		event.stopPropagation();
+		claim(event);
 	}
 
 	/** What was said so far is told to who places. */
@@ -222,35 +221,26 @@ export function mountFeet({ store, playback }, check) {
 
 	// While somebody is placed a click in a picture says where; nothing else happens there.
 	for (const name of ["pointerdown", "click", "dblclick"])
-		mosaic.addEventListener(
-			name,
-			(event) => {
-				const { placing } = state.get();
-				const target = /** @type {Element} */ (event.target);
-				if (!placing || target.closest(".foothold")) return;
-				const at = pixelOf(/** @type {MouseEvent} */ (event), store.get());
-				if (!at) return;
-				event.stopPropagation();
-				const foot = feet.find(({ index }) => index === at.index);
-				if (name !== "click" || !foot) return;
-				says(foot, at.x, at.y);
-			},
-			true,
-		);
-	document.addEventListener(
-		"keydown",
-		(event) => {
-			if (!state.get().placing || store.get().place !== "check") return;
-			if (document.querySelector("dialog[open], :popover-open")) return;
-			const onControl = /** @type {Element} */ (event.target).closest("button, input, select");
-			if (event.key === "Escape") cancel();
-			else if (event.key === "Enter" && !onControl && said().length) void send();
-			else return;
-			event.preventDefault();
+		capture(mosaic, name, (event) => {
+			const { placing } = state.get();
+			const target = /** @type {Element} */ (event.target);
+			if (!placing || target.closest(".foothold")) return;
+			const at = pixelOf(/** @type {MouseEvent} */ (event), store.get());
+			if (!at) return;
 			event.stopPropagation();
-		},
-		true,
-	);
+			const foot = feet.find(({ index }) => index === at.index);
+			if (name !== "click" || !foot) return;
+			says(foot, at.x, at.y);
+		});
+	capture(document, "keydown", (event) => {
+		if (!state.get().placing || store.get().place !== "check") return;
+		if (document.querySelector("dialog[open], :popover-open")) return;
+		const onControl = /** @type {Element} */ (event.target).closest("button, input, select");
+		if (event.key === "Escape") cancel();
+		else if (event.key === "Enter" && !onControl && said().length) void send();
+		else return;
+		claim(event);
+	});
 	store.on(["shown"], goAlong);
 	store.watch(
 		["place", "selection", "shown", "playing", "basis", "revision", "result", "cameras"],

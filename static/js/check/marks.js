@@ -2,7 +2,7 @@
  * In the timeline: numbered places in a row under the ruler, how it would be as ghosts in the lanes,
  * and pins and brackets where something was put right.
  */
-import { faded, stroke, trace } from "../draw/canvas.js";
+import { faded, rule, stroke, trace } from "../draw/canvas.js";
 import { fill, h, icon, one, write } from "../elements/dom.js";
 import { xOf } from "../play/clock.js";
 import { clockOf, middleOf } from "./words.js";
@@ -210,26 +210,12 @@ function drawPin(g, ink, x, to, y) {
 		ink.get("ink-1"),
 		1.25,
 	);
-	stroke(
-		trace(g, [
-			[a, y + 3],
-			[a, y - 4],
-		]),
-		ink.get("bg-1"),
-		4,
-	);
+	rule(g, [a, y + 3], [a, y - 4], ink.get("bg-1"), 4);
 	g.beginPath();
 	g.arc(a, y - 4, 4, 0, 7);
 	g.fillStyle = ink.get("bg-1");
 	g.fill();
-	stroke(
-		trace(g, [
-			[a, y + 3],
-			[a, y - 4],
-		]),
-		ink.get("ink-1"),
-		1.5,
-	);
+	rule(g, [a, y + 3], [a, y - 4], ink.get("ink-1"), 1.5);
 	g.beginPath();
 	g.arc(a, y - 4, 2.8, 0, 7);
 	g.fillStyle = ink.get("ink-1");

@@ -1,5 +1,6 @@
 /** The queue of doubtful places where the sliders stand, and under it what was put right. */
-import { capital, fill, h, icon, idTag, write } from "../elements/dom.js";
+import { claim, capital, fill, h, icon, idTag, write } from "../elements/dom.js";
+import { signButton } from "../elements/drawn.js";
 import { commandOf, keyLabel } from "../state/commands.js";
 import { shownVersion } from "../state/events.js";
 import { offerTurn } from "../panes/controls.js";
@@ -32,15 +33,9 @@ export function mountQueue(root, { store, actions }, check, crops) {
 	const count = h("span.count");
 	/** @param {"undo" | "redo"} what @param {-1 | 1} direction */
 	const turn = (what, direction) =>
-		h(
-			"button.btn.icon",
-			{
-				"aria-label": commandOf(what).title,
-				"data-key": commandOf(what).keys.map(keyLabel).join(),
-				onclick: () => actions.undo(direction),
-			},
-			icon(`i-${what}`),
-		);
+		signButton(`i-${what}`, commandOf(what).title, () => actions.undo(direction), {
+			"data-key": commandOf(what).keys.map(keyLabel).join(),
+		});
 	const [undo, redo] = [turn("undo", -1), turn("redo", 1)];
 	store.watch(["server"], ({ server }) => {
 		offerTurn(undo, "undo", server);
@@ -225,8 +220,7 @@ export function mountQueue(root, { store, actions }, check, crops) {
 		if (!step || !doubts.length) return;
 		const index = doubts.findIndex(({ id }) => id === state.get().chosen?.id);
 		check.choose(doubts[Math.max(0, Math.min(doubts.length - 1, index + step))]);
-		event.preventDefault();
-		event.stopPropagation();
+		claim(event);
 	});
 
 	/** The correction that is walked to. */
@@ -255,7 +249,7 @@ export function mountQueue(root, { store, actions }, check, crops) {
 			},
 			icon(unmet ? "i-warn" : (ICONS[one.kind] ?? "i-pin"), "s"),
 			h(
-				"span.qw",
+				"span.qw.cut",
 				[...new Set(one.tracks)].slice(0, 2).flatMap((id) => [idTag(id), " "]),
 				one.words,
 				unmet && h("span.q", ` · ${one.why || "found no track"}`),
@@ -306,8 +300,7 @@ export function mountQueue(root, { store, actions }, check, crops) {
 		else if (event.key === "Enter" && newest[index]) show(newest[index]);
 		else if (event.key === "Delete" && newest[index]) void check.drop(newest[index].id);
 		else return;
-		event.preventDefault();
-		event.stopPropagation();
+		claim(event);
 	});
 
 	state.watch(["queue", "chosen"], list);

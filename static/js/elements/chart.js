@@ -1,5 +1,5 @@
 /** The chart of the page: axes with round ticks, marks, a card at the pointer or by keys, a brush. */
-import { fill, h, show, svg } from "./dom.js";
+import { claim, fill, h, show, svg } from "./dom.js";
 
 /**
  * @typedef {object} Axis
@@ -366,8 +366,7 @@ export function chart() {
 			mean(target);
 			span(from === null ? null : target.x);
 		} else return;
-		event.preventDefault();
-		event.stopPropagation();
+		claim(event);
 	}
 
 	function draw() {

@@ -56,6 +56,19 @@ export function write(node, text) {
 	if (node.textContent !== text) node.textContent = text;
 }
 
+/** Hear of an event before what it happens in does. @type {Capture} */
+export const capture = (
+	/** @type {EventTarget} */ target,
+	/** @type {string} */ kind,
+	/** @type {any} */ act,
+) => target.addEventListener(kind, act, true);
+
+/** What happened is dealt with: it means nothing else. @param {Event} event */
+export function claim(event) {
+	event.preventDefault();
+	event.stopPropagation();
+}
+
 /**
  * The elements of the markup that a selector finds.
  * @param {string} selector

@@ -1,5 +1,5 @@
 /** What lies over the page: menus, and the one tip. */
-import { all, fill, h } from "./dom.js";
+import { all, capture, fill, h } from "./dom.js";
 
 /* ---------- Menus: a popover whose lines are walked by arrows, and whose keys are its own. */
 
@@ -94,13 +94,9 @@ export function mountTips() {
 	document.addEventListener("focusin", ({ target }) => tabbed && ask(target, 0));
 	document.addEventListener("focusout", hide);
 	document.documentElement.addEventListener("pointerleave", hide);
-	for (const kind of ["pointerdown", "wheel"]) document.addEventListener(kind, hide, true);
-	document.addEventListener(
-		"keydown",
-		({ key }) => {
-			tabbed = key === "Tab";
-			hide();
-		},
-		true,
-	);
+	for (const kind of ["pointerdown", "wheel"]) capture(document, kind, hide);
+	capture(document, "keydown", ({ key }) => {
+		tabbed = key === "Tab";
+		hide();
+	});
 }

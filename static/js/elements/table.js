@@ -1,5 +1,5 @@
 /** Tables: sorted by their heads, walked by arrows, filled again without losing place or focus. */
-import { fill, h, write } from "./dom.js";
+import { claim, fill, h, write } from "./dom.js";
 
 /** By which column each table is sorted, by its label: kept while it is drawn anew. @type {Map<string | null, {word?: string, down?: boolean}>} */
 const sorted = new Map();
@@ -80,8 +80,7 @@ export function table(label, columns, { key, by, down, choose, open, attributes 
 					? element.nextElementSibling
 					: key === "ArrowUp" && element.previousElementSibling;
 			if (!(next instanceof HTMLElement)) return;
-			event.preventDefault();
-			event.stopPropagation();
+			claim(event);
 			next.focus();
 		}
 		entry.element = h(

@@ -2,8 +2,8 @@
  * The tab Parameters: one table of all of them, by topics, each with slider, number, unit, what it
  * would change, reset and help; below it presets and the same run without a browser.
  */
-import { all, choices, h, icon, parts, show, svg, write } from "../elements/dom.js";
-import { fixed, symbolParts } from "../elements/drawn.js";
+import { claim, all, choices, h, icon, parts, show, svg, write } from "../elements/dom.js";
+import { fixed, signButton, symbolParts } from "../elements/drawn.js";
 import { fetcher, getJson } from "../state/api.js";
 
 /** @typedef {Server.ParameterInfo} Parameter */
@@ -193,21 +193,17 @@ export function mountParameters(root, { store, actions }) {
 		const called = { "aria-label": whose, "aria-describedby": `help-${key}` };
 		/** @type {Part | undefined} */
 		let slider;
-		/** @type {Part} */
+		/** @type {any} */
 		let field;
 		if (kind === "choice")
-			field = /** @type {any} */ (
-				h("select", { id, ...called, onchange: () => void wish(key, field.value) })
-			);
+			field = h("select", { id, ...called, onchange: () => void wish(key, field.value) });
 		else if (kind === "bool")
-			field = /** @type {any} */ (
-				h("input", {
-					id,
-					type: "checkbox",
-					...called,
-					onchange: () => void wish(key, field.checked),
-				})
-			);
+			field = h("input", {
+				id,
+				type: "checkbox",
+				...called,
+				onchange: () => void wish(key, field.checked),
+			});
 		else {
 			const bar = (slider = /** @type {any} */ (
 				h("input", {
@@ -219,8 +215,7 @@ export function mountParameters(root, { store, actions }) {
 					onkeydown: (/** @type {KeyboardEvent} */ event) => {
 						const by = { ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1 }[event.key];
 						if (!by) return;
-						event.preventDefault();
-						event.stopPropagation();
+						claim(event);
 						bar.value = String(Number(bar.value) + by * placesOf(of, now(key))[2]);
 						slide(bar, of);
 					},
@@ -249,11 +244,7 @@ export function mountParameters(root, { store, actions }) {
 			h("span", label),
 			h("span.q", group.replaceAll("_", " ")),
 		);
-		const reset = h(
-			"button.btn.icon",
-			{ "aria-label": `Reset ${whose}`, onclick: () => actions.reset(key) },
-			icon("i-reset", "s"),
-		);
+		const reset = signButton("i-reset", `Reset ${whose}`, () => actions.reset(key));
 		const effect = h("td.effect");
 		const said = h("p");
 		const row = h(

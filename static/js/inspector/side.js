@@ -1,5 +1,5 @@
 /** The side panel: tabs with a panel each, and the first of them, the table of tracks. */
-import { all, one, parts, fill, h, idTag, write } from "../elements/dom.js";
+import { claim, all, one, parts, fill, h, idTag, write } from "../elements/dom.js";
 import { table } from "../elements/table.js";
 import {
 	isAlone,
@@ -244,8 +244,7 @@ export function mountSide(root, context) {
 			const [at, count] = [there.indexOf(tab), there.length];
 			const to = { ArrowRight: at + 1, ArrowLeft: at - 1, Home: 0, End: -1 }[event.key];
 			if (to === undefined) return;
-			event.preventDefault();
-			event.stopPropagation();
+			claim(event);
 			const next = there[(to + count) % count];
 			store.set({ tab: nameOf(next) });
 			next.focus();

@@ -344,7 +344,7 @@ function saving({ unsaved, file, read_only: why, built_in, copy_to: copy }) {
 				? [
 						h("span.dot.warn"),
 						h("b", `${unsaved.length} change${unsaved.length > 1 ? "s" : ""} not saved`),
-						h("span.words", { title: words }, words),
+						h("span.words.cut", { title: words }, words),
 					]
 				: quiet("All is as the file has it."),
 			h("span.grow"),

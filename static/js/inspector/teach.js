@@ -3,7 +3,7 @@
  * it is sent.
  */
 import { lensOf } from "../draw/overlay.js";
-import { all, h, one } from "../elements/dom.js";
+import { claim, capture, all, h, one } from "../elements/dom.js";
 import { ARROWS } from "../elements/drawn.js";
 import { resultOf } from "../state/events.js";
 
@@ -83,8 +83,7 @@ function mountFrame(mosaic, store, { keep, tell }) {
 			end();
 			cell.focus();
 		} else return;
-		event.preventDefault();
-		event.stopPropagation();
+		claim(event);
 		put();
 	}
 
@@ -223,33 +222,24 @@ export function mountTeach(mosaic, { store, actions }) {
 		dblclick() {},
 	};
 	for (const [name, act] of Object.entries(drag)) {
-		mosaic.addEventListener(
-			name,
-			(event) => {
-				if (hint.hidden) return;
-				event.stopPropagation();
-				act(event);
-			},
-			true,
-		);
+		capture(mosaic, name, (event) => {
+			if (hint.hidden) return;
+			event.stopPropagation();
+			act(event);
+		});
 	}
 
 	// In the picture that has the focus, else in the large one or the first.
-	document.addEventListener(
-		"keydown",
-		(event) => {
-			const target = /** @type {HTMLElement} */ (event.target);
-			if (event.key !== "Enter" || hint.hidden || document.querySelector("dialog[open]")) return;
-			const own = /** @type {HTMLElement | null} */ (target.closest(".cam"));
-			if (!own && target.closest("button, a, input, select, summary, tr, [role=listbox]")) return;
-			const cell = own ?? all(".cam", mosaic)[store.get().large ?? 0];
-			if (!cell) return;
-			event.preventDefault();
-			event.stopPropagation();
-			frame.begin(cell);
-		},
-		true,
-	);
+	capture(document, "keydown", (event) => {
+		const target = /** @type {HTMLElement} */ (event.target);
+		if (event.key !== "Enter" || hint.hidden || document.querySelector("dialog[open]")) return;
+		const own = /** @type {HTMLElement | null} */ (target.closest(".cam"));
+		if (!own && target.closest("button, a, input, select, summary, tr, [role=listbox]")) return;
+		const cell = own ?? all(".cam", mosaic)[store.get().large ?? 0];
+		if (!cell) return;
+		claim(event);
+		frame.begin(cell);
+	});
 
 	/** A command, or a method and a path. @param {any} from @param {string} kind @param {() => object} body */
 	function send(from, kind, body) {

@@ -1,5 +1,5 @@
 /** The place Library: recordings, the runs of one, and one run in small. */
-import { all, fill, h, icon, write } from "../elements/dom.js";
+import { claim, capture, all, fill, h, icon, write } from "../elements/dom.js";
 import { asks, chooser, grow, paneHead } from "../elements/drawn.js";
 import { getJson } from "../state/api.js";
 import { chosenBar } from "./chosen.js";
@@ -18,7 +18,7 @@ import { factsOf, has, many, size, titleOf, when, whereabouts } from "./words.js
 function lostRecording({ actions, moved }) {
 	/** @type {Server.RecordingInfo | null} */
 	let now = null;
-	const why = h("span");
+	const why = h("span.cut");
 	const place = h("input.field", {
 		placeholder: "folder where it lies now",
 		"aria-label": "Folder where the recording lies now",
@@ -431,33 +431,28 @@ export function mountLibrary(root, { store, actions }) {
 		"Ctrl+a": () => (listed().forEach(({ id }) => chosen.add(id)), show()),
 		"/": () => recordings.find.focus(),
 	};
-	document.addEventListener(
-		"keydown",
-		(event) => {
-			if (store.get().place !== "library" || document.querySelector("dialog[open]")) return;
-			const target = /** @type {HTMLElement} */ (event.target);
-			const types = target.matches("input:not([type=checkbox])");
-			if (event.key === "Escape" && !target.closest("[popover]")) {
-				if (types) target.blur();
-				else if (chosen.size) chooseNone();
-				else location.hash = "#tune";
-				return event.stopPropagation();
-			}
-			const control = event.ctrlKey || event.metaKey;
-			if (types || event.altKey) return;
-			if (recordings.walk(event)) return stopped(event);
-			const act = KEYS[(control ? "Ctrl+" : "") + (control ? event.key.toLowerCase() : event.key)];
-			const onButton = target.closest("button, a, input");
-			if (!act || (onButton && ["Enter", " "].includes(event.key))) return;
-			act();
-			stopped(event);
-		},
-		true,
-	);
+	capture(document, "keydown", (event) => {
+		if (store.get().place !== "library" || document.querySelector("dialog[open]")) return;
+		const target = /** @type {HTMLElement} */ (event.target);
+		const types = target.matches("input:not([type=checkbox])");
+		if (event.key === "Escape" && !target.closest("[popover]")) {
+			if (types) target.blur();
+			else if (chosen.size) chooseNone();
+			else location.hash = "#tune";
+			return event.stopPropagation();
+		}
+		const control = event.ctrlKey || event.metaKey;
+		if (types || event.altKey) return;
+		if (recordings.walk(event)) return stopped(event);
+		const act = KEYS[(control ? "Ctrl+" : "") + (control ? event.key.toLowerCase() : event.key)];
+		const onButton = target.closest("button, a, input");
+		if (!act || (onButton && ["Enter", " "].includes(event.key))) return;
+		act();
+		stopped(event);
+	});
 	/** @param {Event} event */
 	function stopped(event) {
-		event.preventDefault();
-		event.stopPropagation();
+		claim(event);
 	}
 	root.addEventListener("focusin", ({ target }) => {
 		const id = Number(/** @type {HTMLElement} */ (target).closest("tr")?.dataset.run);

@@ -160,7 +160,7 @@ export function runsTable(on) {
 			by: (run) => run.steps_per_second,
 			cell: (run) => (run.steps_per_second ? Math.round(run.steps_per_second) : "–"),
 		},
-		{ word: "Note", kind: "q note-cell", by: true, cell: (run) => run.note },
+		{ word: "Note", kind: "q note-cell cut", by: true, cell: (run) => run.note },
 	];
 	const rows = table("Runs", columns, {
 		key: (run) => run.id,

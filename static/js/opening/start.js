@@ -136,7 +136,7 @@ function card(recording, named) {
 			picture && h("img", { src: picture, alt: "", loading: "lazy", onerror: away }),
 			small(many(cameras, "camera"), { class: "small lens" }),
 		),
-		h("b", name),
+		h("b.cut", name),
 		!named && small(`…/${opens.split(/[\\/]/).filter(Boolean).slice(-2).join("/")}`),
 		h(
 			"span.small",

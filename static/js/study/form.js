@@ -41,7 +41,7 @@ export function numberField(changed, label, value, set, more = {}) {
 /** @param {string} word @param {false | (() => void)} out @param {string} [title] */
 const tag = (word, out, title) =>
 	h(
-		"span.pc",
+		"span.pc.cut",
 		{ title: title ?? word },
 		word,
 		out && signButton("i-close", `Leave out ${word}`, out),

@@ -1,5 +1,5 @@
 /** The place Study: what is tried, how far it is, what it has found. */
-import { capital, choices, fill, h, icon, write } from "../elements/dom.js";
+import { claim, capture, capital, choices, fill, h, icon, write } from "../elements/dom.js";
 import { getJson } from "../state/api.js";
 import { bestTrials } from "./best.js";
 import { overview } from "./figures.js";
@@ -378,25 +378,19 @@ export function mountStudy(root, { store, actions }) {
 		const next = best.rows.beside(chosen, by);
 		if (next !== null) choose(next);
 	}
-	document.addEventListener(
-		"keydown",
-		(event) => {
-			if (store.get().place !== "study" || document.querySelector("dialog[open]")) return;
-			const target = /** @type {HTMLElement} */ (event.target);
-			if (event.ctrlKey || event.metaKey || event.altKey) return;
-			if (target.matches("input, select")) {
-				if (event.key === "Escape") (target.blur(), event.stopPropagation());
-				return;
-			}
-			const act = KEYS[event.key];
-			if (!act || (target.closest("button, a, .chart") && ["Enter", " "].includes(event.key)))
-				return;
-			act();
-			event.preventDefault();
-			event.stopPropagation();
-		},
-		true,
-	);
+	capture(document, "keydown", (event) => {
+		if (store.get().place !== "study" || document.querySelector("dialog[open]")) return;
+		const target = /** @type {HTMLElement} */ (event.target);
+		if (event.ctrlKey || event.metaKey || event.altKey) return;
+		if (target.matches("input, select")) {
+			if (event.key === "Escape") (target.blur(), event.stopPropagation());
+			return;
+		}
+		const act = KEYS[event.key];
+		if (!act || (target.closest("button, a, .chart") && ["Enter", " "].includes(event.key))) return;
+		act();
+		claim(event);
+	});
 
 	/** @type {Timer} */
 	let clock;

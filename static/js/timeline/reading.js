@@ -3,8 +3,8 @@
  * track; and what two fingers ask of it.
  */
 import { faded, stroke, trace } from "../draw/canvas.js";
-import { drawGround } from "../draw/rows.js";
-import { fill, h, icon, idTag, one, write } from "../elements/dom.js";
+import { drawGround, levels } from "../draw/rows.js";
+import { capture, fill, h, icon, idTag, one, write } from "../elements/dom.js";
 import { menuOf, opensMenu } from "../elements/over.js";
 import { bucketOf, panned, secondsOf, xOf, zoomed } from "../play/clock.js";
 import { fetcher, getJson } from "../state/api.js";
@@ -98,41 +98,33 @@ function mountFingers(plot, store) {
 	const place = (/** @type {PointerEvent} */ event) =>
 		event.clientX - plot.getBoundingClientRect().left;
 
-	plot.addEventListener(
-		"pointerdown",
-		(event) => {
-			if (event.pointerType !== "touch") return;
-			fingers.set(event.pointerId, place(event));
-			// A second one does not seek.
-			if (fingers.size > 1) event.stopImmediatePropagation();
-		},
-		true,
-	);
-	plot.addEventListener(
-		"pointermove",
-		(event) => {
-			const other = [...fingers].find(([id]) => id !== event.pointerId)?.[1];
-			const before = fingers.get(event.pointerId);
-			if (before === undefined || other === undefined) return;
-			event.stopImmediatePropagation();
-			const now = place(event);
-			fingers.set(event.pointerId, now);
-			const { span, frames } = store.get();
-			const [first, last] = span ?? [0, Math.max(1, frames - 1)];
-			const far = (/** @type {number} */ at) => Math.max(NEAR, Math.abs(at - other));
-			const middle = (now + other) / 2;
-			const view = zoomed(
-				{ first, last, width: plot.clientWidth },
-				far(before) / far(now),
-				middle,
-				frames,
-			);
-			const aside = (middle - (before + other) / 2) / plot.clientWidth;
-			const seen = panned(view, -aside * (view.last - view.first), frames);
-			store.set({ span: [seen.first, seen.last] });
-		},
-		true,
-	);
+	capture(plot, "pointerdown", (event) => {
+		if (event.pointerType !== "touch") return;
+		fingers.set(event.pointerId, place(event));
+		// A second one does not seek.
+		if (fingers.size > 1) event.stopImmediatePropagation();
+	});
+	capture(plot, "pointermove", (event) => {
+		const other = [...fingers].find(([id]) => id !== event.pointerId)?.[1];
+		const before = fingers.get(event.pointerId);
+		if (before === undefined || other === undefined) return;
+		event.stopImmediatePropagation();
+		const now = place(event);
+		fingers.set(event.pointerId, now);
+		const { span, frames } = store.get();
+		const [first, last] = span ?? [0, Math.max(1, frames - 1)];
+		const far = (/** @type {number} */ at) => Math.max(NEAR, Math.abs(at - other));
+		const middle = (now + other) / 2;
+		const view = zoomed(
+			{ first, last, width: plot.clientWidth },
+			far(before) / far(now),
+			middle,
+			frames,
+		);
+		const aside = (middle - (before + other) / 2) / plot.clientWidth;
+		const seen = panned(view, -aside * (view.last - view.first), frames);
+		store.set({ span: [seen.first, seen.last] });
+	});
 	for (const kind of /** @type {const} */ (["pointerup", "pointercancel"]))
 		plot.addEventListener(kind, ({ pointerId }) => fingers.delete(pointerId));
 }
@@ -378,11 +370,7 @@ export function mountReading({ store, actions }, timeline) {
  * @param {Pen} pen @param {Server.Courses} buckets @param {Server.TrackCourse} course
  */
 function drawCurve({ g, row, view, ink }, buckets, { values: [values], low, high }) {
-	const level = (/** @type {number} */ value) =>
-		row.y +
-		row.height -
-		4 -
-		((Math.min(high, Math.max(low, value)) - low) / (high - low)) * (row.height - 10);
+	const level = levels(row, low, high);
 	/** @type {number[][]} */
 	let points = [];
 	const colour = ink.id(buckets.track);

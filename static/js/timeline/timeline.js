@@ -371,7 +371,7 @@ export function mountTimeline(root, context) {
 						onpointerleave: () => store.set({ hover: null }),
 					},
 					idTag(id),
-					h("span.who"),
+					h("span.who.cut"),
 					h("span.r"),
 				);
 			labels.set(id, label);

@@ -34,6 +34,16 @@ interface Maker<Kinds> {
 	<T extends string>(tag: T, ...children: (Child | Child[])[]): Kinds[TagOf<T> & keyof Kinds];
 }
 
+/** What hears of events on their way to what they happen in. */
+interface Capture {
+	<K extends keyof HTMLElementEventMap>(
+		target: EventTarget,
+		kind: K,
+		act: (event: HTMLElementEventMap[K]) => void,
+	): void;
+	(target: EventTarget, kind: string, act: (event: Event) => void): void;
+}
+
 /** `button` of `button.btn.box`. */
 type TagOf<T extends string> = T extends `${infer Tag}.${string}` ? Tag : T;
 
