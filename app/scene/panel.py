@@ -69,6 +69,9 @@ ORIGIN = "viser"
 WIDTH = 276
 """Width of the panel in pixels."""
 
+TITLE = "Essential parameters"
+"""What the panel's head says in place of viser's word that it is connected."""
+
 OWN_VALUES = "own values"
 """What the panel calls values that are no preset's, as the page does."""
 
@@ -108,6 +111,7 @@ class Panel(Follower):
         self._built = threading.Event()
         server.gui.main_panel.dock_right()
         server.gui.main_panel.set_width(WIDTH)
+        server.gui.set_panel_label(TITLE)
         essential = [parameter for parameter in PARAMETERS.values() if parameter.essential]
         # what all methods share comes first
         essential.sort(key=lambda parameter: parameter.stage == "single_view")

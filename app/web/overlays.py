@@ -25,8 +25,8 @@ from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Room, Sequence
 from tracker.single_view.box_sizes import BoxSizes
 from tracker.single_view.colour.templates import likelihood_map, read_templates
-from tracker.single_view.pictures.colour import ColourModel
 from tracker.single_view.pictures.background import unpack
+from tracker.single_view.pictures.colour import ColourModel
 
 Line = list[tuple[float, float]]
 """Points one after the other, x and y in pixels of the camera's picture."""

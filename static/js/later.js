@@ -1,7 +1,8 @@
 /** What nobody needs before the first picture: read when the page is there. */
 import { mountCorrecting } from "./check/edits.js";
-import { fill, h, icon, one, parts } from "./elements/dom.js";
-import { mountTips } from "./elements/tips.js";
+import { fill, h, icon, one, parts, write } from "./elements/dom.js";
+import { signButton } from "./elements/drawn.js";
+import { mountTips } from "./elements/over.js";
 import { mountBookmarks, mountIdentity, mountTables } from "./inspector/tables.js";
 import { keyLabel } from "./state/commands.js";
 import { mountReading } from "./timeline/reading.js";
@@ -10,6 +11,7 @@ import { mountReading } from "./timeline/reading.js";
 export function mountLater(context, timeline) {
 	const side = one(".side");
 	mountTips();
+	mountExport(parts(one(".top")), context);
 	mountTour(one(".tour"), context);
 	mountTables(side, context);
 	mountIdentity(context);
@@ -19,13 +21,35 @@ export function mountLater(context, timeline) {
 	timeline.draw();
 }
 
+/**
+ * The run that is shown leaves in the same forms as those of the library.
+ * @param {Record<string, Part>} top @param {Context} context
+ */
+function mountExport({ leaving, stopLeaving, leave }, { store, actions }) {
+	/** @param {string} words @param {() => void} [cancel] */
+	const say = (words, cancel) => {
+		write(leaving, words);
+		stopLeaving.hidden = !cancel;
+		stopLeaving.onclick = cancel ?? null;
+	};
+	// Read when it is first wanted; from then on the button opens the menu by itself.
+	leave.onclick = async () => {
+		const { exportMenu } = await import("./library/exports.js");
+		leave.onclick = null;
+		const [, menu] = exportMenu({ store, actions, say, chosen: () => [null], button: leave });
+		leave.after(menu);
+		menu.showPopover();
+	};
+}
+
 /* ---------- What is seen, and three things to try: a card in the 3D view, until it is closed or
    all three were done. Help shows it again. */
 
 /** Its name among what was closed for good. */
 const TOUR = "tour";
+const CLOSE = "Close for good; Help shows it again";
 
-const key = (/** @type {string} */ name) => h("kbd", {}, keyLabel(name));
+const key = (/** @type {string} */ name) => h("kbd", keyLabel(name));
 
 /**
  * What can be tried, and how it is seen that somebody has.
@@ -60,7 +84,7 @@ const THINGS = [
 		key: "p",
 		text: () => [
 			"It pins this run as A. Change a value: ",
-			h("b", {}, "Compare"),
+			h("b", "Compare"),
 			" says which is better.",
 		],
 		done: ({ server }) => Boolean(server?.pinned),
@@ -92,23 +116,12 @@ function mountTour(root, { store }) {
 		fill(
 			root,
 			h(
-				"div",
-				{ class: "tour-head" },
-				h("h2", {}, "What you see"),
-				h(
-					"button",
-					{
-						class: "btn icon",
-						"aria-label": "Close for good; Help shows it again",
-						"data-tip": "Close for good; Help shows it again",
-						onclick: close,
-					},
-					icon("i-close"),
-				),
+				"div.tour-head",
+				h("h2", "What you see"),
+				signButton("i-close", CLOSE, close, { "data-tip": CLOSE }),
 			),
 			h(
-				"p",
-				{ class: "seen" },
+				"p.seen",
 				`${cameras} one room. A coloured body is a person the filter believes in, the line on `,
 				"the floor where it came from. Dashed in a picture is who is hidden there",
 				sequence?.has_truth ? ", dashed and white the truth." : ".",
@@ -117,15 +130,9 @@ function mountTour(root, { store }) {
 				h(
 					"div",
 					{ class: `thing${done[index] ? " done" : index === next ? " next" : ""}` },
-					h("span", { class: "step" }, done[index] ? icon("i-tick", "s") : index + 1),
-					h(
-						"h3",
-						{},
-						word,
-						name ? key(name) : "",
-						done[index] && h("span", { class: "vh" }, "done"),
-					),
-					index === next && h("p", {}, ...text(state)),
+					h("span.step", done[index] ? icon("i-tick", "s") : index + 1),
+					h("h3", word, name ? key(name) : "", done[index] && h("span.vh", "done")),
+					index === next && h("p", ...text(state)),
 				),
 			),
 		);

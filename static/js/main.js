@@ -12,14 +12,14 @@ import { createActions } from "./state/actions.js";
 import { createAddress } from "./state/address.js";
 import { getJson, openStream } from "./state/api.js";
 import { register } from "./state/commands.js";
-import { initialState, remember, createStore } from "./state/store.js";
+import { initialState, keepLook, createStore } from "./state/store.js";
 import { createReceiver } from "./state/receiving.js";
 import { mountTimeline } from "./timeline/timeline.js";
 
 register(await getJson("/static/commands.json"));
 /** @type {Store<PageState>} */
 const store = createStore(initialState());
-remember(store);
+keepLook(store);
 
 const origin = Math.random().toString(36).slice(2);
 let seeks = 0;

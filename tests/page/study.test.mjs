@@ -3,7 +3,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import { unbeaten } from "../../static/js/study/figures.js";
 import { placeOf } from "../../static/js/study/where.js";
-import { lineOf, roughly } from "../../static/js/study/words.js";
+import { lineOf } from "../../static/js/study/words.js";
 
 /** @param {string} key @param {boolean} higher */
 const measure = (key, higher) => ({
@@ -39,14 +39,4 @@ test("a study that the time alone ends is told without a number of trials to com
   const study = { name: "mine", state: "running", done: 3, trials: 60 };
   assert.equal(lineOf(study), "mine  ·  3 of 60 trials, running");
   assert.equal(lineOf({ ...study, trials: null }), "mine  ·  3 trials, running");
-});
-
-test("what a study may take is as rough as the server's words beside Start", () => {
-  assert.deepEqual([89, 90, 5220, 7199, 10560].map(roughly), [
-    "89 s",
-    "2 min",
-    "87 min",
-    "120 min",
-    "3 h",
-  ]);
 });

@@ -11,16 +11,16 @@ import {
 	visibleTracks,
 	createFloor,
 } from "../draw/overlay.js";
-import { fill, h, icon, parts, write, idTag, show } from "../elements/dom.js";
+import { capture, fill, h, icon, parts, write, idTag, show } from "../elements/dom.js";
 import { decisionsOf, gateWords, isAlone, viewWords } from "../state/events.js";
 
 /* ---------- Cards beside the boxes of a picture: what a track is made of, and whose a box is. */
 
 /** @param {Child | Child[]} word @param {Child[]} value */
-const row = (word, ...value) => [h("dt", {}, word), h("dd", {}, ...value)];
+const row = (word, ...value) => [h("dt", word), h("dd", ...value)];
 
 /** @param {number} number @param {string} text */
-const about = (number, text) => [show(Number(number.toFixed(2))), h("small", {}, text)];
+const about = (number, text) => [show(Number(number.toFixed(2))), h("small", text)];
 
 /**
  * @param {HTMLElement} card
@@ -40,16 +40,15 @@ function fillTrackCard(card, track, whole, decisions) {
 	} = track;
 	fill(
 		card,
-		h("h3", {}, idTag(id), seen ? "seen" : "coasting"),
+		h("h3", idTag(id), seen ? "seen" : "coasting"),
 		h(
 			"dl",
-			{},
 			whole && row("existence", whole.existence.toFixed(2)),
 			p !== null &&
 				row(
-					[h("i", {}, "p"), h("sub", {}, "D")],
+					[h("i", "p"), h("sub", "D")],
 					show(Number(p.toFixed(3))),
-					h("small", {}, front !== null ? ` hidden by ${front}` : reason ? ` ${reason}` : ""),
+					h("small", front !== null ? ` hidden by ${front}` : reason ? ` ${reason}` : ""),
 				),
 			row(
 				"fed by",
@@ -58,7 +57,6 @@ function fillTrackCard(card, track, whole, decisions) {
 							`box ${source + 1}`,
 							h(
 								"small",
-								{},
 								`, ${Math.round(100 * fed.share)} % sure, score ${show(Number(fed.weight.toPrecision(2)))}`,
 							),
 						]
@@ -68,17 +66,17 @@ function fillTrackCard(card, track, whole, decisions) {
 				row(
 					"at",
 					whole.position.map((v) => v.toFixed(2).replace("-", "−")).join("  "),
-					h("small", {}, " m"),
+					h("small", " m"),
 				),
-			whole && row("±", whole.sigma.map((v) => v.toFixed(2)).join("  "), h("small", {}, " m")),
+			whole && row("±", whole.sigma.map((v) => v.toFixed(2)).join("  "), h("small", " m")),
 			whole?.height &&
 				row(
 					"height",
 					whole.height[0].toFixed(2),
-					h("small", {}, ` ± ${whole.height[1].toFixed(2)} m, standing`),
+					h("small", ` ± ${whole.height[1].toFixed(2)} m, standing`),
 				),
 		),
-		decisions.slice(0, 2).map(({ words }) => h("p", { class: "decision" }, words)),
+		decisions.slice(0, 2).map(({ words }) => h("p.decision", words)),
 	);
 }
 
@@ -92,10 +90,9 @@ function fillBoxCard(card, { score, track, nearest, sigmas, gate }, index) {
 	const beyond = sigmas !== null && gate !== null ? sigmas - gate : 0;
 	fill(
 		card,
-		h("h3", {}, `box ${index + 1}`, h("small", {}, track === null ? " nobody's" : " feeds")),
+		h("h3", `box ${index + 1}`, h("small", track === null ? " nobody's" : " feeds")),
 		h(
 			"dl",
-			{},
 			row("score", ...about(score, "")),
 			track !== null && row("track", idTag(track)),
 			track === null &&
@@ -319,15 +316,14 @@ function mountMagnifier(body, store) {
 	});
 	for (const kind of /** @type {const} */ (["pointerup", "pointercancel"]))
 		body.addEventListener(kind, ({ pointerId }) => fingers.delete(pointerId));
-	body.addEventListener(
-		"click",
-		(event) => {
-			if (travelled >= STILL) event.stopPropagation();
-			travelled = 0;
-		},
-		true,
-	);
+	capture(body, "click", (event) => {
+		if (travelled >= STILL) event.stopPropagation();
+		travelled = 0;
+	});
 }
+
+/** As wide as this a picture has its words in one line, CSS pixels: as in panes.css. */
+const NARROW = 260;
 
 /** A second click within this time makes it a double click, milliseconds. */
 const DOUBLE_CLICK = 220;
@@ -362,17 +358,16 @@ export function mountCameras(root, { store, actions, playback }) {
 		frame = null;
 		cells = cameras().map((camera, index) => {
 			const canvas = h("canvas");
-			const [name, words] = [h("b", {}, camera.name), h("span")];
-			const absent = h("p", { class: "cam-absent", hidden: true });
-			const card = h("div", { class: "card", hidden: true });
+			const [name, words] = [h("b", camera.name), h("span")];
+			const absent = h("p.cam-absent", { hidden: true });
+			const card = h("div.card", { hidden: true });
 			const through = () => {
 				clearTimeout(clicked);
 				actions.lookThrough(index);
 			};
 			const element = h(
-				"div",
+				"div.cam",
 				{
-					class: "cam",
 					tabindex: 0,
 					role: "button",
 					"aria-label": `Camera ${camera.name}`,
@@ -398,7 +393,7 @@ export function mountCameras(root, { store, actions, playback }) {
 				},
 				canvas,
 				absent,
-				h("div", { class: "cam-tag" }, name, words),
+				h("div.cam-tag", name, words),
 				card,
 			);
 			return { element, canvas, name, words, absent, card };
@@ -553,7 +548,9 @@ export function mountCameras(root, { store, actions, playback }) {
 			words.push(store.get().run?.state === "computing" ? "computing" : "not computed");
 		else if (view && roomy) {
 			if (view.events.length) words.push(`2D: ${viewWords(view.events)}`);
-			if (layers2d.samples) words.push(...gateWords(view.information));
+			// Of a narrower one they would be cut; the tab Step has them.
+			if (layers2d.samples && places[index].width > NARROW)
+				words.push(...gateWords(view.information));
 			/** @type {Record<string, number[]>} */
 			const away = {};
 			for (const { id, visible, reason } of view.tracks)
@@ -646,18 +643,10 @@ export function mountCameras(root, { store, actions, playback }) {
 		fill(
 			blank,
 			icon("i-folder", "l"),
-			h("h3", {}, opening ? `Opening ${opening.name}` : "No sequence is open"),
-			h(
-				"p",
-				{},
-				opening ? "reading" : "Choose one at the top left: a built-in room needs no data.",
-			),
+			h("h3", opening ? `Opening ${opening.name}` : "No sequence is open"),
+			h("p", opening ? "reading" : "Choose one at the top left: a built-in room needs no data."),
 			sample &&
-				h(
-					"button",
-					{ class: "btn main", onclick: () => actions.open(sample.name) },
-					`Open ${sample.name}`,
-				),
+				h("button.btn.main", { onclick: () => actions.open(sample.name) }, `Open ${sample.name}`),
 		);
 	}
 

@@ -1,5 +1,5 @@
 /** The place Check: the workbench, with the queue where the sliders stand and the tab Place. */
-import { one } from "../elements/dom.js";
+import { capture, one } from "../elements/dom.js";
 import { OPENED_AT } from "../panes/top.js";
 import { createCrops } from "./crops.js";
 import { mountFeet } from "./feet.js";
@@ -22,15 +22,11 @@ export function mountCheck(root, context) {
 	// Tapped V goes there and back; what is seen while it is held down is gone with it. A key that
 	// is held repeats, however long the page took for its first press.
 	let held = false;
-	document.addEventListener(
-		"keydown",
-		(event) => {
-			if (event.key !== "v" || !event.repeat || store.get().place !== "check") return;
-			held = true;
-			event.stopPropagation();
-		},
-		true,
-	);
+	capture(document, "keydown", (event) => {
+		if (event.key !== "v" || !event.repeat || store.get().place !== "check") return;
+		held = true;
+		event.stopPropagation();
+	});
 	document.addEventListener("keyup", ({ key }) => {
 		if (key !== "v" || !held) return;
 		held = false;

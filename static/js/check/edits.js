@@ -1,6 +1,6 @@
 /** What can be said to put tracks right: one function for each command, at every place of the bench. */
-import { fill, h, icon, idTag, one } from "../elements/dom.js";
-import { ApiError, request } from "../state/api.js";
+import { capture, all, fill, h, icon, idTag, one, turned } from "../elements/dom.js";
+import { menuOf } from "../elements/over.js";
 import { commandOf, keyLabel, perform } from "../state/commands.js";
 import { resultOf } from "../state/events.js";
 import { lensOf } from "../draw/overlay.js";
@@ -17,23 +17,6 @@ import {
 	joinable,
 	whereIs,
 } from "./words.js";
-
-/* ---------- A file of the server's, saved by the browser. ---------- */
-
-/** @param {Actions} actions @param {string} path @param {string} name */
-async function sendsFile(actions, path, name) {
-	try {
-		const blob = await (await request(path)).blob();
-		const link = document.createElement("a");
-		link.href = URL.createObjectURL(blob);
-		link.download = name;
-		link.click();
-		setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
-	} catch (error) {
-		if (!(error instanceof ApiError)) throw error;
-		actions.note("error", error.message, error.hint ?? "");
-	}
-}
 
 /* ---------- A finger or a pen that is held still asks for what the other button of a mouse asks
    for: not every browser says so by itself. */
@@ -56,48 +39,35 @@ function whenHeld(element, act) {
 	/** @type {Timer} */
 	let timer;
 	const end = () => clearTimeout(timer);
-	element.addEventListener(
-		"pointerdown",
-		(event) => {
-			end();
-			held = false;
-			if (event.pointerType === "mouse" || !event.isPrimary || event.button !== 0) return;
-			pressed = event;
-			timer = setTimeout(() => {
-				held = true;
-				act(event);
-			}, HELD_MS);
-		},
-		true,
-	);
-	element.addEventListener(
-		"pointermove",
-		({ clientX, clientY }) => {
-			const far = pressed && Math.hypot(clientX - pressed.clientX, clientY - pressed.clientY);
-			if (far && far > HELD_STILL) end();
-		},
-		true,
-	);
-	for (const kind of ["pointerup", "pointercancel", "contextmenu"])
-		element.addEventListener(kind, end, true);
+	capture(element, "pointerdown", (event) => {
+		end();
+		held = false;
+		if (event.pointerType === "mouse" || !event.isPrimary || event.button !== 0) return;
+		pressed = event;
+		timer = setTimeout(() => {
+			held = true;
+			act(event);
+		}, HELD_MS);
+	});
+	capture(element, "pointermove", ({ clientX, clientY }) => {
+		const far = pressed && Math.hypot(clientX - pressed.clientX, clientY - pressed.clientY);
+		if (far && far > HELD_STILL) end();
+	});
+	for (const kind of ["pointerup", "pointercancel", "contextmenu"]) capture(element, kind, end);
 	element.addEventListener("pointerup", () => {
 		const again = held ? pressed : null;
 		if (again) timer = setTimeout(() => act(again), AFTER_MS);
 	});
 	// What ends it is no click, and closes what opened as one beside it would.
-	element.addEventListener(
-		"click",
-		(event) => {
-			const again = held ? pressed : null;
-			if (!again) return;
-			held = false;
-			event.stopImmediatePropagation();
-			event.preventDefault();
-			end();
-			setTimeout(() => act(again));
-		},
-		true,
-	);
+	capture(element, "click", (event) => {
+		const again = held ? pressed : null;
+		if (!again) return;
+		held = false;
+		event.stopImmediatePropagation();
+		event.preventDefault();
+		end();
+		setTimeout(() => act(again));
+	});
 }
 
 /* ---------- Where in a picture somebody points. */
@@ -167,7 +137,7 @@ const MOST = 12;
 function mountMenu(context, timeline, does) {
 	const { store, actions } = context;
 	const { state } = checkOf(context);
-	const menu = h("div", { class: "menu corrects", popover: "auto" });
+	const menu = menuOf({ class: "menu corrects" });
 	one("main").append(menu);
 	/** Whoever is chosen elsewhere while others are offered is taken. @type {((id: number) => void) | null} */
 	let takes = null;
@@ -176,31 +146,16 @@ function mountMenu(context, timeline, does) {
 
 	/** @param {string} label @param {Child[]} head @param {"menu" | "group"} role @param {Child[]} children */
 	function show(label, head, role, ...children) {
-		fill(
-			menu,
-			h("p", { class: "menu-head" }, ...head),
-			h("div", { role, "aria-label": label }, ...children),
-		);
+		fill(menu, h("p.menu-head", ...head), h("div", { role, "aria-label": label }, ...children));
 		if (!menu.matches(":popover-open")) menu.showPopover();
 		const box = menu.getBoundingClientRect();
 		menu.style.left = `${Math.max(4, Math.min(left, innerWidth - box.width - 4))}px`;
 		menu.style.top = `${Math.max(4, Math.min(top, innerHeight - box.height - 4))}px`;
-		/** @type {HTMLElement | null} */ (menu.querySelector("button, input"))?.focus();
+		all("button, input", menu)[0]?.focus();
 	}
 	const close = () => menu.matches(":popover-open") && menu.hidePopover();
 	menu.addEventListener("toggle", (event) => {
 		if (/** @type {ToggleEvent} */ (event).newState !== "open") takes = null;
-	});
-	menu.addEventListener("keydown", (event) => {
-		const turn = { ArrowDown: 1, ArrowUp: -1 }[event.key];
-		if (turn) {
-			const all = [...menu.querySelectorAll("button")];
-			const at = all.indexOf(/** @type {HTMLButtonElement} */ (document.activeElement));
-			all[(at + turn + all.length) % all.length]?.focus();
-			event.preventDefault();
-		}
-		// Its keys are its own: the page's mean something else.
-		if (event.key !== "Escape") event.stopPropagation();
 	});
 
 	/** @param {string} sign @param {Child[]} words @param {string} key @param {() => void} act */
@@ -209,8 +164,8 @@ function mountMenu(context, timeline, does) {
 			"button",
 			{ role: "menuitem", onclick: () => (close(), act()) },
 			icon(sign),
-			h("span", {}, ...words),
-			key && h("kbd", {}, key),
+			h("span", ...words),
+			key && h("kbd", key),
 		);
 
 	/** @param {{track: number | null, step: number, click?: Spot}} what */
@@ -228,7 +183,7 @@ function mountMenu(context, timeline, does) {
 			[
 				track === null ? "nobody" : idTag(track),
 				track !== null && told?.names[track],
-				h("span", { class: "sub" }, `step ${step}`),
+				h("span.sub", `step ${step}`),
 			],
 			"menu",
 			...(track === null
@@ -281,8 +236,7 @@ function mountMenu(context, timeline, does) {
 					own &&
 					!ends &&
 					h(
-						"span",
-						{ class: "sub alone" },
+						"span.sub.alone",
 						`nobody comes before step ${own.first} or after step ${own.last}; ` +
 							`of two who are there at once it is said from step ${step} on`,
 					),
@@ -296,7 +250,7 @@ function mountMenu(context, timeline, does) {
 						[
 							idTag(other.id),
 							names[other.id] && ` ${names[other.id]}`,
-							h("span", { class: "sub" }, ` ${whereIs(other, step, own)}`),
+							h("span.sub", ` ${whereIs(other, step, own)}`),
 						],
 						"",
 						() => take(other.id),
@@ -314,8 +268,7 @@ function mountMenu(context, timeline, does) {
 	function name(track) {
 		middle();
 		const given = state.get().told?.names[track] ?? "";
-		const field = h("input", {
-			class: "field",
+		const field = h("input.field", {
 			value: given,
 			maxlength: 80,
 			"aria-label": `Name of track ${track}`,
@@ -382,14 +335,14 @@ function mountMenu(context, timeline, does) {
 		/** @type {[number, number] | null} */
 		let pressed = null;
 		const view = frame.contentDocument?.defaultView;
-		view?.addEventListener(
-			"pointerdown",
-			({ button, clientX, clientY }) => (pressed = button === 2 ? [clientX, clientY] : null),
-			true,
-		);
-		view?.addEventListener(
-			"pointerup",
-			(event) => {
+		if (view)
+			capture(
+				view,
+				"pointerdown",
+				({ button, clientX, clientY }) => (pressed = button === 2 ? [clientX, clientY] : null),
+			);
+		if (view)
+			capture(view, "pointerup", (event) => {
 				if (event.button !== 2 || !pressed || !store.get().sequence) return;
 				const [x, y] = [event.clientX - pressed[0], event.clientY - pressed[1]];
 				if (Math.hypot(x, y) > STILL) return;
@@ -399,9 +352,7 @@ function mountMenu(context, timeline, does) {
 				const edge = frame.getBoundingClientRect();
 				[left, top] = [edge.left + event.clientX + 2, edge.top + event.clientY + 2];
 				open({ track: selection, step: shown() });
-			},
-			true,
-		);
+			});
 	}
 	frame.addEventListener("load", in3d);
 	// It may have been there before this was read.
@@ -522,17 +473,8 @@ export function mountCorrecting(context, timeline) {
 		const { queue, chosen: now } = state.get();
 		const doubts = queue?.doubts ?? [];
 		location.hash = "#check";
-		if (!doubts.length) return;
 		const index = doubts.findIndex(({ id }) => id === now?.id);
-		check.choose(
-			doubts[
-				index < 0
-					? direction > 0
-						? 0
-						: doubts.length - 1
-					: (index + direction + doubts.length) % doubts.length
-			],
-		);
+		if (doubts.length) check.choose(turned(doubts, index, direction));
 	}
 
 	/** What one track says of itself here. @param {"came" | "left" | "nobody" | "different"} kind @param {string} words */
@@ -629,7 +571,7 @@ export function mountCorrecting(context, timeline) {
 			const track = who();
 			if (track !== null) menu.open({ track, step: shown() });
 		},
-		truth: () => sendsFile(actions, "/api/corrections/truth.csv", "ground_truth.csv"),
+		truth: () => actions.saveFile("/api/corrections/truth.csv", "ground_truth.csv"),
 	};
 	actions.correct = (what) => EDITS[what]();
 	mountMarks(context, timeline, check);

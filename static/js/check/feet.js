@@ -4,7 +4,8 @@
  * click.
  */
 import { clickOf, pixelOf, scaleOf } from "./edits.js";
-import { colourIndex, h, one } from "../elements/dom.js";
+import { claim, capture, colourIndex, h, one } from "../elements/dom.js";
+import { ARROWS } from "../elements/drawn.js";
 import { getJson } from "../state/api.js";
 import { shownVersion } from "../state/events.js";
 
@@ -16,7 +17,7 @@ export function mountFeet({ store, playback }, check) {
 	const { state } = check;
 	const mosaic = one(".mosaic");
 	// Beside the pictures, which are buttons themselves.
-	const layer = h("div", { class: "feet" });
+	const layer = h("div.feet");
 	mosaic.after(layer);
 	/** By camera: a place in a picture, whether somebody said it, and where the run has it.
 	 * @typedef {Spot & {said: boolean, from: [number, number] | null}} Foot
@@ -88,8 +89,7 @@ export function mountFeet({ store, playback }, check) {
 		for (const handle of handles) handle.remove();
 		handles = feet.map((foot) => {
 			const id = placing ? placing.track : selection;
-			const handle = h("button", {
-				class: "foothold",
+			const handle = h("button.foothold", {
 				"aria-label": `Feet of ${id === null ? "somebody" : `track ${id}`} in ${foot.camera}: drag, or arrows and Enter`,
 				onclick: (event) => event.stopPropagation(),
 				ondblclick: (event) => event.stopPropagation(),
@@ -112,7 +112,7 @@ export function mountFeet({ store, playback }, check) {
 				else if (foot.said) void send();
 			});
 			handle.addEventListener("keydown", (event) => keyed(event, foot));
-			handle.append(h("span", { class: "footbox", hidden: true }));
+			handle.append(h("span.footbox", { hidden: true }));
 			layer.append(handle);
 			return handle;
 		});
@@ -144,9 +144,7 @@ export function mountFeet({ store, playback }, check) {
 	/** @param {KeyboardEvent} event @param {Foot} foot */
 	function keyed(event, foot) {
 		const far = event.shiftKey ? LARGE : SMALL;
-		const way = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[
-			event.key
-		];
+		const way = ARROWS[event.key];
 		if (way) move(foot, foot.x + far * way[0], foot.y + far * way[1]);
 		else if (event.key === "Enter") {
 			// Where the ring lies of somebody who is not known nobody has said yet.
@@ -154,8 +152,7 @@ export function mountFeet({ store, playback }, check) {
 			void send();
 		} else if (event.key === "Escape") cancel();
 		else return;
-		event.preventDefault();
-		event.stopPropagation();
+		claim(event);
 	}
 
 	/** What was said so far is told to who places. */
@@ -224,35 +221,26 @@ export function mountFeet({ store, playback }, check) {
 
 	// While somebody is placed a click in a picture says where; nothing else happens there.
 	for (const name of ["pointerdown", "click", "dblclick"])
-		mosaic.addEventListener(
-			name,
-			(event) => {
-				const { placing } = state.get();
-				const target = /** @type {Element} */ (event.target);
-				if (!placing || target.closest(".foothold")) return;
-				const at = pixelOf(/** @type {MouseEvent} */ (event), store.get());
-				if (!at) return;
-				event.stopPropagation();
-				const foot = feet.find(({ index }) => index === at.index);
-				if (name !== "click" || !foot) return;
-				says(foot, at.x, at.y);
-			},
-			true,
-		);
-	document.addEventListener(
-		"keydown",
-		(event) => {
-			if (!state.get().placing || store.get().place !== "check") return;
-			if (document.querySelector("dialog[open], :popover-open")) return;
-			const onControl = /** @type {Element} */ (event.target).closest("button, input, select");
-			if (event.key === "Escape") cancel();
-			else if (event.key === "Enter" && !onControl && said().length) void send();
-			else return;
-			event.preventDefault();
+		capture(mosaic, name, (event) => {
+			const { placing } = state.get();
+			const target = /** @type {Element} */ (event.target);
+			if (!placing || target.closest(".foothold")) return;
+			const at = pixelOf(/** @type {MouseEvent} */ (event), store.get());
+			if (!at) return;
 			event.stopPropagation();
-		},
-		true,
-	);
+			const foot = feet.find(({ index }) => index === at.index);
+			if (name !== "click" || !foot) return;
+			says(foot, at.x, at.y);
+		});
+	capture(document, "keydown", (event) => {
+		if (!state.get().placing || store.get().place !== "check") return;
+		if (document.querySelector("dialog[open], :popover-open")) return;
+		const onControl = /** @type {Element} */ (event.target).closest("button, input, select");
+		if (event.key === "Escape") cancel();
+		else if (event.key === "Enter" && !onControl && said().length) void send();
+		else return;
+		claim(event);
+	});
 	store.on(["shown"], goAlong);
 	store.watch(
 		["place", "selection", "shown", "playing", "basis", "revision", "result", "cameras"],

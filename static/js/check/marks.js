@@ -2,7 +2,7 @@
  * In the timeline: numbered places in a row under the ruler, how it would be as ghosts in the lanes,
  * and pins and brackets where something was put right.
  */
-import { faded, stroke, trace } from "../draw/canvas.js";
+import { faded, rule, stroke, trace } from "../draw/canvas.js";
 import { fill, h, icon, one, write } from "../elements/dom.js";
 import { xOf } from "../play/clock.js";
 import { clockOf, middleOf } from "./words.js";
@@ -18,12 +18,12 @@ const roomOf = ({ textContent }) => NUMBER + DIGIT * ((textContent?.length ?? 1)
 /** @param {Context} context @param {TimelineSeam} timeline @param {Check} check */
 export function mountMarks({ store }, timeline, check) {
 	const { state } = check;
-	const left = h("span", { class: "r" });
-	const label = h("div", { class: "gr check" }, h("span", {}, "to check"), left);
+	const left = h("span.r");
+	const label = h("div.gr.check", h("span", "to check"), left);
 	one(".gut .ruler").after(label);
-	const row = h("div", { class: "check-row", role: "group", "aria-label": "Places to check" });
+	const row = h("div.check-row", { role: "group", "aria-label": "Places to check" });
 	timeline.plot.append(row);
-	const tip = h("div", { class: "card mark-card", hidden: true });
+	const tip = h("div.card.mark-card", { hidden: true });
 	timeline.plot.append(tip);
 	const legend = h("span", { "data-tip": "Corrected" }, icon("i-pin", "s"), "corrected");
 	legend.hidden = true;
@@ -37,9 +37,8 @@ export function mountMarks({ store }, timeline, check) {
 	function number(doubt, k) {
 		const { chosen } = state.get();
 		return h(
-			"button",
+			"button.qn",
 			{
-				class: "qn",
 				tabindex: -1,
 				"aria-label": `Place ${k + 1}: ${doubt.title}`,
 				"aria-pressed": String(doubt.id === chosen?.id),
@@ -176,7 +175,7 @@ export function mountMarks({ store }, timeline, check) {
 		const found = pins.find((pin) => Math.abs(pin.x - x) < 7 && Math.abs(pin.y - y) < 9);
 		tip.hidden = !found;
 		if (!found) return;
-		fill(tip, h("b", {}, found.told.words), ` · ${clockOf(found.told.time)}`);
+		fill(tip, h("b", found.told.words), ` · ${clockOf(found.told.time)}`);
 		tip.style.translate = `${Math.round(Math.min(x + 12, box.width - tip.offsetWidth))}px ${Math.round(y - 26)}px`;
 	});
 	timeline.plot.addEventListener("pointerleave", () => (tip.hidden = true));
@@ -211,26 +210,12 @@ function drawPin(g, ink, x, to, y) {
 		ink.get("ink-1"),
 		1.25,
 	);
-	stroke(
-		trace(g, [
-			[a, y + 3],
-			[a, y - 4],
-		]),
-		ink.get("bg-1"),
-		4,
-	);
+	rule(g, [a, y + 3], [a, y - 4], ink.get("bg-1"), 4);
 	g.beginPath();
 	g.arc(a, y - 4, 4, 0, 7);
 	g.fillStyle = ink.get("bg-1");
 	g.fill();
-	stroke(
-		trace(g, [
-			[a, y + 3],
-			[a, y - 4],
-		]),
-		ink.get("ink-1"),
-		1.5,
-	);
+	rule(g, [a, y + 3], [a, y - 4], ink.get("ink-1"), 1.5);
 	g.beginPath();
 	g.arc(a, y - 4, 2.8, 0, 7);
 	g.fillStyle = ink.get("ink-1");

@@ -19,18 +19,17 @@ const OFTEN = 1500;
 
 /** @param {Context} context @returns {Check} */
 function createCheck({ store, actions, playback }) {
-	/** @type {Store<CheckState>} */
-	const state = createStore(
-		/** @type {CheckState} */ ({
-			told: null,
-			queue: null,
-			chosen: null,
-			other: 0,
-			preview: null,
-			ends: null,
-			placing: null,
-		}),
-	);
+	/** @type {CheckState} */
+	const empty = {
+		told: null,
+		queue: null,
+		chosen: null,
+		other: 0,
+		preview: null,
+		ends: null,
+		placing: null,
+	};
+	const state = createStore(empty);
 	/** Where the chosen place stood, so that the next one is there when it is done. */
 	let at = 0;
 	let answered = false;
@@ -139,15 +138,7 @@ function createCheck({ store, actions, playback }) {
 
 	state.on(["told"], ({ told }) => store.set({ names: told?.names ?? {} }));
 	store.watch(["sequence"], () => {
-		state.set({
-			told: null,
-			queue: null,
-			chosen: null,
-			other: 0,
-			preview: null,
-			ends: null,
-			placing: null,
-		});
+		state.set(empty);
 		store.set({ signs: { ...store.get().signs, check: "" } });
 	});
 	/** @type {Timer} */

@@ -1,6 +1,7 @@
 /** The inspector's tab Place: one doubtful moment in pictures, what it could be, what to do. */
 import { palette } from "../draw/canvas.js";
-import { all, capital, choices, colourIndex, fill, h, icon, idTag } from "../elements/dom.js";
+import { all, capital, colourIndex, fill, h, icon, idTag } from "../elements/dom.js";
+import { chooser, grow, segment } from "../elements/drawn.js";
 import { commandOf, keyLabel, perform } from "../state/commands.js";
 import { scoresOf, shownVersion } from "../state/events.js";
 import { drawCrop } from "./crops.js";
@@ -43,15 +44,12 @@ function fillSights(film, sights, camera, { views, crops, seek }) {
 	const canvases = shown.map(() => h("canvas", { "aria-hidden": "true" }));
 	fill(
 		film,
-		...shown.map(({ step }, k) =>
-			h("span", { class: "fs in", "--column": k + 2, "data-at": step }, step),
-		),
-		h("span", { class: "fid", "--row": 2 }, "?"),
+		...shown.map(({ step }, k) => h("span.fs.in", { "--column": k + 2, "data-at": step }, step)),
+		h("span.fid", { "--row": 2 }, "?"),
 		...shown.map(({ step }, k) =>
 			h(
-				"button",
+				"button.fr.in",
 				{
-					class: "fr in",
 					"--row": 2,
 					"--column": k + 2,
 					"--c": "var(--warn)",
@@ -111,17 +109,13 @@ function placingWords({ track, step, clicks }) {
  */
 export function mountPlace(root, { store, actions, playback }, check, crops) {
 	const { state } = check;
-	const head = h("div", { class: "plhead" });
-	const film = h("div", { class: "film", role: "group" });
-	const why = h("p", { class: "why" });
-	const cameras = h("div", { class: "seg", role: "group", "aria-label": "Camera of the pictures" });
-	const acts = h("div", { class: "acts", role: "toolbar", "aria-label": "Actions" });
-	const blank = h("div", { class: "blank" });
-	fill(
-		root,
-		h("div", { class: "pl" }, head, film, h("div", { class: "whyline" }, why, cameras), acts),
-		blank,
-	);
+	const head = h("div.plhead");
+	const film = h("div.film", { role: "group" });
+	const why = h("p.why");
+	const cameras = h("div.seg", { role: "group", "aria-label": "Camera of the pictures" });
+	const acts = h("div.acts", { role: "toolbar", "aria-label": "Actions" });
+	const blank = h("div.blank");
+	fill(root, h("div.pl", head, film, h("div.whyline", why, cameras), acts), blank);
 	/** By which camera; null: the one that sees them best. @type {number | null} */
 	let by = null;
 	let drawn = 0;
@@ -139,10 +133,9 @@ export function mountPlace(root, { store, actions, playback }, check, crops) {
 				onclick: () => perform(command, actions),
 			},
 			icon(sign),
-			h("span", { class: "w" }, word),
+			h("span.w", word),
 			h(
 				"kbd",
-				{},
 				command.keys
 					.slice(0, 1)
 					.map((key) =>
@@ -156,14 +149,14 @@ export function mountPlace(root, { store, actions, playback }, check, crops) {
 	/** @param {string} label @param {number | null} value @param {(turn: -1 | 1) => void} act */
 	const stepper = (label, value, act) =>
 		h(
-			"span",
-			{ class: "stepper", role: "group", "aria-label": label },
+			"span.stepper",
+			{ role: "group", "aria-label": label },
 			h(
 				"button",
 				{ "aria-label": `${label}: earlier`, onclick: () => act(-1) },
 				icon("i-prev", "s"),
 			),
-			h("span", {}, value ?? "end"),
+			h("span", value ?? "end"),
 			h("button", { "aria-label": `${label}: later`, onclick: () => act(1) }, icon("i-next", "s")),
 		);
 
@@ -185,14 +178,13 @@ export function mountPlace(root, { store, actions, playback }, check, crops) {
 	function heads() {
 		const { chosen, other, queue, ends, placing } = state.get();
 		blank.hidden = Boolean(chosen);
-		if (!chosen && placing) return fill(blank, h("p", {}, placingWords(placing)));
+		if (!chosen && placing) return fill(blank, h("p", placingWords(placing)));
 		if (!chosen) {
 			fill(
 				blank,
-				h("h3", {}, queue?.doubts.length ? "No place is chosen" : "No place to look at"),
+				h("h3", queue?.doubts.length ? "No place is chosen" : "No place to look at"),
 				h(
 					"p",
-					{},
 					queue?.doubts.length
 						? "Y goes to the next one."
 						: `Corrections can be made anywhere: select a track, then ${keyLabel(commandOf("check-menu").keys[0])} or its menu.`,
@@ -207,22 +199,21 @@ export function mountPlace(root, { store, actions, playback }, check, crops) {
 		];
 		fill(
 			head,
-			h("span", { class: "qn on", "aria-hidden": "true" }, number || "–"),
-			h("span", { class: "q" }, "steps"),
+			h("span.qn.on", { "aria-hidden": "true" }, number || "–"),
+			h("span.q", "steps"),
 			...(isOfTwo(chosen)
 				? [
 						stepper("From step", from, (turn) => moveEnd(0, turn)),
-						h("span", { class: "q" }, "to"),
+						h("span.q", "to"),
 						stepper("To step", to, (turn) => moveEnd(1, turn)),
 					]
 				: [
 						h(
 							"span",
-							{},
 							chosen.first === chosen.last ? chosen.first : `${chosen.first} – ${chosen.last}`,
 						),
 					]),
-			h("span", { class: "grow" }),
+			grow(),
 			choice(chosen, other),
 		);
 		head
@@ -241,33 +232,21 @@ export function mountPlace(root, { store, actions, playback }, check, crops) {
 		const listed = far.some(([, k]) => k === other);
 		/** @param {Doubt["alternatives"][number]} one */
 		const likely = ({ words, probability }) => `${words}: ${percent(probability)}`;
-		const more = h("select", {
-			class: listed ? "on" : "",
-			"aria-label": "Other alternatives",
-			onchange: () => check.show(Number(more.value)),
-		});
-		choices(
-			more,
-			[
-				["", `${far.length} more`],
-				...far.map(([one, k]) => /** @type {[string, string]} */ ([String(k), likely(one)])),
-			],
-			listed ? String(other) : "",
+		const more = chooser(
+			"Other alternatives",
+			[["", `${far.length} more`], ...far.map(([one, k]) => [k, likely(one)])],
+			listed ? other : "",
+			(value) => check.show(Number(value)),
 		);
+		more.className = listed ? "on" : "";
 		more.options[0].hidden = true;
 		return h(
-			"div",
-			{ class: "seg", role: "group", "aria-label": "Shown" },
-			beside.map(([one, k]) =>
-				h(
-					"button",
-					{
-						"aria-pressed": String(k === other),
-						title: likely(one),
-						onclick: () => check.show(k),
-					},
-					one.words,
-				),
+			"div.seg",
+			{ role: "group", "aria-label": "Shown" },
+			segment(
+				beside.map(([one, k]) => /** @type {const} */ ([k, one.words, likely(one)])),
+				other,
+				check.show,
 			),
 			far.length > 0 && more,
 		);
@@ -287,11 +266,10 @@ export function mountPlace(root, { store, actions, playback }, check, crops) {
 		why.title = chosen.why;
 		fill(
 			why,
-			h("b", {}, unbroken(chosen.title)),
+			h("b", unbroken(chosen.title)),
 			`${chosen.title.endsWith("?") ? "" : "."} ${unbroken(capital(chosen.why))}.`,
 			h(
-				"span",
-				{ class: "q" },
+				"span.q",
 				` ${what}: ${percent(probability)}.`,
 				switches
 					? ` Truth counts ${switches === 1 ? "a switch" : `${switches} switches`} here.`
@@ -313,7 +291,7 @@ export function mountPlace(root, { store, actions, playback }, check, crops) {
 				([name, sign, word]) =>
 					button(name, sign, name === main && name === "check-join" ? "Join" : word, name === main),
 			),
-			h("span", { class: "grow" }),
+			grow(),
 			main === "check-apply" &&
 				(OF_NOBODY.includes(chosen.kind)
 					? button(main, "i-here", capital(alternative), true)
@@ -354,7 +332,7 @@ export function mountPlace(root, { store, actions, playback }, check, crops) {
 		/** @type {{canvas: HTMLCanvasElement, cell: HTMLElement, step: number, box: Box | null, id: number}[]} */
 		const cells = [];
 		const rows = ids.flatMap((id, row) => [
-			h("span", { class: "fid", "--row": row + 2 }, idTag(id)),
+			h("span.fid", { "--row": row + 2 }, idTag(id)),
 			...steps.map((step, k) => {
 				const result = results[k];
 				const now = preview ? standsFor(preview, id, result) : id;
@@ -373,7 +351,7 @@ export function mountPlace(root, { store, actions, playback }, check, crops) {
 						onclick: () => playback.seek(step),
 					},
 					canvas,
-					!there && h("span", { class: "small" }, track ? "out of view" : "not there"),
+					!there && h("span.small", track ? "out of view" : "not there"),
 				);
 				cells.push({ canvas, cell, step, box: there ? (track?.box ?? null) : null, id });
 				return cell;
@@ -398,8 +376,7 @@ export function mountPlace(root, { store, actions, playback }, check, crops) {
 				const bitmap = await crops.pictureOf(camera, step);
 				if (turn !== drawn) return;
 				drawCrop(canvas, bitmap, box, palette().id(id));
-				if (!bitmap && views[camera].has_pictures)
-					cell.append(h("span", { class: "small" }, `no frame ${step}`));
+				if (!bitmap && views[camera].has_pictures) cell.append(h("span.small", `no frame ${step}`));
 			}),
 		);
 	}
@@ -408,19 +385,18 @@ export function mountPlace(root, { store, actions, playback }, check, crops) {
 	function numbers(best, now) {
 		const views = store.get().cameras;
 		cameras.hidden = views.length < 2;
+		const rank = (/** @type {number} */ camera) =>
+			camera === best[0] ? ", which sees them best" : camera === best[1] ? ", second best" : "";
+		const words = views.map(
+			({ name }, camera) =>
+				/** @type {const} */ ([camera, `C${camera + 1}`, `${name}${rank(camera)}`]),
+		);
 		fill(
 			cameras,
-			views.map(({ name }, camera) =>
-				h(
-					"button",
-					{
-						"aria-pressed": String(camera === now),
-						title: `${name}${camera === best[0] ? ", which sees them best" : camera === best[1] ? ", second best" : ""}`,
-						onclick: () => ((by = camera), void roll()),
-					},
-					`C${camera + 1}`,
-				),
-			),
+			segment(words, now, (camera) => {
+				by = camera;
+				void roll();
+			}),
 		);
 	}
 

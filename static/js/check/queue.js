@@ -1,5 +1,6 @@
 /** The queue of doubtful places where the sliders stand, and under it what was put right. */
-import { capital, fill, h, icon, idTag, write } from "../elements/dom.js";
+import { claim, capital, fill, h, icon, idTag, write } from "../elements/dom.js";
+import { signButton } from "../elements/drawn.js";
 import { commandOf, keyLabel } from "../state/commands.js";
 import { shownVersion } from "../state/events.js";
 import { offerTurn } from "../panes/controls.js";
@@ -17,75 +18,51 @@ const MOST = 200;
 export function mountQueue(root, { store, actions }, check, crops) {
 	const { state } = check;
 	let byTime = false;
-	const sub = h("span", { class: "sub", role: "status" });
-	const order = h("button", {
-		class: "btn",
+	const sub = h("span.sub", { role: "status" });
+	const order = h("button.btn", {
 		"data-tip": "Order: what is most at stake first, or as they come",
 		onclick: () => ((byTime = !byTime), list()),
 	});
-	const places = h("div", {
-		class: "qlist",
+	const places = h("div.qlist", {
 		role: "listbox",
 		"aria-label": "Places, most doubtful first",
 		tabindex: 0,
 	});
-	const blank = h("div", { class: "qblank", hidden: true });
-	const cameras = h("p", { class: "small keepnote", hidden: true });
-	const count = h("span", { class: "count" });
+	const blank = h("div.blank.qblank", { hidden: true });
+	const cameras = h("p.small.keepnote", { hidden: true });
+	const count = h("span.count");
 	/** @param {"undo" | "redo"} what @param {-1 | 1} direction */
 	const turn = (what, direction) =>
-		h(
-			"button",
-			{
-				class: "btn icon",
-				"aria-label": commandOf(what).title,
-				"data-key": commandOf(what).keys.map(keyLabel).join(),
-				onclick: () => actions.undo(direction),
-			},
-			icon(`i-${what}`),
-		);
+		signButton(`i-${what}`, commandOf(what).title, () => actions.undo(direction), {
+			"data-key": commandOf(what).keys.map(keyLabel).join(),
+		});
 	const [undo, redo] = [turn("undo", -1), turn("redo", 1)];
 	store.watch(["server"], ({ server }) => {
 		offerTurn(undo, "undo", server);
 		offerTurn(redo, "redo", server);
 	});
 	const file = h(
-		"button",
+		"button.btn",
 		{
-			class: "btn",
 			"data-tip": "What is checked, as ground truth for an evaluation",
 			onclick: () => actions.correct("truth"),
 		},
 		icon("i-export", "s"),
 		"Save truth",
 	);
-	const done = h("div", {
-		class: "qds",
+	const done = h("div.qds", {
 		role: "listbox",
 		"aria-label": "Corrections, newest first",
 		tabindex: 0,
 	});
-	const told = h("p", { class: "small keepnote" });
+	const told = h("p.small.keepnote");
 	fill(
 		root,
-		h(
-			"div",
-			{ class: "qhead" },
-			h("h2", { class: "pane-title" }, "Check"),
-			sub,
-			h("span", { class: "grow" }),
-			order,
-		),
+		h("div.qhead", h("h2.pane-title", "Check"), sub, h("span.grow"), order),
 		cameras,
 		places,
 		blank,
-		h(
-			"div",
-			{ class: "qdone" },
-			h("h3", { class: "h" }, "Corrections", count, h("span", { class: "grow" }), file, undo, redo),
-			done,
-			told,
-		),
+		h("div.qdone", h("h3.h", "Corrections", count, h("span.grow"), file, undo, redo), done, told),
 	);
 
 	/** Pictures are read for what is in sight. */
@@ -135,33 +112,19 @@ export function mountQueue(root, { store, actions }, check, crops) {
 	/** @param {Doubt} doubt */
 	function make(doubt) {
 		const item = h(
-			"div",
+			"div.qi",
 			{
-				class: "qi",
 				role: "option",
 				id: `place-${doubt.id}`,
 				"data-doubt": doubt.id,
 				onclick: () => check.choose(doubt),
 			},
-			h("span", { class: "qn", "aria-hidden": "true" }),
+			h("span.qn", { "aria-hidden": "true" }),
+			h("span.qp", { "aria-hidden": "true" }, h("canvas"), icon("i-next", "s"), h("canvas")),
+			h("span.qt", h("b", doubt.title), h("span.small", stepsOf(doubt.first, doubt.last))),
 			h(
-				"span",
-				{ class: "qp", "aria-hidden": "true" },
-				h("canvas"),
-				icon("i-next", "s"),
-				h("canvas"),
-			),
-			h(
-				"span",
-				{ class: "qt" },
-				h("b", {}, doubt.title),
-				h("span", { class: "small" }, stepsOf(doubt.first, doubt.last)),
-			),
-			h(
-				"span",
-				{ class: "qs" },
-				h("span", {
-					class: "dbar",
+				"span.qs",
+				h("span.dbar", {
 					"--v": doubt.doubt,
 					role: "img",
 					"aria-label": `doubt ${percent(doubt.doubt)}`,
@@ -198,7 +161,7 @@ export function mountQueue(root, { store, actions }, check, crops) {
 		places.ariaLabel = byTime ? "Places, as they come" : "Places, most doubtful first";
 		const words = byTime ? "as they come" : "most doubtful";
 		order.ariaLabel = `Order: ${words}`;
-		fill(order, icon("i-swap", "s"), h("span", { class: "opt-1" }, words));
+		fill(order, icon("i-swap", "s"), h("span.opt-1", words));
 		head();
 	}
 
@@ -224,7 +187,6 @@ export function mountQueue(root, { store, actions }, check, crops) {
 				icon("i-warn", "s"),
 				h(
 					"span",
-					{},
 					words.map((one) => `${capital(one)}. `),
 				),
 			);
@@ -235,17 +197,17 @@ export function mountQueue(root, { store, actions }, check, crops) {
 		if (!queue || (computing && !answered))
 			return fill(
 				blank,
-				h("h3", {}, computing ? "Computing" : sequence ? "No run yet" : "No recording is open"),
-				h("p", {}, "Places appear as the run passes them."),
+				h("h3", computing ? "Computing" : sequence ? "No run yet" : "No recording is open"),
+				h("p", "Places appear as the run passes them."),
 			);
 		fill(
 			blank,
-			h("h3", {}, answered ? `All ${answered} done` : "Nothing to check"),
-			h("p", {}, `Judged by ${queue.how}.`),
+			h("h3", answered ? `All ${answered} done` : "Nothing to check"),
+			h("p", `Judged by ${queue.how}.`),
 			answered > 0 &&
 				h(
-					"button",
-					{ class: "btn box", onclick: () => actions.exportTracks() },
+					"button.btn.box",
+					{ onclick: () => actions.exportTracks() },
 					icon("i-export", "s"),
 					"Export the tracks",
 				),
@@ -258,8 +220,7 @@ export function mountQueue(root, { store, actions }, check, crops) {
 		if (!step || !doubts.length) return;
 		const index = doubts.findIndex(({ id }) => id === state.get().chosen?.id);
 		check.choose(doubts[Math.max(0, Math.min(doubts.length - 1, index + step))]);
-		event.preventDefault();
-		event.stopPropagation();
+		claim(event);
 	});
 
 	/** The correction that is walked to. */
@@ -288,13 +249,12 @@ export function mountQueue(root, { store, actions }, check, crops) {
 			},
 			icon(unmet ? "i-warn" : (ICONS[one.kind] ?? "i-pin"), "s"),
 			h(
-				"span",
-				{ class: "qw" },
+				"span.qw.cut",
 				[...new Set(one.tracks)].slice(0, 2).flatMap((id) => [idTag(id), " "]),
 				one.words,
-				unmet && h("span", { class: "q" }, ` · ${one.why || "found no track"}`),
+				unmet && h("span.q", ` · ${one.why || "found no track"}`),
 			),
-			h("span", { class: "q" }, one.met === null ? "…" : clockOf(one.time)),
+			h("span.q", one.met === null ? "…" : clockOf(one.time)),
 		);
 	}
 
@@ -315,7 +275,6 @@ export function mountQueue(root, { store, actions }, check, crops) {
 			icon(unmet || now?.problem ? "i-warn" : "i-pin", "s"),
 			h(
 				"span",
-				{},
 				now?.problem
 					? `Left out, and nothing new is taken: ${now.problem}. `
 					: unmet
@@ -326,10 +285,9 @@ export function mountQueue(root, { store, actions }, check, crops) {
 			),
 			chosen &&
 				h(
-					"span",
-					{ class: "group" },
-					h("button", { class: "btn", onclick: () => show(chosen) }, "Show"),
-					h("button", { class: "btn", onclick: () => void check.drop(chosen.id) }, "Drop"),
+					"span.group",
+					h("button.btn", { onclick: () => show(chosen) }, "Show"),
+					h("button.btn", { onclick: () => void check.drop(chosen.id) }, "Drop"),
 				),
 		);
 	}
@@ -342,8 +300,7 @@ export function mountQueue(root, { store, actions }, check, crops) {
 		else if (event.key === "Enter" && newest[index]) show(newest[index]);
 		else if (event.key === "Delete" && newest[index]) void check.drop(newest[index].id);
 		else return;
-		event.preventDefault();
-		event.stopPropagation();
+		claim(event);
 	});
 
 	state.watch(["queue", "chosen"], list);

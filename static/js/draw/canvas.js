@@ -93,6 +93,14 @@ export function trace(g, points) {
 }
 
 /**
+ * A straight line.
+ * @param {Brush} g @param {number[]} from @param {number[]} to @param {string} colour
+ * @param {number} [width] @param {number[]} [dash]
+ */
+export const rule = (g, from, to, colour, width = 1, dash) =>
+	stroke(trace(g, [from, to]), colour, width, dash);
+
+/**
  * Stroke the current path, with a dark halo under it where it lies on a picture.
  * @param {Brush} g
  * @param {string} colour

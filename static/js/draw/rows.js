@@ -1,6 +1,6 @@
 /** The rows of the timeline: range bar, ruler and lanes, and the curves below them. */
 import { rangesOf, tickSteps, xOf, bucketOf } from "../play/clock.js";
-import { faded, hatch, stroke, trace } from "./canvas.js";
+import { faded, hatch, rule, stroke, trace } from "./canvas.js";
 
 /* ---------- Range bar, ruler and track lanes of the timeline. ---------- */
 
@@ -44,14 +44,8 @@ export function drawRuler({ g, row, view, ink }, range, marks, hidden) {
 	for (let step = Math.ceil(view.first / minor) * minor; step <= view.last; step += minor) {
 		const x = Math.round(xOf(step, view)) + 0.5;
 		const labelled = Math.round(step % major) === 0;
-		stroke(
-			trace(g, [
-				[x, bottom - (labelled ? 5 : 3)],
-				[x, bottom],
-			]),
-			ink.get(labelled ? "ink-3" : "bg-4"),
-			1,
-		);
+		const colour = ink.get(labelled ? "ink-3" : "bg-4");
+		rule(g, [x, bottom - (labelled ? 5 : 3)], [x, bottom], colour);
 		if (!labelled || Math.round(step) === hidden) continue;
 		const text = String(Math.round(step));
 		const half = g.measureText(text).width / 2;
@@ -81,14 +75,7 @@ export function drawRuler({ g, row, view, ink }, range, marks, hidden) {
 			[x + (end ? -5 : 5), bottom - 7],
 		]).fill();
 	});
-	stroke(
-		trace(g, [
-			[0, bottom - 0.5],
-			[view.width + 20, bottom - 0.5],
-		]),
-		ink.get("line"),
-		1,
-	);
+	rule(g, [0, bottom - 0.5], [view.width + 20, bottom - 0.5], ink.get("line"));
 }
 
 /** @param {Pen} pen @param {Lanes} lanes */
@@ -113,16 +100,11 @@ export function drawLanes(
 		const below = topOf(index) + laneHeight - 1.5;
 		for (const { like, spans } of pinned) {
 			if (like !== track.id) continue;
-			for (const [from, to] of spans)
-				stroke(
-					trace(g, [
-						[Math.max(-4, xOf(from, view)), below],
-						[Math.min(view.width + 4, xOf(to + 1, view)), below],
-					]),
-					ink.get("ink-2"),
-					1,
-					[4, 2],
-				);
+			for (const [from, to] of spans) {
+				const [x0, x1] = [xOf(from, view), xOf(to + 1, view)];
+				const ends = [Math.max(-4, x0), Math.min(view.width + 4, x1)];
+				rule(g, [ends[0], below], [ends[1], below], ink.get("ink-2"), 1, [4, 2]);
+			}
 		}
 		if (track.last >= view.first && track.first <= view.last)
 			drawLane(pen, track, middle, done, Math.max(5, Math.round(laneHeight * 0.42)));
@@ -227,6 +209,15 @@ function drawLane({ g, view, ink }, track, middle, done, thick) {
 /* ---------- Plots over the steps, under the lanes and on the same axis. ---------- */
 
 /**
+ * How high a value stands in a strip; what leaves its axis is at the end of it.
+ * @param {Pen["row"]} row @param {number} low @param {number} high  the ends of the axis
+ */
+export const levels =
+	({ y, height }, low, high) =>
+	(/** @type {number} */ value) =>
+		y + height - 4 - ((Math.min(high, Math.max(low, value)) - low) / (high - low)) * (height - 10);
+
+/**
  * A staircase: numbers of people hold for a whole step. Of many steps on one pixel the
  * lowest and the highest are drawn, so that a short change never disappears.
  * @param {Pen} pen
@@ -239,8 +230,7 @@ function drawStairs({ g, row, view }, buckets, { low, high }, top, colour, width
 	const { first, stride } = buckets;
 	const from = Math.max(0, bucketOf(view.first, buckets));
 	const to = Math.min(low.length - 1, bucketOf(view.last, buckets) + 1);
-	const level = (/** @type {number} */ value) =>
-		row.y + row.height - 4 - (Math.max(0, Math.min(value, top)) / top) * (row.height - 10);
+	const level = levels(row, 0, top);
 	const x = (/** @type {number} */ k) =>
 		Math.max(0, Math.min(view.width, xOf(first + k * stride, view)));
 	const many = Math.max(1, Math.floor((view.last - view.first) / stride / Math.max(1, view.width)));
@@ -260,23 +250,9 @@ function drawStairs({ g, row, view }, buckets, { low, high }, top, colour, width
 
 /** The edge above a strip and the ground it stands on. @param {Pen} pen */
 export function drawGround({ g, row, view, ink }) {
-	stroke(
-		trace(g, [
-			[0, row.y + 0.5],
-			[view.width + 20, row.y + 0.5],
-		]),
-		ink.get("line-0"),
-		1,
-	);
+	rule(g, [0, row.y + 0.5], [view.width + 20, row.y + 0.5], ink.get("line-0"));
 	const base = row.y + row.height - 3.5;
-	stroke(
-		trace(g, [
-			[0, base],
-			[view.width, base],
-		]),
-		ink.get("p-grid"),
-		1,
-	);
+	rule(g, [0, base], [view.width, base], ink.get("p-grid"));
 }
 
 /**
@@ -306,8 +282,7 @@ export function drawCardinality(pen, timeline) {
 function drawBand({ g, row, view, ink }, timeline, top) {
 	const { cardinality, deviation } = timeline;
 	const slope = (view.last - view.first) / view.width;
-	const level = (/** @type {number} */ value) =>
-		row.y + row.height - 4 - (Math.max(0, Math.min(value, top)) / top) * (row.height - 10);
+	const level = levels(row, 0, top);
 	g.fillStyle = faded(ink.get("p-loc"), 0.4);
 	for (let x = 0; x < view.width; x += 1) {
 		const at = bucketOf(view.first + x * slope, timeline);
@@ -380,6 +355,7 @@ export function drawErrors(
 ) {
 	drawGround(pen);
 	const { g, row, view, ink } = pen;
+	const level = levels(row, 0, axes.error);
 	const many = Math.max(1, Math.floor((view.last - view.first) / stride / view.width));
 	/** @param {Course} course @param {string} colour @param {number} width */
 	const draw = ({ first, values }, colour, width) => {
@@ -392,12 +368,8 @@ export function drawErrors(
 			k += many
 		) {
 			const known = values.slice(k, k + many).filter((value) => value !== null);
-			const worst = Math.min(axes.error, Math.max(0, ...known));
 			if (known.length)
-				g[open ? "lineTo" : "moveTo"](
-					xOf(first + k * stride, view),
-					row.y + row.height - 4 - (worst / axes.error) * (row.height - 10),
-				);
+				g[open ? "lineTo" : "moveTo"](xOf(first + k * stride, view), level(Math.max(0, ...known)));
 			open = known.length > 0;
 		}
 		stroke(g, colour, width);

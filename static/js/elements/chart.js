@@ -1,5 +1,5 @@
 /** The chart of the page: axes with round ticks, marks, a card at the pointer or by keys, a brush. */
-import { fill, h, show, svg } from "./dom.js";
+import { claim, fill, h, show, svg } from "./dom.js";
 
 /**
  * @typedef {object} Axis
@@ -211,12 +211,12 @@ export function plot({ x, y, marks, margin, aside }, width, height) {
 	};
 	const within = { ...box, viewBox: Object.values(box).join(" ") };
 	const element = h(
-		"div",
-		{ class: "figure", "--left": `${left}px`, "--room": `${tall}px` },
+		"div.figure",
+		{ "--left": `${left}px`, "--room": `${tall}px` },
 		svg(
 			"svg",
 			{ width, height, "aria-hidden": "true" },
-			svg("path", { class: "grid", d: grid.join("") }),
+			svg("path.grid", { d: grid.join("") }),
 			marks.map(({ kind }, k) => (kind === "dots" ? drawn[k] : svg("svg", within, drawn[k]))),
 		),
 		words,
@@ -250,13 +250,12 @@ export function chart() {
 	/** Where a range along x began, CSS pixels. @type {number | null} */
 	let from = null;
 	const stage = h("div");
-	const card = h("div", { class: "says", role: "status" });
-	const ring = h("i", { class: "at", hidden: true });
-	const range = h("i", { class: "range", hidden: true });
+	const card = h("div.says", { role: "status" });
+	const ring = h("i.at", { hidden: true });
+	const range = h("i.range", { hidden: true });
 	const element = h(
-		"div",
+		"div.chart",
 		{
-			class: "chart",
 			role: "application",
 			"aria-roledescription": "chart",
 			tabindex: 0,
@@ -367,8 +366,7 @@ export function chart() {
 			mean(target);
 			span(from === null ? null : target.x);
 		} else return;
-		event.preventDefault();
-		event.stopPropagation();
+		claim(event);
 	}
 
 	function draw() {
@@ -393,7 +391,7 @@ export function chart() {
 		clear(words) {
 			figure = drawn = null;
 			mean(undefined);
-			fill(stage, words && h("p", { class: "blank" }, words));
+			fill(stage, words && h("p.blank", words));
 		},
 	};
 }

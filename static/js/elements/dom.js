@@ -1,35 +1,31 @@
 /** Building and filling elements. */
 
 /**
- * An element with attributes and children. `on…` is a listener, `class` and the rest are
- * attributes; `true` sets an empty one, `false` and `null` none; `--x` is a style property.
- * @template {keyof HTMLElementTagNameMap} K
- * @param {K} tag
- * @param {Attributes} [attributes]
- * @param {...(Child | Child[])} children
+ * An element: its tag with classes, `div.a.b`; attributes, if it has any; children. `on…` is a
+ * listener, `class` and the rest are attributes; `true` sets an empty one, `false` and `null` none;
+ * `--x` is a style property.
+ * @type {Maker<HTMLElementTagNameMap>}
  */
-export const h = (tag, attributes, ...children) =>
-	furnish(document.createElement(tag), attributes, children);
+export const h = (/** @type {string} */ tag, /** @type {any[]} */ ...inside) =>
+	furnish(document.createElement(tag.split(".", 1)[0]), tag, inside);
 
-/**
- * The same of a drawing.
- * @template {keyof SVGElementTagNameMap} K
- * @param {K} tag
- * @param {Attributes} [attributes]
- * @param {...(Child | Child[])} children
- */
-export const svg = (tag, attributes, ...children) =>
-	furnish(document.createElementNS("http://www.w3.org/2000/svg", tag), attributes, children);
+/** The same of a drawing. @type {Maker<SVGElementTagNameMap>} */
+export const svg = (/** @type {string} */ tag, /** @type {any[]} */ ...inside) =>
+	furnish(
+		document.createElementNS("http://www.w3.org/2000/svg", tag.split(".", 1)[0]),
+		tag,
+		inside,
+	);
 
-/**
- * @template {HTMLElement | SVGElement} E
- * @param {E} element @param {Attributes} attributes @param {(Child | Child[])[]} children
- */
-function furnish(element, attributes = {}, children) {
+/** @param {any} element @param {string} tag @param {any[]} inside */
+function furnish(element, tag, inside) {
+	const [, ...classes] = tag.split(".");
+	if (classes.length) element.setAttribute("class", classes.join(" "));
+	const [attributes, children] =
+		inside[0]?.constructor === Object ? [inside[0], inside.slice(1)] : [{}, inside];
 	for (const [name, value] of Object.entries(attributes)) {
 		if (value === null || value === undefined || value === false) continue;
-		if (name.startsWith("on"))
-			element.addEventListener(name.slice(2), /** @type {EventListener} */ (value));
+		if (name.startsWith("on")) element.addEventListener(name.slice(2), value);
 		else if (name.startsWith("--")) element.style.setProperty(name, String(value));
 		else element.setAttribute(name, value === true ? "" : String(value));
 	}
@@ -58,6 +54,19 @@ export function fill(element, ...children) {
  */
 export function write(node, text) {
 	if (node.textContent !== text) node.textContent = text;
+}
+
+/** Hear of an event before what it happens in does. @type {Capture} */
+export const capture = (
+	/** @type {EventTarget} */ target,
+	/** @type {string} */ kind,
+	/** @type {any} */ act,
+) => target.addEventListener(kind, act, true);
+
+/** What happened is dealt with: it means nothing else. @param {Event} event */
+export function claim(event) {
+	event.preventDefault();
+	event.stopPropagation();
 }
 
 /**
@@ -96,7 +105,7 @@ export function allow(control, why) {
  * @param {Element} select @param {...(Child | Child[])} children
  */
 export function refill(select, ...children) {
-	const made = [...h("select", {}, ...children).childNodes];
+	const made = [...h("select", ...children).childNodes];
 	const there = select.childNodes;
 	if (made.length !== there.length || made.some((node, k) => !node.isEqualNode(there[k])))
 		select.replaceChildren(...made);
@@ -104,7 +113,7 @@ export function refill(select, ...children) {
 
 /**
  * @param {Element & { value: string }} select
- * @param {[string | number, string][]} choices  values and words
+ * @param {(string | number)[][]} choices  values and words
  * @param {string | number} chosen
  */
 export function choices(select, choices, chosen) {
@@ -125,18 +134,8 @@ export const colourIndex = (id) => ((((id - 1) % 24) + 24) % 24) + 1;
 /** @param {number} id */
 export function idTag(id) {
 	const n = colourIndex(id);
-	return h("span", { class: "id", "--c": `var(--id-${n})`, "--on-id": `var(--on-${n})` }, id);
+	return h("span.id", { "--c": `var(--id-${n})`, "--on-id": `var(--on-${n})` }, id);
 }
-
-/** A symbol with indices set low; a method's key is words. @param {string} symbol  such as p_D or σ_z/σ_x */
-export function symbolParts(symbol) {
-	if (!/^.{1,4}_/.test(symbol)) return [symbol.replaceAll("_", " ")];
-	return symbol.split(/_([^/()+]+)/).map((part, k) => (k % 2 ? h("sub", {}, part) : part));
-}
-
-/** @param {string} symbol */
-export const symbolOf = (symbol, kind = "sym") =>
-	h("span", { class: kind }, ...symbolParts(symbol));
 
 /** @param {number} value  @returns {string} as short as it stays readable */
 export function show(value) {
@@ -149,6 +148,41 @@ export function show(value) {
 /** @param {number} value  @returns {string} a rate, never rounded to nothing: 25, 4.2, 0.043 */
 export const rate = (value) =>
 	value >= 9.95 ? String(Math.round(value)) : show(Number(value.toPrecision(2)));
+
+/**
+ * The next one of a list that goes round; of none the first or the last.
+ * @template V
+ * @param {V[]} list @param {number} index  -1: none @param {number} direction  1 or -1
+ */
+export const turned = (list, index, direction) =>
+	list[
+		index < 0 && direction < 0 ? list.length - 1 : (index + direction + list.length) % list.length
+	];
+
+/** What this browser remembers under a name. @param {string} name @param {any} usual  else */
+export function remembered(name, usual) {
+	try {
+		return JSON.parse(localStorage.getItem(name) ?? "null") ?? usual;
+	} catch {
+		return usual;
+	}
+}
+
+/** Have this browser remember; without storage it lasts as long as the page. @param {string} name @param {unknown} value */
+export function remember(name, value) {
+	try {
+		localStorage.setItem(name, JSON.stringify(value));
+	} catch {
+		// Nothing else changes.
+	}
+}
+
+/** Have the browser save a file. @param {Blob} blob @param {string} name */
+export function save(blob, name) {
+	const href = URL.createObjectURL(blob);
+	h("a", { href, download: name }).click();
+	setTimeout(() => URL.revokeObjectURL(href), 10_000);
+}
 
 /** @param {string} words  @returns {string} as a sentence begins */
 export const capital = (words) => words.slice(0, 1).toUpperCase() + words.slice(1);

@@ -1,5 +1,5 @@
 /** Panels that are drawn anew while somebody works in them, and what they are written with. */
-import { all, h, symbolParts } from "./dom.js";
+import { all, choices, h, icon } from "./dom.js";
 import { table } from "./table.js";
 
 /** Elements that are replaced as a whole where they differ: what they do is made with what they say. */
@@ -42,7 +42,7 @@ export function redraw(root, ...children) {
 	const held = all(":focus", root)[0];
 	const stops = `${CONTROLS}, [tabindex]`;
 	const at = all(stops, root).indexOf(held);
-	adapt(root, h("div", {}, ...children));
+	adapt(root, h("div", ...children));
 	if (!held || held.isConnected) return;
 	const now = all(stops, root);
 	const next = now.find((control) => called(control) === called(held)) ?? now[at] ?? now.at(-1);
@@ -52,20 +52,108 @@ export function redraw(root, ...children) {
 	panel.focus();
 }
 
+/**
+ * A list of choices of its own.
+ * @param {string} label
+ * @param {(string | number)[][]} words  values and words
+ * @param {string | number} chosen
+ * @param {(value: string) => void} choose
+ */
+export function chooser(label, words, chosen, choose) {
+	const select = h("select.field", {
+		"aria-label": label,
+		onchange: () => choose(select.value),
+	});
+	choices(select, words, chosen);
+	return select;
+}
+
+/**
+ * Buttons beside each other, one of them pressed.
+ * @template V
+ * @param {readonly (readonly [V, Child, string?])[]} words  values, words and what the pointer says
+ * @param {V} chosen
+ * @param {(value: V) => void} choose
+ */
+export const segment = (words, chosen, choose) =>
+	words.map(([value, word, title]) =>
+		h(
+			"button",
+			{ "aria-pressed": String(value === chosen), title, onclick: () => choose(value) },
+			word,
+		),
+	);
+
+/** What takes the room that is left. */
+export const grow = () => h("span.grow");
+
+/** @param {Child | Node} title  a heading or its words @param {...(Child | Child[])} beside */
+export const paneHead = (title, ...beside) =>
+	h("div.pane-head", title instanceof Element ? title : h("h2.pane-title", title), ...beside);
+
+/**
+ * A button that is a sign alone.
+ * @param {string} sign @param {string} label @param {() => void} onclick @param {Attributes} [more]
+ */
+export const signButton = (sign, label, onclick, more = {}) =>
+	h("button.btn.icon", { "aria-label": label, onclick, ...more }, icon(sign, "s"));
+
+/**
+ * Have a text written in a field: Enter takes it, Escape and leaving the field do not, unless they
+ * are told to.
+ * @param {Attributes & {value: string}} attributes
+ * @param {(text: string | null) => void} done  null where it is not taken
+ * @param {boolean} [leaves]  leaving the field takes it
+ */
+export function asks(attributes, done, leaves = false) {
+	let over = false;
+	const end = (/** @type {boolean} */ taken) => {
+		if (over) return;
+		over = true;
+		done(taken ? field.value : null);
+	};
+	const field = h("input.field", {
+		...attributes,
+		onblur: () => end(leaves),
+		onkeydown: (event) => {
+			event.stopPropagation();
+			if (event.key === "Enter" || event.key === "Escape") end(event.key === "Enter");
+		},
+	});
+	return field;
+}
+
+/** The place of a key among the arrows: what it adds across and down. @type {Record<string, [number, number] | undefined>} */
+export const ARROWS = {
+	ArrowLeft: [-1, 0],
+	ArrowRight: [1, 0],
+	ArrowUp: [0, -1],
+	ArrowDown: [0, 1],
+};
+
+/** A symbol with indices set low; a method's key is words. @param {string} symbol  such as p_D or σ_z/σ_x */
+export function symbolParts(symbol) {
+	if (!/^.{1,4}_/.test(symbol)) return [symbol.replaceAll("_", " ")];
+	return symbol.split(/_([^/()+]+)/).map((part, k) => (k % 2 ? h("sub", part) : part));
+}
+
+/** @param {string} symbol */
+export const symbolOf = (symbol, kind = "sym") =>
+	h("span", { class: kind }, ...symbolParts(symbol));
+
 /** A parameter: its words with its symbol; what it means comes with the pointer. @param {Server.ParameterInfo} of */
 export function parameterName({ label, symbol, help }) {
-	return h("span", { title: help }, `${label} `, h("i", {}, ...symbolParts(symbol)));
+	return h("span", { title: help }, `${label} `, h("i", ...symbolParts(symbol)));
 }
 
 /** Text in a muted colour. @param {...(Child | Child[])} children */
-export const quiet = (...children) => h("span", { class: "q" }, ...children);
+export const quiet = (...children) => h("span.q", ...children);
 
 /** A line of words above or below a table. @param {...(Child | Child[])} children */
-export const line = (...children) => h("p", { class: "words" }, ...children);
+export const line = (...children) => h("p.words", ...children);
 
 /** What stands where there is nothing to list. @param {string} title @param {string} text */
-export const nothing = (title, text) =>
-	h("div", { class: "blank" }, h("h3", {}, title), h("p", {}, text));
+export const nothing = (title, text) => h("div.blank", h("h3", title), h("p", text));
 
 /**
  * A number with fixed digits and a true minus; a dash where there is none.

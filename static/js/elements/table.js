@@ -1,5 +1,5 @@
 /** Tables: sorted by their heads, walked by arrows, filled again without losing place or focus. */
-import { fill, h, write } from "./dom.js";
+import { claim, fill, h, write } from "./dom.js";
 
 /** By which column each table is sorted, by its label: kept while it is drawn anew. @type {Map<string | null, {word?: string, down?: boolean}>} */
 const sorted = new Map();
@@ -53,15 +53,11 @@ export function table(label, columns, { key, by, down, choose, open, attributes 
 		h(
 			"th",
 			{ scope: "col", class: kind, title: help, "data-by": value && word },
-			value
-				? h("button", { onclick: sortBy }, head)
-				: word
-					? head
-					: h("span", { class: "vh" }, "Actions"),
+			value ? h("button", { onclick: sortBy }, head) : word ? head : h("span.vh", "Actions"),
 		),
 	);
 	const body = h("tbody");
-	const element = h("table", { "aria-label": label }, h("thead", {}, h("tr", {}, heads)), body);
+	const element = h("table", { "aria-label": label }, h("thead", h("tr", heads)), body);
 	if (by) sorted.set(label, { word: by, down });
 
 	/** @param {Element} cell  @param {any} value */
@@ -84,8 +80,7 @@ export function table(label, columns, { key, by, down, choose, open, attributes 
 					? element.nextElementSibling
 					: key === "ArrowUp" && element.previousElementSibling;
 			if (!(next instanceof HTMLElement)) return;
-			event.preventDefault();
-			event.stopPropagation();
+			claim(event);
 			next.focus();
 		}
 		entry.element = h(

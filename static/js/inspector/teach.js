@@ -3,7 +3,8 @@
  * it is sent.
  */
 import { lensOf } from "../draw/overlay.js";
-import { all, h, one } from "../elements/dom.js";
+import { claim, capture, all, h, one } from "../elements/dom.js";
+import { ARROWS } from "../elements/drawn.js";
 import { resultOf } from "../state/events.js";
 
 /* ---------- A box over a picture without a pointer: arrows move it, with Ctrl they size it,
@@ -27,7 +28,7 @@ const LEAST = 4;
 function mountFrame(mosaic, store, { keep, tell }) {
 	/** @type {{cell: HTMLElement, index: number, sides: Sides} | null} */
 	let at = null;
-	const frame = h("button", { class: "drawn framed", onkeydown: keyed });
+	const frame = h("button.drawn.framed", { onkeydown: keyed });
 
 	/** In a picture, around the selected person where it is seen there. @param {HTMLElement} cell */
 	function begin(cell) {
@@ -61,9 +62,7 @@ function mountFrame(mosaic, store, { keep, tell }) {
 		const { sides, index } = at;
 		const { width: wide, height: high } = store.get().cameras[index];
 		const far = event.shiftKey ? LARGE : SMALL;
-		const way = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[
-			event.key
-		];
+		const way = ARROWS[event.key];
 		const within = (
 			/** @type {number} */ value,
 			/** @type {number} */ least,
@@ -84,8 +83,7 @@ function mountFrame(mosaic, store, { keep, tell }) {
 			end();
 			cell.focus();
 		} else return;
-		event.preventDefault();
-		event.stopPropagation();
+		claim(event);
 		put();
 	}
 
@@ -122,8 +120,8 @@ export const NUMBERS = "Template by numbers";
 /** @param {HTMLElement} mosaic  the pictures @param {Context} context */
 export function mountTeach(mosaic, { store, actions }) {
 	const panel = one("#panel-teach");
-	const drawn = h("div", { class: "drawn" });
-	const hint = h("p", { class: "hint", role: "status", hidden: true }, DRAW);
+	const drawn = h("div.drawn");
+	const hint = h("p.hint", { role: "status", hidden: true }, DRAW);
 	mosaic.before(hint);
 	/** Where a drag began.  @type {{cam: HTMLElement, x: number, y: number} | null} */
 	let begun = null;
@@ -224,33 +222,24 @@ export function mountTeach(mosaic, { store, actions }) {
 		dblclick() {},
 	};
 	for (const [name, act] of Object.entries(drag)) {
-		mosaic.addEventListener(
-			name,
-			(event) => {
-				if (hint.hidden) return;
-				event.stopPropagation();
-				act(event);
-			},
-			true,
-		);
+		capture(mosaic, name, (event) => {
+			if (hint.hidden) return;
+			event.stopPropagation();
+			act(event);
+		});
 	}
 
 	// In the picture that has the focus, else in the large one or the first.
-	document.addEventListener(
-		"keydown",
-		(event) => {
-			const target = /** @type {HTMLElement} */ (event.target);
-			if (event.key !== "Enter" || hint.hidden || document.querySelector("dialog[open]")) return;
-			const own = /** @type {HTMLElement | null} */ (target.closest(".cam"));
-			if (!own && target.closest("button, a, input, select, summary, tr, [role=listbox]")) return;
-			const cell = own ?? all(".cam", mosaic)[store.get().large ?? 0];
-			if (!cell) return;
-			event.preventDefault();
-			event.stopPropagation();
-			frame.begin(cell);
-		},
-		true,
-	);
+	capture(document, "keydown", (event) => {
+		const target = /** @type {HTMLElement} */ (event.target);
+		if (event.key !== "Enter" || hint.hidden || document.querySelector("dialog[open]")) return;
+		const own = /** @type {HTMLElement | null} */ (target.closest(".cam"));
+		if (!own && target.closest("button, a, input, select, summary, tr, [role=listbox]")) return;
+		const cell = own ?? all(".cam", mosaic)[store.get().large ?? 0];
+		if (!cell) return;
+		claim(event);
+		frame.begin(cell);
+	});
 
 	/** A command, or a method and a path. @param {any} from @param {string} kind @param {() => object} body */
 	function send(from, kind, body) {

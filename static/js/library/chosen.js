@@ -1,5 +1,6 @@
 /** The bar under the runs: what can be done with those that are ticked, and what was just done. */
 import { fill, h, icon, one } from "../elements/dom.js";
+import { grow, signButton } from "../elements/drawn.js";
 import { exportMenu } from "./exports.js";
 import { comparison } from "./small.js";
 import { many, size } from "./words.js";
@@ -15,9 +16,9 @@ import { many, size } from "./words.js";
 export function chosenBar({ store, actions, chosen, none, leave }) {
 	const numbers = () => chosen().map(({ id }) => id);
 	const picked = h("b");
-	const line = h("span", { role: "status", class: "gone-line" });
-	const stop = h("button", { class: "btn" }, "Stop");
-	const side = h("button", { class: "btn box", onclick: compare }, icon("i-swap"), "Compare");
+	const line = h("span.gone-line", { role: "status" });
+	const stop = h("button.btn", "Stop");
+	const side = h("button.btn.box", { onclick: compare }, icon("i-swap"), "Compare");
 	/** @param {string} words @param {() => void} [cancel] */
 	const say = (words, cancel) => {
 		fill(line, words);
@@ -26,36 +27,22 @@ export function chosenBar({ store, actions, chosen, none, leave }) {
 		element.hidden = !words && !chosen().length;
 	};
 	const tools = h(
-		"span",
-		{ class: "picked", role: "toolbar", "aria-label": "Chosen runs" },
+		"span.picked",
+		{ role: "toolbar", "aria-label": "Chosen runs" },
 		picked,
 		side,
 		exportMenu({ store, actions, say, chosen: numbers }),
-		h(
-			"button",
-			{ class: "btn box", onclick: () => void remove(numbers()) },
-			icon("i-trash"),
-			"Delete",
-		),
-		h(
-			"button",
-			{ class: "btn icon", "aria-label": "Choose none", onclick: none },
-			icon("i-close", "s"),
-		),
+		h("button.btn.box", { onclick: () => void remove(numbers()) }, icon("i-trash"), "Delete"),
+		signButton("i-close", "Choose none", none),
 	);
-	const element = h("div", { class: "undo-line" }, tools, h("span", { class: "grow" }), line, stop);
+	const element = h("div.undo-line", tools, grow(), line, stop);
 
 	function compare() {
 		const dialog = /** @type {any} */ (one(".compare"));
 		const close = () => dialog.close();
 		fill(
 			dialog,
-			h(
-				"header",
-				{},
-				h("h2", {}, "Runs side by side"),
-				h("button", { class: "btn icon", "aria-label": "Close", onclick: close }, icon("i-close")),
-			),
+			h("header", h("h2", "Runs side by side"), signButton("i-close", "Close", close)),
 			...comparison(chosen(), store.get().schema),
 		);
 		// beside it; what is in it can be marked and copied

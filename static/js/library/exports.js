@@ -1,6 +1,11 @@
 /** Runs leave: a menu of forms, then each is written by the server and saved by the browser. */
-import { choices, fill, h, icon } from "../elements/dom.js";
+import { fill, h, icon } from "../elements/dom.js";
+import { chooser } from "../elements/drawn.js";
+import { menuOf, opensMenu } from "../elements/over.js";
 import { getJson } from "../state/api.js";
+
+const exportButton = () =>
+	h("button.btn.box", { "aria-haspopup": "menu" }, icon("i-export"), "Export", icon("i-down", "s"));
 
 /** A browser begins to read a file before the next one takes its place, milliseconds. */
 const SAVES_MS = 250;
@@ -11,55 +16,21 @@ const SAVES_MS = 250;
  * @param {Actions} how.actions
  * @param {() => (number | null)[]} how.chosen  runs of the library; null is the one that is shown
  * @param {(words: string, cancel?: () => void) => void} how.say
+ * @param {HTMLElement} [how.button]  that opens it, where there is one
  */
-export function exportMenu({ store, actions, chosen, say }) {
+export function exportMenu({ store, actions, chosen, say, button = exportButton() }) {
 	const forms = h("div", { role: "menu", "aria-label": "Export as" });
-	const menu = h("div", { class: "menu", popover: "auto" }, forms);
-	const button = h(
-		"button",
-		{ class: "btn box", "aria-haspopup": "menu" },
-		icon("i-export"),
-		"Export",
-		icon("i-down", "s"),
-	);
-	button.popoverTargetElement = menu;
-	menu.addEventListener("toggle", (event) => {
-		if (/** @type {ToggleEvent} */ (event).newState !== "open") return;
-		const { left, right, top } = button.getBoundingClientRect();
-		// Towards the middle of the window, whose edges would cut it.
-		const far = left > innerWidth / 2;
-		Object.assign(menu.style, {
-			left: far ? "auto" : `${left}px`,
-			right: far ? `${innerWidth - right}px` : "auto",
-			bottom: `${innerHeight - top + 6}px`,
-		});
-		menu.querySelector("button")?.focus();
-		void list();
-	});
-	menu.addEventListener("keydown", (event) => {
-		const step = { ArrowDown: 1, ArrowUp: -1 }[event.key];
-		if (!step || part.contains(/** @type {Node} */ (event.target))) return;
-		const all = [...menu.querySelectorAll("button")];
-		const at = all.indexOf(/** @type {HTMLButtonElement} */ (document.activeElement));
-		all[(at + step + all.length) % all.length].focus();
-		event.preventDefault();
-		event.stopPropagation();
-	});
+	const menu = menuOf({}, forms);
+	opensMenu(button, menu, () => void list());
 	const [first, last] = ["first step", "last step"].map((words) =>
 		h("input", { type: "number", min: 0, placeholder: words, "aria-label": `Video, ${words}` }),
 	);
-	const speed = h("select", { "aria-label": "Video, speed" });
-	choices(
-		/** @type {any} */ (speed),
-		[1, 0.5, 0.25, 0.1].map((value) => [value, value === 1 ? "real speed" : `${value}×`]),
-		1,
-	);
-	const part = h(
-		"div",
-		{ class: "video-part" },
-		h("b", {}, "Of a video"),
-		h("span", {}, first, " – ", last, " ", speed),
-	);
+	const speeds = [1, 0.5, 0.25, 0.1].map((value) => [
+		value,
+		value === 1 ? "real speed" : `${value}×`,
+	]);
+	const speed = chooser("Video, speed", speeds, 1, () => {});
+	const part = h("div.video-part", h("b", "Of a video"), h("span", first, " – ", last, " ", speed));
 	let listed = false;
 
 	/** Once the server has told them; asked again when the menu is opened again. */
@@ -67,7 +38,7 @@ export function exportMenu({ store, actions, chosen, say }) {
 		if (listed) return;
 		const told = await getJson("/api/exports/formats").catch((error) => error);
 		if (told instanceof Error) {
-			fill(menu, h("p", { class: "small" }, `What can be written is not known: ${told.message}`));
+			fill(menu, h("p.small", `What can be written is not known: ${told.message}`));
 			return;
 		}
 		listed = true;
@@ -77,12 +48,9 @@ export function exportMenu({ store, actions, chosen, say }) {
 			told.formats.map((/** @type {Server.FormatInfo} */ form) =>
 				h(
 					"button",
-					{
-						role: "menuitem",
-						onclick: () => (menu.hidePopover(), void write(form)),
-					},
-					h("b", {}, form.word),
-					h("span", { class: "small" }, form.help),
+					{ role: "menuitem", onclick: () => (menu.hidePopover(), void write(form)) },
+					h("b", form.word),
+					h("span.small", form.help),
 				),
 			),
 		);

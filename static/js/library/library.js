@@ -1,5 +1,6 @@
 /** The place Library: recordings, the runs of one, and one run in small. */
-import { all, fill, h, icon, write } from "../elements/dom.js";
+import { claim, capture, all, fill, h, icon, write } from "../elements/dom.js";
+import { asks, chooser, grow, paneHead } from "../elements/drawn.js";
 import { getJson } from "../state/api.js";
 import { chosenBar } from "./chosen.js";
 import { preview } from "./preview.js";
@@ -17,19 +18,18 @@ import { factsOf, has, many, size, titleOf, when, whereabouts } from "./words.js
 function lostRecording({ actions, moved }) {
 	/** @type {Server.RecordingInfo | null} */
 	let now = null;
-	const why = h("span", {});
-	const place = h("input", {
-		class: "field",
+	const why = h("span.cut");
+	const place = h("input.field", {
 		placeholder: "folder where it lies now",
 		"aria-label": "Folder where the recording lies now",
 		onkeydown: (/** @type {KeyboardEvent} */ event) => event.key === "Enter" && void find(),
 	});
 	const element = h(
-		"div",
-		{ class: "lost", role: "status", hidden: true },
+		"div.lost",
+		{ role: "status", hidden: true },
 		why,
 		place,
-		h("button", { class: "btn box", onclick: () => void find() }, "Find…"),
+		h("button.btn.box", { onclick: () => void find() }, "Find…"),
 	);
 
 	async function find() {
@@ -99,24 +99,19 @@ function shelf(on) {
 		"aria-label": "Find",
 		oninput: () => on.find(),
 	});
-	const order = h(
-		"select",
-		{ "aria-label": "Sort recordings by", onchange: () => on.find() },
-		Object.keys(ORDERS).map((word) => h("option", {}, word)),
-	);
-	const list = h("div", { class: "scroll list", role: "listbox", "aria-label": "Recordings" });
-	const foot = h("div", { class: "foot" });
+	const orders = Object.keys(ORDERS).map((word) => [word, word]);
+	const order = chooser("Sort recordings by", orders, orders[0][0], on.find);
+	const list = h("div.scroll.list", { role: "listbox", "aria-label": "Recordings" });
+	const foot = h("div.foot");
 	const element = h(
-		"section",
-		{ class: "pane", "aria-label": "Recordings" },
-		h(
-			"div",
-			{ class: "pane-head" },
-			h("h2", { class: "pane-title" }, "Recordings"),
-			h("span", { class: "grow" }),
-			h("button", { class: "btn", "data-key": "Ctrl O", onclick: on.add }, "Open…"),
+		"section.pane",
+		{ "aria-label": "Recordings" },
+		paneHead(
+			"Recordings",
+			grow(),
+			h("button.btn", { "data-key": "Ctrl O", onclick: on.add }, "Open…"),
 		),
-		h("div", { class: "lib-find" }, icon("i-search", "s"), find, order),
+		h("div.lib-find", icon("i-search", "s"), find, order),
 		list,
 		foot,
 	);
@@ -134,20 +129,14 @@ function shelf(on) {
 				onclick: () => on.choose(one),
 				ondblclick: () => on.open(one),
 			},
-			h("span", { class: "th" }, picture(one)),
+			h("span.th", picture(one)),
 			h(
-				"span",
-				{ class: "tx" },
-				h("b", {}, one.name),
-				where && h("span", { class: "small where" }, where),
+				"span.tx",
+				h("b", one.name),
+				where && h("span.small.where", where),
 				h("span", { class: `small${one.missing ? " missing" : ""}` }, factsOf(one)),
 			),
-			h(
-				"span",
-				{ class: "en" },
-				h("b", {}, one.runs || ""),
-				h("span", { class: "small" }, one.opened ? when(one.opened) : ""),
-			),
+			h("span.en", h("b", one.runs || ""), h("span.small", one.opened ? when(one.opened) : "")),
 		);
 
 	return {
@@ -189,7 +178,7 @@ function shelf(on) {
 								one.kind === kind &&
 								(!text || has(text, [one.name, one.place]) || one.place === recording?.place),
 						);
-					const head = h("div", { class: "cap" }, h("span", {}, word), h("span", {}, "runs"));
+					const head = h("div.cap", h("span", word), h("span", "runs"));
 					const items = found.map((one) =>
 						item(one, one.place === recording?.place, where.get(one.place)),
 					);
@@ -244,11 +233,11 @@ export function mountLibrary(root, { store, actions }) {
 		none: chooseNone,
 		leave,
 	});
-	const title = h("h2", { class: "pane-title" }, "Runs");
-	const sub = h("span", { class: "sub" });
+	const title = h("h2.pane-title", "Runs");
+	const sub = h("span.sub");
 	const only = h(
-		"button",
-		{ class: "btn", "aria-pressed": "false", onclick: () => ((starred = !starred), show()) },
+		"button.btn",
+		{ "aria-pressed": "false", onclick: () => ((starred = !starred), show()) },
 		icon("i-star", "s"),
 		"starred",
 	);
@@ -258,7 +247,7 @@ export function mountLibrary(root, { store, actions }) {
 		star: (run) => void change(run, { star: !run.star }),
 		tick: (run) => tick(run.id),
 	});
-	const empty = h("div", { class: "blank", hidden: true });
+	const empty = h("div.blank", { hidden: true });
 	const gone = lostRecording({
 		moved: (told) => {
 			recording = told;
@@ -270,17 +259,9 @@ export function mountLibrary(root, { store, actions }) {
 		root,
 		recordings.element,
 		h(
-			"section",
-			{ class: "pane runs", "aria-label": "Runs" },
-			h(
-				"div",
-				{ class: "pane-head" },
-				title,
-				sub,
-				h("span", { class: "grow" }),
-				only,
-				table.chooser,
-			),
+			"section.pane.runs",
+			{ "aria-label": "Runs" },
+			paneHead(title, sub, grow(), only, table.chooser),
 			gone.element,
 			table.element,
 			empty,
@@ -327,15 +308,14 @@ export function mountLibrary(root, { store, actions }) {
 				empty,
 				h(
 					"h3",
-					{},
 					runs.length ? "No run matches" : isUnderWay() ? "A run is under way" : "Nothing kept yet",
 				),
-				h("p", {}, library.error ?? "Every run is kept here a few seconds after its end."),
+				h("p", library.error ?? "Every run is kept here a few seconds after its end."),
 				// The one that is open is only a tab away.
 				recording.place !== store.get().sequence?.opened_as &&
 					h(
-						"button",
-						{ class: "btn main", onclick: () => recording && openRecording(recording) },
+						"button.btn.main",
+						{ onclick: () => recording && openRecording(recording) },
 						`Open ${recording.name}`,
 					),
 			);
@@ -424,19 +404,13 @@ export function mountLibrary(root, { store, actions }) {
 		const run = focusedRun();
 		const cell = root.querySelector(`tr[data-run="${focused}"] td:nth-child(2)`);
 		if (!run || !cell) return;
-		const field = h("input", { class: "field", value: run.name, "aria-label": "Name of the run" });
 		writing = true;
-		const end = (/** @type {boolean} */ keep) => {
-			if (!writing) return;
+		const done = (/** @type {string | null} */ name) => {
 			writing = false;
-			if (keep && field.value !== run.name) void change(run, { name: field.value });
+			if (name !== null && name !== run.name) void change(run, { name });
 			else show();
 		};
-		field.addEventListener("keydown", (event) => {
-			event.stopPropagation();
-			if (event.key === "Enter" || event.key === "Escape") end(event.key === "Enter");
-		});
-		field.addEventListener("blur", () => end(true));
+		const field = asks({ value: run.name, "aria-label": "Name of the run" }, done, true);
 		fill(cell, field);
 		field.select();
 	}
@@ -457,33 +431,28 @@ export function mountLibrary(root, { store, actions }) {
 		"Ctrl+a": () => (listed().forEach(({ id }) => chosen.add(id)), show()),
 		"/": () => recordings.find.focus(),
 	};
-	document.addEventListener(
-		"keydown",
-		(event) => {
-			if (store.get().place !== "library" || document.querySelector("dialog[open]")) return;
-			const target = /** @type {HTMLElement} */ (event.target);
-			const types = target.matches("input:not([type=checkbox])");
-			if (event.key === "Escape" && !target.closest("[popover]")) {
-				if (types) target.blur();
-				else if (chosen.size) chooseNone();
-				else location.hash = "#tune";
-				return event.stopPropagation();
-			}
-			const control = event.ctrlKey || event.metaKey;
-			if (types || event.altKey) return;
-			if (recordings.walk(event)) return stopped(event);
-			const act = KEYS[(control ? "Ctrl+" : "") + (control ? event.key.toLowerCase() : event.key)];
-			const onButton = target.closest("button, a, input");
-			if (!act || (onButton && ["Enter", " "].includes(event.key))) return;
-			act();
-			stopped(event);
-		},
-		true,
-	);
+	capture(document, "keydown", (event) => {
+		if (store.get().place !== "library" || document.querySelector("dialog[open]")) return;
+		const target = /** @type {HTMLElement} */ (event.target);
+		const types = target.matches("input:not([type=checkbox])");
+		if (event.key === "Escape" && !target.closest("[popover]")) {
+			if (types) target.blur();
+			else if (chosen.size) chooseNone();
+			else location.hash = "#tune";
+			return event.stopPropagation();
+		}
+		const control = event.ctrlKey || event.metaKey;
+		if (types || event.altKey) return;
+		if (recordings.walk(event)) return stopped(event);
+		const act = KEYS[(control ? "Ctrl+" : "") + (control ? event.key.toLowerCase() : event.key)];
+		const onButton = target.closest("button, a, input");
+		if (!act || (onButton && ["Enter", " "].includes(event.key))) return;
+		act();
+		stopped(event);
+	});
 	/** @param {Event} event */
 	function stopped(event) {
-		event.preventDefault();
-		event.stopPropagation();
+		claim(event);
 	}
 	root.addEventListener("focusin", ({ target }) => {
 		const id = Number(/** @type {HTMLElement} */ (target).closest("tr")?.dataset.run);

@@ -1,5 +1,6 @@
 /** One run in small, and what can be done with it: opened, pinned, taken as the start of a study. */
 import { fill, h } from "../elements/dom.js";
+import { grow } from "../elements/drawn.js";
 import { getJson } from "../state/api.js";
 import { drawn } from "./small.js";
 import { many, titleOf, when } from "./words.js";
@@ -9,9 +10,9 @@ import { many, titleOf, when } from "./words.js";
  * @param {(run: Server.KeptRunInfo, note: string) => void} written  somebody wrote a note
  */
 export function preview({ store, actions }, written) {
-	const head = h("div", { class: "pane-head" });
-	const body = h("div", { class: "pv-body" });
-	const element = h("section", { class: "pane pv", "aria-label": "The run" }, head, body);
+	const head = h("div.pane-head");
+	const body = h("div.pv-body");
+	const element = h("section.pane.pv", { "aria-label": "The run" }, head, body);
 	/** @type {Server.KeptRunInfo | null} */
 	let now = null;
 	/** @type {number | null} what the body shows */
@@ -67,19 +68,18 @@ export function preview({ store, actions }, written) {
 				shown = null;
 				fill(head);
 				const empty = "A run that is chosen is shown here in small.";
-				return fill(body, h("p", { class: "blank" }, empty));
+				return fill(body, h("p.blank", empty));
 			}
 			fill(
 				head,
-				h("h2", { class: "pane-title" }, titleOf(run)),
-				h("span", { class: "sub" }, facts(run)),
-				h("span", { class: "grow" }),
-				h("button", { class: "btn main", onclick: () => void open(run) }, "Open in Tune"),
-				h("button", { class: "btn box", onclick: () => void pin(run) }, "Pin as A"),
+				h("h2.pane-title", titleOf(run)),
+				h("span.sub", facts(run)),
+				grow(),
+				h("button.btn.main", { onclick: () => void open(run) }, "Open in Tune"),
+				h("button.btn.box", { onclick: () => void pin(run) }, "Pin as A"),
 				h(
-					"button",
+					"button.btn.box",
 					{
-						class: "btn box",
 						title: "A new study of this recording, around the values of this run",
 						onclick: () => void study(run),
 					},
@@ -91,7 +91,7 @@ export function preview({ store, actions }, written) {
 			// Whoever writes a note is not disturbed.
 			if (run.id === shown && body.contains(document.activeElement)) return;
 			shown = answer instanceof Error ? null : run.id;
-			if (answer instanceof Error) fill(body, h("p", { class: "blank" }, answer.message));
+			if (answer instanceof Error) fill(body, h("p.blank", answer.message));
 			else fill(body, ...drawn(answer));
 		},
 	};

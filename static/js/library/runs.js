@@ -1,5 +1,7 @@
 /** The table of a recording's runs. */
-import { fill, h, icon, rate, symbolOf } from "../elements/dom.js";
+import { h, icon, rate, remember, remembered } from "../elements/dom.js";
+import { symbolOf } from "../elements/drawn.js";
+import { menuOf, opensMenu } from "../elements/over.js";
 import { table } from "../elements/table.js";
 import { figure, isMethod, livesAMinute, madeWhen, many, methodWord } from "./words.js";
 
@@ -26,51 +28,26 @@ const PILLS = 3;
 /** @param {Server.KeptRunInfo} run @param {boolean} taught  whether runs differ in their templates */
 function pills(run, taught) {
 	const changes = run.changes.filter(({ key }) => !isMethod(key));
-	if (!changes.length && !run.corrected && !(taught && run.templates))
-		return h("span", { class: "q" }, "–");
+	if (!changes.length && !run.corrected && !(taught && run.templates)) return h("span.q", "–");
 	const all = changes.map(({ key, value }) => `${key} ${value}`).join("\n");
 	const shown = changes
 		.slice(0, PILLS)
-		.map(({ symbol, value }) =>
-			h("span", { class: "pc" }, symbolOf(symbol, "q"), " ", methodWord(value)),
-		);
+		.map(({ symbol, value }) => h("span.pc", symbolOf(symbol, "q"), " ", methodWord(value)));
 	const more = changes.length - PILLS;
 	return h(
 		"span",
 		{ title: all },
 		taught &&
 			run.templates &&
-			h(
-				"span",
-				{ class: "pc", title: run.templates.join("\n") },
-				many(run.templates.length, "template"),
-			),
+			h("span.pc", { title: run.templates.join("\n") }, many(run.templates.length, "template")),
 		shown,
-		more > 0 && h("span", { class: "pc" }, `+${more}`),
-		run.corrected > 0 &&
-			h("span", { class: "pc" }, icon("i-pin", "s"), `${run.corrected} corrected`),
+		more > 0 && h("span.pc", `+${more}`),
+		run.corrected > 0 && h("span.pc", icon("i-pin", "s"), `${run.corrected} corrected`),
 	);
 }
 
+/** Under which this browser remembers the columns that it does not show. */
 const COLUMNS = "library columns";
-
-/** @returns {string[]} columns that this browser does not show */
-function recall() {
-	try {
-		return JSON.parse(localStorage.getItem(COLUMNS) ?? "[]");
-	} catch {
-		return [];
-	}
-}
-
-/** @param {string[]} hidden */
-function keep(hidden) {
-	try {
-		localStorage.setItem(COLUMNS, JSON.stringify(hidden));
-	} catch {
-		// Without storage they come back with the next start.
-	}
-}
 
 /**
  * @param {object} on
@@ -118,20 +95,15 @@ export function runsTable(on) {
 					},
 					icon("i-star", run.star ? "s full" : "s"),
 				),
-				h("b", {}, run.name || String(run.id)),
-				run.name ? h("span", { class: "q" }, ` ${run.id}`) : null,
+				h("b", run.name || String(run.id)),
+				run.name ? h("span.q", ` ${run.id}`) : null,
 				run.older_code
-					? h(
-							"span",
-							{ class: "q", title: "Another version of the program made it" },
-							" older code",
-						)
+					? h("span.q", { title: "Another version of the program made it" }, " older code")
 					: null,
 				run.provisional
 					? h(
-							"span",
+							"span.q",
 							{
-								class: "q",
 								title:
 									"Its figures were made before it was finished; opening it computes them again",
 							},
@@ -151,7 +123,7 @@ export function runsTable(on) {
 			by: true,
 			cell: (run) => [
 				methodWord(run.single_view),
-				h("span", { class: "q" }, " › "),
+				h("span.q", " › "),
 				methodWord(run.fusion_method),
 			],
 		},
@@ -166,12 +138,12 @@ export function runsTable(on) {
 			kind: "num met",
 			by: (/** @type {Server.KeptRunInfo} */ run) => final(run, key) ?? -Infinity,
 			cell: (/** @type {Server.KeptRunInfo} */ run) => {
-				if (run.provisional) return h("span", { class: "q" }, `(${figure(run[key])})`);
+				if (run.provisional) return h("span.q", `(${figure(run[key])})`);
 				const value = run[key];
 				const share = value === null ? 0 : (value - from) / (to - from);
 				return [
 					h("span", { class: value !== null && value === best[key] ? "top1" : "" }, figure(value)),
-					h("i", { class: "mb", "--v": Math.max(0.02, Math.min(1, share)) }),
+					h("i.mb", { "--v": Math.max(0.02, Math.min(1, share)) }),
 				];
 			},
 		})),
@@ -188,7 +160,7 @@ export function runsTable(on) {
 			by: (run) => run.steps_per_second,
 			cell: (run) => (run.steps_per_second ? rate(run.steps_per_second) : "–"),
 		},
-		{ word: "Note", kind: "q note-cell", by: true, cell: (run) => run.note },
+		{ word: "Note", kind: "q note-cell cut", by: true, cell: (run) => run.note },
 	];
 	const rows = table("Runs", columns, {
 		key: (run) => run.id,
@@ -200,7 +172,7 @@ export function runsTable(on) {
 	});
 
 	/** Words of the columns that somebody does not want. @type {Set<string>} */
-	const hidden = new Set(recall());
+	const hidden = new Set(remembered(COLUMNS, []));
 	const hide = () => {
 		for (const row of rows.element.querySelectorAll("tr"))
 			[...row.cells].forEach((cell, k) => {
@@ -210,42 +182,31 @@ export function runsTable(on) {
 				cell.hidden = wrong || hidden.has(word);
 			});
 	};
-	const menu = h("div", { class: "menu plots", popover: "auto", "aria-label": "Columns" });
-	fill(
-		menu,
+	const menu = menuOf(
+		{ class: "menu plots", "aria-label": "Columns" },
 		columns
 			.filter(({ word }) => word && word !== "Run")
 			.map(({ word }) =>
 				h(
 					"label",
-					{},
 					h("input", {
 						type: "checkbox",
 						checked: !hidden.has(word),
 						onchange: () => {
 							if (!hidden.delete(word)) hidden.add(word);
-							keep([...hidden]);
+							remember(COLUMNS, [...hidden]);
 							hide();
 						},
 					}),
-					h("b", {}, word),
+					h("b", word),
 				),
 			),
 	);
-	const chooser = h(
-		"button",
-		{ class: "btn", "aria-haspopup": "true" },
-		"Columns",
-		icon("i-down", "s"),
-	);
-	chooser.popoverTargetElement = menu;
-	menu.addEventListener("toggle", () => {
-		const { right, bottom } = chooser.getBoundingClientRect();
-		Object.assign(menu.style, { right: `${innerWidth - right}px`, top: `${bottom + 4}px` });
-	});
+	const chooser = h("button.btn", { "aria-haspopup": "true" }, "Columns", icon("i-down", "s"));
+	opensMenu(chooser, menu);
 
 	return {
-		element: h("div", { class: "scroll" }, rows.element),
+		element: h("div.scroll", rows.element),
 		/** What chooses the columns. */
 		chooser: [chooser, menu],
 		/**

@@ -1,7 +1,7 @@
 /** A kept run in small, and runs side by side: what of them is drawn. */
 import { chart, roundTicks } from "../elements/chart.js";
-import { colourIndex, h, idTag, svg, symbolOf } from "../elements/dom.js";
-import { parameterName } from "../elements/drawn.js";
+import { colourIndex, h, idTag, svg } from "../elements/dom.js";
+import { parameterName, symbolOf } from "../elements/drawn.js";
 import { METHODS, figure, isMethod, methodWord, templateWords, titleOf } from "./words.js";
 
 /** Lanes that are drawn: those of the longest tracks. */
@@ -23,7 +23,7 @@ const FIGURES = /** @type {const} */ ([
 const PROVISIONAL = "made before the run was finished; opening it computes them again";
 
 /** @param {unknown} text */
-const quiet = (text) => h("span", { class: "q" }, String(text));
+const quiet = (text) => h("span.q", String(text));
 
 /** @param {Server.ChangeInfo} change */
 const named = ({ key, symbol }) => h("span", { title: key }, symbolOf(symbol, ""));
@@ -36,14 +36,13 @@ const programOf = (run) => (run.older_code ? `${run.program}, older code` : run.
 /** @param {Server.Preview} told */
 export const drawn = (told) => [
 	h(
-		"div",
-		{ class: "pv-lanes" },
+		"div.pv-lanes",
 		lanes(told),
 		curve("People", "", told.people, told.frames, told.people_every),
 		told.ospa.length > 0 && curve("OSPA", " m", told.ospa, told.frames, told.ospa_every),
 	),
-	h("div", { class: "pv-top" }, ways(told)),
-	h("dl", { class: "pv-facts" }, ...facts(told.run)),
+	h("div.pv-top", ways(told)),
+	h("dl.pv-facts", ...facts(told.run)),
 ];
 
 /** @param {Server.Preview} told */
@@ -54,16 +53,14 @@ function lanes({ run, frames, tracks }) {
 	const at = (/** @type {number} */ step) => `${((100 * step) / Math.max(1, frames)).toFixed(2)}%`;
 	const more = tracks.length - longest.length;
 	return h(
-		"div",
+		"div.lines",
 		{
-			class: "lines",
 			role: "img",
 			"aria-label": `Lanes of run ${run.id}: ${tracks.length} tracks over ${frames} steps`,
 		},
 		h("span"),
 		h(
-			"span",
-			{ class: "ends" },
+			"span.ends",
 			roundTicks([0, frames - 1], Math.min(8, frames - 1)).map(([step, text]) =>
 				h("span", { "--at": at(step) }, text),
 			),
@@ -115,9 +112,8 @@ function curve(word, unit, values, frames, every) {
 		margin: [0, 7, 0, 3],
 	});
 	return h(
-		"div",
-		{ class: "crowd" },
-		h("span", {}, `${word}${unit}`, h("br"), quiet(`0–${most.toFixed(unit ? 2 : 0)}`)),
+		"div.crowd",
+		h("span", `${word}${unit}`, h("br"), quiet(`0–${most.toFixed(unit ? 2 : 0)}`)),
 		figure.element,
 	);
 }
@@ -176,8 +172,7 @@ const outline = ({ min, max, entrances }) => [
 
 /** @param {Server.KeptRunInfo} run */
 function facts(run) {
-	const note = h("input", {
-		class: "addnote",
+	const note = h("input.addnote", {
 		"aria-label": "Note",
 		placeholder: "add a note",
 		value: run.note,
@@ -210,9 +205,9 @@ function facts(run) {
 		["Program", [programOf(run)]],
 	);
 	return [
-		h("dt", { class: "vh" }, "Note"),
-		h("dd", { class: "whole" }, note),
-		...rows.flatMap(([word, value]) => [h("dt", {}, word), h("dd", {}, value)]),
+		h("dt.vh", "Note"),
+		h("dd.whole", note),
+		...rows.flatMap(([word, value]) => [h("dt", word), h("dd", value)]),
 	];
 }
 
@@ -231,9 +226,8 @@ export function comparison(runs, schema) {
 		rows.map(([word, values]) =>
 			h(
 				"tr",
-				{},
-				h("td", {}, word),
-				values.map((value) => h("td", { class: "num" }, value)),
+				h("td", word),
+				values.map((value) => h("td.num", value)),
 			),
 		);
 	const figures = FIGURES.map((one) => sideBySide(runs, one));
@@ -248,26 +242,23 @@ export function comparison(runs, schema) {
 			{ "aria-label": "Runs side by side" },
 			h(
 				"thead",
-				{},
 				h(
 					"tr",
-					{},
 					h("th", { scope: "col" }, "What"),
-					runs.map((run) => h("th", { scope: "col", class: "num" }, titleOf(run))),
+					runs.map((run) => h("th.num", { scope: "col" }, titleOf(run))),
 				),
 			),
-			h("tbody", {}, lines(figures)),
-			h("tbody", {}, lines(differing)),
+			h("tbody", lines(figures)),
+			h("tbody", lines(differing)),
 		),
 		alike.length > 0 &&
 			h(
 				"details",
-				{},
-				h("summary", {}, `${alike.length} equal`),
+				h("summary", `${alike.length} equal`),
 				h(
 					"table",
 					{ "aria-label": "Equal in all of them" },
-					h("tbody", {}, lines(alike.map(([word, [value]]) => [word, [value]]))),
+					h("tbody", lines(alike.map(([word, [value]]) => [word, [value]]))),
 				),
 			),
 	];
@@ -293,7 +284,7 @@ function causes(runs, schema) {
 				const known = schema?.parameters.find(({ key }) => key === one.key);
 				const word = known ? parameterName(known) : methodWord(one.key);
 				return /** @type {[Child, string[]]} */ ([
-					h("span", {}, word, quiet(known?.unit ? ` ${known.unit}` : "")),
+					h("span", word, quiet(known?.unit ? ` ${known.unit}` : "")),
 					runs.map((run) => methodWord(change(run, one.key)?.value ?? one.default)),
 				]);
 			}),
@@ -323,7 +314,7 @@ function sideBySide(runs, [word, key, digits, sign]) {
 			const text = figure(run[key], digits);
 			if (provisional(run)) return quiet(`(${text})`);
 			const wins = alone && run[key] !== null && sign * Number(run[key]) === best;
-			return wins ? h("b", { class: "top1" }, text) : text;
+			return wins ? h("b.top1", text) : text;
 		}),
 	];
 }

@@ -3,7 +3,7 @@ import { plot } from "../elements/chart.js";
 import { h, icon, one, show } from "../elements/dom.js";
 import { drawnTable } from "../elements/drawn.js";
 import { ownEnd } from "../library/words.js";
-import { cut, div, field, numberField, select, small, span, wishing } from "./controls.js";
+import { cut, field, numberField, select, small, wishing } from "./controls.js";
 
 /** @typedef {Server.ImportInfo} Info */
 /** @typedef {Server.ImportedCamera} Camera */
@@ -26,18 +26,13 @@ export function camerasTable(info) {
 		...info.told,
 	].join(" · ");
 	return [
-		div(
-			{ class: "cams-scroll" },
+		h(
+			"div.cams-scroll",
 			rows,
 			left.length > 0 &&
-				h(
-					"p",
-					{ class: "small unused" },
-					`Left out: ${left.join(", ")}`,
-					wishing("Put back", { left_out: [] }),
-				),
+				h("p.small.unused", `Left out: ${left.join(", ")}`, wishing("Put back", { left_out: [] })),
 		),
-		words && h("p", { class: "small unused told", title: words, tabindex: 0 }, words),
+		words && h("p.small.unused.told", { title: words, tabindex: 0 }, words),
 	];
 }
 
@@ -102,12 +97,12 @@ function row(info, camera, k) {
 	// The file is named for the browser, which shows an address that it has shown before as it was.
 	const query = new URLSearchParams({ camera: key, of: video });
 	return [
-		div(
-			{ class: "pic" },
+		h(
+			"div.pic",
 			isPictured(info) &&
-				span(
-					{ class: "shot" },
-					span({ class: "blank" }, icon("i-boxes")),
+				h(
+					"span.shot",
+					h("span.blank", icon("i-boxes")),
 					video && h("img", { src: `/api/import/${info.key}/picture?${query}`, alt: "" }),
 				),
 			field(`in-name-${k}`, `Name of ${key}`, name, { names: { [key]: "$" } }, { maxlength: 60 }),
@@ -134,7 +129,7 @@ function row(info, camera, k) {
 					detections,
 				)
 			: [
-					span({ class: missesBoxes(info, camera) ? "missing" : "small" }, "none found"),
+					h("span", { class: missesBoxes(info, camera) ? "missing" : "small" }, "none found"),
 					small(video ? "a video only" : ""),
 				],
 		stateOf(info, camera, k),
@@ -168,10 +163,10 @@ function sync(info, { key, name, seconds_late, offset }, k) {
 	const words = offset
 		? `Agreement over the offset, best ${(late + offset.steps).toFixed(1)} frames late`
 		: "Nothing to compare";
-	return div(
-		{ class: "sync" },
-		span(
-			{ class: "stepper" },
+	return h(
+		"div.sync",
+		h(
+			"span.stepper",
 			step("−", -1, "less"),
 			numberField(
 				`in-late-${k}`,
@@ -189,12 +184,7 @@ function sync(info, { key, name, seconds_late, offset }, k) {
 
 /** @param {string} words @param {...(Child)} buttons */
 const fault = (words, ...buttons) =>
-	div(
-		{ class: "fault" },
-		icon("i-warn", "s"),
-		span({}, words),
-		span({ class: "group" }, ...buttons),
-	);
+	h("div.fault", icon("i-warn", "s"), h("span", words), h("span.group", ...buttons));
 
 /** @param {Info} info @param {Camera} camera @param {number} k */
 function stateOf(info, camera, k) {
@@ -230,7 +220,7 @@ function stateOf(info, camera, k) {
 			leaving(info, [key], ""),
 		);
 	if (isStray(info, camera)) return fault("does not fit the others", leaving(info, [key], ""));
-	return span({ class: "okay" }, icon("i-tick"), "ready");
+	return h("span.okay", icon("i-tick"), "ready");
 }
 
 /* ---------- How well a camera agrees with the others when it is shifted. */
@@ -247,8 +237,9 @@ const REACH = 30;
  * @param {string} words  what the picture says
  */
 const curve = (found, late, words) =>
-	div(
-		{ class: "curve", role: "img", "aria-label": words },
+	h(
+		"div.curve",
+		{ role: "img", "aria-label": words },
 		found ? plot(agreement(found, late), WIDTH, HEIGHT).element : "nothing to compare",
 	);
 

@@ -14,23 +14,17 @@ import { h, icon } from "../elements/dom.js";
 export const CALIBRATIONS =
 	"OpenCV, Pose2Sim, Caliscope, Anipose, Qualisys, COLMAP, Metashape, Kalibr, ROS, projections";
 
-/** @param {Attributes} attributes @param {...Inside} children */
-export const div = (attributes, ...children) => h("div", attributes, ...children);
-
-/** @param {Attributes} attributes @param {...Inside} children */
-export const span = (attributes, ...children) => h("span", attributes, ...children);
-
 /** @param {Inside} words @param {Attributes} [attributes] */
-export const small = (words, attributes) => span({ class: "small", ...attributes }, words);
+export const small = (words, attributes) => h("span", { class: "small", ...attributes }, words);
 
 /** Text in one line, whole by the pointer. @param {string} words @param {string} [kind] @param {string} [whole] */
 export const cut = (words, kind = "", whole = words) =>
-	span({ class: `${kind} cut`.trim(), title: whole }, words);
+	h("span", { class: `${kind} cut`.trim(), title: whole }, words);
 
-export const grow = () => span({ class: "grow" });
+export const grow = () => h("span.grow");
 
 /** The head of a part, and what stands beside it. @param {string} words @param {...Inside} beside */
-export const heading = (words, ...beside) => h("h3", { class: "h" }, words, ...beside);
+export const heading = (words, ...beside) => h("h3.h", words, ...beside);
 
 /** A button that does something of the sheet's. @param {Inside} words @param {string} act @param {string} [kind] @param {Attributes} [attributes] */
 export const button = (words, act, kind = "box", attributes = {}) =>
@@ -80,15 +74,13 @@ export const select = (id, label, choices, now, wish, off = {}) =>
 
 /** Buttons beside each other, one of them pressed. @param {string} label @param {string[]} choices @param {string} now @param {string} key  of the wish */
 export const segment = (label, choices, now, key) =>
-	div(
-		{ class: "seg", role: "group", "aria-label": label },
+	h(
+		"div.seg",
+		{ role: "group", "aria-label": label },
 		choices.map((one) =>
 			h(
 				"button",
-				{
-					"aria-pressed": String(one === now),
-					"data-wish": JSON.stringify({ [key]: one }),
-				},
+				{ "aria-pressed": String(one === now), "data-wish": JSON.stringify({ [key]: one }) },
 				one.replaceAll("-", "−"),
 			),
 		),

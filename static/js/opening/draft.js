@@ -2,17 +2,7 @@
 import { h, icon } from "../elements/dom.js";
 import { many, size } from "../library/words.js";
 import { camerasTable, isPictured, standing } from "./cameras.js";
-import {
-	CALIBRATIONS,
-	button,
-	close,
-	cut,
-	div,
-	field,
-	grow,
-	numberField,
-	span,
-} from "./controls.js";
+import { CALIBRATIONS, button, close, cut, field, grow, numberField } from "./controls.js";
 import { anglesChoice, checksPart, roomPart, targetPart } from "./settings.js";
 
 /**
@@ -27,16 +17,11 @@ export function draftSheet(info, methods, moved) {
 		...(info.cameras.length
 			? [
 					...camerasTable(info),
-					div(
-						{ class: "in-body" },
-						roomPart(info, moved),
-						checksPart(info),
-						targetPart(info, methods),
-					),
+					h("div.in-body", roomPart(info, moved), checksPart(info), targetPart(info, methods)),
 				]
 			: [
 					files(info),
-					asked && div({ class: "in-asked" }, asked),
+					asked && h("div.in-asked", asked),
 					!info.busy && ["failed", "settled"].includes(info.phase) && adding(),
 				]),
 		foot(info),
@@ -61,10 +46,9 @@ function head(info) {
 			? many(files_there, "file")
 			: "";
 	return h(
-		"header",
-		{ class: "s-head" },
+		"header.s-head",
 		button(icon("i-prev"), "give-up", "icon start", { "aria-label": "Back to recent" }),
-		h("h2", {}, "Import"),
+		h("h2", "Import"),
 		field("in-name", "Name", wish.name, { name: "$" }, { maxlength: 80 }),
 		frames > 0 &&
 			numberField(
@@ -83,22 +67,23 @@ function head(info) {
 
 /** @param {Server.ImportInfo} info */
 const files = ({ files, coming }) =>
-	div(
-		{ class: "in-scroll in-files", tabindex: 0 },
+	h(
+		"div.in-scroll.in-files",
+		{ tabindex: 0 },
 		files.map(({ label, why, format, read_with }) => {
 			const short = why.startsWith(`${label}: `) ? why.slice(label.length + 2) : why;
 			const words = short || (read_with ? `read with ${read_with}` : format);
-			return h("p", {}, h("b", {}, label), ` ${words}`);
+			return h("p", h("b", label), ` ${words}`);
 		}),
-		coming.map((name) => h("p", { class: "coming" }, cut(name))),
+		coming.map((name) => h("p.coming", cut(name))),
 	);
 
 /** What may be missing where the files give no camera, and the way to add it. */
 const adding = () =>
-	div(
-		{ class: "in-asked in-add" },
+	h(
+		"div.in-asked.in-add",
 		icon("i-import", "l"),
-		h("p", {}, `Cameras need a calibration: ${CALIBRATIONS}. Drop what is missing, or`),
+		h("p", `Cameras need a calibration: ${CALIBRATIONS}. Drop what is missing, or`),
 		button("Add a calibration file…", "files"),
 	);
 
@@ -151,12 +136,11 @@ function foot(info) {
 	const disabled = phase !== "settled" || !pictured || Boolean(info.undecided);
 	const stops = ["uploading", "writing", "copying"].includes(phase);
 	return h(
-		"footer",
-		{ class: "s-foot" },
-		span({ class: `dot ${kind}` }),
-		span(
+		"footer.s-foot",
+		h("span", { class: `dot ${kind}` }),
+		h(
+			"span.bar",
 			{
-				class: "bar",
 				role: "progressbar",
 				"aria-label": uploads ? "Upload" : "Copy",
 				"aria-valuemin": 0,
@@ -167,10 +151,10 @@ function foot(info) {
 			},
 			h("i"),
 		),
-		span({ class: "cut say", role: "status", title: words }, words),
+		h("span.cut.say", { role: "status", title: words }, words),
 		grow(),
 		button(stops ? "Stop" : "Cancel", "give-up", "tall"),
 		button("Only import", "import", "box tall", { disabled }),
-		button(["Import and track", h("kbd", {}, "Ctrl ↵")], "track", "main tall", { disabled }),
+		button(["Import and track", h("kbd", "Ctrl ↵")], "track", "main tall", { disabled }),
 	);
 }

@@ -59,12 +59,9 @@ export function planPicture(info, words, moved) {
 			"--pixel": `${pixel.toFixed(5)}px`,
 			"--shape": (wide / high).toFixed(3),
 		},
-		svg("rect", { class: "ground", width: mm(wide), height: mm(high) }),
+		svg("rect.ground", { width: mm(wide), height: mm(high) }),
 		tint(plan),
-		svg("path", {
-			class: "feet",
-			d: plan.feet.map(([x, y]) => `M${at(x, y).map(mm).join(" ")}h0`).join(""),
-		}),
+		svg("path.feet", { d: plan.feet.map(([x, y]) => `M${at(x, y).map(mm).join(" ")}h0`).join("") }),
 		plan.entrances.map(([x, y, width, depth]) => {
 			const [cx, cy] = at(x, y).map(mm);
 			// Hollow while it is only suggested.
@@ -84,16 +81,15 @@ export function planPicture(info, words, moved) {
 			);
 			const { name, x: left, y: base } = labels[k];
 			return [
-				svg("path", { class: "camera", d: `M${mm(u)} ${mm(v)}${ends.join("")}z` }),
+				svg("path.camera", { d: `M${mm(u)} ${mm(v)}${ends.join("")}z` }),
 				svg("text", { x: mm(left), y: mm(base) }, name),
 			];
 		}),
-		svg("rect", { class: "box" }),
+		svg("rect.box"),
 		[0, 1].flatMap((axis) =>
 			[0, 1].map((end) => {
 				const [x, y] = axis ? [13, 4] : [4, 13];
-				return svg("rect", {
-					class: "grip",
+				return svg("rect.grip", {
 					"data-face": `${axis} ${end}`,
 					x: -x * pixel,
 					y: -y * pixel,
@@ -103,12 +99,9 @@ export function planPicture(info, words, moved) {
 				});
 			}),
 		),
-		svg("text", { class: "length" }),
-		svg("text", { class: "length" }),
-		svg("path", {
-			class: "scale",
-			d: `M${mm(scaleX - bar / 2)} ${mm(scaleY)}h${bar}`,
-		}),
+		svg("text.length"),
+		svg("text.length"),
+		svg("path.scale", { d: `M${mm(scaleX - bar / 2)} ${mm(scaleY)}h${bar}` }),
 		svg("text", { x: mm(scaleX), y: mm(scaleY - 4 * pixel) }, `${bar} m`),
 	);
 	mountFaces(drawing, room, at, moved);

@@ -1,18 +1,7 @@
 /** What was found out of an import: room, checks, target; each can be had otherwise. */
 import { capital, h, icon, show } from "../elements/dom.js";
 import { size } from "../library/words.js";
-import {
-	cut,
-	div,
-	grow,
-	heading,
-	numberField,
-	segment,
-	select,
-	small,
-	span,
-	wishing,
-} from "./controls.js";
+import { grow, heading, numberField, segment, select, small, wishing } from "./controls.js";
 import { isMoved, isPictured, leaving, standing } from "./cameras.js";
 import { planPicture } from "./plan.js";
 
@@ -45,7 +34,7 @@ const SIGNS = {
 
 /** @param {string} words @param {string} note @param {string} [reason]  by the pointer */
 const label = (words, note, reason) =>
-	div({ class: "lab", title: reason }, span({}, words), span({}, note));
+	h("div.lab", { title: reason }, h("span", words), h("span", note));
 
 /** Where a value is from, in a word, and the reason. @param {Info} info @param {"up" | "unit"} what @returns {[string, string?]} */
 function origin({ wish, found }, what) {
@@ -76,19 +65,19 @@ export function roomPart(info, moved) {
 			},
 			{ step: 0.05 },
 		);
-	const side = div(
-		{ class: "rf" },
-		div(
-			{},
+	const side = h(
+		"div.rf",
+		h(
+			"div",
 			label("From, to", "metres"),
-			div(
-				{ class: "xyz" },
-				AXES.flatMap((letter, axis) => [span({}, letter), face(0, axis), face(1, axis)]),
+			h(
+				"div.xyz",
+				AXES.flatMap((letter, axis) => [h("span", letter), face(0, axis), face(1, axis)]),
 			),
 		),
-		div({}, label("Up", ...origin(info, "up")), segment("Up", UPS, info.up, "up")),
-		div(
-			{},
+		h("div", label("Up", ...origin(info, "up")), segment("Up", UPS, info.up, "up")),
+		h(
+			"div",
 			label("File's unit", ...origin(info, "unit")),
 			segment("Unit", ["mm", "cm", "m"], info.unit, "unit"),
 		),
@@ -107,16 +96,16 @@ export function roomPart(info, moved) {
 		"section",
 		{ "aria-label": "Room" },
 		heading("Room", small(`${from}; drag its faces`)),
-		div(
-			{ class: "roomy" },
-			div(
-				{ class: "from-above" },
+		h(
+			"div.roomy",
+			h(
+				"div.from-above",
 				planPicture(info, `Room from above, ${words.join(", ")}. ${keys}`, moved),
-				div(
-					{ class: "keyline small" },
+				h(
+					"div.keyline.small",
 					"Floor seen by",
 					[1, 2, 3, 4].map((count) =>
-						span({}, h("i", { class: `seen-${count}` }), count < 4 ? count : "4 +"),
+						h("span", h("i", { class: `seen-${count}` }), count < 4 ? count : "4 +"),
 					),
 					"cameras",
 				),
@@ -129,15 +118,12 @@ export function roomPart(info, moved) {
 /** Where people come in, as tracks of a first run show it; used where that is wished. @param {Info} info */
 function entrances({ wish: { entrances: used }, entrances: found }) {
 	if (used.length)
-		return div(
-			{ class: "lab" },
-			`${used.length} entrances used`,
-			wishing("Use none", { entrances: [] }),
-		);
+		return h("div.lab", `${used.length} entrances used`, wishing("Use none", { entrances: [] }));
 	return (
 		found.length > 0 &&
-		div(
-			{ class: "lab", title: "Where tracks of a first run begin and end" },
+		h(
+			"div.lab",
+			{ title: "Where tracks of a first run begin and end" },
 			"Entrances found",
 			wishing(found.length === 1 ? "Use it" : `Use all ${found.length}`, { entrances: found }),
 		)
@@ -163,8 +149,7 @@ function choice(words, what, wished, found, values) {
 	/** @type {[string, string]} */
 	const first = ["", wished === null && own ? own[1] : "as found"];
 	return h(
-		"label",
-		{ class: "lab" },
+		"label.lab",
 		words,
 		select(`in-${what}`, words, [first, ...others], String(wished ?? ""), {
 			[what]: what === "first_index" ? "#" : "$",
@@ -181,16 +166,16 @@ export function checksPart(info) {
 		checks.filter(({ status }) => status === kind);
 	const { open, known, fine } = standing(info);
 	return h(
-		"section",
-		{ class: "in-scroll", tabindex: 0, "aria-label": "Checks" },
+		"section.in-scroll",
+		{ tabindex: 0, "aria-label": "Checks" },
 		heading(
 			"Checks",
 			small(now ? `looking at the ${now}…` : ""),
 			grow(),
 			small(`${fine} fine · ${open + known} to look at`),
 		),
-		div(
-			{ class: "checks" },
+		h(
+			"div.checks",
 			undecided(info),
 			exchanged(info),
 			[...of("warning"), ...of("good"), ...of("absent")].map((one) => check(info, one)),
@@ -265,12 +250,7 @@ const check = (info, { status, name, sentence, remedy, mend, cameras }) =>
 /** @param {Server.ImportedCheck["status"]} status @param {string} name @param {string} words @param {...Child} more */
 function line(status, name, words, ...more) {
 	const [sign, kind] = SIGNS[status];
-	return div(
-		{ class: "chk" },
-		icon(`i-${sign}`, kind),
-		h("p", {}, h("b", {}, capital(name)), " ", words),
-		...more,
-	);
+	return h("div.chk", icon(`i-${sign}`, kind), h("p", h("b", capital(name)), " ", words), ...more);
 }
 
 /** @param {Server.ImportedPair} pair @param {string} [sign] */
@@ -284,17 +264,18 @@ const meeting = ({ share }) => `${(100 * share).toFixed(0)} % of their boxes mee
 function pairs({ pairs: found, cameras }) {
 	if (!found.length) return null;
 	if (cameras.length > MOST_LISTED) return grid(found, cameras);
-	return div(
+	return h(
+		"div.pairs",
 		{
-			class: "pairs",
 			role: "group",
 			"aria-label": "How far boxes of two cameras miss each other",
 		},
 		found.map((pair) =>
-			span(
+			h(
+				"span",
 				{ class: pair.odd && "w", title: meeting(pair) },
 				`${pair.first} – ${pair.second} `,
-				h("b", {}, pixels(pair, " px")),
+				h("b", pixels(pair, " px")),
 			),
 		),
 	);
@@ -311,28 +292,24 @@ function grid(found, cameras) {
 	const worst = [...found].sort(
 		(a, b) => Number(b.odd) - Number(a.odd) || (b.pixels ?? 0) - (a.pixels ?? 0),
 	);
-	return div(
-		{ class: "pair-grid" },
+	return h(
+		"div.pair-grid",
 		h(
 			"table",
 			{ "aria-label": "How far boxes of two cameras miss each other, pixels" },
 			h(
 				"thead",
-				{},
 				h(
 					"tr",
-					{},
 					h("td"),
 					names.map((title, k) => h("th", { title }, k + 1)),
 				),
 			),
 			h(
 				"tbody",
-				{},
 				names.map((name, k) =>
 					h(
 						"tr",
-						{},
 						h("th", { scope: "row" }, `${k + 1} ${name}`),
 						names.slice(0, k).map((other) => {
 							const pair = of(name, other);
@@ -347,12 +324,11 @@ function grid(found, cameras) {
 				),
 			),
 		),
-		div(
-			{},
+		h(
+			"div",
 			small("worst first"),
 			h(
 				"ol",
-				{},
 				worst
 					.slice(0, MOST_WORST)
 					.map((pair) =>
@@ -360,7 +336,7 @@ function grid(found, cameras) {
 							"li",
 							{ class: pair.odd && "w" },
 							`${pair.first} – ${pair.second} `,
-							h("b", {}, pixels(pair, " px")),
+							h("b", pixels(pair, " px")),
 						),
 					),
 			),
@@ -385,21 +361,22 @@ export function targetPart(info, methods) {
 		own.every((side, k) => Math.abs(side - half[k]) < 2e-3),
 	);
 	return h(
-		"section",
-		{ class: "in-scroll", tabindex: 0, "aria-label": "Target and place" },
+		"section.in-scroll",
+		{ tabindex: 0, "aria-label": "Target and place" },
 		heading("Target"),
-		div(
-			{ class: "choices" },
+		h(
+			"div.choices",
 			rows.map(([words, own, value], k) =>
 				chosen(words, `${own.map((side) => (2 * side).toFixed(2)).join(" × ")} m`, k === pressed, {
 					half_extents: value,
 				}),
 			),
-			div(
-				{ class: "choice own", "aria-current": pressed < 0 && "true" },
-				h("b", {}, "Own size"),
-				span(
-					{},
+			h(
+				"div.choice.own",
+				{ "aria-current": pressed < 0 && "true" },
+				h("b", "Own size"),
+				h(
+					"span",
 					["Width", "Depth", "Height"].map((words, axis) =>
 						numberField(
 							`in-size-${axis}`,
@@ -417,7 +394,6 @@ export function targetPart(info, methods) {
 		heading("Then track with"),
 		h(
 			"p",
-			{},
 			info.has_boxes
 				? "By the boxes: no templates are needed."
 				: "By what moves, until boxes are dragged on the pictures for colours.",
@@ -425,8 +401,7 @@ export function targetPart(info, methods) {
 		STAGES.map(([key, words]) => {
 			const fits = info.fitting[key];
 			return h(
-				"label",
-				{ class: "lab" },
+				"label.lab",
 				words,
 				select(
 					`in-${key}`,
@@ -447,10 +422,10 @@ export function targetPart(info, methods) {
 /** @param {string} words @param {string} value @param {boolean} pressed @param {Record<string, unknown>} wish @param {string} [note] */
 const chosen = (words, value, pressed, wish, note) =>
 	h(
-		"button",
-		{ class: "choice", "aria-pressed": String(pressed), "data-wish": JSON.stringify(wish) },
-		h("b", {}, words),
-		span({}, value),
+		"button.choice",
+		{ "aria-pressed": String(pressed), "data-wish": JSON.stringify(wish) },
+		h("b", words),
+		h("span", value),
 		note && small(note),
 	);
 
@@ -464,8 +439,8 @@ function kept(info) {
 	if (uploaded) return h("p", { title: whole }, `${size(bytes)} uploaded to ${place}, ${there}.`);
 	// Boxes and truth are written anew: there is nothing to link.
 	if (!isPictured(info)) return h("p", { title: whole }, `In ${place}, ${there}.`);
-	return div(
-		{ class: "choices" },
+	return h(
+		"div.choices",
 		chosen("Link", "", !copies, { copy_files: false }, "The videos stay where they are."),
 		chosen("Copy", size(bytes), copies, { copy_files: true }, `Into ${place}, ${there}.`),
 	);

@@ -123,10 +123,7 @@ export function mountOpening({ store, actions }) {
 	async function start() {
 		const known = await getJson("/api/recordings");
 		if (info) return;
-		draw([
-			...startSheet(known),
-			trouble && h("p", { class: "s-foot say", role: "alert" }, trouble),
-		]);
+		draw([...startSheet(known), trouble && h("p.s-foot.say", { role: "alert" }, trouble)]);
 	}
 
 	/** @param {Server.ImportInfo} next */

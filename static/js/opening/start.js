@@ -1,7 +1,7 @@
 /** The sheet before anything was dropped: files, what was open last, the built-in rooms. */
 import { h, icon, show } from "../elements/dom.js";
 import { many, size, when } from "../library/words.js";
-import { CALIBRATIONS, button, close, div, grow, heading, small, span } from "./controls.js";
+import { CALIBRATIONS, button, close, grow, heading, small } from "./controls.js";
 
 const UNDERSTOOD = [
 	["Video", "mp4, mov, avi, mkv; folders of numbered pictures"],
@@ -15,9 +15,8 @@ const UNDERSTOOD = [
 /** What stands there before the list of recordings is. */
 export const startHead = () => [
 	h(
-		"header",
-		{ class: "s-head" },
-		h("h2", {}, "Open a recording"),
+		"header.s-head",
+		h("h2", "Open a recording"),
 		grow(),
 		h("input", {
 			id: "open-find",
@@ -34,12 +33,12 @@ export function startSheet(known) {
 	const { recordings } = known;
 	return [
 		...startHead(),
-		div(
-			{ class: "open-body" },
+		h(
+			"div.open-body",
 			files(known),
 			h(
-				"section",
-				{ class: "open-list", "aria-label": "Recordings" },
+				"section.open-list",
+				{ "aria-label": "Recordings" },
 				...cards(
 					"Recent",
 					"what you open is found here again",
@@ -60,32 +59,22 @@ export function startSheet(known) {
 /** @param {Server.Recordings} known */
 const files = ({ most, free, folders }) =>
 	h(
-		"section",
-		{ class: "open-files", "aria-label": "Files" },
-		div(
-			{ class: "dropzone" },
+		"section.open-files",
+		{ "aria-label": "Files" },
+		h(
+			"div.dropzone",
 			icon("i-import", "l"),
-			h("b", {}, "Drop files or a folder"),
+			h("b", "Drop files or a folder"),
 			h(
 				"p",
-				{},
 				"Videos or picture folders, a calibration, detections: whatever there is. ",
 				`At most ${Math.floor(most / 2 ** 30)} GB; ${size(free)} are free.`,
 			),
-			span(
-				{ class: "group" },
-				button("Choose files…", "files"),
-				button("Choose folder…", "folder"),
-			),
+			h("span.group", button("Choose files…", "files"), button("Choose folder…", "folder")),
 		),
+		h("label.small", { for: "open-path" }, "or a path on the machine that runs the workbench"),
 		h(
-			"label",
-			{ class: "small", for: "open-path" },
-			"or a path on the machine that runs the workbench",
-		),
-		h(
-			"form",
-			{ class: "pathline" },
+			"form.pathline",
 			h("input", {
 				id: "open-path",
 				type: "text",
@@ -102,9 +91,8 @@ const files = ({ most, free, folders }) =>
 			button("Open", "path"),
 		),
 		h(
-			"dl",
-			{ class: "known" },
-			UNDERSTOOD.flatMap(([word, text]) => [h("dt", {}, word), h("dd", {}, text)]),
+			"dl.known",
+			UNDERSTOOD.flatMap(([word, text]) => [h("dt", word), h("dd", text)]),
 		),
 	);
 
@@ -117,8 +105,8 @@ function cards(words, note, recordings, ...beside) {
 	const told = recordings.length && recordings[0].kind !== "rendered" ? "" : note;
 	return [
 		heading(words, small(told), ...beside),
-		div(
-			{ class: "cards" },
+		h(
+			"div.cards",
 			recordings.map((one) => card(one, names.indexOf(one.name) === names.lastIndexOf(one.name))),
 		),
 	];
@@ -134,27 +122,26 @@ function card(recording, named) {
 		? `${show(fps)} Hz · ${lasting(frames / fps)}`
 		: description.replace(/^rendered room: /, "") || (frames ? `${frames} steps` : "");
 	return h(
-		"button",
+		"button.rec",
 		{
-			class: "rec",
 			title: `${name}: ${description || length}${named ? "" : `, ${opens}`}`,
 			"data-do": "recording",
 			"data-value": opens,
 			"aria-current": recording.open && "true",
 		},
-		span(
-			{ class: "shot" },
+		h(
+			"span.shot",
 			// Under its picture; what was opened and has none has boxes alone.
-			span({ class: "blank" }, icon(opened ? "i-boxes" : "i-folder", "l")),
+			h("span.blank", icon(opened ? "i-boxes" : "i-folder", "l")),
 			picture && h("img", { src: picture, alt: "", loading: "lazy", onerror: away }),
 			small(many(cameras, "camera"), { class: "small lens" }),
 		),
-		h("b", {}, name),
+		h("b.cut", name),
 		!named && small(`…/${opens.split(/[\\/]/).filter(Boolean).slice(-2).join("/")}`),
-		span(
-			{ class: "small" },
-			span({ class: "cut" }, length),
-			span({}, recording.open ? "open now" : opened > 0 && when(opened)),
+		h(
+			"span.small",
+			h("span.cut", length),
+			h("span", recording.open ? "open now" : opened > 0 && when(opened)),
 		),
 	);
 }

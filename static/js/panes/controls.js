@@ -2,7 +2,7 @@
  * What a person gives the page: buttons, layer chips and keys, each a command of the one list, and
  * files that are dropped.
  */
-import { all, one } from "../elements/dom.js";
+import { capture, all, one } from "../elements/dom.js";
 import { commandFor, commandOf, keyLabel, keyOf, perform } from "../state/commands.js";
 import { isBench } from "../state/address.js";
 
@@ -116,14 +116,10 @@ export function mountControls({ store, actions, press }) {
 	});
 	// Most of the page keeps the focus where it is when it is pressed, but who presses elsewhere is
 	// done with a field.
-	document.addEventListener(
-		"pointerdown",
-		({ target }) => {
-			const field = /** @type {HTMLElement | null} */ (document.activeElement);
-			if (field?.matches(TYPING) && target !== field) field.blur();
-		},
-		true,
-	);
+	capture(document, "pointerdown", ({ target }) => {
+		const field = /** @type {HTMLElement | null} */ (document.activeElement);
+		if (field?.matches(TYPING) && target !== field) field.blur();
+	});
 	document.addEventListener("keydown", press);
 	// What was pressed while the page was read comes first; after Ctrl K it is what is sought.
 	/** @type {KeyboardEvent[]} */

@@ -1,5 +1,5 @@
 /** How much room each pane has: dragged or moved by key, one pane alone, remembered. */
-import { all, one } from "../elements/dom.js";
+import { claim, all, one } from "../elements/dom.js";
 
 /** What a splitter sets, which way it grows, and its least and largest share of the window. */
 const SPLITS = {
@@ -59,8 +59,7 @@ export function mountLayout({ store, actions }) {
 					event.key,
 				) - 1;
 			if (turn !== -1 && turn !== 1) return;
-			event.preventDefault();
-			event.stopPropagation();
+			claim(event);
 			resize(name, now(name) + sign * turn * (event.shiftKey ? 80 : 16));
 		});
 	}

@@ -32,21 +32,21 @@ export function mountNotes(root, { store, actions, retry }) {
 	/** @type {(kind: string, title: string, text: string, buttons: (Node | null)[]) => HTMLElement} */
 	const note = (kind, title, text, buttons) =>
 		h(
-			"div",
-			{ class: "note", role: kind === "bad" ? "alert" : null },
+			"div.note",
+			{ role: kind === "bad" ? "alert" : null },
 			h("span", { class: `dot ${kind}` }),
-			h("h2", {}, title),
-			h("span", { class: "group" }, buttons),
-			text && h("p", {}, text),
+			h("h2", title),
+			h("span.group", buttons),
+			text && h("p", text),
 		);
 	/** A sentence begins with a capital, unless it begins with a name of its own. @param {string} text */
 	const sentence = (text) => text.replace(/^[a-z](?=[a-z]* )/, (letter) => letter.toUpperCase());
 	const button = (/** @type {string} */ word, /** @type {() => void} */ onclick) =>
-		h("button", { class: "btn box", onclick }, word);
+		h("button.btn.box", { onclick }, word);
 	const close = (/** @type {() => void} */ onclick) =>
 		h(
-			"button",
-			{ class: "btn icon", "aria-label": "Dismiss", "data-tip": "Dismiss", onclick },
+			"button.btn.icon",
+			{ "aria-label": "Dismiss", "data-tip": "Dismiss", onclick },
 			icon("i-close"),
 		);
 

@@ -17,10 +17,10 @@ export function mountPlaces(root, context) {
 	const known = new Set();
 	const links = PLACES.map(({ name, word, tip }) =>
 		h(
-			"a",
-			{ class: "place", href: `#${name}`, "data-tip": tip, "data-go": name },
+			"a.place",
+			{ href: `#${name}`, "data-tip": tip, "data-go": name },
 			word,
-			h("span", { class: "count", hidden: true }),
+			h("span.count", { hidden: true }),
 		),
 	);
 	fill(root, links);
@@ -94,7 +94,7 @@ export function mountTop(root, { store, actions }) {
 		cancel,
 		again,
 		spoken,
-		csv,
+		leave,
 	} = parts(root);
 	const methods = { single_view, fusion_method, smoothing_method };
 	sequence.addEventListener("change", () => actions.open(sequence.value));
@@ -172,7 +172,7 @@ export function mountTop(root, { store, actions }) {
 			write(word, text);
 			write(spoken, text);
 		};
-		allow(csv, link === "open" && run?.done ? "" : "There are no tracks yet.");
+		allow(leave, link === "open" && run?.done ? "" : "There are no tracks yet.");
 		bar.hidden = link === "lost" || !(opening || run?.state === "computing");
 		cancel.hidden = link !== "open" || run?.state !== "computing" || Boolean(opening);
 		again.hidden = link !== "open" || run?.state !== "cancelled" || Boolean(opening);
@@ -197,7 +197,7 @@ export function mountTop(root, { store, actions }) {
 		bar.ariaValueNow = endless ? null : String(done);
 		// Then its steps are no measure of how far it is.
 		number.hidden = left.hidden || (endless && run?.state === "computing");
-		fill(number, total > 0 && [h("b", {}, done), `/${total}`]);
+		fill(number, total > 0 && [h("b", done), `/${total}`]);
 		const time = run ? timeText(run) : "";
 		const words = opening ? "reading" : time || run?.message || "";
 		write(left, words);

@@ -1,6 +1,6 @@
 /** The 3D pane: viser's page inside ours, with its layers and view points. */
 import { drawing } from "../draw/canvas.js";
-import { all, fill, h, icon, one, parts } from "../elements/dom.js";
+import { capture, all, fill, h, icon, one, parts } from "../elements/dom.js";
 
 /* ---------- How often another document of this window draws: viser goes on drawing for a while
    after each change, and where there is no graphics card each of its frames is one that pictures
@@ -95,32 +95,20 @@ function takeWholeNumbers(page) {
 		passing = false;
 		before = field.value;
 	};
-	page.addEventListener("focusin", (event) => (before = fieldOf(event)?.value ?? ""), true);
-	page.addEventListener(
-		"input",
-		(event) => {
-			if (!passing && fieldOf(event)) event.stopImmediatePropagation();
-		},
-		true,
-	);
-	page.addEventListener(
-		"keydown",
-		(event) => {
-			const field = fieldOf(event);
-			if (!field) return;
-			if (ENDS.includes(event.key)) pass(field);
-			if (event.key === "Escape") field.value = before;
-		},
-		true,
-	);
-	page.addEventListener(
-		"focusout",
-		(event) => {
-			const field = fieldOf(event);
-			if (field) pass(field);
-		},
-		true,
-	);
+	capture(page, "focusin", (event) => (before = fieldOf(event)?.value ?? ""));
+	capture(page, "input", (event) => {
+		if (!passing && fieldOf(event)) event.stopImmediatePropagation();
+	});
+	capture(page, "keydown", (event) => {
+		const field = fieldOf(event);
+		if (!field) return;
+		if (ENDS.includes(event.key)) pass(field);
+		if (event.key === "Escape") field.value = before;
+	});
+	capture(page, "focusout", (event) => {
+		const field = fieldOf(event);
+		if (field) pass(field);
+	});
 }
 
 /** The 3D view waits no longer than this for the first pictures, milliseconds. */
@@ -167,14 +155,10 @@ export function mountView3d(root, { store, actions, playback, retry, press }) {
 		if (!reachable) return;
 		pace(view, playback.after3d);
 		takeWholeNumbers(view.document);
-		view.addEventListener(
-			"keydown",
-			(event) => {
-				if (/^(Arrow.*|[wasdqe])$/i.test(event.key) && !event.ctrlKey && !event.metaKey) return;
-				if (press(event)) event.stopImmediatePropagation();
-			},
-			true,
-		);
+		capture(view, "keydown", (event) => {
+			if (/^(Arrow.*|[wasdqe])$/i.test(event.key) && !event.ctrlKey && !event.metaKey) return;
+			if (press(event)) event.stopImmediatePropagation();
+		});
 	});
 
 	function cover() {
@@ -189,9 +173,9 @@ export function mountView3d(root, { store, actions, playback, retry, press }) {
 			fill(
 				blank,
 				icon("i-plug", "l"),
-				h("h3", {}, title),
-				h("p", {}, text),
-				h("button", { class: "btn box", onclick }, "Try now"),
+				h("h3", title),
+				h("p", text),
+				h("button.btn.box", { onclick }, "Try now"),
 			);
 		if (link === "lost")
 			say("3D view lost", "Pictures and results that were loaded can still be looked at.", retry);
@@ -201,7 +185,7 @@ export function mountView3d(root, { store, actions, playback, retry, press }) {
 				"Pictures, timeline and tables still work. It is tried again by itself.",
 				load,
 			);
-		else fill(blank, h("p", {}, server ? "Loading the 3D view" : "Connecting"));
+		else fill(blank, h("p", server ? "Loading the 3D view" : "Connecting"));
 	}
 
 	function header() {
@@ -229,11 +213,7 @@ export function mountView3d(root, { store, actions, playback, retry, press }) {
 				points.map(([name, view, tip, key]) =>
 					h(
 						"button",
-						{
-							"data-tip": tip,
-							"data-key": key,
-							onclick: () => actions.lookThrough(view),
-						},
+						{ "data-tip": tip, "data-key": key, onclick: () => actions.lookThrough(view) },
 						name,
 					),
 				),

@@ -3,7 +3,7 @@
  * are written where they stand.
  */
 import { writers } from "../draw/canvas.js";
-import { all, one } from "../elements/dom.js";
+import { all, one, save } from "../elements/dom.js";
 import { request } from "../state/api.js";
 
 /* ---------- A brush that writes SVG: the drawing code of the canvases makes a vector picture
@@ -193,15 +193,6 @@ function svgOf(pane, drawn) {
 		);
 	}
 	return `${head}${marks.join("\n")}</svg>`;
-}
-
-/** @param {Blob} blob @param {string} name */
-function save(blob, name) {
-	const link = document.createElement("a");
-	link.href = URL.createObjectURL(blob);
-	link.download = name;
-	link.click();
-	setTimeout(() => URL.revokeObjectURL(link.href), 10000);
 }
 
 /** @param {Context} context */

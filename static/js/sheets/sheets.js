@@ -1,5 +1,6 @@
 /** The two dialogs made from the registry of commands: help with its keys, and the palette. */
-import { all, fill, h, one, parts, symbolOf } from "../elements/dom.js";
+import { all, fill, h, one, parts } from "../elements/dom.js";
+import { symbolOf } from "../elements/drawn.js";
 import { COMMANDS, keyLabel, perform, search } from "../state/commands.js";
 import { PLACES } from "../state/address.js";
 
@@ -113,7 +114,7 @@ function worded({ title, symbol }) {
 }
 
 /** @param {string[]} keys */
-const signs = (keys) => keys.map((key) => h("kbd", {}, keyLabel(key)));
+const signs = (keys) => keys.map((key) => h("kbd", keyLabel(key)));
 
 /** @param {Context} context */
 export function mountSheets({ store, actions }) {
@@ -130,10 +131,9 @@ export function mountSheets({ store, actions }) {
 	const row = (/** @type {Command} */ { name, title, keys }) => {
 		const cameras = name === "camera-1";
 		return h(
-			"div",
-			{ class: "key-row" },
+			"div.key-row",
 			cameras ? "Camera 1 to 9 large, again: all alike" : title,
-			h("span", { class: "grow" }),
+			h("span.grow"),
 			cameras ? [...signs(["1"]), "–", ...signs(["9"])] : signs(keys),
 		);
 	};
@@ -143,13 +143,7 @@ export function mountSheets({ store, actions }) {
 		[...new Set(listed.map(({ group }) => group))].map((group) =>
 			h(
 				"section",
-				{},
-				h(
-					"h3",
-					{},
-					group,
-					group === "Check" && h("span", { class: "small" }, " · in that place, before all others"),
-				),
+				h("h3", group, group === "Check" && h("span.small", " · in that place, before all others")),
 				listed.filter((c) => c.group === group).map(row),
 			),
 		),
@@ -256,16 +250,15 @@ export function mountSheets({ store, actions }) {
 				: "Command, parameter, recording or track";
 		const option = (/** @type {Offer} */ one, /** @type {number} */ index) =>
 			h(
-				"div",
+				"div.key-row",
 				{
-					class: "key-row",
 					role: "option",
 					id: `option-${index}`,
 					"aria-selected": String(index === at),
 					onclick: () => run(one),
 					onpointermove: () => index !== at && choose(index),
 				},
-				h("span", { class: "grow" }, ...worded(one)),
+				h("span.grow", ...worded(one)),
 				signs(one.keys),
 			);
 		const none = naming
@@ -273,7 +266,7 @@ export function mountSheets({ store, actions }) {
 			: asked
 				? `${asked.help} ${rangeOf(asked)}`
 				: "Nothing here has these words.";
-		fill(list, found.length ? found.map(option) : h("p", {}, none));
+		fill(list, found.length ? found.map(option) : h("p", none));
 		choose(at);
 	}
 	/** @param {number} index */

@@ -1,5 +1,6 @@
 /** What a person can do: the page's own state at once, the server's by request. */
 import { ApiError, getJson, request, sendCommand, sendJson } from "./api.js";
+import { save, turned } from "../elements/dom.js";
 import { SPEEDS, clampStep } from "../play/clock.js";
 import { eventsNow, nextEvent, nextLayers, ordered } from "./events.js";
 
@@ -16,21 +17,6 @@ const LAYOUTS = {
 	inspect: { right: 0.64, cams: 0.5 },
 	compare: { right: 0.5, cams: 0.2, lanes: 0.2 },
 };
-
-/**
- * Save what an address gives, once it is known that it gives it.
- * @param {string} path
- * @param {string} fallback  name of the file where the answer has none
- */
-async function download(path, fallback) {
-	const response = await request(path);
-	const named = /filename="?([^";]+)"?/.exec(response.headers.get("content-disposition") ?? "");
-	const link = document.createElement("a");
-	link.href = URL.createObjectURL(await response.blob());
-	link.download = named?.[1] ?? fallback;
-	link.click();
-	setTimeout(() => URL.revokeObjectURL(link.href), 10000);
-}
 
 /**
  * @param {object} how
@@ -178,16 +164,7 @@ export function createActions({ store, seek, send, receive }) {
 			const { timeline, laneOrder, selection } = store.get();
 			const ids = ordered(timeline?.tracks ?? [], laneOrder).map((track) => track.id);
 			const index = ids.indexOf(selection ?? -1);
-			if (ids.length)
-				actions.select(
-					ids[
-						index < 0
-							? direction > 0
-								? 0
-								: ids.length - 1
-							: (index + direction + ids.length) % ids.length
-					],
-				);
+			if (ids.length) actions.select(turned(ids, index, direction));
 		},
 		go(place) {
 			const [step, id] = place.split(" ").map(Number);
@@ -200,10 +177,18 @@ export function createActions({ store, seek, send, receive }) {
 			else if (store.get().layout.max) actions.maximise(store.get().layout.max ?? null);
 			else actions.select(null);
 		},
-		exportTracks: () =>
-			void download("/api/export/tracks.csv", "tracks.csv").catch((error) =>
-				actions.refused(error, "export"),
-			),
+		exportTracks: () => void actions.saveFile("/api/export/tracks.csv", "tracks.csv"),
+		async saveFile(path, fallback) {
+			try {
+				const response = await request(path);
+				const named = /filename="?([^";]+)"?/.exec(
+					response.headers.get("content-disposition") ?? "",
+				);
+				save(await response.blob(), named?.[1] ?? fallback);
+			} catch (error) {
+				actions.refused(error, "export");
+			}
+		},
 
 		// cameras and 3D
 		chooseCamera(index) {

@@ -2,6 +2,7 @@
  * The address of the page: what is looked at and how, as words. The place that it names is gone to once its sequence is open, and written back as the
  * page moves on; back and forward go over what was chosen.
  */
+import { remember, remembered } from "../elements/dom.js";
 import { SPEEDS } from "../play/clock.js";
 import { valuesOf } from "./actions.js";
 import { LAYERS_2D, LAYERS_3D } from "./store.js";
@@ -264,23 +265,8 @@ const NOWHERE = {
 /** Milliseconds until the address follows: browsers limit how often it may change. */
 const WRITE_AFTER = 400;
 
-/** Where this browser was last. @param {{session: string, search: string, kept: number | null}} last */
-function note(last) {
-	try {
-		localStorage.setItem("last", JSON.stringify(last));
-	} catch {
-		// Without storage the next start begins anew.
-	}
-}
-
-/** @returns {{session?: string, search?: string, kept?: number | null}} */
-function recall() {
-	try {
-		return JSON.parse(localStorage.getItem("last") ?? "{}");
-	} catch {
-		return {};
-	}
-}
+/** Under which this browser remembers where it was last: session, search, and the kept run. */
+const LAST = "last";
 
 /** @param {Store<PageState>} store @param {Actions} actions */
 export function createAddress(store, actions) {
@@ -333,7 +319,7 @@ export function createAddress(store, actions) {
 	 */
 	function takeUp(server) {
 		if (location.search.length > 1) return;
-		const { session, search, kept } = recall();
+		const { session, search, kept } = remembered(LAST, {});
 		if (!search || session === server.session) return;
 		const { place: last } = readPlace(search);
 		const { sequence, opening } = server;
@@ -446,29 +432,20 @@ export function createAddress(store, actions) {
 				(search || location.pathname) + location.hash,
 			);
 		standing = next;
-		note({ session: server.session, search, kept: server.run.kept });
+		remember(LAST, { session: server.session, search, kept: server.run.kept });
 		document.title = `${server.sequence.name} · multiview-phd`;
 	}
-	const seen = /** @type {const} */ ([
+	const viewed = Object.values(KEYS).flatMap(({ first }) => Object.keys(first));
+	const seen = /** @type {(keyof PageState)[]} */ ([
 		"shown",
 		"selection",
 		"large",
 		"server",
-		"tab",
 		"place",
-		"span",
-		"loop",
-		"range",
-		"speed",
-		"layers2d",
-		"measure",
-		"laneOrder",
-		"zooms",
-		"listed",
-		"eventKind",
+		...viewed,
 	]);
 	// While it plays, the address follows slowly.
-	store.on([...seen], () => (writing ??= setTimeout(write, WRITE_AFTER)));
+	store.on(seen, () => (writing ??= setTimeout(write, WRITE_AFTER)));
 	addEventListener("popstate", ({ state }) => {
 		const { server } = store.get();
 		if (!state?.view || !server) return;

@@ -3,6 +3,8 @@
  * depend on and are told once a turn, however many changes that turn brought.
  */
 
+import { remember, remembered } from "../elements/dom.js";
+
 /* ---------- What the page begins with, and what of it this browser remembers. ---------- */
 
 /** Layers of the pictures, as they are at first. */
@@ -47,18 +49,10 @@ const KEPT = /** @type {const} */ ([
 	"used",
 ]);
 
-/** @returns {Partial<PageState>} */
-function remembered() {
-	try {
-		return JSON.parse(localStorage.getItem("page") ?? "{}");
-	} catch {
-		return {};
-	}
-}
-
 /** @returns {PageState} */
 export function initialState() {
-	const kept = remembered();
+	/** @type {Partial<PageState>} */
+	const kept = remembered("page", {});
 	return {
 		link: "connecting",
 		lostAt: 0,
@@ -127,17 +121,10 @@ export function initialState() {
 }
 
 /** From now on this browser remembers. @param {Store<PageState>} store */
-export function remember(store) {
-	store.on([...KEPT], (state) => {
-		try {
-			localStorage.setItem(
-				"page",
-				JSON.stringify(Object.fromEntries(KEPT.map((key) => [key, state[key]]))),
-			);
-		} catch {
-			// Without storage the page forgets; nothing else changes.
-		}
-	});
+export function keepLook(store) {
+	store.on([...KEPT], (state) =>
+		remember("page", Object.fromEntries(KEPT.map((key) => [key, state[key]]))),
+	);
 }
 
 /**

@@ -1,5 +1,6 @@
 /** The trials of a study, and what is done with the chosen one: used, compared, kept, repeated. */
-import { all, fill, h, icon, symbolOf } from "../elements/dom.js";
+import { all, fill, h, icon } from "../elements/dom.js";
+import { asks, grow, paneHead, symbolOf } from "../elements/drawn.js";
 import { table } from "../elements/table.js";
 import { getJson } from "../state/api.js";
 import { differenceOf, figureOf, titledOf, valueOf } from "./words.js";
@@ -24,7 +25,7 @@ function signOf({ best, front, objectives }, { number, vetoed, state }) {
  * @param {(number: number) => void} on.use
  */
 function trialsTable({ choose, use }) {
-	const element = h("div", { class: "scroll", tabindex: 0, "aria-label": "Trials, best first" });
+	const element = h("div.scroll", { tabindex: 0, "aria-label": "Trials, best first" });
 	/** @type {Server.Study} */
 	let study;
 	/** @type {Server.TrialInfo | undefined} */
@@ -60,12 +61,8 @@ function trialsTable({ choose, use }) {
 				const { number } = trial;
 				const sign = signOf(study, trial);
 				return [
-					h(
-						"button",
-						{ class: "as-text", onclick: () => choose(number) },
-						number ? number : "default",
-					),
-					sign && h("span", { class: "q" }, ` ${sign}`),
+					h("button.as-text", { onclick: () => choose(number) }, number ? number : "default"),
+					sign && h("span.q", ` ${sign}`),
 				];
 			},
 		},
@@ -94,11 +91,10 @@ function trialsTable({ choose, use }) {
 			kind: "act",
 			cell: ({ number }) =>
 				number === 0
-					? h("span", { class: "q" }, "trial 0")
+					? h("span.q", "trial 0")
 					: h(
-							"button",
+							"button.btn",
 							{
-								class: "btn",
 								"aria-label": `Use trial ${number}`,
 								onclick: (event) => (event.stopPropagation(), use(number)),
 							},
@@ -168,40 +164,21 @@ function trialsTable({ choose, use }) {
  */
 export function bestTrials({ store, actions }, { choose, chosen, name, path }) {
 	const rows = trialsTable({ choose, use: (number) => void use(number) });
-	const which = h("span", { class: "sub" });
-	const put = h("button", { class: "btn main", onclick: () => useChosen() }, "Use");
-	const beside = h(
-		"button",
-		{ class: "btn box", onclick: () => void compare() },
-		"Compare with current",
-	);
-	const keep = h("button", { class: "btn box", onclick: askName }, "Save as preset…");
-	const differs = h("span", { class: "sub" });
+	const which = h("span.sub");
+	const put = h("button.btn.main", { onclick: () => useChosen() }, "Use");
+	const beside = h("button.btn.box", { onclick: () => void compare() }, "Compare with current");
+	const keep = h("button.btn.box", { onclick: askName }, "Save as preset…");
+	const differs = h("span.sub");
 	const command = h(
-		"button",
-		{
-			class: "btn",
-			onclick: () => void copyCommand(),
-			title: "The command that gives these tracks again",
-		},
+		"button.btn",
+		{ onclick: () => void copyCommand(), title: "The command that gives these tracks again" },
 		icon("i-copy", "s"),
 		"Command",
 	);
 	const element = h(
-		"section",
-		{ class: "pane tab2", "aria-label": "Best trials" },
-		h(
-			"div",
-			{ class: "pane-head" },
-			h("h2", { class: "pane-title" }, "Best trials"),
-			differs,
-			h("span", { class: "grow" }),
-			which,
-			put,
-			beside,
-			keep,
-			command,
-		),
+		"section.pane.tab2",
+		{ "aria-label": "Best trials" },
+		paneHead("Best trials", differs, grow(), which, put, beside, keep, command),
 		rows.element,
 	);
 	/** @param {number} number */
@@ -228,36 +205,14 @@ export function bestTrials({ store, actions }, { choose, chosen, name, path }) {
 
 	/** The name is asked for where the button stands. */
 	function askName() {
-		const number = chosen();
-		const field = h("input", {
-			class: "field",
-			value: `${name()} ${number}`,
-			"aria-label": "Name of the preset",
-		});
-		let over = false;
-		const end = async (/** @type {boolean} */ kept) => {
-			if (over) return;
-			over = true;
+		const trial = chosen();
+		const asked = { value: `${name()} ${trial}`, "aria-label": "Name of the preset" };
+		const field = asks(asked, async (text) => {
 			field.replaceWith(keep);
-			if (!kept || !field.value.trim()) return;
-			if (
-				await actions.command("keep_trial", {
-					study: name(),
-					trial: number,
-					preset: field.value.trim(),
-				})
-			)
-				actions.note(
-					"info",
-					`Kept as the preset ${field.value.trim()}`,
-					"It is among the presets in Tune.",
-				);
-		};
-		field.addEventListener("keydown", (event) => {
-			event.stopPropagation();
-			if (event.key === "Enter" || event.key === "Escape") void end(event.key === "Enter");
+			const preset = text?.trim();
+			if (preset && (await actions.command("keep_trial", { study: name(), trial, preset })))
+				actions.note("info", `Kept as the preset ${preset}`, "It is among the presets in Tune.");
 		});
-		field.addEventListener("blur", () => void end(false));
 		keep.replaceWith(field);
 		field.select();
 	}

@@ -1,6 +1,7 @@
 /** The figures of a study: its trials, what matters, each parameter; the table says the same. */
 import { chart } from "../elements/chart.js";
-import { fill, h, write, symbolOf } from "../elements/dom.js";
+import { fill, h, write } from "../elements/dom.js";
+import { grow, paneHead, segment, symbolOf } from "../elements/drawn.js";
 import { many } from "../library/words.js";
 import { figureOf, titledOf, valueOf } from "./words.js";
 
@@ -269,11 +270,11 @@ function shares({ importance, varied }) {
 			ends: [rows.length - 0.5, -0.5],
 			ticks: rows.map(({ range, name, share, y }) => {
 				const words = h(
-					"span",
-					{ class: "lab", title: range && `${name}: ${range.help}` },
-					h("span", {}, name),
+					"span.lab",
+					{ title: range && `${name}: ${range.help}` },
+					h("span", name),
 					range && symbolOf(range.symbol),
-					h("b", {}, percent(share)),
+					h("b", percent(share)),
 				);
 				return /** @type {const} */ ([y, words]);
 			}),
@@ -296,55 +297,37 @@ export function overview({ choose, narrow }) {
 	let shown = { study: null, done: [], chosen: null };
 	/** Key of the figure along the other axis. */
 	let across = "";
-	const axes = h("div", { class: "seg", role: "group", "aria-label": "Axes" });
+	const axes = h("div.seg", { role: "group", "aria-label": "Axes" });
 	const pareto = chart();
 	const scat = h(
-		"section",
-		{ class: "pane scat", "aria-label": "Trials" },
-		h(
-			"div",
-			{ class: "pane-head" },
-			h("h2", { class: "pane-title" }, "Trials"),
-			axes,
-			h("span", { class: "grow" }),
-			legend(),
-		),
+		"section.pane.scat",
+		{ "aria-label": "Trials" },
+		paneHead("Trials", axes, grow(), legend()),
 		pareto.element,
 	);
 	const bars = chart();
-	const rows = h("div", { class: "ibars" }, bars.element);
-	const aside = h("p", { class: "small ifoot" });
-	const of = h("span", { class: "sub" });
-	const since = h("span", { class: "q" });
+	const rows = h("div.ibars", bars.element);
+	const aside = h("p.small.ifoot");
+	const of = h("span.sub");
+	const since = h("span.q");
 	const sofar = chart();
 	const matters = h(
-		"section",
-		{ class: "pane imp", "aria-label": "What matters" },
-		h(
-			"div",
-			{ class: "pane-head" },
-			h("h2", { class: "pane-title" }, "What matters"),
-			h("span", { class: "grow" }),
-			of,
-		),
+		"section.pane.imp",
+		{ "aria-label": "What matters" },
+		paneHead("What matters", grow(), of),
 		rows,
 		aside,
-		h(
-			"div",
-			{ class: "sofar" },
-			h("div", { class: "mh" }, h("span", {}, "Best so far"), h("span", { class: "grow" }), since),
-			sofar.element,
-		),
+		h("div.sofar", h("div.mh", h("span", "Best so far"), grow(), since), sofar.element),
 	);
-	const each = h("h2", { class: "pane-title" }, "Each parameter");
-	const grid = h("div", { class: "mgrid" });
-	const narrowing = h("span", { class: "sub" });
+	const each = h("h2.pane-title", "Each parameter");
+	const grid = h("div.mgrid");
+	const narrowing = h("span.sub");
 	/** Of each shown parameter by its key: its chart, and the value of the best. */
 	const cells = new Map();
 	const multiples = h(
-		"section",
-		{ class: "pane mult", "aria-label": "Each parameter" },
-		h("div", { class: "pane-head" }, each, h("span", { class: "grow" }), narrowing),
+		"section.pane.mult",
+		{ "aria-label": "Each parameter" },
+		paneHead(each, grow(), narrowing),
 		grid,
 	);
 
@@ -411,18 +394,19 @@ export function overview({ choose, narrow }) {
 		const y = measure(0);
 		const others = measures();
 		const x = others.find(({ of: { key } }) => key === across) ?? others[0];
+		const words = others.map(
+			({ of: { key }, name: word }) =>
+				/** @type {const} */ ([
+					key,
+					y.name.length > LONG ? `against ${word}` : `${y.name} · ${word}`,
+				]),
+		);
 		fill(
 			axes,
-			others.map(({ of: { key }, name: word }) =>
-				h(
-					"button",
-					{
-						"aria-pressed": String(key === x.of.key),
-						onclick: () => ((across = key), draw()),
-					},
-					y.name.length > LONG ? `against ${word}` : `${y.name} · ${word}`,
-				),
-			),
+			segment(words, x.of.key, (key) => {
+				across = key;
+				draw();
+			}),
 		);
 		const complete = done.filter(({ state }) => state === "complete");
 		const told = { best: now.best, chosen };
@@ -479,14 +463,13 @@ export function overview({ choose, narrow }) {
 		const [figure, best] = [chart(), h("b")];
 		cells.set(key, { figure, best });
 		return h(
-			"div",
-			{ class: "mp" },
+			"div.mp",
 			h(
-				"div",
-				{ class: "mh", title: `${label}: ${help}` },
-				h("span", { class: "lab" }, h("span", {}, label), symbolOf(symbol)),
-				h("span", { class: "grow" }),
-				h("span", { class: "q" }, "best"),
+				"div.mh",
+				{ title: `${label}: ${help}` },
+				h("span.lab", h("span", label), symbolOf(symbol)),
+				grow(),
+				h("span.q", "best"),
 				best,
 			),
 			figure.element,
@@ -516,8 +499,7 @@ function legend() {
 		["best", "best"],
 	];
 	return h(
-		"div",
-		{ class: "legend" },
-		signs.map(([kind, word]) => h("span", {}, h("i", { class: `sign ${kind}` }), word)),
+		"div.legend",
+		signs.map(([kind, word]) => h("span", h("i", { class: `sign ${kind}` }), word)),
 	);
 }

@@ -1,12 +1,12 @@
 /** What a study tries: written down before it starts, locked afterwards. */
-import { choices, fill, h, icon, symbolOf } from "../elements/dom.js";
+import { fill, h, icon } from "../elements/dom.js";
+import { chooser, grow, paneHead, signButton, symbolOf } from "../elements/drawn.js";
 import { getJson, sendJson } from "../state/api.js";
 import { placeOf, runsOn } from "./where.js";
 import { nameOf, valueOf } from "./words.js";
 
 /* ---------- Small pieces of what is written down of a study. ---------- */
 
-/** @type {[string, string][]} */
 const SEARCHES = [
 	["auto", "narrowing"],
 	["tpe", "narrowing, one figure"],
@@ -41,16 +41,14 @@ export function numberField(changed, label, value, set, more = {}) {
 /** @param {string} word @param {false | (() => void)} out @param {string} [title] */
 const tag = (word, out, title) =>
 	h(
-		"span",
-		{ class: "pc", title: title ?? word },
+		"span.pc.cut",
+		{ title: title ?? word },
 		word,
-		out &&
-			h(
-				"button",
-				{ class: "btn icon", "aria-label": `Leave out ${word}`, onclick: out },
-				icon("i-close", "s"),
-			),
+		out && signButton("i-close", `Leave out ${word}`, out),
 	);
+
+/** @param {string} title @param {...(Child | Child[])} rest */
+const block = (title, ...rest) => h("div.blk", h("h3.h", title), ...rest);
 
 /**
  * Parameters and their ranges, a row each.
@@ -59,30 +57,21 @@ const tag = (word, out, title) =>
  * @param {string} [last]  what a further column is for
  */
 const rangesBlock = (count, rows, last) => [
+	h("h3.h", "Parameters", grow(), h("span.small", count)),
 	h(
-		"h3",
-		{ class: "h" },
-		"Parameters",
-		h("span", { class: "grow" }),
-		h("span", { class: "small" }, count),
-	),
-	h(
-		"table",
-		{ class: "pt" },
+		"table.pt",
 		h(
 			"thead",
-			{},
 			h(
 				"tr",
-				{},
-				h("th", {}, "name"),
-				h("th", { class: "num" }, "from"),
-				h("th", { class: "num" }, "to"),
-				h("th", {}, "scale"),
-				last && h("th", {}, h("span", { class: "vh" }, last)),
+				h("th", "name"),
+				h("th.num", "from"),
+				h("th.num", "to"),
+				h("th", "scale"),
+				last && h("th", h("span.vh", last)),
 			),
 		),
-		h("tbody", {}, rows),
+		h("tbody", rows),
 	),
 ];
 
@@ -99,15 +88,9 @@ export const choiceCard = (on, title, choose, can, ...rest) =>
 		"div",
 		{ class: `choice${on ? " on" : ""}` },
 		h(
-			"button",
-			{
-				class: "as-text",
-				role: "radio",
-				"aria-checked": String(on),
-				disabled: !can,
-				onclick: choose,
-			},
-			h("b", {}, title),
+			"button.as-text",
+			{ role: "radio", "aria-checked": String(on), disabled: !can, onclick: choose },
+			h("b", title),
 		),
 		rest,
 	);
@@ -118,45 +101,39 @@ export const choiceCard = (on, title, choose, can, ...rest) =>
 function lockedParts(study) {
 	const { definition: told } = study;
 	/** @param {string} word @param {Child} value */
-	const line = (word, value) =>
-		h("div", { class: "pairline" }, h("span", {}, word), h("span", {}, value));
+	const line = (word, value) => h("div.pairline", h("span", word), h("span", value));
 	const seeds = Array.isArray(told.seeds) ? told.seeds.length : told.seeds;
 	return [
 		h(
-			"div",
-			{ class: "blk" },
-			h("h3", { class: "h" }, "Recordings"),
+			"div.blk",
+			h("h3.h", "Recordings"),
 			h(
-				"div",
-				{ class: "tags" },
+				"div.tags",
 				told.recordings.map((/** @type {string} */ place) => tag(nameOf(place), false, place)),
 			),
 		),
 		h(
-			"div",
-			{ class: "blk" },
+			"div.blk",
 			rangesBlock(
 				study.varied.length,
 				study.varied.map(({ label, symbol, help, low, high, log, choices: all }) =>
 					h(
 						"tr",
-						{},
-						h("td", { title: help }, h("span", { class: "lab" }, label), " ", symbolOf(symbol)),
+						h("td", { title: help }, h("span.lab", label), " ", symbolOf(symbol)),
 						all.length
-							? h("td", { class: "num", colspan: 3 }, all.map(valueOf).join(", "))
+							? h("td.num", { colspan: 3 }, all.map(valueOf).join(", "))
 							: [
-									h("td", { class: "num" }, valueOf(low)),
-									h("td", { class: "num" }, valueOf(high)),
-									h("td", {}, log ? "log" : "linear"),
+									h("td.num", valueOf(low)),
+									h("td.num", valueOf(high)),
+									h("td", log ? "log" : "linear"),
 								],
 					),
 				),
 			),
 		),
 		h(
-			"div",
-			{ class: "blk" },
-			h("h3", { class: "h" }, "Search"),
+			"div.blk",
+			h("h3.h", "Search"),
 			line("trials", study.info.trials ?? "as many as fit"),
 			line("seeds", seeds),
 			line("search", SEARCHES.find(([key]) => key === told.search)?.[1] ?? told.search),
@@ -176,9 +153,9 @@ function lockedParts(study) {
  * @param {Wish} now
  * @param {Server.ObjectiveInfo[]} figures  all that there are
  * @param {{hasTruth: boolean, cameras: number}} of  the recording that is open
- * @param {{changed: () => void, show: () => void}} on
+ * @param {() => void} edited
  */
-function objectiveCards(now, figures, { hasTruth, cameras }, { changed, show }) {
+function objectiveCards(now, figures, { hasTruth, cameras }, edited) {
 	const leads = {
 		truth: figures.filter(({ of }) => of !== "agreement"),
 		agreement: figures.filter(({ of }) => of === "agreement"),
@@ -187,37 +164,25 @@ function objectiveCards(now, figures, { hasTruth, cameras }, { changed, show }) 
 	/** @param {string[]} next */
 	const set = (next) => {
 		now.objectives = [...new Set(next.filter(Boolean))];
-		show();
-		changed();
+		edited();
 	};
 
 	/** @param {number} place @param {string} word @param {Server.ObjectiveInfo[]} from */
-	const chooser = (place, word, from) => {
+	const objective = (place, word, from) => {
 		const free = from.filter(
 			({ key }) => now.objectives[place] === key || !now.objectives.includes(key),
 		);
-		const select = h("select", {
-			class: "field",
-			"aria-label": word,
-			onchange: () => set(now.objectives.with(place, select.value)),
-		});
-		if (place === now.objectives.length)
-			select.onchange = () => set([...now.objectives, select.value]);
-		choices(
-			select,
-			[
-				...(place ? [/** @type {[string, string]} */ (["", "nothing else"])] : []),
-				...free.map(
-					({ key, name, higher }) =>
-						/** @type {[string, string]} */ ([
-							key,
-							`${name}, ${higher ? "more" : "less"} is better`,
-						]),
-				),
-			],
+		const words = free.map(({ key, name, higher }) => [
+			key,
+			`${name}, ${higher ? "more" : "less"} is better`,
+		]);
+		const select = chooser(
+			word,
+			place ? [["", "nothing else"], ...words] : words,
 			now.objectives[place] ?? "",
+			(key) => set(now.objectives.toSpliced(place, 1, key)),
 		);
-		return h("label", {}, h("span", {}, word), select);
+		return h("label", h("span", word), select);
 	};
 
 	/** @param {"truth" | "agreement"} kind @param {string} title @param {string} beside @param {...Child} rest */
@@ -229,7 +194,7 @@ function objectiveCards(now, figures, { hasTruth, cameras }, { changed, show }) 
 			title,
 			() => !on && set([usual(kind)]),
 			on || can,
-			h("span", { class: "small beside" }, beside),
+			h("span.small.beside", beside),
 			...rest,
 		);
 	};
@@ -240,21 +205,19 @@ function objectiveCards(now, figures, { hasTruth, cameras }, { changed, show }) 
 	const lead = figures.find(({ key }) => key === now.objectives[0]);
 	const [known] = leads.agreement;
 
-	return h(
-		"div",
-		{ class: "blk" },
-		h("h3", { class: "h" }, "Objective"),
+	return block(
+		"Objective",
 		h(
-			"div",
-			{ role: "radiogroup", "aria-label": "Objective", class: "stack" },
+			"div.stack",
+			{ role: "radiogroup", "aria-label": "Objective" },
 			card(
 				"truth",
 				"Truth",
 				hasTruth ? "" : "not there",
-				!byAgreement && chooser(0, "best is", leads.truth),
+				!byAgreement && objective(0, "best is", leads.truth),
 				h(
-					"span",
-					{ class: "small", title: byAgreement ? null : lead?.help },
+					"span.small",
+					{ title: byAgreement ? null : lead?.help },
 					hasTruth
 						? "mean over recordings and seeds of a figure against the truth"
 						: "no one knows where people were in this recording",
@@ -265,25 +228,23 @@ function objectiveCards(now, figures, { hasTruth, cameras }, { changed, show }) 
 				"Held-out camera",
 				"no truth needed",
 				h(
-					"span",
-					{ class: "small", title: known?.help },
+					"span.small",
+					{ title: known?.help },
 					cameras > 1
 						? "do runs backwards and without each camera find the same people? None is best whose people miss the boxes of a camera that was left out"
 						: "one camera cannot be left out: only the run backwards is held against it",
 				),
 				byAgreement &&
 					h(
-						"span",
-						{ class: "small warn" },
+						"span.small.warn",
 						"a tracker can be consistently wrong: look at the best trial before you use it",
 					),
 			),
 		),
 		h(
-			"div",
-			{ class: "stack" },
-			now.objectives.length > 0 && chooser(1, "against", others),
-			now.objectives.length > 1 && chooser(2, "and", others),
+			"div.stack",
+			now.objectives.length > 0 && objective(1, "against", others),
+			now.objectives.length > 1 && objective(2, "and", others),
 		),
 	);
 }
@@ -291,7 +252,7 @@ function objectiveCards(now, figures, { hasTruth, cameras }, { changed, show }) 
 /* ---------- How far each parameter is varied. ---------- */
 
 /** @typedef {{low: number | null, high: number | null, log: boolean, choices: any[] | null}} Range */
-/** @typedef {{changed: () => void, show: () => void, add: (key: string) => Promise<void>}} On */
+/** @typedef {{changed: () => void, edited: () => void, add: (key: string) => Promise<void>}} On */
 
 /** @param {Server.RangeInfo} range @returns {Range} */
 const rangeOf = ({ low, high, log, choices: all }) => ({
@@ -310,30 +271,17 @@ const rangeOf = ({ low, high, log, choices: all }) => ({
  */
 function parameterRanges(now, known, all, on) {
 	const rest = all.filter(({ key }) => !(key in now.parameters));
-	const more = h("select", {
-		class: "field",
-		"aria-label": "Vary another parameter",
-		onchange: () => void on.add(more.value),
-	});
-	choices(
-		more,
-		[
-			["", "vary another…"],
-			...rest.map(
-				({ key, label, group }) => /** @type {[string, string]} */ ([key, `${label} · ${group}`]),
-			),
-		],
-		"",
-	);
+	const others = rest.map(({ key, label, group }) => [key, `${label} · ${group}`]);
 	return h(
-		"div",
-		{ class: "blk" },
+		"div.blk",
 		rangesBlock(
 			`${Object.keys(now.parameters).length} of ${all.length}`,
 			Object.entries(now.parameters).map(([key, range]) => parameter(now, known, key, range, on)),
 			"leave out",
 		),
-		more,
+		chooser("Vary another parameter", [["", "vary another…"], ...others], "", (key) => {
+			void on.add(key);
+		}),
 	);
 }
 
@@ -344,91 +292,72 @@ function parameterRanges(now, known, all, on) {
  * @param {Range} range
  * @param {On} on
  */
-function parameter(now, known, key, range, { changed, show }) {
+function parameter(now, known, key, range, { changed, edited }) {
 	const found = known.find((one) => one.key === key);
 	const label = found?.label ?? key;
-	const out = h(
-		"button",
-		{
-			class: "btn icon",
-			"aria-label": `Leave out ${label}`,
-			onclick: () => {
-				delete now.parameters[key];
-				show();
-				changed();
-			},
-		},
-		icon("i-close", "s"),
-	);
+	const out = signButton("i-close", `Leave out ${label}`, () => {
+		delete now.parameters[key];
+		edited();
+	});
 	const name = h(
 		"td",
 		{ title: found?.help ?? "" },
-		h("span", { class: "lab" }, label),
+		h("span.lab", label),
 		" ",
 		found && symbolOf(found.symbol),
 	);
 	if (range.choices)
 		return h(
 			"tr",
-			{},
 			name,
 			h(
-				"td",
-				{ colspan: 3, class: "num" },
+				"td.num",
+				{ colspan: 3 },
 				(found?.choices ?? range.choices).map((one) =>
 					h(
-						"button",
+						"button.btn.one",
 						{
-							class: "btn one",
 							"aria-pressed": String(range.choices?.includes(one)),
 							onclick: () => {
 								const left = range.choices?.includes(one)
 									? range.choices.filter((other) => other !== one)
 									: [...(range.choices ?? []), one];
 								range.choices = left;
-								show();
-								changed();
+								edited();
 							},
 						},
 						valueOf(one),
 					),
 				),
 			),
-			h("td", {}, out),
+			h("td", out),
 		);
-	const ends = { min: found?.minimum, max: found?.maximum };
+	const bounds = { min: found?.minimum, max: found?.maximum };
+	/** @param {"low" | "high"} end @param {string} word */
+	const bound = (end, word) => {
+		const set = (/** @type {number | null} */ value) => (range[end] = value);
+		return h("td.num", numberField(changed, `${label} ${word}`, tidy(range[end]), set, bounds));
+	};
 	return h(
 		"tr",
-		{},
 		name,
+		bound("low", "from"),
+		bound("high", "to"),
 		h(
 			"td",
-			{ class: "num" },
-			numberField(changed, `${label} from`, tidy(range.low), (value) => (range.low = value), ends),
-		),
-		h(
-			"td",
-			{ class: "num" },
-			numberField(changed, `${label} to`, tidy(range.high), (value) => (range.high = value), ends),
-		),
-		h(
-			"td",
-			{},
 			h(
-				"button",
+				"button.btn.scale",
 				{
-					class: "btn scale",
 					"aria-label": `Scale of ${label}: ${range.log ? "logarithmic" : "linear"}`,
 					onclick: () => {
 						range.log = !range.log;
-						show();
-						changed();
+						edited();
 					},
 				},
 				range.log ? "log" : "linear",
 			),
 		),
-		h("td", {}, out),
+		h("td", out),
 	);
 }
 
@@ -458,24 +387,17 @@ const ASKED_MS = 300;
  * @param {() => void} on.copy
  */
 export function definition({ store }, { start, cost: told, copy }) {
-	const body = h("div", { class: "scroll" });
-	const sub = h("span", { class: "sub" });
-	const again = h("button", { class: "btn", onclick: copy }, "Edit a copy");
-	const begin = h("button", { class: "btn main tall2", onclick: () => wish && start(wish, where) });
+	const body = h("div.scroll");
+	const sub = h("span.sub");
+	const again = h("button.btn", { onclick: copy }, "Edit a copy");
+	const begin = h("button.btn.main.tall2", { onclick: () => wish && start(wish, where) });
 	fill(begin, icon("i-play", "s"), "Start");
-	const why = h("p", { class: "small why", role: "status" });
-	const foot = h("div", { class: "def-foot" }, why, begin);
+	const why = h("p.small.why", { role: "status" });
+	const foot = h("div.def-foot", why, begin);
 	const element = h(
-		"section",
-		{ class: "pane def", "aria-label": "Definition" },
-		h(
-			"div",
-			{ class: "pane-head" },
-			h("h2", { class: "pane-title" }, "What is tried"),
-			sub,
-			h("span", { class: "grow" }),
-			again,
-		),
+		"section.pane.def",
+		{ "aria-label": "Definition" },
+		paneHead("What is tried", sub, grow(), again),
 		body,
 		foot,
 	);
@@ -528,8 +450,7 @@ export function definition({ store }, { start, cost: told, copy }) {
 			objectives: draft.objectives,
 			...from,
 		};
-		show();
-		changed();
+		edited();
 	}
 
 	/** Another parameter is varied. @param {string} key */
@@ -542,6 +463,11 @@ export function definition({ store }, { start, cost: told, copy }) {
 		if (!found) return;
 		known = [...known.filter((range) => range.key !== key), found];
 		wish.parameters[key] = rangeOf(found);
+		edited();
+	}
+
+	/** What can be chosen has changed with what is wished. */
+	function edited() {
 		show();
 		changed();
 	}
@@ -557,22 +483,21 @@ export function definition({ store }, { start, cost: told, copy }) {
 			body,
 			named(now),
 			recordings(now),
-			parameterRanges(now, known, store.get().schema?.parameters ?? [], { changed, show, add }),
+			parameterRanges(now, known, store.get().schema?.parameters ?? [], { changed, edited, add }),
 			numbers(now),
 			objectiveCards(
 				now,
 				figures,
 				{ hasTruth, cameras: store.get().sequence?.cameras.length ?? 2 },
-				{ changed, show },
+				edited,
 			),
-			runsOn(where, { changed, show }),
+			runsOn(where, { changed, edited }),
 		);
 	}
 
 	/** @param {Wish} now */
 	function named(now) {
-		const field = h("input", {
-			class: "field",
+		const field = h("input.field", {
 			value: now.name,
 			"aria-label": "Name of the study",
 			maxlength: 60,
@@ -581,7 +506,7 @@ export function definition({ store }, { start, cost: told, copy }) {
 				changed();
 			},
 		});
-		return h("div", { class: "blk" }, h("h3", { class: "h" }, "Name"), field);
+		return block("Name", field);
 	}
 
 	/** @param {Wish} now */
@@ -592,31 +517,22 @@ export function definition({ store }, { start, cost: told, copy }) {
 				({ name, error }) =>
 					!error && !now.recordings.some((place) => place === name || nameOf(place) === name),
 			);
-		const more = h("select", {
-			class: "field",
-			"aria-label": "Add a recording",
-			onchange: () => {
-				now.recordings = [...now.recordings, more.value];
-				show();
-				changed();
-			},
+		const words = [["", "add a recording…"], ...others.map(({ name }) => [name, name])];
+		const more = chooser("Add a recording", words, "", (name) => {
+			now.recordings = [...now.recordings, name];
+			edited();
 		});
-		choices(more, [["", "add a recording…"], ...others.map(({ name }) => pair(name))], "");
-		return h(
-			"div",
-			{ class: "blk" },
-			h("h3", { class: "h" }, "Recordings"),
+		return block(
+			"Recordings",
 			h(
-				"div",
-				{ class: "tags" },
+				"div.tags",
 				now.recordings.map((place) =>
 					tag(
 						nameOf(place),
 						now.recordings.length > 1 &&
 							(() => {
 								now.recordings = now.recordings.filter((one) => one !== place);
-								show();
-								changed();
+								edited();
 							}),
 					),
 				),
@@ -627,42 +543,29 @@ export function definition({ store }, { start, cost: told, copy }) {
 
 	/** @param {Wish} now */
 	function numbers(now) {
-		const search = h("select", {
-			class: "field",
-			"aria-label": "Search",
-			onchange: () => {
-				now.search = search.value;
-				changed();
-			},
+		const search = chooser("Search", SEARCHES, now.search, (value) => {
+			now.search = value;
+			changed();
 		});
-		choices(search, SEARCHES, now.search);
 		/** @param {string} word @param {Element} field */
-		const labelled = (word, field) => h("label", {}, h("span", {}, word), field);
+		const labelled = (word, field) => h("label", h("span", word), field);
+		/** @param {string} word @param {"trials" | "seeds"} key */
+		const count = (word, key) => {
+			const set = (/** @type {number | null} */ value) => (now[key] = value ?? 0);
+			return labelled(word, numberField(changed, word, now[key], set, { min: 1 }));
+		};
+		const minutes = numberField(
+			changed,
+			"At most so many minutes",
+			now.minutes,
+			(value) => (now.minutes = value),
+			{ placeholder: "any" },
+		);
 		return h(
-			"div",
-			{ class: "blk four" },
-			labelled(
-				"Trials",
-				numberField(changed, "Trials", now.trials, (value) => (now.trials = value ?? 0), {
-					min: 1,
-				}),
-			),
-			labelled(
-				"Seeds",
-				numberField(changed, "Seeds", now.seeds, (value) => (now.seeds = value ?? 0), { min: 1 }),
-			),
-			labelled(
-				"Minutes",
-				numberField(
-					changed,
-					"At most so many minutes",
-					now.minutes,
-					(value) => (now.minutes = value),
-					{
-						placeholder: "any",
-					},
-				),
-			),
+			"div.blk.four",
+			count("Trials", "trials"),
+			count("Seeds", "seeds"),
+			labelled("Minutes", minutes),
 			labelled("Search", search),
 		);
 	}
@@ -683,6 +586,3 @@ export function definition({ store }, { start, cost: told, copy }) {
 
 	return { element, edit, locked, state, places: () => where };
 }
-
-/** @param {string} name @returns {[string, string]} */
-const pair = (name) => [name, name];

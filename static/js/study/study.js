@@ -1,17 +1,17 @@
 /** The place Study: what is tried, how far it is, what it has found. */
-import { choices, fill, h, icon, write } from "../elements/dom.js";
+import { claim, capture, capital, choices, fill, h, icon, write } from "../elements/dom.js";
 import { getJson } from "../state/api.js";
 import { bestTrials } from "./best.js";
 import { overview } from "./figures.js";
 import { definition } from "./form.js";
 import { placeOf } from "./where.js";
-import { lasting, lineOf, nameOf, roughly } from "./words.js";
+import { lasting, lineOf, nameOf } from "./words.js";
 
 /* ---------- How far a study is, and what each worker does. ---------- */
 
 /** @param {{pause: () => void}} on */
 function progressPane({ pause }) {
-	const element = h("section", { class: "pane prog", "aria-label": "Progress" });
+	const element = h("section.pane.prog", { "aria-label": "Progress" });
 
 	/** @param {Server.Study} now @param {string} going what is just being done with it, if anything */
 	function show({ info, status, definition, sentences }, going) {
@@ -33,18 +33,15 @@ function progressPane({ pause }) {
 		fill(
 			element,
 			h(
-				"div",
-				{ class: "pgl" },
+				"div.pgl",
 				h(
-					"div",
-					{ class: "big" },
-					h("b", {}, done),
-					h("span", { class: "q" }, trials === null ? " trials so far" : ` of ${trials} trials`),
+					"div.big",
+					h("b", done),
+					h("span.q", trials === null ? " trials so far" : ` of ${trials} trials`),
 				),
 				h(
-					"span",
+					"span.bar.wide",
 					{
-						class: "bar wide",
 						"--part": part,
 						role: "progressbar",
 						"aria-label": "Trials",
@@ -54,25 +51,18 @@ function progressPane({ pause }) {
 					},
 					h("i"),
 				),
-				h("div", { class: "q" }, gone.filter(Boolean).join(" · ")),
+				h("div.q", gone.filter(Boolean).join(" · ")),
 			),
 			h(
-				"div",
-				{ class: "wk" },
+				"div.wk",
 				running && status.workers.length
 					? status.workers.slice(0, 4).map((worker, k) => workerRow(worker, k))
-					: h("div", { class: "q" }, info.words || sentences[0] || ""),
-				status.workers.length > 4 &&
-					h("div", { class: "q" }, `and ${status.workers.length - 4} more workers`),
+					: h("div.q", info.words || sentences[0] || ""),
+				status.workers.length > 4 && h("div.q", `and ${status.workers.length - 4} more workers`),
 			),
 			h(
-				"button",
-				{
-					class: "btn box tall2",
-					"data-key": "Space",
-					onclick: pause,
-					disabled: Boolean(going) || info.state === "done",
-				},
+				"button.btn.box.tall2",
+				{ "data-key": "Space", onclick: pause, disabled: Boolean(going) || info.state === "done" },
 				icon(running ? "i-pause" : "i-play", "s"),
 				word,
 			),
@@ -85,11 +75,10 @@ function progressPane({ pause }) {
 /** @param {Server.WorkerInfo} worker @param {number} k */
 function workerRow({ words, trial, recording, seed, machine }, k) {
 	return h(
-		"div",
-		{ class: "wrow" },
+		"div.wrow",
 		h("span", { title: machine }, `worker ${k + 1}`),
-		h("span", {}, words || (trial === null ? "waits" : trial ? `trial ${trial}` : "the default")),
-		h("span", { class: "q" }, recording && !words ? `${nameOf(recording)}, seed ${seed}` : ""),
+		h("span", words || (trial === null ? "waits" : trial ? `trial ${trial}` : "the default")),
+		h("span.q", recording && !words ? `${nameOf(recording)}, seed ${seed}` : ""),
 	);
 }
 
@@ -118,16 +107,15 @@ export function mountStudy(root, { store, actions }) {
 
 	const path = (/** @type {string} */ rest = "") => `studies/${encodeURIComponent(name)}${rest}`;
 
-	const list = h("select", {
-		class: "field which",
+	const list = h("select.field.which", {
 		"aria-label": "Study",
 		onchange: () => void open(list.value),
 	});
 	/** @param {string} word @param {string} sign @param {() => void} act @param {string} tip */
 	const tool = (word, sign, act, tip) =>
-		h("button", { class: "btn", onclick: act, title: tip }, sign && icon(sign, "s"), word);
-	const report = h("a", { class: "btn", download: "" }, icon("i-export", "s"), "Report");
-	const table = h("a", { class: "btn", download: "" }, icon("i-export", "s"), "Table");
+		h("button.btn", { onclick: act, title: tip }, sign && icon(sign, "s"), word);
+	const report = h("a.btn", { download: "" }, icon("i-export", "s"), "Report");
+	const table = h("a.btn", { download: "" }, icon("i-export", "s"), "Table");
 	const remove = tool(
 		"Delete",
 		"i-trash",
@@ -141,12 +129,12 @@ export function mountStudy(root, { store, actions }) {
 		"Seek better values for what is open, by what matters most, and check them on other seeds",
 	);
 	const bar = h(
-		"div",
-		{ class: "pane stu-bar", role: "toolbar", "aria-label": "Studies" },
+		"div.pane.stu-bar",
+		{ role: "toolbar", "aria-label": "Studies" },
 		list,
 		tool("New", "", () => void begin(), "Another study, from what is on the sliders"),
 		tune,
-		h("span", { class: "grow" }),
+		h("span.grow"),
 		report,
 		table,
 		remove,
@@ -162,10 +150,9 @@ export function mountStudy(root, { store, actions }) {
 		{ store, actions },
 		{ choose, chosen: () => chosen, name: () => name, path },
 	);
-	const blank = h("section", { class: "pane stu-blank" });
+	const blank = h("section.pane.stu-blank");
 	const main = h(
-		"div",
-		{ class: "stu" },
+		"div.stu",
 		bar,
 		form.element,
 		progress.element,
@@ -177,14 +164,7 @@ export function mountStudy(root, { store, actions }) {
 
 	async function refreshList() {
 		studies = (await getJson("/api/studies")).studies;
-		choices(
-			list,
-			[
-				[NEW, "a new study"],
-				...studies.map((one) => /** @type {[string, string]} */ ([one.name, lineOf(one)])),
-			],
-			name,
-		);
+		choices(list, [[NEW, "a new study"], ...studies.map((one) => [one.name, lineOf(one)])], name);
 	}
 
 	/** @param {string} wanted */
@@ -209,7 +189,7 @@ export function mountStudy(root, { store, actions }) {
 		const draft = await getJson(`/api/studies/draft${asked}`).catch((error) => error);
 		if (draft instanceof Error) {
 			main.dataset.shows = "nothing";
-			return fill(blank, h("h3", {}, "No study yet"), h("p", {}, draft.message));
+			return fill(blank, h("h3", "No study yet"), h("p", draft.message));
 		}
 		main.dataset.shows = "draft";
 		form.edit(draft, from);
@@ -251,55 +231,36 @@ export function mountStudy(root, { store, actions }) {
 		if (name !== NEW) return;
 		fill(
 			blank,
-			h("h3", {}, "What it will take"),
-			cost
-				? h(
-						"dl",
-						{ class: "cost" },
-						h("div", {}, h("dt", {}, "runs"), h("dd", {}, cost.runs)),
-						h(
-							"div",
-							{},
-							h("dt", {}, "time"),
-							h(
-								"dd",
-								{},
-								cost.seconds === null
-									? "known after the first trial"
-									: `about ${roughly(cost.seconds)}`,
-							),
-						),
-						h("div", {}, h("dt", {}, "disk"), h("dd", {}, `${(cost.bytes / 1e6).toFixed(1)} MB`)),
-					)
-				: h("p", {}, "See what is said beside Start."),
-			h("h3", {}, "What a study is"),
+			h("h3", "What it will take"),
 			h(
 				"p",
-				{},
+				cost
+					? `${capital(cost.words)}; ${(cost.bytes / 1e6).toFixed(1)} MB on disk.`
+					: "See what is said beside Start.",
+			),
+			h("h3", "What a study is"),
+			h(
+				"p",
 				"Many runs of the same recordings, each a trial with other values of the chosen parameters. It finds which values track better, and which parameters matter at all. Trial 0 is always the default.",
 			),
-			h("h3", {}, "What to do first"),
+			h("h3", "What to do first"),
 			h(
-				"ol",
-				{ class: "firsts" },
+				"ol.firsts",
 				h(
 					"li",
-					{},
-					h("b", {}, TUNE),
+					h("b", TUNE),
 					" does all of it for the open recording: it varies what matters most and checks the best values on other seeds.",
 				),
 				h(
 					"li",
-					{},
 					"Or say it yourself, at the left: recordings, parameters with their ranges, by which figure a trial is better. ",
-					h("b", {}, "Start"),
+					h("b", "Start"),
 					" runs it, also while you work elsewhere.",
 				),
 				h(
 					"li",
-					{},
 					"As trials end, each is a dot here: its figures against each other, what matters, each parameter, and a table. ",
-					h("b", {}, "Use"),
+					h("b", "Use"),
 					" puts the best values on the sliders.",
 				),
 			),
@@ -367,7 +328,7 @@ export function mountStudy(root, { store, actions }) {
 			show(begun || more.trials.length > 0);
 		} catch (error) {
 			// The socket tells whether the server is there.
-			if (name === wanted && !study) fill(blank, h("p", {}, /** @type {Error} */ (error).message));
+			if (name === wanted && !study) fill(blank, h("p", /** @type {Error} */ (error).message));
 		} finally {
 			busy = false;
 		}
@@ -417,25 +378,19 @@ export function mountStudy(root, { store, actions }) {
 		const next = best.rows.beside(chosen, by);
 		if (next !== null) choose(next);
 	}
-	document.addEventListener(
-		"keydown",
-		(event) => {
-			if (store.get().place !== "study" || document.querySelector("dialog[open]")) return;
-			const target = /** @type {HTMLElement} */ (event.target);
-			if (event.ctrlKey || event.metaKey || event.altKey) return;
-			if (target.matches("input, select")) {
-				if (event.key === "Escape") (target.blur(), event.stopPropagation());
-				return;
-			}
-			const act = KEYS[event.key];
-			if (!act || (target.closest("button, a, .chart") && ["Enter", " "].includes(event.key)))
-				return;
-			act();
-			event.preventDefault();
-			event.stopPropagation();
-		},
-		true,
-	);
+	capture(document, "keydown", (event) => {
+		if (store.get().place !== "study" || document.querySelector("dialog[open]")) return;
+		const target = /** @type {HTMLElement} */ (event.target);
+		if (event.ctrlKey || event.metaKey || event.altKey) return;
+		if (target.matches("input, select")) {
+			if (event.key === "Escape") (target.blur(), event.stopPropagation());
+			return;
+		}
+		const act = KEYS[event.key];
+		if (!act || (target.closest("button, a, .chart") && ["Enter", " "].includes(event.key))) return;
+		act();
+		claim(event);
+	});
 
 	/** @type {Timer} */
 	let clock;

@@ -9,10 +9,9 @@ import { choiceCard, numberField } from "./form.js";
 export const placeOf = ({ scheduler, workers }) =>
 	scheduler === null ? { workers } : { scheduler };
 
-/** @param {Where} where @param {{changed: () => void, show: () => void}} on */
-export function runsOn(where, { changed, show }) {
-	const address = h("input", {
-		class: "field addr",
+/** @param {Where} where @param {{changed: () => void, edited: () => void}} on */
+export function runsOn(where, { changed, edited }) {
+	const address = h("input.field.addr", {
 		value: where.scheduler ?? "",
 		placeholder: "tcp://scheduler:8786",
 		"aria-label": "Address of the Dask scheduler",
@@ -21,11 +20,10 @@ export function runsOn(where, { changed, show }) {
 			changed();
 		},
 	});
-	const answer = h("span", { class: "small", role: "status" });
+	const answer = h("span.small", { role: "status" });
 	const test = h(
-		"button",
+		"button.btn.box",
 		{
-			class: "btn box",
 			onclick: async () => {
 				fill(answer, "asking…");
 				const found = await sendJson("POST", "/api/studies/scheduler", {
@@ -45,8 +43,7 @@ export function runsOn(where, { changed, show }) {
 		const on = here === (where.scheduler === null);
 		const choose = () => {
 			where.scheduler = here ? null : (where.scheduler ?? "");
-			show();
-			changed();
+			edited();
 		};
 		return choiceCard(on, title, choose, true, ...(on ? rest : []));
 	};
@@ -62,18 +59,12 @@ export function runsOn(where, { changed, show }) {
 		},
 	);
 	return h(
-		"div",
-		{ class: "blk" },
-		h("h3", { class: "h" }, "Runs on"),
+		"div.blk",
+		h("h3.h", "Runs on"),
 		h(
-			"div",
-			{ role: "radiogroup", "aria-label": "Runs on", class: "stack" },
-			choice(
-				true,
-				"This machine",
-				workers,
-				h("span", { class: "small" }, "workers, behind the page"),
-			),
+			"div.stack",
+			{ role: "radiogroup", "aria-label": "Runs on" },
+			choice(true, "This machine", workers, h("span.small", "workers, behind the page")),
 			choice(false, "Dask scheduler", address, test, answer),
 		),
 	);

@@ -12,14 +12,6 @@ export function lasting(seconds) {
 	return `${Math.floor(minutes / 60)} h ${minutes % 60} min`;
 }
 
-/** How long something may take, as roughly as beside Start. @param {number} seconds */
-export const roughly = (seconds) =>
-	seconds < 90
-		? `${Math.round(seconds)} s`
-		: seconds < 7200
-			? `${Math.round(seconds / 60)} min`
-			: `${Math.round(seconds / 3600)} h`;
-
 /** A recording by the last part of its path. @param {string} place */
 export const nameOf = (place) => place.split(/[\\/]/).filter(Boolean).at(-1) ?? place;
 
@@ -46,7 +38,7 @@ export const figureOf = (value, { digits }) =>
 export function differenceOf(value, from, { digits, higher }) {
 	if (value === null || value === undefined || from === null || from === undefined) return null;
 	const text = Math.abs(value - from).toFixed(digits);
-	if (!Number(text)) return h("span", { class: "dl" }, text);
+	if (!Number(text)) return h("span.dl", text);
 	const more = value > from;
 	return h(
 		"span",

@@ -3,8 +3,9 @@
  * track; and what two fingers ask of it.
  */
 import { faded, stroke, trace } from "../draw/canvas.js";
-import { drawGround } from "../draw/rows.js";
-import { all, fill, h, icon, idTag, one, write } from "../elements/dom.js";
+import { drawGround, levels } from "../draw/rows.js";
+import { capture, fill, h, icon, idTag, one, write } from "../elements/dom.js";
+import { menuOf, opensMenu } from "../elements/over.js";
 import { bucketOf, panned, secondsOf, xOf, zoomed } from "../play/clock.js";
 import { fetcher, getJson } from "../state/api.js";
 import { decisionsOf, scoresOf, shownVersion, stateAt } from "../state/events.js";
@@ -22,7 +23,7 @@ function hintLines(state, step, track) {
 	/** Within which a mark is pointed at, steps. */
 	const reach = Math.max(1, (span ? span[1] - span[0] : frames) / 150);
 	/** @type {(Node | string)[][]} */
-	const lines = [[h("b", {}, `step ${step}`), ` · ${secondsOf(step, fps)} s`]];
+	const lines = [[h("b", `step ${step}`), ` · ${secondsOf(step, fps)} s`]];
 	if (track) {
 		const events = (timeline?.events ?? []).filter(
 			([at, id]) => id === track.id && Math.abs(at - step) <= (timeline?.stride ?? 1),
@@ -59,7 +60,7 @@ function mountHint({ plot, at }, store) {
 		const { step, track } = at(event);
 		return store.get().sequence ? hintLines(store.get(), step, track) : [];
 	};
-	const card = h("div", { class: "card hint-card", hidden: true });
+	const card = h("div.card.hint-card", { hidden: true });
 	plot.append(card);
 	plot.addEventListener("pointermove", (event) => {
 		// A finger or a pen has no other way to ask than to press.
@@ -69,7 +70,7 @@ function mountHint({ plot, at }, store) {
 		if (card.hidden) return;
 		fill(
 			card,
-			lines.map((line) => h("p", {}, ...line)),
+			lines.map((line) => h("p", ...line)),
 		);
 		const box = plot.getBoundingClientRect();
 		const [x, y] = [event.clientX - box.left, event.clientY - box.top];
@@ -97,41 +98,33 @@ function mountFingers(plot, store) {
 	const place = (/** @type {PointerEvent} */ event) =>
 		event.clientX - plot.getBoundingClientRect().left;
 
-	plot.addEventListener(
-		"pointerdown",
-		(event) => {
-			if (event.pointerType !== "touch") return;
-			fingers.set(event.pointerId, place(event));
-			// A second one does not seek.
-			if (fingers.size > 1) event.stopImmediatePropagation();
-		},
-		true,
-	);
-	plot.addEventListener(
-		"pointermove",
-		(event) => {
-			const other = [...fingers].find(([id]) => id !== event.pointerId)?.[1];
-			const before = fingers.get(event.pointerId);
-			if (before === undefined || other === undefined) return;
-			event.stopImmediatePropagation();
-			const now = place(event);
-			fingers.set(event.pointerId, now);
-			const { span, frames } = store.get();
-			const [first, last] = span ?? [0, Math.max(1, frames - 1)];
-			const far = (/** @type {number} */ at) => Math.max(NEAR, Math.abs(at - other));
-			const middle = (now + other) / 2;
-			const view = zoomed(
-				{ first, last, width: plot.clientWidth },
-				far(before) / far(now),
-				middle,
-				frames,
-			);
-			const aside = (middle - (before + other) / 2) / plot.clientWidth;
-			const seen = panned(view, -aside * (view.last - view.first), frames);
-			store.set({ span: [seen.first, seen.last] });
-		},
-		true,
-	);
+	capture(plot, "pointerdown", (event) => {
+		if (event.pointerType !== "touch") return;
+		fingers.set(event.pointerId, place(event));
+		// A second one does not seek.
+		if (fingers.size > 1) event.stopImmediatePropagation();
+	});
+	capture(plot, "pointermove", (event) => {
+		const other = [...fingers].find(([id]) => id !== event.pointerId)?.[1];
+		const before = fingers.get(event.pointerId);
+		if (before === undefined || other === undefined) return;
+		event.stopImmediatePropagation();
+		const now = place(event);
+		fingers.set(event.pointerId, now);
+		const { span, frames } = store.get();
+		const [first, last] = span ?? [0, Math.max(1, frames - 1)];
+		const far = (/** @type {number} */ at) => Math.max(NEAR, Math.abs(at - other));
+		const middle = (now + other) / 2;
+		const view = zoomed(
+			{ first, last, width: plot.clientWidth },
+			far(before) / far(now),
+			middle,
+			frames,
+		);
+		const aside = (middle - (before + other) / 2) / plot.clientWidth;
+		const seen = panned(view, -aside * (view.last - view.first), frames);
+		store.set({ span: [seen.first, seen.last] });
+	});
 	for (const kind of /** @type {const} */ (["pointerup", "pointercancel"]))
 		plot.addEventListener(kind, ({ pointerId }) => fingers.delete(pointerId));
 }
@@ -212,18 +205,17 @@ export function mountReading({ store, actions }, timeline) {
 	mountFingers(timeline.plot, store);
 	timeline.braid = drawBraid;
 	const gutter = one(".gut");
-	const menu = h("div", { class: "menu plots", popover: "auto", "aria-label": "Plots of a track" });
+	const menu = menuOf({ class: "menu plots", "aria-label": "Plots of a track" });
 	const button = h(
-		"button",
+		"button.btn",
 		{
-			class: "btn",
 			"data-tip": "Plots of the selected track: height, speed, what each camera makes of it",
 			"aria-haspopup": "true",
 		},
 		"Plots",
 		icon("i-down", "s"),
 	);
-	button.popoverTargetElement = menu;
+	opensMenu(button, menu);
 	one(".trans .grow").before(button, menu);
 	/** @type {Server.CourseKind[]} */
 	let kinds = [];
@@ -275,15 +267,14 @@ export function mountReading({ store, actions }, timeline) {
 			offered.map(({ name, word, help }) =>
 				h(
 					"label",
-					{},
 					h("input", {
 						type: "checkbox",
 						id: `plot-${name}`,
 						...(plots.includes(name) ? { checked: true } : {}),
 						onchange: () => toggle(name),
 					}),
-					h("b", {}, word),
-					h("span", { class: "small" }, help),
+					h("b", word),
+					h("span.small", help),
 				),
 			),
 		);
@@ -294,7 +285,7 @@ export function mountReading({ store, actions }, timeline) {
 			const { word, help } = /** @type {Server.CourseKind} */ (
 				offered.find((kind) => kind.name === name)
 			);
-			const [value, sub] = [h("span", { class: "r" }), h("span", { class: "lg" })];
+			const [value, sub] = [h("span.r"), h("span.lg")];
 			const away = h(
 				"button",
 				{ "aria-label": `Take ${word} away`, onclick: () => toggle(name) },
@@ -303,12 +294,12 @@ export function mountReading({ store, actions }, timeline) {
 			const element =
 				rows.get(name)?.element ??
 				h(
-					"div",
-					{ class: "gr strip plot-row", title: help },
-					h("span", { class: "n" }, word),
+					"div.gr.strip.plot-row",
+					{ title: help },
+					h("span.n", word),
 					value,
 					away,
-					h("span", { class: "brk" }),
+					h("span.brk"),
 					sub,
 				);
 			if (!rows.has(name)) rows.set(name, { element, value, sub });
@@ -363,12 +354,7 @@ export function mountReading({ store, actions }, timeline) {
 		if (name) toggle(name);
 		else menu.togglePopover();
 	};
-	menu.addEventListener("toggle", (event) => {
-		if (/** @type {ToggleEvent} */ (event).newState !== "open") return;
-		const { left, top } = button.getBoundingClientRect();
-		Object.assign(menu.style, { left: `${left}px`, bottom: `${innerHeight - top + 6}px` });
-		all("input", menu)[0]?.focus();
-	});
+
 	async function read() {
 		if (kinds.length) return;
 		const found = await getJson("/api/courses/kinds").catch(() => null);
@@ -384,11 +370,7 @@ export function mountReading({ store, actions }, timeline) {
  * @param {Pen} pen @param {Server.Courses} buckets @param {Server.TrackCourse} course
  */
 function drawCurve({ g, row, view, ink }, buckets, { values: [values], low, high }) {
-	const level = (/** @type {number} */ value) =>
-		row.y +
-		row.height -
-		4 -
-		((Math.min(high, Math.max(low, value)) - low) / (high - low)) * (row.height - 10);
+	const level = levels(row, low, high);
 	/** @type {number[][]} */
 	let points = [];
 	const colour = ink.id(buckets.track);

@@ -24,15 +24,7 @@ import {
 	parseStep,
 } from "../play/clock.js";
 import { shownDone } from "../play/playback.js";
-import {
-	isAlone,
-	ordered,
-	resultOf,
-	scoresOf,
-	trueCount,
-	decisionsOf,
-	stateAt,
-} from "../state/events.js";
+import { isAlone, ordered, resultOf, scoresOf, trueCount } from "../state/events.js";
 
 /* ---------- Play, step, speed, loop and the readout. ---------- */
 
@@ -173,7 +165,20 @@ export function mountTimeline(root, context) {
 	/** Height of what stands over the lanes. */
 	const above = () => token("h-over") + token("h-ruler") + token("h-check");
 
+	/** Alone on the page its strips have the height that the lanes leave. */
+	function share() {
+		const { style } = document.documentElement;
+		style.removeProperty("--h-strip");
+		if (store.get().layout.max !== "time") return;
+		const strips = all(".gr.strip:not([hidden])", root).length;
+		const lanesHeight = shownTracks().length * token("h-lane");
+		const room = plot.clientHeight - above();
+		const each = (room - Math.min(lanesHeight, room / 2)) / Math.max(1, strips);
+		style.setProperty("--h-strip", `${Math.floor(Math.max(token("h-strip"), each))}px`);
+	}
+
 	function resize() {
+		share();
 		view = { ...view, width: Math.max(1, plot.clientWidth - token("pad-end")) };
 		draw();
 		placeHead();
@@ -343,7 +348,7 @@ export function mountTimeline(root, context) {
 		fill(
 			people,
 			result?.tracks.length ?? "–",
-			result && sequence?.has_truth && h("span", { class: "sub" }, ` of ${trueCount(result)}`),
+			result && sequence?.has_truth && h("span.sub", ` of ${trueCount(result)}`),
 		);
 		if (!scored.hidden) writeScores();
 	}
@@ -359,16 +364,15 @@ export function mountTimeline(root, context) {
 			const label =
 				labels.get(id) ??
 				h(
-					"button",
+					"button.gr.lane",
 					{
-						class: "gr lane",
 						onclick: (event) => (event.altKey ? actions.solo : actions.select)(id),
 						onpointerenter: () => store.set({ hover: { id, camera: -1 } }),
 						onpointerleave: () => store.set({ hover: null }),
 					},
 					idTag(id),
-					h("span", { class: "who" }),
-					h("span", { class: "r" }),
+					h("span.who.cut"),
+					h("span.r"),
 				);
 			labels.set(id, label);
 			label.ariaLabel = `Track ${id}${name ? `, ${name}` : ""}`;
@@ -467,8 +471,7 @@ export function mountTimeline(root, context) {
 	});
 	store.on(["timeline", "run", "basis", "laneOrder", "scores", "measure", "layers3d"], () => {
 		listLanes();
-		draw();
-		placeHead();
+		resize();
 	});
 	store.on(["selection"], () => {
 		listLanes();
@@ -501,7 +504,7 @@ export function mountTimeline(root, context) {
 		}, 200);
 	});
 	listLanes();
-	addEventListener("panes", draw);
+	addEventListener("panes", resize);
 	new ResizeObserver(resize).observe(plot);
 	resize();
 	return seam;

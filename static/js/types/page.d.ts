@@ -24,6 +24,29 @@ interface Attributes {
 	[name: string]: unknown;
 }
 
+/** What makes elements of a kind, by tag and classes. */
+interface Maker<Kinds> {
+	<T extends string>(
+		tag: T,
+		attributes: Attributes,
+		...children: (Child | Child[])[]
+	): Kinds[TagOf<T> & keyof Kinds];
+	<T extends string>(tag: T, ...children: (Child | Child[])[]): Kinds[TagOf<T> & keyof Kinds];
+}
+
+/** What hears of events on their way to what they happen in. */
+interface Capture {
+	<K extends keyof HTMLElementEventMap>(
+		target: EventTarget,
+		kind: K,
+		act: (event: HTMLElementEventMap[K]) => void,
+	): void;
+	(target: EventTarget, kind: string, act: (event: Event) => void): void;
+}
+
+/** `button` of `button.btn.box`. */
+type TagOf<T extends string> = T extends `${infer Tag}.${string}` ? Tag : T;
+
 /** How many times, and the middle of what is seen, in shares of the picture. */
 type Magnified = [number, number, number];
 
@@ -233,6 +256,8 @@ interface Actions {
 	go: (place: string) => void;
 	clear: () => void;
 	exportTracks: () => void;
+	/** Save what an address gives, once it is known that it gives it; a name where the answer has none. */
+	saveFile: (path: string, fallback: string) => Promise<void>;
 	/** As the large picture. */
 	chooseCamera: (index: number) => void;
 	/** In 3D; null is the free view. */

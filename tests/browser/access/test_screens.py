@@ -10,7 +10,7 @@ from pathlib import Path
 
 import cv2
 import pytest
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Browser, Page, Route, expect
 
 from tests.browser.conftest import COARSE_3D
 from tests.browser.looking import as_at_first, ask, by_palette, readout, until, viser
@@ -183,6 +183,49 @@ def test_every_layout_fits_every_width(flat_page: Page, server: Server, layout: 
         cut = "e => e.scrollWidth - e.clientWidth"
         until(page, lambda: status.evaluate(cut) <= 1, "the run's state is whole", 20.0)  # noqa: B023
     page.evaluate("localStorage.removeItem('page')")
+
+
+def test_alone_the_strips_of_the_timeline_have_the_height_that_lanes_leave(
+    flat_page: Page, server: Server
+) -> None:
+    as_at_first(server)
+    flat_page.locator("[data-command=maximise-time]").first.click()
+    lane, strip = flat_page.locator(".lane").last, flat_page.locator(".gr.strip:visible").first
+
+    def gap() -> float:
+        above, below = lane.bounding_box(), strip.bounding_box()
+        assert above is not None
+        assert below is not None
+        return below["y"] - above["y"] - above["height"]
+
+    until(flat_page, lambda: 0 <= gap() < 40, "no empty room is under the lanes")
+    last = flat_page.locator(".gr.strip:visible").last.bounding_box()
+    assert last is not None
+    assert last["y"] + last["height"] <= 901, "the last strip is inside the window"
+    flat_page.keyboard.press("Escape")
+
+
+def with_candidates(route: Route) -> None:
+    """Answer with the steps as if each camera's method had looked at candidates."""
+    answer = route.fetch()
+    steps = answer.json()
+    for step in steps:
+        for camera in step["cameras"]:
+            camera["information"] = {"candidates": 9, "dropped for colour": 6}
+    route.fulfill(response=answer, json=steps)
+
+
+def test_the_words_of_a_narrow_picture_are_whole_with_samples_on(
+    flat_page: Page, server: Server
+) -> None:
+    as_at_first(server)
+    flat_page.route("**/api/steps?*", with_candidates)
+    flat_page.get_by_role("button", name="samples").click()
+    tags = flat_page.locator(".cam-tag")
+    expect(tags.first).to_contain_text("9 candidates, 6 dropped for colour")
+    flat_page.set_viewport_size({"width": 1280, "height": 720})
+    expect(tags.first).not_to_contain_text("candidates")
+    assert tags.evaluate_all("all => all.filter(e => e.scrollWidth > e.clientWidth).length") == 0
 
 
 def test_pictures_leave_room_for_the_tables_where_notes_make_the_column_low(

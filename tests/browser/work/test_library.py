@@ -165,8 +165,7 @@ def test_a_run_leaves_as_a_file(library: Page) -> None:
 
 def test_the_shown_run_leaves_in_the_same_forms(flat_page: Page) -> None:
     page = flat_page
-    page.get_by_role("tab", name="Runs").click()
-    page.get_by_role("tabpanel", name="Runs").get_by_role("button", name="Export").click()
+    page.get_by_role("button", name="Export this run").click()
     expect(page.get_by_role("menuitem")).to_have_count(len(FORMATS))
     box = page.get_by_role("menu", name="Export as").bounding_box()
     assert box is not None

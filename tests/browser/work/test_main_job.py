@@ -222,6 +222,7 @@ def the_csv_is_what_is_shown(page: Page, server: Server, path: Path) -> None:
     server.wait_for_run()
     with page.expect_download() as download:
         page.get_by_role("button", name="Export").first.click()
+        page.get_by_role("menuitem", name="CSV").first.click()
     download.value.save_as(path)
     tracks = read_tracks_csv(path)
     for step in LOOKED_AT:

@@ -84,6 +84,7 @@ def test_a_box_dragged_on_a_camera_becomes_a_template_and_changes_the_run(
     values["template"].append({"name": "Anna", "camera": "cam1", "frame": 20, "box": box})
     with page.expect_download() as download:
         page.get_by_role("button", name="Export").first.click()
+        page.get_by_role("menuitem", name="CSV").first.click()
     path = tmp_path / "tracks.csv"
     download.value.save_as(path)
     shown = read_tracks_csv(path)

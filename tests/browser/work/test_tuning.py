@@ -163,6 +163,7 @@ def test_presets_of_ones_own_by_keyboard(flat_page: Page, server: Server) -> Non
 def test_one_value_on_the_page_beside_the_3d_view_and_back(page: Page, server: Server) -> None:
     as_at_first(server)
     scene = viser(page)
+    expect(scene.get_by_text("Essential parameters")).to_be_visible()
     page.get_by_role("tab", name="Parameters").click()
     row = page.locator(f'#panel-parameters tr[data-key="{P_D}"]')
     field, slider = row.locator(".num"), row.get_by_role("slider")
