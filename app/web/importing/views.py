@@ -27,9 +27,9 @@ from app.web.importing.words import on_page
 from tracker.io.checks import Check
 from tracker.io.checks.synchronisation import CameraOffset
 from tracker.io.importing.finding.angles import open_turns, product_in_words, turns_in_words
+from tracker.io.importing.gathering import FileUse, file_uses
 from tracker.io.importing.options import ImportOptions
 from tracker.io.importing.remedies import unsaid
-from tracker.io.importing.usage import FileUse, file_uses
 from tracker.io.read.pieces import CalibrationPiece, DetectionPiece
 
 if TYPE_CHECKING:

@@ -19,9 +19,8 @@ from tracker.io.checks import check
 from tracker.io.conventions.questions import Undecided, Unexplained
 from tracker.io.importing.gathering import gather
 from tracker.io.importing.options import ImportOptions
-from tracker.io.importing.preview import as_sequence
 from tracker.io.importing.remedies import for_import
-from tracker.io.importing.writing import write
+from tracker.io.importing.writing import as_sequence, write
 from tracker.io.read.pieces import FormatError, Unit, Up
 from tracker.sequences.finding import Remedy
 from tracker.sequences.reader import read_sequence

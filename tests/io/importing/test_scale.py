@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.random_rooms import random_room
-from tracker.io.importing.finding.scale import PERSON, paced, resized
+from tracker.io.importing.finding.people import PERSON, paced, resized
 
 
 @pytest.mark.full

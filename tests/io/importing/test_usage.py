@@ -7,10 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from tests.io.folders import make_folder
-from tracker.io.importing.gathering import gather
+from tracker.io.importing.gathering import file_uses, gather
 from tracker.io.importing.options import ImportOptions
 from tracker.io.importing.settling import settle
-from tracker.io.importing.usage import file_uses
 
 CAMERA = """[cam_{n}]
 name = "cam{n}"

@@ -23,7 +23,7 @@ from tracker.geometry.camera import Camera
 from tracker.geometry.consistency.consensus import Consensus, consensus
 from tracker.geometry.consistency.observed import PairsOfBoxes, Pose, Rays, pair_up, rays_of, uncut
 from tracker.geometry.consistency.standing import turn_of
-from tracker.io.conventions.level import upwards
+from tracker.io.conventions.level import reversed_, standing, turns_tried, upside_down, upwards
 from tracker.io.conventions.reading import (
     Reading,
     boxes_by,
@@ -34,7 +34,6 @@ from tracker.io.conventions.reading import (
     with_pixels,
 )
 from tracker.io.conventions.sizes import likely_unit
-from tracker.io.conventions.standing import reversed_, standing, turns_tried, upside_down
 from tracker.io.read.pieces import METRES, Axes, Direction, Layout, RawCamera, Unit, Up
 
 MOST_PAIRS = 6000

@@ -53,14 +53,20 @@ from tracker.io.importing.finding.matching import (
     same_aspect,
 )
 from tracker.io.importing.finding.names import short_names
-from tracker.io.importing.finding.people import rate_of, rays_of_all
+from tracker.io.importing.finding.people import (
+    AS_STANDING,
+    PERSON,
+    paced,
+    rate_of,
+    rays_of_all,
+    resized,
+)
 from tracker.io.importing.finding.pictures import (
     COMMON_SIZES,
     exchange_by_shape,
     picture_sizes,
     scaled,
 )
-from tracker.io.importing.finding.scale import AS_STANDING, PERSON, paced, resized
 from tracker.io.importing.finding.times import (
     CameraTime,
     check_common,

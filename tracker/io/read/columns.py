@@ -19,9 +19,8 @@ from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
 from tracker.files.text import shown
-from tracker.io.read.picture_names import camera_of, number_in
 from tracker.io.read.pieces import DetectionPiece, Layout, Piece, TruthPiece, unit_named
-from tracker.io.read.source import SourceFile
+from tracker.io.read.source import SourceFile, camera_of, number_in
 from tracker.io.read.values import plain
 
 WORDS: dict[str, tuple[str, ...]] = {
