@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
 from tracker.geometry.camera import Camera
@@ -22,17 +23,41 @@ _CLEARLY = 0.05
 """By how much more of the places must lie in boxes for another reading than the plain one."""
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Surroundings:
+    """The recording into which truth is brought."""
+
+    cameras: Sequence[Camera]
+    """In metres, z up."""
+    detections: Sequence[Detections | None]
+    """Of each camera, by step."""
+    views: Sequence[str | None]
+    """What each camera is called in the annotations whose boxes it has; None without."""
+    reading: Reading
+    """Of the calibration."""
+    frames: int
+    """Steps of the recording; what is beyond is left out."""
+    floor: float
+    """z of the floor, metres."""
+    middle: float
+    """z of the middle of a person, metres, for places on the floor."""
+    first_index: int | None
+    """Number of the first frame, where it is known better."""
+
+    def share(self, steps: Int[ndarray, " G"], places: Float[ndarray, "G 3"]) -> float:
+        """The share of places in boxes."""
+        return share_in_boxes(steps, places, self.cameras, self.detections)
+
+    def contradict(
+        self, share: float, steps: Int[ndarray, " G"], places: Float[ndarray, "G 3"]
+    ) -> bool:
+        """Whether there are boxes, and places are elsewhere."""
+        there = any(each is not None for each in self.detections)
+        return there and contradicts(share, steps, places, self.cameras, self.detections)
+
+
 def settle_truth(
-    pieces: Sequence[TruthPiece],
-    cameras: Sequence[Camera],
-    detections: Sequence[Detections | None],
-    views: Sequence[str | None],
-    reading: Reading,
-    frames: int,
-    floor: float,
-    middle: float,
-    first_index: int | None,
-    found: list[tuple[str, str]],
+    pieces: Sequence[TruthPiece], around: Surroundings, found: list[tuple[str, str]]
 ) -> GroundTruth | None:
     """All truth in metres, in the cameras' world.
 
@@ -41,14 +66,7 @@ def settle_truth(
 
     Args:
         pieces: As their files have them; several of one person each become several people.
-        cameras: In metres, z up.
-        detections: Of each camera.
-        views: What each camera is called in the annotations whose boxes it has; None without.
-        reading: Of the calibration.
-        frames: Steps of the recording; what is beyond is left out.
-        floor: z of the floor, metres.
-        middle: z of the middle of a person, metres, for places on the floor.
-        first_index: Number of the first frame, where it is known better.
+        around: The recording.
         found: What was found out is added.
 
     Returns:
@@ -60,54 +78,13 @@ def settle_truth(
     steps, ids, places, valid = [], [], [], []
     beyond = 0
     for piece in pieces:
-        if piece.left_out:
-            found.append(("truth", piece.left_out))
-        first = piece.first_index if first_index is None else first_index
+        first = piece.first_index if around.first_index is None else around.first_index
         own = piece.frames - (first if first is not None else int(piece.frames.min() > 0))
-        given = piece.positions.copy()
-        given[~np.isfinite(given[:, 2]), 2] = 0.0
-        on_floor = ~np.isfinite(piece.positions[:, 2])
-        keep = (own >= 0) & (own < frames)
+        keep = (own >= 0) & (own < around.frames)
         # what the recording will have is compared, as its check compares it
         compared = keep if keep.any() else np.ones(len(own), dtype=bool)
-        steps_compared = own[compared]
-        candidates: list[tuple[str, Float[ndarray, "G 3"]]] = []
-        grids = GRIDS if piece.cells is not None else (None,)
-        for grid in grids:
-            if grid is not None and piece.cells is not None:
-                given = np.column_stack([grid.places(piece.cells), np.zeros(len(given))])
-            for factor, turn, how in _ways(piece, reading):
-                moved = _moved(given, on_floor, factor, turn, middle)
-                taken = how if grid is None else f"taken with the grid of {grid.name}"
-                candidates.append((taken, moved))
-        scores = [
-            share_in_boxes(steps_compared, moved[compared], cameras, detections)
-            for _, moved in candidates
-        ]
-        if piece.cells is not None and max(scores) < _MOST_INSIDE:
-            inferred = infer_grid(piece.cells, feet_on_floor(piece, views, cameras, floor))
-            if inferred is not None:
-                moved = np.column_stack([inferred[0], np.full(len(given), middle)])
-                how = f"taken with a grid of {inferred[1]}, by where the boxes stand,"
-                candidates.append((how, moved))
-                scores.append(share_in_boxes(steps_compared, moved[compared], cameras, detections))
-        best = int(np.argmax(scores))
-        if scores[best] < max(scores[0] + _CLEARLY, _MOST_INSIDE):
-            best = 0
-        how, moved = candidates[best]
-        if any(each is not None for each in detections) and contradicts(
-            scores[best], steps_compared, moved[compared], cameras, detections
-        ):
-            found.append(
-                ("truth", f"{piece.source.name}: {100 * scores[best]:.0f} % of its places lie in "
-                 "boxes; its origin, axes, grid, unit or frame numbers may be others than the "
-                 "calibration's and the boxes'")
-            )  # fmt: skip
-        if best:
-            found.append(
-                ("truth", f"{piece.source.name}: {how} so that {100 * scores[best]:.0f} % of its "
-                 f"places lie in boxes ({100 * scores[0]:.0f} % as it is)")
-            )  # fmt: skip
+        moved, sentences = _placed(piece, around, own, compared)
+        found += [("truth", words) for words in sentences]
         beyond += int((~keep).sum())
         steps.append(own[keep])
         ids.append(piece.ids[keep])
@@ -124,7 +101,7 @@ def settle_truth(
     order = np.lexsort([all_ids, all_steps])
     pairs = np.column_stack([all_steps, all_ids])[order]
     order = order[np.concatenate([[True], (np.diff(pairs, axis=0) != 0).any(axis=1)])]
-    known = covered_steps(all_steps, frames)
+    known = covered_steps(all_steps, around.frames)
     if known is not None:
         gap = in_gaps(regular_gap(all_steps))
         found.append(("truth", f"knows {gap}; others are not scored"))
@@ -135,6 +112,61 @@ def settle_truth(
         np.concatenate(valid)[order],
         known,
     )
+
+
+def _placed(
+    piece: TruthPiece,
+    around: Surroundings,
+    steps: Int[ndarray, " G"],
+    compared: Bool[ndarray, " G"],
+) -> tuple[Float[ndarray, "G 3"], list[str]]:
+    """The places of a file in the cameras' world, and sentences on how they are taken.
+
+    Args:
+        piece: As the file has them.
+        around: The recording.
+        steps: Of each place.
+        compared: Which places are compared with boxes.
+    """
+    given = piece.positions.copy()
+    on_floor = ~np.isfinite(given[:, 2])
+    given[on_floor, 2] = 0.0
+    candidates: list[tuple[str, Float[ndarray, "G 3"]]] = []
+    for grid in GRIDS if piece.cells is not None else (None,):
+        if grid is not None and piece.cells is not None:
+            given = np.column_stack([grid.places(piece.cells), np.zeros(len(given))])
+        for factor, turn, how in _ways(piece, around.reading):
+            moved = factor * given @ turn.T
+            moved[on_floor, 2] = around.middle
+            candidates.append(
+                (how if grid is None else f"taken with the grid of {grid.name}", moved)
+            )
+    scores = [around.share(steps[compared], moved[compared]) for _, moved in candidates]
+    if piece.cells is not None and max(scores) < _MOST_INSIDE:
+        feet = feet_on_floor(piece, around.views, around.cameras, around.floor)
+        inferred = infer_grid(piece.cells, feet)
+        if inferred is not None:
+            moved = np.column_stack([inferred[0], np.full(len(given), around.middle)])
+            how = f"taken with a grid of {inferred[1]}, by where the boxes stand,"
+            candidates.append((how, moved))
+            scores.append(around.share(steps[compared], moved[compared]))
+    best = int(np.argmax(scores))
+    if scores[best] < max(scores[0] + _CLEARLY, _MOST_INSIDE):
+        best = 0
+    how, moved = candidates[best]
+    name = piece.source.name
+    sentences = [piece.left_out] if piece.left_out else []
+    if around.contradict(scores[best], steps[compared], moved[compared]):
+        sentences.append(
+            f"{name}: {100 * scores[best]:.0f} % of its places lie in boxes; its origin, axes, "
+            "grid, unit or frame numbers may be others than the calibration's and the boxes'"
+        )
+    if best:
+        sentences.append(
+            f"{name}: {how} so that {100 * scores[best]:.0f} % of its places lie in boxes "
+            f"({100 * scores[0]:.0f} % as it is)"
+        )
+    return moved, sentences
 
 
 def in_gaps(gap: int) -> str:
@@ -161,18 +193,6 @@ def _ways(
             words = [f"read in {unit}"] if unit != units[0] else []
             words += [f"turned by {90 * turn}°"] if turn else []
             yield METRES[unit], yaw @ own, " and ".join(words)
-
-
-def _moved(
-    given: Float[ndarray, "G 3"],
-    on_floor: ndarray,
-    factor: float,
-    turn: Float[ndarray, "3 3"],
-    middle: float,
-) -> Float[ndarray, "G 3"]:
-    moved = factor * given @ turn.T
-    moved[on_floor, 2] = middle
-    return np.asarray(moved)
 
 
 def _overlap(steps: Sequence[ndarray], ids: Sequence[ndarray]) -> bool:
