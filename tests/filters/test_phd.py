@@ -27,6 +27,7 @@ from tracker.kernels import gating
 from tracker.kernels import kalman as update_kernels
 from tracker.kernels.gating import Measurements
 from tracker.kernels.kalman import Expected
+from tracker.kernels.lens import project_points
 
 seeds = st.integers(0, 2**32 - 1)
 DIMENSIONS = (1, 2, 4, 6)
@@ -280,11 +281,11 @@ def test_one_sure_target_before_a_camera_is_the_extended_kalman_filter() -> None
         oracle.predict()
         oracle.update(
             z,
-            HJacobian=lambda x: camera.project_with_jacobian(x[None]).jacobians[0],
+            HJacobian=lambda x: project_points(x[None], camera.calibration, True).jacobians[0],
             Hx=lambda x: camera.project(x[None])[0][0],
         )
         mixture = gaussian_mixture.predict(mixture, np.eye(3), noise, 1.0)
-        drawn = camera.project_with_jacobian(mixture.means)
+        drawn = project_points(mixture.means, camera.calibration, True)
         updated = phd.update(
             mixture,
             z[None],

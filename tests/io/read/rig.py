@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -88,3 +89,16 @@ def assert_same(raw: RawCamera, camera: Camera, tolerance: float = 1e-9) -> None
         np.testing.assert_allclose(
             getattr(found, name), getattr(camera, name), rtol=tolerance, atol=tolerance
         )
+
+
+def assert_cameras(
+    found: Iterable[RawCamera],
+    expected: Iterable[Camera],
+    tolerance: float = 1e-9,
+    *,
+    named: bool = True,
+) -> None:
+    """As many cameras as expected are the same, also by their names unless these are no matter."""
+    for raw, camera in zip(found, expected, strict=True):
+        assert raw.name == camera.name or not named
+        assert_same(raw, camera, tolerance)
