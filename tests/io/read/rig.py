@@ -10,7 +10,7 @@ from numpy import ndarray
 
 from tracker.geometry.camera import Camera
 from tracker.io.conventions.reading import Reading, to_camera
-from tracker.io.read.pieces import METRES, CalibrationPiece, Piece, RawCamera
+from tracker.io.read.pieces import METRES, CalibrationPiece, DetectionPiece, Piece, RawCamera
 from tracker.io.read.registry import recognise
 from tracker.io.read.source import SourceFile
 
@@ -67,6 +67,17 @@ def read(path: Path, *series: Path) -> tuple[str, list[Piece]]:
     found, _, complaint = recognise(file)
     assert found is not None, complaint
     return found.NAME, list(found.read(file))
+
+
+def boxes_in(path: Path, *series: Path) -> list[DetectionPiece]:
+    """The boxes of a file, a piece a camera."""
+    return [piece for piece in read(path, *series)[1] if isinstance(piece, DetectionPiece)]
+
+
+def boxes_of_one(path: Path, *series: Path) -> DetectionPiece:
+    """The boxes of a file of one camera."""
+    (piece,) = boxes_in(path, *series)
+    return piece
 
 
 def raw_cameras(path: Path) -> tuple[RawCamera, ...]:
