@@ -33,9 +33,9 @@ def import_files(command: Import) -> int:
     options = options_of(command)
     from tracker.io.conventions.questions import Undecided, Unexplained
     from tracker.io.importing.arriving import gather_whole
+    from tracker.io.importing.gathering import file_uses
     from tracker.io.importing.remedies import for_import, unsaid
     from tracker.io.importing.settling import settle
-    from tracker.io.importing.usage import file_uses
     from tracker.io.importing.writing import write
     from tracker.sequences import library
     from tracker.sequences.reader import FILE

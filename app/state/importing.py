@@ -600,9 +600,8 @@ class Draft:
         place: Path,
         then: Callable[[Path], object],
     ) -> None:
-        from tracker.io.importing.bringing import copy_links, links_in
         from tracker.io.importing.settling import settle
-        from tracker.io.importing.writing import write
+        from tracker.io.importing.writing import copy_links, links_in, write
 
         try:
             # what was wished last may not have been looked into yet

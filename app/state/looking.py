@@ -20,9 +20,9 @@ from tracker.io.checks.synchronisation import CameraOffset, synchronise
 from tracker.io.checks.timing import check_counting, check_time
 from tracker.io.checks.truth import check_truth
 from tracker.io.conventions.judge import EVERY_ORDER
-from tracker.io.importing.preview import as_sequence
 from tracker.io.importing.remedies import for_import
 from tracker.io.importing.settling import ImportPlan
+from tracker.io.importing.writing import as_sequence
 from tracker.parameters.catalogue import METHODS
 from tracker.runs.fitting import default_parameters, unfit_methods
 from tracker.runs.pipeline import Cancelled, compute

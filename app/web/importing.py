@@ -38,9 +38,9 @@ from tracker.io.checks import Check, Status
 from tracker.io.checks.synchronisation import CameraOffset
 from tracker.io.conventions.questions import Part
 from tracker.io.importing.finding.angles import open_turns, product_in_words, turns_in_words
+from tracker.io.importing.gathering import FileUse, file_uses
 from tracker.io.importing.options import ImportOptions
 from tracker.io.importing.remedies import unsaid
-from tracker.io.importing.usage import FileUse, file_uses
 from tracker.io.read.pieces import CalibrationPiece, DetectionPiece, FormatError
 from tracker.parameters.catalogue import RunParameters
 from tracker.parameters.values import ParameterError, with_values

@@ -10,14 +10,70 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from hypothesis.strategies import SearchStrategy
 
-from tests.bad_input import strategies
 from tests.bad_input.cases import make_bases, try_case
-from tests.bad_input.drawing import Damage
+from tests.bad_input.drawing import CONTENTS, KINDS, NUMBERS, WORDS, Damage
 from tests.synthetic import write_sequence
 from tracker.sequences.csv_columns import read_columns
 from tracker.sequences.errors import SequenceError
 from tracker.sequences.reader import FILE, read_sequence, read_summary
+
+BASES = ("boxes", "videos", "images", "bare")
+
+
+def damages() -> SearchStrategy[list[Damage]]:
+    """What is done to a folder."""
+    part = st.floats(0.0, 1.0, exclude_max=True)
+    what = st.integers(0, max(len(NUMBERS), len(WORDS), len(CONTENTS), 64) * 8)
+    return st.lists(
+        st.builds(Damage, kind=st.sampled_from(list(KINDS)), file=part, place=part, what=what),
+        min_size=1,
+        max_size=4,
+    )
+
+
+def folders() -> SearchStrategy[tuple[str, list[Damage]]]:
+    """A good folder by its name, and what is done to it."""
+    return st.tuples(st.sampled_from(BASES), damages())
+
+
+def cells() -> SearchStrategy[str]:
+    """A cell of a table: mostly a number, in any notation."""
+    numbers = st.one_of(
+        st.floats().map(repr), st.integers().map(str), st.sampled_from(NUMBERS[:-3])
+    )
+    return st.one_of(numbers, numbers, st.text(max_size=12), st.just(""))
+
+
+def tables(*columns: str) -> SearchStrategy[str]:
+    """A CSV file with about these columns."""
+    header = st.lists(st.sampled_from((*columns, "id", "other")), min_size=1, max_size=8)
+    whole = st.one_of(st.just(list(columns)), header)
+    rows = st.lists(st.lists(cells(), min_size=0, max_size=8), max_size=12)
+    ends = st.sampled_from(("\n", "\r\n", "\n\n"))
+
+    def text(parts: tuple[list[str], list[list[str]], str]) -> str:
+        names, lines, end = parts
+        return end.join([",".join(names), *(",".join(line) for line in lines)])
+
+    return st.tuples(whole, rows, ends).map(text)
+
+
+def toml_values() -> SearchStrategy[str]:
+    """A value as TOML has it, of any type and depth."""
+    leaves = st.one_of(
+        st.sampled_from((*NUMBERS, *WORDS)),
+        st.floats(allow_nan=False, allow_infinity=False).map(repr),
+        st.integers().map(str),
+        st.text(max_size=20).map(lambda text: '"' + text.replace('"', "").replace("\\", "") + '"'),
+    )
+    return st.recursive(
+        leaves,
+        lambda inner: st.lists(inner, max_size=4).map(lambda some: f"[{', '.join(some)}]"),
+        max_leaves=12,
+    )
+
 
 CORPUS: list[dict[str, Any]] = json.loads(
     Path(__file__).with_name("corpus.json").read_text(encoding="utf-8")
@@ -36,7 +92,7 @@ def bases(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 
 @pytest.mark.full
-@pytest.mark.parametrize("base", strategies.BASES)
+@pytest.mark.parametrize("base", BASES)
 def test_a_good_folder_runs(bases: dict[str, Path], tmp_path: Path, base: str) -> None:
     assert try_case(bases[base], [], tmp_path) == ""
 
@@ -47,7 +103,7 @@ def test_what_fell_once_stands(bases: dict[str, Path], tmp_path: Path, case: Any
     try_case(bases[case["base"]], [Damage(**one) for one in case["damages"]], tmp_path)
 
 
-@given(case=strategies.folders())
+@given(case=folders())
 @QUICK
 def test_any_damage_leads_to_a_sentence(
     bases: dict[str, Path], tmp_path: Path, case: tuple[str, list[Damage]]
@@ -56,7 +112,7 @@ def test_any_damage_leads_to_a_sentence(
     try_case(bases[base], damages, tmp_path)
 
 
-@given(text=strategies.tables("frame", "left", "top", "width", "height", "score"))
+@given(text=tables("frame", "left", "top", "width", "height", "score"))
 @settings(QUICK, max_examples=150)
 def test_any_table_is_read_or_refused(tmp_path: Path, text: str) -> None:
     path = tmp_path / "case.csv"
@@ -69,7 +125,7 @@ def test_any_table_is_read_or_refused(tmp_path: Path, text: str) -> None:
     assert told is None or told.startswith("case.csv, line ")
 
 
-@given(value=strategies.toml_values(), field=st.integers(0, 11))
+@given(value=toml_values(), field=st.integers(0, 11))
 @settings(QUICK, max_examples=100)
 def test_any_value_of_any_field_is_read_or_refused(tmp_path: Path, value: str, field: int) -> None:
     folder = tmp_path / "case"

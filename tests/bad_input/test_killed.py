@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import json
 import multiprocessing
 import os
 import sys
@@ -15,6 +16,7 @@ from random import Random
 
 import pytest
 
+from tests.bad_input import faults
 from tests.bad_input.writes import KINDS, Kind
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="there is no such signal")
@@ -68,3 +70,17 @@ def test_what_was_confirmed_survives_a_kill_at_any_instant(
         assert last <= newest <= last + 1, f"kill {kill}: {last} was confirmed, {newest} is there"
     kind.write(folder, newest + 1)  # and it goes on
     assert kind.newest(folder) == newest + 1
+
+
+@pytest.mark.full
+@pytest.mark.skipif(sys.platform == "win32", reason="there are no such signals and mounts")
+def test_nothing_is_lost_and_trials_go_on_where_they_ended(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "trials.jsonl"
+    for trials in (2, 5):
+        arguments = ["faults", str(file), "--trials", str(trials), "--seed", "7"]
+        monkeypatch.setattr(sys, "argv", arguments)
+        assert faults.main() == 0, file.read_text()
+        told = [json.loads(line) for line in file.read_text().splitlines()]
+        assert [one["trial"] for one in told] == list(range(trials))

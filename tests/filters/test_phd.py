@@ -38,9 +38,9 @@ from tests.filters.mixtures import (
 )
 from tracker.filters import gaussian_mixture, phd
 from tracker.filters.gaussian_mixture import GaussianMixture
-from tracker.kernels import kalman
 from tracker.kernels import kalman as update_kernels
 from tracker.kernels.kalman import Expected, Measurements
+from tracker.kernels.lens import project_points
 
 seeds = st.integers(0, 2**32 - 1)
 DIMENSIONS = (1, 2, 4, 6)
@@ -136,7 +136,7 @@ def test_the_gate_bounds_the_squared_mahalanobis_distance(
     on_gate = np.linalg.cholesky(own[0] + noise[0]) @ direction / np.linalg.norm(direction)
     factors = np.sqrt(gate * np.array([1.0 - 1e-6, 1.0 + 1e-6]))
     expected = rng.normal(size=(1, size))
-    pairs = kalman.gated_pairs(
+    pairs = update_kernels.gated_pairs(
         expected,
         Measurements(
             expected + factors[:, None] * on_gate, noise if shared else noise.repeat(2, 0)
@@ -294,11 +294,11 @@ def test_one_sure_target_before_a_camera_is_the_extended_kalman_filter() -> None
         oracle.predict()
         oracle.update(
             z,
-            HJacobian=lambda x: camera.project_with_jacobian(x[None]).jacobians[0],
+            HJacobian=lambda x: project_points(x[None], camera.calibration, True).jacobians[0],
             Hx=lambda x: camera.project(x[None])[0][0],
         )
         mixture = gaussian_mixture.predict(mixture, np.eye(3), noise, 1.0)
-        drawn = camera.project_with_jacobian(mixture.means)
+        drawn = project_points(mixture.means, camera.calibration, True)
         updated = phd.update(
             mixture,
             z[None],

@@ -20,8 +20,8 @@ from tests.io.folders import MOST_FRAMES, Known, judge, make_folder
 from tracker.io.checks import check
 from tracker.io.conventions.questions import OF_ONE, OF_TWO, UNPROVEN
 from tracker.io.importing.gathering import gather
-from tracker.io.importing.preview import as_sequence
 from tracker.io.importing.settling import settle
+from tracker.io.importing.writing import as_sequence
 from tracker.io.read.pieces import FormatError
 
 OUTCOMES = ("right", "asked", "refused", "warned", "silent")

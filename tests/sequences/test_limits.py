@@ -13,14 +13,14 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from tracker.files.text import shown
 from tracker.sequences import csv_columns
-from tracker.sequences.calibration import POSE, check_view_of_room, read_camera
 from tracker.sequences.clock import Clock, read_timing
 from tracker.sequences.csv_columns import Columns, guarded, read_columns, unguarded
 from tracker.sequences.errors import SequenceError
 from tracker.sequences.fields import Fields, did_you_mean, is_number, listed
 from tracker.sequences.sequence import Room, View
 from tracker.sequences.tables import BoxTable, truth_of
-from tracker.sequences.writing.taught_fields import read_room, read_templates
+from tracker.sequences.views import POSE, check_view_of_room, read_camera
+from tracker.sequences.writing.teaching import read_room, read_templates
 
 EYE = np.eye(3).tolist()
 K = [[500.0, 0.0, 99.5], [0.0, 500.0, 79.5], [0.0, 0.0, 1.0]]

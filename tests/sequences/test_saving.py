@@ -21,7 +21,7 @@ from tracker.sequences.errors import SequenceError
 from tracker.sequences.reader import FILE, read_sequence
 from tracker.sequences.sequence import Sequence
 from tracker.sequences.writing import saving
-from tracker.sequences.writing.rewriting import rewritten, taught_in
+from tracker.sequences.writing.saving import rewritten, taught_in
 from tracker.sequences.writing.teaching import Values, changes, taught_values, with_taught
 
 Edit = Callable[[Values], Any]

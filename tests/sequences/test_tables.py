@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
-import numpy as np
+from pathlib import Path
 
+import numpy as np
+from numpy import ndarray
+
+from tests.synthetic import write_sequence
+from tracker.sequences.reader import read_sequence
 from tracker.sequences.tables import regular_gap
 
 
@@ -16,3 +21,39 @@ def test_a_gap_between_frames_is_decided_at_a_thousand_to_one() -> None:
     assert regular_gap(np.append(even, 101)) == 1
     assert regular_gap(10 * np.arange(5)) == 10
     assert regular_gap(np.array([3, 90])) == 1
+
+
+FRAMES = 8
+
+
+def folder_with(folder: Path, first: ndarray, second: ndarray | None = None) -> Path:
+    write_sequence(folder, frames=FRAMES, container=None, detections=True)
+    path = folder / "sequence.toml"
+    text = path.read_text(encoding="utf-8")
+    for name, values in (("cam1", first), ("cam2", second)):
+        if values is not None:
+            np.save(folder / f"{name}.npy", values)
+            line = f'detections = "{name}.csv"'
+            text = text.replace(line, f'{line}\nappearance = "{name}.npy"')
+    path.write_text(text, encoding="utf-8")
+    return folder
+
+
+def test_vectors_have_the_order_of_the_table_and_the_length_one(tmp_path: Path) -> None:
+    values = np.random.default_rng(0).normal(size=(FRAMES, 6)).astype(np.float32)
+    values[3] = 0.0
+    folder = folder_with(tmp_path / "room", values, 1e300 * values.astype(float))
+    lines = (folder / "cam1.csv").read_text(encoding="utf-8").splitlines()
+    rows = [*lines[1:][::-1], "2,,,,,"]  # the last row first, and one that is no box
+    (folder / "cam1.csv").write_text("\n".join([lines[0], *rows]) + "\n", encoding="utf-8")
+    np.save(folder / "cam1.npy", np.concatenate([values[::-1], values[:1]]))
+    for view in read_sequence(folder).views:
+        own = view.detections
+        assert own is not None
+        assert own.embeddings.shape == (FRAMES, 6)
+        expected = values / np.maximum(np.linalg.norm(values, axis=1, keepdims=True), 1e-9)
+        np.testing.assert_allclose(own.embeddings, expected, atol=1e-3)
+    key = read_sequence(folder).digest
+    np.save(folder / "cam1.npy", np.concatenate([values, values[:1], values[:0]])[:, :5])
+    np.save(folder / "cam2.npy", values[:, :5])
+    assert read_sequence(folder).digest != key

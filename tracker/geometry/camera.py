@@ -19,7 +19,7 @@ from jaxtyping import Bool, Float
 from numpy import ndarray
 
 from tracker.kernels import lens
-from tracker.kernels.lens import Calibration, Calibrations, Projection
+from tracker.kernels.lens import Calibration, Calibrations
 
 NEAREST_DEPTH = 0.05
 """Depth below which a point counts as behind the camera, metres."""
@@ -150,16 +150,9 @@ class Camera:
         Points behind the camera, and points so far aside that the lens model is not valid
         (:attr:`largest_radius`), result in NaN and False.
         """
-        projection = self._project(points, with_jacobian=False)
-        return projection.pixels, projection.valid
-
-    def project_with_jacobian(self, points: Float[ndarray, "N 3"]) -> Projection:
-        """Project world points, with d pixel / d world (pixels per metre) and their validity."""
-        return self._project(points, with_jacobian=True)
-
-    def _project(self, points: Float[ndarray, "N 3"], *, with_jacobian: bool) -> Projection:
         places = np.ascontiguousarray(points, dtype=float)
-        return lens.project_points(places, self.calibration, with_jacobian)
+        projection = lens.project_points(places, self.calibration, False)
+        return projection.pixels, projection.valid
 
     def back_project(self, pixels: Float[ndarray, "N 2"]) -> Float[ndarray, "N 3"]:
         """The unit directions, in world axes, of the rays from :attr:`centre` through the pixels.

@@ -14,14 +14,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tracker.files.text import not_utf_8, shown
-from tracker.sequences.calibration import check_view_of_room
 from tracker.sequences.errors import SequenceError
 from tracker.sequences.fields import LARGEST_COUNT, LONGEST_NAME, Fields, did_you_mean
 from tracker.sequences.filling import check_missing, find_room, find_time
 from tracker.sequences.sequence import FileState, Sequence
 from tracker.sequences.tables import OpenedFiles, read_ground_truth
-from tracker.sequences.views import CAMERA, read_sources, read_views
-from tracker.sequences.writing.taught_fields import read_room, read_target, read_templates
+from tracker.sequences.views import CAMERA, check_view_of_room, read_sources, read_views
+from tracker.sequences.writing.teaching import read_room, read_target, read_templates
 
 FILE = "sequence.toml"
 FORMAT = 1

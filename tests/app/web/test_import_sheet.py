@@ -12,7 +12,7 @@ from starlette.testclient import TestClient
 from app.web.importing import FIELDS, on_page
 from tests.app.conftest import wait_until
 from tests.app.web.test_importing import _send, _settled, _wish, client, data, files, toml
-from tests.io.importing.test_strangers import BOXES
+from tests.io.importing.test_left_out import BOXES
 from tracker.sequences.reader import read_sequence
 
 __all__ = ["client", "data", "files"]

@@ -17,7 +17,7 @@ from tests.app.conftest import ADDRESS, run_is, wait_until
 from tests.io.importing.test_angles import lay_out
 from tests.io.read.recorded import PLACES, detections, settled_of, toml, videos
 from tracker.io.checks.truth import check_truth
-from tracker.io.importing import bringing
+from tracker.io.importing import writing
 from tracker.io.importing.writing import write
 from tracker.runs.pipeline import Cancelled
 from tracker.sequences.reader import read_sequence
@@ -268,13 +268,13 @@ def test_a_recording_is_open_before_its_copies_are_there(
     inside = files.rename(data / "walk")
     videos(inside, size=(320, 180), frames=60)
     held = threading.Event()
-    copy = bringing._copy
+    copy = writing._copy
 
     def slowly(*arguments: Any) -> None:
         assert held.wait(60.0)
         copy(*arguments)
 
-    monkeypatch.setattr(bringing, "_copy", slowly)
+    monkeypatch.setattr(writing, "_copy", slowly)
     begun = client.post("/api/import/path", json={"path": "walk"}).json()["draft"]
     info = _wish(client, _settled(client, begun["key"]), copy_files=True)
     client.post(f"/api/import/{info['key']}/write", json={})
@@ -303,7 +303,7 @@ def test_copying_can_be_stopped(client: TestClient, files: Path, data: Path) -> 
     folder = data / "taken"
     settled = settled_of(inside)
     write(settled, folder, "taken")
-    assert len(bringing.links_in(folder)) == 4
+    assert len(writing.links_in(folder)) == 4
     calls = []
 
     def stop(more: int) -> None:
@@ -312,8 +312,8 @@ def test_copying_can_be_stopped(client: TestClient, files: Path, data: Path) -> 
             raise Cancelled
 
     with pytest.raises(Cancelled):
-        bringing.copy_links(folder, stop)
-    assert len(bringing.links_in(folder)) == 3
+        writing.copy_links(folder, stop)
+    assert len(writing.links_in(folder)) == 3
     assert sorted(path.name for path in folder.glob("*.avi")) == [
         f"cam{k}.avi" for k in (1, 2, 3, 4)
     ]

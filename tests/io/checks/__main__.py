@@ -28,8 +28,8 @@ from tests.random_rooms import random_room
 from tracker.io.checks import check
 from tracker.io.checks.synchronisation import synchronise
 from tracker.io.importing.gathering import gather
-from tracker.io.importing.preview import as_sequence
 from tracker.io.importing.settling import settle
+from tracker.io.importing.writing import as_sequence
 from tracker.sequences.library import open_sequence
 from tracker.sequences.sequence import Sequence
 

@@ -14,8 +14,7 @@ from tests.conftest import short
 from tests.random_rooms import looking_camera, random_room, random_walkers
 from tracker.geometry.camera import Camera
 from tracker.io.checks import check
-from tracker.io.checks.offsets import solve
-from tracker.io.checks.synchronisation import LEAST_GAIN, CameraOffset, synchronise
+from tracker.io.checks.synchronisation import LEAST_GAIN, CameraOffset, solve, synchronise
 from tracker.sequences.sequence import Detections, Room, Sequence, View
 
 STEPS = [-25.0, -7.0, -0.5, 0.0, 0.5, 3.0, 12.0, 40.0]

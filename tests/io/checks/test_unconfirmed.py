@@ -16,9 +16,8 @@ from tests.random_rooms import random_room
 from tracker.io.checks import check
 from tracker.io.conventions.search import find_reading
 from tracker.io.importing.gathering import gather
-from tracker.io.importing.preview import as_sequence
 from tracker.io.importing.settling import settle
-from tracker.io.importing.writing import write
+from tracker.io.importing.writing import as_sequence, write
 from tracker.sequences.reader import read_sequence
 
 SAME = "every camera agrees with another"

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy import ndarray
 
 from tests.io.read.rig import cameras
-from tracker.io.importing.finding.grids import feet_on_floor, infer_grid
+from tracker.io.importing.finding.truths import feet_on_floor, infer_grid
 from tracker.io.read.pieces import Grid, TruthPiece
 
 

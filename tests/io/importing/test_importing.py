@@ -9,9 +9,19 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from numpy import ndarray
 
 from app.command.main import main
-from tests.io.read.recorded import PLACES, detections, settled_of, toml, videos
+from tests.io.read.recorded import (
+    HEAD,
+    PLACES,
+    assert_boxes,
+    detections,
+    settled_of,
+    table,
+    toml,
+    videos,
+)
 from tests.io.read.rig import FLIP, HALF_EXTENTS, SIZE, boxes, cameras
 from tracker.io.conventions.questions import PARTS
 from tracker.io.importing.finding.names import match, short_names
@@ -20,6 +30,15 @@ from tracker.io.importing.settling import ImportPlan
 from tracker.io.importing.writing import write
 from tracker.io.read.pieces import FormatError
 from tracker.sequences.reader import read_sequence
+
+SIDES = np.array([*SIZE, *SIZE])
+HALF = np.array([0.5, 0.5, 0.0, 0.0])
+"""Of a pixel: parts of the picture count from the corner of its first."""
+
+
+def _middles(ltwh: ndarray) -> ndarray:
+    """The middle and the size of boxes."""
+    return np.hstack([ltwh[:, :2] + ltwh[:, 2:] / 2.0, ltwh[:, 2:]])
 
 
 def _assert_cameras(settled: ImportPlan, tolerance: float = 1e-6) -> None:
@@ -375,21 +394,16 @@ def test_corners_with_y_before_x_are_found_out(tmp_path: Path) -> None:
     settled = settled_of(tmp_path)
     _assert_cameras(settled)
     assert dict(settled.found)["boxes"].startswith("yxyx, since")
-    for view, camera in zip(settled.views, cameras(), strict=True):
+    assert_boxes(settled)
+    for view in settled.views:
         assert view.detections is not None
-        np.testing.assert_allclose(view.detections.boxes, boxes(camera, PLACES)[1], atol=1e-6)
         np.testing.assert_array_equal(view.detections.scores, 0.5)
 
 
 def test_a_camera_that_saw_nobody_does_not_contradict_parts_of_the_picture(tmp_path: Path) -> None:
     toml(tmp_path)
-    for number, camera in enumerate(cameras()):
-        frames, found = boxes(camera, PLACES)
-        found[:, :2] += found[:, 2:] / 2.0 + 0.5
-        found /= np.array([*SIZE, *SIZE])
-        rows = [f"{f},{','.join(map(str, b))}" for f, b in zip(frames, found, strict=True)]
-        lines = ["frame,x,y,w,h", *(rows if number else [])]
-        (tmp_path / f"{camera.name}.csv").write_text("\n".join(lines))
+    detections(tmp_path, head="frame,x,y,w,h", written=lambda ltwh: (_middles(ltwh) + HALF) / SIDES)
+    (tmp_path / "cam1.csv").write_text("frame,x,y,w,h")
     settled = settled_of(tmp_path)
     assert dict(settled.found)["boxes"].startswith("cxcywh, since")
     own = settled.views[1].detections
@@ -400,35 +414,20 @@ def test_a_camera_that_saw_nobody_does_not_contradict_parts_of_the_picture(tmp_p
 @pytest.mark.parametrize("parts", [100, 1000])
 def test_boxes_in_finer_parts_of_the_picture_are_found_out(tmp_path: Path, parts: int) -> None:
     toml(tmp_path)
-    for camera in cameras():
-        frames, found = boxes(camera, PLACES)
-        found[:, :2] += 0.5
-        found *= parts / np.array([*SIZE, *SIZE])
-        rows = [f"{f},{','.join(map(str, b))}" for f, b in zip(frames, found, strict=True)]
-        lines = ["frame,left,top,width,height", *rows]
-        (tmp_path / f"{camera.name}.csv").write_text("\n".join(lines))
+    detections(tmp_path, written=lambda ltwh: (ltwh + HALF) * parts / SIDES)
     settled = settled_of(tmp_path)
     assert dict(settled.found)["boxes"].startswith(PARTS[parts])
-    for view, camera in zip(settled.views, cameras(), strict=True):
-        assert view.detections is not None
-        np.testing.assert_allclose(view.detections.boxes, boxes(camera, PLACES)[1], atol=1e-6)
+    assert_boxes(settled)
 
 
 def test_boxes_by_their_middle_are_found_out(tmp_path: Path) -> None:
     """``x, y, w, h`` are Ultralytics' and Roboflow's names for middle and size."""
     toml(tmp_path)
-    for camera in cameras():
-        frames, found = boxes(camera, PLACES)
-        found[:, :2] += found[:, 2:] / 2.0
-        rows = [f"{f},{','.join(map(str, b))}" for f, b in zip(frames, found, strict=True)]
-        (tmp_path / f"{camera.name}.csv").write_text("\n".join(["frame,x,y,w,h", *rows]))
+    detections(tmp_path, head="frame,x,y,w,h", written=_middles)
     settled = settled_of(tmp_path)
     _assert_cameras(settled)
     assert dict(settled.found)["boxes"].startswith("cxcywh, since")
-    own = settled.views[0].detections
-    assert own is not None
-    _, expected = boxes(cameras()[0], PLACES)
-    np.testing.assert_allclose(own.boxes, expected, atol=1e-6)
+    assert_boxes(settled)
 
 
 def test_parts_of_one_camera_s_video_are_told(tmp_path: Path) -> None:
@@ -509,12 +508,8 @@ def _pictures_by_number(folder: Path, numbers: list[int]) -> None:
         for number in numbers[:PICTURES]:
             cv2.imwrite(str(own / f"{number}.png"), np.zeros((SIZE[1], SIZE[0]), np.uint8))
         frames, found = boxes(camera, PLACES)
-        rows = [
-            f"{camera.name}/{numbers[f]}.png,{','.join(map(str, box))}"
-            for f, box in zip(frames, found.tolist(), strict=True)
-        ]
-        path = folder / f"{camera.name}.csv"
-        path.write_text("\n".join(["image,left,top,width,height", *rows]))
+        names = [f"{camera.name}/{numbers[f]}.png" for f in frames]
+        table(folder / f"{camera.name}.csv", names, found, HEAD.replace("frame", "image"))
 
 
 @pytest.mark.parametrize("every", [10, 40])
@@ -525,11 +520,7 @@ def test_boxes_that_name_pictures_are_of_these(tmp_path: Path, every: int) -> No
     settled = settled_of(tmp_path, ImportOptions(accept_best=True))
     _assert_cameras(settled)
     assert settled.frames == PICTURES
-    for view, camera in zip(settled.views, cameras(), strict=True):
-        assert view.detections is not None
-        frames, found = boxes(camera, PLACES[:PICTURES])
-        np.testing.assert_array_equal(view.detections.frames, frames)
-        np.testing.assert_allclose(view.detections.boxes, found, atol=1e-6)
+    assert_boxes(settled, PLACES[:PICTURES])
 
 
 @pytest.mark.full
@@ -548,21 +539,14 @@ def test_frames_without_pictures_are_counted_from_the_first(tmp_path: Path) -> N
     settled = settled_of(tmp_path)
     assert settled.frames == len(PLACES)
     assert ("frames", "counted from 10000, the first that any file names") in settled.found
-    for view, camera in zip(settled.views, cameras(), strict=True):
-        assert view.detections is not None
-        np.testing.assert_array_equal(view.detections.frames, boxes(camera, PLACES)[0])
+    assert_boxes(settled)
 
 
 def test_cameras_that_count_from_other_frames_are_refused(tmp_path: Path) -> None:
     toml(tmp_path)
     for number, camera in enumerate(cameras()):
         frames, found = boxes(camera, PLACES)
-        rows = [
-            f"{f + 55 * number},{','.join(map(str, b))}"
-            for f, b in zip(frames.tolist(), found.tolist(), strict=True)
-        ]
-        path = tmp_path / f"{camera.name}.csv"
-        path.write_text("\n".join(["frame,left,top,width,height", *rows]))
+        table(tmp_path / f"{camera.name}.csv", frames + 55 * number, found)
     with pytest.raises(FormatError, match=r"other frames \(cam1 0 … 59, cam2 55 … 114"):
         settled_of(tmp_path)
 
@@ -571,13 +555,10 @@ def _timed(folder: Path, times: list[list[float]], kept: list[int]) -> None:
     """Boxes of each camera with the time of each step, of every so many steps."""
     for camera, own, every in zip(cameras(), times, kept, strict=True):
         frames, found = boxes(camera, PLACES)
-        rows = [
-            f"{own[f]},{','.join(map(str, box))}"
-            for f, box in zip(frames.tolist(), found.tolist(), strict=True)
-            if f % every == 0
-        ]
-        path = folder / f"{camera.name}.csv"
-        path.write_text("\n".join(["time,left,top,width,height", *rows]))
+        rows = frames % every == 0
+        times_of_rows = [own[f] for f in frames[rows]]
+        head = HEAD.replace("frame", "time")
+        table(folder / f"{camera.name}.csv", times_of_rows, found[rows], head)
 
 
 def test_times_of_cameras_with_other_rates_are_steps_of_one(tmp_path: Path) -> None:

@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import json
+import random
+import string
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from tests.conftest import short
+from tests.io.folders import make_folder
 from tests.io.read.recorded import PLACES, detections, settled_of, toml
 from tests.io.read.rig import boxes, cameras, walks
 from tracker.export.calibration import save_calibration
-from tracker.io.importing.gathering import gather
+from tracker.io.importing.gathering import file_uses, gather
 from tracker.io.importing.options import ImportOptions
 from tracker.io.importing.settling import ImportPlan, settle
 from tracker.io.read.pieces import DetectionPiece, FormatError
+from tracker.io.read.source import SourceFile
 
 
 def _coco(folder: Path, *, people: bool) -> ImportPlan:
@@ -204,3 +209,152 @@ def test_a_table_of_which_most_rows_cannot_be_read_is_not_used(tmp_path: Path) -
         settled_of(tmp_path)
     plan = settled_of(tmp_path, ImportOptions(accept_best=True))
     assert [view.camera.name for view in plan.views] == ["cam1", "cam3", "cam4"]
+
+
+CAMERA = """[cam_{n}]
+name = "cam{n}"
+size = [1280, 720]
+matrix = [[900.0, 0.0, 640.0], [0.0, 900.0, 360.0], [0.0, 0.0, 1.0]]
+distortions = [0.0, 0.0, 0.0, 0.0, 0.0]
+rotation = [1.2, {turn}, 0.3]
+translation = [0.0, 0.5, 6.0]
+"""
+
+
+def rows_of(people: str, flag: int) -> str:
+    """MOTChallenge's ground truth of a few frames: of a class, counted or not."""
+    return "".join(f"{k},1,{300 + 4 * k},200,60,180,{flag},{people},1\n" for k in range(1, 40))
+
+
+def recording(folder: Path) -> Path:
+    """Two cameras with annotations that name their classes, and files that nobody reads."""
+    text = "".join(CAMERA.format(n=n, turn=turn) for n, turn in ((1, -0.8), (2, 0.8)))
+    (folder / "calibration.toml").write_text(text)
+    for n in (1, 2):
+        place = folder / f"cam{n}" / "gt"
+        place.mkdir(parents=True)
+        (place / "gt.txt").write_text(rows_of("2", 1))
+        (place / "labels.txt").write_text("car\nperson\n")
+    (folder / "notes.txt").write_text("the door was open\n")
+    stranger = folder / "hall" / "gt"
+    stranger.mkdir(parents=True)
+    (stranger / "gt.txt").write_text(rows_of("1", 1))
+    return folder
+
+
+def test_what_is_read_with_another_file_is_used_where_that_one_is(tmp_path: Path) -> None:
+    taken = gather([recording(tmp_path)])
+    settled = settle(taken, ImportOptions(fps=25.0, accept_best=True))
+    uses = {one.files.label: one for one in file_uses(taken, settled.sources)}
+    assert {label: one.used for label, one in uses.items()} == {
+        "calibration.toml": 1,
+        "cam1/gt/gt.txt": 1,
+        "cam1/gt/labels.txt": 1,
+        "cam2/gt/gt.txt": 1,
+        "cam2/gt/labels.txt": 1,
+        "hall/gt/gt.txt": 0,
+        "notes.txt": 0,
+    }
+    assert uses["cam2/gt/labels.txt"].files.read_with == "cam2/gt/gt.txt"
+    assert uses["notes.txt"].why == "no format that is read"
+    assert any(told.startswith("hall/gt/gt: belongs to no camera") for told in settled.told)
+    # before anything is settled, what was read counts
+    assert sum(one.used for one in file_uses(taken, None)) == 6
+
+
+def test_the_lenses_of_a_model_are_used_with_its_poses(tmp_path: Path) -> None:
+    (tmp_path / "cameras.txt").write_text("1 PINHOLE 640 480 500 500 320 240\n")
+    (tmp_path / "images.txt").write_text(
+        "1 1 0 0 0 0 0 3 1 cam1.jpg\n\n2 0.9 0.1 0.3 0.3 0 0 4 1 cam2.jpg\n\n"
+    )
+    (tmp_path / "points3D.txt").write_text("# nothing\n")
+    uses = {one.files.label: one.used for one in file_uses(gather([tmp_path]), None)}
+    assert uses == {"cameras.txt": 1, "images.txt": 1, "points3D.txt": 0}
+
+
+def test_files_are_counted_not_their_series(tmp_path: Path) -> None:
+    known = make_folder(tmp_path, np.random.default_rng([9, 1]), "none", 40)
+    taken = gather([tmp_path])
+    there = sum(path.is_file() for path in tmp_path.rglob("*"))
+    assert sum(one.count for one in taken) == there
+    options = known.options.model_copy(update={"accept_best": True})
+    uses = file_uses(taken, settle(taken, options).sources)
+    assert sum(one.used for one in uses) == there, [(one.files.label, one.used) for one in uses]
+
+
+BOXES = "frame,left,top,width,height\n" + "".join(f"{k},{300 + k},200,60,180\n" for k in range(40))
+OPTIONS = ImportOptions(fps=25.0, accept_best=True)
+
+
+def calibrated(folder: Path, texts: dict[int, str]) -> Path:
+    """Cameras and their boxes; the text is what a camera has besides its name and size."""
+    text = ""
+    for n, own in texts.items():
+        text += f'[cam_{n}]\nname = "cam{n}"\nsize = [1280, 720]\n{own}'
+        (folder / f"cam{n}.csv").write_text(BOXES)
+    (folder / "calibration.toml").write_text(text)
+    return folder
+
+
+def test_all_files_that_belong_to_no_camera_are_named(tmp_path: Path) -> None:
+    text = "".join(CAMERA.format(n=n, turn=n) for n in (1, 2, 3))
+    (tmp_path / "calibration.toml").write_text(text)
+    for name in ("x", "y"):
+        (tmp_path / f"{name}.csv").write_text(BOXES)
+    with pytest.raises(FormatError) as refusal:
+        settle(gather([tmp_path]), OPTIONS)
+    words = "x, y: belong to no camera of the calibration (cam1, cam2, cam3); --camera NAME=FILE"
+    assert words in str(refusal.value)
+
+
+def test_a_camera_that_is_calibrated_in_part_lacks_what_it_lacks(tmp_path: Path) -> None:
+    lens = "".join(CAMERA.format(n=0, turn=1).splitlines(keepends=True)[3:5])
+    pose = "rotation = [1.2, {turn}, 0.3]\ntranslation = [0.0, 0.5, 6.0]\n"
+    whole = {n: lens + pose.format(turn=turn) for n, turn in ((1, -0.8), (2, 0.8))}
+    plan = settle(gather([calibrated(tmp_path, {**whole, 3: lens, 4: lens})]), OPTIONS)
+    (words,) = (told for told in plan.told if "unlike the others" in told)
+    assert "cam3, cam4: no pose, unlike the others" in words
+    assert "lens" not in words
+
+
+def _strange(folder: Path, count: int, ending: str) -> None:
+    folder.mkdir(exist_ok=True)
+    some = random.Random(7)
+    for _ in range(count):
+        name = "".join(some.choices(string.ascii_lowercase, k=10))
+        (folder / f"{name}{ending}").write_text("nobody knows what this is, or means\n")
+
+
+def test_of_a_crowd_that_nobody_knows_most_are_not_opened(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _strange(tmp_path / "notes", 700, ".txt")
+    toml(tmp_path)
+    detections(tmp_path)
+    # between them in the order of names, but of another size
+    (tmp_path / "notes" / "mm.txt").write_text("frame,left,top,width,height\n" + "1,2,3,4,5\n" * 9)
+    opened: list[str] = []
+    head = SourceFile.head.func
+    monkeypatch.setattr(
+        SourceFile, "head", property(lambda own: opened.append(own.where) or head(own))
+    )
+    taken = gather([tmp_path])
+    known = [one.label for one in taken if one.pieces]
+    assert "notes/mm.txt" in known
+    assert len(known) == len({*known}) >= 3
+    assert len({name for name in opened if name.startswith("notes/")}) == 201
+    (told,) = (one for one in taken if "not opened" in one.complaint)
+    assert told.label == "notes/….txt (500)"
+    assert told.complaint.endswith(
+        "200 of these files are of no format that is read, so 500 more of like size were not "
+        "opened; name those that are wanted"
+    )
+
+
+def test_where_one_of_them_is_known_all_are_opened(tmp_path: Path) -> None:
+    _strange(tmp_path / "notes", 300, ".txt")
+    (tmp_path / "notes" / "aa.txt").write_text(
+        "frame,left,top,width,height\n0,2,3,4,5\n1,2,3,4,5\n"
+    )
+    taken = gather([tmp_path])
+    assert len(taken) == 301

@@ -7,21 +7,21 @@ from typing import Literal, get_args
 
 import numpy as np
 import pytest
+from numpy import ndarray
 
 from app.command.arguments import Import
 from app.command.flags import parse
 from app.command.importing import options_of
 from app.command.main import main
 from tests.conftest import short
-from tests.io.read.recorded import PLACES, detections, settled_of, toml, videos
-from tests.io.read.rig import SIZE, boxes, cameras
+from tests.io.read.recorded import assert_boxes, detections, settled_of, toml, videos
+from tests.io.read.rig import SIZE, cameras
 from tracker.io.checks import check
 from tracker.io.conventions.questions import Undecided, Unexplained
 from tracker.io.importing.gathering import gather
 from tracker.io.importing.options import ImportOptions
-from tracker.io.importing.preview import as_sequence
 from tracker.io.importing.remedies import for_import
-from tracker.io.importing.writing import write
+from tracker.io.importing.writing import as_sequence, write
 from tracker.io.read.pieces import FormatError, Unit, Up
 from tracker.sequences.finding import Remedy
 from tracker.sequences.reader import read_sequence
@@ -77,28 +77,20 @@ def test_files_that_are_matched_by_order_are_named_with_their_cameras(tmp_path: 
 
 def test_boxes_as_parts_of_the_picture_are_read_where_it_is_told(tmp_path: Path) -> None:
     toml(tmp_path)
-    for camera in cameras():
-        frames, found = boxes(camera, PLACES)
-        parts = (found + np.array([0.5, 0.5, 0.0, 0.0])) / np.array([*SIZE, *SIZE])
-        rows = [f"{f},{','.join(map(str, b))}" for f, b in zip(frames, parts.tolist(), strict=True)]
-        (tmp_path / f"{camera.name}.csv").write_text(
-            "\n".join(["frame,left,top,width,height", *rows])
-        )
-    options = ImportOptions(boxes="ltwh", normalised=True)
-    view = settled_of(tmp_path, options).views[0]
-    assert view.detections is not None
-    np.testing.assert_allclose(view.detections.boxes, boxes(cameras()[0], PLACES)[1], atol=1e-6)
+    half, sides = np.array([0.5, 0.5, 0.0, 0.0]), np.array([*SIZE, *SIZE])
+    detections(tmp_path, written=lambda ltwh: (ltwh + half) / sides)
+    assert_boxes(settled_of(tmp_path, ImportOptions(boxes="ltwh", normalised=True)))
 
 
 def test_parts_of_the_picture_may_reach_beyond_it(tmp_path: Path) -> None:
     toml(tmp_path)
-    for camera in cameras():
-        frames, found = boxes(camera, PLACES)
+
+    def parts(found: ndarray) -> ndarray:
         found[::50, 3] += 2.0 * SIZE[1]  # drawn on below the picture
         corners = np.hstack([found[:, :2], found[:, :2] + found[:, 2:]])
-        parts = (corners + 0.5) / np.array([*SIZE, *SIZE])
-        rows = [f"{f},{','.join(map(str, b))}" for f, b in zip(frames, parts.tolist(), strict=True)]
-        (tmp_path / f"{camera.name}.csv").write_text("\n".join(["frame,x1,y1,x2,y2", *rows]))
+        return (corners + 0.5) / np.array([*SIZE, *SIZE])
+
+    detections(tmp_path, head="frame,x1,y1,x2,y2", written=parts)
     for view in settled_of(tmp_path).views:
         assert view.detections is not None
         assert np.median(view.detections.boxes[:, 3]) > 50.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import cv2
@@ -15,6 +16,7 @@ from tracker.io.importing.options import ImportOptions
 from tracker.io.importing.settling import ImportPlan, settle
 
 PLACES = walks()
+HEAD = "frame,left,top,width,height"
 
 
 def toml(folder: Path, *, scale: float = 1.0, size: tuple[int, int] = SIZE) -> None:
@@ -31,18 +33,35 @@ def toml(folder: Path, *, scale: float = 1.0, size: tuple[int, int] = SIZE) -> N
     (folder / "calibration.toml").write_text("\n".join(lines))
 
 
+def table(path: Path, frames: Iterable[object], found: ndarray, head: str = HEAD) -> None:
+    """Write the frame of each row, or what else tells it, and the four numbers of a box."""
+    rows = [f"{f},{','.join(map(str, b))}" for f, b in zip(frames, found.tolist(), strict=True)]
+    path.write_text("\n".join([head, *rows]))
+
+
 def detections(
-    folder: Path, first: int = 0, *, size: tuple[int, int] = SIZE, places: ndarray = PLACES
+    folder: Path,
+    first: int = 0,
+    *,
+    size: tuple[int, int] = SIZE,
+    places: ndarray = PLACES,
+    head: str = HEAD,
+    written: Callable[[ndarray], ndarray] = np.asarray,
 ) -> None:
+    """Write the boxes of all cameras, their four numbers as a function makes them of ltwh."""
     for camera in cameras():
         frames, found = boxes(camera, places)
         found = found * np.tile(np.array(size) / SIZE, 2)
-        rows = [
-            f"{f + first},{','.join(map(str, b))}"
-            for f, b in zip(frames, found.tolist(), strict=True)
-        ]
-        path = folder / f"{camera.name}.csv"
-        path.write_text("\n".join(["frame,left,top,width,height", *rows]))
+        table(folder / f"{camera.name}.csv", frames + first, written(found), head)
+
+
+def assert_boxes(plan: ImportPlan, places: ndarray = PLACES, tolerance: float = 1e-6) -> None:
+    """Each camera has its boxes at their frames."""
+    for view, camera in zip(plan.views, cameras(), strict=True):
+        assert view.detections is not None
+        frames, found = boxes(camera, places)
+        np.testing.assert_array_equal(view.detections.frames, frames)
+        np.testing.assert_allclose(view.detections.boxes, found, atol=tolerance)
 
 
 def videos(folder: Path, size: tuple[int, int] = SIZE, frames: int = 60) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ from numpy import ndarray
 
 from tracker.geometry.camera import Camera
 from tracker.io.conventions.reading import Reading, to_camera
-from tracker.io.read.pieces import METRES, CalibrationPiece, Piece, RawCamera
+from tracker.io.read.pieces import METRES, CalibrationPiece, DetectionPiece, Piece, RawCamera
 from tracker.io.read.registry import recognise
 from tracker.io.read.source import SourceFile
 
@@ -68,6 +69,17 @@ def read(path: Path, *series: Path) -> tuple[str, list[Piece]]:
     return found.NAME, list(found.read(file))
 
 
+def boxes_in(path: Path, *series: Path) -> list[DetectionPiece]:
+    """The boxes of a file, a piece a camera."""
+    return [piece for piece in read(path, *series)[1] if isinstance(piece, DetectionPiece)]
+
+
+def boxes_of_one(path: Path, *series: Path) -> DetectionPiece:
+    """The boxes of a file of one camera."""
+    (piece,) = boxes_in(path, *series)
+    return piece
+
+
 def raw_cameras(path: Path) -> tuple[RawCamera, ...]:
     """The cameras of a file."""
     return tuple(c for p in read(path)[1] if isinstance(p, CalibrationPiece) for c in p.cameras)
@@ -88,3 +100,16 @@ def assert_same(raw: RawCamera, camera: Camera, tolerance: float = 1e-9) -> None
         np.testing.assert_allclose(
             getattr(found, name), getattr(camera, name), rtol=tolerance, atol=tolerance
         )
+
+
+def assert_cameras(
+    found: Iterable[RawCamera],
+    expected: Iterable[Camera],
+    tolerance: float = 1e-9,
+    *,
+    named: bool = True,
+) -> None:
+    """As many cameras as expected are the same, also by their names unless these are no matter."""
+    for raw, camera in zip(found, expected, strict=True):
+        assert raw.name == camera.name or not named
+        assert_same(raw, camera, tolerance)

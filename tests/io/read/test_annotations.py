@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.io.read.rig import SIZE, boxes, cameras, read, walks
+from tests.io.read.rig import SIZE, boxes, boxes_of_one, cameras, read, walks
 from tracker.io.conventions.reading import read_boxes
 from tracker.io.read.pieces import DetectionPiece, FormatError
 from tracker.io.read.registry import recognise
@@ -18,11 +18,6 @@ from tracker.io.read.source import SourceFile
 CAMERA = cameras()[0]
 FRAMES, BOXES = boxes(CAMERA, walks())
 STEPS = len(walks())
-
-
-def _piece(path: Path, *series: Path) -> DetectionPiece:
-    (piece,) = (p for p in read(path, *series)[1] if isinstance(p, DetectionPiece))
-    return piece
 
 
 def _assert_boxes(piece: DetectionPiece, tolerance: float = 1e-9) -> None:
@@ -48,7 +43,7 @@ def test_labelme(tmp_path: Path) -> None:
                    "imageWidth": SIZE[0], "imageHeight": SIZE[1]}  # fmt: skip
         files.append(tmp_path / f"frame_{frame:05d}.json")
         files[-1].write_text(json.dumps(content))
-    piece = _piece(files[0], *files)
+    piece = boxes_of_one(files[0], *files)
     _assert_boxes(piece)
     assert (piece.format, piece.image_size) == ("LabelMe JSON", SIZE)
     assert (piece.first_index, piece.last_frame) == (0, STEPS - 1)
@@ -69,7 +64,7 @@ def test_pascal_voc(tmp_path: Path) -> None:
             f"<annotation><filename>{frame:06d}.jpg</filename><size><width>{SIZE[0]}</width>"
             f"<height>{SIZE[1]}</height></size>{objects}</annotation>"
         )
-    piece = _piece(files[0], *files)
+    piece = boxes_of_one(files[0], *files)
     _assert_boxes(piece)
     assert (piece.format, piece.image_size) == ("Pascal VOC XML", SIZE)
 
@@ -109,7 +104,7 @@ def test_vgg_image_annotator(tmp_path: Path, form: str) -> None:
     project = {"_via_settings": {"ui": {}}, "_via_img_metadata": pictures, "_via_attributes": {}}
     content = json.dumps(project if form == "project" else pictures)
     path.write_text("\n".join(lines) if form == "csv" else content)
-    piece = _piece(path)
+    piece = boxes_of_one(path)
     _assert_boxes(piece)
     assert (piece.format, piece.camera) == ("VGG Image Annotator JSON or CSV", "cam1")
     assert (piece.first_index, piece.last_frame) == (0, STEPS - 1)
@@ -124,7 +119,7 @@ def test_shapes_of_vgg_image_annotator_and_what_is_wrong_with_one(tmp_path: Path
         {"shape_attributes": shape, "region_attributes": {}} for shape in shapes]}  # fmt: skip
     path = tmp_path / "via.json"
     path.write_text(json.dumps({"7.jpg1": picture}))
-    np.testing.assert_allclose(_piece(path).boxes, [[10, 5, 30, 45], [40, 40, 60, 80]])
+    np.testing.assert_allclose(boxes_of_one(path).boxes, [[10, 5, 30, 45], [40, 40, 60, 80]])
     shapes[1]["rx"] = "wide"
     path.write_text(json.dumps({"7.jpg1": picture}))
     with pytest.raises(FormatError, match=r"via.json, 7.jpg rx: expected numbers"):
@@ -165,9 +160,9 @@ def test_a_size_of_no_picture_is_not_known(tmp_path: Path, sides: tuple[object, 
     label = {"flags": {}, "shapes": [shape], "imageWidth": sides[0], "imageHeight": sides[1]}
     path = tmp_path / "frame_7.json"
     path.write_text(json.dumps(label))
-    assert _piece(path).image_size is None
+    assert boxes_of_one(path).image_size is None
     path.write_text(json.dumps({**label, "imageWidth": 640}))
-    assert _piece(path).image_size == (640, 480)
+    assert boxes_of_one(path).image_size == (640, 480)
 
 
 def _percent(box: list[float]) -> dict[str, float]:
@@ -191,7 +186,7 @@ def test_label_studio(tmp_path: Path, small: bool) -> None:
             tasks.append({"data": {"image": image}, "annotations": [{"result": result}]})
     path = tmp_path / "project.json"
     path.write_text(json.dumps(tasks))
-    piece = _piece(path)
+    piece = boxes_of_one(path)
     _assert_boxes(piece)
     assert (piece.camera, piece.image_size, piece.last_frame) == ("cam1", SIZE, STEPS - 1)
 
@@ -206,7 +201,7 @@ def test_label_studio_moves_boxes_between_key_frames(tmp_path: Path) -> None:
     task = {"data": {"video": "/data/upload/cam2.mp4"}, "annotations": [{"result": [result]}]}
     path = tmp_path / "project.json"
     path.write_text(json.dumps([task]))
-    piece = _piece(path)
+    piece = boxes_of_one(path)
     assert (piece.camera, piece.first_index) == ("cam2", 1)
     np.testing.assert_array_equal(piece.frames, [1, 2, 3, 4, 5, 9])
     np.testing.assert_allclose(piece.boxes[:, 0], [0.1, 0.15, 0.2, 0.25, 0.3, 0.5])
@@ -226,7 +221,7 @@ def test_cvat(tmp_path: Path) -> None:
         "<name>cam 1</name><original_size><width>1280</width><height>720</height>"
         f"</original_size></task></meta>{tracks}</annotations>"
     )
-    piece = _piece(path)
+    piece = boxes_of_one(path)
     kept = np.arange(len(FRAMES)) % 5 != 4
     np.testing.assert_array_equal(piece.frames, FRAMES[kept])
     np.testing.assert_allclose(read_boxes(piece.boxes, "xyxy"), BOXES[kept], atol=1e-9)
@@ -242,7 +237,7 @@ def test_parquet(tmp_path: Path) -> None:
     }
     path = tmp_path / "boxes.parquet"
     pq.write_table(pa.table(columns), path)
-    _assert_boxes(_piece(path))
+    _assert_boxes(boxes_of_one(path))
     path.write_bytes(path.read_bytes()[:200])
     file = SourceFile(path)
     found, _, _ = recognise(file)

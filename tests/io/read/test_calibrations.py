@@ -13,9 +13,10 @@ import scipy.io
 import yaml
 from scipy.spatial.transform import Rotation
 
-from tests.io.read.rig import FLIP, SIZE, assert_same, cameras, raw_cameras, read
+from tests.io.read.rig import FLIP, SIZE, assert_cameras, assert_same, cameras, raw_cameras, read
 from tracker.export.calibration import Form, save_calibration
 from tracker.geometry.camera import Camera
+from tracker.io.conventions.reading import Reading, to_camera
 from tracker.io.read.pieces import FormatError
 from tracker.io.read.registry import recognise
 from tracker.io.read.source import SourceFile
@@ -94,8 +95,7 @@ def test_tables_of_toml(tmp_path: Path, program: str) -> None:
     path.write_text("\n".join(lines))
     raws = raw_cameras(path)
     assert raws[0].convention.unit == ("m" if program == "Caliscope" else None)
-    for raw, camera in zip(raws, cameras(), strict=True):
-        assert_same(raw, camera)
+    assert_cameras(raws, cameras(), named=False)
 
 
 def test_qualisys(tmp_path: Path) -> None:
@@ -228,8 +228,7 @@ def test_panoptic_studio(tmp_path: Path) -> None:
     ]  # fmt: skip
     path = tmp_path / "calibration.json"
     path.write_text(json.dumps({"calibDataSource": "somewhere", "cameras": tables}))
-    for raw, camera in zip(raw_cameras(path), cameras(), strict=True):
-        assert_same(raw, camera)
+    assert_cameras(raw_cameras(path), cameras(), named=False)
 
 
 def test_tsai_draws_what_its_equations_draw(tmp_path: Path) -> None:
@@ -280,8 +279,7 @@ def test_projection_matrices(tmp_path: Path, form: str) -> None:
             else:
                 path.write_text("P0: " + " ".join(map(repr, matrix.ravel().tolist())))
             raws += raw_cameras(path)
-    for raw, camera in zip(raws, plain, strict=True):
-        assert_same(raw, camera, 1e-8)
+    assert_cameras(raws, plain, 1e-8, named=False)
 
 
 def test_a_pose_is_no_projection(tmp_path: Path) -> None:
@@ -370,8 +368,7 @@ def test_arrays_of_all_cameras(tmp_path: Path) -> None:
         dist=[c.distortion for c in own],
         made_with=np.array(["a program"]),
     )
-    for raw, camera in zip(raw_cameras(tmp_path / "rig.npz"), own, strict=True):
-        assert_same(raw, camera)
+    assert_cameras(raw_cameras(tmp_path / "rig.npz"), own, named=False)
 
 
 def test_an_archive_that_unpacks_to_gigabytes(tmp_path: Path) -> None:
@@ -400,3 +397,16 @@ def test_a_size_by_its_sides(tmp_path: Path) -> None:
     (tmp_path / "cams.json").write_text(json.dumps({"a": {**table, "resolution": size}}))
     (raw,) = raw_cameras(tmp_path / "cams.json")
     assert raw.image_size == SIZE
+
+
+@pytest.mark.parametrize("form", ["opencv", "pose2sim"])
+def test_a_fisheye_is_written_and_read_again(tmp_path: Path, form: Form) -> None:
+    lens = np.array([-0.02, 0.01, -0.004, 0.0008])
+    camera = replace(cameras()[0], distortion=lens, fisheye=True)
+    path = tmp_path / ("cameras.yml" if form == "opencv" else "cameras.toml")
+    save_calibration(path, [camera], form)
+    (raw,) = raw_cameras(path)
+    found = to_camera(raw, Reading(), SIZE)
+    assert found.fisheye
+    for name in ("intrinsics", "rotation", "translation", "distortion"):
+        np.testing.assert_allclose(getattr(found, name), getattr(camera, name), atol=1e-9)

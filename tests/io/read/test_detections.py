@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from numpy import ndarray
 
-from tests.io.read.rig import SIZE, boxes, cameras, read, walks
+from tests.io.read.rig import SIZE, boxes, boxes_in, boxes_of_one, cameras, read, walks
 from tracker.io.conventions.reading import read_boxes
 from tracker.io.importing.finding.times import on_one_clock
 from tracker.io.read.columns import people
@@ -22,11 +22,6 @@ from tracker.io.read.source import SourceFile
 
 CAMERA = cameras()[0]
 FRAMES, BOXES = boxes(CAMERA, walks())
-
-
-def _detections(path: Path, *series: Path) -> DetectionPiece:
-    (piece,) = (p for p in read(path, *series)[1] if isinstance(p, DetectionPiece))
-    return piece
 
 
 def _assert_boxes(piece: DetectionPiece, tolerance: float = 1e-9, first: int = 0) -> None:
@@ -45,7 +40,7 @@ def test_motchallenge_counts_from_1(tmp_path: Path) -> None:
     path = tmp_path / "det.txt"
     rows = zip(FRAMES, BOXES.tolist(), strict=True)
     path.write_text("".join(f"{f + 1},-1,{','.join(map(repr, b))},0.9,-1,-1,-1\n" for f, b in rows))
-    piece = _detections(path)
+    piece = boxes_of_one(path)
     assert (piece.first_index, piece.layout) == (1, "ltwh")
     _assert_boxes(piece, first=1)
     np.testing.assert_array_equal(piece.scores, 0.9)
@@ -54,7 +49,7 @@ def test_motchallenge_counts_from_1(tmp_path: Path) -> None:
 def test_motchallenge_truth_leaves_out_what_is_not_counted(tmp_path: Path) -> None:
     path = tmp_path / "gt.txt"
     path.write_text("1,1,10,10,20,40,1,1,0.8\n1,2,50,10,20,40,0,1,1\n1,3,90,10,20,40,1,8,1\n")
-    piece = _detections(path)
+    piece = boxes_of_one(path)
     assert piece.format == "MOTChallenge ground truth"
     np.testing.assert_array_equal(piece.boxes, [[10, 10, 20, 40]])
 
@@ -75,7 +70,7 @@ def test_coco_results(tmp_path: Path) -> None:
     ]
     other = {"image_id": 0, "category_id": 3, "bbox": [1, 1, 9, 9], "score": 0.9}
     path.write_text(json.dumps([*records, other]))
-    _assert_boxes(_detections(path))
+    _assert_boxes(boxes_of_one(path))
 
 
 def test_a_coco_data_set_has_a_camera_a_folder(tmp_path: Path) -> None:
@@ -92,7 +87,7 @@ def test_a_coco_data_set_has_a_camera_a_folder(tmp_path: Path) -> None:
         json.dumps({"images": images, "annotations": annotations,
                     "categories": [{"id": 7, "name": "person"}]})
     )  # fmt: skip
-    pieces = [p for p in read(path)[1] if isinstance(p, DetectionPiece)]
+    pieces = boxes_in(path)
     assert [p.camera for p in pieces] == ["cam1", "cam2"]
     assert [p.frames.tolist() for p in pieces] == [[0, 1], [0, 1]]
     assert pieces[0].image_size == (640, 480)
@@ -106,7 +101,7 @@ def test_annotations_of_no_image_are_said(tmp_path: Path, faulty: int, frames: l
     annotations = [{"image_id": one, "bbox": [one, 0, 10, 20]} for one in ids]
     path = tmp_path / "annotations.json"
     path.write_text(json.dumps({"images": images, "annotations": annotations}))
-    (piece,) = (p for p in read(path)[1] if isinstance(p, DetectionPiece))
+    piece = boxes_of_one(path)
     assert piece.frames.tolist() == frames
     assert piece.boxes[:, 0].tolist() == frames
     assert ("80 %" if faulty > 1 else "1 of 5") in piece.left_out
@@ -122,7 +117,7 @@ def test_yolo_text_a_file_a_frame(tmp_path: Path) -> None:
             rows.append(" ".join(map(repr, [0, *centre.tolist(), *(box[2:] / SIZE).tolist(), 0.5])))
         files.append(tmp_path / f"video_{frame + 1}.txt")
         files[-1].write_text("\n".join([*rows, "2 0.5 0.5 0.1 0.1 0.9"]))
-    piece = _detections(files[0], *files)
+    piece = boxes_of_one(files[0], *files)
     assert (piece.layout, piece.normalised, piece.first_index) == ("cxcywh", True, 1)
     _assert_boxes(piece, 1e-6, first=1)
     np.testing.assert_array_equal(piece.scores, 0.5)
@@ -138,7 +133,7 @@ def test_results_of_ultralytics(tmp_path: Path) -> None:
         ]  # fmt: skip
         files.append(tmp_path / f"frame{frame}.json")
         files[-1].write_text(json.dumps(records))
-    piece = _detections(files[0], *files)
+    piece = boxes_of_one(files[0], *files)
     assert piece.format == "Ultralytics results"
     _assert_boxes(piece)
 
@@ -159,7 +154,7 @@ def test_tables_of_ultralytics(tmp_path: Path, index: bool) -> None:
         files.append(tmp_path / f"frame{frame}.csv")
         with files[-1].open("w", newline="") as file:
             csv.writer(file).writerows(rows)
-    piece = _detections(files[0], *files)
+    piece = boxes_of_one(files[0], *files)
     assert (piece.format, piece.layout) == ("Ultralytics results", "xyxy")
     _assert_boxes(piece)
     np.testing.assert_array_equal(piece.scores, 0.7)
@@ -179,7 +174,7 @@ def test_a_sink_of_supervision_with_a_detectors_own_columns(tmp_path: Path) -> N
     ]
     other = [1, 1, 9, 9, 56, 0.9, 99, "chair", 0, 0.02]
     path.write_text("\n".join(",".join(map(str, row)) for row in [head, other, *rows]))
-    piece = _detections(path)
+    piece = boxes_of_one(path)
     assert piece.format == "supervision sink"
     _assert_boxes(piece)
 
@@ -201,7 +196,7 @@ def test_sinks_of_supervision(tmp_path: Path, form: str) -> None:
         path.write_text("\n".join(",".join(map(str, row)) for row in [names, *rows]))
     else:
         path.write_text(json.dumps([dict(zip(names, row, strict=True)) for row in rows]))
-    piece = _detections(path)
+    piece = boxes_of_one(path)
     assert (piece.format, piece.layout) == ("supervision sink", "xyxy")
     _assert_boxes(piece)
 
@@ -215,7 +210,7 @@ def test_csv_with_columns_in_any_order_and_several_cameras(tmp_path: Path) -> No
         for f, b in zip(FRAMES, BOXES.tolist(), strict=True)
     ]
     path.write_text("\n".join([head, *rows]))
-    pieces = [p for p in read(path)[1] if isinstance(p, DetectionPiece)]
+    pieces = boxes_in(path)
     assert [p.camera for p in pieces] == ["north", "south"]
     for piece in pieces:
         _assert_boxes(piece)
@@ -224,7 +219,7 @@ def test_csv_with_columns_in_any_order_and_several_cameras(tmp_path: Path) -> No
 def test_four_numbers_without_names_leave_the_layout_open(tmp_path: Path) -> None:
     path = tmp_path / "boxes.json"
     path.write_text(json.dumps([{"frame": 0, "bbox": [1, 2, 3, 4], "score": 1.0}] * 3))
-    assert _detections(path).layout is None
+    assert boxes_of_one(path).layout is None
 
 
 def _rows(first: int = 0) -> list[list[float]]:
@@ -235,7 +230,7 @@ def test_blanks_for_commas_and_a_header_that_is_a_comment(tmp_path: Path) -> Non
     path = tmp_path / "cam1.txt"
     lines = ["  ".join([f"{f:.0f}", "7", *map(repr, b), "0.5"]) for f, *b in _rows()]
     path.write_text("\n".join(["# frame id x y w h score", *lines]))
-    piece = _detections(path)
+    piece = boxes_of_one(path)
     assert piece.layout is None  # x and y are the middle where Ultralytics writes them
     _assert_boxes(piece)
     np.testing.assert_array_equal(piece.scores, 0.5)
@@ -246,7 +241,7 @@ def test_decimal_commas(tmp_path: Path) -> None:
     lines = [";".join(repr(v).replace(".", ",") for v in row) for row in _rows()]
     text = "\r\n".join(["Frame;Left;Top;Width;Height", *lines])
     path.write_text(text.replace(",0;", ";", 1), encoding="utf-8-sig")
-    _assert_boxes(_detections(path))
+    _assert_boxes(boxes_of_one(path))
 
 
 def test_decimal_commas_between_blanks(tmp_path: Path) -> None:
@@ -255,7 +250,7 @@ def test_decimal_commas_between_blanks(tmp_path: Path) -> None:
     rows = zip(FRAMES, BOXES.tolist(), strict=True)
     lines = [f"{f + 1} -1 {' '.join(map(repr, b))} 0.9 -1 -1 -1" for f, b in rows]
     path.write_text("\n".join(lines).replace(".", ","))
-    piece = _detections(path)
+    piece = boxes_of_one(path)
     assert piece.format == "MOTChallenge detections"
     _assert_boxes(piece, first=1)
     np.testing.assert_array_equal(piece.scores, 0.9)
@@ -268,7 +263,7 @@ def test_tables_as_excel_and_older_programs_write_them(tmp_path: Path, encoding:
     mark = "\ufeff" if encoding == "utf-16-le" else ""
     text = mark + "\r\n".join(["frame\tleft\ttop\twidth\theight\tnote", *lines])
     path.write_bytes(text.encode(encoding))
-    _assert_boxes(_detections(path))
+    _assert_boxes(boxes_of_one(path))
 
 
 def test_pictures_by_their_paths_tell_the_camera(tmp_path: Path) -> None:
@@ -279,7 +274,7 @@ def test_pictures_by_their_paths_tell_the_camera(tmp_path: Path) -> None:
         for f, *b in _rows()
     ]
     path.write_text("\n".join(["image_path,left,top,width,height", *rows]))
-    pieces = [p for p in read(path)[1] if isinstance(p, DetectionPiece)]
+    pieces = boxes_in(path)
     assert [p.camera for p in pieces] == ["data/north", "data/south"]
     for piece in pieces:
         _assert_boxes(piece)
@@ -289,7 +284,7 @@ def test_times_of_day(tmp_path: Path) -> None:
     path = tmp_path / "cam1.csv"
     lines = [f"00:01:{f / 25.0:06.3f},{','.join(map(repr, b))}" for f, *b in _rows()]
     path.write_text("\n".join(["timecode,left,top,width,height", *lines]))
-    piece = _detections(path)
+    piece = boxes_of_one(path)
     assert piece.fps == pytest.approx(25.0, rel=1e-3)
     np.testing.assert_array_equal(piece.frames, FRAMES + 60 * 25)
 
@@ -307,7 +302,7 @@ def test_a_camera_s_number_is_no_frame(tmp_path: Path) -> None:
 def test_five_numbers_without_a_header(tmp_path: Path, sign: str) -> None:
     path = tmp_path / "cam1.csv"
     path.write_text("\n".join(sign.join(map(repr, row)) for row in _rows()))
-    piece = _detections(path)
+    piece = boxes_of_one(path)
     assert piece.layout is None
     _assert_boxes(piece)
 
@@ -322,7 +317,7 @@ def test_times_in_place_of_frames(tmp_path: Path, name: str, scale: float, fps: 
     rows = [[round(f / fps, 3) * scale, *b] for f, *b in _rows()]
     lines = [",".join(map(repr, row)) for row in rows]
     path.write_text("\n".join([f"{name},left,top,width,height", *lines]))
-    piece = _detections(path)
+    piece = boxes_of_one(path)
     assert piece.fps == pytest.approx(fps, rel=1e-3)
     assert piece.first_index == 0
     _assert_boxes(piece)
@@ -332,7 +327,7 @@ def test_times_that_are_none_since_a_beginning(tmp_path: Path) -> None:
     path = tmp_path / "cam1.csv"
     path.write_text("time,left,top,width,height\n1.7e7,1,2,3,4\n1.7000001e7,1,2,3,4\n")
     with pytest.raises(FormatError, match=r'cam1\.csv.*time.*since the beginning.*"frame"'):
-        _detections(path)
+        boxes_of_one(path)
 
 
 def test_a_record_a_line(tmp_path: Path) -> None:
@@ -346,7 +341,7 @@ def test_a_record_a_line(tmp_path: Path) -> None:
         for frame, found in by_frame.items()
     ]
     path.write_text("\n".join(lines))
-    piece = _detections(path)
+    piece = boxes_of_one(path)
     assert piece.camera == "cam1"
     _assert_boxes(piece)
     path.write_text("\n".join([*lines[:3], lines[3][:-9]]))
@@ -463,7 +458,7 @@ MIDDLES = [[left + w / 2, top + h / 2, w, h] for left, top, w, h in BOXES.tolist
 def test_rows_of_numbers_without_known_names(tmp_path: Path, name: str, rows: list[object]) -> None:
     path = tmp_path / "cam1.tsv"
     path.write_text("\n".join("\t".join(map(str, row)) for row in rows))  # type: ignore[call-overload]
-    piece = _detections(path)
+    piece = boxes_of_one(path)
     assert piece.layout is None
     assert (piece.scores == (0.75 if "comma" in name or "score" in name else 1.0)).all()
     _assert_boxes(piece)
@@ -478,7 +473,7 @@ def test_words_between_numbers_are_cameras_or_classes(tmp_path: Path, header: st
         for f, *b in _rows()
     ]
     path.write_text("\n".join([*filter(None, [header]), *rows]))
-    pieces = [p for p in read(path)[1] if isinstance(p, DetectionPiece)]
+    pieces = boxes_in(path)
     assert [p.camera for p in pieces] == ["north", "south"]
     for piece in pieces:
         _assert_boxes(piece)
@@ -511,7 +506,7 @@ ARRAYS: dict[str, Callable[[Path], object]] = {
 def test_arrays_of_numpy(tmp_path: Path, form: str) -> None:
     ARRAYS[form](tmp_path / "cam1")
     (path,) = tmp_path.iterdir()
-    piece = _detections(path)
+    piece = boxes_of_one(path)
     _assert_boxes(piece)
     np.testing.assert_array_equal(piece.scores, SCORES)
     assert piece.camera == ("north" if form == "cameras" else "")
@@ -551,7 +546,7 @@ def test_rows_that_become_others_further_down_are_refused(tmp_path: Path) -> Non
     ]
     path.write_text("\n".join([*lines, "1\t2"]))
     with pytest.raises(FormatError, match=r"cam1\.txt: expected rows of the same count"):
-        _detections(path)
+        boxes_of_one(path)
 
 
 def test_labels_of_kitti_s_tracking(tmp_path: Path) -> None:
@@ -561,7 +556,7 @@ def test_labels_of_kitti_s_tracking(tmp_path: Path) -> None:
         for f, c in zip(FRAMES, CORNERS, strict=True)
     ]
     path.write_text("\n".join([*rows, "0 -1 DontCare -1 -1 -10 1 1 90 90 -1 -1 -1 -1 -1 -1 -1"]))
-    piece = _detections(path)
+    piece = boxes_of_one(path)
     assert "1 of" in piece.left_out
     _assert_boxes(piece)
 
@@ -575,7 +570,7 @@ def test_text_of_vatic_leaves_out_who_is_out_of_sight(tmp_path: Path) -> None:
     ]
     path.write_text("\n".join([*rows, '0 1 1 90 90 9 1 0 0 "PERSON"']))
     assert read(path)[0] == "VATIC text"
-    _assert_boxes(_detections(path))
+    _assert_boxes(boxes_of_one(path))
 
 
 @pytest.mark.parametrize("by", ["middle", "corner"])
@@ -596,7 +591,7 @@ def test_boxes_in_xml_by_frame(tmp_path: Path, by: str) -> None:
     )
     path = tmp_path / "cam1.xml"
     path.write_text(f'<?xml version="1.0"?><dataset name="a walk">{frames}</dataset>')
-    _assert_boxes(_detections(path), 1e-6)
+    _assert_boxes(boxes_of_one(path), 1e-6)
 
 
 def test_a_time_that_all_boxes_of_a_file_share_is_no_frame(tmp_path: Path) -> None:
@@ -609,7 +604,7 @@ def test_a_time_that_all_boxes_of_a_file_share_is_no_frame(tmp_path: Path) -> No
         ]
         paths.append(tmp_path / f"frame_{f:05}.json")
         paths[-1].write_text(json.dumps({"time": 0.1 + f / 1e3, "predictions": boxes_}))
-    piece = _detections(paths[0], *paths)
+    piece = boxes_of_one(paths[0], *paths)
     found = read_boxes(piece.boxes, "cxcywh", None)
     np.testing.assert_array_equal(piece.frames, FRAMES)
     np.testing.assert_allclose(found, BOXES, atol=1e-9)
@@ -628,7 +623,7 @@ def test_a_file_a_camera_whose_boxes_have_times(tmp_path: Path) -> None:
     paths = [tmp_path / f"cam{number}.json" for number in (1, 2)]
     for path in paths:
         path.write_text(json.dumps({"Persons": people}))
-    pieces = [p for p in read(paths[0], *paths)[1] if isinstance(p, DetectionPiece)]
+    pieces = boxes_in(paths[0], *paths)
     assert [piece.source.name for piece in pieces] == ["cam1.json", "cam2.json"]
     for piece in pieces:
         assert piece.fps == pytest.approx(25.0)
@@ -648,7 +643,7 @@ def test_times_with_dates_are_counted_from_the_first_of_all_files(
         times = [w.isoformat() if written == "iso" else w.timestamp() * parts for w in whens]
         rows = [",".join(map(str, (w, *b))) for w, b in zip(times, BOXES.tolist(), strict=True)]
         path.write_text("\n".join(["timestamp,left,top,width,height", *rows]))
-    first, second = on_one_clock([_detections(path) for path in paths])
+    first, second = on_one_clock([boxes_of_one(path) for path in paths])
     assert first.fps == pytest.approx(25.0, rel=1e-3)
     _assert_boxes(first)
     _assert_boxes(second, first=25)
@@ -665,7 +660,7 @@ def test_boxes_by_frame_are_a_camera_a_file_or_a_frame_a_file(tmp_path: Path) ->
     for path, rows in zip(frames, BY_FRAME.values(), strict=True):
         lists = {"labels": [0] * len(rows), "scores": [r[4] for r in rows]}
         path.write_text(json.dumps({**lists, "bboxes": [r[:4] for r in rows]}))
-    piece = _detections(frames[0], *frames)
+    piece = boxes_of_one(frames[0], *frames)
     np.testing.assert_array_equal(piece.frames, FRAMES)
     assert (piece.last_frame, piece.first_index) == (len(walks()) - 1, 0)
 
@@ -674,7 +669,7 @@ def test_people_by_number_are_no_cameras(tmp_path: Path) -> None:
     path = tmp_path / "tracks.json"
     people = {f: {str(n): row[:4] for n, row in enumerate(rows)} for f, rows in BY_FRAME.items()}
     path.write_text(json.dumps(people))
-    piece = _detections(path)
+    piece = boxes_of_one(path)
     assert (piece.camera, len(piece.frames)) == ("", len(FRAMES))
 
 
@@ -682,7 +677,7 @@ def test_other_classes_in_lists_of_six_are_left_out(tmp_path: Path) -> None:
     path = tmp_path / "boxes.json"
     rows = {f: [[*row, kind] for row in rows for kind in (0, 56)] for f, rows in BY_FRAME.items()}
     path.write_text(json.dumps(rows))
-    np.testing.assert_array_equal(_detections(path).frames, FRAMES)
+    np.testing.assert_array_equal(boxes_of_one(path).frames, FRAMES)
 
 
 @pytest.mark.parametrize(

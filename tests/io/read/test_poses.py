@@ -8,14 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.io.read.rig import read
+from tests.io.read.rig import boxes_of_one
 from tracker.io.read.detections.body import NOSE_HEIGHT, boxes_of
-from tracker.io.read.pieces import DetectionPiece
-
-
-def _detections(path: Path, *series: Path) -> DetectionPiece:
-    (piece,) = (p for p in read(path, *series)[1] if isinstance(p, DetectionPiece))
-    return piece
 
 
 def _stick_figure(stature: float) -> dict[str, list[float]]:
@@ -67,7 +61,7 @@ def test_openpose_a_file_a_frame_with_nobody_in_the_first(tmp_path: Path) -> Non
     for number, path in enumerate(files):
         people = [{"person_id": [-1], "pose_keypoints_2d": pose}] if number else []
         path.write_text(json.dumps({"version": 1.3, "people": people}))
-    piece = _detections(files[1], *files)
+    piece = boxes_of_one(files[1], *files)
     assert piece.frames.tolist() == [1, 2]
     assert (piece.first_index, piece.last_frame) == (0, 2)
     np.testing.assert_allclose(piece.scores, 0.8)
@@ -81,7 +75,7 @@ def test_a_joint_or_a_person_of_nan_was_not_seen(tmp_path: Path, missing: str) -
     people = [{"pose_keypoints_2d": own} for own in (pose, gaps, [None] * len(pose))]
     path = tmp_path / "cam1_000000.json"
     path.write_text(json.dumps({"people": people}).replace("null", missing))
-    piece = _detections(path)
+    piece = boxes_of_one(path)
     np.testing.assert_allclose(piece.boxes[0], piece.boxes[1])
     assert len(piece.boxes) == 2
     assert piece.keypoints is not None
@@ -97,7 +91,7 @@ def test_alphapose(tmp_path: Path) -> None:
     record = {"image_id": "12.jpg", "category_id": 1, "keypoints": pose, "score": 2.7,
               "box": [1, 2, 3, 4], "idx": 1}  # fmt: skip
     path.write_text(json.dumps([record]))
-    piece = _detections(path)
+    piece = boxes_of_one(path)
     assert (piece.format, piece.frames.tolist()) == ("AlphaPose JSON", [12])
     np.testing.assert_allclose(piece.boxes[0, 1] + piece.boxes[0, 3], 900.0, atol=1.0)
 
@@ -123,7 +117,7 @@ def test_the_other_forms_of_alphapose(tmp_path: Path, form: str, people: str, jo
     for name, one in pictures.items():
         files.append(tmp_path / name.replace("jpg", "json"))
         files[-1].write_text(json.dumps(one))
-    for piece in (_detections(whole), _detections(files[0], *files)):
+    for piece in (boxes_of_one(whole), boxes_of_one(files[0], *files)):
         assert piece.frames.tolist() == [3, 12, 12]
         np.testing.assert_allclose(piece.boxes[:, 1] + piece.boxes[:, 3], 900.0, atol=1.0)
         np.testing.assert_allclose(piece.boxes[:, 1], 300.0, atol=4.0)
@@ -139,6 +133,6 @@ def test_alphapose_with_the_joints_of_halpe(tmp_path: Path, count: int) -> None:
     path.write_text(json.dumps([{"image_id": "cam1_0007.jpg", "category_id": 1,
                                  "keypoints": pose, "score": 3.1, "box": [1, 2, 3, 4],
                                  "idx": [0.0]}]))  # fmt: skip
-    piece = _detections(path)
+    piece = boxes_of_one(path)
     assert (piece.camera, piece.frames.tolist()) == ("cam1", [7])
     np.testing.assert_allclose(piece.boxes[0, 1] + piece.boxes[0, 3], 900.0, atol=1.0)

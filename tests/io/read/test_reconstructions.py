@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import scipy.io
 
-from tests.io.read.rig import FLIP, SIZE, assert_same, cameras, raw_cameras, read
+from tests.io.read.rig import FLIP, SIZE, assert_cameras, assert_same, cameras, raw_cameras, read
 from tracker.io.read.pieces import FormatError
 
 
@@ -126,8 +126,7 @@ def test_voxelpose_has_the_place_of_a_camera(tmp_path: Path) -> None:
     path = tmp_path / "calibration_shelf.json"
     path.write_text(json.dumps(table))
     assert read(path)[0] == "VoxelPose calibration JSON"
-    for raw, camera in zip(raw_cameras(path), cameras(), strict=True):
-        assert_same(raw, camera)
+    assert_cameras(raw_cameras(path), cameras(), named=False)
 
 
 def test_lenses_and_poses_in_two_tables(tmp_path: Path) -> None:
@@ -140,9 +139,7 @@ def test_lenses_and_poses_in_two_tables(tmp_path: Path) -> None:
     }
     path = tmp_path / "camera-parameters.json"
     path.write_text(json.dumps({"intrinsics": lenses, "extrinsics": {"S1": poses}}))
-    for raw, camera in zip(raw_cameras(path), cameras(), strict=True):
-        assert raw.name == camera.name
-        assert_same(raw, camera)
+    assert_cameras(raw_cameras(path), cameras())
 
 
 def test_matrices_for_points_in_rows(tmp_path: Path) -> None:
@@ -194,8 +191,7 @@ def test_middlebury(tmp_path: Path) -> None:
     assert read(path)[0] == "Middlebury _par.txt"
     found = raw_cameras(path)
     assert [raw.name for raw in found] == [f"templeR{number:04d}" for number in range(1, 5)]
-    for raw, camera in zip(found, cameras(distortion=False), strict=True):
-        assert_same(raw, camera)
+    assert_cameras(found, cameras(distortion=False), named=False)
     path.write_text("47\n" + "\n".join(rows))
     with pytest.raises(FormatError, match="line 1: expected the count of rows below it, found 47"):
         read(path)

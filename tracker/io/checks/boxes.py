@@ -1,4 +1,7 @@
-"""Do the boxes of several cameras meet in 3D, as given and as each usual mistake would have it."""
+"""Do the boxes of several cameras meet in 3D, as given and as each usual mistake would have it.
+
+[DC66] Drillis, Contini, "Body segment parameters", Office of Vocational Rehabilitation, 1966.
+"""
 
 from __future__ import annotations
 
@@ -6,10 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool
-from numpy import ndarray
 
-from tracker.geometry.consistency.consensus import Consensus
 from tracker.geometry.consistency.observed import pose_of
 from tracker.geometry.consistency.suggestion import LEAST_AGREEING, Suggestion, stands, suggest
 from tracker.io.conventions.judge import (
@@ -34,20 +34,19 @@ from tracker.io.conventions.sizes import likely_unit
 from tracker.io.read.pieces import METRES, RawCamera
 from tracker.sequences.fields import listed
 from tracker.sequences.finding import Check, Remedy, absent, good, percent, warning
-from tracker.sequences.sequence import Sequence, View
+from tracker.sequences.sequence import Sequence
 
 AS_GIVEN = Reading()
 """How a sequence's file is read."""
 
-_SMALLER, _TALLER = 0.6, 1.6  # than the target: how tall boxes may be
-_SMALLEST = 0.08  # metres: not even a head
+# What is measured of recordings that are read rightly is of the random rooms of seeds 0 … 11, with
+# 200 steps; each bound lies far from it, for it is a mistake that is sought and not an error.
+_SMALLER, _TALLER = 0.6, 1.6  # than the target: how tall boxes may be, there 0.93 to 1.03
+_SMALLEST = 0.08  # metres: not half a head, which is 0.13 of a stature [DC66]
 _TALLEST_TARGET = 4.0  # metres: who states more has not written metres
-_LEAST_INSIDE = 0.25  # of the people: with fewer in the room it is another place
-_FLOOR_OFF = 0.5  # metres
-_TILT = np.radians(20.0)
-_OWN_SHARE = 0.2  # of the people whom others see: with boxes of fewer a camera is out of place
-_SAME_PLACE = 0.5  # heights of a person in the picture
-_LEAST_EXPECTED = 50
+_LEAST_INSIDE = 0.25  # of the people, of whom all are in the room there
+_FLOOR_OFF = 0.5  # metres, there at most 0.04
+_TILT = np.radians(20.0)  # there at most 1°
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -331,30 +330,18 @@ def _inside(sequence: Sequence, judged: JudgedBoxes) -> Check:
 
 
 def _stray_cameras(sequence: Sequence, judged: JudgedBoxes) -> Iterator[Check]:
-    """A camera whose boxes agree with no other's, or that has none where others see somebody: its
-    own pose or clock is off."""
+    """A camera whose boxes agree with no other's: its own pose or clock is off.
+
+    How many of the people whom others see it has boxes of says no more: in the random rooms of
+    seeds 2000 … 2008 every camera with few of them, for the boxes of another room or a pose turned
+    by 25°, was named for this or for having been moved.
+    """
     name_of_check = "every camera agrees with another"
     names = [camera.name for camera in sequence.cameras]
     doubtful = describe_unconfirmed(judged.verdict, names, sequence.fps)
     if doubtful.alone:
         yield warning(name_of_check, doubtful.alone, cameras=doubtful.without)
-    if len(sequence.views) < 3 or doubtful.alone:
-        return
-    shares: dict[str, float] = {}
-    for index, view in enumerate(sequence.views):
-        hits = _found_where_expected(view, index, judged.given.consensus)
-        if len(hits) >= _LEAST_EXPECTED:
-            shares[view.camera.name] = float(hits.mean())
-    for name, share in shares.items():
-        if share < _OWN_SHARE:
-            yield warning(
-                name_of_check,
-                f"{name} has a box at {percent(share)} of the places where others' boxes meet and "
-                "it sees: its calibration, its file of boxes or its clock is another one's",
-                cameras=[name],
-                share=share,
-            )
-    if shares and min(shares.values()) >= _OWN_SHARE:
+    elif len(sequence.views) > 2 and not judged.verdict.moved:
         # boxes of one that nothing confirms may meet those of others by chance
         sure = [name for name in names if name not in doubtful.doubtful]
         whose = f"{', '.join(sure)}: " if 0 < len(sure) < len(names) else ""
@@ -372,25 +359,3 @@ def _moved_cameras(sequence: Sequence, judged: JudgedBoxes) -> Iterator[Check]:
             cameras=[sequence.cameras[c].name for c in moved],
             degrees=float(np.degrees(max(moved.values()))),
         )
-
-
-def _found_where_expected(view: View, index: int, agreed: Consensus) -> Bool[ndarray, " E"]:
-    """Whether a camera has a box where boxes of two others meet, at steps at which it has any."""
-    own = view.detections
-    if own is None:
-        return np.zeros(0, dtype=bool)
-    rows = np.flatnonzero((agreed.cameras != index).all(axis=1))
-    low, low_seen = view.camera.project(agreed.feet[rows])
-    high, high_seen = view.camera.project(agreed.feet[rows] + agreed.rises[rows])
-    first, last = np.searchsorted(own.frames, [agreed.steps[rows], agreed.steps[rows] + 1])
-    there = low_seen & high_seen & (last > first)
-    there &= view.camera.contains(low) & view.camera.contains(high)
-    low, high, first, last = low[there], high[there], first[there], last[there]
-    middles = own.boxes[:, :2] + own.boxes[:, 2:] / 2.0
-    counts = last - first
-    of = np.repeat(np.arange(len(counts)), counts)
-    boxes = np.arange(counts.sum()) + np.repeat(first - np.cumsum(counts) + counts, counts)
-    away = np.linalg.norm(middles[boxes] - (low + high)[of] / 2.0, axis=1)
-    found = np.zeros(len(counts), dtype=bool)
-    found[of[away < _SAME_PLACE * np.linalg.norm(high - low, axis=1)[of]]] = True
-    return found

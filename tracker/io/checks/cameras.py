@@ -12,6 +12,8 @@ from tracker.sequences.fields import listed
 from tracker.sequences.finding import Check, good, percent, warning
 from tracker.sequences.sequence import Room
 
+# The 46 cameras of 12 recordings (CMC, WILDTRACK, AV16.3, Pose2Sim's demonstration, the built-in
+# rooms) are well within: off by at most 0.16, 36° to 85° wide, fx 0.91 to 1.01 times fy.
 _OFF_CENTRE = 0.25  # share of the picture's size that the principal point may be off its middle
 _NARROWEST, _WIDEST = np.radians(5.0), np.radians(160.0)  # of what a lens shows across
 _LEAST_ASPECT, _LARGEST_ASPECT = 0.7, 1.4  # of fx to fy

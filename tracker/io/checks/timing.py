@@ -8,7 +8,12 @@ from functools import lru_cache
 import numpy as np
 
 from tracker.io.checks.boxes import AS_GIVEN, raw_cameras, seen_boxes
-from tracker.io.checks.synchronisation import LEAST_STEPS, CameraOffset, synchronise
+from tracker.io.checks.synchronisation import (
+    LEAST_SHARPNESS,
+    LEAST_STEPS,
+    CameraOffset,
+    synchronise,
+)
 from tracker.io.conventions.questions import (
     Unconfirmed,
     describe_clocks,
@@ -20,10 +25,11 @@ from tracker.sequences.finding import Check, Remedy, absent, good, warning
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence
 
-_SHIFTS = (-3, -2, -1, 0, 1, 2, 3)
-_NEAR = 0.4  # heights of a box
-_LEAST_NEAR = 100
-_LEAST_SHARP = 3.0  # deviations by which all peaks stand out where offsets are told
+_SHIFTS = (-3, -2, -1, 0, 1, 2, 3)  # steps: those of counting from 1 and two beyond, for the bend
+_NEAR = 0.4  # heights of a box, a box's usual breadth: farther away it is another person's
+_LEAST_NEAR = 100  # places: in the random rooms of seeds 0 … 11 boxes are off by 0.09 steps at most
+_APART = 0.6  # steps by which each camera, and
+_APART_IN_ALL = 0.4  # by which the median may be off a whole step: more than four times as much
 
 
 def check_time(
@@ -98,7 +104,7 @@ def _agreeing(name: str, found: tuple[CameraOffset, ...], unconfirmed: Unconfirm
     if unconfirmed is not None and len(rest) < 2:
         return absent(name, unconfirmed.others or "too few cameras agree to compare their moments")
     steps = max(abs(offset.steps) for offset in rest)
-    sharp = min(offset.sharpness for offset in rest) >= _LEAST_SHARP
+    sharp = min(offset.sharpness for offset in rest) >= LEAST_SHARPNESS
     if sharp and steps < LEAST_STEPS:
         words = f"to within {max(steps, 0.1):.1f} frames"
     elif unconfirmed is not None:
@@ -137,8 +143,8 @@ def check_counting(sequence: Sequence, *, places: bool = True) -> Check:
     late = float(np.median(behind)) if behind else 0.0
     # one camera may be late for other reasons: counting is the same in all, and by one step
     for side, when, right in ((1.0, "before", "1"), (-1.0, "later", "0")):
-        near = all(abs(steps - side) < 0.6 for steps in behind)
-        if len(behind) > 1 and near and abs(late - side) < 0.4:
+        near = all(abs(steps - side) < _APART for steps in behind)
+        if len(behind) > 1 and near and abs(late - side) < _APART_IN_ALL:
             return warning(
                 name,
                 f"boxes show people as they are {abs(late):.1f} steps {when}, by the ground truth: "

@@ -14,14 +14,16 @@ from tracker.sequences.finding import Check, absent, good, percent, warning
 from tracker.sequences.sequence import Detections, Sequence
 
 _LEAST_INSIDE = 0.2
-"""Share of places in boxes below which the truth contradicts them."""
+"""Share of places in boxes below which the truth contradicts them. In the random rooms of seeds
+0 … 11 the truth has at least 0.91, and that of another room 0.07 to 0.46."""
 
 _BY_CHANCE = 1.5
 """The ratio to the share in the boxes of another time below which a share of less than half is one
-by chance, as of places that all lie in the middle of the room."""
+by chance, as of places that all lie in the middle of the room. In these rooms the truth has at most
+0.47 of its share half the recording later, so that the ratio of the right one is 2 or more."""
 
 _SAMPLED = 300
-"""Places that are compared with the boxes."""
+"""Places that are compared with the boxes: the standard error of a share is at most 0.03."""
 
 
 @lru_cache(maxsize=1)

@@ -23,7 +23,7 @@ from tracker.geometry.camera import Camera
 from tracker.geometry.consistency.consensus import Consensus, consensus
 from tracker.geometry.consistency.observed import PairsOfBoxes, Pose, Rays, pair_up, rays_of, uncut
 from tracker.geometry.consistency.standing import turn_of
-from tracker.io.conventions.level import upwards
+from tracker.io.conventions.level import reversed_, standing, turns_tried, upside_down, upwards
 from tracker.io.conventions.reading import (
     Reading,
     boxes_by,
@@ -34,7 +34,6 @@ from tracker.io.conventions.reading import (
     with_pixels,
 )
 from tracker.io.conventions.sizes import likely_unit
-from tracker.io.conventions.standing import reversed_, standing, turns_tried, upside_down
 from tracker.io.read.pieces import METRES, Axes, Direction, Layout, RawCamera, Unit, Up
 
 MOST_PAIRS = 6000
@@ -252,32 +251,27 @@ class Judge:
         turns = tuple(turn_of(pose.rotation @ up) for pose in poses)
         return Judged(reading, agreed, float(agreed.fits.sum()), agreed.rise, turns)
 
-    def righted(
-        self, judged: Judged, up: Up | None, unit: Unit | None = None, height: float | None = None
-    ) -> Judged:
+    def righted(self, judged: Judged, up: Up | None, unit: Unit | None = None) -> Judged:
         """With heads above feet, where the cameras hang upside down.
 
         Args:
             judged: What boxes agree on.
             up: The axis that the file claims to point up.
             unit: Of the poses, where it is known.
-            height: Of what is tracked, metres, where it is known.
         """
         agreed = judged.consensus
-        metres = METRES[unit or likely_unit(self.away(judged), agreed, height)]
+        metres = METRES[unit or likely_unit(self.away(judged), agreed)]
         claimed = None if up is None else upright(up).T @ np.array([0.0, 0.0, 1.0])
         if not upside_down(agreed, self.poses(judged.reading), metres, claimed):
             return judged
         turns = tuple((turn + 2) % 4 for turn in judged.turns)
         return replace(judged, consensus=reversed_(agreed), pictured=-judged.pictured, turns=turns)
 
-    def meant(
-        self, judged: Judged, up: Up | None, unit: Unit | None = None, height: float | None = None
-    ) -> Reading:
+    def meant(self, judged: Judged, up: Up | None, unit: Unit | None = None) -> Reading:
         """The reading with the axis that points up and the unit, where the file states neither."""
         agreed = judged.consensus
         reading = replace(judged.reading, up=up or upwards(agreed.rise))
-        return replace(reading, unit=unit or likely_unit(self.away(judged), agreed, height))
+        return replace(reading, unit=unit or likely_unit(self.away(judged), agreed))
 
     def poses(self, reading: Reading) -> list[Pose]:
         """Where the cameras stand."""

@@ -9,20 +9,19 @@ from tracker.geometry.consistency.consensus import Consensus
 from tracker.io.read.pieces import METRES, Unit
 
 
-def likely_unit(away: float, agreed: Consensus, height: float | None = None) -> Unit:
+def likely_unit(away: float, agreed: Consensus) -> Unit:
     """The unit in which the usual person is as tall, and as far from the cameras, as people are.
 
     Args:
         away: The usual distance from a camera to people, in the world's unit.
         agreed: On how tall they are, in the world's unit.
-        height: Of what is tracked, metres, where it is known.
     """
     if agreed.height <= 0.0:
         return "m"
 
     def fit(unit: Unit) -> float:
         own = METRES[unit]
-        return likelihood_of_size(agreed.height * own, away * own, height)
+        return likelihood_of_size(agreed.height * own, away * own)
 
     units: tuple[Unit, ...] = get_args(Unit)
     return max(units, key=fit)
@@ -37,10 +36,9 @@ USUAL_HEIGHTS = tuple(height for height, _, _ in _USUAL_HEIGHTS)
 _USUAL_DISTANCE = (6.0, 0.9)  # metres from a camera, spread of the logarithm
 
 
-def likelihood_of_size(height: float, away: float, known: float | None = None) -> float:
+def likelihood_of_size(height: float, away: float) -> float:
     """The logarithm of how usual people are of that height, that far from a camera, metres."""
-    kinds = _USUAL_HEIGHTS if known is None else ((known, 0.3, 0.0),)
-    tall = max(w - 0.5 * (math.log(height / h) / s) ** 2 for h, s, w in kinds)
+    tall = max(w - 0.5 * (math.log(height / h) / s) ** 2 for h, s, w in _USUAL_HEIGHTS)
     if not away > 0.0:
         return tall
     middle, spread = _USUAL_DISTANCE

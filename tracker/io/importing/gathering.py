@@ -2,20 +2,33 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from tracker.io.importing.spoilt_rows import is_table, readable_rows
-from tracker.io.read.calibration.possible import check_cameras
-from tracker.io.read.pieces import CalibrationPiece, DetectionPiece, FormatError, Piece
+from tracker.files.text import shown
+from tracker.geometry.calibration import check_focal_lengths
+from tracker.geometry.camera import Camera
+from tracker.io.read.columns import decimal_points, delimiter_of
+from tracker.io.read.pieces import (
+    CalibrationPiece,
+    DetectionPiece,
+    FormatError,
+    ImagesPiece,
+    Piece,
+    RawCamera,
+    VideoPiece,
+)
 from tracker.io.read.protocol import Certainty, Format
 from tracker.io.read.registry import recognise, unforeseen
-from tracker.io.read.source import FileOfLines, SourceFile
+from tracker.io.read.source import MOST_TREE_BYTES, FileOfLines, SourceFile
+from tracker.sequences.fields import LARGEST_IN_MATRIX, LONGEST_NAME
 
 MOST_FILES = 200_000
 MOST_DEPTH = 8
@@ -338,3 +351,188 @@ def _pieces(found: Format, certainty: Certainty, file: SourceFile, label: str) -
     return ParsedFiles(
         label, found.NAME, certainty, pieces, files=file.series, companions=companions
     )
+
+
+def check_cameras(file: SourceFile, piece: CalibrationPiece) -> None:
+    """Refuse cameras whose numbers are none of a lens or of a place.
+
+    Raises:
+        FormatError: Naming the camera and the field.
+    """
+    for place, camera in enumerate(piece.cameras):
+        if len(camera.name) > LONGEST_NAME:
+            raise file.error(
+                f"expected a name of at most {LONGEST_NAME} characters, found "
+                f"{len(camera.name):,}; shorten it",
+                f"camera {place + 1}",
+            )
+        _check_lens(file, camera)
+        _check_pose(file, camera)
+
+
+def _check_lens(file: SourceFile, camera: RawCamera) -> None:
+    try:
+        if camera.intrinsics is not None:
+            check_focal_lengths(camera.intrinsics)
+    except ValueError as error:
+        raise file.error(str(error), f"{camera.name} K".strip()) from None
+
+
+def _check_pose(file: SourceFile, camera: RawCamera) -> None:
+    for field, values in (
+        ("rotation", camera.rotation),
+        ("translation", camera.translation),
+        ("projection", camera.projection),
+    ):
+        if values is not None and not np.abs(values).max() <= LARGEST_IN_MATRIX:
+            raise file.error(
+                f"expected numbers of at most {LARGEST_IN_MATRIX:g}, "
+                f"found {shown(np.asarray(values).tolist())}",
+                f"{camera.name} {field}".strip(),
+            )
+    if camera.projection is not None:
+        try:
+            Camera.from_projection(camera.name, (1, 1), camera.projection)
+        except (ValueError, np.linalg.LinAlgError) as error:
+            raise file.error(str(error), f"{camera.name} projection".strip()) from None
+
+
+_FEWEST = 10
+"""Fewest rows by which it is judged what a row is."""
+
+_MOSTLY = 0.9
+"""Share of a column's cells that are numbers where the column is one of numbers."""
+
+_LARGEST = 2.0**53
+"""Largest number, beyond which whole numbers are not exact."""
+
+
+@dataclass(frozen=True, slots=True)
+class ReadableRows:
+    """A table without the rows that cannot be read."""
+
+    lines: list[str]
+    """The other lines, the header included."""
+    left_out: str
+    """A sentence about the rows that are left out."""
+
+
+def readable_rows(file: SourceFile, most: float) -> ReadableRows | None:
+    """Leave out the rows of a text table that are not like its others.
+
+    These are rows with another count of cells than most, or without a number in a column that is
+    one of numbers: 90 % of its cells are.
+
+    Args:
+        file: The file.
+        most: Largest share of rows that may be left out.
+
+    Returns:
+        The rows; None if the file is no table, or none of its rows or too many are unlike.
+
+    Raises:
+        FormatError: If the file cannot be read as text.
+    """
+    if not is_table(file):
+        return None
+    lines = file.lines()
+    rows = [k for k, line in enumerate(lines) if line.strip() and not line.startswith("#")]
+    if not rows:
+        return None
+    cells = {k: _cells(lines[k]) for k in rows}
+    if any(_number(cell) is None for cell in cells[rows[0]]):  # names of columns
+        rows = rows[1:]
+    if len(rows) < _FEWEST:
+        return None
+    width = Counter(len(cells[k]) for k in rows).most_common(1)[0][0]
+    table = {k: [_number(cell) for cell in cells[k]] for k in rows if len(cells[k]) == width}
+    numbers = np.array([[value is not None for value in row] for row in table.values()])
+    finite = np.array(
+        [[value is not None and math.isfinite(value) for value in row] for row in table.values()]
+    )
+    fits = np.where(finite.mean(axis=0) >= _MOSTLY, finite, numbers)
+    fits = (fits | (numbers.mean(axis=0) < _MOSTLY)).all(axis=1)
+    good = {k for k, own in zip(table, fits, strict=True) if own}
+    spoilt = [k for k in rows if k not in good]
+    if not 0 < len(spoilt) <= most * len(rows):
+        return None
+    count = f"{len(spoilt)} of {len(rows)} rows ({100.0 * len(spoilt) / len(rows):.2g} %)"
+    first = spoilt[0]
+    return ReadableRows(
+        [line for k, line in enumerate(lines) if k not in set(spoilt)],
+        f"{file.where}: {count} cannot be read and are left out, the first in line {first + 1}: "
+        f"{shown(lines[first])}.",
+    )
+
+
+def is_table(file: SourceFile) -> bool:
+    """Whether a file is text of rows rather than a tree, and not too large to look at each row."""
+    return (
+        file.is_text
+        and file.size <= MOST_TREE_BYTES
+        and file.head_text.lstrip()[:1] not in ("[", "{", "<")
+    )
+
+
+def _cells(line: str) -> list[str]:
+    line = decimal_points(line)
+    delimiter = delimiter_of(line)
+    return [cell.strip() for cell in (line.split(delimiter) if delimiter in line else line.split())]
+
+
+def _number(cell: str) -> float | None:
+    """Return the number of a cell, infinite where it is too large; None for none."""
+    try:
+        value = float(cell.replace(",", ".").strip('"'))
+    except ValueError:
+        return None
+    return value if abs(value) <= _LARGEST else math.inf
+
+
+_UNKNOWN = "no format that is read"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FileUse:
+    """A file, or a series of numbered ones, and how many of them are used."""
+
+    files: ParsedFiles
+    used: int
+    """The number of files that are used, at most :attr:`ParsedFiles.count`."""
+    why: str
+    """Why not all are used; empty where all are, and where sentences on the cameras say it."""
+
+
+def file_uses(taken: Sequence[ParsedFiles], sources: frozenset[Path] | None) -> list[FileUse]:
+    """Judge all files.
+
+    A file whose content was read with another one's is used where that one is.
+
+    Args:
+        taken: All files.
+        sources: The files that the recording is made of; None while that is not known, when all
+            that were read count.
+    """
+    used = {one.label: _used(one, sources) for one in taken}
+    found = []
+    for one in taken:
+        count = one.count if one.read_with and used.get(one.read_with) else used[one.label]
+        why = "" if count == one.count or one.pieces else one.complaint or _UNKNOWN
+        found.append(FileUse(one, count, why))
+    return found
+
+
+def _used(one: ParsedFiles, sources: frozenset[Path] | None) -> int:
+    if not one.pieces:
+        return 0
+    if sources is None:
+        return one.count
+    own: set[Path] = set()
+    for piece in one.pieces:
+        if isinstance(piece, ImagesPiece):
+            own.update(piece.files)
+        else:
+            own.add(piece.path if isinstance(piece, VideoPiece) else piece.source)
+    there = own & sources
+    # of a series that is read as a whole the pieces name a file or two
+    return len(there) if len(own) == one.count else one.count * bool(there)

@@ -53,14 +53,20 @@ from tracker.io.importing.finding.matching import (
     same_aspect,
 )
 from tracker.io.importing.finding.names import short_names
-from tracker.io.importing.finding.people import rate_of, rays_of_all
+from tracker.io.importing.finding.people import (
+    AS_STANDING,
+    PERSON,
+    paced,
+    rate_of,
+    rays_of_all,
+    resized,
+)
 from tracker.io.importing.finding.pictures import (
     COMMON_SIZES,
     exchange_by_shape,
     picture_sizes,
     scaled,
 )
-from tracker.io.importing.finding.scale import AS_STANDING, PERSON, paced, resized
 from tracker.io.importing.finding.times import (
     CameraTime,
     check_common,
@@ -70,7 +76,7 @@ from tracker.io.importing.finding.times import (
     settle_times,
     told_beyond,
 )
-from tracker.io.importing.finding.truths import in_gaps, settle_truth
+from tracker.io.importing.finding.truths import Surroundings, in_gaps, settle_truth
 from tracker.io.importing.gathering import ParsedFiles
 from tracker.io.importing.options import ImportOptions
 from tracker.io.read.pieces import DetectionPiece, FormatError, Layout, RawCamera
@@ -557,8 +563,7 @@ class _PlanDraft:
         looked_at = self._looked_at()
         suggested = self._suggest_room(cameras)
         room = _with_stated_room(suggested, options)
-        truth = settle_truth(
-            [piece for _, piece in matched.truths],
+        surroundings = Surroundings(
             cameras,
             self.at_steps,
             [None if c.detections is None else c.detections.camera for c in matched.cameras],
@@ -567,8 +572,8 @@ class _PlanDraft:
             room.floor,
             float(room.half_extents[2]) + room.floor,
             options.first_index,
-            self.notes,
         )
+        truth = settle_truth([piece for _, piece in matched.truths], surroundings, self.notes)
         views = map(
             PlannedView,
             self._renamed(cameras),

@@ -1,22 +1,127 @@
-"""A settled recording as an ordinary sequence folder."""
+"""A settled recording as a sequence in memory, for checks, and as an ordinary sequence folder.
+
+Its pictures are brought into the folder: as they lie there, linked, or copied.
+"""
 
 from __future__ import annotations
 
+import os
 import re
-from collections.abc import Sequence
+import shutil
+from collections.abc import Callable
+from collections.abc import Sequence as Many
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from numpy import ndarray
 
 from tracker.files.atomic import new_folder, replacing, write_whole
 from tracker.io.conventions.questions import ACCEPT
-from tracker.io.importing.bringing import Told, bring, bring_images, free_place
-from tracker.io.importing.settling import ImportPlan, PlannedView, plain_name
+from tracker.io.importing.settling import ImportPlan, PlannedView, at_steps_of, plain_name
 from tracker.io.read.pieces import FormatError
 from tracker.sequences.reader import FILE
-from tracker.sequences.writing.csv_files import steps_without_boxes, write_boxes, write_truth
+from tracker.sequences.sequence import Room, Sequence, View
+from tracker.sequences.tables import steps_without_boxes, write_boxes, write_truth
+
+PIECE = 1 << 22
+"""Bytes that are copied at once."""
+
+Told = Callable[[int], None]
+"""Called with how many more bytes are copied; what it raises ends the copying."""
+
+
+def free_place(path: Path) -> Path:
+    """A path at which there is nothing yet: this one, or with a number after its name. A folder
+    that is imported into itself keeps its own files."""
+    number, found = 2, path
+    while found.exists() or found.is_symlink():
+        number, found = number + 1, path.with_name(f"{path.stem}-{number}{path.suffix}")
+    return found
+
+
+def bring(path: Path, folder: Path, name: str, copy: bool, told: Told) -> tuple[str, bool]:
+    """A file in the folder: where it lies if it is inside, else a link to it, or a copy.
+
+    Args:
+        path: The file.
+        folder: Of the recording.
+        name: What it is called there, without its suffix.
+        copy: Copy it, also where it could be linked.
+        told: Of what is copied.
+
+    Returns:
+        Its path inside the folder; and whether it had to be copied where a link was wanted:
+        another file system, or one without links.
+    """
+    real, home = path.resolve(), folder.resolve()
+    if real.is_relative_to(home):
+        return real.relative_to(home).as_posix(), False
+    target = free_place(folder / f"{name}{path.suffix.lower()}")
+    linked = _place(real, target, copy, told)
+    return target.name, not copy and not linked
+
+
+def bring_images(
+    files: Many[Path], folder: Path, name: str, copy: bool, told: Told
+) -> tuple[str, bool]:
+    """Pictures under numbers that sort as they follow each other; as :func:`bring`."""
+    own = free_place(folder / name)
+    own.mkdir()
+    width = len(str(len(files)))
+    linked = [
+        _place(path.resolve(), own / f"{number:0{width}}{path.suffix.lower()}", copy, told)
+        for number, path in enumerate(files)
+        if path.exists()  # one missing in the row of their numbers stays missing
+    ]
+    return f"{own.name}/*{files[0].suffix.lower()}", not copy and not all(linked)
+
+
+def _place(real: Path, target: Path, copy: bool, told: Told) -> bool:
+    """Whether it is a link."""
+    if not copy:
+        try:
+            os.link(real, target)
+            return True
+        except OSError:
+            pass
+    _copy(real, target, told)
+    return False
+
+
+def _copy(source: Path, target: Path, told: Told) -> None:
+    """A copy with the times of the original, so that what is known of its content stays so."""
+    with source.open("rb") as reading, target.open("wb") as writing:
+        while piece := reading.read(PIECE):
+            writing.write(piece)
+            told(len(piece))
+    shutil.copystat(source, target)
+
+
+def links_in(folder: Path) -> dict[Path, int]:
+    """The files of a folder that are second names of others, with their bytes."""
+    found = {}
+    for path in sorted(folder.rglob("*")):
+        if path.is_file() and not path.is_symlink():
+            known = path.stat()
+            if known.st_nlink > 1:
+                found[path] = known.st_size
+    return found
+
+
+def copy_links(folder: Path, told: Told) -> None:
+    """Make a file of its own of every link in a folder; whoever reads one goes on undisturbed.
+
+    Args:
+        folder: Of a recording.
+        told: Of what is copied; files that are not copied yet stay links where it raises.
+
+    Raises:
+        OSError: If one cannot be copied.
+    """
+    for path in links_in(folder):
+        with replacing(path) as temporary:
+            _copy(path, temporary, told)
 
 
 def write(
@@ -151,7 +256,7 @@ def _camera(
     return "\n".join(lines)
 
 
-def _file_names(names: Sequence[str]) -> list[str]:
+def _file_names(names: Many[str]) -> list[str]:
     """Names of files, each its own, without slashes and other signs."""
     found: list[str] = []
     for name in names:
@@ -180,3 +285,44 @@ def _list(values: Float[ndarray, " n"]) -> str:
 
 def _rows(matrix: Float[ndarray, "n m"]) -> str:
     return f"[{', '.join(_list(row) for row in matrix)}]"
+
+
+def as_sequence(settled: ImportPlan, name: str) -> Sequence:
+    """What the written folder will be read as; its folder is none.
+
+    Args:
+        settled: As it would be written.
+        name: Of the sequence.
+    """
+    views = tuple(
+        View(
+            camera=view.camera,
+            video=None if view.matched.video is None else view.matched.video.path,
+            images=() if view.matched.images is None else view.matched.images.files,
+            detections=None if view.detections is None else at_steps_of(view.detections, view.time),
+            clock=view.time.clock,
+            detector_ran=_ran(view, settled.frames),
+        )
+        for view in settled.views
+    )
+    room = settled.room
+    return Sequence(
+        name=name,
+        folder=Path(),
+        fps=settled.fps,
+        frames=settled.frames,
+        room=Room(np.asarray(room.minimum), np.asarray(room.maximum), settled.entrances),
+        target_half_extents=np.asarray(room.half_extents),
+        views=views,
+        ground_truth=settled.truth,
+    )
+
+
+def _ran(view: PlannedView, steps: int) -> Bool[ndarray, " steps"] | None:
+    """Whether the detector ran, by step; None where it ran at all."""
+    if view.looked_at is None:
+        return None
+    ran = np.zeros(steps, dtype=bool)
+    at = view.time.steps_of(view.looked_at)
+    ran[at[(at >= 0) & (at < steps)]] = True
+    return ran

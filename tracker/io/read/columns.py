@@ -19,9 +19,8 @@ from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
 from tracker.files.text import shown
-from tracker.io.read.picture_names import camera_of, number_in
 from tracker.io.read.pieces import DetectionPiece, Layout, Piece, TruthPiece, unit_named
-from tracker.io.read.source import SourceFile
+from tracker.io.read.source import SourceFile, camera_of, number_in
 from tracker.io.read.values import plain
 
 WORDS: dict[str, tuple[str, ...]] = {
@@ -184,8 +183,6 @@ def read_table(
     file: SourceFile,
     name: str,
     columns: Mapping[str, Column],
-    frame: int | None = None,
-    boxes_layout: Layout | None = None,
 ) -> Iterator[Piece]:
     """The boxes, a piece a camera, or the truth that a table holds.
 
@@ -193,15 +190,13 @@ def read_table(
         file: For the messages.
         name: The format, as it is shown.
         columns: Cells by column, as text or numbers.
-        frame: The frame of all rows, where the file's name or place says it.
-        boxes_layout: How a box that is one list of four numbers is meant.
 
     Raises:
         FormatError: If there is no frame, or a cell is no number.
     """
     columns = _with_places(file, columns)
-    columns, left_out = (columns, "") if frame is not None else _with_frames(file, columns)
-    for piece in _pieces(file, name, columns, frame, boxes_layout):
+    columns, left_out = _with_frames(file, columns)
+    for piece in _pieces(file, name, columns):
         yield replace(piece, left_out=" ".join(filter(None, (left_out, piece.left_out))))
 
 
@@ -209,13 +204,10 @@ def _pieces(
     file: SourceFile,
     name: str,
     columns: Mapping[str, Column],
-    frame: int | None,
-    boxes_layout: Layout | None,
 ) -> Iterator[DetectionPiece | TruthPiece]:
     found = meanings(list(columns))
-    rows = len(next(iter(columns.values()), ()))
     when = RowTimes()
-    if frame is None and "frame" not in found and "time" in found:
+    if "frame" not in found and "time" in found:
         column = found["time"]
         times = _numbers(file, column, [_seconds(cell) for cell in columns[column]])
         if not np.isfinite(times).all():
@@ -224,13 +216,11 @@ def _pieces(
             frames, when = frames_of_times(times, plain(column).endswith("ms"))
         except ValueError as error:
             raise file.error(str(error), column) from None
-    elif frame is None and "frame" not in found:
+    elif "frame" not in found:
         raise file.error(
             'expected a column "frame" (or a number in the name of a file a frame), found the '
             f"columns {shown(', '.join(columns))}"
         )
-    elif frame is not None:
-        frames = np.full(rows, frame, dtype=np.int64)
     else:
         frames = _numbers_in(columns[found["frame"]]).astype(np.int64)
     form = layout_of(found)
@@ -238,7 +228,7 @@ def _pieces(
         values, more = _fours(file, found["box"], columns[found["box"]], frames)
         new = {meaning: cells for meaning, cells in more.items() if meaning not in found}
         columns, found = {**columns, **new}, {**{meaning: meaning for meaning in new}, **found}
-        yield from _detections(file, name, columns, found, frames, values, boxes_layout, when)
+        yield from _detections(file, name, columns, found, frames, values, None, when)
     elif form is not None:
         layout, parts = form
         values = np.column_stack([_numbers(file, found[p], columns[found[p]]) for p in parts])

@@ -8,10 +8,8 @@ from importlib.metadata import entry_points
 
 from tracker.io.read.calibration import (
     camera_rows,
-    labelled,
     matlab,
-    opencv,
-    plain,
+    named_format,
     projection,
     trees,
 )
@@ -45,15 +43,15 @@ GROUP = "multiview_phd.formats"
 
 FORMATS: tuple[Format, ...] = (
     *trees.FORMATS,
-    opencv.OPENCV,
+    named_format.OPENCV,
     *colmap.FORMATS,
     *scenes.FORMATS,
     tsai.TSAI,
     *matrices.FORMATS,
     projection,
     matlab,
-    labelled.LABELLED,
-    plain.PLAIN,
+    named_format.LABELLED,
+    named_format.PLAIN,
     camera_rows,
     numbers,
     motchallenge,

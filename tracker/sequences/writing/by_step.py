@@ -15,7 +15,7 @@ import numpy as np
 from tracker.sequences.clock import FIELDS as CLOCK
 from tracker.sequences.pictures.frames import FrameReader
 from tracker.sequences.sequence import Sequence, View
-from tracker.sequences.writing.csv_files import steps_without_boxes, write_boxes, write_truth
+from tracker.sequences.tables import steps_without_boxes, write_boxes, write_truth
 from tracker.sequences.writing.teaching import taught_values
 
 _QUALITY = {"preset": "veryfast", "crf": "32"}

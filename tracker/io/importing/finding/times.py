@@ -14,8 +14,8 @@ from tracker.io.conventions.questions import ACCEPT
 from tracker.io.importing.finding.matching import Matched, MatchedCamera
 from tracker.io.importing.options import ImportOptions
 from tracker.io.read.columns import frames_of_times, parts_of_date
-from tracker.io.read.picture_names import number_in
 from tracker.io.read.pieces import DetectionPiece, FormatError, TruthPiece, VideoPiece
+from tracker.io.read.source import number_in
 from tracker.sequences.clock import Clock, Timing
 from tracker.sequences.fields import LARGEST_COUNT
 

@@ -18,10 +18,9 @@ import numpy as np
 from tracker.files.text import shown
 from tracker.io.read.columns import only_people, to_unit
 from tracker.io.read.detections.body import read_people
-from tracker.io.read.picture_names import camera_of, number_in
 from tracker.io.read.pieces import DetectionPiece, Piece
 from tracker.io.read.protocol import Certainty, Kind
-from tracker.io.read.source import SourceFile
+from tracker.io.read.source import SourceFile, camera_of, number_in
 from tracker.io.read.values import numbers, stated_size, tables
 
 NAME = "COCO results or annotations JSON"

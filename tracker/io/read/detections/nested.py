@@ -22,10 +22,9 @@ import numpy as np
 
 from tracker.io.read.columns import Column, layout_of, meanings, read_table
 from tracker.io.read.detections.table import flat
-from tracker.io.read.picture_names import camera_of, is_camera_number, number_in
 from tracker.io.read.pieces import DetectionPiece, Piece
 from tracker.io.read.protocol import Certainty, Kind
-from tracker.io.read.source import SourceFile
+from tracker.io.read.source import SourceFile, camera_of, is_camera_number, number_in
 from tracker.io.read.values import plain
 
 NAME = "boxes by camera and frame (JSON, XML)"

@@ -17,10 +17,9 @@ from typing import Any
 import numpy as np
 
 from tracker.io.read.detections.body import read_people
-from tracker.io.read.picture_names import number_in
 from tracker.io.read.pieces import DetectionPiece, Piece
 from tracker.io.read.protocol import Certainty, Kind
-from tracker.io.read.source import SourceFile
+from tracker.io.read.source import SourceFile, number_in
 from tracker.io.read.values import field_of, tables
 
 NAME = "OpenPose key points JSON"

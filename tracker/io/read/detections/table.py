@@ -27,10 +27,9 @@ from tracker.io.read.columns import (
     meanings,
     read_table,
 )
-from tracker.io.read.picture_names import is_camera_number, number_in
 from tracker.io.read.pieces import FormatError, Piece
 from tracker.io.read.protocol import Certainty, Kind
-from tracker.io.read.source import SourceFile
+from tracker.io.read.source import SourceFile, is_camera_number, number_in
 from tracker.io.read.values import is_list_of_tables, plain
 
 _OF_PERSON = re.compile(

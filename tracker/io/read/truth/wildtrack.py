@@ -16,10 +16,9 @@ import numpy as np
 from jaxtyping import Float
 from numpy import ndarray
 
-from tracker.io.read.picture_names import number_in
 from tracker.io.read.pieces import GRIDS, DetectionPiece, Piece, TruthPiece
 from tracker.io.read.protocol import Certainty, Kind
-from tracker.io.read.source import SourceFile
+from tracker.io.read.source import SourceFile, number_in
 from tracker.io.read.values import need, tables, vector
 
 NAME = "WILDTRACK annotations"

@@ -13,10 +13,9 @@ from itertools import pairwise
 from typing import Any, Literal, NamedTuple
 
 from tracker.io.read.detections.pictured import PicturedBoxes
-from tracker.io.read.picture_names import camera_of, number_in
 from tracker.io.read.pieces import Piece
 from tracker.io.read.protocol import Certainty, Kind
-from tracker.io.read.source import SourceFile
+from tracker.io.read.source import SourceFile, camera_of, number_in
 from tracker.io.read.values import is_list_of_tables, numbers, tables
 
 NAME = "Label Studio JSON"

@@ -15,10 +15,9 @@ from typing import Any
 
 from tracker.files.text import shown
 from tracker.io.read.detections.pictured import PicturedBoxes
-from tracker.io.read.picture_names import camera_of, number_in
 from tracker.io.read.pieces import Piece
 from tracker.io.read.protocol import Certainty, Kind
-from tracker.io.read.source import SourceFile
+from tracker.io.read.source import SourceFile, camera_of, number_in
 from tracker.io.read.values import number, numbers
 
 NAME = "VGG Image Annotator JSON or CSV"
