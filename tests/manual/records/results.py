@@ -24,8 +24,8 @@ SMALLER = "A smaller form, run as `python -m tests.papers {experiment} {form}`."
 
 INTRODUCTION = """# Results
 
-Every table on this page is printed from a record under `static/manual/records/`, and a test holds
-the two equal. The records are made anew by one command in a checkout, with the real recordings in
+Every table on this page is printed from a record under `static/manual/records/`, and a test checks
+that they agree. The records are made anew by one command in a checkout, with the real recordings in
 a folder `DIR`:
 
 ```sh
