@@ -55,6 +55,10 @@ FOR_KERNELS = (
 )  # fmt: skip
 """What ``tracker.runs.warm_up`` imports: installed first, and the rest while it compiles."""
 
+WAITING = ("nice", "-n", "19") if shutil.which("nice") else ()
+"""What runs on what others leave of the processor: in the full form many tests wait for a process
+that starts or ends, for a page, or for what must not happen for seconds."""
+
 SHORT = "not full and not long"
 FULL = "full"
 
@@ -240,9 +244,12 @@ def main() -> int:
     # at once for all processes that the tests start
     kernels = Check("kernels", ((PYTHON, "-m", "tracker.runs.warm_up"),))
     benchmarks = Check("benchmarks", ((PYTHON, "-m", "tests.benchmarks", "--short"),))
-    # these three go side by side with the benchmarks, which keep one core busy
-    mutants = Check("mutants", ((PYTHON, "-m", "tests.mutate", "--workers", "1"),))
+    # these go beside the full form, whose tests leave some of both cores
+    mutants = Check("mutants", ((*WAITING, PYTHON, "-m", "tests.mutate", "--workers", "1"),))
     always = ("--seed", "20261122")  # the same cases; --fuzz draws others each time
+    checked = (*WAITING, *fuzzing(0.0, *always, "--bounds", workers=1))
+    checked_kernels = Check("kernels that check their indices", (checked,))
+    # these two go side by side with the benchmarks, which keep one core busy
     fuzz = Check("fuzz", (fuzzing(1.4, *always, "--imports", workers=1),))
     bounds = Check("bounds", (fuzzing(0.7, *always, "--bounds", workers=1),))
     names = [check.name for check in (*page, *code, kernels, *test_runs([]).values())]
@@ -294,11 +301,12 @@ def main() -> int:
             if not failed and not arguments.pytest:
                 PASSED.write_text(before, encoding="utf-8")
         if arguments.all:
-            failed += [] if full_tests.run(shown=True) else [full_tests.name]
             with ThreadPoolExecutor(1) as lane:
-                checking = lane.submit(in_order, [bounds, fuzz, mutants])
+                checking = lane.submit(in_order, [checked_kernels, mutants])
+                failed += [] if full_tests.run(shown=True) else [full_tests.name]
+                timed = lane.submit(in_order, [bounds, fuzz])
                 failed += [] if benchmarks.run(shown=True) else [benchmarks.name]
-                failed += checking.result()
+                failed += checking.result() + timed.result()
     if failed:
         print(f"failed: {', '.join(dict.fromkeys(failed))}", file=sys.stderr)
     return 1 if failed else 0

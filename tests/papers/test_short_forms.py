@@ -1,4 +1,4 @@
-"""Every experiment in its short form, as the command runs it: files, and the claims' direction."""
+"""Every experiment in its short form: its files, and the direction of its claims."""
 
 from __future__ import annotations
 
@@ -10,13 +10,15 @@ from typing import Any
 import pytest
 
 from tests.conftest import DATA
-from tests.papers.__main__ import main
 from tests.papers.claims import association, jpda, ppf
 from tests.papers.claims.cmc import GATES
 from tests.papers.claims.cmc import methods as cmc_methods
 from tests.papers.claims.methods import ON_PICTURES
 from tests.papers.clips.light import ROBUST
+from tests.papers.laboratory.experiment import Context
+from tests.papers.laboratory.writing import write
 from tests.papers.registry import EXPERIMENTS
+from tracker.runs.processes import available_cores
 
 pytestmark = pytest.mark.full
 
@@ -125,12 +127,17 @@ DEAR = ("fig3", "ppf", "association", "methods", "rooms")
 
 
 def look_at(names: Iterable[str], folder: Path) -> None:
-    """Run some experiments as the command does, and look at what each leaves."""
-    data = ["--data", str(DATA)] if HAS_DATA else []
+    """Run some experiments as the command does, and look at what each leaves.
+
+    As with ``--all`` they share what several of them look at: Figures 1 and 2 are of one run.
+    """
+    data = DATA if HAS_DATA else None
+    context = Context(quick=True, data=data, output=folder, processes=available_cores())
     for name in names:
-        if name in NEEDS_DATA and not data:
+        if name in NEEDS_DATA and data is None:
             continue
-        assert main([name, "--quick", "--output", str(folder), *data]) == 0
+        experiment = EXPERIMENTS[name]
+        write(experiment, experiment.run(context), folder, quick=True, seeds=None)
         assert (folder / f"{name}.png").stat().st_size > 10_000, name
         found = json.loads((folder / f"{name}.json").read_text(encoding="utf-8"))
         table = found["table"]
@@ -139,7 +146,6 @@ def look_at(names: Iterable[str], folder: Path) -> None:
 
 
 def test_in_short_they_show_the_direction_of_each_claim(tmp_path: Path) -> None:
-    """In one process, since several of them look at the same runs."""
     look_at((name for name in EXPERIMENTS if name not in DEAR), tmp_path)
 
 

@@ -597,9 +597,9 @@ def test_a_file_is_read_up_to_its_largest_size(
 ) -> None:
     path = answering(tmp_path / "m.onnx", {"a": yolo_8()})
     size = path.stat().st_size
-    monkeypatch.setattr("tracker.single_view.onnx.network.MOST_BYTES", size)
+    monkeypatch.setattr("tracker.sequences.detectors.MOST_BYTES", size)
     assert Network(path, Settings()).size_for(9, 9) == SIZE
-    monkeypatch.setattr("tracker.single_view.onnx.network.MOST_BYTES", size - 1)
+    monkeypatch.setattr("tracker.sequences.detectors.MOST_BYTES", size - 1)
     with pytest.raises(ValueError, match=r"cannot be read \(it has 0 MB, expected at most 2,048"):
         Network(path, Settings())
 
@@ -722,7 +722,9 @@ def test_it_sees_the_full_picture(tmp_path: Path) -> None:
     assert stage_keys(sequence, values, 0) == stage_keys(sequence, reduced, 0)
 
 
-def test_what_is_kept_depends_on_the_models_content(tmp_path: Path) -> None:
+def test_what_is_kept_depends_on_the_models_content(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     one, same, other = (tmp_path / f"{name}.onnx" for name in ("one", "same", "other"))
     answering(one, {"output0": yolo_8()})
     answering(same, {"output0": yolo_8()})
@@ -739,6 +741,10 @@ def test_what_is_kept_depends_on_the_models_content(tmp_path: Path) -> None:
     )
     with pytest.raises(SequenceError, match=r"nowhere\.onnx cannot be read"):
         with_detector(sequence, tmp_path / "nowhere.onnx")
+    # a file that cannot be a network is not read to its end for that
+    monkeypatch.setattr("tracker.sequences.detectors.MOST_BYTES", one.stat().st_size - 1)
+    with pytest.raises(SequenceError, match=r"one\.onnx cannot be read \(it has 0 MB"):
+        with_detector(sequence, one)
 
 
 @pytest.mark.full

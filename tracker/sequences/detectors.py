@@ -6,6 +6,7 @@ and a record of both. A network whose content is not the recorded one is not use
 
 from __future__ import annotations
 
+import errno
 import hashlib
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
@@ -18,6 +19,9 @@ from tracker.sequences.sequence import DetectorFile
 
 MODEL, LICENCE, RECORD = "model.onnx", "licence.txt", "detector.json"
 """Names of the files of a network."""
+
+MOST_BYTES = 2**31
+"""Largest size of a Protocol Buffers message, and so of an ONNX file, bytes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,6 +118,17 @@ def usable_detector() -> tuple[DetectorFile | None, str]:
             "used: fetch it again by `multiview-phd detector get`"
         )
     return None, damaged
+
+
+def check_model_size(path: Path) -> None:
+    """Raise unless a network can be read: a regular file of at most the size that ONNX allows.
+
+    Raises:
+        OSError: If it cannot; reading a pipe would block, and reading a large file takes long.
+    """
+    size = size_of(path)
+    if size > MOST_BYTES:
+        raise OSError(errno.EFBIG, f"it has {size >> 20:,} MB, expected at most 2,048")
 
 
 def sha256_of(path: Path) -> str:

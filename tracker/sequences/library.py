@@ -8,9 +8,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
-from tracker.files.atomic import size_of
 from tracker.sequences.built_in import BUILT_IN, ROOMS, cached_rooms
-from tracker.sequences.detectors import sha256_of, usable_detector
+from tracker.sequences.detectors import check_model_size, sha256_of, usable_detector
 from tracker.sequences.errors import SequenceError
 from tracker.sequences.fields import did_you_mean, listed
 from tracker.sequences.reader import FILE, given_folder, read_sequence, read_summary
@@ -163,7 +162,7 @@ def with_detector(sequence: Sequence, path: Path | None) -> Sequence:
     if path is None:
         return sequence
     try:
-        size_of(path)  # refuses a pipe, on which reading would block
+        check_model_size(path)
         digest = sha256_of(path)[:16]
     except OSError as error:
         raise SequenceError(

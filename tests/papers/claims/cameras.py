@@ -24,9 +24,9 @@ if TYPE_CHECKING:
 
 RECORDING = "av163-seq30-2p-1101"
 
-SEEDS, QUICK_SEEDS = 6, 2
+SEEDS, QUICK_SEEDS = 6, 1
 
-QUICK_STEPS = 240
+QUICK_STEPS = 160
 
 FIGURES = ("position_error", "found_share", "false_per_step", "mota", "idf1", "ospa")
 

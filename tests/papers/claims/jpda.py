@@ -43,6 +43,9 @@ CLOTHES = ((40.0, 45.0, 50.0), (120.0, 140.0, 205.0), (150.0, 60.0, 50.0), (70.0
 SEEDS, QUICK_SEEDS = 6, 1
 """Clips: the same meetings on other irregular paths."""
 
+QUICK_STEPS = 60
+"""Of the recording, which no claim is judged by."""
+
 SETTLING = 10
 """Steps from the start that do not count: newcomers have to be confirmed."""
 
@@ -234,7 +237,7 @@ def _recording(context: Context, notes: list[str]) -> dict[str, dict[str, float 
     except Unavailable as missing:
         notes.append(f"Left out: {missing}.")
         return {}
-    steps = min(cameras.QUICK_STEPS, sequence.frames) if context.quick else sequence.frames
+    steps = min(QUICK_STEPS, sequence.frames) if context.quick else sequence.frames
     notes.append(
         f"{sequence.name}: heads found within one half size in {len(sequence.views)} cameras, "
         "all filters with a target under each top of the foreground."

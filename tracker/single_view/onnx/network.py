@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-import errno
 import math
 import threading
 from collections.abc import Mapping
@@ -16,7 +15,7 @@ import numpy as np
 from jaxtyping import Float, UInt8
 from numpy import ndarray
 
-from tracker.files.atomic import size_of
+from tracker.sequences.detectors import check_model_size
 from tracker.single_view.onnx.file import INT64, UINT8, Port, ports_of
 from tracker.single_view.onnx.layouts import FOUND_OUT, proposals
 
@@ -31,9 +30,6 @@ MOST_SIDE = 2048
 """Largest side that metadata or the parameter may ask for, pixels."""
 _CELL = 32
 """Sides that are left open are multiples of this, the known layouts' largest stride, pixels."""
-
-MOST_BYTES = 2**31
-"""Largest size of a Protocol Buffers message, and so of an ONNX file, bytes."""
 
 _GREY = 114
 """Grey level of the borders that fill an image up to the network's shape, as in YOLO's training."""
@@ -267,9 +263,7 @@ def _whole_cells(length: float) -> int:
 
 def _content(path: Path) -> bytes:
     """Read the bytes of a model, from a regular file of at most the size that ONNX allows."""
-    size = size_of(path)
-    if size > MOST_BYTES:
-        raise OSError(errno.EFBIG, f"it has {size >> 20:,} MB, expected at most 2,048")
+    check_model_size(path)
     return path.read_bytes()
 
 
