@@ -11,7 +11,7 @@ makes a scene, and every stage has its input from the same truth::
     tracks(paths)         # stage 2, for smoothing, corrections and export
     truth(paths)          # for the evaluation
     sequence(cameras, paths, seen)               # the whole as a value …
-    folder(tmp_path, sequence(cameras, paths))   # … or in files, with numbered or painted pictures
+    folder(tmp_path, sequence(cameras, paths))   # … or in files, with painted or other pictures
 
 Boxes are drawn by OpenCV's projection, not by the one that is tested.
 """
@@ -61,9 +61,6 @@ Picture = Callable[[int, int], ndarray]
 """The picture (height, width, 3), uint8, BGR, of a camera at a step: camera and step, by index."""
 
 Colour = tuple[float, float, float]
-
-BITS = 12
-"""Squares that carry the step in a numbered picture: up to 4095."""
 
 
 # ── cameras and the room
@@ -442,30 +439,6 @@ def sequence(
         ground_truth=truth(paths),
         digest=hashlib.sha256(b"".join(content)).hexdigest(),
     )
-
-
-def numbered(cameras: Many[Camera]) -> Picture:
-    """Pictures that say their own step in a row of black and white squares, coloured by camera."""
-
-    def picture(camera: int, step: int) -> ndarray:
-        width, height = cameras[camera].image_size
-        coarse = np.random.default_rng(step).integers(40, 200, (6, 8, 3), dtype=np.uint8)
-        result = cv2.resize(coarse, (width, height), interpolation=cv2.INTER_LINEAR)
-        result[:, :, camera % 3] //= 2
-        side = width // BITS
-        for bit in range(BITS):
-            result[:side, bit * side : (bit + 1) * side] = 255 if step >> bit & 1 else 0
-        return np.asarray(result, dtype=np.uint8)
-
-    return picture
-
-
-def number_in(picture: ndarray) -> int:
-    """The step that a numbered picture says it is."""
-    side = picture.shape[1] // BITS
-    middle = picture[side // 4 : side - side // 4, : BITS * side].mean(axis=(0, 2))
-    squares = middle.reshape(BITS, side)[:, side // 4 : side - side // 4].mean(axis=1)
-    return sum(1 << bit for bit in range(BITS) if squares[bit] > 127.0)
 
 
 def painted(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -156,7 +156,7 @@ def runs(
     As in the workbench one reader serves all of them, and what depends on the pictures alone, such
     as the background, is made once.
     """
-    previous: Mapping[str, Run] = {}
+    previous: dict[str, Run] = {}
     with FrameReader(sequence) as reader:
         for combination in chosen:
             run = pipeline.compute(
@@ -166,5 +166,5 @@ def runs(
                 reader=reader,
                 previous=previous.get(combination.view_name),
             )
-            previous = {combination.view_name: run}
+            previous[combination.view_name] = run
             yield combination, run

@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from functools import lru_cache, partial
+from functools import cache, partial
 from typing import TypeVar
 
 import numpy as np
@@ -16,7 +16,7 @@ from scipy.ndimage import gaussian_filter
 
 from tests.rooms.lighting import floor_shadows
 from tests.rooms.raster import Backdrop, Figures, Mesh, Sensor, draw
-from tests.rooms.rooms import CAMERAS, TARGET_HALF_EXTENTS, RoomSpec
+from tests.rooms.rooms import TARGET_HALF_EXTENTS, RoomSpec
 from tests.rooms.scene import Scene, script, shadow_balls
 from tests.rooms.walls.background import FINE, Background, Tracer, lamp_table, render_background
 from tests.rooms.walls.interior import LEFT, NEAR, Interior, furnish
@@ -74,9 +74,9 @@ def stage_of(spec: RoomSpec) -> Stage:
     )
 
 
-@lru_cache(maxsize=len(CAMERAS))
+@cache
 def _empty_room(spec: RoomSpec, camera: Camera) -> Background:
-    """The traced room, kept for the next rendering with another seed."""
+    """The traced room, kept for the next rendering: nine of 10 MB at the most."""
     interior = furnish(spec.decor, spec.back_door, spec.front_door)
     return muted_room(render_background(Tracer(interior), camera))
 
