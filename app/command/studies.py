@@ -9,7 +9,7 @@ import statistics
 import sys
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
@@ -30,7 +30,7 @@ from app.command.arguments import (
     Where,
 )
 from app.command.flags import preset_values, set_values
-from app.command.terminal import FAILURE, Bar, CommandError, print_json, print_table, say
+from app.command.terminal import FAILURE, Bar, CommandError, print_json, print_table, rate, say
 from tracker.files.folders import library_file
 from tracker.library.store import open_library
 from tracker.parameters.catalogue import RunParameters
@@ -86,6 +86,22 @@ def study(command: Study) -> int:
     return 0
 
 
+def _have_truth(recordings: Sequence[str], folder: Path) -> bool:
+    """Return whether no recording lacks a truth, as far as they can be read yet."""
+    from tracker.sequences.errors import SequenceError
+    from tracker.sequences.library import open_sequence
+    from tracker.studies.definition import places_of
+
+    for name in recordings:
+        try:
+            opened = [open_sequence(place) for place in places_of([name], folder)]
+        except (SequenceError, StudyError, OSError):
+            continue
+        if any(one.ground_truth is None for one in opened):
+            return False
+    return True
+
+
 def _new(command: NewStudy) -> None:
     from tracker.files.atomic import replacing
     from tracker.studies.definition import example
@@ -95,8 +111,11 @@ def _new(command: NewStudy) -> None:
         raise CommandError(f"{file} exists; name a file that does not")
     if file.suffix != ".toml":
         raise CommandError(f"{file}: expected the name of a .toml file")
+    recordings = command.recording or ("room44-3p",)
+    objective = "score" if _have_truth(recordings, file.parent) else "identity"
+    text = example(file.stem, recordings, objective=objective)
     with replacing(file) as begun:
-        begun.write_text(example(file.stem, command.recording or ("room44-3p",)), encoding="utf-8")
+        begun.write_text(text, encoding="utf-8")
     say(f"{file} is written: change it, then `multiview-phd study run {shlex.quote(str(file))}`")
 
 
@@ -421,8 +440,8 @@ def _tell(places: Sequence[str], found: Sequence[BatchRun]) -> None:
         why = next((one.words for one in found if one.recording == place and one.words), "")
         name = runs[0].recording_name if runs else place
         figures = [_mean([getattr(run, key) for run in runs]) for key in _FIGURES]
-        targets = _mean([float(run.targets) for run in runs], 1)
-        speed = _mean([run.steps_per_second for run in runs], 0)
+        targets = _mean([float(run.targets) for run in runs], "{:.1f}".format)
+        speed = _mean([run.steps_per_second for run in runs], rate)
         kept = " ".join(str(run.id) for run in runs)
         rows.append((name, str(len(runs)), *figures, targets, speed, kept, why))
     print_table(
@@ -434,12 +453,12 @@ def _tell(places: Sequence[str], found: Sequence[BatchRun]) -> None:
     say(f"{len(found)} runs, {computed} of them computed now; `multiview-phd runs` lists them")
 
 
-def _mean(values: Sequence[float | None], digits: int = 3) -> str:
+def _mean(values: Sequence[float | None], shown: Callable[[float], str] = "{:.3f}".format) -> str:
     there = [value for value in values if value is not None]
     if not there:
         return "–"
-    about = f" ± {statistics.stdev(there):.{digits}f}" if len(there) > 1 else ""
-    return f"{statistics.fmean(there):.{digits}f}{about}"
+    about = f" ± {shown(statistics.stdev(there))}" if len(there) > 1 else ""
+    return f"{shown(statistics.fmean(there))}{about}"
 
 
 def tune(command: Tune) -> int:

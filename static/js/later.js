@@ -110,7 +110,8 @@ function mountTour(root, { store }) {
 				"p",
 				{ class: "seen" },
 				`${cameras} one room. A coloured body is a person the filter believes in, the line on `,
-				"the floor where it came from; dashed in the pictures is the truth.",
+				"the floor where it came from. Dashed in a picture is who is hidden there",
+				sequence?.has_truth ? ", dashed and white the truth." : ".",
 			),
 			THINGS.map(({ word, key: name, text }, index) =>
 				h(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -20,6 +21,7 @@ from tracker.parameters.groups.fusion import FusionParams
 from tracker.parameters.groups.smoothing import SmoothingParams
 from tracker.single_view.protocol import ViewResult
 from tracker.smoothing.paths import Links, Paths
+from tracker.smoothing.result import Smoothed
 from tracker.smoothing.smoother import BoxAssociations, Smoother
 from tracker.smoothing.tracklets import costs, linking
 from tracker.smoothing.tracklets.appearance import AppearanceModel
@@ -263,7 +265,11 @@ def test_corrections_that_are_not_met_are_applied_one_of_a_track_at_a_time(
         make(kind="different", places=[[k + 1, at, 0.0, 0.85], [8, at, 0.0, 0.85]])
         for k, at in enumerate(x)
     ]
-    found = linking._unmet(paths, waiting, 2, careful=careful)
+    tracks = replace(
+        Smoothed.empty(6, 0), frames=paths.steps, labels=paths.labels[paths.owners],
+        means=paths.states,
+    )  # fmt: skip
+    found = linking._unmet(tracks, waiting, 2, careful=careful)
     assert found == [waiting[k] for k in unmet]
     met = make(kind="different", places=[[1, 0.0, 0.0, 0.85], [8, 5.0, 0.0, 0.85]])
-    assert linking._unmet(paths, [met, *waiting], 2, careful=careful) == found
+    assert linking._unmet(tracks, [met, *waiting], 2, careful=careful) == found

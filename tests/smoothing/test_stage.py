@@ -221,6 +221,25 @@ def test_each_kind_of_correction_holds_where_it_did_not(
         assert (there.min() if kind == "came" else there.max()) == 14
 
 
+def test_what_confirms_a_track_where_only_its_boxes_lead_changes_nothing() -> None:
+    """The filter loses one of two neighbours eight steps before his last box. A correction there
+    refers to him, and not to the neighbour, who alone has a tracklet at that step."""
+    paths = np.stack([world.stand((0.0, 0.0), STEPS), world.stand((0.45, 0.0), STEPS)], axis=1)
+    scene = known(paths, hidden=lambda camera, person, step: person == 1 and step > 25)
+    labels = np.tile([4, 7], (STEPS, 1))
+    labels[18:, 1] = -1
+    stage = create(scene.whole, SETTLED)
+    said = make(kind="same", places=[place(scene, 1, 4), place(scene, 1, 25)])
+    plain, told = (
+        stage.smooth(scene.views, scene.fused(labels), corrections=log) for log in ((), (said,))
+    )
+    assert plain is not None
+    assert told is not None
+    assert plain.frames[(plain.labels == 7) & (plain.existences > 0.5)].max() == 25
+    assert_array_equal(told.labels, plain.labels)
+    assert_array_equal(told.means, plain.means)
+
+
 def test_who_was_away_too_long_is_joined_where_somebody_says_so() -> None:
     path = world.stand((0.3, 0.2), 24)[:, None]
     scene = known(path, hidden=lambda camera, person, step: 8 <= step < 16)

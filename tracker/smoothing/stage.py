@@ -57,8 +57,6 @@ class _Resolution(NamedTuple):
     """The tracklets of the tracks."""
     limits: Mapping[int, tuple[int, int]] = MappingProxyType({})
     """First and last step at which corrections let a track exist, by its label."""
-    key: str = ""
-    """Hash of the corrections that were enforced; empty where identities are not resolved."""
 
 
 class _FilterTracks(NamedTuple):
@@ -159,39 +157,37 @@ class IdentitySmoothing(PositionSmoothing):
         earlier: ResultStore,
     ) -> Smoothed:
         """Split the filter's tracks into tracklets, and smooth the linked ones."""
-        decided = self._resolve(tracks, views, corrections, earlier)
-        known: Smoothed | None = earlier.get(f"smoothed-{decided.key}")
-        if known is not None:
-            return known
-        found = tracks.finish(1, decided)  # resolved tracks are near their boxes
-        earlier.put(f"smoothed-{decided.key}", found)
-        return found
-
-    def _resolve(
-        self,
-        tracks: _Refinement,
-        views: Steps[tuple[ViewResult, ...]],
-        corrections: Many[Correction],
-        earlier: ResultStore,
-    ) -> _Resolution:
-        """Replace the filter's tracks by linked tracklets."""
         p = self._parameters.smoothing
         seen = Appearances.of(views) if p.appearance > 0.0 else Appearances()
         start: _LastRoundInput | None = earlier.get("start")
         if start is None:
             start = self._before_last_round(tracks, seen)
             earlier.put("start", start)
-        tracked = Tracked(
-            tracks.smoother, start.fitted, start.shared, start.contested, start.had, start.names
-        )
-        tracks.learnt, first = start.learnt, start.first
+        given = [
+            Tracked(
+                tracks.smoother, start.fitted, start.shared, start.contested, start.had, start.names
+            )
+        ]  # nothing else holds them when they are linked for the last time
+        learnt, first = start.learnt, start.first
         del start
-        found, key = linking.resolve_identities(tracked, p, seen, corrections, earlier)
-        tracks.check()
-        tracks.adopt(found)
-        gone = np.flatnonzero(~np.isin(first.paths.labels, found.names)).tolist()
-        removed = [_removal(first.paths, path, first.odds[path]) for path in gone]
-        return _Resolution([*found.decisions, *removed], found.joined, found.limits, key)
+
+        def finish(found: LinkedTracks, key: str) -> Smoothed:
+            """Smooth linked tracks, unless that was done before."""
+            known: Smoothed | None = earlier.get(f"smoothed-{key}")
+            if known is not None:
+                return known
+            tracks.check()
+            tracks.learnt = learnt
+            tracks.adopt(found)
+            gone = np.flatnonzero(~np.isin(first.paths.labels, found.names)).tolist()
+            removed = [_removal(first.paths, path, first.odds[path]) for path in gone]
+            decided = _Resolution([*found.decisions, *removed], found.joined, found.limits)
+            del found
+            finished = tracks.finish(1, decided)  # resolved tracks are near their boxes
+            earlier.put(f"smoothed-{key}", finished)
+            return finished
+
+        return linking.link_with_corrections(given.pop(), p, seen, corrections, earlier, finish)
 
     def _before_last_round(self, tracks: _Refinement, seen: Appearances) -> _LastRoundInput:
         """Run all rounds but the last resolution, the only one with corrections of identity.
@@ -210,7 +206,7 @@ class IdentitySmoothing(PositionSmoothing):
         for _ in range(p.rounds - 1):
             tracked = Tracked(smoother, fitted, shared, contested, had, names)
             del fitted, shared
-            found, _key = linking.resolve_identities(tracked, p, seen)
+            found = linking.link_tracks(tracked, p, seen)
             del tracked
             tracks.check()
             had, names = found.had, found.names

@@ -146,5 +146,9 @@ export function show(value) {
 		: String(Number(value.toPrecision(5)));
 }
 
+/** @param {number} value  @returns {string} a rate, never rounded to nothing: 25, 4.2, 0.043 */
+export const rate = (value) =>
+	value >= 9.95 ? String(Math.round(value)) : show(Number(value.toPrecision(2)));
+
 /** @param {string} words  @returns {string} as a sentence begins */
 export const capital = (words) => words.slice(0, 1).toUpperCase() + words.slice(1);

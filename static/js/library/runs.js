@@ -1,5 +1,5 @@
 /** The table of a recording's runs. */
-import { fill, h, icon, symbolOf } from "../elements/dom.js";
+import { fill, h, icon, rate, symbolOf } from "../elements/dom.js";
 import { table } from "../elements/table.js";
 import { figure, isMethod, livesAMinute, madeWhen, many, methodWord } from "./words.js";
 
@@ -186,7 +186,7 @@ export function runsTable(on) {
 			word: "Steps/s",
 			kind: "num",
 			by: (run) => run.steps_per_second,
-			cell: (run) => (run.steps_per_second ? Math.round(run.steps_per_second) : "–"),
+			cell: (run) => (run.steps_per_second ? rate(run.steps_per_second) : "–"),
 		},
 		{ word: "Note", kind: "q note-cell", by: true, cell: (run) => run.note },
 	];

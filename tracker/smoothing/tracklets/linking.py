@@ -7,6 +7,7 @@ tracklets that remain is of one person; all of them together are linked at the l
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from collections.abc import Sequence as Many
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -30,8 +31,8 @@ from tracker.smoothing.paths import (
     same_label,
     select_rows,
 )
-from tracker.smoothing.protocol import EmptyStore, ResultStore
-from tracker.smoothing.result import Decision, LinkedTracklets
+from tracker.smoothing.protocol import ResultStore
+from tracker.smoothing.result import Decision, LinkedTracklets, Smoothed
 from tracker.smoothing.smoother import BoxAssociations
 from tracker.smoothing.tracklets import costs, splitting
 from tracker.smoothing.tracklets.constraints import (
@@ -90,18 +91,32 @@ class LinkedTracks:
     """The label of each row before the splits, -1 where no track has it."""
 
 
-def resolve_identities(
+def link_tracks(tracked: Tracked, parameters: SmoothingParams, seen: Appearances) -> LinkedTracks:
+    """Split tracks into tracklets and link these, without any correction.
+
+    Args:
+        tracked: Tracks of the filter, or of the previous round, whose states are forgotten.
+        parameters: Thresholds of the splits, and weights of the links.
+        seen: Appearance of the boxes.
+    """
+    plain = splitting.find_splits(tracked, parameters)
+    tracked.forget_predictions()
+    return _link(tracked, parameters, seen, (), 0, plain, PriorLinks(), waits=False)
+
+
+def link_with_corrections(
     tracked: Tracked,
     parameters: SmoothingParams,
     seen: Appearances,
-    corrections: Many[Correction] = (),
-    earlier: ResultStore | None = None,
-) -> tuple[LinkedTracks, str]:
+    corrections: Many[Correction],
+    earlier: ResultStore,
+    finish: Callable[[LinkedTracks, str], Smoothed],
+) -> Smoothed:
     """Split tracks into tracklets and link these, so that all corrections of identity are met.
 
-    Only corrections that the result without them does not meet are enforced, one after another:
-    a correction that confirms the result has no effect. Links that no correction refers to
-    remain, as far as possible, those of the result without corrections.
+    Only corrections that the finished tracks without them do not meet are enforced, one after
+    another: a correction that confirms the result has no effect. Links that no correction refers
+    to remain, as far as possible, those of the result without corrections.
 
     Args:
         tracked: Tracks of the filter, or of the previous round; without corrections their states
@@ -111,11 +126,10 @@ def resolve_identities(
         corrections: The user's corrections, in the order in which they were made.
         earlier: Results for these tracks under other sets of corrections: with one more
             correction most of the sets that are enforced on the way are the same.
-
-    Returns:
-        The tracks, and a hash of the corrections that were enforced.
+        finish: Makes the finished tracks of linked ones, given a hash of the corrections that are
+            enforced. These are what the user sees and corrects: unlike the linked ones they reach
+            as far as their boxes do, and lack those that are likelier nobody.
     """
-    earlier = earlier or EmptyStore()
     leeway = corrections_leeway(tracked.smoother.model.step_time)
     waiting = [
         one for one in corrections if one.constraints.must_link or one.constraints.cannot_link
@@ -134,24 +148,29 @@ def resolve_identities(
                 tracked.forget_predictions()
             found = _link(
                 tracked, parameters, seen, obeyed, leeway, plain, prior_links,
-                bool(corrections),
+                waits=bool(corrections),
             )  # fmt: skip
             earlier.put(key, found)
         if prior_links.people is None:
             prior_links = PriorLinks(found.people)
-        unmet = _unmet(found.paths, waiting, leeway, careful=turn < _CAREFUL_ROUNDS)
+        given = [found]  # nothing else holds the states that the fit replaces
+        del found
+        if not waiting:
+            del tracked
+        finished = finish(given.pop(), key)
+        unmet = _unmet(finished, waiting, leeway, careful=turn < _CAREFUL_ROUNDS)
         if not unmet:
-            return found, key
+            return finished
         waiting, turn = [one for one in waiting if one not in unmet], turn + 1
 
 
 def _unmet(
-    paths: Paths, waiting: Many[Correction], leeway: int, *, careful: bool
+    tracks: Smoothed, waiting: Many[Correction], leeway: int, *, careful: bool
 ) -> list[Correction]:
-    """Find the corrections that paths do not meet.
+    """Find the corrections that tracks do not meet.
 
     Args:
-        paths: The linked tracks.
+        tracks: The finished tracks.
         waiting: The corrections that are not enforced yet.
         leeway: Number of steps by which a track may miss the step of a correction.
         careful: Whether a correction is left out where an unmet earlier one refers to the same
@@ -159,9 +178,7 @@ def _unmet(
     """
     if not waiting:
         return []
-    results = outcomes(
-        paths.steps, paths.labels[paths.owners], paths.states[:, :3], waiting, leeway=leeway
-    )
+    results = outcomes(tracks.frames, tracks.labels, tracks.means[:, :3], waiting, leeway=leeway)
     found: list[Correction] = []
     touched: set[int] = set()
     for one, outcome in zip(waiting, results, strict=True):
@@ -183,6 +200,7 @@ def _link(
     leeway: int,
     plain: splitting.Splits,
     prior_links: PriorLinks,
+    *,
     waits: bool,
 ) -> LinkedTracks:
     """Split tracks and link the tracklets under the constraints of some corrections.
