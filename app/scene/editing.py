@@ -58,13 +58,7 @@ class RoomEditing(Follower):
     """The handles, kept where the room is; a drag of one teaches the sequence."""
 
     def __init__(self, server: viser.ViserServer, workbench: Workbench, teaching: Teaching) -> None:
-        """Make the handles of the faces, hidden, and follow the workbench from now on.
-
-        Args:
-            server: Where the nodes live.
-            workbench: Whose room.
-            teaching: Who is told what was dragged.
-        """
+        """Make the handles of the faces, hidden, and follow the workbench from now on."""
         super().__init__("room editing", workbench)
         self._server = server
         self._teaching = teaching

@@ -34,13 +34,7 @@ class Lines:
     """A batch of line segments, coloured end by end."""
 
     def __init__(self, server: viser.ViserServer, name: str, thickness: float) -> None:
-        """Make the node, hidden.
-
-        Args:
-            server: Where the node lives.
-            name: Of the node.
-            thickness: Pixels, whatever the distance.
-        """
+        """Make the node, hidden."""
         self._handle = server.scene.add_line_segments(
             name,
             np.zeros((1, 2, 3)),

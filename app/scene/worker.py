@@ -103,12 +103,7 @@ class Follower:
     """A part of the 3D view that is kept equal to the workbench by a thread of its own."""
 
     def __init__(self, name: str, workbench: Workbench) -> None:
-        """Start the thread, which is asked for nothing yet.
-
-        Args:
-            name: The name of the thread.
-            workbench: The workbench to follow.
-        """
+        """Start the thread, which is asked for nothing yet."""
         self._workbench = workbench
         self._worker = LatestWorker(name, self._work)
         self._unsubscribe: Callable[[], None] = lambda: None

@@ -51,12 +51,7 @@ class Correcting:
     """Follows a workbench; the log is written before anybody hears of a change."""
 
     def __init__(self, workbench: Workbench, edits: Edits) -> None:
-        """Read the log of what is open, now and whenever something else is.
-
-        Args:
-            workbench: Whose recordings.
-            edits: Where what is said can be undone.
-        """
+        """Read the log of what is open, now and whenever something else is."""
         self._workbench, self._edits = workbench, edits
         edits.own("corrections", self.restore)
         self._lock = threading.RLock()

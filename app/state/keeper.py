@@ -233,13 +233,7 @@ class Marking:
     """Marks and deletes runs of a library, so that it can be undone."""
 
     def __init__(self, workbench: Workbench, edits: Edits, library: Callable[[], Library]) -> None:
-        """Mark runs of a library.
-
-        Args:
-            workbench: Tells the pages of it.
-            edits: Where it can be undone.
-            library: Opens the library.
-        """
+        """Mark runs of a library."""
         self._workbench, self._edits, self._library = workbench, edits, library
         edits.own("runs", self._restore)
 

@@ -58,10 +58,6 @@ def values_to_try(parameter: Parameter, now: Any) -> tuple[Any, ...]:
     """Three to seven values of a parameter, with the one that it has now.
 
     Numbers lie evenly on the parameter's slider, which may be logarithmic, away from its ends.
-
-    Args:
-        parameter: Which one.
-        now: Its value.
     """
     if parameter.kind == "bool":
         return (False, True)
@@ -87,9 +83,6 @@ def shares(curves: Mapping[str, Curve]) -> dict[str, float]:
     The variance is that of the scores along the parameter's curve, and the shares sum to one over
     all curves that are whole. It is the first-order share of fANOVA [HHL14], which studies report,
     where one parameter is moved at a time and the others stay. Empty for fewer than two parameters.
-
-    Args:
-        curves: The curves to compare, by key.
     """
     spread: dict[str, float] = {}
     for key, curve in curves.items():

@@ -58,12 +58,7 @@ class StudyDesk:
     """Starts, stops and reads the studies of one folder."""
 
     def __init__(self, workbench: Workbench, folder: Path) -> None:
-        """Begin to look for news.
-
-        Args:
-            workbench: Tells the pages.
-            folder: Of all studies.
-        """
+        """Begin to look for news."""
         self.folder = folder
         self._workbench = workbench
         self._seen: dict[str, tuple[float, str]] = {}

@@ -91,7 +91,7 @@ class Owners:
 def of_app(name: str) -> Any:
     """What gives a route a part of the application, by the name that it has there."""
 
-    def part(request: Request) -> Any:
+    async def part(request: Request) -> Any:  # else it would take a thread for each request
         return getattr(request.app.state, name)
 
     return Depends(part)

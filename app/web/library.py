@@ -393,7 +393,6 @@ def _info(run: KeptRun) -> KeptRunInfo:
         older_code=run.code != code_version(),
         program=run.version,
         star=bool(run.star),
-        steps_per_second=run.steps_per_second,
     )
 
 
