@@ -43,6 +43,11 @@ def say(text: str) -> None:
     sys.stderr.flush()
 
 
+def rate(value: float) -> str:
+    """A rate in whole numbers from 10 on, below in two significant figures: 0.43, not 0."""
+    return f"{value:.0f}" if value >= 9.95 else f"{value:.2g}"
+
+
 class Bar:
     """A progress bar on standard error, from the first step on, and only on a terminal."""
 

@@ -29,6 +29,23 @@ def _mark_of(path: Path) -> tuple[int, int, int] | None:
     return found.st_ino, found.st_mtime_ns, found.st_size
 
 
+def _written(corrections: Told, places: Sequence[Path]) -> Path:
+    """Write the log at the first of some places that can be written to, and return that place.
+
+    Raises:
+        CorrectionError: If none can be; it tells of the last.
+    """
+    why = ""
+    for path in dict.fromkeys(places):
+        try:
+            write_log(path, corrections)
+        except OSError as error:
+            why = str(error)
+        else:
+            return path
+    raise CorrectionError(why)
+
+
 class Correcting:
     """Follows a workbench; the log is written before anybody hears of a change."""
 
@@ -137,14 +154,8 @@ class Correcting:
             raise CorrectionError("no recording is open")
         if self._log.problem is not None:
             raise CorrectionError(f"{self._log.problem}; mend the file, or move it away")
-        path, own = writing_place(self._recording.folder), own_place(self._recording.folder)
-        try:
-            write_log(path, corrections)
-        except OSError as error:
-            if path == own:
-                raise CorrectionError(str(error)) from None
-            path = own
-            write_log(path, corrections)
+        own = own_place(self._recording.folder)
+        path = _written(corrections, (writing_place(self._recording.folder), own))
         if self._log.path == own != path:  # the folder has again what was kept in the settings
             with contextlib.suppress(OSError):
                 own.unlink()

@@ -1,14 +1,25 @@
 /** What nobody needs before the first picture: read when the page is there. */
 import { mountCorrecting } from "./check/edits.js";
 import { fill, h, icon, one, parts, write } from "./elements/dom.js";
-import { signButton } from "./elements/drawn.js";
+import { save, signButton } from "./elements/drawn.js";
 import { mountTips } from "./elements/over.js";
 import { mountBookmarks, mountIdentity, mountTables } from "./inspector/tables.js";
+import { request } from "./state/api.js";
 import { keyLabel } from "./state/commands.js";
 import { mountReading } from "./timeline/reading.js";
 
 /** @param {Context} context @param {TimelineSeam} timeline */
 export function mountLater(context, timeline) {
+	const { actions } = context;
+	actions.saveFile = async (path, fallback) => {
+		try {
+			const response = await request(path);
+			const named = /filename="?([^";]+)"?/.exec(response.headers.get("content-disposition") ?? "");
+			save(await response.blob(), named?.[1] ?? fallback);
+		} catch (error) {
+			actions.refused(error, "export");
+		}
+	};
 	const side = one(".side");
 	mountTips();
 	mountExport(parts(one(".top")), context);
@@ -123,7 +134,8 @@ function mountTour(root, { store }) {
 			h(
 				"p.seen",
 				`${cameras} one room. A coloured body is a person the filter believes in, the line on `,
-				"the floor where it came from; dashed in the pictures is the truth.",
+				"the floor where it came from. Dashed in a picture is who is hidden there",
+				sequence?.has_truth ? ", dashed and white the truth." : ".",
 			),
 			THINGS.map(({ word, key: name, text }, index) =>
 				h(

@@ -14,6 +14,7 @@ import {
   templateWords,
   whereabouts,
 } from "../../static/js/library/words.js";
+import { rate } from "../../static/js/elements/dom.js";
 
 test("a number and its unit stay on one line, other words do not", () => {
   assert.equal(
@@ -123,4 +124,14 @@ test("runs that differ in their templates say which, and how many each has", () 
   ]);
   assert.deepEqual(templateWords([{ templates: [anna] }, { templates: [anna] }]), ["1", "1"]);
   assert.deepEqual(templateWords([{ templates: [anna] }, { templates: null }]), ["1", "not known"]);
+});
+
+test("a rate below one step a second is not told as none", () => {
+  assert.deepEqual([123.4, 9.96, 4.24, 0.43, 0.0432].map(rate), [
+    "123",
+    "10",
+    "4.2",
+    "0.43",
+    "0.043",
+  ]);
 });

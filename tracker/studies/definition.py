@@ -421,12 +421,13 @@ def _shown(found: Any) -> str:
 _KEYS = ("fusion.detection_probability", "fusion.clutter_rate", "fusion.acceleration_sigma")
 
 
-def example(name: str, recordings: Sequence[str]) -> str:
+def example(name: str, recordings: Sequence[str], *, objective: str = "score") -> str:
     """Return the text of an example of a study's file.
 
     Args:
         name: The name of the study.
         recordings: Names of built-in recordings, or folders.
+        objective: The key of its objective.
     """
     listed = ", ".join(json.dumps(one, ensure_ascii=False) for one in recordings)
     ranges = []
@@ -459,7 +460,7 @@ search = "auto"
 # What is sought, the leading figure first: any of `evaluate`, "score" (the mean of HOTA and IDF1),
 # "speed", or "identity", which needs no truth. Without this line: HOTA, IDF1 and speed where all
 # recordings have a truth, else identity.
-objectives = ["score"]
+objectives = ["{objective}"]
 
 # Whether hopeless trials are given up after a third of their runs.
 prune = true

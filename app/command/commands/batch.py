@@ -5,12 +5,12 @@ from __future__ import annotations
 import json
 import statistics
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from app.command.arguments.studies import Batch
 from app.command.commands.studies import INTERRUPTED, crew_of, to_be_stopped
 from app.command.flags import preset_values, set_values
-from app.command.terminal import FAILURE, Bar, print_table, say
+from app.command.terminal import FAILURE, Bar, print_table, rate, say
 from tracker.files.folders import library_file
 from tracker.library.store import open_library
 from tracker.parameters.catalogue import RunParameters
@@ -68,8 +68,8 @@ def _tell(places: Sequence[str], found: Sequence[BatchRun]) -> None:
         why = next((one.words for one in found if one.recording == place and one.words), "")
         name = runs[0].recording_name if runs else place
         figures = [_mean([getattr(run, key) for run in runs]) for key in _FIGURES]
-        targets = _mean([float(run.targets) for run in runs], 1)
-        speed = _mean([run.steps_per_second for run in runs], 0)
+        targets = _mean([float(run.targets) for run in runs], "{:.1f}".format)
+        speed = _mean([run.steps_per_second for run in runs], rate)
         kept = " ".join(str(run.id) for run in runs)
         rows.append((name, str(len(runs)), *figures, targets, speed, kept, why))
     print_table(
@@ -81,9 +81,9 @@ def _tell(places: Sequence[str], found: Sequence[BatchRun]) -> None:
     say(f"{len(found)} runs, {computed} of them computed now; `multiview-phd runs` lists them")
 
 
-def _mean(values: Sequence[float | None], digits: int = 3) -> str:
+def _mean(values: Sequence[float | None], shown: Callable[[float], str] = "{:.3f}".format) -> str:
     there = [value for value in values if value is not None]
     if not there:
         return "–"
-    about = f" ± {statistics.stdev(there):.{digits}f}" if len(there) > 1 else ""
-    return f"{statistics.fmean(there):.{digits}f}{about}"
+    about = f" ± {shown(statistics.stdev(there))}" if len(there) > 1 else ""
+    return f"{shown(statistics.fmean(there))}{about}"

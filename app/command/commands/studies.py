@@ -9,7 +9,7 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
@@ -76,6 +76,22 @@ def study(command: Study) -> int:
     return 0
 
 
+def _have_truth(recordings: Sequence[str], folder: Path) -> bool:
+    """Return whether no recording lacks a truth, as far as they can be read yet."""
+    from tracker.sequences.errors import SequenceError
+    from tracker.sequences.library import open_sequence
+    from tracker.studies.definition import places_of
+
+    for name in recordings:
+        try:
+            opened = [open_sequence(place) for place in places_of([name], folder)]
+        except (SequenceError, StudyError, OSError):
+            continue
+        if any(one.ground_truth is None for one in opened):
+            return False
+    return True
+
+
 def _new(command: NewStudy) -> None:
     from tracker.files.atomic import replacing
     from tracker.studies.definition import example
@@ -85,8 +101,11 @@ def _new(command: NewStudy) -> None:
         raise CommandError(f"{file} exists; name a file that does not")
     if file.suffix != ".toml":
         raise CommandError(f"{file}: expected the name of a .toml file")
+    recordings = command.recording or ("room44-3p",)
+    objective = "score" if _have_truth(recordings, file.parent) else "identity"
+    text = example(file.stem, recordings, objective=objective)
     with replacing(file) as begun:
-        begun.write_text(example(file.stem, command.recording or ("room44-3p",)), encoding="utf-8")
+        begun.write_text(text, encoding="utf-8")
     say(f"{file} is written: change it, then `multiview-phd study run {shlex.quote(str(file))}`")
 
 

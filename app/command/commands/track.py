@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from app.command.computing import compute
 from app.command.flags import Track
-from app.command.terminal import FAILURE, Bar, CommandError, check_keep, check_seed, say
+from app.command.terminal import FAILURE, Bar, CommandError, check_keep, check_seed, rate, say
 from tracker.files.folders import library_file
 from tracker.parameters import Stage
 from tracker.parameters.catalogue import METHODS, RunParameters
@@ -95,10 +95,11 @@ def track(command: Track) -> int:
         _keep(command, run, began, seconds)
     incomplete = "".join(f"; {one}" for one in missing)
     methods = [name for key in METHODS if (name := str(written.settings[key])) != "none"]
+    speed = sequence.frames / seconds
     say(
         f"{sequence.frames} steps, {targets} track{'' if targets == 1 else 's'} by "
-        f"{', '.join(methods)}, {sequence.frames / seconds:.0f} steps/s "
-        f"({sequence.frames / seconds / sequence.fps:.1f} × real time{kept}), written to {output}"
+        f"{', '.join(methods)}, {rate(speed)} steps/s "
+        f"({rate(speed / sequence.fps)} × real time{kept}), written to {output}"
         f"{incomplete}"
     )
     return FAILURE if command.strict and missing else 0

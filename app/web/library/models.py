@@ -151,5 +151,5 @@ def run_info(run: KeptRun, changes: list[ChangeInfo], older_code: bool) -> KeptR
         program=run.version,
         star=bool(run.star),
         tags=run.tags,
-        steps_per_second=round(run.steps_per_second, 1),
+        steps_per_second=run.steps_per_second,
     )

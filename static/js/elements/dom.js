@@ -173,12 +173,9 @@ export function remember(name, value) {
 	}
 }
 
-/** Have the browser save a file. @param {Blob} blob @param {string} name */
-export function save(blob, name) {
-	const href = URL.createObjectURL(blob);
-	h("a", { href, download: name }).click();
-	setTimeout(() => URL.revokeObjectURL(href), 10_000);
-}
+/** @param {number} value  @returns {string} a rate, never rounded to nothing: 25, 4.2, 0.043 */
+export const rate = (value) =>
+	value >= 9.95 ? String(Math.round(value)) : show(Number(value.toPrecision(2)));
 
 /** @param {string} words  @returns {string} as a sentence begins */
 export const capital = (words) => words.slice(0, 1).toUpperCase() + words.slice(1);

@@ -1,5 +1,5 @@
 /** What the panels beside the pictures tell: the shown step, events, figures and runs. */
-import { h, idTag, show } from "../elements/dom.js";
+import { h, idTag, rate, show } from "../elements/dom.js";
 import { drawnTable, fixed, line, nothing, parameterName, quiet } from "../elements/drawn.js";
 import { getJson } from "../state/api.js";
 import { eventsNow, resultOf, scoresOf, trueCount } from "../state/events.js";
@@ -416,7 +416,7 @@ export function runTable({ run: now }, { runs }, actions) {
 				[h("span", run.sequence), " ", quiet(run.at)],
 				[quiet(`${run.single_view} ·`), " ", quiet(run.fusion_method)],
 				run.done >= run.total ? words : `${words} ${run.done}/${run.total}`,
-				speed ? fixed(speed, speed >= 10 ? 0 : 1) : null,
+				speed ? rate(speed) : null,
 				run.changes,
 				current
 					? quiet("current")

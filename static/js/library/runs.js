@@ -1,5 +1,5 @@
 /** The table of a recording's runs. */
-import { h, icon, remember, remembered } from "../elements/dom.js";
+import { h, icon, rate, remember, remembered } from "../elements/dom.js";
 import { symbolOf } from "../elements/drawn.js";
 import { menuOf, opensMenu } from "../elements/over.js";
 import { table } from "../elements/table.js";
@@ -158,7 +158,7 @@ export function runsTable(on) {
 			word: "Steps/s",
 			kind: "num",
 			by: (run) => run.steps_per_second,
-			cell: (run) => (run.steps_per_second ? Math.round(run.steps_per_second) : "–"),
+			cell: (run) => (run.steps_per_second ? rate(run.steps_per_second) : "–"),
 		},
 		{ word: "Note", kind: "q note-cell cut", by: true, cell: (run) => run.note },
 	];

@@ -1,5 +1,5 @@
 /** The top bar: its places, what is open, which methods run, how far they are. */
-import { allow, fill, h, one, parts, write, all, refill } from "../elements/dom.js";
+import { allow, fill, h, one, parts, rate, write, all, refill } from "../elements/dom.js";
 import { PLACES, isBench, placeOf } from "../state/address.js";
 import { isOld } from "../state/events.js";
 
@@ -252,5 +252,4 @@ function timeText({ state, done, total, steps_per_second: speed, seconds_left: l
 }
 
 /** @param {Server.RunInfo} run  @returns {string} */
-const rateText = ({ steps_per_second: speed }) =>
-	speed ? `${speed < 10 ? speed.toFixed(1) : Math.round(speed)} steps/s` : "";
+const rateText = ({ steps_per_second: speed }) => (speed ? `${rate(speed)} steps/s` : "");

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -16,6 +17,7 @@ import pytest
 from app.command import main as cli
 from app.command.commands import listing
 from app.command.flags import Track, parse
+from app.command.terminal import rate
 from tests.app.conftest import Runs
 from tests.app.folders import write_crossing
 from tracker import __version__
@@ -36,6 +38,12 @@ def engine_csv(crossing: Path, path: Path, changes: dict[str, Any], seed: int = 
     computed = pipeline.compute(sequence, wanted, seed=seed)
     tracks_csv.save_tracks_csv(path, sequence, computed.tracks, wanted, seed)
     return path.read_text(encoding="utf-8")
+
+
+def test_a_rate_below_one_is_not_told_as_none() -> None:
+    assert [rate(value) for value in (123.4, 9.96, 4.24, 0.43, 0.0432)] == [
+        "123", "10", "4.2", "0.43", "0.043",
+    ]  # fmt: skip
 
 
 @pytest.mark.full
@@ -460,6 +468,22 @@ def test_a_limit_of_the_cache_that_cannot_be_is_wrong_usage(run: Runs, size: str
     status, stdout, stderr = run("serve", f"--disk={size}")
     assert (status, stdout) == (2, "")
     assert f"--disk: expected 0 to 65536 GB, got {size}" in stderr
+
+
+def test_a_new_study_seeks_what_its_recording_can_tell(
+    run: Runs, crossing: Path, tmp_path: Path
+) -> None:
+    bare = tmp_path / "bare"
+    shutil.copytree(crossing, bare)
+    file = bare / "sequence.toml"
+    text = file.read_text(encoding="utf-8")
+    truth = '[ground_truth]\nfile = "truth.csv"'
+    assert truth in text
+    file.write_text(text.replace(truth, ""), encoding="utf-8")
+    for recording, objective in [(crossing, "score"), (bare, "identity"), ("absent", "score")]:
+        study = tmp_path / f"{objective}-{Path(recording).name}.toml"
+        assert run("study", "new", study, "--recording", recording)[0] == 0
+        assert f'objectives = ["{objective}"]' in study.read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(

@@ -134,9 +134,10 @@ def test_what_a_full_disk_kept_elsewhere_is_there_after_a_start_and_goes_back(
 ) -> None:
     wishes = [{"kind": "checked", "first": first, "last": first} for first in (2, 20, 40)]
     log = own / "corrections.toml"
+    full_places = {log}
 
     def full(path: Path, corrections: Iterable[Correction]) -> None:
-        if path == log:
+        if path in full_places:
             raise OSError(f"{path}: cannot be written (No space left on device)")
         write_log(path, corrections)
 
@@ -145,6 +146,10 @@ def test_what_a_full_disk_kept_elsewhere_is_there_after_a_start_and_goes_back(
         with monkeypatch.context() as patched:
             patched.setattr("app.state.correcting.write_log", full)
             assert command(client, "correct", corrections=wishes[1:2]).status_code == 204
+            full_places.add(own_place(own))
+            full_there = command(client, "correct", corrections=wishes[2:])
+            assert full_there.status_code == 422
+            assert full_there.json()["detail"].endswith("(No space left on device).")
         assert len(read_log(log)) == 1
     with started(own) as client:
         assert client.get(PLACE).json()["checked"] == [[2, 2], [20, 20]]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cv2
@@ -14,7 +14,8 @@ from tests.conftest import short
 from tests.random_rooms import looking_camera, random_room, random_walkers
 from tracker.geometry.camera import Camera
 from tracker.io.checks import check
-from tracker.io.checks.synchronisation import CameraOffset, synchronise
+from tracker.io.checks.offsets import solve
+from tracker.io.checks.synchronisation import LEAST_GAIN, CameraOffset, synchronise
 from tracker.sequences.sequence import Detections, Room, Sequence, View
 
 STEPS = [-25.0, -7.0, -0.5, 0.0, 0.5, 3.0, 12.0, 40.0]
@@ -155,6 +156,30 @@ def test_people_who_stand_still_give_no_sure_offset() -> None:
         )
     found = synchronise(replace(sequence, views=tuple(still)))
     assert not any(offset.sure for offset in found)
+
+
+@dataclass(frozen=True)
+class _Agreement:
+    """Two cameras of which noise alone, or a shift by ``peak`` steps, agrees."""
+
+    noise: np.random.Generator
+    peak: float | None
+
+    def scores(self, offsets: np.ndarray, *, fine: bool = False) -> tuple[np.ndarray, np.ndarray]:
+        fits = self.noise.normal(0.0, 0.01, (len(offsets), 20))
+        if self.peak is not None:
+            fits += np.exp(-((offsets[:, None] - self.peak) ** 2) / 8.0)
+        return fits, np.ones_like(fits)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_two_cameras_that_agree_with_each_other_alone_tell_no_offset(seed: int) -> None:
+    noise = np.random.default_rng(seed)
+    apart, together = _Agreement(noise, None), _Agreement(noise, -20.0)
+    found = solve({(0, 1): apart, (0, 2): apart, (1, 2): together}, 3, 100)
+    steps = [offset.steps for offset in found if offset is not None]
+    assert steps[2] - steps[1] == pytest.approx(-20.0, abs=1.0)
+    assert [offset.gain < LEAST_GAIN for offset in found if offset is not None] == [True] * 3
 
 
 def test_nothing_to_compare_gives_nothing() -> None:

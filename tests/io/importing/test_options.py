@@ -62,6 +62,19 @@ def test_the_axis_that_a_check_names_can_be_typed_as_it_is_printed(up: Up) -> No
     assert options_of(command) == ImportOptions(up=up)
 
 
+def test_files_that_are_matched_by_order_are_named_with_their_cameras(tmp_path: Path) -> None:
+    toml(tmp_path)
+    videos(tmp_path)
+    names = ["window", "door", "stairs", "hall"][: len(cameras())]
+    for camera, name in zip(cameras(), names, strict=True):
+        (tmp_path / f"{camera.name}.avi").rename(tmp_path / f"{name}.avi")
+    (words,) = [why for what, why in settled_of(tmp_path).found if what == "matching"]
+    told = ", ".join(
+        f"{camera.name} = {name}" for camera, name in zip(cameras(), sorted(names), strict=True)
+    )
+    assert words == f"files go to cameras by order: {told}; --camera NAME=FILE"
+
+
 def test_boxes_as_parts_of_the_picture_are_read_where_it_is_told(tmp_path: Path) -> None:
     toml(tmp_path)
     for camera in cameras():

@@ -68,8 +68,7 @@ def run(context: Context) -> Result:
     notes += [
         f"{settings.in_words(('distance', 'gate'))}; "
         f"OSPA {settings.in_words(('cutoff', 'order'))}; "
-        f"found {settings.in_words(('near',))}. Default parameters, seed 0, fusion {FUSION}; "
-        "steps a second with all cores of this machine.",
+        f"found {settings.in_words(('near',))}. Default parameters, seed 0, fusion {FUSION}.",
         f"{ON_BOXES} needs an outside detector's boxes: the rooms and {cameras.RECORDING} have "
         f"none, and {BOXES_RECORDING} has no pictures for the others.",
     ]

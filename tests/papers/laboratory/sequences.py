@@ -73,7 +73,7 @@ def run(context: Context) -> Result:
     notes.append(
         f"{settings.in_words(('distance', 'gate'))}; "
         f"OSPA {settings.in_words(('cutoff', 'order'))}; "
-        f"found {settings.in_words(('near',))}. Steps a second with all cores of this machine. "
+        f"found {settings.in_words(('near',))}. "
         "Filter: step by step, as a live system would see it; smoothed: after stage 3, over the "
         "whole recording."
     )

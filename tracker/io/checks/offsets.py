@@ -71,8 +71,8 @@ class Offset:
     sharpness: float
     """How far the curve's peak stands above its median, in its median absolute deviations."""
     gain: float
-    """By how many standard deviations the agreement is better than with no offset, over the
-    parts of the recording."""
+    """By how many standard deviations the agreement with the cameras that have no offset is better
+    than with no offset, over the parts of the recording."""
 
 
 def solve(
@@ -262,12 +262,18 @@ def _gain(
     pairings: Mapping[tuple[int, int], Pairing],
     keys: Many[tuple[int, int]],
 ) -> float:
-    """By how many standard deviations the camera's offset is better than none."""
+    """By how many standard deviations the camera's offset is better than none.
+
+    It is compared with the cameras that have no offset. Where another one that has an offset
+    agrees with it, both may be late by any common amount.
+    """
     if found[camera] == 0.0:
         return 0.0
+    on_time = np.abs(found) < _SAME
     gains: list[ndarray] = []
     for a, b in keys:
-        if camera not in (a, b):
+        other = {a: b, b: a}.get(camera)
+        if other is None or not on_time[other]:
             continue
         own = found[b] - found[a]
         without = found[b] if camera == a else -found[a]

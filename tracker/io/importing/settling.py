@@ -52,6 +52,7 @@ from tracker.io.importing.finding.matching import (
     nothing_of,
     same_aspect,
 )
+from tracker.io.importing.finding.names import short_names
 from tracker.io.importing.finding.people import rate_of, rays_of_all
 from tracker.io.importing.finding.pictures import (
     COMMON_SIZES,
@@ -205,7 +206,10 @@ class _PlanDraft:
         self.matched = matched
         """The files by camera."""
         for way in sorted({how for own in matched.cameras for how in own.how.values()} - {"name"}):
-            self._note("matching", f"pictures and boxes go to the cameras by {way}")
+            pairs = [(c.raw.name, str(file)) for c in matched.cameras for file in c.files_by(way)]
+            files = short_names([file for _, file in pairs])
+            told = ", ".join(f"{pair[0]} = {file}" for pair, file in zip(pairs, files, strict=True))
+            self._note("matching", f"files go to cameras by {way}: {told}; --camera NAME=FILE")
         exchange_by_shape(matched.cameras, self.notes)
         self.sizes = picture_sizes(matched.cameras, self.notes)
         """The size of each camera's pictures, pixels."""

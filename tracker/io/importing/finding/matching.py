@@ -45,6 +45,13 @@ class MatchedCamera:
     how: dict[str, How] = field(default_factory=dict)
     """How its pictures and boxes were matched."""
 
+    def files_by(self, how: How) -> list[Path]:
+        """The files, or folders of pictures, that were matched in this way."""
+        pictures = self.video.path if self.video else self.images.folder if self.images else None
+        boxes = None if self.detections is None else self.detections.source
+        files = {"pictures": pictures, "detections": boxes}
+        return [file for kind, file in files.items() if file and self.how.get(kind) == how]
+
     @property
     def picture_size(self) -> tuple[int, int] | None:
         """Of video or images; else what the boxes' file says."""
