@@ -44,7 +44,7 @@ function mountExport({ leaving, stopLeaving, leave }, { store, actions }) {
 		stopLeaving.onclick = cancel ?? null;
 	};
 	// Read when it is first wanted; from then on the button opens the menu by itself.
-	leave.onclick = async () => {
+	actions.exportForms = async () => {
 		const { exportMenu } = await import("./library/exports.js");
 		leave.onclick = null;
 		const [, menu] = exportMenu({ store, actions, say, chosen: () => [null], button: leave });

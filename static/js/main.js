@@ -92,6 +92,7 @@ const brought = /** @type {const} */ ([
 	["keepPicture", readKeep],
 	["copyRun", readRest],
 	["saveFile", readRest],
+	["exportForms", readRest],
 	["swap", readRest],
 ]);
 for (const [name, read] of brought) {

@@ -63,7 +63,7 @@ export const capture = (
 	/** @type {any} */ act,
 ) => target.addEventListener(kind, act, true);
 
-/** What happened is dealt with: it means nothing else. @param {Event} event */
+/** It means nothing else. @param {Event} event */
 export function claim(event) {
 	event.preventDefault();
 	event.stopPropagation();
@@ -151,9 +151,7 @@ export function show(value) {
  * @param {V[]} list @param {number} index  -1: none @param {number} direction  1 or -1
  */
 export const turned = (list, index, direction) =>
-	list[
-		index < 0 && direction < 0 ? list.length - 1 : (index + direction + list.length) % list.length
-	];
+	list[(Math.max(index, direction < 0 ? 0 : -1) + direction + list.length) % list.length];
 
 /** What this browser remembers under a name. @param {string} name @param {any} usual  else */
 export function remembered(name, usual) {
@@ -164,7 +162,7 @@ export function remembered(name, usual) {
 	}
 }
 
-/** Have this browser remember; without storage it lasts as long as the page. @param {string} name @param {unknown} value */
+/** Have it remember; without storage that lasts as long as the page. @param {string} name @param {unknown} value */
 export function remember(name, value) {
 	try {
 		localStorage.setItem(name, JSON.stringify(value));

@@ -179,6 +179,7 @@ export function createActions({ store, seek, send, receive }) {
 		},
 		exportTracks: () => void actions.saveFile("/api/export/tracks.csv", "tracks.csv"),
 		async saveFile() {},
+		exportForms() {},
 
 		// cameras and 3D
 		chooseCamera(index) {
