@@ -1,14 +1,25 @@
 /** What nobody needs before the first picture: read when the page is there. */
 import { mountCorrecting } from "./check/edits.js";
 import { fill, h, icon, one, parts, write } from "./elements/dom.js";
-import { signButton } from "./elements/drawn.js";
+import { save, signButton } from "./elements/drawn.js";
 import { mountTips } from "./elements/over.js";
 import { mountBookmarks, mountIdentity, mountTables } from "./inspector/tables.js";
+import { request } from "./state/api.js";
 import { keyLabel } from "./state/commands.js";
 import { mountReading } from "./timeline/reading.js";
 
 /** @param {Context} context @param {TimelineSeam} timeline */
 export function mountLater(context, timeline) {
+	const { actions } = context;
+	actions.saveFile = async (path, fallback) => {
+		try {
+			const response = await request(path);
+			const named = /filename="?([^";]+)"?/.exec(response.headers.get("content-disposition") ?? "");
+			save(await response.blob(), named?.[1] ?? fallback);
+		} catch (error) {
+			actions.refused(error, "export");
+		}
+	};
 	const side = one(".side");
 	mountTips();
 	mountExport(parts(one(".top")), context);
@@ -33,7 +44,7 @@ function mountExport({ leaving, stopLeaving, leave }, { store, actions }) {
 		stopLeaving.onclick = cancel ?? null;
 	};
 	// Read when it is first wanted; from then on the button opens the menu by itself.
-	leave.onclick = async () => {
+	actions.exportForms = async () => {
 		const { exportMenu } = await import("./library/exports.js");
 		leave.onclick = null;
 		const [, menu] = exportMenu({ store, actions, say, chosen: () => [null], button: leave });

@@ -91,14 +91,16 @@ const brought = /** @type {const} */ ([
 	["keepLayout", readSheets],
 	["keepPicture", readKeep],
 	["copyRun", readRest],
+	["saveFile", readRest],
+	["exportForms", readRest],
 	["swap", readRest],
 ]);
 for (const [name, read] of brought) {
-	const early = async (/** @type {any} */ what = undefined) => {
+	const early = async (/** @type {any[]} */ ...what) => {
 		await read();
 		if (actions[name] === early)
 			return actions.note("error", "That is not read yet", "The server does not answer.");
-		await /** @type {any} */ (actions)[name](what);
+		await /** @type {any} */ (actions)[name](...what);
 	};
 	actions[name] = early;
 }

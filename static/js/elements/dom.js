@@ -63,7 +63,7 @@ export const capture = (
 	/** @type {any} */ act,
 ) => target.addEventListener(kind, act, true);
 
-/** What happened is dealt with: it means nothing else. @param {Event} event */
+/** It means nothing else. @param {Event} event */
 export function claim(event) {
 	event.preventDefault();
 	event.stopPropagation();
@@ -145,19 +145,13 @@ export function show(value) {
 		: String(Number(value.toPrecision(5)));
 }
 
-/** @param {number} value  @returns {string} a rate, never rounded to nothing: 25, 4.2, 0.043 */
-export const rate = (value) =>
-	value >= 9.95 ? String(Math.round(value)) : show(Number(value.toPrecision(2)));
-
 /**
  * The next one of a list that goes round; of none the first or the last.
  * @template V
  * @param {V[]} list @param {number} index  -1: none @param {number} direction  1 or -1
  */
 export const turned = (list, index, direction) =>
-	list[
-		index < 0 && direction < 0 ? list.length - 1 : (index + direction + list.length) % list.length
-	];
+	list[(Math.max(index, direction < 0 ? 0 : -1) + direction + list.length) % list.length];
 
 /** What this browser remembers under a name. @param {string} name @param {any} usual  else */
 export function remembered(name, usual) {
@@ -168,7 +162,7 @@ export function remembered(name, usual) {
 	}
 }
 
-/** Have this browser remember; without storage it lasts as long as the page. @param {string} name @param {unknown} value */
+/** Have it remember; without storage that lasts as long as the page. @param {string} name @param {unknown} value */
 export function remember(name, value) {
 	try {
 		localStorage.setItem(name, JSON.stringify(value));
@@ -177,12 +171,9 @@ export function remember(name, value) {
 	}
 }
 
-/** Have the browser save a file. @param {Blob} blob @param {string} name */
-export function save(blob, name) {
-	const href = URL.createObjectURL(blob);
-	h("a", { href, download: name }).click();
-	setTimeout(() => URL.revokeObjectURL(href), 10_000);
-}
+/** @param {number} value  @returns {string} a rate, never rounded to nothing: 25, 4.2, 0.043 */
+export const rate = (value) =>
+	value >= 9.95 ? String(Math.round(value)) : show(Number(value.toPrecision(2)));
 
 /** @param {string} words  @returns {string} as a sentence begins */
 export const capital = (words) => words.slice(0, 1).toUpperCase() + words.slice(1);

@@ -123,6 +123,13 @@ export function asks(attributes, done, leaves = false) {
 	return field;
 }
 
+/** Have the browser save a file. @param {Blob} blob @param {string} name */
+export function save(blob, name) {
+	const href = URL.createObjectURL(blob);
+	h("a", { href, download: name }).click();
+	setTimeout(() => URL.revokeObjectURL(href), 10_000);
+}
+
 /** The place of a key among the arrows: what it adds across and down. @type {Record<string, [number, number] | undefined>} */
 export const ARROWS = {
 	ArrowLeft: [-1, 0],

@@ -104,6 +104,8 @@ export function mountTop(root, { store, actions }) {
 	for (const select of [sequence, ...Object.values(methods)])
 		select.addEventListener("change", () => select.blur());
 
+	leave.onclick = () => actions.exportForms();
+
 	function lists() {
 		const { server, sequences, schema, link } = store.get();
 		// What is shown, until another is there in its place.

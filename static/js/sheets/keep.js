@@ -3,7 +3,8 @@
  * are written where they stand.
  */
 import { writers } from "../draw/canvas.js";
-import { all, one, save } from "../elements/dom.js";
+import { all, one } from "../elements/dom.js";
+import { save } from "../elements/drawn.js";
 import { request } from "../state/api.js";
 
 /* ---------- A brush that writes SVG: the drawing code of the canvases makes a vector picture

@@ -1,6 +1,6 @@
 /** What a person can do: the page's own state at once, the server's by request. */
-import { ApiError, getJson, request, sendCommand, sendJson } from "./api.js";
-import { save, turned } from "../elements/dom.js";
+import { ApiError, getJson, sendCommand, sendJson } from "./api.js";
+import { turned } from "../elements/dom.js";
 import { SPEEDS, clampStep } from "../play/clock.js";
 import { eventsNow, nextEvent, nextLayers, ordered } from "./events.js";
 
@@ -178,17 +178,8 @@ export function createActions({ store, seek, send, receive }) {
 			else actions.select(null);
 		},
 		exportTracks: () => void actions.saveFile("/api/export/tracks.csv", "tracks.csv"),
-		async saveFile(path, fallback) {
-			try {
-				const response = await request(path);
-				const named = /filename="?([^";]+)"?/.exec(
-					response.headers.get("content-disposition") ?? "",
-				);
-				save(await response.blob(), named?.[1] ?? fallback);
-			} catch (error) {
-				actions.refused(error, "export");
-			}
-		},
+		async saveFile() {},
+		exportForms() {},
 
 		// cameras and 3D
 		chooseCamera(index) {

@@ -171,9 +171,9 @@ export function mountTimeline(root, context) {
 		style.removeProperty("--h-strip");
 		if (store.get().layout.max !== "time") return;
 		const strips = all(".gr.strip:not([hidden])", root).length;
-		const lanesHeight = shownTracks().length * token("h-lane");
+		const tall = shownTracks().length * token("h-lane");
 		const room = plot.clientHeight - above();
-		const each = (room - Math.min(lanesHeight, room / 2)) / Math.max(1, strips);
+		const each = (room - Math.min(tall, room / 2)) / Math.max(1, strips);
 		style.setProperty("--h-strip", `${Math.floor(Math.max(token("h-strip"), each))}px`);
 	}
 

@@ -256,6 +256,8 @@ interface Actions {
 	go: (place: string) => void;
 	clear: () => void;
 	exportTracks: () => void;
+	/** Open the menu of the forms that the shown run leaves in. */
+	exportForms: () => void;
 	/** Save what an address gives, once it is known that it gives it; a name where the answer has none. */
 	saveFile: (path: string, fallback: string) => Promise<void>;
 	/** As the large picture. */
