@@ -71,7 +71,7 @@ def test_a_detection_is_inside_the_gate_if_and_only_if_the_filter_associates_it(
             posterior.means,
             posterior.covariances,
             model.expected(index, posterior).expected,
-            model.target.measured_boxes(boxes, sigmas, run.parameters.fusion.measurement_sigma),
+            model.target.measured(boxes, sigmas, run.parameters.fusion.measurement_sigma),
             model.gate,
         )
         near = np.isin(np.arange(200), pairs.measured)

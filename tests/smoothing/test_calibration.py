@@ -64,7 +64,7 @@ def test_a_number_of_a_box_is_free_where_it_moves_along_any_axis() -> None:
     ways = np.array(list(itertools.product([0.0, -1e-3], repeat=3)))
     derivatives = np.hstack([ways, np.ones_like(ways)])[:, None]
     seen = standing(2).smoother().model.target.expected(CAMERAS[0], np.zeros((8, 6)))
-    seen = replace(seen, expected=seen.expected._replace(jacobians=derivatives))
+    seen = seen._replace(expected=seen.expected._replace(jacobians=derivatives))
     assert free(seen)[:, 0].tolist() == [False] + [True] * 7
 
 
