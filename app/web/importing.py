@@ -38,7 +38,6 @@ from tracker.io.checks import Check, Status
 from tracker.io.checks.synchronisation import CameraOffset
 from tracker.io.conventions.questions import Part
 from tracker.io.importing.finding.angles import open_turns, product_in_words, turns_in_words
-from tracker.io.importing.gathering import FileUse, file_uses
 from tracker.io.importing.options import ImportOptions
 from tracker.io.importing.remedies import unsaid
 from tracker.io.read.pieces import CalibrationPiece, DetectionPiece, FormatError
@@ -52,6 +51,7 @@ if TYPE_CHECKING:
     from app.state.looking import Looked
     from tracker.geometry.consistency.entrances import Door
     from tracker.io.conventions.questions import Question
+    from tracker.io.importing.gathering import FileUse
     from tracker.io.importing.settling import ImportPlan, PlannedView
 
 
@@ -370,6 +370,8 @@ def _changed(wish: ImportWish, changes: Mapping[str, Any]) -> ImportWish:
 
 def info_of(draft: Draft) -> ImportInfo:
     """Everything that is known."""
+    from tracker.io.importing.gathering import file_uses  # with every format
+
     known, upload = draft.known, draft.upload
     settled, looked = known.settled, known.looked
     uses = file_uses(known.taken, None if settled is None else settled.sources)
