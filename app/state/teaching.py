@@ -31,7 +31,6 @@ from tracker.sequences.built_in import EARLIER, earlier_key, key_of
 from tracker.sequences.errors import SequenceError
 from tracker.sequences.reader import FILE, given_folder
 from tracker.sequences.sequence import Sequence
-from tracker.sequences.writing import saving
 from tracker.sequences.writing.teaching import (
     Values,
     carried_over,
@@ -282,6 +281,8 @@ class Teaching:
         Raises:
             SequenceError: If it cannot be; nothing is lost then.
         """
+        from tracker.sequences.writing import saving  # with tomlkit
+
         with self._lock:
             sequence, saved = self.sequence(), self._workbench.snapshot().saved
             assert saved is not None
@@ -298,6 +299,8 @@ class Teaching:
         Raises:
             SequenceError: If it cannot be; nothing is lost then.
         """
+        from tracker.sequences.writing import saving  # with tomlkit
+
         with self._lock:
             sequence, saved = self.sequence(), self._workbench.snapshot().saved
             assert saved is not None
@@ -575,12 +578,14 @@ class Teaching:
 
     def why_not_in_place(self) -> str | None:
         """Why the sequence can only be saved as a copy; None where it can be saved."""
+        from tracker.sequences.writing import saving  # with tomlkit
+
         return saving.why_not_in_place(self.sequence().folder)
 
     def copies_in(self) -> Path:
         """Where a copy goes that is given a name alone: a folder that can be written."""
         folder = self.sequence().folder
-        beside = [] if saving.why_not_in_place(folder) else [folder.parent]
+        beside = [] if self.why_not_in_place() else [folder.parent]
         places = [*([self._data.absolute()] if self._data else []), *beside, Path.cwd()]
         return next((place for place in places if os.access(place, os.W_OK)), home())
 
