@@ -109,7 +109,7 @@ class PeopleNodes:
             selected: The track that is drawn stronger.
             layers: Which of boxes, ellipsoids and trails are on, and whether tracks other
                 than the selected one are.
-            palette: Of the theme.
+            palette: The colours of the theme.
             trail: How long trails are.
             names: What tracks were called by hand, by id.
         """

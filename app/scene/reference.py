@@ -39,7 +39,7 @@ class ReferenceNodes:
             sequence: Gives the truth and a person's size.
             tracks: Of the run; what it does not have at the step gets no line.
             step: 0-based; None draws nothing.
-            palette: Of the theme.
+            palette: The colours of the theme.
         """
         truth = sequence.ground_truth
         if truth is None or step is None:
@@ -116,8 +116,8 @@ class GhostNodes:
         Args:
             sequence: Gives the floor and a person's size.
             ghosts: Tracks as they would be, around the place.
-            step: That is shown, 0-based.
-            palette: Of the theme.
+            step: The step that is shown, from 0.
+            palette: The colours of the theme.
         """
         tracks = Trajectories.empty(len(sequence.views)) if ghosts is None else ghosts
         order = np.lexsort((tracks.frames, tracks.ids))

@@ -36,7 +36,7 @@ class StraightView:
     camera: Camera
     """The real one."""
     width: int
-    """Of the straight picture, pixels."""
+    """The size of the straight picture, pixels."""
 
     @cached_property
     def rotation(self) -> Float[ndarray, "3 3"]:
@@ -225,7 +225,7 @@ class RoomNodes:
 
         Args:
             room: Its volume and entrances.
-            palette: Of the theme.
+            palette: The colours of the theme.
             volume: Whether that layer is on.
             floor: Whether the grid is drawn, with the entrances on it.
         """
@@ -346,7 +346,7 @@ class FrustumNodes:
             cameras: Those of the sequence.
             room: Gives the measure of how large to draw them.
             through: The one that is looked through: its picture stands behind the room.
-            palette: Of the theme.
+            palette: The colours of the theme.
         """
         if cameras != self._cameras:
             self._cameras, self._views = cameras, {}

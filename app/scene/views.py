@@ -47,7 +47,7 @@ def overview(
     Args:
         points: What must be seen: corners of the volume, the cameras.
         eyes: The cameras' positions.
-        centre: Of the volume.
+        centre: The centre of the volume.
         aspect: Width over height of the picture.
         fov: Vertical field of view, radians.
         elevation: Angle above the floor, radians.
