@@ -32,6 +32,7 @@ import time
 import zipfile
 from collections import Counter
 from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from random import Random
@@ -449,27 +450,16 @@ def correct_until(server: Server, until: float) -> tuple[int, int]:
     return confirmed, refused
 
 
-def main() -> int:
-    """Run trials that the file does not have yet; 1 where something fell."""
-    parser = argparse.ArgumentParser(prog="python3 -m tests.bad_input.faults", description=__doc__)
-    parser.add_argument("file", type=Path, help="a line a trial; what it has is not run again")
-    parser.add_argument("--trials", type=int, default=900)
-    parser.add_argument("--seed", type=int, default=0)
-    arguments = parser.parse_args()
-    known = arguments.file.read_text().splitlines() if arguments.file.exists() else []
-    told = {one["trial"]: one for one in map(json.loads, known)}
+def run_trials(file: Path, seed: int, trials: list[int]) -> None:
+    """Run trials in a home of their own, and note each as a line of the file."""
     faults = FAULTS if can_mount() else FAULTS[:1]
-    if faults != FAULTS:
-        print("faults: no disk can be mounted here, so that commands are killed only", flush=True)
     with tempfile.TemporaryDirectory(prefix="multiview-phd-faults-") as name:
         folder = Path(name)
         base = folder / "base"
         make_home(base)
         usuals: dict[str, Usual] = {}
-        for trial in range(arguments.trials):
-            if trial in told:
-                continue
-            chance = Random(f"{arguments.seed} {trial}")
+        for trial in trials:
+            chance = Random(f"{seed} {trial}")
             fault = faults[trial % len(faults)]
             job = chance.choice([*jobs(), SERVED])
             place = folder / "trial"
@@ -488,13 +478,35 @@ def main() -> int:
                 print(f"FELL: trial {trial}, {job.name}, {fault}: {why}", flush=True)
             shutil.rmtree(place)
             row = {"trial": trial, "job": job.name, "fault": fault, "outcome": outcome, "why": why}
-            told[trial] = row
-            with arguments.file.open("a", encoding="utf-8") as file:
-                file.write(json.dumps(row) + "\n")
-    counts = Counter((one["fault"], one["outcome"]) for one in told.values())
+            with file.open("a", encoding="utf-8") as lines:
+                lines.write(json.dumps(row) + "\n")
+
+
+def main() -> int:
+    """Run trials that the file does not have yet; 1 where something fell."""
+    parser = argparse.ArgumentParser(prog="python3 -m tests.bad_input.faults", description=__doc__)
+    parser.add_argument("file", type=Path, help="a line a trial; what it has is not run again")
+    parser.add_argument("--trials", type=int, default=900)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--workers", type=int, default=1)
+    arguments = parser.parse_args()
+    if not can_mount():
+        print("faults: no disk can be mounted here, so that commands are killed only", flush=True)
+    arguments.file.touch()
+    known = {one["trial"] for one in map(json.loads, arguments.file.read_text().splitlines())}
+    left = [trial for trial in range(arguments.trials) if trial not in known]
+    with ProcessPoolExecutor(arguments.workers) as pool:
+        shares = [left[share :: arguments.workers] for share in range(arguments.workers)]
+        running = [
+            pool.submit(run_trials, arguments.file, arguments.seed, share) for share in shares
+        ]
+        for one in running:
+            one.result()
+    told = [json.loads(line) for line in arguments.file.read_text().splitlines()]
+    counts = Counter((one["fault"], one["outcome"]) for one in told)
     words = ", ".join(f"{fault}: {count} {how}" for (fault, how), count in sorted(counts.items()))
     print(f"faults: {len(told)} trials: {words}", flush=True)
-    return 1 if any(one["outcome"] == "fell" for one in told.values()) else 0
+    return 1 if any(one["outcome"] == "fell" for one in told) else 0
 
 
 if __name__ == "__main__":
