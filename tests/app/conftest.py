@@ -28,7 +28,7 @@ def wait_until(holds: Callable[[], bool], seconds: float = 120.0) -> None:
     deadline = time.monotonic() + seconds
     while not holds():
         assert time.monotonic() < deadline, "it did not come about in time"
-        time.sleep(0.01)
+        time.sleep(0.05)
 
 
 def run_is(client: TestClient, phase: str) -> Callable[[], bool]:

@@ -22,6 +22,12 @@ from tracker.library.store import Library
 P_D = "fusion.detection_probability"
 
 
+@pytest.fixture(autouse=True)
+def kept_soon(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nobody drags a slider here, which a run that is to be kept waits for."""
+    monkeypatch.setattr(keeper, "DRAG_SECONDS", 0.2)
+
+
 @pytest.fixture
 def path(tmp_path: Path) -> Path:
     return tmp_path / "library.sqlite3"
@@ -139,6 +145,21 @@ def test_a_run_that_was_deleted_and_is_made_again_is_kept_again(kept: TestClient
     assert len(runs_of(kept)) == 1
     command(kept, "reset_parameters", keys=[P_D])
     wait_until(lambda: [run["id"] for run in runs_of(kept)][:1] == [default["id"]])
+
+
+@pytest.mark.full
+def test_of_the_runs_that_a_dragged_slider_passes_none_is_kept(
+    data: Path, path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(keeper, "DRAG_SECONDS", 2.0)
+    with application(data, path) as client:
+        wait_until(lambda: len(runs_of(client)) == 1)
+        for value in (0.8, 0.85, 0.9):
+            command(client, "set_parameters", changes={P_D: value})
+            wait_until(run_is(client, "done"))
+        wait_until(lambda: len(runs_of(client)) == 2)
+        kept, _ = runs_of(client)
+    assert [(c["key"], c["value"]) for c in kept["changes"]] == [(P_D, "0.9")]
 
 
 @pytest.mark.full
