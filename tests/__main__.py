@@ -45,9 +45,9 @@ PASSED = ENVIRONMENT / "passed"
 
 CORES = min(4, os.cpu_count() or 1)
 WORKERS = CORES + 1
-"""Processes that run the short form's tests side by side, one more than there are cores, since
-many wait for what another process does; each takes up to a gigabyte. The full form's have a core
-each: a browser and its server keep one busy."""
+"""Processes that run tests side by side, one more than there are cores, since many wait for what
+another process does; each takes up to a gigabyte. Those of the browser's tests have a core each: a
+browser and its server keep one busy."""
 
 FOR_KERNELS = (
     "jaxtyping", "numba", "numpy", "opencv-python-headless", "platformdirs", "pydantic", "pyyaml",
@@ -60,7 +60,8 @@ WAITING = ("nice", "-n", "19") if shutil.which("nice") else ()
 that starts or ends, for a page, or for what must not happen for seconds."""
 
 SHORT = "not full and not long"
-FULL = "full"
+FULL = "full and not browser"
+BROWSER = "full and browser"
 
 
 @dataclass(frozen=True)
@@ -196,11 +197,15 @@ def code_checks() -> list[Check]:
 
 
 def test_runs(arguments: list[str]) -> dict[str, Check]:
-    """The tests: the short form, and what it leaves out."""
+    """The tests: the short form, and what it leaves out, without a browser and with one."""
     line = (PYTHON, "-m", "pytest", "--dist", "worksteal")
     return {
         name: Check(name, ((*line, "-n", str(workers), "-m", marked, *arguments),))
-        for name, workers, marked in (("tests", WORKERS, SHORT), ("full tests", CORES, FULL))
+        for name, workers, marked in (
+            ("tests", WORKERS, SHORT),
+            ("full tests", WORKERS, FULL),
+            ("browser tests", CORES, BROWSER),
+        )
     }
 
 
@@ -272,7 +277,7 @@ def main() -> int:
     parser.add_argument("pytest", nargs="*", help="arguments for pytest, after --")
     arguments = parser.parse_args()
     only: list[str] = arguments.only or []
-    tests, full_tests = test_runs(arguments.pytest).values()
+    tests, *longer_tests = test_runs(arguments.pytest).values()
 
     if arguments.fuzz is not None:
         install()
@@ -280,7 +285,9 @@ def main() -> int:
         failed = [] if longer.run(shown=True) else [longer.name]
     elif only:
         install()
-        everything = [*page, *code, kernels, tests, full_tests, benchmarks, mutants, fuzz, bounds]
+        everything = [
+            *page, *code, kernels, tests, *longer_tests, benchmarks, mutants, fuzz, bounds
+        ]  # fmt: skip
         failed = [c.name for c in everything if c.name in only and not c.run(shown=True)]
     else:
         failed = []
@@ -303,7 +310,7 @@ def main() -> int:
         if arguments.all:
             with ThreadPoolExecutor(1) as lane:
                 checking = lane.submit(in_order, [checked_kernels, mutants])
-                failed += [] if full_tests.run(shown=True) else [full_tests.name]
+                failed += [one.name for one in longer_tests if not one.run(shown=True)]
                 timed = lane.submit(in_order, [bounds, fuzz])
                 failed += [] if benchmarks.run(shown=True) else [benchmarks.name]
                 failed += checking.result() + timed.result()
