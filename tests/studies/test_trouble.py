@@ -53,6 +53,27 @@ def test_a_full_disk_is_told_and_gone_on_from(
     assert len(store.trials()) == 400
 
 
+@pytest.mark.parametrize("nth", [1, 2, 3])
+def test_a_disk_that_is_full_at_the_start_leaves_a_study_that_can_be_begun(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, nth: int
+) -> None:
+    store, insert, done = study(tmp_path, trials=2), Writer._insert, 0
+
+    def full(self: Writer, statement: str, *values: object) -> None:
+        nonlocal done
+        done += 1
+        if done == nth:
+            raise StudyError("there is no space left")
+        insert(self, statement, *values)
+
+    monkeypatch.setattr(Writer, "_insert", full)
+    with pytest.raises(StudyError, match="no space left"):
+        run(store, Serial(made_up(lambda values: 0.5)))
+    monkeypatch.setattr(Writer, "_insert", insert)
+    run(store, Serial(made_up(lambda values: 0.5)))
+    assert len(store.trials()) == 2
+
+
 def test_a_reader_finds_all_tables_or_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     store, looked = study(tmp_path), 0
     tables = studies_store._TABLES

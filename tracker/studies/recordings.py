@@ -161,9 +161,11 @@ def check_same(store: Store, writer: Writer, recordings: Recordings) -> None:
     """
     now, before = [one.to_json() for one in recordings.every], store.fact("recordings")
     if before is None:
-        writer.put_fact("recordings", now)
-        writer.put_fact("code", figures_version())
-        writer.put_fact("objectives", [asdict(one) for one in recordings.objectives])
+        writer.put_facts(
+            recordings=now,
+            code=figures_version(),
+            objectives=[asdict(one) for one in recordings.objectives],
+        )
         return
     for one, other in zip(before, now, strict=True):
         if one["content"] != other["content"]:

@@ -216,7 +216,7 @@ class _Session:
     def close(self) -> None:
         """Store the time that was spent, and end the thread that estimates the importance."""
         self._estimator.close()
-        self._writer.put_fact("spent", self._report.all_seconds)
+        self._writer.put_facts(spent=self._report.all_seconds)
 
     # the loop
 
@@ -307,7 +307,7 @@ class _Session:
         found = proposer.propose()
         if self._is_stopped():
             return False
-        self._writer.put_fact("tuned", found)
+        self._writer.put_facts(tuned=found)
         return True
 
     def _measure(self, jobs: Sequence[Job]) -> dict[str, Outcome]:
@@ -419,7 +419,7 @@ class _Session:
     def _write_status(self) -> None:
         """Write the status, and store the time that was spent."""
         self._report.write()
-        self._writer.put_fact("spent", self._report.all_seconds)
+        self._writer.put_facts(spent=self._report.all_seconds)
         self._last_status = time.monotonic()
 
     def _details(self) -> dict[str, Any]:
@@ -449,7 +449,7 @@ class _Session:
         """Store the importance of the parameters if there is a new estimate."""
         found = self._estimator.update(self._judge.complete, last=last)
         if found is not None:
-            self._writer.put_fact("importance", found)
+            self._writer.put_facts(importance=found)
 
 
 @dataclass(eq=False)

@@ -14,6 +14,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass, field, replace
+from itertools import chain
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
@@ -510,10 +511,11 @@ class Writer:
         statement = "INSERT OR REPLACE INTO trials VALUES (?, ?, ?, ?)"
         self._insert(statement, trial.number, trial.state, text, self._ended)
 
-    def put_fact(self, name: str, value: Any) -> None:
-        """Store a fact beside the trials, under a name (see :data:`STORED`)."""
-        text = json.dumps(value, ensure_ascii=False)
-        self._insert("INSERT OR REPLACE INTO told VALUES (?, ?)", name, text)
+    def put_facts(self, **facts: Any) -> None:
+        """Store facts beside the trials under their names (see :data:`STORED`), all or none."""
+        rows = ", ".join(["(?, ?)"] * len(facts))
+        texts = [(name, json.dumps(value, ensure_ascii=False)) for name, value in facts.items()]
+        self._insert(f"INSERT OR REPLACE INTO told VALUES {rows}", *chain.from_iterable(texts))
 
     def _insert(self, statement: str, *values: Any) -> None:
         with self._explained():
