@@ -56,7 +56,7 @@ TRACEBACK = "MULTIVIEW_PHD_TRACEBACK"
 def main(arguments: list[str] | None = None) -> int:
     """Run one command; returns the exit status."""
     if arguments is None and sys.argv[1:2] == ["serve"]:
-        return supervision.keep_up(lambda: main(sys.argv[1:]))
+        return supervision.supervise(lambda: main(sys.argv[1:]))
     return_large_arrays()
     try:
         status = run(parse(arguments))

@@ -55,12 +55,12 @@ def runs(command: Runs) -> int:
             case RenameRun():
                 run = library.find(action.run)
                 library.rename(run.id, action.name)
-                _tell(action, [library.run(run.id)])
+                _print_runs(action, [library.run(run.id)])
             case StarRun():
                 numbers = [library.find(text).id for text in action.runs]
                 for number in numbers:
                     library.star(number, not action.off)
-                _tell(action, [library.run(number) for number in numbers])
+                _print_runs(action, [library.run(number) for number in numbers])
             case DeleteRuns():
                 _delete(library, action)
             case DiffRuns():
@@ -150,10 +150,10 @@ def _list(library: Library, command: ListRuns) -> None:
         for run in library.runs()
         if wanted is None or wanted == run.recording_name or run.recording in places
     ]
-    _tell(command, found)
+    _print_runs(command, found)
 
 
-def _tell(command: OfLibrary, found: list[KeptRun]) -> None:
+def _print_runs(command: OfLibrary, found: list[KeptRun]) -> None:
     if command.json:
         print_json([run.to_json() for run in found])
         return
@@ -239,7 +239,7 @@ def _delete(library: Library, command: DeleteRuns) -> None:
             raise CommandError(f"--undo: expected the numbers of runs, got {unknown[0]!r}")
         numbers = [int(text) for text in command.runs]
         library.restore(numbers)
-        _tell(command, [library.run(number) for number in numbers])
+        _print_runs(command, [library.run(number) for number in numbers])
         return
     numbers = [library.find(text).id for text in command.runs]
     size = library.delete(numbers)

@@ -202,11 +202,11 @@ def run(store: Store, where: Where, *, as_json: bool = False, quiet: bool = Fals
     if as_json:
         print_json({"study": store.name, "state": status.state, "trials": len(store.trials())})
     elif not quiet:
-        _tell_end(store, status)
+        _print_end(store, status)
     return INTERRUPTED if status.state == "stopped" and stopped.is_set() else 0
 
 
-def _tell_end(store: Store, status: Status) -> None:
+def _print_end(store: Store, status: Status) -> None:
     words = f"; {status.words}" if status.words else ""
     if status.state == "stopped":
         words += "; `study resume` goes on"
@@ -416,16 +416,16 @@ def batch(command: Batch) -> int:
             lambda: crew(say), bar.at, stopped.is_set, corrected=not command.no_corrections,
         )  # fmt: skip
     if command.json:
-        print_json([_told(one) for one in found])
+        print_json([_to_json(one) for one in found])
     else:
-        _tell(places, found)
+        _print_batch(places, found)
     if stopped.is_set():
         say("stopped; what is there is kept: the same command goes on")
         return INTERRUPTED
     return FAILURE if any(one.run is None for one in found) else 0
 
 
-def _told(one: BatchRun) -> dict[str, object]:
+def _to_json(one: BatchRun) -> dict[str, object]:
     run = None if one.run is None else one.run.to_json()
     return {
         "recording": one.recording, "seed": one.seed, "computed": one.computed, "run": run,
@@ -433,7 +433,7 @@ def _told(one: BatchRun) -> dict[str, object]:
     }  # fmt: skip
 
 
-def _tell(places: Sequence[str], found: Sequence[BatchRun]) -> None:
+def _print_batch(places: Sequence[str], found: Sequence[BatchRun]) -> None:
     rows = []
     for place in places:
         runs = [one.run for one in found if one.recording == place and one.run is not None]

@@ -56,7 +56,7 @@ life: Life | None = None
 """Of this process, where another one waits for it."""
 
 
-def keep_up(serve: Callable[[], int]) -> int:
+def supervise(serve: Callable[[], int]) -> int:
     """Have something done in another process, and again where that crashes.
 
     Args:
@@ -105,7 +105,7 @@ class _Waiting:
             _, status = os.waitpid(self._process, 0)
             code = os.waitstatus_to_exitcode(status)
             ended, self._process = (self._process, -code), 0
-            port = _told_port(ours) or port
+            port = _reported_port(ours) or port
             ours.close()
             if code >= 0:
                 return code
@@ -154,7 +154,7 @@ class _Waiting:
         return 128 + number
 
 
-def _told_port(line: socket.socket) -> int | None:
+def _reported_port(line: socket.socket) -> int | None:
     line.setblocking(False)
     with suppress(OSError, ValueError):
         return int(line.recv(_PORT_LETTERS))

@@ -90,7 +90,7 @@ def track(command: Track) -> int:
             if one.id in unmet:
                 say(f"unmet: {one.words}: {unmet[one.id]}")
     if command.keep and not any(gap.unexpected for gap in gaps.gaps(run)):
-        _keep(command, run, began, seconds)
+        _store_run(command, run, began, seconds)
     incomplete = "".join(f"; {one}" for one in missing)
     methods = [name for key in METHODS if (name := str(written.settings[key])) != "none"]
     speed = sequence.frames / seconds
@@ -103,7 +103,7 @@ def track(command: Track) -> int:
     return FAILURE if command.strict and missing else 0
 
 
-def _keep(command: Track, run: Run, began: float, seconds: float) -> None:
+def _store_run(command: Track, run: Run, began: float, seconds: float) -> None:
     """Put a finished run into the library; where that cannot be used, say so and go on."""
     from tracker.evaluation import evaluate_sequence
     from tracker.library.errors import LibraryError

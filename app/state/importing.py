@@ -437,7 +437,7 @@ class Draft:
             if self._known.phase in _BEGUN:
                 return
             before = self._known.wish
-            self._tell(wish=wish)
+            self._publish(wish=wish)
             if not looks_alike(before, wish) and self._gathered:
                 self._look_again()
 
@@ -472,9 +472,9 @@ class Draft:
             self._stop.set()
             # else a wish would have it settled while files are on their way
             self._gathered = False
-            self._tell(phase="uploading", busy=False)
+            self._publish(phase="uploading", busy=False)
 
-    def _tell(self, **changes: object) -> None:
+    def _publish(self, **changes: object) -> None:
         with self._lock:
             version = self._known.version + 1
             self._known = replace(self._known, version=version, **changes)  # type: ignore[arg-type]
@@ -486,7 +486,7 @@ class Draft:
         self._stop.set()
         stop = self._stop = threading.Event()
         phase: Phase = "settled" if self._gathered and self._known.settled else "reading"
-        self._tell(phase=phase, busy=True, error="", undecided="", question=None, waiting="")
+        self._publish(phase=phase, busy=True, error="", undecided="", question=None, waiting="")
         threading.Thread(target=self._look, args=(stop,), name="importing", daemon=True).start()
 
     def _look(self, stop: threading.Event) -> None:
@@ -494,7 +494,7 @@ class Draft:
             with self._lock:
                 if stop.is_set():
                     raise Cancelled
-                self._tell(**changes)
+                self._publish(**changes)
 
         # the readers of all formats: a server starts without them
         from app.state.looking import look_into
@@ -531,7 +531,7 @@ class Draft:
                 logger.exception("looking into an import failed")
             with self._lock:
                 if not stop.is_set():
-                    self._tell(phase="failed", busy=False, error=sentence(error))
+                    self._publish(phase="failed", busy=False, error=sentence(error))
 
     def picture(self, camera: str) -> bytes | None:
         """The middle picture of a camera, by its name in the calibration, as JPEG."""
@@ -572,7 +572,7 @@ class Draft:
             self._check_unchanged()
             self._stop.set()
             began = time.monotonic()
-            self._tell(phase="writing", busy=False, error="", copied=0, copying_since=began)
+            self._publish(phase="writing", busy=False, error="", copied=0, copying_since=began)
         arguments = (known.taken, known.wish, place, then)
         threading.Thread(target=self._write, args=arguments, name="import", daemon=True).start()
 
@@ -615,15 +615,15 @@ class Draft:
             with self._lock:
                 # else it could not be tried again under another name
                 (self.folder / FILE).unlink(missing_ok=True)
-                self._tell(phase="settled", error=f"it cannot be written: {sentence(error)}")
+                self._publish(phase="settled", error=f"it cannot be written: {sentence(error)}")
                 if self._given_up:
                     shutil.rmtree(self.folder, ignore_errors=True)
             return
         if not wish.copy_files or self.uploaded or not links_in(place):
-            self._tell(phase="written", folder=place, told=tuple(told))
+            self._publish(phase="written", folder=place, told=tuple(told))
             then(place)
             return
-        self._tell(phase="copying", folder=place, told=tuple(told))
+        self._publish(phase="copying", folder=place, told=tuple(told))
         then(place)
         try:
             copy_links(place, self._copied)
@@ -631,12 +631,12 @@ class Draft:
             told.append("the copying was stopped: what is not copied is linked")
         except OSError as error:
             told.append(f"not all files are copied, the others are linked: {sentence(error)}")
-        self._tell(phase="written", told=tuple(told))
+        self._publish(phase="written", told=tuple(told))
 
     def _copied(self, more: int) -> None:
         if self._given_up:
             raise Cancelled
-        self._tell(copied=self._known.copied + more)
+        self._publish(copied=self._known.copied + more)
 
     def discard(self) -> None:
         """Give it up; what was uploaded for it is removed."""

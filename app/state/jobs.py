@@ -50,7 +50,7 @@ class Watchdog:
 
     def __init__(
         self,
-        told: Callable[[float], None],
+        on_silence: Callable[[float], None],
         *,
         after: float = SILENT_SECONDS,
         looks: float = _LOOKS_SECONDS,
@@ -58,11 +58,11 @@ class Watchdog:
         """Nothing runs before it is entered.
 
         Args:
-            told: Called with the seconds of silence, from a thread of its own, while it lasts.
+            on_silence: Called from a thread of its own with the seconds of silence, while it lasts.
             after: Seconds from which on it is called.
             looks: Seconds between two looks.
         """
-        self._told = told
+        self._on_silence = on_silence
         self._after = after
         self._looks = looks
         self._last = 0.0
@@ -85,7 +85,7 @@ class Watchdog:
         while not self._ended.wait(self._looks):
             silent = time.monotonic() - self._last
             if silent >= self._after:
-                self._told(silent)
+                self._on_silence(silent)
 
 
 logger = logging.getLogger("app")

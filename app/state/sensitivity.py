@@ -139,7 +139,7 @@ class Sensitivity:
             self._wanted = keys
             self._done, self._total = 0, sum(map(len, tried))
             self._condition.notify_all()
-        self._tell()
+        self._publish()
 
     @property
     def under_way(self) -> list[str]:
@@ -189,9 +189,9 @@ class Sensitivity:
                 return
             self._wanted = []
             self._cancelled.set()
-        self._tell()
+        self._publish()
 
-    def _tell(self) -> None:
+    def _publish(self) -> None:
         with self._condition:
             of = self._workbench.snapshot().sequence_key
             state = "computing" if self._wanted else "done"
@@ -206,7 +206,7 @@ class Sensitivity:
                 if self._closed:
                     return
                 key, cancelled = self._wanted[0], self._cancelled
-            self._tell()
+            self._publish()
             try:
                 self._compute(key, cancelled)
             except Cancelled:
@@ -218,7 +218,7 @@ class Sensitivity:
                     self._wanted = self._wanted[1:]
                 if not self._wanted:
                     self._last = None
-            self._tell()
+            self._publish()
 
     def _compute(self, key: str, cancelled: threading.Event) -> None:
         now = self._workbench.snapshot()
@@ -248,7 +248,7 @@ class Sensitivity:
                     tuple(known[value] for value in there),
                     whole=len(there) == len(values),
                 )
-            self._tell()
+            self._publish()
 
     def _score(
         self, now: Snapshot, parameters: RunParameters, cancelled: threading.Event

@@ -117,7 +117,7 @@ class Workbench:
             if any(getattr(now, name) != value for name, value in values.items()):
                 self._put(change, **values)
 
-    def _tell(self, event: Event) -> None:
+    def _notify(self, event: Event) -> None:
         with self._lock:
             listeners = list(self._listeners)
         for callback in listeners:
@@ -567,11 +567,11 @@ class Workbench:
 
     def command(self, name: str) -> None:
         """Relay a key that was pressed inside the 3D view to the pages."""
-        self._tell(Command(name))
+        self._notify(Command(name))
 
     def notify(self, level: Level, message: str, hint: str | None = None) -> None:
         """Say one sentence to everyone who looks."""
-        self._tell(Notice(level, message, hint))
+        self._notify(Notice(level, message, hint))
 
     def study_changed(self, told: Mapping[str, Any]) -> None:
         """Tell everyone who looks of a study, and whoever looks later of those that run."""
@@ -580,7 +580,7 @@ class Workbench:
             self._running = [one for one in self._running if one.told["name"] != told["name"]]
             if told["state"] == "running":
                 self._running.append(news)
-        self._tell(news)
+        self._notify(news)
 
     @property
     def running_studies(self) -> tuple[StudyNews, ...]:

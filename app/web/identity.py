@@ -63,7 +63,7 @@ Check = Annotated[IdentityCheck, of_app("identity_check")]
 @router.get("")
 def identity(check: Check, bench: Bench) -> IdentityInfo:
     """How far the check is, and what it found."""
-    return _told(check.now, bench)
+    return _info(check.now, bench)
 
 
 @router.post("")
@@ -73,7 +73,7 @@ def begin(check: Check, bench: Bench) -> IdentityInfo:
     try:
         if now.run is None:
             raise ValueError("no step is there")
-        return _told(check.start(now.run), bench)
+        return _info(check.start(now.run), bench)
     except ValueError as error:
         raise ApiError(
             409,
@@ -87,10 +87,10 @@ def begin(check: Check, bench: Bench) -> IdentityInfo:
 def stop(check: Check, bench: Bench) -> IdentityInfo:
     """Stop looking."""
     check.cancel()
-    return _told(check.now, bench)
+    return _info(check.now, bench)
 
 
-def _told(now: Checked, bench: Bench) -> IdentityInfo:
+def _info(now: Checked, bench: Bench) -> IdentityInfo:
     found, sequence = now.found, bench.snapshot().sequence
     names = [] if sequence is None else [camera.name for camera in sequence.cameras]
     low, high = (None, None) if found is None else found.interval

@@ -397,7 +397,7 @@ def info_of(draft: Draft) -> ImportInfo:
         free=shutil.disk_usage(draft.home).free,
         **_recording(settled),
         **_boxes(known),
-        told=_told(settled, looked),
+        told=_notes(settled, looked),
         place=folder_name(known.wish.name),
         open_turns=_open_turns(known),
         cameras=[] if settled is None else [_camera(view, known) for view in settled.views],
@@ -459,7 +459,7 @@ def _unfit(methods: Mapping[str, str]) -> dict[str, str]:
     return {name: on_page(why) for name, why in methods.items()}
 
 
-def _told(settled: ImportPlan | None, looked: Looked | None) -> list[str]:
+def _notes(settled: ImportPlan | None, looked: Looked | None) -> list[str]:
     """What is said besides the checks: what one of these says as well stands there alone."""
     if settled is None:
         return []

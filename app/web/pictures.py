@@ -133,7 +133,7 @@ class Pictures:
             loop = asyncio.get_running_loop()
             job = loop.run_in_executor(self._pool, _encode, reader, camera, step, width)
             self._under_way[key] = job
-            job.add_done_callback(lambda done: self._keep(key, done))
+            job.add_done_callback(lambda done: self._cache(key, done))
         # a page that gives up must not cancel what another one waits for
         jpeg = await asyncio.shield(self._under_way[key])
         if jpeg is None:
@@ -157,7 +157,7 @@ class Pictures:
     def _checked(self, sequence_key: str, camera: int, step: int) -> tuple[Sequence, FrameReader]:
         return checked(self._workbench.snapshot(), sequence_key, camera, step, _missing)
 
-    def _keep(self, key: Key, job: asyncio.Future[bytes | None]) -> None:
+    def _cache(self, key: Key, job: asyncio.Future[bytes | None]) -> None:
         self._under_way.pop(key, None)
         if job.cancelled() or job.exception() is not None:
             return

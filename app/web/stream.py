@@ -121,7 +121,7 @@ FromPage = TypeAdapter[StreamSeek | StreamSelect | StreamMotion | StreamPing](
 
 
 class _Page:
-    """What one page has not been told yet."""
+    """What has not been sent to one page yet."""
 
     def __init__(self) -> None:
         self.news: set[Change] = {"sequence", "playhead", "tasks"}
@@ -129,12 +129,12 @@ class _Page:
         self.messages: list[str] = []
         self.wake = asyncio.Event()
         self.wake.set()
-        self.told_step: tuple[Any, ...] = ()
-        self.told_timeline: tuple[str, str, int, int] = ("", "", 0, 0)
-        self.told_evaluation: Scored | None = None
+        self.sent_step: tuple[Any, ...] = ()
+        self.sent_timeline: tuple[str, str, int, int] = ("", "", 0, 0)
+        self.sent_evaluation: Scored | None = None
         self.due: set[str] = set()
         """Kinds of message that are held back for a moment."""
-        self.told_at = dict.fromkeys(SECONDS_BETWEEN, 0.0)
+        self.sent_at = dict.fromkeys(SECONDS_BETWEEN, 0.0)
         self.timer: asyncio.TimerHandle | None = None
 
 
@@ -214,7 +214,7 @@ class Stream:
                 self._before = None
         page.messages += [_study(news) for news in self._workbench.running_studies]
         self._pages.add(page)
-        sender = asyncio.create_task(self._tell(socket, page))
+        sender = asyncio.create_task(self._send(socket, page))
         try:
             while (message := await socket.receive())["type"] == "websocket.receive":
                 self._hear(page, message.get("text"))
@@ -259,7 +259,7 @@ class Stream:
         """
         self._workbench.set_flies(all(page.flies for page in self._pages))
 
-    async def _tell(self, socket: WebSocket, page: _Page) -> None:
+    async def _send(self, socket: WebSocket, page: _Page) -> None:
         while True:
             await page.wake.wait()
             page.wake.clear()
@@ -270,48 +270,48 @@ class Stream:
             snapshot = self._workbench.snapshot()
             if "playhead" in news:  # first: the page then asks for the picture at once
                 origin = snapshot.playhead_origin
-                told = {"type": "playhead", "step": snapshot.playhead, "origin": origin}
-                await socket.send_text(json.dumps(told))
+                message = {"type": "playhead", "step": snapshot.playhead, "origin": origin}
+                await socket.send_text(json.dumps(message))
             if news - {"playhead", "progress", "evaluation", "tasks"}:
                 await socket.send_text(self._state_text(snapshot))
-            await self._tell_step(socket, page, snapshot)
-            await self._tell_evaluation(socket, page, snapshot)
-            await self._tell_progress(socket, page, news, snapshot)
+            await self._send_step(socket, page, snapshot)
+            await self._send_evaluation(socket, page, snapshot)
+            await self._send_progress(socket, page, news, snapshot)
 
-    async def _tell_step(self, socket: WebSocket, page: _Page, snapshot: Snapshot) -> None:
+    async def _send_step(self, socket: WebSocket, page: _Page, snapshot: Snapshot) -> None:
         sequence, run, step = snapshot.sequence, snapshot.run, snapshot.playhead
         if sequence is None:
             return
         computed = snapshot.step_is_computed
         shown = (run.key, run.revision) if run is not None else ("", 0)
         key = (snapshot.sequence_key, *shown, step, computed)
-        if key == page.told_step:
+        if key == page.sent_step:
             return
         text = self._steps.get(key)
         if text is None:
             message = steps.step_of(sequence, run, step)
             text = _with_type("step", message)
-            told = (message.computed, message.revision)
-            if told == (computed, shown[1]):  # else it was computed this very moment
+            sent = (message.computed, message.revision)
+            if sent == (computed, shown[1]):  # else it was computed this very moment
                 self._steps[key] = text
                 while len(self._steps) > KEPT_STEPS:
                     self._steps.popitem(last=False)
-        page.told_step = key
+        page.sent_step = key
         await socket.send_text(text)
 
-    async def _tell_evaluation(self, socket: WebSocket, page: _Page, snapshot: Snapshot) -> None:
+    async def _send_evaluation(self, socket: WebSocket, page: _Page, snapshot: Snapshot) -> None:
         scored = snapshot.scores.shown
-        if scored is not None and scored is not page.told_evaluation:
-            told = {
+        if scored is not None and scored is not page.sent_evaluation:
+            message = {
                 "type": "evaluation",
                 "run": scored.key,
                 "steps": scored.steps,
                 "partial": not scored.final,
             }
-            await socket.send_text(json.dumps(told))
-        page.told_evaluation = scored
+            await socket.send_text(json.dumps(message))
+        page.sent_evaluation = scored
 
-    async def _tell_progress(
+    async def _send_progress(
         self, socket: WebSocket, page: _Page, news: set[Change], snapshot: Snapshot
     ) -> None:
         assert self._loop is not None
@@ -319,28 +319,28 @@ class Stream:
             page.due |= {"progress", "timeline"}
         if news & {"run", "sequence"}:
             page.due = {"timeline", *page.due} - {"progress"}  # how far the run is, the state said
-            page.told_at["timeline"] = 0.0
+            page.sent_at["timeline"] = 0.0
         if "tasks" in news:
             page.due.add("tasks")
         shown = _shown(snapshot)
-        if shown == page.told_timeline:
+        if shown == page.sent_timeline:
             page.due.discard("timeline")
         now = self._loop.time()
         for kind in sorted(page.due):
-            if now - page.told_at[kind] >= SECONDS_BETWEEN[kind]:
-                page.told_at[kind] = now
+            if now - page.sent_at[kind] >= SECONDS_BETWEEN[kind]:
+                page.sent_at[kind] = now
                 page.due.discard(kind)
-                told: dict[str, Any]
+                message: dict[str, Any]
                 if kind == "timeline":
-                    page.told_timeline = shown
-                    told = {"run": shown[1], "done": shown[2], "revision": shown[3]}
+                    page.sent_timeline = shown
+                    message = {"run": shown[1], "done": shown[2], "revision": shown[3]}
                 elif kind == "tasks":
-                    told = {"tasks": results.tasks_of(snapshot)}
+                    message = {"tasks": results.tasks_of(snapshot)}
                 else:
-                    told = {"run": results.run_of(snapshot).model_dump(mode="json")}
-                await socket.send_text(json.dumps({"type": kind, **told}))
+                    message = {"run": results.run_of(snapshot).model_dump(mode="json")}
+                await socket.send_text(json.dumps({"type": kind, **message}))
         if page.due and page.timer is None:
-            when = min(page.told_at[kind] + SECONDS_BETWEEN[kind] for kind in page.due)
+            when = min(page.sent_at[kind] + SECONDS_BETWEEN[kind] for kind in page.due)
             page.timer = self._loop.call_at(when, _remind, page)
 
     def _state_text(self, snapshot: Snapshot) -> str:
@@ -355,10 +355,10 @@ def _study(news: StudyNews) -> str:
 
 
 def _notice(notice: Notice) -> str:
-    told = {"type": "notice", **asdict(notice)}
+    message = {"type": "notice", **asdict(notice)}
     if notice.report is None:
-        del told["report"]
-    return json.dumps(told)
+        del message["report"]
+    return json.dumps(message)
 
 
 def _remind(page: _Page) -> None:

@@ -169,7 +169,7 @@ class Names:
         self._sums: dict[int, np.ndarray] = {}
         self._done = 0
 
-    def told(self, run: Run) -> dict[int, str]:
+    def by_track(self, run: Run) -> dict[int, str]:
         """The name of each track that has one, as far as the run is computed.
 
         The mean over the boxes that fed a track of the probability that their colours are those
@@ -335,7 +335,7 @@ class _Spans:
 def names_of(run: Run) -> dict[int, str]:
     """The names of a finished run's tracks, by id: what somebody said goes before what the colours
     say."""
-    return {**Names().told(run), **given_names(run)}
+    return {**Names().by_track(run), **given_names(run)}
 
 
 class Timelines:
@@ -409,7 +409,7 @@ class Timelines:
             events = sorted([*events, *found], key=lambda e: e[:2])[:MOST_EVENTS]
             # what somebody said goes before what the colours say
             said = given_names(run)
-            names = {**self._names.told(run), **run.stored_names, **said}
+            names = {**self._names.by_track(run), **run.stored_names, **said}
             for life in lives:
                 life.name = names.get(life.id)
         return Timeline(

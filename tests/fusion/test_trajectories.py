@@ -124,7 +124,7 @@ def test_pieces_give_the_same_as_the_whole(results: list[FusionResult], cuts: li
         extract(results[first:last], first_frame=first, ids=ids)
         for first, last in itertools.pairwise(edges)
     ]
-    assert_same(trajectories.concatenate(parts, CAMERAS), whole)
+    assert_same(Trajectories.concatenate(parts), whole)
 
 
 @given(runs())
@@ -232,7 +232,7 @@ def test_what_grows_is_what_was_there_and_what_came(parts: list[list[FusionResul
     growing = trajectories.GrowingTrajectories(pieces[0])
     seen = [(pieces[0], pieces[0])]
     for number, piece in enumerate(pieces[1:], 2):
-        whole = trajectories.concatenate(pieces[:number], CAMERAS)
+        whole = Trajectories.concatenate([Trajectories.empty(CAMERAS), *pieces[:number]])
         seen.append((growing.append(piece), whole))
     for found, expected in seen:
         assert_same(found, expected)

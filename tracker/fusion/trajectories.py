@@ -21,6 +21,7 @@ from tracker.fusion.protocol import FusionResult
 from tracker.kernels import linear_algebra
 from tracker.kernels import mixtures as mixture_kernels
 from tracker.sequences.sequence import Room
+from tracker.steps.table import Table
 
 Rule = Literal["components", "boxes"]
 """Unit of extraction: a component, or all components that one box updated."""
@@ -30,7 +31,7 @@ _AT_ONCE = 1024
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Trajectories:
+class Trajectories(Table):
     """Tracks as N rows, one for each target at each step, sorted by step and then id."""
 
     frames: Int[ndarray, " N"]
@@ -64,10 +65,6 @@ class Trajectories:
         """The rows of one step."""
         first, last = np.searchsorted(self.frames, [frame, frame + 1])
         return slice(int(first), int(last))
-
-    def take(self, rows: ndarray) -> Trajectories:
-        """Select some of the rows, by mask or ascending index."""
-        return Trajectories(*(getattr(self, name)[rows] for name in type(self).__slots__))
 
     @staticmethod
     def empty(cameras: int) -> Trajectories:
@@ -136,7 +133,9 @@ def extract(
             _extract_part(some, cameras, extraction_threshold, rule, bounds, first_frame, ids)
         )
         first_frame += len(some)
-    return parts[0] if len(parts) == 1 else concatenate(parts, cameras)
+    if len(parts) == 1:
+        return parts[0]
+    return Trajectories.concatenate([Trajectories.empty(cameras), *parts])
 
 
 def _extract_part(
@@ -273,14 +272,3 @@ def _with_capacity(rows: ndarray, least: int) -> ndarray:
     found = np.empty((max(1024, least + least // 2), *rows.shape[1:]), rows.dtype)
     found[: len(rows)] = rows
     return found
-
-
-def concatenate(parts: Iterable[Trajectories], cameras: int) -> Trajectories:
-    """Concatenate parts of one run, given in the order of their steps."""
-    all_parts = [Trajectories.empty(cameras), *parts]
-    return Trajectories(
-        *(
-            np.concatenate([getattr(part, name) for part in all_parts])
-            for name in Trajectories.__slots__
-        )
-    )

@@ -23,6 +23,7 @@ from tracker.sequences.pictures.frames import Pictures
 from tracker.sequences.sequence import Sequence, Template
 from tracker.single_view.colour.templates import read_templates, template_picture
 from tracker.single_view.pictures import colour
+from tracker.steps.table import Table
 
 STEPS = 200
 """Largest number of steps that are considered; they are spread over the recording, since
@@ -67,7 +68,7 @@ _NUMBERS = ColourPhdParams()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Moments:
+class Moments(Table):
     """M moments at which a camera shows a person well: the place is known, the box is whole and
     not covered."""
 
@@ -93,10 +94,6 @@ class Moments:
         agreeing = np.zeros((0, cameras), dtype=bool)
         own = np.zeros(0, dtype=bool)
         return Moments(whole, whole, whole, np.zeros((0, 4)), own, agreeing, real)
-
-    def take(self, rows: ndarray) -> Moments:
-        """Select moments by mask or index."""
-        return Moments(*(getattr(self, name)[rows] for name in type(self).__slots__))
 
     def __len__(self) -> int:
         return len(self.tracks)
@@ -169,8 +166,7 @@ def best_moments(run: Run) -> Moments:
         )  # fmt: skip
     if not found:
         return Moments.none(len(sequence.views))
-    together = [np.concatenate([getattr(one, name) for one in found]) for name in Moments.__slots__]
-    return _best(Moments(*together), sequence.fps)
+    return _best(Moments.concatenate(found), sequence.fps)
 
 
 def _considered(run: Run) -> Trajectories:

@@ -15,6 +15,7 @@ from tracker.fusion.target_model import TargetModel
 from tracker.kernels.kalman import Measurements
 from tracker.single_view.protocol import ViewResult
 from tracker.steps import Steps
+from tracker.steps.table import Table
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -112,7 +113,7 @@ class Paths:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Links:
+class Links(Table):
     """L pairs of a row of a path and a box, with their association probabilities."""
 
     cameras: Int[ndarray, " L"]
@@ -125,22 +126,10 @@ class Links:
     """Association probability, 0 … 1."""
 
     @staticmethod
-    def concatenate(parts: Many[Links]) -> Links:
-        """Concatenate the pairs of several cameras."""
+    def none() -> Links:
+        """Make an empty set of pairs."""
         nothing = np.zeros(0, dtype=np.int64)
-        every = [Links(nothing, nothing, nothing, np.zeros(0)), *parts]
-        return Links(
-            np.concatenate([one.cameras for one in every]),
-            np.concatenate([one.rows for one in every]),
-            np.concatenate([one.boxes for one in every]),
-            np.concatenate([one.shares for one in every]),
-        )
-
-    def take(self, chosen: ndarray | slice) -> Links:
-        """Select some of the pairs, by mask or index."""
-        return Links(
-            self.cameras[chosen], self.rows[chosen], self.boxes[chosen], self.shares[chosen]
-        )
+        return Links(nothing, nothing, nothing, np.zeros(0))
 
 
 def contested_shares(paths: Paths, links: Links) -> Float[ndarray, " N"]:

@@ -448,7 +448,7 @@ class Smoother:
         learnt = learnt or self.uncalibrated(paths)
         shape = len(self.cameras), len(order)
         found = BoxAssociations(
-            Links.concatenate([]),
+            Links.none(),
             np.zeros(shape),
             np.ones(shape),
             np.full(shape, -1, dtype=np.int64),
@@ -468,7 +468,7 @@ class Smoother:
                 boxes = own.links.boxes + self.cameras[c].starts[first]
                 of_links = np.full(len(boxes), c, dtype=np.int64)
                 parts.append(Links(of_links, rows[own.links.rows], boxes, own.links.shares))
-            return Links.concatenate(parts)
+            return Links.concatenate([Links.none(), *parts])
 
         return replace(found, links=Links.concatenate(self._each_camera(of_camera)))
 

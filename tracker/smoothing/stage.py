@@ -263,7 +263,7 @@ class _Refinement:
 
     def _take_links(self) -> Links:
         """The links, which are forgotten here."""
-        found, self.links = self.links, Links.concatenate([])
+        found, self.links = self.links, Links.none()
         return found
 
     def _fit(self, turns: int) -> Fitted:
@@ -461,7 +461,8 @@ def read_links(fused: Steps[FusionResult], paths: Paths, cameras: Many[CameraBox
         cameras: The boxes of each camera.
     """
     parts = range(0, len(fused), _AT_ONCE)
-    return Links.concatenate([_links_of(fused, first, paths, cameras) for first in parts])
+    found = [_links_of(fused, first, paths, cameras) for first in parts]
+    return Links.concatenate([Links.none(), *found])
 
 
 def _links_of(
@@ -475,7 +476,7 @@ def _links_of(
     )
     labels = fused.column("posterior.labels", first=begin, last=end)
     if not len(of_pair.values) or not len(paths.labels):
-        return Links.concatenate([])
+        return Links.none()
     within = of_pair.steps
     named = labels.values[labels.starts[within] + components.values]
     order = np.argsort(paths.labels, kind="stable")

@@ -120,7 +120,7 @@ def serve():
 
 # whatever the tests are run by, as nohup, which has it ignored
 signal.signal(getattr(signal, sys.argv[3]), signal.SIG_DFL)
-sys.exit(supervision.keep_up(serve))
+sys.exit(supervision.supervise(serve))
 """
 
 
@@ -154,5 +154,5 @@ def test_an_end_on_purpose_is_one(tmp_path: Path, name: str) -> None:
 
 
 def test_a_function_that_ends_gives_its_status() -> None:
-    line = "import sys; from app.command import supervision as s; sys.exit(s.keep_up(lambda: 7))"
+    line = "import sys; from app.command import supervision as s; sys.exit(s.supervise(lambda: 7))"
     assert subprocess.run([sys.executable, "-c", line], check=False).returncode == 7

@@ -10,13 +10,14 @@ from numpy import ndarray
 
 from tracker.geometry.camera import Camera
 from tracker.geometry.consistency.standing import ends, sides
+from tracker.steps.table import Table
 
 EDGE = 2.0
 """Distance from the image's edge within which a box may be clipped there, pixels."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Rays:
+class Rays(Table):
     """D boxes of one camera as rays to head and foot of the person."""
 
     frames: Int[ndarray, " D"]
@@ -39,10 +40,6 @@ class Rays:
         """The angle between head and foot, radians."""
         chord = np.linalg.norm(self.heads - self.feet, axis=1)
         return np.asarray(2.0 * np.arcsin(np.minimum(chord / 2.0, 1.0)))
-
-    def take(self, rows: ndarray) -> Rays:
-        """Select some of the boxes, by index or mask."""
-        return Rays(self.frames[rows], self.heads[rows], self.feet[rows], self.whole[rows])
 
 
 @dataclass(frozen=True, slots=True, eq=False)

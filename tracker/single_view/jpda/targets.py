@@ -15,8 +15,7 @@ data association", patent CN101783020A, 2010.
 
 from __future__ import annotations
 
-from collections.abc import Sequence as Many
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -26,13 +25,14 @@ from tracker.filters.gaussian_mixture import GaussianMixture
 from tracker.geometry.assignment import linear_sum_assignment
 from tracker.parameters.groups.jpda import JpdaParams
 from tracker.single_view.jpda.measurements import Measured
+from tracker.steps.table import Table
 
 X, Y = 0, 2
 """Indices of the position in the state."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Targets:
+class Targets(Table):
     """n targets: state [p_x, v_x, p_y, v_y] in pixels and pixels per second, and a box."""
 
     means: Float[ndarray, "n 4"]
@@ -102,10 +102,6 @@ class Targets:
         """Covariance of each position, squared pixels."""
         return self.covariances[:, [[X], [Y]], [[X, Y]]]
 
-    def take(self, indices: ndarray) -> Targets:
-        """Select some of the targets, by index or mask."""
-        return Targets(**{f.name: getattr(self, f.name)[indices] for f in fields(self)})
-
     def predict(self, step_time: float, acceleration_sigma: float) -> Targets:
         """Predict one step at constant velocity with white acceleration.
 
@@ -141,13 +137,6 @@ class Targets:
         covariances[:, :2, :2] = self.place_covariances
         covariances[:, [2, 3], [2, 3]] = sigmas[:, 2:] ** 2
         return GaussianMixture(np.ones(self.size), self.boxes, covariances, self.labels)
-
-
-def concatenate(parts: Many[Targets]) -> Targets:
-    """Concatenate targets."""
-    return Targets(
-        **{f.name: np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(Targets)}
-    )
 
 
 def scale_of(half_sizes: Float[ndarray, "n 2"]) -> Float[ndarray, " n"]:
@@ -296,7 +285,7 @@ def manage(
         p.velocity_sigma,
         np.zeros(len(fresh), dtype=np.int64),
     )
-    after = concatenate([kept, returned, newcomers])
+    after = Targets.concatenate([kept, returned, newcomers])
     counting = np.flatnonzero((after.labels == 0) & (after.hits >= p.confirmation_steps))
     labels = after.labels.copy()
     labels[counting] = next_label + np.arange(len(counting))
@@ -305,7 +294,7 @@ def manage(
     lost = replace(lost, misses=np.full(lost.size, p.vanish_steps))
     return Managed(
         targets=replace(after, labels=labels),
-        vanished=concatenate([still, lost]),
+        vanished=Targets.concatenate([still, lost]),
         next_label=next_label + len(counting),
         stayed=np.flatnonzero(~gone),
         sources=np.concatenate([where, fresh]),

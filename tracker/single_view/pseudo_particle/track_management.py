@@ -10,20 +10,21 @@ elsewhere would be new.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from numpy import ndarray
 
 from tracker.single_view.protocol import ViewEvent
+from tracker.steps.table import Table
 
 UNCONFIRMED = 0
 """Label of a target that has not been detected often enough."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Targets:
+class Targets(Table):
     """T targets in one camera, by columns."""
 
     labels: Int[ndarray, " T"]
@@ -55,19 +56,6 @@ class Targets:
         """Whether each target is confirmed."""
         return np.asarray(self.labels != UNCONFIRMED)
 
-    def take(self, chosen: ndarray) -> Targets:
-        """Select some of the targets, by index or mask."""
-        return Targets(*(column[chosen] for column in self._columns))
-
-    def joined(self, other: Targets) -> Targets:
-        """Append other targets."""
-        pairs = zip(self._columns, other._columns, strict=True)
-        return Targets(*(np.concatenate(pair) for pair in pairs))
-
-    @property
-    def _columns(self) -> tuple[ndarray, ...]:
-        return tuple(getattr(self, column.name) for column in fields(self))
-
     def moved(self, velocity_share: float) -> Targets:
         """Predict the targets one step.
 
@@ -80,7 +68,7 @@ class Targets:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Departed:
+class Departed(Table):
     """V targets that vanished and may return."""
 
     labels: Int[ndarray, " V"]
@@ -95,10 +83,6 @@ class Departed:
         """Make an empty set of vanished targets."""
         none = np.zeros(0, dtype=np.int64)
         return Departed(none, none, none)
-
-    def take(self, chosen: ndarray) -> Departed:
-        """Select some of the targets."""
-        return Departed(self.labels[chosen], self.persons[chosen], self.ages[chosen])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -165,17 +149,16 @@ def manage(
         patience,
         velocity_memory,
     )
-    targets = updated.joined(
-        Targets(
-            labels=np.full(len(persons), UNCONFIRMED),
-            persons=persons,
-            boxes=modes[newcomers],
-            velocities=np.zeros((len(persons), 2)),
-            hits=np.ones(len(persons), dtype=np.int64),
-            misses=np.zeros(len(persons), dtype=np.int64),
-            existences=existences[newcomers],
-        )
+    new = Targets(
+        labels=np.full(len(persons), UNCONFIRMED),
+        persons=persons,
+        boxes=modes[newcomers],
+        velocities=np.zeros((len(persons), 2)),
+        hits=np.ones(len(persons), dtype=np.int64),
+        misses=np.zeros(len(persons), dtype=np.int64),
+        existences=existences[newcomers],
     )
+    targets = Targets.concatenate([updated, new])
     lost = targets.misses > np.where(targets.confirmed, patience, newcomer_misses - 1)
     gone = targets.take(lost & targets.confirmed)
     targets = targets.take(~lost)

@@ -27,6 +27,7 @@ from tracker.sequences.sequence import Room, Sequence
 from tracker.single_view.box_sizes import box_sigmas, geometry_key, upright_boxes
 from tracker.single_view.pictures.foreground import learn_background
 from tracker.single_view.shape.channels import Channels, ChannelState
+from tracker.steps.table import Table
 
 FILE = Path(__file__).parent / "trees.npz"
 
@@ -101,7 +102,7 @@ _INSIDE = 0.35
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Windows:
+class Windows(Table):
     """N windows of an image in which a person may be."""
 
     edges: Float[ndarray, "N 4"]
@@ -114,10 +115,6 @@ class Windows:
         """Pixels per metre, across and down."""
         spans = self.edges[:, 2:] - self.edges[:, :2]
         return np.asarray(spans / [WIDTH, ABOVE + BELOW])
-
-    def take(self, indices: ndarray) -> Windows:
-        """Select some of the windows, by index."""
-        return Windows(self.edges[indices], self.boxes[indices])
 
     @staticmethod
     def at(

@@ -24,6 +24,7 @@ from tracker.single_view.protocol import ViewResult
 from tracker.smoothing.paths import CameraBoxes, Links, Paths
 from tracker.smoothing.smoother import Smoother
 from tracker.steps import Steps
+from tracker.steps.table import Table
 
 _WINDOW = 4.0
 """Duration of the parts of tracklets from which the model is learnt, seconds: whole tracklets are
@@ -52,7 +53,7 @@ _MOST = 6.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Means:
+class Means(Table):
     """The mean embeddings of n tracklets in D dimensions, and the number of boxes of each."""
 
     values: Float[ndarray, "n D"]
@@ -65,10 +66,6 @@ class Means:
         """Variance of each mean in units of that of one box; 1 without a box."""
         counts = np.where(self.counts > 0.0, self.counts, 1.0)
         return np.asarray((1.0 + _CORRELATION * (counts - 1.0)) / counts)
-
-    def take(self, chosen: ndarray) -> Means:
-        """Select the means of some tracklets, by mask or index."""
-        return Means(self.values[chosen], self.counts[chosen])
 
 
 class AppearanceModel:

@@ -288,7 +288,7 @@ def _link(
         [tracklet for number in numbers for tracklet in first[number]]
         for numbers in link_tracklets(of_firsts, on_chains)
     ]
-    pairs = pairs.with_more(long_gap_pairs.of_ends(first))
+    pairs = Pairs.concatenate([pairs, long_gap_pairs.of_ends(first)])
     labels = _labels(tracklets, chains)
     decisions = split_decisions(tracklets, before, source_rows, plain.reasons, chains, labels)
     decisions += join_decisions(

@@ -15,6 +15,7 @@ from numpy import ndarray
 from tracker.filters.models import Motion
 from tracker.smoothing.paths import Paths, same_label
 from tracker.smoothing.smoother import Fitted
+from tracker.steps.table import Table
 
 PRIOR_LEFT = 1e-9
 """Share of the prior's information that is not subtracted from that of the estimates, so that
@@ -119,7 +120,7 @@ class Ends:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Pairs:
+class Pairs(Table):
     """P pairs of tracklets that may be linked, the first before the second."""
 
     earlier: Int[ndarray, " P"]
@@ -131,26 +132,11 @@ class Pairs:
     gains: Float[ndarray, " P"]
     """Log odds of the second continuing the first against being a new target."""
 
-    def take(self, chosen: ndarray) -> Pairs:
-        """Select some of the pairs, by mask or index."""
-        return Pairs(
-            self.earlier[chosen], self.later[chosen], self.gaps[chosen], self.gains[chosen]
-        )
-
     def of_ends(self, chains: Many[Many[int]]) -> Pairs:
         """Convert pairs of chains to pairs of one's last tracklet and the other's first."""
         first = np.array([chain[0] for chain in chains], dtype=np.int64)
         last = np.array([chain[-1] for chain in chains], dtype=np.int64)
         return Pairs(last[self.earlier], first[self.later], self.gaps, self.gains)
-
-    def with_more(self, more: Pairs) -> Pairs:
-        """Append other pairs."""
-        return Pairs(
-            np.concatenate([self.earlier, more.earlier]),
-            np.concatenate([self.later, more.later]),
-            np.concatenate([self.gaps, more.gaps]),
-            np.concatenate([self.gains, more.gains]),
-        )
 
 
 def near_pairs(tracklets: Paths, *, longest: int, fastest: float) -> Pairs:

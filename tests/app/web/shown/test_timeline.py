@@ -178,7 +178,7 @@ def test_names_are_those_of_the_run_while_its_templates_are_renamed() -> None:
     run.tracks = replace(run.tracks, ids=run.tracks.ids + 100)
     assert {track.name for track in timelines.of(renamed, run, window).tracks} == {"Cleo"}
     assert timelines.of(renamed, run, window) == Timelines().of(renamed, run, window)
-    assert set(timelines._names.told(run)) == set(run.tracks.ids.tolist())
+    assert set(timelines._names.by_track(run)) == set(run.tracks.ids.tolist())
 
 
 @pytest.mark.full
